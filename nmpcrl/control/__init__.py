@@ -1,0 +1,17 @@
+"""What the controller is: a plant, a task, and the NMPC that solves it. The only home of CasADi."""
+
+from nmpcrl.control.nmpc import Nmpc, Solution, SolverError
+from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
+from nmpcrl.control.task import Obstacle, Task
+
+__all__ = [
+    "Nmpc",
+    "Obstacle",
+    "Plant",
+    "Solution",
+    "SolverError",
+    "Task",
+    "differential_drive",
+    "rk4",
+    "unicycle",
+]

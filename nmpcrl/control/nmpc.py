@@ -1,0 +1,129 @@
+"""The controller: Eq. (2) solved in a state, with the value's gradient in theta.
+
+`Nmpc.solve(state, theta)` is the value V_theta(s), the paper's Q_theta(s, a) of Eq. (3);
+`Nmpc.solve(state, theta, action=a)` fixes u_0 = a and is the action value proper.
+"""
+
+import time
+from functools import cached_property
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control.ocp import transcribe
+from nmpcrl.control.plant import Plant
+from nmpcrl.control.program import SOLVERS, Program
+from nmpcrl.control.solution import Solution, SolverError, short
+from nmpcrl.control.task import Task
+
+ABSURD = 1e6  # no state or theta beyond this reaches a solver: fatrop never returns from some
+
+__all__ = ["ABSURD", "Nmpc", "Solution", "SolverError"]
+
+
+class Nmpc:
+    """Eq. (2) for one plant and one task, as a function of the state and of theta."""
+
+    def __init__(
+        self,
+        plant: Plant,
+        task: Task,
+        horizon: int = 10,
+        gamma: float = 0.97,
+        slack_weight: float = 100.0,
+        solver: str = "fatrop",
+    ) -> None:
+        """Check and keep the problem; it is transcribed at the first solve.
+
+        Args:
+            plant: predicts; the robot of Eq. (18) in the paper.
+            task: target, box and obstacles.
+            horizon: N, the number of planned inputs.
+            gamma: discount factor, 0 < gamma <= 1.
+            slack_weight: omega, the cost of a unit of each slack.
+            solver: "fatrop" or "ipopt".
+        """
+        if isinstance(horizon, bool) or not isinstance(horizon, int | np.integer) or horizon < 1:
+            raise ValueError(f"horizon = {horizon!r} must be a whole number, 1 or more")
+        if not 0 < gamma <= 1:
+            raise ValueError(f"gamma = {gamma} must lie in (0, 1]")
+        if not 0 < slack_weight < np.inf:
+            raise ValueError(f"slack_weight = {slack_weight} must be a positive number")
+        if solver not in SOLVERS:
+            raise ValueError(f"solver = {solver!r} must be one of {', '.join(SOLVERS)}")
+        if task.start.size != plant.n:
+            raise ValueError(f"the task has {task.start.size} states and the plant {plant.n}")
+        self.plant = plant
+        self.task = task
+        self.horizon = int(horizon)
+        self.gamma = float(gamma)
+        self.slack_weight = float(slack_weight)
+        self.solver = solver
+
+    def solve(
+        self,
+        state: Vector,
+        theta: Vector,
+        guess: Solution | None = None,
+        action: Vector | None = None,
+    ) -> Solution:
+        """Solve Eq. (2) from `state`: V_theta(s), or Q_theta(s, a) with u_0 = `action`.
+
+        Args:
+            state: plant state, shape (n,); (x [m], y [m], heading [rad]) for the robot.
+            theta: NMPC parameters, shape (2n + m + 1,).
+            guess: an earlier solution to start from: as it is if it was solved in this state,
+                shifted by one stage if in another. Standing still at `state` if absent.
+            action: the first input, shape (m,), within the plant's bounds; free if absent.
+
+        Raises:
+            ValueError: an argument has the wrong shape, is not finite, or is absurdly large.
+            SolverError: no optimum was found; carries the status, the state and theta.
+        """
+        began = time.perf_counter()
+        state = _checked("state", state, self.plant.n)
+        theta = _checked("theta", theta, 2 * self.plant.n + self.plant.m + 1)
+        if action is None:
+            return self._free.solve(state, theta, guess, began=began)
+        action = _checked("action", action, self.plant.m)
+        if (action < self.plant.lower).any() or (action > self.plant.upper).any():
+            bounds = f"{short(self.plant.lower)} and {short(self.plant.upper)}"
+            raise ValueError(f"action {short(action)} must lie between {bounds}")
+        return self._fixed.solve(state, theta, guess, action, began=began)
+
+    def value_hessian(self, solution: Solution) -> Matrix:
+        """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
+        return self._program(solution).value_hessian(solution)
+
+    def kkt_residual(self, solution: Solution) -> float:
+        """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`."""
+        return self._program(solution).kkt_residual(solution)
+
+    def _program(self, solution: Solution) -> Program:
+        return self._fixed if solution.ocp.fixed_action.size else self._free
+
+    @cached_property
+    def _free(self) -> Program:
+        return self._transcribed(fix_action=False)
+
+    @cached_property
+    def _fixed(self) -> Program:
+        return self._transcribed(fix_action=True)
+
+    def _transcribed(self, *, fix_action: bool) -> Program:
+        problem = (self.plant, self.task, self.horizon, self.gamma, self.slack_weight)
+        return Program(transcribe(*problem, fix_action=fix_action), self.task, self.solver)
+
+
+def _checked(name: str, vector: Vector, size: int) -> Vector:
+    try:
+        vector = np.array(vector, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {vector!r} must hold {size} numbers") from None
+    if vector.shape != (size,):
+        raise ValueError(f"{name} has shape {vector.shape}; it must be ({size},)")
+    if not (np.abs(vector) <= ABSURD).all():  # also false for nan
+        raise ValueError(
+            f"{name} {short(vector)} must hold finite numbers of size at most {ABSURD:g}"
+        )
+    return vector

@@ -1,0 +1,168 @@
+"""The optimal control problem, Eq. (2), in symbols: `transcribe` turns a task into an NLP.
+
+The decision variables are ordered by stage, z = (x_0, u_0, sigma_0, ..., x_N, sigma_N), and so are
+the constraints. That order is the block structure which a structure-exploiting solver needs.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from nmpcrl import Vector
+from nmpcrl.control.plant import Plant
+from nmpcrl.control.task import Task, overlap
+
+Indices = NDArray[np.int_]
+
+
+class Theta(NamedTuple):
+    """The blocks of theta, in the paper's order: (stage, inputs, terminal, constraint)."""
+
+    stage: Any  # vartheta_x, square roots of the state weights, shape (n,)
+    inputs: Any  # vartheta_u, square roots of the input weights, shape (m,)
+    terminal: Any  # vartheta_f, square roots of the terminal weights, shape (n,)
+    constraint: Any  # theta_c, tightens the obstacle constraint, shape (1,)
+
+    @classmethod
+    def split(cls, theta: Any, n: int, m: int) -> "Theta":
+        """Cut a vector of 2n + m + 1 numbers or symbols into its blocks."""
+        return cls(theta[:n], theta[n : n + m], theta[n + m : 2 * n + m], theta[2 * n + m :])
+
+
+def stage_cost(state: ca.SX, action: ca.SX, theta: Theta, target: Vector) -> ca.SX:
+    """L(s, u, theta) of the paper: ||s - s_ref||^2 and ||u||^2, weighted by theta squared."""
+    return ca.sumsqr(theta.stage * (state - target)) + ca.sumsqr(theta.inputs * action)
+
+
+def terminal_cost(state: ca.SX, theta: Theta, target: Vector) -> ca.SX:
+    """Gamma(s, theta) of the paper: ||s - s_ref||^2, weighted by theta squared."""
+    return ca.sumsqr(theta.terminal * (state - target))
+
+
+@dataclass(frozen=True, eq=False)
+class Ocp:
+    """Eq. (2) as an NLP: min f(z; p) subject to lower <= z <= upper and Eqs. (2b), (2c), (2f).
+
+    The constraints g(z; p) are equalities where `equality` is true, and g <= 0 elsewhere.
+    The parameter is p = (s, theta), or p = (s, theta, a) when the first input is fixed.
+    The index arrays say where in z and in g each part of the problem lies.
+    """
+
+    variables: ca.SX  # z
+    parameters: ca.SX  # p
+    theta: ca.SX  # the part of p that is learned
+    objective: ca.SX  # Eq. (2a)
+    constraints: ca.SX  # g
+    equality: NDArray[np.bool_]
+    lower: Vector
+    upper: Vector
+    states: Indices  # x_i in z, shape (N + 1, n)
+    inputs: Indices  # u_i in z, shape (N, m)
+    slacks: Indices  # sigma_i in z, shape (N + 1, M)
+    initial: Indices  # Eq. (2b) in g, shape (n,)
+    fixed_action: Indices  # u_0 = a in g, shape (m,), or (0,) when u_0 is free
+    dynamics: Indices  # Eq. (2c) in g, shape (N, n)
+    obstacles: Indices  # Eq. (2f) in g, shape (N + 1, M)
+    gamma: float
+    slack_weight: float
+
+
+def transcribe(
+    plant: Plant, task: Task, horizon: int, gamma: float, slack_weight: float, *, fix_action: bool
+) -> Ocp:
+    """Write Eq. (2) by multiple shooting; with `fix_action`, add u_0 = a as a constraint.
+
+    The box holds for the predicted states x_1, ..., x_N only: x_0 is given, and noise may have
+    pushed it out.  # departure M
+    Eq. (2f) of stage 0 is written in s rather than in x_0, its equal, so that the multipliers of
+    the slacks that no plan can change stay out of the others.
+    A fixed u_0 has no bounds of its own, or a = 0.6 m/s would leave the problem without interior.
+    """
+    n, m, count = plant.n, plant.m, len(task.obstacles)
+    x = [ca.SX.sym(f"x_{i}", n) for i in range(horizon + 1)]
+    u = [ca.SX.sym(f"u_{i}", m) for i in range(horizon)]
+    sigma = [ca.SX.sym(f"sigma_{i}", count) for i in range(horizon + 1)]
+    state, action = ca.SX.sym("s", n), ca.SX.sym("a", m if fix_action else 0)
+    theta = ca.SX.sym("theta", 2 * n + m + 1)
+    weights = Theta.split(theta, n, m)
+
+    variables, constraints = _Stack(), _Stack()
+    objective = ca.SX(0)
+    for i in range(horizon + 1):
+        last = i == horizon
+        box = (task.lower, task.upper) if i > 0 else (-np.inf, np.inf)
+        variables.add("states", x[i], *box)
+        if not last:
+            free = fix_action and i == 0
+            bounds = (-np.inf, np.inf) if free else (plant.lower, plant.upper)
+            variables.add("inputs", u[i], *bounds)
+            constraints.add(
+                "dynamics", x[i + 1] - plant.transition(x[i], u[i]), 0, 0
+            )  # departure O
+            objective += gamma**i * stage_cost(x[i], u[i], weights, task.target)
+        else:
+            objective += gamma**i * terminal_cost(x[i], weights, task.target)
+        variables.add("slacks", sigma[i], 0, np.inf)
+        objective += gamma**i * slack_weight * ca.sum1(sigma[i])
+        if i == 0:
+            constraints.add("initial", x[0] - state, 0, 0)
+            constraints.add("fixed_action", (u[0] - action) if fix_action else ca.SX(0, 1), 0, 0)
+        where = state if i == 0 else x[i]
+        xi = [overlap(where[0], where[1], *disc) for disc in zip(*task.discs, strict=True)]
+        tightened = ca.vertcat(ca.SX(0, 1), *xi) + weights.constraint
+        constraints.add("obstacles", tightened - sigma[i], -np.inf, 0)
+
+    return Ocp(
+        variables=variables.expression,
+        parameters=ca.vertcat(state, theta, action),
+        theta=theta,
+        objective=objective,
+        constraints=constraints.expression,
+        equality=constraints.lower == constraints.upper,
+        lower=variables.lower,
+        upper=variables.upper,
+        states=variables.where("states"),
+        inputs=variables.where("inputs"),
+        slacks=variables.where("slacks"),
+        initial=constraints.where("initial")[0],
+        fixed_action=constraints.where("fixed_action")[0],
+        dynamics=constraints.where("dynamics"),
+        obstacles=constraints.where("obstacles"),
+        gamma=gamma,
+        slack_weight=slack_weight,
+    )
+
+
+class _Stack:
+    """Expressions put on top of each other, with their bounds and where each kind ended up."""
+
+    def __init__(self) -> None:
+        self._parts: list[ca.SX] = []
+        self._bounds: list[tuple[Vector, Vector]] = []
+        self._rows: dict[str, list[Indices]] = {}
+        self._size = 0
+
+    def add(self, kind: str, part: ca.SX, lower: Any, upper: Any) -> None:
+        size = part.numel()
+        self._parts.append(part)
+        self._bounds.append((np.broadcast_to(lower, size), np.broadcast_to(upper, size)))
+        self._rows.setdefault(kind, []).append(np.arange(self._size, self._size + size))
+        self._size += size
+
+    def where(self, kind: str) -> Indices:
+        return np.array(self._rows[kind], dtype=int)
+
+    @property
+    def expression(self) -> ca.SX:
+        return ca.vertcat(*self._parts)
+
+    @property
+    def lower(self) -> Vector:
+        return np.concatenate([lower for lower, _ in self._bounds]).astype(float)
+
+    @property
+    def upper(self) -> Vector:
+        return np.concatenate([upper for _, upper in self._bounds]).astype(float)

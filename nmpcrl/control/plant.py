@@ -1,0 +1,91 @@
+"""The plant: continuous dynamics, discretised by Runge-Kutta 4, with bounds on its inputs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from nmpcrl import Vector
+
+Dynamics = Callable[[ca.SX, ca.SX], ca.SX]
+
+
+def unicycle(state: ca.SX, action: ca.SX) -> ca.SX:
+    """Time derivative of (x, y, heading) under (speed, turn rate): Eq. (17)."""
+    heading, speed, turn_rate = state[2], action[0], action[1]
+    return ca.vertcat(speed * ca.cos(heading), speed * ca.sin(heading), turn_rate)
+
+
+def rk4(dynamics: Dynamics, state: ca.SX, action: ca.SX, period: float) -> ca.SX:
+    """One Runge-Kutta 4 step of length `period` [s] with the action held: Eq. (18)."""
+    k1 = dynamics(state, action)
+    k2 = dynamics(state + period / 2 * k1, action)
+    k3 = dynamics(state + period / 2 * k2, action)
+    k4 = dynamics(state + period * k3, action)
+    return state + period / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """A plant that is sampled every `period` seconds; the first two states are its position."""
+
+    dynamics: Dynamics  # d state / dt as a CasADi expression of (state, action)
+    state_names: tuple[str, ...]  # with units, as an axis shows them: ("x [m]", ...)
+    action_names: tuple[str, ...]  # with units
+    lower: Vector  # smallest action, shape (m,)
+    upper: Vector  # largest action, shape (m,)
+    period: float = 0.2  # [s]
+
+    def __post_init__(self) -> None:
+        for side in ("lower", "upper"):
+            bound = np.asarray(getattr(self, side), float)
+            if bound.shape != (self.m,) or np.isnan(bound).any():
+                raise ValueError(f"plant.{side} = {bound} must hold {self.m} numbers, one an input")
+            object.__setattr__(self, side, bound)
+        if self.n < 2:
+            raise ValueError(
+                f"a plant's first two states are its position; {self.n} state is too few"
+            )
+        if not (self.lower < self.upper).all():
+            raise ValueError(f"plant.lower = {self.lower} must lie below upper = {self.upper}")
+        if not 0 < self.period < np.inf:
+            raise ValueError(f"plant.period = {self.period} must be a positive number of seconds")
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return len(self.state_names)
+
+    @property
+    def m(self) -> int:
+        """Number of inputs."""
+        return len(self.action_names)
+
+    @cached_property
+    def transition(self) -> ca.Function:
+        """The discrete dynamics f(state, action) of Eq. (18), as a CasADi function."""
+        state, action = ca.SX.sym("state", self.n), ca.SX.sym("action", self.m)
+        return ca.Function("f", [state, action], [rk4(self.dynamics, state, action, self.period)])
+
+    def step(self, state: Vector, action: Vector) -> Vector:
+        """The state one period later, shape (n,): Eq. (18)."""
+        return self.transition(state, action).full().ravel()
+
+    def clip(self, action: Vector) -> Vector:
+        """The nearest action within the bounds, shape (m,)."""
+        return np.clip(action, self.lower, self.upper)
+
+
+def differential_drive(period: float = 0.2) -> Plant:
+    """The paper's robot: `unicycle` with |speed| <= 0.6 m/s and |turn rate| <= pi/2 rad/s."""
+    bound = np.array([0.6, np.pi / 2])
+    return Plant(
+        dynamics=unicycle,
+        state_names=("x [m]", "y [m]", "heading [rad]"),
+        action_names=("speed [m/s]", "turn rate [rad/s]"),
+        lower=-bound,
+        upper=bound,
+        period=period,
+    )

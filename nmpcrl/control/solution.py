@@ -1,0 +1,96 @@
+"""What a solve gives back: an optimum, or an error that says where there was none."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control.ocp import Ocp
+
+
+class SolverError(RuntimeError):
+    """No optimum was found; carries the solver's status, the state and theta."""
+
+    def __init__(self, status: str, state: Vector, theta: Vector) -> None:
+        super().__init__(f"{status}, in state {short(state)} with theta {short(theta)}")
+        self.status = status
+        self.state = state
+        self.theta = theta
+
+    def __reduce__(self) -> tuple[type, tuple[str, Vector, Vector]]:
+        return type(self), (self.status, self.state, self.theta)
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """The multipliers of Eq. (2), with CasADi's signs."""
+
+    initial: Vector  # of (2b), shape (n,)
+    dynamics: Matrix  # of (2c), shape (N, n)
+    states: Matrix  # of the box (2d), shape (N + 1, n); negative at a lower bound
+    inputs: Matrix  # of the input bounds (2e), shape (N, m); negative at a lower bound
+    obstacles: Matrix  # of (2f), shape (N + 1, M); between 0 and omega gamma^i
+    slacks: Matrix  # of sigma >= 0, shape (N + 1, M); never positive
+    action: Vector  # of u_0 = a, shape (m,); shape (0,) when u_0 is free
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """An optimum of Eq. (2) for one state and one theta."""
+
+    state: Vector  # s, shape (n,)
+    theta: Vector  # shape (2n + m + 1,)
+    value: float  # V_theta(s), or Q_theta(s, a) when u_0 was fixed
+    features: Vector  # phi, the value's gradient in theta, shape (2n + m + 1,)
+    iterations: int  # of the solver
+    seconds: float  # wall time of the solve and the gradient [s]
+    status: str  # "solved"
+    primal: Vector  # z, in the order of `ocp`
+    constraint_duals: Vector  # multipliers lam of the constraints, in the order of `ocp`
+    bound_duals: Vector  # multipliers nu of the bounds on z
+    ocp: Ocp  # says where each part lies
+
+    @cached_property
+    def states(self) -> Matrix:
+        """Predicted x_0, ..., x_N, shape (N + 1, n)."""
+        return self.primal[self.ocp.states]
+
+    @cached_property
+    def inputs(self) -> Matrix:
+        """Planned u_0, ..., u_{N-1}, shape (N, m)."""
+        return self.primal[self.ocp.inputs]
+
+    @cached_property
+    def slacks(self) -> Matrix:
+        """sigma_0, ..., sigma_N, one column an obstacle, shape (N + 1, M)."""
+        return self.primal[self.ocp.slacks]
+
+    @property
+    def action(self) -> Vector:
+        """u_0, shape (m,): the policy of Eq. (4), or the action that was fixed."""
+        return self.inputs[0]
+
+    @property
+    def next_action(self) -> Vector:
+        """u_1, shape (m,): what the plan does next; u_0 when the horizon is 1."""
+        return self.inputs[min(1, len(self.inputs) - 1)]
+
+    @cached_property
+    def multipliers(self) -> Multipliers:
+        """The multipliers, sorted by constraint."""
+        ocp, lam, nu = self.ocp, self.constraint_duals, self.bound_duals
+        return Multipliers(
+            initial=lam[ocp.initial],
+            dynamics=lam[ocp.dynamics],
+            states=nu[ocp.states],
+            inputs=nu[ocp.inputs],
+            obstacles=lam[ocp.obstacles],
+            slacks=nu[ocp.slacks],
+            action=lam[ocp.fixed_action],
+        )
+
+
+def short(vector: Vector) -> str:
+    """A vector as a message shows it, on one line with four digits."""
+    return np.array2string(np.asarray(vector), precision=4, max_line_width=1000)

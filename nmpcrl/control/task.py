@@ -1,0 +1,102 @@
+"""The task: where to go, what to avoid, and the cost that reinforcement learning minimises."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from nmpcrl import Vector
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A disc that the robot keeps away from."""
+
+    x: float  # centre [m]
+    y: float  # centre [m]
+    diameter: float = 2.0  # d_obs [m]
+
+    def __post_init__(self) -> None:
+        if not np.isfinite([self.x, self.y]).all():
+            raise ValueError(f"obstacle centre ({self.x}, {self.y}) must be finite")
+        if not 0 < self.diameter < np.inf:
+            raise ValueError(f"obstacle diameter {self.diameter} must be a positive length")
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Drive from `start` to `target` within a box and around the obstacles."""
+
+    start: Vector  # s_0, shape (n,)
+    target: Vector  # s_ref, shape (n,); the reference input is 0
+    lower: Vector  # box on the state, shape (n,); -inf where free
+    upper: Vector  # shape (n,)
+    obstacles: tuple[Obstacle, ...]
+    weights: Vector = field(default_factory=lambda: np.array([1.0, 1.0, 0.1]))  # diagonal of Q
+    robot_diameter: float = 0.5  # d_rob [m]
+    near: float = 1.5  # d_t: closer than this the input is charged instead of the obstacles
+    margin: float = 0.35  # d_o: the penalty begins this much before Xi = 0  # departure N
+    penalty: float = 50.0  # c of Upsilon
+    target_may_lie_outside: bool = False  # only to show what the paper's printed box does
+
+    def __post_init__(self) -> None:
+        for name in ("start", "target", "lower", "upper", "weights"):
+            vector = np.asarray(getattr(self, name), float)
+            if vector.shape != np.shape(self.start) or np.isnan(vector).any():
+                raise ValueError(
+                    f"task.{name} = {vector} must hold {np.size(self.start)} numbers, as start does"
+                )
+            object.__setattr__(self, name, vector)
+        for name in ("robot_diameter", "near", "margin", "penalty"):
+            if not 0 <= getattr(self, name) < np.inf:
+                raise ValueError(f"task.{name} = {getattr(self, name)} must be 0 or more")
+        if not (self.lower < self.upper).all():
+            raise ValueError(f"task.lower = {self.lower} must lie below upper = {self.upper}")
+        self._refuse_outside("start")
+        if not self.target_may_lie_outside:
+            self._refuse_outside("target")
+        object.__setattr__(self, "obstacles", tuple(self.obstacles))
+
+    def _refuse_outside(self, name: str) -> None:
+        point = getattr(self, name)
+        if not np.isfinite(point).all():
+            raise ValueError(f"task.{name} = {point} must be finite")
+        for i in np.flatnonzero((point < self.lower) | (point > self.upper)):
+            box = f"[{self.lower[i]:g}, {self.upper[i]:g}]"
+            raise ValueError(f"{name} {np.round(point, 2)} is outside the box {box} in state {i}")
+
+    def overlap(self, state: Any) -> Any:
+        """Xi of Eq. (19), one value an obstacle: positive inside, 1 at the centre.
+
+        Takes a state of shape (n,) and returns shape (M,), or states (..., n) and (..., M).
+        """
+        state = np.asarray(state)[..., None]
+        return overlap(state[..., 0, :], state[..., 1, :], *self.discs)
+
+    @property
+    def discs(self) -> tuple[Vector, Vector, Vector]:
+        """Centres x and y, and d_rob + d_obs, of the obstacles; shape (M,) each."""
+        x, y, d = (
+            np.array([getattr(o, k) for o in self.obstacles]) for k in ("x", "y", "diameter")
+        )
+        return x, y, d + self.robot_diameter
+
+    def distance(self, state: Vector) -> float:
+        """Euclidean distance to the target over all states, ||s - s_ref||_2."""
+        return float(np.linalg.norm(state - self.target))
+
+    def collision_penalty(self, state: Vector) -> float:
+        """Upsilon of Eq. (20): c times how far each obstacle's margin is entered."""
+        return float(self.penalty * np.maximum(0, self.overlap(state) + self.margin).sum())
+
+    def stage_cost(self, state: Vector, action: Vector) -> float:
+        """The RL stage cost l(s, a), Eq. (20)."""
+        tracking = float(self.weights @ (state - self.target) ** 2)
+        if self.distance(state) < self.near:
+            return tracking + float(np.linalg.norm(action))
+        return tracking + self.collision_penalty(state)
+
+
+def overlap(x: Any, y: Any, centre_x: Any, centre_y: Any, clearance: Any) -> Any:
+    """Xi of Eq. (19) for numbers, arrays and CasADi expressions alike; dimensionless."""
+    return 1 - 4 * ((x - centre_x) ** 2 + (y - centre_y) ** 2) / clearance**2

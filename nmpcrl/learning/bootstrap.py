@@ -1,0 +1,100 @@
+"""Where the value of the next state comes from: a second solve, or a network that imitates one."""
+
+import time
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.control import Solution
+from nmpcrl.learning.network import QNetwork
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """One step of the plant, and the NMPC's solution that led to it."""
+
+    state: Vector  # s, shape (n,)
+    action: Vector  # a, the action applied, noise included, shape (m,)
+    cost: float  # l(s, a)
+    next_state: Vector  # s+, shape (n,)
+    solution: Solution  # of the NMPC in s: its value is Q_theta(s, a)  # departure F
+
+
+@dataclass(frozen=True, eq=False)
+class Successor:
+    """What is known of the next state."""
+
+    value: float  # Q(s+, a+)
+    features: Vector | None = None  # phi+, shape (d,); None from a network
+    solution: Solution | None = None  # of the second solve, a guess for the next first one
+    loss: float = np.nan  # of the network's fit in this step
+    seconds: float = 0.0  # spent on fit and prediction [s]; a solve keeps its own time
+
+
+class Controller(Protocol):
+    """All that learning asks of control: `nmpcrl.control.Nmpc`, or anything that acts like it."""
+
+    @property
+    def gamma(self) -> float:
+        """The discount factor of the value."""
+
+    def solve(
+        self,
+        state: Vector,
+        theta: Vector,
+        guess: Solution | None = None,
+        action: Vector | None = None,
+    ) -> Solution:
+        """See `nmpcrl.control.Nmpc.solve`."""
+
+
+class Bootstrap(Protocol):
+    """Anything that values the next state of a transition."""
+
+    def __call__(self, transition: Transition, theta: Vector) -> Successor | None:
+        """Value `transition.next_state` under `theta`; None if there is nothing to go by yet."""
+
+
+@dataclass(frozen=True)
+class SecondSolve:
+    """Solve the NMPC again in the next state: ES and GES."""
+
+    nmpc: Controller
+
+    def __call__(self, transition: Transition, theta: Vector) -> Successor:
+        """Start from the first solution, shifted by a stage.
+
+        Raises:
+            SolverError: no optimum was found.
+        """
+        solution = self.nmpc.solve(transition.next_state, theta, transition.solution)
+        return Successor(solution.value, solution.features, solution)
+
+
+@dataclass(frozen=True)
+class Imitation:
+    """Let a network learn the NMPC's value and ask it: DES, and RDES if it is told theta."""
+
+    network: QNetwork
+    with_theta: bool
+    gated: bool = True  # wait for the first fit; Algorithm 1 read literally does not  # departure G
+
+    def __call__(self, transition: Transition, theta: Vector) -> Successor | None:
+        """Remember (s, a[, theta]) -> Q, fit, and predict Q(s+, a+) with a+ = u_1 of the plan."""
+        began = time.perf_counter()
+        solution = transition.solution
+        self.network.remember(
+            self.inputs(transition.state, transition.action, solution.theta), solution.value
+        )
+        if self.gated and not self.network.ready:
+            return None
+        loss = self.network.fit() if self.network.ready else np.nan
+        inputs = self.inputs(transition.next_state, solution.next_action, theta)
+        value = float(self.network.predict(inputs))
+        return Successor(value, loss=loss, seconds=time.perf_counter() - began)
+
+    def inputs(self, state: Vector, action: Vector, theta: Vector) -> Vector:
+        """What the network sees: (s, a, theta) for RDES, (s, a) for DES.  # departure I"""
+        return np.concatenate([state, action, theta] if self.with_theta else [state, action])

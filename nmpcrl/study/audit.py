@@ -1,0 +1,68 @@
+"""What the convergence theorem of nonlinear TDC assumes, beside what is run: claim C8."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nmpcrl.study import metrics, paper
+from nmpcrl.study.curvature import Curvature
+from nmpcrl.study.store import Study
+
+
+@dataclass(frozen=True, eq=False)
+class Assumption:
+    """One assumption of the theorem behind C8, beside what is run."""
+
+    theorem: str  # what Maei et al. (2009) assume
+    here: str  # what the paper does, with a measurement where one is possible
+    holds: bool
+
+
+def audit(study: Study, curvature: Curvature) -> tuple[Assumption, ...]:
+    """The assumptions of the convergence theorem of nonlinear TDC, beside what is run."""
+    ges = study.select(learner="GES")
+    experiment = next(iter(ges))
+    task = paper.task(experiment.layout)
+    kinks = float(np.mean([metrics.boundary_share(r, task) for r in ges.values()]))
+    memory = float(np.median([metrics.memory(r) for r in ges.values()]))
+    dropped = float(np.median(curvature.ratio))
+    return (
+        Assumption(
+            "a finite MDP",
+            "states and actions are continuous",
+            holds=False,
+        ),
+        Assumption(
+            "transitions drawn independently from one distribution",
+            "one trajectory of a policy that changes; consecutive TD errors have a correlation of"
+            f" {memory:.2f}",
+            holds=False,
+        ),
+        Assumption(
+            "Q is three times differentiable in theta",
+            f"the value has a kink wherever an active set changes; {kinks:.1%} of the steps start"
+            " exactly on one",
+            holds=kinks == 0,
+        ),
+        Assumption(
+            "step sizes that decay, their squares summable",
+            f"constant, alpha = {experiment.alpha:g} and beta = {experiment.beta:g}",
+            holds=False,
+        ),
+        Assumption(
+            "w moves faster than theta, alpha / beta to 0",
+            f"alpha / beta = {experiment.alpha / experiment.beta:g}",
+            holds=experiment.alpha < experiment.beta,
+        ),
+        Assumption(
+            "theta is projected onto a compact set",
+            "there is no projection",
+            holds=False,
+        ),
+        Assumption(
+            "the update follows the gradient of the MSPBE",
+            "Eq. (16) drops the curvature term, whose size beside the printed direction is"
+            f" {dropped:.1e} in the median",
+            holds=dropped == 0,
+        ),
+    )

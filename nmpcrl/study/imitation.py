@@ -1,0 +1,66 @@
+"""Does the network need theta? Two networks, the same examples, and episodes that neither saw."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.learning import QNetwork
+from nmpcrl.study import paper
+from nmpcrl.study.records import Records
+
+HELD_OUT = 5  # every fifth episode is kept from the networks
+FITS = 4000  # mini-batches that each network is given
+
+
+@dataclass(frozen=True, eq=False)
+class Imitation:
+    """What two networks make of the held-out steps of one run."""
+
+    episode: Vector  # of each held-out step
+    value: Vector  # V_theta(s), what they should say
+    without_theta: Vector  # prediction from (s, a), as in DES
+    with_theta: Vector  # prediction from (s, a, theta), as in RDES
+
+    def error(self, which: str) -> float:
+        """Root mean square error of `with_theta` or `without_theta`, in units of cost."""
+        return float(np.sqrt(np.mean((getattr(self, which) - self.value) ** 2)))
+
+    @property
+    def ratio(self) -> float:
+        """Error with theta over error without: below 1, theta helps."""
+        return self.error("with_theta") / self.error("without_theta")
+
+
+def imitate(records: Records, *, fits: int = FITS, seed: int = 0) -> Imitation:
+    """Fit the networks of DES and RDES to the same run, and let both predict held-out episodes.
+
+    Args:
+        records: a run whose theta moved; every `HELD_OUT`-th episode is held out.
+        fits: mini-batches a network is given.
+        seed: of weights and batches, the same for both networks.
+    """
+    steps = records.steps
+    whole = np.isfinite(steps["value"])
+    state_action = np.hstack([steps["state"], steps["action"]])[whole]
+    before = np.vstack([records.experiment["theta"], steps["theta"][:-1]])[whole]
+    value, episode = steps["value"][whole], steps["episode"][whole]
+    held_out = episode % HELD_OUT == HELD_OUT - 1
+    if not held_out.any():
+        held_out = episode == episode.max()  # fewer than five episodes: the last one
+
+    def predict(inputs: Vector) -> Vector:
+        rng = np.random.default_rng(seed)
+        network = QNetwork(inputs.shape[1], rng, learning_rate=paper.ZETA, batch=paper.BATCH)
+        for example, target in zip(inputs[~held_out], value[~held_out], strict=True):
+            network.remember(example, target)
+        for _ in range(fits):
+            network.fit()
+        return network.predict(inputs[held_out])
+
+    return Imitation(
+        episode=episode[held_out],
+        value=value[held_out],
+        without_theta=predict(state_action),
+        with_theta=predict(np.hstack([state_action, before])),
+    )

@@ -1,0 +1,118 @@
+"""From records to numbers: pure functions."""
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.control import Task
+from nmpcrl.study.records import Column, Records
+
+TOUCH = 1e-6  # an overlap or an excess this small is the solver's tolerance, not a violation
+LAST = 3  # rollouts that the final noise-free cost averages
+
+
+def training_cost(records: Records) -> Vector:
+    """Sum of the RL cost over each episode, noise included, shape (episodes,): Figs. 1 and 2.
+
+    nan for an episode that a failed solve cut short, or that was never reached.
+    """
+    steps = records.steps
+    episodes, length = records.experiment["episodes"], records.experiment["steps"]
+    total = np.bincount(steps["episode"], np.nan_to_num(steps["cost"]), minlength=episodes)
+    count = np.bincount(steps["episode"], steps["status"] < 2, minlength=episodes)
+    return np.where(count == length, total, np.nan)
+
+
+def noise_free_cost(records: Records) -> tuple[Column, Vector]:
+    """After how many episodes theta was judged without noise, and the cost it then had."""
+    return records.evaluations["episode"], records.evaluations["cost"]
+
+
+def initial_cost(records: Records) -> float:
+    """Noise-free cost of theta_init."""
+    return float(records.evaluations["cost"][0])
+
+
+def final_cost(records: Records) -> float:
+    """Noise-free cost at the end, the mean of the last `LAST` rollouts; infinite if one failed."""
+    return float(records.evaluations["cost"][-LAST:].mean())
+
+
+def final_theta(records: Records) -> Vector:
+    """theta when training stopped, shape (d,)."""
+    return records.steps["theta"][-1]
+
+
+def final_rollout(records: Records) -> tuple[Column, Column]:
+    """States (K + 1, n) and actions (K + 1, m) of the last rollout without noise."""
+    return records.evaluations["states"][-1], records.evaluations["actions"][-1]
+
+
+def gain(records: Records) -> float:
+    """Share of the noise-free cost that learning took away; negative if it added."""
+    return 1 - final_cost(records) / initial_cost(records)
+
+
+def wander(records: Records) -> float:
+    """Range of the noise-free cost over the second half of training, as a share of the first's."""
+    episode, cost = noise_free_cost(records)
+    late = cost[episode >= records.experiment["episodes"] / 2]
+    return float((late.max() - late.min()) / initial_cost(records)) if late.size else np.inf
+
+
+def excess(records: Records, frozen: Records, last: int = 20) -> float:
+    """Median training cost of the last episodes over that of the frozen arm under the same noise.
+
+    Args:
+        records: a run.
+        frozen: the run of the frozen learner with the same seed, layout and decay.
+        last: how many episodes count; at most the second half of training.
+    """
+    window = -min(last, max(1, records.experiment["episodes"] // 2))
+    late = training_cost(records)[window:]
+    if np.isnan(late).any():
+        return np.inf
+    return float(np.median(late) / np.median(training_cost(frozen)[window:]))
+
+
+def overshooting(records: Records) -> float:
+    """Share of the steps with alpha ||phi||^2 > 2, where a semi-gradient step overshoots."""
+    return float(np.mean(records.steps["alpha_phi2"] > 2))
+
+
+def theta_distance(a: Records, b: Records) -> float:
+    """Largest relative difference between the components of two final thetas."""
+    first, second = final_theta(a), final_theta(b)
+    return float(np.max(np.abs(first - second) / np.maximum(np.abs(first), np.abs(second))))
+
+
+def path_distance(a: Records, b: Records) -> float:
+    """Largest distance [m] between two robots that drive without noise side by side."""
+    (first, _), (second, _) = final_rollout(a), final_rollout(b)
+    return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))
+
+
+def obstacle_violations(states: Column, task: Task) -> Vector:
+    """Xi of the worst obstacle, where it is above 0 by more than `TOUCH`: one value a violation."""
+    worst = task.overlap(states).max(axis=-1)
+    return worst[worst > TOUCH]
+
+
+def input_violations(actions: Column, lower: Vector, upper: Vector) -> int:
+    """How many actions leave the action space by more than `TOUCH`."""
+    return int(((actions < lower - TOUCH) | (actions > upper + TOUCH)).any(axis=-1).sum())
+
+
+def boundary_share(records: Records, task: Task) -> float:
+    """Share of the steps whose state lies on a boundary Xi + theta_c = 0, where V has a kink.
+
+    theta is the one that the step was solved with.  # departure L
+    """
+    before = np.vstack([records.experiment["theta"], records.steps["theta"][:-1]])
+    edge = task.overlap(records.steps["state"]) + before[:, -1:]
+    return float((np.abs(edge) <= TOUCH).any(axis=-1).mean())
+
+
+def memory(records: Records) -> float:
+    """Correlation of consecutive TD errors; 0 if transitions were drawn independently."""
+    delta = records.steps["delta"][np.isfinite(records.steps["delta"])]
+    return float(np.corrcoef(delta[:-1], delta[1:])[0, 1])

@@ -1,0 +1,110 @@
+"""What a run leaves behind: two tables of equal-length columns, and facts; one .npz file.
+
+Analyses read records and nothing else. Loading never unpickles.
+"""
+
+import json
+import os
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Column = NDArray[Any]
+
+
+class DamagedRecords(ValueError):
+    """A file is not a whole run."""
+
+
+class Table:
+    """Rows of named numbers and arrays, gathered into columns."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[Any, ...]] = []
+        self._names: tuple[str, ...] = ()
+
+    def append(self, **row: Any) -> None:
+        """Add a row; every row has the names of the first."""
+        self._names = self._names or tuple(row)
+        if tuple(row) != self._names:
+            raise ValueError(f"row {tuple(row)} does not have the columns {self._names}")
+        self._rows.append(tuple(row.values()))
+
+    def columns(self) -> dict[str, Column]:
+        """One array a name, its first axis the rows."""
+        return {
+            name: np.array(values)
+            for name, values in zip(self._names, zip(*self._rows, strict=True), strict=False)
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Records:
+    """One run.
+
+    Columns of `steps`, one row per step of training: episode, time, state (n,), action (m,), cost,
+    value, next_value, delta, features (d,), alpha_phi2 (alpha ||phi||^2), theta (d,), w (d,), loss,
+    status (0 solved, 1 after a restart, 2 failed), iterations, solves, solve_seconds, fit_seconds,
+    seconds. theta and w are those after the step. What a step does not have is nan.
+
+    Columns of `evaluations`, one row per rollout without noise: episode (so many were trained),
+    theta (d,), cost (infinite where a solve failed), states (K + 1, n), actions (K + 1, m).
+    """
+
+    experiment: dict[str, Any]  # the fields of the Experiment
+    steps: dict[str, Column]
+    evaluations: dict[str, Column]
+    facts: dict[str, Any]  # stopped, seconds, versions, key
+
+    def save(self, path: Path) -> None:
+        """Write the whole file beside `path`, then rename it into place."""
+        about = json.dumps({"experiment": self.experiment, "facts": self.facts})
+        arrays = {f"steps/{name}": column for name, column in self.steps.items()}
+        arrays |= {f"evaluations/{name}": column for name, column in self.evaluations.items()}
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".half-", suffix=".npz")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                np.savez_compressed(file, about=np.array(about), **arrays)  # type: ignore[arg-type]
+                file.flush()
+                os.fsync(file.fileno())
+            Path(name).replace(path)
+        finally:
+            Path(name).unlink(missing_ok=True)
+
+    @classmethod
+    def load(cls, path: Path) -> "Records":
+        """Read a file that `save` wrote.
+
+        Raises:
+            FileNotFoundError: there is none.
+            DamagedRecords: it cannot be read whole.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                about = json.loads(str(file["about"]))
+                tables: dict[str, dict[str, Column]] = {"steps": {}, "evaluations": {}}
+                for key in file.files:
+                    table, _, name = key.partition("/")
+                    if name:
+                        tables[table][name] = file[key]
+            return cls(about["experiment"], tables["steps"], tables["evaluations"], about["facts"])
+        except FileNotFoundError:
+            raise
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            raise DamagedRecords(f"{path} is not a whole run ({error})") from error
+
+    @staticmethod
+    def about(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The experiment's fields and the facts, without reading the tables."""
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                about = json.loads(str(file["about"]))
+            return about["experiment"], about["facts"]
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            raise DamagedRecords(f"{path} is not a whole run ({error})") from error

@@ -1,0 +1,82 @@
+"""Table II: what a step of each learner costs, measured with the learners in turn."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl.study import paper
+from nmpcrl.study.experiment import Experiment, prepare
+from nmpcrl.study.training import Persistent, Step, train
+
+PAPER_HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}  # Table II: training time of 300 episodes
+
+
+def time_learners(
+    learners: tuple[str, ...] = ("ES", "GES", "RDES", "DES"),
+    solvers: tuple[str, ...] = ("fatrop", "ipopt"),
+    steps: int = 400,
+) -> pd.DataFrame:
+    """Time of one learning step, one row a learner and solver.
+
+    All take one step each in turn, in this process and with one thread, so that a change of the
+    machine's speed meets all alike. Counting starts when the networks are fitted.
+
+    Args:
+        learners: names, as `Experiment` knows them.
+        solvers: names, as `Experiment` knows them.
+        steps: how many steps of each count.
+
+    Returns:
+        Columns solver, learner, solves (per step), ms_per_step, ms_per_solve, ms_per_fit (medians;
+        nan where there is no fit), hours (the median step times the paper's 300 x 130 steps), and
+        hours_paper (Table II; nan for DES, which is not in it).
+    """
+    runs = {
+        (solver, learner): _steps(Experiment(learner=learner, solver=solver))
+        for solver in solvers
+        for learner in learners
+    }
+    times: dict[tuple[str, str], list[tuple[float, ...]]] = {name: [] for name in runs}
+    for _ in range(paper.BATCH + steps):
+        for name, run in runs.items():
+            times[name].append(_parts(next(run)))
+    rows = []
+    for (solver, learner), parts in times.items():
+        solves, solving, fitting = np.array(parts[paper.BATCH :]).T
+        step = float(np.median(solving + fitting))
+        rows.append(
+            {
+                "solver": solver,
+                "learner": learner,
+                "solves": float(solves.mean()),
+                "ms_per_step": 1e3 * step,
+                "ms_per_solve": 1e3 * float(np.median(solving / solves)),
+                "ms_per_fit": 1e3 * float(np.median(fitting)) if fitting.any() else np.nan,
+                "hours": step * paper.EPISODES * paper.STEPS / 3600,
+                "hours_paper": PAPER_HOURS.get(learner, np.nan),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def ratio(timings: pd.DataFrame, solver: str, learner: str, reference: str = "ES") -> float:
+    """Time of a learner's step over that of the reference's, with one solver."""
+    per_step = timings[timings.solver == solver].set_index("learner").ms_per_step
+    return float(per_step[learner] / per_step[reference])
+
+
+def _steps(experiment: Experiment) -> Iterator[Step]:
+    controller = Persistent(paper.nmpc(solver=experiment.solver))
+    learner, weights, explore = prepare(experiment, controller)
+    return train(learner, controller, weights, explore)
+
+
+def _parts(step: Step) -> tuple[float, float, float]:
+    """Number of solves, their time and the network's time [s]; failed steps do not occur here."""
+    if step.solution is None or step.update is None:
+        raise RuntimeError(f"a solve failed while timing: {step.failure}")
+    successor = step.update.successor
+    second = successor.solution if successor else None
+    solving = step.solution.seconds + (second.seconds if second else 0.0)
+    return (2.0 if second else 1.0), solving, successor.seconds if successor else 0.0

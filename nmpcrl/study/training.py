@@ -1,0 +1,185 @@
+"""Algorithm 1 as a generator of steps, and the rollout without noise that judges its result."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control import Nmpc, Solution, SolverError
+from nmpcrl.control.nmpc import ABSURD
+from nmpcrl.learning import Learner, Transition, Update, Weights
+
+Counts = NDArray[np.int_]
+
+PATIENCE = 10  # so many episodes in a row that a failed solve ended are a divergence
+
+
+class Diverged(Exception):
+    """Learning cannot go on; the message says why."""
+
+
+@dataclass(frozen=True)
+class Persistent:
+    """An NMPC that tries a failed solve once more, from a standing start.
+
+    With `train`, the one place that decides what a failed solve means.  # departure M
+    """
+
+    nmpc: Nmpc
+
+    @property
+    def gamma(self) -> float:
+        """The discount factor of the NMPC."""
+        return self.nmpc.gamma
+
+    def solve(
+        self,
+        state: Vector,
+        theta: Vector,
+        guess: Solution | None = None,
+        action: Vector | None = None,
+    ) -> Solution:
+        """As `Nmpc.solve`; the status is "restarted" where only the second attempt succeeded."""
+        try:
+            return self.nmpc.solve(state, theta, guess, action)
+        except SolverError:
+            if guess is None:
+                raise
+            return replace(self.nmpc.solve(state, theta, None, action), status="restarted")
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of learning; `update` and `solution` are None where a solve failed."""
+
+    episode: int
+    time: int  # t of Algorithm 1
+    state: Vector  # s, shape (n,)
+    weights: Weights  # after the step
+    action: Vector  # a, noise included, shape (m,); nan where no action was found
+    cost: float = np.nan  # l(s, a); nan where no action was found
+    solution: Solution | None = None
+    update: Update | None = None
+    failure: str = ""  # what the solver said, if it failed
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """The noise of Eq. (5), drawn in advance so that every learner of a seed meets the same."""
+
+    noise: Matrix  # epsilon, shape (episodes, steps, m)
+    scale: NDArray[np.floating]  # c_epsilon^k, shape (episodes, steps)
+
+    def __call__(self, policy: Vector, episode: int, time: int) -> Vector:
+        """The action before it is clipped to the action space."""
+        return policy + self.scale[episode, time] * self.noise[episode, time]
+
+
+def count_steps(episodes: int, steps: int) -> Counts:
+    """k of Eq. (5) read as written, the time step counted through training.  # departure C"""
+    return np.arange(episodes * steps).reshape(episodes, steps)
+
+
+def count_episodes(episodes: int, steps: int) -> Counts:
+    """k of Eq. (5) as Algorithm 1 uses it, the episode.  # departure C"""
+    return np.repeat(np.arange(episodes), steps).reshape(episodes, steps)
+
+
+def train(
+    learner: Learner, controller: Persistent, weights: Weights, explore: Exploration
+) -> Iterator[Step]:
+    """Algorithm 1: as many episodes and steps as `explore` has noise for.
+
+    A solve that fails twice ends the episode, and learning goes on from the next one.
+
+    Raises:
+        Diverged: theta is no longer usable, or `PATIENCE` episodes in a row ended early.
+    """
+    episodes = len(explore.scale)
+    failed = 0
+    for episode in range(episodes):
+        failure = ""
+        for step in _episode(learner, controller, weights, explore, episode):
+            weights, failure = step.weights, step.failure
+            yield step
+            _refuse_absurd(weights)
+        failed = failed + 1 if failure else 0
+        if failed == PATIENCE:
+            raise Diverged(f"{PATIENCE} episodes in a row ended in a failed solve: {failure}")
+
+
+def _episode(
+    learner: Learner,
+    controller: Persistent,
+    weights: Weights,
+    explore: Exploration,
+    episode: int,
+) -> Iterator[Step]:
+    plant, task = controller.nmpc.plant, controller.nmpc.task
+    state, guess = task.start, None
+    for t in range(explore.scale.shape[1]):
+        try:
+            solution = controller.solve(state, weights.theta, guess)
+        except SolverError as error:
+            nothing = np.full(plant.m, np.nan)
+            yield Step(episode, t, state, weights, nothing, failure=str(error))
+            return
+        action = plant.clip(explore(solution.action, episode, t))  # departure E
+        next_state = plant.step(state, action)
+        cost = task.stage_cost(state, action)
+        transition = Transition(state, action, cost, next_state, solution)
+        try:
+            update = learner.step(weights, transition)
+        except SolverError as error:
+            yield Step(episode, t, state, weights, action, cost, solution, failure=str(error))
+            return
+        weights = update.weights
+        yield Step(episode, t, state, weights, action, cost, solution, update)
+        guess = (update.successor and update.successor.solution) or solution
+        state = next_state
+
+
+def _refuse_absurd(weights: Weights) -> None:
+    for name, vector in (("theta", weights.theta), ("w", weights.w)):
+        if not (np.abs(vector) <= ABSURD).all():  # also false for nan
+            raise Diverged(f"{name} left the numbers a solver is given: {vector}")
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """The closed loop from the start without noise."""
+
+    states: Matrix  # s_0, ..., s_K; fewer where a solve failed, shape (<= K + 1, n)
+    actions: Matrix  # shape (<= K + 1, m)
+    costs: Vector  # RL stage costs, shape (<= K + 1,)
+    failure: str = field(default="")  # what the solver said, if it failed
+
+    @property
+    def cost(self) -> float:
+        """Sum of the RL stage cost, t = 0, ..., K; infinite where a solve failed."""
+        return np.inf if self.failure else float(self.costs.sum())
+
+
+def evaluate(controller: Persistent, theta: Vector, steps: int) -> Rollout:
+    """Follow the policy of `theta` from the start for `steps` steps, without noise."""
+    plant, task = controller.nmpc.plant, controller.nmpc.task
+    state, guess, failure = task.start, None, ""
+    states, actions, costs = [], [], []
+    for _ in range(steps):
+        try:
+            guess = controller.solve(state, theta, guess)
+        except SolverError as error:
+            failure = str(error)
+            break
+        states.append(state)
+        actions.append(guess.action)
+        costs.append(task.stage_cost(state, guess.action))
+        state = plant.step(state, guess.action)
+    return Rollout(
+        states=np.reshape(states, (-1, plant.n)),
+        actions=np.reshape(actions, (-1, plant.m)),
+        costs=np.array(costs),
+        failure=failure,
+    )
