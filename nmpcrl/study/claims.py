@@ -78,7 +78,7 @@ def judge(
         rdes_takes_half_the_time(timings),
         ges_takes_the_same_time(timings),
         rdes_and_ges_reach_the_same_policy(study),
-        theta_makes_the_network_more_accurate(tuple(imitations)),
+        theta_makes_the_network_more_accurate(study, tuple(imitations)),
         constraints_hold(study),
         convergence_is_guaranteed(tuple(assumptions)),
         learning_beats_the_frozen_theta(study),
@@ -162,11 +162,15 @@ def rdes_and_ges_reach_the_same_policy(study: Study) -> Verdict:
     )
 
 
-def theta_makes_the_network_more_accurate(imitations: tuple[Imitation, ...]) -> Verdict:
+def theta_makes_the_network_more_accurate(
+    study: Study, imitations: tuple[Imitation, ...]
+) -> Verdict:
     """C6, from Section III-A."""
     ratios = np.array([imitation.ratio for imitation in imitations])
     clear = dict(enumerate(ratios <= MORE_ACCURATE))
-    if all(clear.values()):
+    if not _full_length(study):
+        outcome = UNDECIDABLE
+    elif all(clear.values()):
         outcome = REPRODUCED
     else:
         outcome = PARTLY if np.median(ratios) < 1 else NOT
@@ -194,7 +198,9 @@ def constraints_hold(study: Study) -> Verdict:
     )
     in_training, in_testing = np.concatenate(training), np.concatenate(testing)
     steps = sum(len(r.steps["cost"]) for r in runs)
-    if in_testing.size or inputs:
+    if not _full_length(study):
+        outcome = UNDECIDABLE
+    elif in_testing.size or inputs:
         outcome = NOT
     else:
         outcome = PARTLY if in_training.size else REPRODUCED

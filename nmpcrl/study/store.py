@@ -13,12 +13,14 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cache
 from importlib.metadata import version
-from multiprocessing import Manager, get_context
+from multiprocessing import get_context
 from pathlib import Path
 from queue import Empty
+from types import ModuleType
 from typing import Any
 
 from tqdm import tqdm
@@ -29,6 +31,7 @@ from nmpcrl.study.records import DamagedRecords, Records
 
 LIBRARIES = ("casadi", "numpy", "torch")
 MATHEMATICS = ("control", "learning", "study/paper.py", "study/training.py", "study/experiment.py")
+SPAWN = get_context("spawn")  # a fork would copy the threads' locks but not the threads
 ATTEMPTS = 3  # how often a run is started whose worker was killed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
@@ -184,13 +187,31 @@ def _is_whole(path: Path) -> bool:
 def _processes(workers: int) -> ProcessPoolExecutor:
     """Worker processes with one thread each; the setting is inherited, so it is made here."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    return ProcessPoolExecutor(workers, mp_context=SPAWN)
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """Hide the caller's script from new processes, which would otherwise run it again.
+
+    So a script needs no `if __name__ == "__main__"`, and one read from standard input works too.
+    """
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def _train(missing: list[Experiment], executor: Executor, *, progress: bool) -> None:
     """Run `missing` and show how far they are; the first failure is raised when all have ended."""
     total = sum(e.episodes for e in missing)
-    with Manager() as manager, tqdm(total=total, unit="ep", disable=not progress) as bar:
+    with (
+        tqdm(total=total, unit="ep", disable=not progress) as bar,
+        _without_main(),
+        SPAWN.Manager() as manager,
+    ):
         reports = manager.Queue()
         pending = {executor.submit(_fetch_and_report, e, reports) for e in missing}
         ended: set[Future[None]] = set()
