@@ -59,7 +59,7 @@ class Records:
     experiment: dict[str, Any]  # the fields of the Experiment
     steps: dict[str, Column]
     evaluations: dict[str, Column]
-    facts: dict[str, Any]  # stopped, seconds, versions, key
+    facts: dict[str, Any]  # stopped, seconds; when stored also final_cost, versions, machine, key
 
     def save(self, path: Path) -> None:
         """Write the whole file beside `path`, then rename it into place."""
@@ -97,7 +97,7 @@ class Records:
         except FileNotFoundError:
             raise
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise DamagedRecords(f"{path} is not a whole run ({error})") from error
+            raise DamagedRecords(f"{path} is damaged, or not a run") from error
 
     @staticmethod
     def about(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -107,4 +107,4 @@ class Records:
                 about = json.loads(str(file["about"]))
             return about["experiment"], about["facts"]
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise DamagedRecords(f"{path} is not a whole run ({error})") from error
+            raise DamagedRecords(f"{path} is damaged, or not a run") from error

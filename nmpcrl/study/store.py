@@ -9,6 +9,7 @@ import hashlib
 import json
 import os
 import platform
+import signal
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
@@ -26,6 +27,7 @@ from typing import Any
 from tqdm import tqdm
 
 import nmpcrl
+from nmpcrl.study import metrics
 from nmpcrl.study.experiment import Experiment, run
 from nmpcrl.study.records import DamagedRecords, Records
 
@@ -83,7 +85,12 @@ def fetch(experiment: Experiment, **options: Any) -> Records:
         path.replace(aside)
         print(f"{error}; it is kept as {aside.name} and the run is done again", file=sys.stderr)
     records = run(experiment, **options)
-    records.facts.update(versions=versions(), machine=platform.machine(), key=key(experiment))
+    records.facts.update(
+        final_cost=metrics.final_cost(records),
+        versions=versions(),
+        machine=platform.machine(),
+        key=key(experiment),
+    )
     records.save(path)
     return records
 
@@ -187,7 +194,8 @@ def _is_whole(path: Path) -> bool:
 def _processes(workers: int) -> ProcessPoolExecutor:
     """Worker processes with one thread each; the setting is inherited, so it is made here."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
-    return ProcessPoolExecutor(workers, mp_context=SPAWN)
+    quiet = (signal.SIGINT, signal.SIG_DFL)  # an interrupt ends a worker without a traceback
+    return ProcessPoolExecutor(workers, SPAWN, initializer=signal.signal, initargs=quiet)
 
 
 @contextmanager

@@ -20,7 +20,8 @@ def time_learners(
     """Time of one learning step, one row a learner and solver.
 
     All take one step each in turn, in this process and with one thread, so that a change of the
-    machine's speed meets all alike. Counting starts when the networks are fitted.
+    machine's speed meets all alike; in a new order each time, because whoever follows a network's
+    fit finds the processor's cache full of it. Counting starts when the networks are fitted.
 
     Args:
         learners: names, as `Experiment` knows them.
@@ -38,9 +39,10 @@ def time_learners(
         for learner in learners
     }
     times: dict[tuple[str, str], list[tuple[float, ...]]] = {name: [] for name in runs}
+    names, rng = list(runs), np.random.default_rng(0)
     for _ in range(paper.BATCH + steps):
-        for name, run in runs.items():
-            times[name].append(_parts(next(run)))
+        for i in rng.permutation(len(names)):
+            times[names[i]].append(_parts(next(runs[names[i]])))
     rows = []
     for (solver, learner), parts in times.items():
         solves, solving, fitting = np.array(parts[paper.BATCH :]).T

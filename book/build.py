@@ -1,0 +1,334 @@
+"""Build the book: refuse nonsense, train what is missing, execute the chapters, render the pages.
+
+    python book/build.py                                   all chapters   _build
+    python book/build.py --smoke                           few episodes   _build/smoke
+    python book/build.py --chapter 03_rdes -p episodes 20  one chapter    _build/chapter/03_rdes
+
+Each build has its own place, in the last column, and five steps, each a function:
+
+1. `ask`      run the two first cells of each chapter, its parameters and their check: a bad value
+              ends here, in one sentence; a good one says which experiments the chapter needs
+2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
+3. `train`    those experiments whose runs are not stored
+4. `execute`  the chapters of the mirror with papermill, two at a time, into PLACE/executed
+5. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html
+
+PLACE/html is removed first and put there last: it exists only if everything went well.
+"""
+
+import os
+
+# One thread a process, kernels included, and before NumPy or torch is imported.
+os.environ |= {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+os.environ |= {"PYDEVD_DISABLE_FILE_VALIDATION": "1", "NO_COLOR": "1"}
+
+import difflib
+import logging
+import re
+import shutil
+import subprocess
+import sys
+import time
+import traceback
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from importlib.resources import as_file, files
+from multiprocessing import get_context
+from pathlib import Path
+
+import click
+import nbformat
+import papermill
+import yaml
+from papermill.cli import _resolve_type as papermill_value
+from papermill.exceptions import PapermillExecutionError
+from tqdm import tqdm
+
+logging.getLogger("papermill").setLevel(logging.ERROR)  # a page without parameters is no news
+
+ROOT = Path(__file__).resolve().parent.parent
+SMOKE = {"episodes": 4}
+INDEX = """<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{title}</title>
+<meta http-equiv="refresh" content="0; url={page}.html"></head>
+<body><a href="{page}.html">{title}</a></body>
+</html>
+"""
+
+
+class Failure(click.ClickException):
+    """A sentence for the reader; the details are in a log."""
+
+    def show(self, file=None):
+        click.echo(self.message, file=sys.stderr)
+
+
+@contextmanager
+def told(log: Path):
+    """Turn an error that no step foresaw into a sentence and a log."""
+    try:
+        yield
+    except Failure:
+        raise
+    except Exception as error:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        log.write_text(traceback.format_exc())
+        raise Failure(
+            f"The build failed with {type(error).__name__}: {error} (all of it: {shown(log)})"
+        ) from error
+
+
+def pages() -> list[str]:
+    """The pages of _toc.yml in their order, without suffix."""
+    toc = yaml.safe_load((ROOT / "_toc.yml").read_text())
+    return [toc["root"], *(page["file"] for part in toc["parts"] for page in part["chapters"])]
+
+
+def notebooks() -> dict[str, Path]:
+    """The pages that are notebooks: name -> path from the root."""
+    paths = [Path(f"{page}.ipynb") for page in pages()]
+    return {path.stem: path for path in paths if (ROOT / path).exists()}
+
+
+def parameters(notebook: Path) -> list[str]:
+    """The names a notebook's cell tagged `parameters` declares."""
+    return list(papermill.inspect_notebook(str(notebook)))
+
+
+def known(chapter: str) -> Path:
+    """The path of `chapter`, or a refusal that lists the chapters."""
+    paths = notebooks()
+    name = Path(chapter).stem
+    if name not in paths:
+        raise Failure(
+            f"There is no chapter {chapter!r}{nearest(name, paths)}; "
+            f"the chapters are {listed(paths)}."
+        )
+    return paths[name]
+
+
+def refuse_unknown(notebook: Path, given: dict) -> None:
+    """Papermill only logs a misspelt name; here it ends the build."""
+    names = parameters(notebook)
+    for name in given:
+        if name not in names:
+            raise Failure(
+                f"{notebook.stem} has no parameter {name!r}{nearest(name, names)}; "
+                f"its parameters are {listed(names)}."
+            )
+
+
+def ask(notebook: Path, given: dict) -> tuple:
+    """The experiments a chapter needs: run its parameters cell, set `given`, run its check cell."""
+    cells = [cell for cell in nbformat.read(notebook, 4).cells if cell.cell_type == "code"]
+    if not cells or "parameters" not in cells[0].metadata.get("tags", []):
+        return ()
+    names = {"__name__": "__main__"}
+    try:
+        exec(cells[0].source, names)
+        names.update(given)
+        exec(cells[1].source, names)
+    except ValueError as error:  # ParameterError: the chapter's own sentence
+        raise Failure(str(error)) from error
+    return tuple(names.get("experiments", ()))
+
+
+def nearest(name: str, names) -> str:
+    close = difflib.get_close_matches(name, names, n=1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def listed(names) -> str:
+    *most, last = names
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def mirror(place: Path, announcement: str) -> Path:
+    """Copy the sources to PLACE/src, where chapters may be replaced by their executed selves."""
+    source = place / "src"
+    shutil.rmtree(source, ignore_errors=True)
+    shutil.copytree(
+        ROOT / "book", source / "book", ignore=shutil.ignore_patterns("__pycache__", ".*")
+    )
+    shutil.copy2(ROOT / "_toc.yml", source)
+    (source / "nmpcrl").symlink_to(ROOT / "nmpcrl")  # for literalinclude
+    config = yaml.safe_load((ROOT / "_config.yml").read_text())
+    config["html"]["announcement"] = announcement
+    (source / "_config.yml").write_text(yaml.safe_dump(config, allow_unicode=True))
+    with as_file(files("sphinx-mathjax-offline") / "static/mathjax/tex-svg-full.js") as script:
+        target = source / "book/_static/mathjax"
+        target.mkdir()
+        shutil.copy2(script, target)
+    return source
+
+
+def train(experiments: tuple) -> None:
+    """Run what is not stored yet; the bar is fetch_all's."""
+    from nmpcrl.study import fetch_all  # only here: a refusal should not wait for it
+
+    if experiments:
+        fetch_all(experiments, progress=True)
+
+
+def execute(notebook: Path, target: Path, log: Path, given: dict) -> tuple[float, str]:
+    """Papermill one notebook; return the seconds it took and, if it failed, why in a sentence."""
+    started = time.perf_counter()
+    target.parent.mkdir(parents=True, exist_ok=True)
+    log.parent.mkdir(parents=True, exist_ok=True)
+    os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)  # the kernel's stderr, too
+    problem = ""
+    try:
+        papermill.execute_notebook(
+            str(notebook),
+            str(target),
+            parameters=given,
+            kernel_name="python3",
+            cwd=str(ROOT),
+            progress_bar=False,
+        )
+    except Exception as error:
+        traceback.print_exc()
+        problem = sentence(error)
+    return time.perf_counter() - started, problem
+
+
+def sentence(error: Exception) -> str:
+    if not isinstance(error, PapermillExecutionError):
+        return f"{type(error).__name__}: {error}"
+    if error.ename == "ParameterError":
+        return error.evalue
+    return f"cell {error.cell_index} failed with {error.ename}: {error.evalue}"
+
+
+def execute_all(place: Path, jobs: dict[Path, dict]) -> None:
+    """Execute notebooks (path -> given parameters), and put them into the mirror."""
+    executed, logs = place / "executed", place / "logs"
+    shutil.rmtree(executed, ignore_errors=True)
+    problems = {}
+    with ProcessPoolExecutor(max_workers=2, mp_context=get_context("spawn")) as pool:
+        running = {
+            pool.submit(
+                execute, notebook, executed / notebook.name, logs / f"{notebook.stem}.log", given
+            ): notebook
+            for notebook, given in reversed(jobs.items())  # the later chapters take longest
+        }
+        bar = tqdm(as_completed(running), "chapters", len(running), leave=False, disable=None)
+        for done in bar:
+            notebook, (seconds, problem) = running[done], done.result()
+            tqdm.write(f"  {notebook.stem:<24}{seconds:6.0f} s{'  failed' if problem else ''}")
+            if problem:
+                problems[notebook.stem] = problem
+    if problems:
+        raise Failure(
+            "\n".join(
+                f"{name}: {problem} (all of it: {shown(logs / f'{name}.log')})"
+                for name, problem in sorted(problems.items())
+            )
+        )
+    for notebook in jobs:
+        shutil.copy2(executed / notebook.name, place / "src" / notebook)
+
+
+def render(place: Path, strict: bool) -> None:
+    """Run Jupyter Book on the mirror and put the result at PLACE/html, if it is whole."""
+    work, log = place / "render", place / "logs/render.log"
+    shutil.rmtree(work, ignore_errors=True)  # a remembered page would not repeat its warnings
+    log.parent.mkdir(parents=True, exist_ok=True)
+    command = ["jupyter-book", "build", str(place / "src"), "--path-output", str(work)]
+    command[0] = str(Path(sys.executable).with_name(command[0]))
+    strictness = ["-W", "-n", "--keep-going"] if strict else []
+    with log.open("w") as out:
+        result = subprocess.run(command + strictness, stdout=out, stderr=subprocess.STDOUT)
+    if result.returncode:
+        raise Failure(f"Jupyter Book refused the pages (all of it: {shown(log)}):\n{warnings(log)}")
+    (work / "_build/html").rename(place / "html")
+    title = yaml.safe_load((ROOT / "_config.yml").read_text())["title"]
+    (place / "html/index.html").write_text(INDEX.format(title=title, page=pages()[0]))
+
+
+def warnings(log: Path, most: int = 20) -> str:
+    """The lines of a Sphinx log that say what is wrong, or its end if none does."""
+    text = re.sub(r"\x1b\[[0-9;]*m", "", log.read_text()).replace(f"{ROOT}/", "")
+    text = re.sub(r"\.ipynb:(\d+)(\d{4}):", in_cell, text)
+    lines = text.splitlines()
+    wrong = [line for line in lines if "WARNING: " in line or "ERROR: " in line]
+    return "\n".join(f"  {line}" for line in (wrong[:most] or lines[-most:]))
+
+
+def in_cell(place: re.Match) -> str:
+    """MyST-NB counts 10000 lines a cell, from cell 1: name the cell, from 0, and the line."""
+    return f".ipynb, cell {int(place[1]) - 1}, line {int(place[2])}:"
+
+
+def shown(path: Path) -> str:
+    return os.path.relpath(path, ROOT)
+
+
+def values(pairs, raw, texts) -> dict:
+    """Parameters as papermill's own -p, -r and -y read them."""
+    given = {}
+    for text in texts:
+        try:
+            given |= yaml.safe_load(text)
+        except (yaml.YAMLError, TypeError) as error:
+            raise Failure(f"-y takes a form such as '{{seeds: [3]}}', not {text!r}.") from error
+    given |= {name: papermill_value(value) for name, value in pairs}
+    return given | dict(raw)
+
+
+def build(place: Path, jobs: dict[Path, dict], announcement: str, strict: bool) -> Path:
+    """The five steps."""
+    with told(place / "logs/build.log"):
+        asked = [ask(notebook, given) for notebook, given in jobs.items()]
+        shutil.rmtree(place / "html", ignore_errors=True)
+        mirror(place, announcement)
+        train(tuple(dict.fromkeys(one for experiments in asked for one in experiments)))
+        execute_all(place, jobs)
+        render(place, strict)
+    return place / "html"
+
+
+def build_chapter(name: str, given: dict) -> Path:
+    """Execute one chapter; the other pages are there to be referred to. Returns its page."""
+    notebook = known(name)
+    refuse_unknown(notebook, given)
+    changed = ", ".join(f"{name} = {value}" for name, value in given.items())
+    note = f"Only {notebook.stem} was executed for this build, with {changed or 'its defaults'}."
+    place = Path("_build/chapter") / notebook.stem
+    return build(place, {notebook: given}, note, strict=False) / notebook.with_suffix(".html")
+
+
+def build_book(smoke: bool) -> Path:
+    """Execute every chapter. Returns the page to open."""
+    jobs = {notebook: {} for notebook in notebooks().values()}
+    if not smoke:
+        return build(Path("_build"), jobs, "", strict=True) / "index.html"
+    for notebook in jobs:
+        jobs[notebook] = {name: SMOKE[name] for name in parameters(notebook) if name in SMOKE}
+    note = "A smoke build: a few episodes a run, to see that everything works; no number counts."
+    return build(Path("_build/smoke"), jobs, note, strict=True) / "index.html"
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--smoke", is_flag=True, help=f"Train only {SMOKE['episodes']} episodes a run.")
+@click.option("--chapter", metavar="NAME", help="Execute and show only this chapter.")
+@click.option(
+    "-p", "pairs", nargs=2, multiple=True, metavar="NAME VALUE", help="As papermill does."
+)
+@click.option("-r", "raw", nargs=2, multiple=True, metavar="NAME TEXT", help="Kept as a text.")
+@click.option("-y", "texts", multiple=True, help="Parameters as YAML: '{seeds: [3]}'.")
+def main(smoke, chapter, pairs, raw, texts):
+    """Train what is missing, execute the chapters, build the book."""
+    os.chdir(ROOT)
+    given = values(pairs, raw, texts)
+    if chapter is not None:
+        click.echo(build_chapter(chapter, given))
+    elif given:
+        raise Failure("Parameters are given to one chapter: add --chapter NAME.")
+    else:
+        click.echo(build_book(smoke))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""The command `nmpcrl`: train a run, list what is stored, judge a run without noise."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pandas as pd
+from tqdm import tqdm
+
+from nmpcrl import __version__
+from nmpcrl.study import DamagedRecords, Experiment, ParameterError, Records, fetch, metrics, paper
+from nmpcrl.study.experiment import DECAYS, LEARNERS
+from nmpcrl.study.store import folder, path_of, stored
+
+HELP = {"help_option_names": ["-h", "--help"]}
+
+
+@click.group(context_settings=HELP)
+@click.version_option(__version__, message="nmpcrl %(version)s")
+def main() -> None:
+    """Reinforcement learning on top of nonlinear MPC: one paper, reproduced."""
+
+
+@main.command()
+@click.option("--learner", default="ES", show_default=True, help=f"One of {', '.join(LEARNERS)}.")
+@click.option("--seed", default=0, show_default=True, help="Of the noise and the network.")
+@click.option("--episodes", default=paper.EPISODES, show_default=True)
+@click.option("--layout", default="A", show_default=True, help="Of the obstacles.")
+@click.option(
+    "--decay", default="step", show_default=True, help=f"Exploration, per {' or '.join(DECAYS)}."
+)
+@click.option("--alpha", default=paper.ALPHA, show_default=True, help="Step size of theta.")
+@click.option("--beta", default=paper.BETA, show_default=True, help="Step size of w.")
+@click.option("--literal", is_flag=True, help="Algorithm 1 literally: do not wait for the network.")
+def train(literal: bool, **fields: Any) -> None:
+    """Train one run and store it; a stored one is read."""
+    try:
+        experiment = Experiment(gated=not literal, **fields)
+    except ParameterError as error:
+        raise click.ClickException(str(error)) from None
+    with tqdm(total=experiment.episodes, unit="ep", desc=experiment.learner) as bar:
+
+        def on_episode(done: int, cost: float) -> None:
+            bar.set_postfix_str(f"cost {cost:.0f}", refresh=False)
+            bar.update(done - bar.n)
+
+        records = fetch(experiment, on_episode=on_episode)
+        bar.update(experiment.episodes - bar.n if records.facts["stopped"] == "finished" else 0)
+    click.echo(f"{path_of(experiment)}: {records.facts['stopped']}")
+    click.echo(_verdict(records))
+
+
+@main.command()
+def runs() -> None:
+    """List the stored runs."""
+    rows = [
+        {
+            "run": path.stem,
+            "learner": fields["learner"],
+            "layout": fields["layout"],
+            "decay": fields["decay"],
+            "seed": fields["seed"],
+            "episodes": fields["episodes"],
+            "final cost": f"{facts['final_cost']:.1f}",
+            "minutes": f"{facts['seconds'] / 60:.1f}",
+            "stopped": facts["stopped"],
+        }
+        for path, (fields, facts) in stored().items()
+    ]
+    if rows:
+        click.echo(pd.DataFrame(rows).to_string(index=False))
+    else:
+        click.echo(f"No run is stored in {folder()}; `nmpcrl train` makes one.")
+
+
+@main.command()
+@click.argument("run")
+def evaluate(run: str) -> None:
+    """Print the figures of the last noise-free rollout of RUN, a name that `nmpcrl runs` lists."""
+    path = Path(run) if run.endswith(".npz") else folder() / f"{run}.npz"
+    try:
+        records = Records.load(path)
+    except FileNotFoundError:
+        names = ", ".join(p.stem for p in stored()) or "none"
+        raise click.ClickException(f"no run {run!r} in {folder()}; there are: {names}") from None
+    except DamagedRecords as error:
+        raise click.ClickException(str(error)) from None
+    click.echo(_verdict(records))
+    for name, value in _figures(records).items():
+        click.echo(f"{name:38} {value}")
+
+
+def _verdict(records: Records) -> str:
+    """The noise-free cost before and after, in a sentence."""
+    before, after = metrics.initial_cost(records), metrics.final_cost(records)
+    change = f"{abs(1 - after / before):.1%} {'less' if after <= before else 'more'}"
+    return f"noise-free cost {after:.1f}, {change} than the {before:.1f} of theta_init"
+
+
+def _figures(records: Records) -> dict[str, str]:
+    """What a rollout without noise shows, ready to print."""
+    task = paper.task(records.experiment["layout"])
+    states, actions = metrics.final_rollout(records)
+    overlap = task.overlap(states).max(axis=-1)
+    theta = ", ".join(f"{value:.4g}" for value in records.evaluations["theta"][-1])
+    return {
+        "cost of the last rollout": f"{records.evaluations['cost'][-1]:.1f}",
+        "steps": f"{np.isfinite(states[:, 0]).sum()} of {len(states)}",
+        "distance to the target at the end": f"{task.distance(states[-1]):.3f}",
+        "largest overlap Xi (above 0: inside)": f"{np.nanmax(overlap):.4f}",
+        "states inside an obstacle": f"{metrics.obstacle_violations(states, task).size}",
+        "largest speed and turn rate": " and ".join(
+            f"{value:.3f}" for value in np.nanmax(np.abs(actions), axis=0)
+        ),
+        "steps of training with a failed solve": f"{(records.steps['status'] == 2).sum()}",
+        "steps with alpha ||phi||^2 above 2": f"{metrics.overshooting(records):.2%}",
+        "theta": theta,
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,131 @@
+"""Two states and one parameter: the smallest problem on which a semi-gradient diverges.
+
+    first --cost 0--> second --cost 0--> end
+
+The approximate values are theta in the first state and 2 theta in the second, the end is worth 0,
+so theta = 0 is exactly right. Tsitsiklis and Van Roy (1997); Sutton and Barto (2018), Section 11.2.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.learning import Weights, td_error
+from nmpcrl.learning.learners import UpdateRule
+
+FIRST, SECOND = 0, 1
+PHI = np.array([[1.0], [2.0]])  # features of the two states, one row a state
+PHI_NEXT = np.array([[2.0], [0.0]])  # of the states that follow them
+COST = 0.0  # of either step
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The chain, and how often each of its states is updated."""
+
+    gamma: float = 0.97
+    share: float = 1.0  # of updates made in the first state; on-policy visits give 1/2
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.gamma <= 1:
+            raise ValueError(f"gamma = {self.gamma} must lie in [0, 1]")
+        if not 0 <= self.share <= 1:
+            raise ValueError(f"share = {self.share} must lie in [0, 1]")
+
+    @property
+    def probabilities(self) -> Vector:
+        """How often each state is updated, shape (2,)."""
+        return np.array([self.share, 1 - self.share])
+
+    def delta(self, theta: Vector, state: int) -> float:
+        """TD error of the step out of `state`: Eq. (7)."""
+        q, q_next = float(PHI[state] @ theta), float(PHI_NEXT[state] @ theta)
+        return td_error(COST, self.gamma, q, q_next)
+
+
+def sampled_step(chain: Chain, rule: UpdateRule, weights: Weights, state: int) -> Weights:
+    """One update made in `state`."""
+    delta = chain.delta(weights.theta, state)
+    return rule(weights, delta, PHI[state], PHI_NEXT[state])
+
+
+def expected_step(chain: Chain, rule: UpdateRule, weights: Weights) -> Weights:
+    """The mean of `sampled_step` over the states."""
+    steps = [sampled_step(chain, rule, weights, state) for state in (FIRST, SECOND)]
+    return Weights(
+        theta=chain.probabilities @ [step.theta for step in steps],
+        w=chain.probabilities @ [step.w for step in steps],
+    )
+
+
+def follow(
+    chain: Chain,
+    rule: UpdateRule,
+    updates: int,
+    *,
+    theta: float = 1.0,
+    w: float = 0.0,
+    rng: np.random.Generator | None = None,
+) -> Matrix:
+    """(theta, w) before the first update and after each, shape (updates + 1, 2).
+
+    Args:
+        chain: the chain.
+        rule: an update rule of `nmpcrl.learning`, such as `semi_gradient(alpha)`.
+        updates: how many.
+        theta: where theta starts.
+        w: where w starts.
+        rng: draws the state of each update; expected updates if absent.
+    """
+    weights = Weights(np.array([theta]), np.array([w]))
+    path = [weights]
+    for _ in range(updates):
+        if rng is None:
+            weights = expected_step(chain, rule, weights)
+        else:
+            state = int(rng.random() >= chain.share)
+            weights = sampled_step(chain, rule, weights, state)
+        path.append(weights)
+    return np.array([[step.theta[0], step.w[0]] for step in path])
+
+
+def expected_matrix(chain: Chain, rule: UpdateRule) -> Matrix:
+    """The expected update as a matrix on (theta, w), shape (2, 2): on this chain it is linear."""
+    zero = Weights(np.zeros(1), np.zeros(1))
+    units = replace(zero, theta=np.ones(1)), replace(zero, w=np.ones(1))
+    moved = [expected_step(chain, rule, unit) for unit in units]
+    return np.array([[step.theta[0], step.w[0]] for step in moved]).T
+
+
+def growth(chain: Chain, rule: UpdateRule) -> float:
+    """Largest modulus of an eigenvalue of `expected_matrix`: below 1 the updates converge to 0."""
+    return float(np.abs(np.linalg.eigvals(expected_matrix(chain, rule))).max())
+
+
+def auxiliary_fixed_point(chain: Chain, theta: float) -> float:
+    """w where its expected update stops while theta is held: E[phi phi']^-1 E[delta phi]."""
+    correlation, covariance = _moments(chain, theta)
+    return correlation / covariance
+
+
+def mspbe(chain: Chain, theta: float) -> float:
+    """The mean-square projected Bellman error as expectations: Eq. (15)."""
+    correlation, covariance = _moments(chain, theta)
+    return correlation / covariance * correlation
+
+
+def projected_bellman_error(chain: Chain, theta: float) -> float:
+    """The same error from its definition, Eq. (14): back up both values, project, and compare."""
+    rho, basis = chain.probabilities, PHI[:, 0]
+    values = basis * theta
+    backed_up = COST + chain.gamma * PHI_NEXT[:, 0] * theta
+    projected = basis * (rho @ (basis * backed_up)) / (rho @ basis**2)
+    return float(rho @ (projected - values) ** 2)
+
+
+def _moments(chain: Chain, theta: float) -> tuple[float, float]:
+    """E[delta phi] and E[phi phi']."""
+    rho, basis = chain.probabilities, PHI[:, 0]
+    delta = [chain.delta(np.array([theta]), state) for state in (FIRST, SECOND)]
+    return float(rho @ (delta * basis)), float(rho @ basis**2)

@@ -1,0 +1,1 @@
+"""One function per figure: from records to a matplotlib Figure. The only home of matplotlib."""

@@ -1,0 +1,229 @@
+"""Figures of the controller: plans among obstacles, action values, and what each theta does."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control import Solution, Task
+from nmpcrl.study.figures.style import PAGE, subplots
+from nmpcrl.study.training import Rollout
+
+INK, LESS, MORE = "#222222", "#1B7F79", "#882255"  # none of them is a learner's
+SYMBOLS = {
+    "x": r"\theta_x",
+    "y": r"\theta_y",
+    "heading": r"\theta_\varphi",
+    "v": r"\theta_v",
+    "nu": r"\theta_\nu",
+    "x_f": r"\theta_{x_f}",
+    "y_f": r"\theta_{y_f}",
+    "heading_f": r"\theta_{\varphi_f}",
+    "c": r"\theta_c",
+}  # of paper.THETA_NAMES, between dollar signs
+
+page: Any = plt.rc_context(PAGE)  # as a decorator; matplotlib's types do not know that it is one
+
+
+def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
+    """Obstacles, the circle Xi = 0 around each, start and target; equal scales."""
+    x, y, clearance = task.discs
+    for place in zip(x, y, clearance / 2, strict=True):
+        axes.add_patch(Circle(place[:2], place[2] - task.robot_diameter / 2, color="#CFCFCF"))
+        axes.add_patch(Circle(place[:2], place[2], fill=False, ec="#8A8A8A", ls="--", lw=0.8))
+    axes.plot(*task.start[:2], "o", color=INK, ms=5)
+    axes.plot(*task.target[:2], "*", color=INK, ms=9)
+    if labels:
+        for point, name in ((task.start, "start"), (task.target, "target")):
+            axes.annotate(
+                name, tuple(point[:2]), (0, 7), textcoords="offset points", ha="center", va="bottom"
+            )
+    axes.set_aspect("equal")
+
+
+@page
+def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figure:
+    """The road without noise, and some of the plans it was driven by."""
+    figure, axes = subplots(height=3.7)
+    draw_task(axes, task)
+    axes.plot(*rollout.states[:, :2].T, color=INK, lw=1.0, label="road without noise")
+    for i, plan in enumerate(plans):
+        label = "plans" if i == 0 else None
+        axes.plot(*plan.states[:, :2].T, ".-", color=MORE, lw=2.2, ms=5, label=label)
+    farthest = max((_length(plan.states) for plan in plans), default=0.0)
+    axes.set(
+        title=f"Plans of at most {farthest:.1f} m make a road of {_length(rollout.states):.1f} m",
+        xlabel="x [m]",
+        ylabel="y [m]",
+    )
+    axes.legend(loc="lower left", ncols=2)
+    axes.margins(0.04)
+    return figure
+
+
+@page
+def action_values(
+    speeds: Vector, turn_rates: Vector, values: Matrix, value: float, policy: Vector
+) -> Figure:
+    """Q(s, a) over a grid of first actions, one line a speed, above the level V(s).
+
+    Args:
+        speeds: of the grid [m/s], shape (k,).
+        turn_rates: of the grid [rad/s], shape (l,).
+        values: Q(s, a), shape (l, k); nan where a solve failed.
+        value: V(s).
+        policy: the action of V(s), shape (2,).
+    """
+    figure, axes = subplots(height=3.6)
+    shades = plt.get_cmap("cividis")(np.linspace(0.75, 0.0, len(speeds)))
+    for speed, column, shade in zip(speeds, values.T, shades, strict=True):
+        axes.plot(turn_rates, column, ".-", color=shade, label=f"Q at {speed:g} m/s")
+    axes.axhline(value, color=MORE, ls="--", lw=1.2, label="V(s)")
+    axes.plot(policy[1], value, "D", color=MORE, ms=7, label="the policy's action")
+    above = np.nanmin(values) > value - 1e-4
+    axes.set(
+        title="Q meets V at the policy's action, never below"
+        if above
+        else "Q falls below V: V was a local optimum",
+        xlabel="turn rate of the first action [rad/s]",
+        ylabel="value [cost]",
+    )
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure
+
+
+@page
+def theta_effects(
+    task: Task, middle: Rollout, others: Mapping[str, Mapping[str, Rollout]]
+) -> Figure:
+    """One panel a parameter: the road of theta_init, and of two other values of the parameter.
+
+    Args:
+        task: what the rollouts drove in.
+        middle: the closed loop of theta_init.
+        others: name of the parameter -> how it was changed -> closed loop; two changes each.
+    """
+    figure, grid = subplots(3, 3, height=5.0, sharex=True, sharey=True)
+    for axes, (name, changes) in zip(grid.flat, others.items(), strict=False):
+        draw_task(axes, task, labels=False)
+        _road(axes, middle, INK, ":")
+        for (change, rollout), side in zip(changes.items(), _SIDES, strict=False):
+            _road(axes, rollout, side["color"], side["line"])
+            cost = f"{rollout.cost:.0f}" if np.isfinite(rollout.cost) else "fails"
+            where = {"x": side["x"], "y": 0.03, "ha": side["ha"], "color": side["color"]}
+            axes.text(s=f"{change}: {cost}", transform=axes.transAxes, fontsize=9.5, **where)
+        axes.set_title(f"${SYMBOLS[name]}$", fontsize=12)
+    bottom, top = grid[0, 0].get_ylim()
+    grid[0, 0].set_ylim(bottom - 1, top)
+    for axes in grid[-1]:
+        axes.set_xlabel("x [m]")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("y [m]")
+    moved = {
+        name: max(_apart(middle, rollout) for rollout in changes.values())
+        for name, changes in others.items()
+    }
+    first, second, *_ = sorted(moved, key=lambda name: -moved[name])
+    figure.suptitle(
+        f"${SYMBOLS[first]}$ and ${SYMBOLS[second]}$ bend the road most",
+        x=0.01,
+        ha="left",
+        fontweight="bold",
+    )
+    return figure
+
+
+@page
+def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) -> Figure:
+    """The road in the box of departure A, and in the box as the paper prints it."""
+    figure, axes = subplots(height=3.7)
+    draw_task(axes, task)
+    axes.add_patch(Circle(tuple(task.target[:2]), task.near, fill=False, ec=INK, ls=":", lw=1))
+    axes.annotate(
+        f"$d_t$ = {task.near:g} m",
+        task.target[:2] + [0, task.near],
+        (0, 4),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+    )
+    axes.axvline(wall, color=MORE, lw=1)
+    axes.annotate(
+        f"wall at x = {wall:g} m ", (wall, 1), xycoords=("data", "axes fraction"),
+        ha="right", va="top", color=MORE,
+    )  # fmt: skip
+    axes.plot(*repaired.states[:, :2].T, color=INK, ls=":", label="box [−3, 9]² (used here)")
+    axes.plot(*printed.states[:, :2].T, color=MORE, lw=2, label="box [−9, 3]² (as printed)")
+    nearest = np.linalg.norm(printed.states[:, :2] - task.target[:2], axis=1).min()
+    axes.set(
+        title=f"In the printed box the robot comes no nearer than {nearest:.1f} m",
+        xlabel="x [m]",
+        ylabel="y [m]",
+    )
+    axes.margins(0.04)
+    axes.legend(loc="lower left", fontsize=8.5)
+    return figure
+
+
+@page
+def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Figure:
+    """Where the RL penalty begins, where the NMPC keeps away, and what theta_c does about it.
+
+    Args:
+        task: supplies clearance, margin and penalty.
+        theta_c: the values tried, the first one that of theta_init, shape (k,).
+        costs: noise-free cost of each; infinite where a solve failed, shape (k,).
+    """
+    figure, (left, right) = subplots(1, 2, height=3.5)
+    kept = task.discs[2][0] / 2  # centre distance at which Xi = 0 [m]
+    distance = np.linspace(0.9 * kept, 1.25 * kept, 200)
+    penalty = task.penalty * np.maximum(0, 1 - (distance / kept) ** 2 + task.margin)
+    begins = kept * np.sqrt(1 + task.margin)
+    keeps = kept * np.sqrt(1 + theta_c[0])
+    left.plot(distance, penalty, color=INK)
+    left.axvline(keeps, color=MORE, ls="--", label=f"the NMPC keeps {keeps:.3f} m")
+    left.axvline(begins, color=LESS, ls="-.", label=f"the penalty begins at {begins:.3f} m")
+    left.set(title="The penalty begins too early", xlabel="distance to a centre [m]")
+    left.set_ylabel("penalty of a step [cost]")
+    left.legend(loc="upper center", bbox_to_anchor=(0.45, -0.2))
+    order = np.argsort(theta_c)
+    right.plot(theta_c[order], np.where(np.isfinite(costs), costs, np.nan)[order], "o-", color=INK)
+    right.axvline(task.margin, color=LESS, ls="-.", lw=1)
+    best = int(np.argmin(costs))
+    right.set(
+        title=f"$\\theta_c$ = {theta_c[best]:.2f} is cheapest",
+        xlabel="$\\theta_c$ (no unit)",
+        ylabel="noise-free RL cost",
+    )
+    return figure
+
+
+_SIDES: tuple[dict[str, Any], ...] = (
+    {"color": LESS, "line": "-", "x": 0.0, "ha": "left"},
+    {"color": MORE, "line": "--", "x": 1.0, "ha": "right"},
+)  # of the first and of the second change
+
+
+def _road(axes: Axes, rollout: Rollout, color: str, line: str) -> None:
+    """The path, and an arrow for the heading at its end."""
+    axes.plot(*rollout.states[:, :2].T, color=color, ls=line, lw=1.3)
+    x, y, heading = rollout.states[-1]
+    ahead = (x + 0.9 * np.cos(heading), y + 0.9 * np.sin(heading))
+    axes.annotate("", ahead, (x, y), arrowprops={"arrowstyle": "->", "color": color})
+
+
+def _length(states: Matrix) -> float:
+    return float(np.linalg.norm(np.diff(states[:, :2], axis=0), axis=1).sum())
+
+
+def _apart(a: Rollout, b: Rollout) -> float:
+    """Largest distance [m] from a point of one road to the nearest point of the other."""
+    first, second = a.states[:, None, :2], b.states[None, :, :2]
+    between = np.linalg.norm(first - second, axis=-1)
+    return float(max(between.min(axis=0).max(), between.min(axis=1).max()))

@@ -1,0 +1,232 @@
+"""V and Q, the values that make up a controller, and the arguments that are refused."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nmpcrl.control import Nmpc, Obstacle, SolverError, Task, differential_drive
+from nmpcrl.control import nmpc as module
+from nmpcrl.study import paper
+
+THETA = np.array(paper.THETA_INIT)
+START = np.array(paper.START)
+
+
+def test_the_action_value_of_the_policy_is_the_value(robot, draw):
+    for state, theta in draw(20, seed=30):
+        v = robot.solve(state, theta)
+        q = robot.solve(state, theta, v, v.action)
+        assert q.value == pytest.approx(v.value, rel=1e-6, abs=1e-6)
+        np.testing.assert_allclose(q.features, v.features, atol=1e-5 * np.abs(v.features).max())
+        # What pulls at a fixed action is what its bound held back, and nothing where it was free.
+        np.testing.assert_allclose(q.multipliers.action, v.multipliers.inputs[0], atol=1e-2)
+
+
+def test_no_action_is_better_than_the_policys(robot, draw):
+    """Q >= V, where V is the best plan known: a fixed action may lead to a better local minimum."""
+    rng, led = np.random.default_rng(31), 0
+    for state, theta in draw(30, seed=31):
+        q = robot.solve(state, theta, action=rng.uniform(robot.plant.lower, robot.plant.upper))
+        v = robot.solve(state, theta)
+        if q.value < v.value:
+            v = robot.solve(state, theta, q)
+            led += 1
+        assert q.value >= v.value - 1e-7 * abs(v.value)
+    assert led <= 3
+
+
+def test_a_fixed_action_is_the_first_input(robot, draw):
+    rng = np.random.default_rng(32)
+    for state, theta in draw(10, seed=32):
+        action = rng.uniform(robot.plant.lower, robot.plant.upper)
+        solution = robot.solve(state, theta, action=action)
+        np.testing.assert_allclose(solution.action, action, atol=1e-8)
+        assert (np.abs(solution.inputs[1:]) <= robot.plant.upper).all()
+
+
+@pytest.mark.parametrize("corner", [(0.6, np.pi / 2), (-0.6, np.pi / 2), (0.6, -np.pi / 2)])
+def test_an_action_at_its_bound_can_be_fixed(robot, corner):
+    solution = robot.solve(START, THETA, action=np.array(corner))
+    np.testing.assert_allclose(solution.action, corner, atol=1e-8)
+
+
+def test_a_solution_carries_everything_that_learning_reads(robot):
+    solution = robot.solve(START, THETA)
+    assert isinstance(solution.value, float)
+    assert solution.features.shape == (9,)
+    assert solution.states.shape == (11, 3)
+    assert solution.inputs.shape == (10, 2)
+    assert solution.slacks.shape == (11, 4)
+    np.testing.assert_array_equal(solution.action, solution.inputs[0])
+    np.testing.assert_array_equal(solution.next_action, solution.inputs[1])
+    np.testing.assert_array_equal(solution.state, START)
+    np.testing.assert_array_equal(solution.theta, THETA)
+    assert solution.iterations > 0
+    assert solution.seconds > 0
+    assert solution.status == "solved"
+    assert solution.multipliers.action.shape == (0,)
+
+
+def test_multipliers_have_the_signs_that_are_promised(robot, draw):
+    discount = 0.97 ** np.arange(11)[:, None]
+    for state, theta in draw(10, seed=33):
+        solution = robot.solve(state, theta)
+        m = solution.multipliers
+        assert m.dynamics.shape == (10, 3)
+        assert (m.obstacles >= -1e-6).all()
+        assert (m.obstacles <= 100 * discount + 1e-6).all()
+        assert (m.slacks <= 1e-6).all()
+        np.testing.assert_allclose(m.obstacles - m.slacks, 100 * discount + 0 * m.slacks, atol=1e-4)
+        pressed = np.abs(m.inputs) > 1e-2
+        np.testing.assert_allclose(
+            solution.inputs[pressed],
+            (np.sign(m.inputs) * robot.plant.upper)[pressed],
+            atol=1e-5,
+        )
+
+
+def test_the_value_at_the_start_is_about_a_thousand(robot):
+    """DESIGN's reference numbers, from independent code: 1037, and a slope of norm 1934."""
+    solution = robot.solve(START, THETA)
+    assert solution.value == pytest.approx(1037, abs=1)
+    assert np.linalg.norm(solution.features) == pytest.approx(1934, abs=1)
+
+
+def test_the_sign_of_a_weight_means_nothing(robot):
+    flipped = THETA * [-1, 1, -1, 1, -1, 1, -1, 1, 1]
+    one, other = robot.solve(START, THETA), robot.solve(START, flipped)
+    assert other.value == pytest.approx(one.value, rel=1e-9)
+    np.testing.assert_allclose(
+        other.features, one.features * np.sign(flipped), rtol=1e-5, atol=1e-5
+    )
+
+
+@pytest.mark.parametrize("horizon", [1, 2, 25])
+@pytest.mark.parametrize("count", [0, 1, 7])
+def test_horizon_and_number_of_obstacles_are_values(solver, horizon, count):
+    obstacles = tuple(Obstacle(x, -2.0) for x in range(count))
+    box = np.array([9.0, 9.0, np.inf])
+    task = Task(START, np.array(paper.TARGET), -box, box, obstacles)
+    nmpc = Nmpc(differential_drive(), task, horizon=horizon, solver=solver)
+    solution = nmpc.solve(START, THETA)
+    assert solution.inputs.shape == (horizon, 2)
+    assert solution.slacks.shape == (horizon + 1, count)
+    assert nmpc.kkt_residual(solution) < 1e-5
+    later = nmpc.solve(nmpc.plant.step(START, solution.action), THETA, solution)
+    assert nmpc.kkt_residual(later) < 1e-5
+
+
+def test_with_a_horizon_of_one_the_next_action_is_the_only_one(solver):
+    solution = paper.nmpc(horizon=1, solver=solver).solve(START, THETA)
+    np.testing.assert_array_equal(solution.next_action, solution.action)
+
+
+@settings(derandomize=True, deadline=None, max_examples=25)
+@given(
+    state=st.tuples(st.floats(-3, 9), st.floats(-3, 9), st.floats(-7, 7)),
+    scale=st.lists(st.floats(0.1, 10), min_size=9, max_size=9),
+)
+def test_wherever_the_robot_is_there_is_a_plan(controllers, state, scale):
+    """Standing still satisfies every hard constraint, so a state in the box is never infeasible."""
+    try:
+        solution = controllers["fatrop"].solve(np.array(state), THETA * scale)
+    except SolverError:  # about one drawn problem in a thousand
+        solution = controllers["ipopt"].solve(np.array(state), THETA * scale)
+    assert solution.value >= 0
+    assert controllers["fatrop"].kkt_residual(solution) < 1e-3
+
+
+@pytest.fixture
+def unreached(monkeypatch) -> Nmpc:
+    """A controller that must not get as far as a solver."""
+
+    def transcribe(*_, **__):
+        raise AssertionError("the arguments reached the solver")
+
+    monkeypatch.setattr(module, "transcribe", transcribe)
+    return paper.nmpc()
+
+
+ABSURDITIES = [
+    (np.nan, "nan"),
+    (np.inf, "inf"),
+    (-np.inf, "-inf"),
+    (1e7, "e+07"),
+]
+
+
+@pytest.mark.parametrize("index", [0, -1])
+@pytest.mark.parametrize(("number", "shown"), ABSURDITIES)
+@pytest.mark.parametrize("name", ["state", "theta"])
+def test_absurd_numbers_are_refused_before_a_solver_sees_them(
+    unreached, name, number, shown, index
+):
+    arguments = {"state": START.copy(), "theta": THETA.copy()}
+    arguments[name][index] = number
+    with pytest.raises(ValueError, match=f"^{name} .* finite numbers of size at most") as caught:
+        unreached.solve(**arguments)
+    assert shown in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, 1e7])
+def test_an_absurd_action_is_refused_before_a_solver_sees_it(unreached, number):
+    with pytest.raises(ValueError, match=r"^action .* finite numbers"):
+        unreached.solve(START, THETA, action=np.array([0.1, number]))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"state": START[:2]}, r"state has shape \(2,\); it must be \(3,\)"),
+        ({"theta": THETA[:8]}, r"theta has shape \(8,\); it must be \(9,\)"),
+        ({"theta": THETA[None]}, r"theta has shape \(1, 9\); it must be \(9,\)"),
+        ({"theta": 1.0}, r"theta has shape \(\); it must be \(9,\)"),
+        ({"action": np.zeros(3)}, r"action has shape \(3,\); it must be \(2,\)"),
+        ({"theta": "near"}, "theta = 'near' must hold 9 numbers"),
+        ({"state": ["x", "y", "z"]}, r"state = \['x', 'y', 'z'\] must hold 3 numbers"),
+        ({"state": None}, "state"),
+        ({"theta": [[1.0], [1.0, 2.0]]}, "theta = .* must hold 9 numbers"),
+    ],
+)
+def test_arguments_of_the_wrong_shape_or_kind_are_refused(unreached, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        unreached.solve(**{"state": START, "theta": THETA} | arguments)
+
+
+@pytest.mark.parametrize("action", [(0.61, 0.0), (-0.61, 0.0), (0.0, 1.58), (0.0, -1.58)])
+def test_an_action_outside_the_action_space_is_refused(unreached, action):
+    allowed = r"must lie between \[-0.6\s+-1.5708\] and \[0.6\s+1.5708\]"
+    with pytest.raises(ValueError, match=f"^action .* {allowed}"):
+        unreached.solve(START, THETA, action=np.array(action))
+
+
+def test_lists_of_numbers_will_do(robot):
+    solution = robot.solve([-2.5, 1.5, 0], list(paper.THETA_INIT))
+    assert solution.value == robot.solve(START, THETA).value
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"horizon": 0}, "horizon = 0 must be a whole number, 1 or more"),
+        ({"horizon": 2.5}, "horizon = 2.5 must be a whole number"),
+        ({"horizon": True}, "horizon = True must be a whole number"),
+        ({"horizon": "10"}, "horizon = '10' must be a whole number"),
+        ({"gamma": 0.0}, r"gamma = 0.0 must lie in \(0, 1\]"),
+        ({"gamma": 1.01}, "gamma = 1.01 must lie in"),
+        ({"gamma": np.nan}, "gamma = nan must lie in"),
+        ({"slack_weight": 0.0}, "slack_weight = 0.0 must be a positive number"),
+        ({"slack_weight": np.inf}, "slack_weight = inf must be a positive number"),
+        ({"solver": "acados"}, "solver = 'acados' must be one of fatrop, ipopt"),
+    ],
+)
+def test_a_controller_refuses_nonsense_and_says_which(changed, message):
+    with pytest.raises(ValueError, match=message):
+        Nmpc(differential_drive(), paper.task(), **changed)
+
+
+def test_plant_and_task_must_fit_each_other(point_mass):
+    with pytest.raises(ValueError, match="the task has 3 states and the plant 4"):
+        Nmpc(point_mass(), paper.task())

@@ -1,0 +1,104 @@
+"""The plant against the arc that it drives exactly."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from nmpcrl.control import Plant, differential_drive
+
+BOUND = np.ones(1)
+
+
+def arc(state, speed, turn_rate, time):
+    """Where a unicycle is after driving a circle for `time` seconds: the integral of Eq. (17)."""
+    x, y, heading = state
+    later = heading + turn_rate * time
+    radius = speed / turn_rate
+    return np.array(
+        [
+            x + radius * (np.sin(later) - np.sin(heading)),
+            y - radius * (np.cos(later) - np.cos(heading)),
+            later,
+        ]
+    )
+
+
+def drive(period, state, action, time):
+    plant = differential_drive(period)
+    for _ in range(round(time / period)):
+        state = plant.step(state, action)
+    return state
+
+
+def test_runge_kutta_converges_to_the_arc_with_order_four():
+    state, action, time = np.array([-2.5, 1.5, 0.4]), np.array([0.6, 1.5]), 1.6
+    exact = arc(state, *action, time)
+    errors = [np.abs(drive(h, state, action, time) - exact).max() for h in (0.4, 0.2, 0.1)]
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    np.testing.assert_allclose(orders, 4, atol=0.15)
+
+
+def test_runge_kutta_is_the_exponentials_series_up_to_the_fourth_power():
+    """On x' = a x every one of the four slopes differs; the step must be 1 + z + ... + z^4 / 24."""
+    growth = plant(dynamics=lambda state, action: action * state, period=0.5)
+    z = 0.5 * 0.8
+    series = 1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24
+    np.testing.assert_allclose(
+        growth.step(np.array([1.0, -2.0]), np.array([0.8])), [series, -2 * series]
+    )
+
+
+def test_a_step_is_a_fifth_of_a_second_long():
+    state, action = np.array([1.0, 2.0, -0.7]), np.array([0.5, -1.0])
+    stepped = differential_drive().step(state, action)
+    np.testing.assert_allclose(stepped, arc(state, *action, 0.2), atol=1e-6)
+    assert stepped.shape == (3,)
+
+
+def test_a_robot_that_does_not_turn_drives_straight():
+    stepped = differential_drive().step(np.array([1.0, 2.0, np.pi / 2]), np.array([0.5, 0.0]))
+    np.testing.assert_allclose(stepped, [1.0, 2.1, np.pi / 2], atol=1e-15)
+
+
+def test_the_point_mass_moves_by_the_parabola(point_mass):
+    state, push = np.array([1.0, 2.0, 3.0, -1.0]), np.array([0.5, 2.0])
+    exact = [*(state[:2] + 0.2 * state[2:] + 0.2**2 / 2 * push), *(state[2:] + 0.2 * push)]
+    np.testing.assert_allclose(point_mass().step(state, push), exact, atol=1e-14)
+
+
+def test_an_action_is_clipped_to_the_action_space():
+    plant = differential_drive()
+    np.testing.assert_array_equal(plant.clip(np.array([1.6, -0.1])), [0.6, -0.1])
+    np.testing.assert_array_equal(plant.clip(np.array([-9.0, 9.0])), [-0.6, np.pi / 2])
+
+
+def plant(**changed):
+    fields = {
+        "dynamics": lambda state, action: ca.vertcat(action, action),
+        "state_names": ("x", "y"),
+        "action_names": ("a",),
+        "lower": -BOUND,
+        "upper": BOUND,
+    }
+    return Plant(**fields | changed)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"upper": np.ones(2)}, r"plant.upper = \[1. 1.\] must hold 1 numbers"),
+        ({"lower": [np.nan]}, r"plant.lower = \[nan\] must hold 1 numbers"),
+        ({"lower": BOUND}, r"plant.lower = \[1.\] must lie below upper = \[1.\]"),
+        ({"period": 0.0}, r"plant.period = 0.0 must be a positive number"),
+        ({"period": np.inf}, r"plant.period = inf must be a positive number"),
+        ({"period": np.nan}, r"plant.period = nan must be a positive number"),
+        ({"state_names": ("x",)}, "its position; 1 state is too few"),
+    ],
+)
+def test_a_plant_refuses_nonsense_and_says_which(changed, message):
+    with pytest.raises(ValueError, match=message):
+        plant(**changed)
+
+
+def test_bounds_may_be_given_as_lists():
+    assert plant(lower=[-2], upper=[3]).upper.dtype == float

@@ -1,0 +1,138 @@
+"""The task: Xi and the RL cost by hand, and what is refused."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.control import Obstacle, Task
+
+STILL = np.zeros(2)
+
+
+def task(**changed):
+    fields = {
+        "start": np.array([-2.5, 1.5, 0.0]),
+        "target": np.array([8.5, 2.0, np.pi / 2]),
+        "lower": np.array([-3.0, -3.0, -np.inf]),
+        "upper": np.array([9.0, 9.0, np.inf]),
+        "obstacles": (Obstacle(0.5, 2.2), Obstacle(3.0, 0.5)),
+    }
+    return Task(**fields | changed)
+
+
+def test_overlap_is_one_at_the_centre_and_zero_where_robot_and_obstacle_touch():
+    centre, edge = np.array([0.5, 2.2, 0.3]), np.array([0.5, 2.2 + 1.25, -1.0])
+    assert task().overlap(centre)[0] == 1
+    assert task().overlap(edge)[0] == pytest.approx(0, abs=1e-15)
+
+
+def test_overlap_follows_equation_nineteen():
+    state = np.array([1.0, 1.0, 0.0])
+    by_hand = [
+        1 - 4 * (0.5**2 + 1.2**2) / 2.5**2,
+        1 - 4 * (2.0**2 + 0.5**2) / 2.5**2,
+    ]
+    np.testing.assert_allclose(task().overlap(state), by_hand, rtol=1e-13)
+
+
+def test_overlap_takes_many_states_at_once():
+    states = np.random.default_rng(0).uniform(-3, 9, (4, 5, 3))
+    one_by_one = [[task().overlap(s) for s in row] for row in states]
+    np.testing.assert_array_equal(task().overlap(states), one_by_one)
+
+
+def test_overlap_knows_the_diameters():
+    small = task(obstacles=(Obstacle(0.0, 0.0, diameter=0.5),), robot_diameter=0.3)
+    assert small.overlap(np.array([0.4, 0.0, 0.0]))[0] == pytest.approx(0, abs=1e-15)
+
+
+def test_far_from_the_target_the_cost_is_distance_and_penalty():
+    state, action = np.array([0.5, 1.2, 0.5]), np.array([0.6, 1.0])
+    tracking = 8.0**2 + 0.8**2 + 0.1 * (np.pi / 2 - 0.5) ** 2
+    penalty = 50 * (1 - 4 * 1.0**2 / 2.5**2 + 0.35)  # the second obstacle is too far away
+    assert task().stage_cost(state, action) == pytest.approx(tracking + penalty, rel=1e-14)
+
+
+def test_near_the_target_the_cost_is_distance_and_the_norm_of_the_action():
+    state, action = np.array([8.0, 2.5, 1.5]), np.array([0.3, -0.4])
+    tracking = 0.5**2 + 0.5**2 + 0.1 * (np.pi / 2 - 1.5) ** 2
+    assert task().stage_cost(state, action) == pytest.approx(tracking + 0.5, rel=1e-14)
+
+
+def test_near_means_closer_than_d_t_over_all_states():
+    action = np.array([0.3, -0.4])  # its norm, 0.5, is charged only nearby
+    at = {r: np.array([8.5 - r, 2.0, np.pi / 2]) for r in (1.4999, 1.5)}
+    assert task().stage_cost(at[1.4999], action) == pytest.approx(1.4999**2 + 0.5)
+    assert task().stage_cost(at[1.5], action) == pytest.approx(1.5**2)
+    turned = np.array([8.5 - 1.4999, 2.0, np.pi / 2 + 0.1])  # the heading is part of the distance
+    assert task().stage_cost(turned, action) == pytest.approx(1.4999**2 + 0.1 * 0.1**2)
+
+
+def test_nearby_no_obstacle_is_charged():
+    crowded = task(obstacles=(Obstacle(8.5, 2.0),))
+    assert crowded.stage_cost(crowded.target, STILL) == 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0, 4.0])
+def test_the_penalty_vanishes_at_a_centre_distance_of_1452_millimetres(angle):
+    centre, direction = np.array([0.5, 2.2, 0.0]), np.array([np.cos(angle), np.sin(angle), 0.0])
+    alone = task(obstacles=(Obstacle(0.5, 2.2),))
+    assert alone.collision_penalty(centre + 1.4523 * direction) > 0
+    assert alone.collision_penalty(centre + 1.4524 * direction) == 0
+    assert 1.25 * np.sqrt(1.35) == pytest.approx(1.4524, abs=5e-5)
+
+
+def test_the_penalty_adds_up_over_obstacles():
+    twice = task(obstacles=(Obstacle(0.5, 2.2), Obstacle(0.5, 2.2)))
+    assert twice.collision_penalty(np.array([0.5, 2.2, 0.0])) == pytest.approx(2 * 50 * 1.35)
+
+
+def test_without_obstacles_there_is_no_overlap_and_no_penalty():
+    empty = task(obstacles=())
+    assert empty.overlap(empty.start).shape == (0,)
+    assert empty.collision_penalty(empty.start) == 0
+
+
+def test_a_target_outside_the_box_is_refused_with_the_numbers():
+    with pytest.raises(
+        ValueError, match=r"target \[8.5\s+2.\s+1.57\] is outside the box \[-9, 3\]"
+    ):
+        task(lower=np.array([-9.0, -9.0, -np.inf]), upper=np.array([3.0, 3.0, np.inf]))
+
+
+def test_a_target_outside_the_box_can_be_asked_for():
+    printed = {"lower": np.array([-9, -9, -np.inf]), "upper": np.array([3, 3, np.inf])}
+    assert task(**printed, target_may_lie_outside=True).target[0] == 8.5
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"start": np.array([-4.0, 1.5, 0.0])}, r"start .* is outside the box \[-3, 9\]"),
+        ({"start": np.array([0.0, 1.5, np.inf])}, "task.start = .* must be finite"),
+        ({"target": np.array([8.5, 2.0, -np.inf])}, "task.target = .* must be finite"),
+        ({"target": np.array([8.5, 2.0])}, "task.target = .* must hold 3 numbers"),
+        ({"target": np.array([8.5, np.nan, 0.0])}, "task.target = .* must hold 3 numbers"),
+        ({"weights": np.ones(2)}, "task.weights = .* must hold 3 numbers"),
+        ({"lower": np.array([9.0, -3, -np.inf])}, "task.lower = .* must lie below upper"),
+        ({"near": -1.0}, "task.near = -1.0 must be 0 or more"),
+        ({"margin": np.nan}, "task.margin = nan must be 0 or more"),
+        ({"penalty": np.inf}, "task.penalty = inf must be 0 or more"),
+    ],
+)
+def test_a_task_refuses_nonsense_and_says_which(changed, message):
+    with pytest.raises(ValueError, match=message):
+        task(**changed)
+
+
+@pytest.mark.parametrize(
+    ("disc", "message"),
+    [
+        ((np.nan, 0.0), r"obstacle centre \(nan, 0.0\) must be finite"),
+        ((0.0, np.inf), r"obstacle centre \(0.0, inf\) must be finite"),
+        ((0.0, 0.0, 0.0), "obstacle diameter 0.0 must be a positive length"),
+        ((0.0, 0.0, np.nan), "obstacle diameter nan must be a positive length"),
+    ],
+)
+def test_an_obstacle_refuses_nonsense_and_says_which(disc, message):
+    with pytest.raises(ValueError, match=message):
+        Obstacle(*disc)

@@ -1,0 +1,146 @@
+"""The network: it learns, forgets no row, disturbs no generator, and seeds decide its bits."""
+
+import numpy as np
+import pytest
+import torch
+
+from nmpcrl.learning import QNetwork
+
+
+def network(inputs=2, seed=0, **options):
+    return QNetwork(inputs, np.random.default_rng(seed), **options)
+
+
+def rows(count, inputs=2, seed=1):
+    drawn = np.random.default_rng(seed).uniform(-1, 1, (count, inputs))
+    return drawn, 3 * drawn[:, 0] ** 2 - drawn[:, 1]
+
+
+def taught(examples, **options):
+    learner = network(**options)
+    for inputs, target in zip(*examples, strict=True):
+        learner.remember(inputs, target)
+    return learner
+
+
+def error(learner, examples):
+    inputs, targets = examples
+    return np.sqrt(np.mean((learner.predict(inputs) - targets) ** 2))
+
+
+def test_it_learns_a_known_function():
+    learner, held_out = taught(rows(1000)), rows(500, seed=2)
+    before = error(learner, held_out)
+    for _ in range(600):
+        learner.fit()
+    spread = held_out[1].std()
+    assert before > 0.8 * spread
+    assert error(learner, held_out) < 0.1 * spread
+
+
+def test_the_loss_is_the_mean_squared_error_before_the_step():
+    examples = rows(64)
+    learner = taught(examples, batch=64)
+    before = error(learner, examples) ** 2
+    assert learner.fit() == pytest.approx(before, rel=1e-5)
+    assert error(learner, examples) ** 2 != pytest.approx(before, rel=1e-5)
+
+
+def test_the_buffer_grows_past_its_capacity_and_keeps_every_row():
+    """With a batch as large as the buffer, the loss is over every row that was remembered."""
+    examples = rows(300)
+    learner = taught(examples, batch=300, capacity=4)
+    assert len(learner) == 300
+    assert learner.fit() == pytest.approx(error(learner_like(examples), examples) ** 2, rel=1e-5)
+
+
+def learner_like(examples):
+    """The same first weights, and a buffer that never had to grow."""
+    return taught(examples, batch=300, capacity=1000)
+
+
+def test_it_is_ready_once_it_holds_a_batch():
+    learner = network(batch=3)
+    ready = []
+    for _ in range(4):
+        ready.append(learner.ready)
+        learner.remember(np.zeros(2), 0.0)
+    assert ready == [False, False, False, True]
+
+
+def test_too_few_examples_cannot_be_fitted():
+    learner = taught(rows(127))
+    with pytest.raises(ValueError, match="127 examples are too few for a batch of 128"):
+        learner.fit()
+
+
+def test_a_mini_batch_has_no_row_twice():
+    """Drawn with replacement, 64 of 64 rows would miss some, and the loss would differ."""
+    for seed in range(5):
+        examples = rows(64, seed=seed)
+        learner = taught(examples, batch=64)
+        assert learner.fit() == pytest.approx(error(network(), examples) ** 2, rel=1e-5)
+
+
+def test_torchs_own_generator_is_left_alone():
+    torch.manual_seed(99)  # or a network of an earlier test might have left this very state
+    before = torch.random.get_rng_state()
+    learner = taught(rows(128))
+    learner.fit()
+    learner.predict(np.zeros(2))
+    assert torch.equal(torch.random.get_rng_state(), before)
+
+
+def test_torchs_own_generator_does_not_decide_the_weights():
+    predictions = []
+    for seed in (1, 2):
+        torch.manual_seed(seed)
+        predictions.append(network().predict(rows(10)[0]))
+    np.testing.assert_array_equal(*predictions)
+
+
+def train(seed):
+    learner = taught(rows(200), seed=seed)
+    losses = [learner.fit() for _ in range(20)]
+    return losses, learner.predict(rows(10)[0])
+
+
+def test_the_same_seed_gives_the_same_bits():
+    (losses, predictions), (again, repeated) = train(5), train(5)
+    assert losses == again
+    np.testing.assert_array_equal(predictions, repeated)
+
+
+def test_another_seed_gives_others():
+    assert not np.array_equal(train(5)[1], train(6)[1])
+
+
+def test_it_predicts_one_input_or_many():
+    learner, (inputs, _) = network(), rows(12)
+    many = learner.predict(inputs.reshape(3, 4, 2))
+    assert many.shape == (3, 4)
+    one = learner.predict(inputs[0])
+    assert one.shape == ()
+    assert float(one) == pytest.approx(many[0, 0], rel=1e-6)
+
+
+def test_predicting_teaches_nothing():
+    learner = taught(rows(128))
+    before = learner.predict(rows(5)[0])
+    np.testing.assert_array_equal(learner.predict(rows(5)[0]), before)
+    assert len(learner) == 128
+
+
+def test_it_has_two_hidden_layers_of_64():
+    """With 14 inputs, (14 + 1) 64 + (64 + 1) 64 + 65 weights: Table I."""
+    learner = network(inputs=14)
+    assert sum(p.numel() for p in learner._model.parameters()) == 15 * 64 + 65 * 64 + 65
+
+
+def test_what_it_is_told_is_copied():
+    """The caller may reuse its array."""
+    learner, inputs = network(batch=1), np.ones(2)
+    learner.remember(inputs, 1.0)
+    expected = (float(learner.predict(inputs)) - 1.0) ** 2
+    inputs[:] = 50.0
+    assert learner.fit() == pytest.approx(expected, rel=1e-5)

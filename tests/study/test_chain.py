@@ -1,0 +1,141 @@
+"""The two-state chain of chapter 4: what diverges on it, what converges, and when."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nmpcrl.learning import Weights
+from nmpcrl.learning.learners import gradient_td, semi_gradient
+from nmpcrl.study.chain import (
+    FIRST,
+    PHI,
+    SECOND,
+    Chain,
+    auxiliary_fixed_point,
+    expected_matrix,
+    expected_step,
+    follow,
+    growth,
+    mspbe,
+    projected_bellman_error,
+    sampled_step,
+)
+
+CHAIN = Chain(gamma=0.97)
+ALPHA = 0.1
+
+discounts = st.floats(0.0, 1.0)
+shares = st.floats(0.0, 1.0)
+numbers = st.floats(-10.0, 10.0)
+
+
+def test_semi_gradient_diverges_on_the_two_state_chain():
+    theta = follow(CHAIN, semi_gradient(ALPHA), 200)[:, 0]
+    assert (np.diff(theta) > 0).all()
+    assert theta[-1] > 1e7
+
+
+@given(gamma=discounts, alpha=st.floats(0.01, 0.5))
+def test_the_semi_gradient_multiplies_theta_by_one_plus_alpha_times_two_gamma_minus_one(
+    gamma, alpha
+):
+    theta = follow(Chain(gamma), semi_gradient(alpha), 3)[:, 0]
+    np.testing.assert_allclose(theta, (1 + alpha * (2 * gamma - 1)) ** np.arange(4))
+
+
+def test_gradient_td_converges_on_the_two_state_chain():
+    path = follow(CHAIN, gradient_td(ALPHA, 4 * ALPHA, CHAIN.gamma), 400)
+    np.testing.assert_allclose(path[-1], 0, atol=1e-6)
+
+
+def test_gradient_td_diverges_there_too_if_w_is_as_slow_as_in_table_i():
+    path = follow(CHAIN, gradient_td(ALPHA, ALPHA / 10, CHAIN.gamma), 400)
+    assert np.abs(path[-1]).max() > 1e6
+
+
+@given(gamma=st.floats(0.6, 1.0), alpha=st.floats(0.001, 0.3), ratio=st.floats(0.05, 3.0))
+def test_gradient_td_converges_just_when_w_is_fast_enough(gamma, alpha, ratio):
+    slope = 2 * gamma - 1
+    bound = slope / (1 - alpha * slope**2)
+    if np.isclose(ratio, bound, rtol=1e-3):
+        return
+    radius = growth(Chain(gamma), gradient_td(alpha, ratio * alpha, gamma))
+    assert (radius < 1) == (ratio > bound)
+
+
+def test_on_policy_the_semi_gradient_converges():
+    theta = follow(Chain(share=0.5), semi_gradient(ALPHA), 200)[:, 0]
+    np.testing.assert_allclose(theta[-1], 0, atol=1e-6)
+
+
+def test_the_semi_gradient_turns_where_the_share_of_the_first_state_passes_its_bound():
+    bound = 4 / (3 + 2 * CHAIN.gamma)
+    rule = semi_gradient(0.01)
+    assert expected_matrix(Chain(share=bound - 0.01), rule)[0, 0] < 1
+    assert expected_matrix(Chain(share=bound + 0.01), rule)[0, 0] > 1
+
+
+@given(gamma=discounts, share=shares, theta=numbers)
+def test_w_moves_to_its_fixed_point_while_theta_is_held(gamma, share, theta):
+    chain = Chain(gamma, share)
+    held = gradient_td(0.0, 0.1, gamma)
+    w = follow(chain, held, 300, theta=theta)[-1, 1]
+    np.testing.assert_allclose(w, auxiliary_fixed_point(chain, theta), atol=1e-6)
+
+
+@given(gamma=discounts, share=shares, theta=numbers)
+def test_with_w_at_its_fixed_point_theta_descends_the_mspbe(gamma, share, theta):
+    chain = Chain(gamma, share)
+    w = auxiliary_fixed_point(chain, theta)
+    rule = gradient_td(1.0, 1.0, gamma)
+    moved = expected_step(chain, rule, Weights(np.array([theta]), np.array([w]))).theta[0] - theta
+    h = 1e-4
+    slope = (mspbe(chain, theta + h) - mspbe(chain, theta - h)) / (2 * h)
+    np.testing.assert_allclose(moved, -slope / 2, atol=1e-6)
+
+
+@given(gamma=discounts, share=shares, theta=numbers)
+def test_the_two_forms_of_the_mspbe_agree(gamma, share, theta):
+    chain = Chain(gamma, share)
+    np.testing.assert_allclose(
+        projected_bellman_error(chain, theta), mspbe(chain, theta), atol=1e-9
+    )
+
+
+@given(gamma=discounts, share=shares, theta=numbers, w=numbers)
+def test_an_expected_step_is_the_mean_of_the_sampled_ones_and_linear(gamma, share, theta, w):
+    chain, weights = Chain(gamma, share), Weights(np.array([theta]), np.array([w]))
+    rule = gradient_td(0.1, 0.2, gamma)
+    mean = expected_step(chain, rule, weights)
+    first, second = (sampled_step(chain, rule, weights, state) for state in (FIRST, SECOND))
+    np.testing.assert_allclose(mean.theta, share * first.theta + (1 - share) * second.theta)
+    np.testing.assert_allclose(mean.w, share * first.w + (1 - share) * second.w, atol=1e-12)
+    np.testing.assert_allclose(
+        expected_matrix(chain, rule) @ [theta, w], [mean.theta[0], mean.w[0]], atol=1e-9
+    )
+
+
+def test_sampled_updates_stay_around_the_expected_ones():
+    chain, rule = Chain(share=0.5), semi_gradient(0.01)
+    paths = [follow(chain, rule, 50, rng=np.random.default_rng(seed)) for seed in range(300)]
+    np.testing.assert_allclose(np.mean(paths, axis=0), follow(chain, rule, 50), atol=0.02)
+
+
+def test_updates_of_the_first_state_alone_leave_nothing_to_chance():
+    rule = gradient_td(ALPHA, ALPHA, CHAIN.gamma)
+    sampled = follow(CHAIN, rule, 20, rng=np.random.default_rng(0))
+    np.testing.assert_array_equal(sampled, follow(CHAIN, rule, 20))
+
+
+def test_the_true_value_makes_every_error_zero():
+    for state in (FIRST, SECOND):
+        assert CHAIN.delta(np.zeros(1), state) == 0
+    assert mspbe(CHAIN, 0.0) == 0
+    assert (PHI > 0).all()
+
+
+@pytest.mark.parametrize("name", ["gamma", "share"])
+def test_a_probability_outside_zero_and_one_is_refused(name):
+    with pytest.raises(ValueError, match=rf"{name} = 1\.5 must lie in \[0, 1\]"):
+        Chain(**{name: 1.5})

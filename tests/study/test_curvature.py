@@ -1,0 +1,53 @@
+"""The term that Eq. (16) drops: its size along a run of GES."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.study import Experiment, paper, run
+from nmpcrl.study.curvature import Curvature, dropped_curvature
+
+
+@pytest.fixture(scope="module")
+def records():
+    return run(Experiment("GES", episodes=2, steps=40, evaluate_every=2))
+
+
+@pytest.fixture(scope="module")
+def everywhere(records):
+    """Measured at every step but the first."""
+    return dropped_curvature(records, samples=10_000)
+
+
+def test_samples_are_spread_over_the_run(records):
+    measured = dropped_curvature(records, samples=20)
+    assert 10 <= len(measured.ratio) <= 20
+    assert set(measured.episode) == {0, 1}
+    assert (np.diff(measured.episode) >= 0).all()
+
+
+def test_the_printed_direction_is_the_one_that_theta_went(records, everywhere):
+    steps = records.steps
+    went = np.diff(np.vstack([records.experiment["theta"], steps["theta"]]), axis=0) / paper.ALPHA
+    lengths = np.linalg.norm(went, axis=1)[1:]
+    assert len(everywhere.direction) == len(lengths)
+    close = np.isclose(everywhere.direction, lengths, rtol=1e-3)
+    assert close.mean() > 0.95  # a cold solve may find another optimum
+
+
+def test_the_dropped_term_is_the_hessian_by_differences(records, everywhere):
+    """h along one direction: the gradient of Q at theta + t w, differenced."""
+    k, t = 60, 1e-4
+    steps = records.steps
+    theta, w, delta = steps["theta"][k - 1], steps["w"][k - 1], steps["delta"][k]
+    nmpc = paper.nmpc()
+    solution = nmpc.solve(steps["state"][k], theta)
+    unit = w / np.linalg.norm(w)
+    after, before = (nmpc.solve(steps["state"][k], theta + s * t * unit, solution) for s in (1, -1))
+    bend = np.linalg.norm(w) * (after.features - before.features) / (2 * t)
+    h = (delta - solution.features @ w) * bend
+    assert np.linalg.norm(h) == pytest.approx(everywhere.dropped[k - 1], rel=0.05)
+
+
+def test_the_ratio_is_dropped_over_printed():
+    measured = Curvature(np.zeros(2), np.array([2.0, 4.0]), np.array([1.0, 1.0]))
+    np.testing.assert_array_equal(measured.ratio, [0.5, 0.25])

@@ -1,0 +1,363 @@
+"""An experiment names one run: what it refuses, that it repeats, and what its records say."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nmpcrl.control import Nmpc, SolverError, differential_drive
+from nmpcrl.study import Experiment, ParameterError, experiment, main_study, paper, run, sweep
+from nmpcrl.study.experiment import DECAYS, LEARNERS, prepare
+from nmpcrl.study.training import Persistent
+
+CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
+SHORT = {"episodes": 2, "steps": 70, "evaluate_every": 2}  # the networks are ready after 128 steps
+
+
+def message_of(make, *arguments, **fields):
+    with pytest.raises(ParameterError) as caught:
+        make(*arguments, **fields)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert len(message) < 300
+    return message
+
+
+REFUSED = [
+    ("episodes", 0, "must be a whole number, 1 or more"),
+    ("episodes", -3, "must be a whole number, 1 or more"),
+    ("episodes", 20.0, "must be a whole number, 1 or more"),
+    ("episodes", "20", "must be a whole number, 1 or more"),
+    ("episodes", True, "must be a whole number, 1 or more"),
+    ("episodes", None, "must be a whole number, 1 or more"),
+    ("steps", 0, "must be a whole number, 1 or more"),
+    ("horizon", 0, "must be a whole number, 1 or more"),
+    ("evaluate_every", 0, "must be a whole number, 1 or more"),
+    ("seed", -1, "must be a whole number, 0 or more"),
+    ("seed", 1.5, "must be a whole number, 0 or more"),
+    ("seed", False, "must be a whole number, 0 or more"),
+    ("layout", "Z", "must be one of A"),
+    ("layout", 1, "must be one of A"),
+    ("learner", "SARSA", "must be one of ES, DES, RDES, GES, frozen"),
+    ("learner", "es", "must be one of ES, DES, RDES, GES, frozen"),
+    ("decay", "year", "must be one of step, episode"),
+    ("solver", "acados", "must be one of fatrop, ipopt"),
+    ("alpha", -1e-7, "must be a positive number"),
+    ("alpha", 0, "must be a positive number"),
+    ("alpha", np.nan, "must be a positive number"),
+    ("alpha", np.inf, "must be a positive number"),
+    ("alpha", "1e-7", "must be a positive number"),
+    ("alpha", True, "must be a positive number"),
+    ("beta", -1.0, "must be a positive number"),
+    ("zeta", 0.0, "must be a positive number"),
+    ("decay_rate", 0.0, "must be a number in (0, 1]"),
+    ("decay_rate", 1.01, "must be a number in (0, 1]"),
+    ("gated", 1, "must be true or false"),
+    ("gated", "no", "must be true or false"),
+    ("theta", (1.0,) * 8, "must be 9 numbers"),
+    ("theta", (1.0,) * 8 + (np.nan,), "must be 9 numbers"),
+    ("theta", (1.0,) * 8 + (1e7,), "of size at most 1e+06"),
+    ("theta", 1.0, "must be 9 numbers"),
+    ("theta", "default", "must be 9 numbers"),
+    ("theta", "123456789", "must be 9 numbers"),
+]
+
+
+@pytest.mark.parametrize(("name", "given", "allowed"), REFUSED)
+def test_a_field_that_is_not_what_it_may_be_is_refused_in_one_sentence(name, given, allowed):
+    message = message_of(Experiment, **{name: given})
+    assert message.startswith(f"{name} = {given!r} ")
+    assert allowed in message
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "allowed"), [row for row in REFUSED if row[0] not in ("theta",)]
+)
+def test_a_sweep_refuses_the_same_fixed_or_on_an_axis(name, given, allowed):
+    for value in (given, [given]):
+        message = message_of(sweep, **{name: value})
+        assert name in message
+        assert allowed in message
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    name=st.sampled_from([field.name for field in dataclasses.fields(Experiment)]),
+    value=st.one_of(
+        st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.binary()
+    ),
+)
+def test_whatever_a_field_is_given_it_is_taken_or_refused_by_name(name, value):
+    refusal = f"{name} = "
+    try:
+        taken = Experiment(**{name: value})
+    except ParameterError as error:
+        refusal = str(error)
+    else:
+        assert getattr(taken, name) == value
+        assert hash(taken) == hash(Experiment(**{name: value}))
+    assert refusal.startswith(f"{name} = ")
+
+
+def test_a_list_that_arrived_as_text_shows_how_to_write_it():
+    message = message_of(sweep, seed="[3]", episodes=20)
+    assert message.startswith("seeds = '[3]' ")
+    assert "-y '{seeds: [3]}'" in message
+
+
+@pytest.mark.parametrize("empty", [[], ()])
+def test_an_axis_without_values_is_refused(empty):
+    assert message_of(sweep, seed=empty) == f"seeds = {empty!r} must name at least one seed"
+
+
+def test_an_unknown_parameter_is_refused_with_those_there_are():
+    message = message_of(sweep, episode=3)
+    assert message.startswith("'episode' is not a parameter")
+    for field in dataclasses.fields(Experiment):
+        assert field.name in message
+
+
+def test_a_sweep_is_every_combination_in_order():
+    experiments = sweep(learner=("ES", "GES"), seed=[0, 1], episodes=20)
+    assert [(e.learner, e.seed) for e in experiments] == [
+        ("ES", 0),
+        ("ES", 1),
+        ("GES", 0),
+        ("GES", 1),
+    ]
+    assert {e.episodes for e in experiments} == {20}
+
+
+def test_theta_is_one_value_of_a_sweep_not_an_axis():
+    (only,) = sweep(theta=[2.0] * 9)
+    assert only.theta == (2.0,) * 9
+
+
+def test_the_study_of_the_book_is_five_learners_two_decays_and_the_seeds():
+    experiments = main_study(episodes=7, seeds=[4, 5])
+    assert len(experiments) == len(set(experiments)) == 5 * 2 * 2
+    assert {e.learner for e in experiments} == set(LEARNERS)
+    assert {e.decay for e in experiments} == set(DECAYS)
+    assert {(e.seed, e.episodes, e.layout) for e in experiments} == {(4, 7, "A"), (5, 7, "A")}
+
+
+def test_an_experiment_is_a_value():
+    assert Experiment(alpha=1) == Experiment(alpha=1.0)
+    assert Experiment(theta=list(paper.THETA_INIT)) == Experiment()
+    assert len({Experiment(), Experiment(seed=1), Experiment()}) == 2
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Experiment().seed = 2
+
+
+def test_the_defaults_are_table_one():
+    e = Experiment()
+    assert (e.episodes, e.steps, e.horizon) == (300, 130, 10)
+    assert (e.alpha, e.beta, e.zeta) == (1e-7, 1e-8, 1e-2)
+    assert e.theta == (1, 1, 0.05, 0.05, 0.05, 1, 1, 0.1, 0.001)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """One short run of each learner."""
+    return {name: run(Experiment(learner=name, **SHORT)) for name in LEARNERS}
+
+
+def same(one, other):
+    return all(
+        np.array_equal(table[name], beside[name], equal_nan=True)
+        for table, beside in ((one.steps, other.steps), (one.evaluations, other.evaluations))
+        for name in table
+        if name not in CLOCKS
+    )
+
+
+@pytest.mark.parametrize("learner", LEARNERS)
+def test_the_same_experiment_gives_the_same_bits(runs, learner):
+    assert same(run(Experiment(learner=learner, **SHORT)), runs[learner])
+
+
+@pytest.mark.parametrize("learner", ["ES", "RDES"])
+def test_another_seed_gives_other_bits(runs, learner):
+    other = run(Experiment(learner=learner, seed=1, **SHORT))
+    assert not same(other, runs[learner])
+    assert not np.array_equal(other.steps["theta"][-1], runs[learner].steps["theta"][-1])
+
+
+def test_all_learners_of_a_seed_meet_the_same_noise():
+    controller = Persistent(paper.nmpc())
+    first, *others = (prepare(Experiment(learner=n, seed=3), controller)[2] for n in LEARNERS)
+    for explore in others:
+        np.testing.assert_array_equal(explore.noise, first.noise)
+
+
+def test_the_noise_does_not_depend_on_the_decay():
+    controller = Persistent(paper.nmpc())
+    one, other = (prepare(Experiment(decay=d, seed=3), controller)[2].noise for d in DECAYS)
+    np.testing.assert_array_equal(one, other)
+
+
+def test_the_first_action_is_the_same_for_all_learners(runs):
+    actions = [records.steps["action"][0] for records in runs.values()]
+    for action in actions:
+        np.testing.assert_array_equal(action, actions[0])
+
+
+@pytest.mark.parametrize("learner", LEARNERS)
+def test_every_step_has_a_row_and_every_column_every_row(runs, learner):
+    steps = runs[learner].steps
+    np.testing.assert_array_equal(steps["episode"], np.repeat([0, 1], 70))
+    np.testing.assert_array_equal(steps["time"], np.tile(np.arange(70), 2))
+    assert {len(column) for column in steps.values()} == {140}
+    assert runs[learner].facts["stopped"] == "finished"
+    assert (steps["status"] == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("learner", "solves"), [("ES", 2), ("GES", 2), ("DES", 1), ("RDES", 1), ("frozen", 1)]
+)
+def test_solves_per_step_are_what_the_table_of_learners_says(runs, learner, solves):
+    assert (runs[learner].steps["solves"] == solves).all()
+
+
+@pytest.mark.parametrize("learner", LEARNERS)
+def test_the_columns_satisfy_the_definition_of_the_td_error(runs, learner):
+    s = runs[learner].steps
+    delta = s["cost"] + 0.97 * s["next_value"] - s["value"]
+    np.testing.assert_allclose(s["delta"], delta, rtol=1e-12)
+    np.testing.assert_allclose(s["alpha_phi2"], 1e-7 * (s["features"] ** 2).sum(axis=1))
+
+
+@pytest.mark.parametrize("learner", ["ES", "DES", "RDES"])
+def test_the_columns_satisfy_the_semi_gradient(runs, learner):
+    s = runs[learner].steps
+    before = np.vstack([paper.THETA_INIT, s["theta"][:-1]])
+    moved = np.nan_to_num(1e-7 * s["delta"])[:, None] * s["features"]
+    np.testing.assert_allclose(s["theta"], before + moved, rtol=1e-13)
+    assert (s["w"] == 1e-4).all()
+
+
+def test_the_columns_satisfy_gradient_tds_second_equation(runs):
+    s = runs["GES"].steps
+    before = np.vstack([np.full(9, 1e-4), s["w"][:-1]])
+    overlap = (s["features"] * before).sum(axis=1)
+    moved = 1e-8 * (s["delta"] - overlap)[:, None] * s["features"]
+    np.testing.assert_allclose(s["w"], before + moved, rtol=1e-12)
+
+
+@pytest.mark.parametrize("learner", ["DES", "RDES"])
+def test_gated_learners_stand_still_for_127_steps(runs, learner):
+    s = runs[learner].steps
+    assert np.isnan(s["delta"][:127]).all()
+    assert (s["theta"][:127] == paper.THETA_INIT).all()
+    assert np.isfinite(s["delta"][127:]).all()
+    assert np.isfinite(s["loss"][127:]).all()
+    assert (s["theta"][127] != paper.THETA_INIT).any()
+
+
+def test_read_literally_they_move_from_the_first_step():
+    """Towards a network that knows nothing yet: theta_x falls, as departure G says."""
+    s = run(Experiment(learner="RDES", gated=False, episodes=1, steps=60)).steps
+    assert np.isfinite(s["delta"]).all()
+    assert np.isnan(s["loss"]).all()
+    assert (s["delta"] < 0).mean() > 0.9
+    assert s["theta"][-1, 0] < 0.7
+
+
+def test_frozen_has_no_td_error_and_no_step(runs):
+    s = runs["frozen"].steps
+    assert (s["theta"] == paper.THETA_INIT).all()
+    assert np.isnan(s["delta"]).all()
+
+
+def test_evaluations_come_first_every_so_often_and_last():
+    records = run(Experiment(learner="frozen", episodes=5, steps=6, evaluate_every=2))
+    np.testing.assert_array_equal(records.evaluations["episode"], [0, 2, 4, 5])
+    cost = records.evaluations["cost"]
+    assert (cost == cost[0]).all()  # theta does not move, and there is no noise
+    assert records.evaluations["states"].shape == (4, 6, 3)
+
+
+def test_an_evaluation_judges_the_theta_of_its_time(runs):
+    for records in runs.values():
+        theta = records.evaluations["theta"]
+        np.testing.assert_array_equal(theta[0], paper.THETA_INIT)
+        np.testing.assert_array_equal(theta[-1], records.steps["theta"][-1])
+
+
+def test_evaluations_do_not_count_as_training_time(monkeypatch):
+    """A clock that only runs while a policy is evaluated."""
+    now = 0.0
+
+    def slowly(*arguments):
+        nonlocal now
+        now += 1000.0
+        return evaluate(*arguments)
+
+    evaluate = experiment.evaluate
+    monkeypatch.setattr(experiment, "evaluate", slowly)
+    monkeypatch.setattr(experiment, "time", SimpleNamespace(perf_counter=lambda: now))
+    records = run(Experiment(learner="ES", episodes=3, steps=2, evaluate_every=1))
+    assert now == 4000.0
+    assert records.facts["seconds"] == 0
+    assert (records.steps["seconds"] == 0).all()
+
+
+def test_progress_is_told_after_every_episode():
+    told = []
+    short = Experiment(learner="ES", episodes=3, steps=4)
+    records = run(short, on_episode=lambda *report: told.append(report))
+    sums = np.bincount(records.steps["episode"], records.steps["cost"])
+    assert [done for done, _ in told] == [1, 2, 3]
+    np.testing.assert_allclose([cost for _, cost in told], sums, rtol=1e-12)
+
+
+def faulty(fails):
+    """What `paper.nmpc` may be replaced by: a controller that fails where `fails(call)` says so."""
+
+    class Faulty(Nmpc):
+        calls = 0
+
+        def solve(self, state, theta, guess=None, action=None):
+            self.calls += 1
+            if fails(self.calls - 1):
+                raise SolverError(f"call {self.calls - 1} failed", state, theta)
+            return super().solve(state, theta, guess, action)
+
+    return lambda layout, **options: Faulty(differential_drive(), paper.task(layout), **options)
+
+
+def test_failures_and_restarts_are_recorded(monkeypatch):
+    # six calls evaluate; then the second step restarts, and the fourth fails twice
+    monkeypatch.setattr(paper, "nmpc", faulty(lambda call: call in (6 + 1, 6 + 4, 6 + 5)))
+    records = run(Experiment(learner="frozen", episodes=2, steps=6))
+    s = records.steps
+    np.testing.assert_array_equal(s["episode"], [0] * 4 + [1] * 6)
+    np.testing.assert_array_equal(s["status"], [0, 1, 0, 2] + [0] * 6)
+    assert np.isnan(s["cost"][3])
+    assert np.isnan(s["action"][3]).all()
+    assert np.isfinite(s["theta"]).all()
+    assert records.facts["stopped"] == "finished"
+
+
+def test_a_run_that_fails_ten_times_in_a_row_says_why_it_stopped(monkeypatch):
+    monkeypatch.setattr(paper, "nmpc", faulty(lambda call: True))
+    records = run(Experiment(learner="ES", episodes=20, steps=6, evaluate_every=4))
+    assert records.facts["stopped"].startswith("diverged: 10 episodes in a row")
+    np.testing.assert_array_equal(records.steps["episode"], np.arange(10))
+    assert (records.evaluations["cost"] == np.inf).all()
+
+
+def test_a_run_whose_theta_explodes_says_why_it_stopped():
+    records = run(Experiment(learner="ES", episodes=2, steps=6, alpha=1e5))
+    assert records.facts["stopped"].startswith("diverged: theta left the numbers")
+    assert len(records.steps["time"]) < 12
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3])
+def test_a_theta_that_explodes_in_an_episodes_last_step_is_not_evaluated(steps):
+    records = run(Experiment(learner="ES", episodes=4, steps=steps, alpha=1e5, evaluate_every=1))
+    assert records.facts["stopped"].startswith("diverged: theta left the numbers")
+    assert (np.abs(records.evaluations["theta"]) <= 1e6).all()

@@ -1,0 +1,75 @@
+"""Two networks on the same examples: the comparison of chapter 3."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.study import Experiment, run
+from nmpcrl.study.imitation import HELD_OUT, Imitation, imitate
+from nmpcrl.study.records import Records
+
+
+def made_up(value, theta, *, episodes=5, steps=60):
+    """Records of a run that never was, with the columns that `imitate` reads."""
+    rng = np.random.default_rng(0)
+    episode = np.repeat(np.arange(episodes), steps)
+    state = rng.uniform(-1, 1, (episodes * steps, 3))
+    action = rng.normal(size=(episodes * steps, 2))
+    before = np.vstack([theta[:1], theta[:-1]])
+    columns = {"episode": episode, "state": state, "action": action, "theta": theta}
+    columns["value"] = value(state, before)
+    return Records({"theta": tuple(theta[0])}, columns, {}, {})
+
+
+@pytest.fixture
+def moving():
+    """theta in [0, 2]^9, another one at every step."""
+    return np.random.default_rng(1).uniform(0, 2, (300, 9))
+
+
+def test_a_network_without_theta_cannot_follow_a_value_that_depends_on_it(moving):
+    records = made_up(lambda _, theta: 10 * theta[:, 0], moving)
+    assert imitate(records, fits=500).ratio < 0.5
+
+
+def test_both_networks_learn_a_value_that_does_not_depend_on_theta(moving):
+    records = made_up(lambda state, _: 10 * state[:, 0], moving)
+    imitation = imitate(records, fits=1000)
+    spread = imitation.value.std()
+    assert imitation.error("without_theta") < 0.3 * spread
+    assert imitation.error("with_theta") < 0.5 * spread
+
+
+def test_every_fifth_episode_is_held_out(moving):
+    imitation = imitate(made_up(lambda state, _: state[:, 0], moving), fits=1)
+    assert set(imitation.episode) == {HELD_OUT - 1}
+
+
+def test_of_fewer_than_five_episodes_the_last_is_held_out(moving):
+    records = made_up(lambda state, _: state[:, 0], moving[:240], episodes=3, steps=80)
+    assert set(imitate(records, fits=1).episode) == {2}
+
+
+def test_steps_whose_solve_failed_are_left_out(moving):
+    records = made_up(lambda state, _: state[:, 0], moving)
+    records.steps["value"][-10:] = np.nan
+    assert imitate(records, fits=1).value.size == 50
+
+
+def test_the_same_seed_gives_the_same_prediction(moving):
+    records = made_up(lambda state, _: state[:, 0], moving)
+    first, second, third = (imitate(records, fits=20, seed=seed) for seed in (0, 0, 1))
+    np.testing.assert_array_equal(first.with_theta, second.with_theta)
+    assert (first.with_theta != third.with_theta).any()
+
+
+def test_the_error_is_a_root_mean_square():
+    imitation = Imitation(np.zeros(2), np.zeros(2), np.array([6.0, 8.0]), np.array([3.0, 4.0]))
+    assert imitation.error("with_theta") == pytest.approx(np.sqrt(12.5))
+    assert imitation.ratio == pytest.approx(0.5)
+
+
+def test_a_run_of_the_robot_can_be_imitated():
+    records = run(Experiment("ES", episodes=5, steps=40, evaluate_every=5))
+    imitation = imitate(records, fits=50)
+    assert imitation.value.shape == (40,)
+    assert np.isfinite(imitation.ratio)

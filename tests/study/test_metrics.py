@@ -1,0 +1,185 @@
+"""Metrics on hand-made records, where every number can be checked by eye."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.control import Obstacle, Task
+from nmpcrl.study import metrics
+from nmpcrl.study.records import Records
+
+D = 9  # components of theta
+
+
+def records(
+    costs,
+    *,
+    status=None,
+    judged=(100.0, 90.0),
+    at=None,
+    episodes=None,
+    theta=None,
+    states=None,
+    delta=None,
+) -> Records:
+    """A run from the costs of its steps, one row an episode, and its noise-free costs."""
+    costs = np.array(costs, float)
+    number, length = costs.shape
+    rows = costs.size
+    theta = np.zeros((rows, D)) if theta is None else np.array(theta, float)
+    steps = {
+        "episode": np.repeat(np.arange(number), length),
+        "cost": costs.ravel(),
+        "status": np.zeros(rows, int) if status is None else np.array(status),
+        "theta": theta,
+        "state": np.zeros((rows, 3)) if states is None else np.array(states, float),
+        "alpha_phi2": np.linspace(0, 4, rows),
+        "delta": np.zeros(rows) if delta is None else np.array(delta, float),
+    }
+    judged = np.array(judged, float)
+    evaluations = {
+        "episode": np.arange(judged.size) if at is None else np.array(at),
+        "cost": judged,
+        "states": np.zeros((judged.size, 4, 3)),
+        "actions": np.zeros((judged.size, 4, 2)),
+    }
+    asked = {"episodes": episodes or number, "steps": length, "theta": (0.0,) * D}
+    return Records(asked, steps, evaluations, {"stopped": "finished"})
+
+
+def test_the_training_cost_is_the_sum_over_each_episode():
+    assert metrics.training_cost(records([[1, 2], [3, 4]])) == pytest.approx([3, 7])
+
+
+def test_an_episode_that_a_failed_solve_cut_short_has_no_training_cost():
+    run = records([[1, 2], [3, np.nan]], status=[0, 0, 0, 2])
+    assert metrics.training_cost(run) == pytest.approx([3, np.nan], nan_ok=True)
+
+
+def test_an_episode_whose_last_update_failed_has_no_training_cost():
+    run = records([[1, 2], [3, 4]], status=[0, 0, 0, 2])
+    assert np.isnan(metrics.training_cost(run)[1])
+
+
+def test_a_restarted_solve_counts():
+    run = records([[1, 2]], status=[0, 1])
+    assert metrics.training_cost(run) == pytest.approx([3])
+
+
+def test_an_episode_that_was_never_reached_has_no_training_cost():
+    assert np.isnan(metrics.training_cost(records([[1, 2]], episodes=3))[1:]).all()
+
+
+def test_the_final_cost_is_the_mean_of_the_last_rollouts():
+    run = records([[1]], judged=[100, 50, 40, 30, 20])
+    assert metrics.final_cost(run) == pytest.approx(30)
+    assert metrics.initial_cost(run) == 100
+
+
+def test_one_failed_rollout_at_the_end_makes_the_final_cost_infinite():
+    assert metrics.final_cost(records([[1]], judged=[100, 50, np.inf, 40])) == np.inf
+
+
+@pytest.mark.parametrize(("last", "gain"), [(80, 0.2), (100, 0.0), (150, -0.5)])
+def test_the_gain_is_the_share_of_the_cost_that_learning_took_away(last, gain):
+    assert metrics.gain(records([[1]], judged=[100, last, last, last])) == pytest.approx(gain)
+
+
+def test_wandering_is_judged_in_the_second_half_only():
+    run = records(np.ones((4, 1)), judged=[100, 900, 70, 60, 65], at=[0, 1, 2, 3, 4])
+    assert metrics.wander(run) == pytest.approx(0.1)
+
+
+def test_a_run_without_a_rollout_in_the_second_half_wanders_without_bound():
+    assert metrics.wander(records(np.ones((4, 1)), judged=[100, 90], at=[0, 1])) == np.inf
+
+
+@pytest.mark.parametrize("late", [(np.inf, 60), (np.inf, np.inf)])
+def test_a_failed_rollout_in_the_second_half_is_wandering_without_bound(late):
+    run = records(np.ones((4, 1)), judged=[100, 70, *late], at=[0, 1, 3, 4])
+    assert metrics.wander(run) == np.inf
+
+
+def test_the_excess_compares_the_medians_of_the_last_episodes():
+    frozen = records(np.full((60, 1), 10.0))
+    costs = np.full((60, 1), 10.0)
+    costs[-20:] = 30
+    costs[-9:] = 1000  # fewer than half of the last twenty
+    assert metrics.excess(records(costs), frozen) == pytest.approx(3)
+
+
+def test_the_excess_looks_at_no_more_than_the_second_half():
+    frozen = records(np.full((4, 1), 10.0))
+    assert metrics.excess(records([[999], [999], [20], [20]]), frozen) == pytest.approx(2)
+    assert metrics.excess(records([[30]]), records([[10]])) == pytest.approx(3)
+
+
+def test_an_episode_cut_short_at_the_end_is_an_infinite_excess():
+    frozen = records(np.ones((2, 2)))
+    run = records(np.ones((2, 2)), status=[0, 0, 0, 2])
+    assert metrics.excess(run, frozen) == np.inf
+
+
+def test_overshooting_counts_the_steps_strictly_above_two():
+    assert metrics.overshooting(records(np.ones((1, 5)))) == pytest.approx(2 / 5)  # 0 1 2 3 4
+
+
+def test_the_distance_between_thetas_is_relative_and_symmetric():
+    a = records([[1]], theta=[[1.0] * D])
+    b = records([[1]], theta=[[1.0] * (D - 1) + [2.0]])
+    assert metrics.theta_distance(a, b) == metrics.theta_distance(b, a) == pytest.approx(0.5)
+    assert metrics.theta_distance(a, a) == 0
+
+
+def test_the_distance_between_paths_is_the_largest_at_one_time_and_ignores_the_heading():
+    a, b = records([[1]]), records([[1]])
+    b.evaluations["states"][-1, 2] = [3, 4, 100]
+    assert metrics.path_distance(a, b) == pytest.approx(5)
+
+
+def test_a_state_on_the_boundary_of_an_obstacle_is_no_violation():
+    task = scene()
+    clearance = 1.25
+    states = np.array([[clearance, 0, 0], [clearance - 1e-3, 0, 0], [5, 5, 0]])
+    (worst,) = metrics.obstacle_violations(states, task)
+    assert worst == pytest.approx(task.overlap(states[1]).max())
+
+
+def test_the_states_after_a_failed_rollout_are_no_violations():
+    assert metrics.obstacle_violations(np.full((2, 3), np.nan), scene()).size == 0
+
+
+def test_an_input_on_its_bound_is_no_violation():
+    lower, upper = np.array([-1.0, -2.0]), np.array([1.0, 2.0])
+    actions = np.array([[1, 2], [-1, -2], [1.1, 0], [0, -2.1], [np.nan, np.nan]])
+    assert metrics.input_violations(actions, lower, upper) == 2
+
+
+def test_the_boundary_is_the_one_of_the_theta_that_the_step_was_solved_with():
+    on_boundary = [1.25, 0, 0]  # Xi = 0
+    theta = np.zeros((3, D))
+    theta[0, -1] = 0.1  # moves the boundary away from the second step on
+    run = records([[1, 1, 1]], states=[on_boundary] * 3, theta=theta)
+    assert metrics.boundary_share(run, scene()) == pytest.approx(2 / 3)
+
+
+def test_independent_errors_have_no_memory_and_alternating_ones_a_negative_one():
+    rng = np.random.default_rng(0)
+    free = records(np.ones((1, 4000)), delta=rng.normal(size=4000))
+    assert abs(metrics.memory(free)) < 0.05
+    assert metrics.memory(records(np.ones((1, 4)), delta=[1, -1, 1, -1])) == pytest.approx(-1)
+
+
+def test_steps_without_a_td_error_are_left_out_of_the_memory():
+    run = records(np.ones((1, 6)), delta=[np.nan, np.nan, 1, 2, 3, 4])
+    assert metrics.memory(run) == pytest.approx(1)
+
+
+def scene() -> Task:
+    """One obstacle at the origin, which a robot of 0.5 m touches at 1.25 m."""
+    return Task(
+        start=np.array([-2.0, 0.0, 0.0]),
+        target=np.array([6.0, 0.0, 0.0]),
+        lower=np.array([-9.0, -9.0, -np.inf]),
+        upper=np.array([9.0, 9.0, np.inf]),
+        obstacles=(Obstacle(0.0, 0.0),),
+    )

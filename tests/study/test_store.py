@@ -1,0 +1,331 @@
+"""The store: whole files or none, reuse of what would come out the same, and killed workers."""
+
+import multiprocessing
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nmpcrl
+from nmpcrl.study import Experiment, Records, Study, fetch, fetch_all, run, store, stored, sweep
+from nmpcrl.study.store import THREADS, folder, key, path_of
+
+QUICK = Experiment(learner="frozen", episodes=1, steps=3)
+CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
+
+
+@pytest.fixture(autouse=True)
+def runs(tmp_path, monkeypatch) -> Path:
+    """A folder of this test's own; and what `fetch_all` sets for its workers is unset after it."""
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    for name in THREADS:
+        monkeypatch.setenv(name, os.environ.get(name, "1"))
+    return tmp_path / "runs"
+
+
+@pytest.fixture
+def no_run(monkeypatch):
+    """From here on, training is a mistake."""
+
+    def refuse(*_, **__):
+        raise AssertionError("a stored run was trained again")
+
+    return lambda: monkeypatch.setattr(store, "run", refuse)
+
+
+def assert_same_numbers(one, other):
+    for name in set(one.steps) - CLOCKS:
+        np.testing.assert_array_equal(one.steps[name], other.steps[name])
+
+
+def test_a_run_is_stored_under_its_experiment(runs):
+    records = fetch(QUICK)
+    assert [path_of(QUICK)] == list(runs.iterdir())
+    assert folder() == runs
+    assert path_of(QUICK).name.startswith("frozen-A-step-seed0-1ep-")
+    assert_same_numbers(Records.load(path_of(QUICK)), records)
+
+
+def test_a_stored_run_is_read_not_trained(no_run):
+    records = fetch(QUICK)
+    no_run()
+    assert_same_numbers(fetch(QUICK), records)
+    assert_same_numbers(fetch_all([QUICK], progress=False)[QUICK], records)
+
+
+def test_what_is_stored_says_what_it_depends_on():
+    records = fetch(QUICK)
+    facts = Records.load(path_of(QUICK)).facts
+    assert facts == records.facts
+    assert facts["key"] == key(QUICK)
+    assert facts["stopped"] == "finished"
+    assert set(facts["versions"]) == {"python", "casadi", "numpy", "torch"}
+
+
+@pytest.mark.parametrize(
+    "other",
+    [{"seed": 1}, {"alpha": 2e-7}, {"gated": False}, {"steps": 4}, {"theta": (0.9,) * 9}],
+)
+def test_every_field_has_a_part_in_the_key(other):
+    changed = Experiment(**{"learner": "frozen", "episodes": 1, "steps": 3} | other)
+    assert key(changed) != key(QUICK)
+    assert path_of(changed) != path_of(QUICK)
+
+
+def test_the_key_does_not_depend_on_how_a_value_was_written():
+    assert key(Experiment(alpha=1)) == key(Experiment(alpha=1.0))
+    assert key(Experiment(theta=[1] * 9)) == key(Experiment(theta=(1.0,) * 9))
+
+
+def test_a_run_of_other_code_is_not_reused(monkeypatch, no_run):
+    fetch(QUICK)
+    monkeypatch.setattr(store, "_mathematics", lambda: "changed")
+    no_run()
+    with pytest.raises(AssertionError, match="trained again"):
+        fetch(QUICK)
+
+
+def test_a_run_of_other_versions_is_not_reused(monkeypatch, no_run):
+    fetch(QUICK)
+    versions = store.versions() | {"casadi": "0.0.1"}
+    monkeypatch.setattr(store, "versions", lambda: versions)
+    no_run()
+    with pytest.raises(AssertionError, match="trained again"):
+        fetch(QUICK)
+
+
+@pytest.fixture
+def source(tmp_path, monkeypatch):
+    """A copy of the package whose digest can be taken after a change."""
+    copy = tmp_path / "nmpcrl"
+    shutil.copytree(Path(nmpcrl.__file__).parent, copy, ignore=shutil.ignore_patterns("*.pyc"))
+    monkeypatch.setattr(nmpcrl, "__file__", str(copy / "__init__.py"))
+
+    def digest(place=None, before="", after=""):
+        if place:
+            text = (copy / place).read_text()
+            assert before in text
+            (copy / place).write_text(text.replace(before, after, 1))
+        return store._mathematics.__wrapped__()
+
+    return digest
+
+
+@pytest.mark.parametrize(
+    ("place", "before", "after"),
+    [
+        ("learning/updates.py", "cost + gamma * q_next - q", "cost + gamma * q_next - 2 * q"),
+        ("control/program.py", "MAX_ITERATIONS = 300", "MAX_ITERATIONS = 200"),
+        ("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6"),
+        ("study/training.py", "PATIENCE = 10", "PATIENCE = 11"),
+        ("study/experiment.py", "spawn(2)", "spawn(3)"),
+    ],
+)
+def test_a_change_of_the_mathematics_changes_the_key(source, place, before, after):
+    assert source() != source(place, before, after)
+
+
+@pytest.mark.parametrize(
+    ("place", "before", "after"),
+    [
+        ("learning/updates.py", '"""The update rules', '"""All update rules'),
+        ("learning/updates.py", '"""TD error', '"""The TD error'),
+        ("learning/updates.py", "\n\n\ndef td_error", "\n\n\n# A comment.\n\n\ndef td_error"),
+        ("learning/network.py", '"""Inputs - 64', '"""Many inputs - 64'),
+        ("control/ocp.py", "# z\n", "# the variables\n"),
+        ("study/records.py", "compressed", "compressed "),
+        ("study/store.py", "ATTEMPTS = 3", "ATTEMPTS = 4"),
+    ],
+)
+def test_comments_docstrings_and_bookkeeping_do_not_change_the_key(source, place, before, after):
+    assert source() == source(place, before, after)
+
+
+def test_a_damaged_file_is_set_aside_and_the_run_done_again(runs, capsys):
+    records, path = fetch(QUICK), path_of(QUICK)
+    path.write_bytes(path.read_bytes()[:-200])
+    assert_same_numbers(fetch(QUICK), records)
+    assert sorted(p.suffix for p in runs.iterdir()) == [".damaged", ".npz"]
+    assert "is kept as" in capsys.readouterr().err
+
+
+def test_many_runs_do_again_what_is_damaged(runs):
+    fetch(QUICK)
+    path_of(QUICK).write_bytes(b"")
+    with ThreadPoolExecutor(1) as executor:
+        study = fetch_all([QUICK], executor=executor, progress=False)
+    assert study[QUICK].facts["stopped"] == "finished"
+
+
+def test_what_is_stored_is_listed(runs):
+    experiments = sweep(learner="frozen", seed=[0, 1], episodes=1, steps=2)
+    for e in experiments:
+        fetch(e)
+    (runs / "other.npz").write_bytes(b"not a run")
+    (runs / "notes.txt").write_text("not even that")
+    listed = stored()
+    assert set(listed) == {path_of(e) for e in experiments}
+    assert [fields["seed"] for fields, _ in listed.values()] == [0, 1]
+
+
+def test_without_a_folder_nothing_is_stored():
+    assert stored() == {}
+
+
+KILLED = """
+import os, signal
+import numpy as np
+from nmpcrl.study import Experiment, fetch
+
+def write_half(file, **arrays):
+    file.write(b"PK" + bytes(1000))
+    file.flush()
+    os.kill(os.getpid(), signal.SIGKILL)
+
+np.savez_compressed = write_half
+fetch(Experiment(learner="frozen", episodes=1, steps=3))
+"""
+
+
+def test_a_run_killed_while_it_is_written_leaves_no_half_file(runs, capsys):
+    killed = subprocess.run([sys.executable, "-c", KILLED], check=False, timeout=120)
+    assert killed.returncode == -signal.SIGKILL
+    assert list(runs.glob("*.npz")) == []
+    assert stored() == {}
+    assert capsys.readouterr().err == ""
+    assert fetch(QUICK).facts["stopped"] == "finished"
+    assert list(stored()) == [path_of(QUICK)]
+
+
+def test_runs_train_in_processes_and_come_out_as_in_this_one():
+    experiments = sweep(learner=("RDES", "GES"), episodes=2, steps=65)
+    study = fetch_all(experiments, workers=2, progress=False)
+    assert list(study) == list(experiments)
+    for experiment in experiments:
+        assert_same_numbers(study[experiment], run(experiment))
+
+
+def test_any_executor_will_do():
+    experiments = sweep(learner=("ES", "frozen"), episodes=1, steps=3)
+    with ThreadPoolExecutor(2) as executor:
+        study = fetch_all(experiments, executor=executor, progress=False)
+    for experiment in experiments:
+        assert_same_numbers(study[experiment], run(experiment))
+
+
+def test_an_experiment_asked_for_twice_is_trained_once(monkeypatch):
+    trained = []
+    monkeypatch.setattr(
+        store, "run", lambda e, **options: (trained.append(e), run(e, **options))[1]
+    )
+    with ThreadPoolExecutor(2) as executor:
+        study = fetch_all([QUICK, QUICK], executor=executor, progress=False)
+    assert trained == [QUICK]
+    assert len(study) == 1
+
+
+def test_the_bar_counts_episodes_and_shows_the_latest_cost(capsys):
+    with ThreadPoolExecutor(1) as executor:
+        fetch_all([Experiment(learner="frozen", episodes=3, steps=2)], executor=executor)
+    shown = capsys.readouterr().err
+    assert "3/3" in shown
+    assert "1/1 runs" in shown
+    assert "cost" in shown
+
+
+def test_one_failing_run_does_not_keep_the_others_from_being_stored(monkeypatch):
+    experiments = sweep(learner="frozen", seed=[0, 1, 2], episodes=1, steps=2)
+
+    def run_but_one(experiment, **options):
+        if experiment.seed == 1:
+            raise ArithmeticError("a mistake")
+        return run(experiment, **options)
+
+    monkeypatch.setattr(store, "run", run_but_one)
+    with ThreadPoolExecutor(1) as executor, pytest.raises(ArithmeticError, match="a mistake"):
+        fetch_all(experiments, executor=executor, progress=False)
+    assert [fields["seed"] for fields, _ in stored().values()] == [0, 2]
+
+
+def kill_workers_once_stored(runs: Path, killed: list[int]) -> None:
+    """Wait for the first whole run, then kill every worker."""
+    for _ in range(1200):
+        if any(runs.glob("[!.]*.npz")):
+            break
+        time.sleep(0.05)
+    for child in multiprocessing.active_children():
+        if child.name.startswith("SpawnProcess"):  # the manager has a name of its own
+            os.kill(child.pid, signal.SIGKILL)
+            killed.append(child.pid)
+
+
+def test_a_killed_worker_costs_only_the_run_it_was_at(runs):
+    short = Experiment(learner="frozen", episodes=1, steps=3)
+    long = Experiment(learner="ES", episodes=8, steps=100, evaluate_every=8)
+    killed: list[int] = []
+    killer = threading.Thread(target=kill_workers_once_stored, args=(runs, killed))
+    killer.start()
+    study = fetch_all([short, long], workers=1, progress=False)
+    killer.join()
+    assert killed
+    assert_same_numbers(study[short], run(short))
+    assert study[long].facts["stopped"] == "finished"
+    assert set(runs.glob("*.npz")) == {path_of(short), path_of(long)}
+
+
+def break_pools(monkeypatch, times):
+    """Let the first pools lose their workers, and train here instead of in processes."""
+    broken = []
+
+    def train(missing, executor, *, progress):
+        if len(broken) < times:
+            broken.append(missing)
+            raise BrokenProcessPool("a worker was killed")
+        for experiment in missing:
+            fetch(experiment)
+
+    monkeypatch.setattr(store, "_train", train)
+    return broken
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_a_lost_pool_is_replaced(monkeypatch, times):
+    broken = break_pools(monkeypatch, times)
+    study = fetch_all([QUICK], progress=False)
+    assert len(broken) == times
+    assert study[QUICK].facts["stopped"] == "finished"
+
+
+def test_workers_that_are_killed_again_and_again_are_given_up(monkeypatch):
+    broken = break_pools(monkeypatch, 99)
+    with pytest.raises(RuntimeError, match="killed 3 times; these runs are missing: frozen in lay"):
+        fetch_all([QUICK], progress=False)
+    assert len(broken) == 3
+
+
+def test_an_executor_of_the_callers_is_not_replaced(monkeypatch):
+    broken = break_pools(monkeypatch, 99)
+    with ThreadPoolExecutor(1) as executor, pytest.raises(BrokenProcessPool):
+        fetch_all([QUICK], executor=executor, progress=False)
+    assert len(broken) == 1
+
+
+def test_a_study_is_read_by_experiment_and_selected_by_field():
+    experiments = sweep(learner=("ES", "frozen"), seed=(5, 6), episodes=1)
+    study = Study(dict(zip(experiments, "abcd", strict=True)))
+    assert len(study) == 4
+    assert study[experiments[2]] == "c"
+    assert list(study.select(seed=6).values()) == ["b", "d"]
+    assert list(study.select(seed=6, learner="ES")) == [experiments[1]]
+    assert len(study.select(seed=7)) == 0
+    assert study.values_of("learner") == ("ES", "frozen")
+    assert study.values_of("seed") == (5, 6)

@@ -1,0 +1,331 @@
+"""Algorithm 1 as a generator, what a failed solve means, and the rollout without noise."""
+
+import dataclasses
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from nmpcrl.control import Nmpc, SolverError, differential_drive
+from nmpcrl.learning import Weights, expected_sarsa, frozen
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.experiment import DECAYS, prepare
+from nmpcrl.study.training import (
+    PATIENCE,
+    Diverged,
+    Exploration,
+    Persistent,
+    count_episodes,
+    count_steps,
+    evaluate,
+    train,
+)
+
+THETA = np.array(paper.THETA_INIT)
+
+
+class Faulty(Nmpc):
+    """The paper's controller, whose solves fail where `fails(number of the call)` says so."""
+
+    def __init__(self, fails):
+        super().__init__(differential_drive(), paper.task())
+        self.fails = fails
+        self.guesses = []  # of every call
+
+    def solve(self, state, theta, guess=None, action=None):
+        self.guesses.append(guess)
+        if self.fails(len(self.guesses) - 1):
+            raise SolverError(f"call {len(self.guesses) - 1} failed", state, theta)
+        return super().solve(state, theta, guess, action)
+
+
+@pytest.fixture(scope="module")
+def sound() -> Persistent:
+    return Persistent(paper.nmpc())
+
+
+def first_weights():
+    return Weights(THETA.copy(), np.full(9, paper.W_INIT))
+
+
+def quiet(episodes, steps):
+    """No exploration at all."""
+    return Exploration(np.zeros((episodes, steps, 2)), np.ones((episodes, steps)))
+
+
+def noisy(episodes, steps, scale=1.0):
+    noise = np.random.default_rng(0).normal(size=(episodes, steps, 2))
+    return Exploration(noise, np.full((episodes, steps), scale))
+
+
+def training(controller, explore, make=frozen):
+    return list(train(make(controller), controller, first_weights(), explore))
+
+
+def es(controller):
+    return expected_sarsa(controller, paper.ALPHA)
+
+
+def places(steps):
+    return [(step.episode, step.time) for step in steps]
+
+
+def test_steps_come_in_order_and_every_episode_begins_at_the_start(sound):
+    steps = training(sound, noisy(3, 4))
+    assert places(steps) == [(e, t) for e in range(3) for t in range(4)]
+    for step in steps:
+        assert np.array_equal(step.state, sound.nmpc.task.start) == (step.time == 0)
+
+
+def test_a_step_is_the_plants_and_costs_what_the_task_says(sound):
+    plant, task = sound.nmpc.plant, sound.nmpc.task
+    steps = training(sound, noisy(1, 6), es)
+    for now, later in pairwise(steps):
+        np.testing.assert_array_equal(plant.step(now.state, now.action), later.state)
+    for step in steps:
+        assert step.cost == task.stage_cost(step.state, step.action)
+
+
+def test_the_action_is_the_policys_with_noise_and_clipped(sound):
+    explore, plant = noisy(2, 5, scale=0.7), sound.nmpc.plant
+    clipped = 0
+    for step in training(sound, explore):
+        wish = step.solution.action + 0.7 * explore.noise[step.episode, step.time]
+        np.testing.assert_allclose(step.action, np.clip(wish, plant.lower, plant.upper))
+        clipped += not np.array_equal(step.action, wish)
+    assert clipped > 0
+
+
+def test_weights_go_from_step_to_step_and_from_episode_to_episode(sound):
+    weights = first_weights()
+    for step in training(sound, noisy(2, 4), es):
+        np.testing.assert_array_equal(step.solution.theta, weights.theta)
+        moved = weights.theta + paper.ALPHA * step.update.delta * step.solution.features
+        np.testing.assert_allclose(step.weights.theta, moved, rtol=1e-14)
+        weights = step.weights
+    assert not np.array_equal(weights.theta, THETA)
+
+
+def test_frozen_weights_never_move(sound):
+    for step in training(sound, noisy(2, 4)):
+        np.testing.assert_array_equal(step.weights.theta, THETA)
+
+
+def test_training_can_be_stopped_at_any_step(sound):
+    steps = train(frozen(sound), sound, first_weights(), noisy(1000, 130))
+    assert places([next(steps), next(steps)]) == [(0, 0), (0, 1)]
+    steps.close()
+
+
+def test_the_second_solve_is_the_next_first_ones_guess():
+    """It was solved in that very state, so nothing is shifted, and little is left to do."""
+    controller = Persistent(Faulty(lambda call: False))
+    steps = training(controller, noisy(1, 4), es)
+    guesses = controller.nmpc.guesses
+    assert guesses[0] is None
+    for k, step in enumerate(steps):
+        assert guesses[2 * k + 1] is step.solution
+        if k + 1 < len(steps):
+            assert guesses[2 * k + 2] is step.update.successor.solution
+
+
+def test_without_a_second_solve_the_plan_itself_is_the_next_guess():
+    controller = Persistent(Faulty(lambda call: False))
+    steps = training(controller, noisy(2, 3))
+    plans = [step.solution for step in steps]
+    assert controller.nmpc.guesses == [None, *plans[:2], None, *plans[3:5]]
+
+
+def test_the_step_reading_counts_time_through_training():
+    np.testing.assert_array_equal(count_steps(3, 4), [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 10, 11]])
+
+
+def test_the_episode_reading_counts_episodes():
+    np.testing.assert_array_equal(count_episodes(3, 4), [[0] * 4, [1] * 4, [2] * 4])
+
+
+@pytest.mark.parametrize("decay", list(DECAYS))
+def test_exploration_shrinks_by_the_rate_each_count(sound, decay):
+    experiment = Experiment(decay=decay, episodes=3, steps=4, decay_rate=0.5)
+    scale = prepare(experiment, sound)[2].scale
+    by_hand = [
+        [0.5 ** {"step": 4 * e + t, "episode": e}[decay] for t in range(4)] for e in range(3)
+    ]
+    np.testing.assert_allclose(scale, by_hand)
+
+
+def test_noise_is_standard_normal(sound):
+    noise = prepare(Experiment(episodes=200, steps=130), sound)[2].noise
+    assert noise.shape == (200, 130, 2)
+    assert noise.mean() == pytest.approx(0, abs=0.02)
+    assert noise.std() == pytest.approx(1, abs=0.02)
+
+
+def test_a_failed_solve_is_tried_once_more_from_a_standing_start():
+    controller = Persistent(Faulty(lambda call: call == 2))
+    steps = training(controller, quiet(1, 4))
+    assert [step.solution.status for step in steps] == ["solved", "solved", "restarted", "solved"]
+    assert controller.nmpc.guesses[2] is steps[1].solution
+    assert controller.nmpc.guesses[3] is None
+    assert all(not step.failure for step in steps)
+
+
+def test_a_standing_start_that_failed_is_not_repeated():
+    controller = Persistent(Faulty(lambda call: True))
+    with pytest.raises(SolverError):
+        controller.solve(paper.task().start, THETA)
+    assert len(controller.nmpc.guesses) == 1
+
+
+def test_a_restart_keeps_the_action_that_was_fixed():
+    controller = Persistent(Faulty(lambda call: call == 1))
+    guess = controller.solve(paper.task().start, THETA)
+    action = np.array([0.2, -0.3])
+    solution = controller.solve(paper.task().start, THETA, guess, action)
+    np.testing.assert_allclose(solution.action, action, atol=1e-7)
+
+
+def test_a_solve_that_fails_twice_ends_the_episode_and_learning_goes_on():
+    controller = Persistent(Faulty(lambda call: call in (2, 3)))
+    steps = training(controller, quiet(2, 4))
+    assert places(steps) == [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (1, 3)]
+    failed = steps[2]
+    assert "call 3 failed" in failed.failure
+    assert failed.solution is None
+    assert failed.update is None
+    assert np.isnan(failed.action).all()
+    assert np.isnan(failed.cost)
+    np.testing.assert_array_equal(steps[3].state, controller.nmpc.task.start)
+    assert [bool(step.failure) for step in steps] == [False, False, True] + [False] * 4
+
+
+def test_a_second_solve_that_fails_twice_ends_the_episode_and_keeps_theta():
+    # the calls are V(s0), V(s1), V(s1), V(s2), and that fails twice
+    controller = Persistent(Faulty(lambda call: call in (3, 4)))
+    steps = training(controller, quiet(2, 3), es)
+    assert places(steps) == [(0, 0), (0, 1), (1, 0), (1, 1), (1, 2)]
+    failed = steps[1]
+    assert failed.failure
+    assert failed.solution is not None
+    assert failed.update is None
+    assert np.isfinite(failed.cost)
+    np.testing.assert_array_equal(failed.weights.theta, steps[0].weights.theta)
+    np.testing.assert_array_equal(steps[2].solution.theta, steps[0].weights.theta)
+
+
+def test_ten_failed_episodes_in_a_row_are_a_divergence():
+    controller = Persistent(Faulty(lambda call: True))
+    steps = []
+    with pytest.raises(Diverged, match="10 episodes in a row ended in a failed solve: call 9 fail"):
+        steps.extend(train(frozen(controller), controller, first_weights(), quiet(30, 4)))
+    assert places(steps) == [(e, 0) for e in range(PATIENCE)]
+
+
+def test_ten_failed_episodes_not_in_a_row_are_none():
+    """Nine fail at once, the tenth goes through, and nine more fail."""
+    fails = [True] * 9 + [False] * 2 + [True] * 9
+    controller = Persistent(Faulty(lambda call: fails[call]))
+    steps = training(controller, quiet(19, 2))
+    assert places(steps)[-1] == (18, 0)
+
+
+def leap(vector_of_weights):
+    """A learner that replaces the weights in its third step."""
+    count = 0
+
+    def make(controller):
+        def rule(weights, *_):
+            nonlocal count
+            count += 1
+            return vector_of_weights(weights) if count == 3 else weights
+
+        return dataclasses.replace(es(controller), rule=rule)
+
+    return make
+
+
+@pytest.mark.parametrize("absurd", [np.nan, np.inf, -1e7])
+@pytest.mark.parametrize("name", ["theta", "w"])
+def test_weights_that_are_not_numbers_or_absurd_are_a_divergence(sound, name, absurd):
+    def spoil(weights):
+        vector = getattr(weights, name).copy()
+        vector[4] = absurd
+        return dataclasses.replace(weights, **{name: vector})
+
+    steps = []
+    with pytest.raises(Diverged, match=f"{name} left the numbers a solver is given"):
+        steps.extend(train(leap(spoil)(sound), sound, first_weights(), quiet(2, 5)))
+    assert places(steps) == [(0, 0), (0, 1), (0, 2)]
+    assert not np.abs(getattr(steps[-1].weights, name)[4]) <= 1e6  # the step itself is kept
+
+
+@pytest.fixture(scope="module")
+def rollout(sound):
+    return evaluate(sound, THETA, paper.STEPS)
+
+
+def test_the_noise_free_cost_of_theta_init_is_the_reference(rollout):
+    """DESIGN's number, from independent code: 4695 over t = 0, ..., 129, not discounted."""
+    assert rollout.cost == pytest.approx(4695, abs=1)
+
+
+def test_with_theta_c_at_the_penaltys_margin_the_cost_is_the_other_reference(sound):
+    assert evaluate(sound, np.append(THETA[:-1], 0.35), paper.STEPS).cost == pytest.approx(
+        4119, abs=1
+    )
+
+
+def test_ipopt_drives_to_the_same_cost(rollout):
+    controller = Persistent(paper.nmpc(solver="ipopt"))
+    assert evaluate(controller, THETA, paper.STEPS).cost == pytest.approx(rollout.cost, rel=1e-4)
+
+
+def test_a_rollout_follows_the_plant_and_adds_up_its_costs(sound, rollout):
+    plant, task = sound.nmpc.plant, sound.nmpc.task
+    assert rollout.states.shape == (130, 3)
+    assert rollout.actions.shape == (130, 2)
+    np.testing.assert_array_equal(rollout.states[0], task.start)
+    for now, action, later in zip(
+        rollout.states[:-1], rollout.actions[:-1], rollout.states[1:], strict=True
+    ):
+        np.testing.assert_array_equal(plant.step(now, action), later)
+    by_hand = [task.stage_cost(s, a) for s, a in zip(rollout.states, rollout.actions, strict=True)]
+    assert rollout.cost == pytest.approx(sum(by_hand), rel=1e-14)
+
+
+def test_the_rollout_of_theta_init_reaches_the_target_and_hits_nothing(sound, rollout):
+    task = sound.nmpc.task
+    assert task.distance(rollout.states[-1]) < 0.1
+    assert (task.overlap(rollout.states) <= 1e-6).all()
+    assert (np.abs(rollout.actions) <= sound.nmpc.plant.upper).all()
+    assert (task.lower <= rollout.states).all()
+    assert (rollout.states <= task.upper).all()
+
+
+def test_a_rollout_that_fails_costs_infinity_and_keeps_what_it_drove():
+    controller = Persistent(Faulty(lambda call: call >= 3))
+    failed = evaluate(controller, THETA, 10)
+    assert failed.cost == np.inf
+    assert failed.states.shape == (3, 3)
+    assert failed.actions.shape == (3, 2)
+    assert "failed" in failed.failure
+
+
+def test_a_rollout_that_fails_at_once_has_no_steps():
+    controller = Persistent(Faulty(lambda call: True))
+    failed = evaluate(controller, THETA, 10)
+    assert failed.states.shape == (0, 3)
+    assert failed.actions.shape == (0, 2)
+    assert failed.cost == np.inf
+
+
+def test_a_rollout_restarts_like_training_does():
+    whole = evaluate(Persistent(Faulty(lambda call: False)), THETA, 6)
+    restarted = evaluate(Persistent(Faulty(lambda call: call == 3)), THETA, 6)
+    assert restarted.failure == ""
+    assert restarted.cost == pytest.approx(whole.cost, rel=1e-6)
+
+
+def test_persistence_has_the_discount_of_its_controller():
+    assert Persistent(SimpleNamespace(gamma=0.5)).gamma == 0.5

@@ -1,0 +1,170 @@
+"""The driver, book/build.py: what it refuses, and what it leaves behind when a step fails."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import build
+import nbformat
+import pytest
+import yaml
+from click.testing import CliRunner
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def driver(monkeypatch):
+    """The command; whatever it is asked, it may not come as far as building."""
+
+    def never(*_):
+        raise AssertionError("the driver went on to build")
+
+    for step in ("mirror", "train", "execute_all", "render"):
+        monkeypatch.setattr(build, step, never)
+    return lambda *arguments: CliRunner().invoke(build.main, arguments)
+
+
+def refused(result) -> str:
+    """The one sentence of a refusal."""
+    assert result.exit_code == 1
+    assert isinstance(result.exception, SystemExit)
+    (sentence,) = result.output.strip().splitlines()
+    return sentence
+
+
+def test_a_misspelt_parameter_is_refused_with_the_right_name(driver):
+    sentence = refused(driver("--chapter", "03_rdes", "-p", "episode", "20"))
+    assert "'episode'" in sentence
+    assert "did you mean 'episodes'?" in sentence
+    assert "seeds" in sentence
+
+
+def test_a_chapter_that_does_not_exist_is_refused_with_those_that_do(driver):
+    sentence = refused(driver("--chapter", "03_rde"))
+    assert "'03_rde'" in sentence
+    for chapter in ("01_mdp_and_nmpc", "02_expected_sarsa", "03_rdes", "04_ges", "05_results"):
+        assert chapter in sentence
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "value"),
+    [
+        ("-p", "seeds", "[3]"),
+        ("-p", "episodes", "many"),
+        ("-p", "episodes", "0"),
+        ("-p", "episodes", "2.5"),
+        ("-r", "episodes", "20"),
+        ("-p", "layout", "nowhere"),
+    ],
+)
+def test_a_value_of_the_wrong_type_or_range_is_refused_by_name(driver, option, name, value):
+    sentence = refused(driver("--chapter", "03_rdes", option, name, value))
+    assert name in sentence
+    assert value in sentence
+
+
+def test_a_list_of_seeds_given_as_text_is_answered_with_the_right_form(driver):
+    assert "{seeds: [3]}" in refused(driver("--chapter", "03_rdes", "-p", "seeds", "[3]"))
+
+
+def test_parameters_without_a_chapter_are_refused(driver):
+    assert "--chapter" in refused(driver("-p", "episodes", "20"))
+
+
+def test_yaml_that_is_no_mapping_is_refused(driver):
+    assert "'[3]'" in refused(driver("--chapter", "03_rdes", "-y", "[3]"))
+
+
+def test_values_are_read_as_papermill_reads_them():
+    given = build.values([("a", "1"), ("b", "[3]"), ("c", "1e-7")], [("d", "1")], ["{e: [3]}"])
+    assert given == {"a": 1, "b": "[3]", "c": 1e-7, "d": "1", "e": [3]}
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A copy of the driver with a book of one page and one chapter."""
+    shutil.copytree(ROOT / "book/_static", tmp_path / "book/_static")
+    for name in ("_config.yml", "book/build.py", "book/references.bib"):
+        shutil.copy2(ROOT / name, tmp_path / name)
+    (tmp_path / "nmpcrl").symlink_to(ROOT / "nmpcrl")
+    toc = {
+        "format": "jb-book",
+        "root": "book/intro",
+        "parts": [{"caption": "Part", "numbered": True, "chapters": [{"file": "book/one"}]}],
+    }
+    (tmp_path / "_toc.yml").write_text(yaml.safe_dump(toc))
+    (tmp_path / "book/intro.md").write_text("# A small book\n\nSee {ref}`ch:one` and $\\vs$.\n")
+    write(tmp_path, "print(episodes)")
+    return tmp_path
+
+
+def write(place: Path, last: str) -> None:
+    """Write the small book's chapter, which ends in the cell `last`."""
+    cells = [
+        new_markdown_cell("(ch:one)=\n# One"),
+        new_code_cell("episodes = 300", metadata={"tags": ["parameters"]}),
+        new_code_cell("experiments = ()"),
+        new_code_cell(last),
+    ]
+    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    nbformat.write(
+        new_notebook(cells=cells, metadata={"kernelspec": kernel}), place / "book/one.ipynb"
+    )
+
+
+def run(place: Path, *arguments: str) -> subprocess.CompletedProcess:
+    command = [sys.executable, str(place / "book/build.py"), *arguments]
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+
+
+def test_a_whole_build_ends_with_the_path_of_the_book(small):
+    result = run(small)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines()[-1] == "_build/html/index.html"
+    assert "book/intro.html" in (small / "_build/html/index.html").read_text()
+    assert "300" in (small / "_build/html/book/one.html").read_text()
+    assert (small / "_build/executed/one.ipynb").exists()
+
+
+def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(small):
+    assert run(small, "--smoke").returncode == 0
+    assert not (small / "_build/html").exists()
+    pages = [small / f"_build/smoke/html/book/{page}.html" for page in ("intro", "one")]
+    assert all("A smoke build" in page.read_text() for page in pages)
+    executed = nbformat.read(small / "_build/smoke/executed/one.ipynb", 4)
+    assert executed.cells[-1].outputs[0].text == f"{build.SMOKE['episodes']}\n"
+
+
+def test_one_chapter_is_built_apart_with_the_given_parameters(small):
+    result = run(small, "--chapter", "one", "-p", "episodes", "7")
+    assert result.stdout.splitlines()[-1] == "_build/chapter/one/html/book/one.html"
+    assert (
+        "Only one was executed for this build, with episodes = 7."
+        in (small / "_build/chapter/one/html/book/one.html").read_text()
+    )
+
+
+def test_a_cell_that_fails_is_named_and_no_older_book_survives(small):
+    (small / "_build/html").mkdir(parents=True)
+    write(small, "1 / 0")
+    result = run(small)
+    assert result.returncode == 1
+    assert "one: cell 3 failed with ZeroDivisionError: division by zero" in result.stderr
+    assert "Traceback" not in result.stderr
+    assert "ZeroDivisionError" in (small / "_build/logs/one.log").read_text()
+    assert not (small / "_build/html").exists()
+
+
+def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(small):
+    (small / "_build/html").mkdir(parents=True)
+    (small / "book/intro.md").write_text("# A small book\n\nSee {ref}`ch:two`.\n")
+    result = run(small)
+    assert result.returncode == 1
+    assert "intro.md:3: WARNING" in result.stderr
+    assert "ch:two" in result.stderr
+    assert not (small / "_build/html").exists()
