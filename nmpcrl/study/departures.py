@@ -93,8 +93,8 @@ DEPARTURES = {
         " the value in theta_c jumps by omega, through the slack of stage 0.",
         reading="That slack counts as active only where the constraint is violated by more than"
         " 1e-6.",
-        why="The robot slides along boundaries, so this happens at many steps, and solvers return"
-        " any number in between unless a side is chosen.",
+        why="Without noise the robot slides along boundaries, so this happens at many steps, and"
+        " solvers return any number in between unless a side is chosen.",
     ),
     "M": Departure(
         gap="The state box is hard and the obstacle constraint soft; noise can push the state out"

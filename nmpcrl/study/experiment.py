@@ -25,6 +25,7 @@ from nmpcrl.study.training import (
     Exploration,
     Persistent,
     Step,
+    absurd,
     count_episodes,
     count_steps,
     evaluate,
@@ -101,7 +102,8 @@ def run(experiment: Experiment, on_episode: Callable[[int, float], None] | None 
             cost += step.cost
             if step.failure or step.time == experiment.steps - 1:
                 done = step.episode + 1
-                if done % experiment.evaluate_every == 0 or done == experiment.episodes:
+                due = done % experiment.evaluate_every == 0 or done == experiment.episodes
+                if due and not absurd(step.weights):
                     row = _evaluation(controller, step.weights, done, experiment.steps)
                     evaluations.append(**row)
                 if on_episode:
@@ -110,9 +112,13 @@ def run(experiment: Experiment, on_episode: Callable[[int, float], None] | None 
             began = time.perf_counter()
     except Diverged as error:
         stopped = f"diverged: {error}"
-    table = steps.columns()
-    facts = {"stopped": stopped, "seconds": float(table["seconds"].sum())}
-    return Records(asdict(experiment), table, evaluations.columns(), facts)
+    table, judged = steps.columns(), evaluations.columns()
+    facts = {
+        "stopped": stopped,
+        "seconds": float(table["seconds"].sum()),
+        "final_cost": float(judged["cost"][-1]),  # of the last rollout without noise
+    }
+    return Records(asdict(experiment), table, judged, facts)
 
 
 def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, Weights, Exploration]:

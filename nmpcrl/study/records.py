@@ -59,7 +59,7 @@ class Records:
     experiment: dict[str, Any]  # the fields of the Experiment
     steps: dict[str, Column]
     evaluations: dict[str, Column]
-    facts: dict[str, Any]  # stopped, seconds; when stored also final_cost, versions, machine, key
+    facts: dict[str, Any]  # stopped, seconds, final_cost; when stored versions, machine, key
 
     def save(self, path: Path) -> None:
         """Write the whole file beside `path`, then rename it into place."""

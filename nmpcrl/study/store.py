@@ -27,7 +27,6 @@ from typing import Any
 from tqdm import tqdm
 
 import nmpcrl
-from nmpcrl.study import metrics
 from nmpcrl.study.experiment import Experiment, run
 from nmpcrl.study.records import DamagedRecords, Records
 
@@ -85,12 +84,7 @@ def fetch(experiment: Experiment, **options: Any) -> Records:
         path.replace(aside)
         print(f"{error}; it is kept as {aside.name} and the run is done again", file=sys.stderr)
     records = run(experiment, **options)
-    records.facts.update(
-        final_cost=metrics.final_cost(records),
-        versions=versions(),
-        machine=platform.machine(),
-        key=key(experiment),
-    )
+    records.facts.update(versions=versions(), machine=platform.machine(), key=key(experiment))
     records.save(path)
     return records
 

@@ -104,7 +104,8 @@ def train(
         for step in _episode(learner, controller, weights, explore, episode):
             weights, failure = step.weights, step.failure
             yield step
-            _refuse_absurd(weights)
+            if absurd(weights):
+                raise Diverged(f"{absurd(weights)} left the numbers that a solver is given")
         failed = failed + 1 if failure else 0
         if failed == PATIENCE:
             raise Diverged(f"{PATIENCE} episodes in a row ended in a failed solve: {failure}")
@@ -141,10 +142,12 @@ def _episode(
         state = next_state
 
 
-def _refuse_absurd(weights: Weights) -> None:
+def absurd(weights: Weights) -> str:
+    """Which of the weights no solve can be asked with, if any, and its value."""
     for name, vector in (("theta", weights.theta), ("w", weights.w)):
         if not (np.abs(vector) <= ABSURD).all():  # also false for nan
-            raise Diverged(f"{name} left the numbers a solver is given: {vector}")
+            return f"{name} = {vector}"
+    return ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,14 +56,14 @@ def test_the_titles_of_policies_that_agree():
     runs = study()
     assert title(results.controls(runs)) == "All inputs keep within their bounds"
     assert title(results.paths(runs)).endswith("up to 0.00 m apart")
-    assert title(results.states(runs)) == "The learned policies end within 0.00 m of the target"
+    assert title(results.states(runs)) == "The learned policies end within 1 cm of the target"
 
 
 def test_the_titles_follow_when_a_policy_goes_another_way():
     runs = study(aside)
     assert title(results.controls(runs)) == "4 inputs leave their bounds"
     assert title(results.paths(runs)).endswith("up to 0.50 m apart")
-    assert title(results.states(runs)) == "The learned policies end within 0.50 m of the target"
+    assert title(results.states(runs)) == "The learned policies end within 50 cm of the target"
 
 
 def test_a_rollout_that_failed_is_told_and_drawn_as_far_as_it_got():

@@ -49,8 +49,10 @@ def states(study: Study) -> Figure:
             axis.axhline(task.target[i], **LIMIT)
     ends = np.array([metrics.final_rollout(records)[0][-1] for records in _learned(study)])
     left = np.linalg.norm((ends - task.target)[:, :2], axis=1).max()
-    arrival = f"The learned policies end within {left:.2f} m of the target"
-    return _finished(figure, arrival if np.isfinite(left) else CUT_SHORT)
+    if not np.isfinite(left):
+        return _finished(figure, CUT_SHORT)
+    centimetres = max(1, int(np.ceil(100 * left)))
+    return _finished(figure, f"The learned policies end within {centimetres} cm of the target")
 
 
 def paths(study: Study) -> Figure:
