@@ -6,7 +6,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.learning import QNetwork
-from nmpcrl.study import paper
+from nmpcrl.study import metrics, paper
 from nmpcrl.study.records import Records
 
 HELD_OUT = 5  # every fifth episode is kept from the networks
@@ -43,7 +43,7 @@ def imitate(records: Records, *, fits: int = FITS, seed: int = 0) -> Imitation:
     steps = records.steps
     whole = np.isfinite(steps["value"])
     state_action = np.hstack([steps["state"], steps["action"]])[whole]
-    before = np.vstack([records.experiment["theta"], steps["theta"][:-1]])[whole]
+    before = metrics.theta_before(records)[whole]
     value, episode = steps["value"][whole], steps["episode"][whole]
     held_out = episode % HELD_OUT == HELD_OUT - 1
     if not held_out.any():

@@ -1,12 +1,16 @@
 """From records to numbers: pure functions."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Task
+from nmpcrl.study import paper
 from nmpcrl.study.records import Column, Records
 
 TOUCH = 1e-6  # an overlap or an excess this small is the solver's tolerance, not a violation
+TIGHT = 0.999  # cosine from which two features are called parallel
 LAST = 3  # rollouts that the final noise-free cost averages
 
 
@@ -107,8 +111,7 @@ def boundary_share(records: Records, task: Task) -> float:
 
     theta is the one that the step was solved with.  # departure L
     """
-    before = np.vstack([records.experiment["theta"], records.steps["theta"][:-1]])
-    edge = task.overlap(records.steps["state"]) + before[:, -1:]
+    edge = task.overlap(records.steps["state"]) + theta_before(records)[:, -1:]
     return float((np.abs(edge) <= TOUCH).any(axis=-1).mean())
 
 
@@ -116,3 +119,56 @@ def memory(records: Records) -> float:
     """Correlation of consecutive TD errors; 0 if transitions were drawn independently."""
     delta = records.steps["delta"][np.isfinite(records.steps["delta"])]
     return float(np.corrcoef(delta[:-1], delta[1:])[0, 1])
+
+
+def theta_before(records: Records) -> Vector:
+    """theta that each step was solved with, shape (steps, d)."""
+    return np.vstack([records.experiment["theta"], records.steps["theta"][:-1]])
+
+
+def online_error(records: Records) -> Vector:
+    """What each step took for Q(s+, a+) minus what it was; nan where that is not known.
+
+    The next step of the episode solves in s+, but with the theta that this step moved. Its value is
+    carried back by the gradient: V_theta(s+) = V_theta'(s+) - phi+'(theta' - theta) to first order.
+    """
+    steps = records.steps
+    move = steps["theta"] - theta_before(records)
+    solved = steps["value"][1:] - np.sum(steps["features"][1:] * move[:-1], axis=1)
+    same_episode = steps["episode"][1:] == steps["episode"][:-1]
+    error = np.where(same_episode, steps["next_value"][:-1] - solved, np.nan)
+    return np.append(error, np.nan)
+
+
+def by_episode(records: Records, column: Vector, summary: Callable[[Vector], float]) -> Vector:
+    """`summary` of the known values of a column in each episode, shape (episodes,)."""
+    episodes, known = records.steps["episode"], np.isfinite(column)
+    result = np.full(records.experiment["episodes"], np.nan)
+    for episode in np.unique(episodes[known]):
+        result[episode] = summary(column[known & (episodes == episode)])
+    return result
+
+
+def root_mean_square(values: Vector) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def next_over_this(records: Records) -> Vector:
+    """gamma phi'phi+ / phi'phi, step by step: above 1 a semi-gradient step feeds itself."""
+    steps = records.steps
+    this, after = steps["features"][:-1], steps["features"][1:]
+    ratio = paper.GAMMA * np.sum(this * after, axis=1) / np.sum(this**2, axis=1)
+    same_episode = steps["episode"][1:] == steps["episode"][:-1]
+    return ratio[same_episode & np.isfinite(ratio)]
+
+
+def parallel_share(records: Records) -> float:
+    """Share of the steps whose phi and phi+ point the same way, to a cosine of `TIGHT`."""
+    steps = records.steps
+    this, after = steps["features"][:-1], steps["features"][1:]
+    cosine = np.sum(this * after, axis=1) / (
+        np.linalg.norm(this, axis=1) * np.linalg.norm(after, axis=1)
+    )
+    same_episode = steps["episode"][1:] == steps["episode"][:-1]
+    return float(np.mean(cosine[same_episode & np.isfinite(cosine)] > TIGHT))

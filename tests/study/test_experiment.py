@@ -352,12 +352,14 @@ def test_a_run_that_fails_ten_times_in_a_row_says_why_it_stopped(monkeypatch):
 
 def test_a_run_whose_theta_explodes_says_why_it_stopped():
     records = run(Experiment(learner="ES", episodes=2, steps=6, alpha=1e5))
-    assert records.facts["stopped"].startswith("diverged: theta left the numbers")
+    assert records.facts["stopped"].startswith("diverged: theta ")
+    assert "left the numbers" in records.facts["stopped"]
     assert len(records.steps["time"]) < 12
 
 
 @pytest.mark.parametrize("steps", [1, 2, 3])
 def test_a_theta_that_explodes_in_an_episodes_last_step_is_not_evaluated(steps):
     records = run(Experiment(learner="ES", episodes=4, steps=steps, alpha=1e5, evaluate_every=1))
-    assert records.facts["stopped"].startswith("diverged: theta left the numbers")
+    assert records.facts["stopped"].startswith("diverged: theta ")
+    assert "left the numbers" in records.facts["stopped"]
     assert (np.abs(records.evaluations["theta"]) <= 1e6).all()

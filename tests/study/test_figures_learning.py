@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from nmpcrl.study import Experiment, Study, paper, run, sweep
+from nmpcrl.study import Experiment, Study, metrics, paper, run, sweep
 from nmpcrl.study.chain import Chain
 from nmpcrl.study.curvature import dropped_curvature
+from nmpcrl.study.directions import directions
 from nmpcrl.study.figures import ges, rdes
 from nmpcrl.study.imitation import imitate
 
@@ -32,20 +33,20 @@ def heading(figure: Figure) -> str:
 
 def test_the_value_that_es_solved_for_is_the_one_the_next_step_carries_back(study):
     records = one(study, "ES")
-    error = rdes.online_error(records)
+    error = metrics.online_error(records)
     plain = records.steps["next_value"][:-1] - records.steps["value"][1:]
     assert np.nanmedian(np.abs(error)) < 1e-2 * np.nanmedian(np.abs(plain))
 
 
 def test_the_last_step_of_an_episode_has_no_online_error(study):
-    error = rdes.online_error(one(study, "ES"))
+    error = metrics.online_error(one(study, "ES"))
     last = one(study, "ES").steps["time"] == SMALL["steps"] - 1
     assert np.isnan(error[last]).all()
     assert np.isfinite(error[~last]).all()
 
 
 def test_theta_before_is_theta_after_shifted_by_a_step(study):
-    before = rdes.theta_before(one(study, "ES"))
+    before = metrics.theta_before(one(study, "ES"))
     np.testing.assert_array_equal(before[0], paper.THETA_INIT)
     np.testing.assert_array_equal(before[1:], one(study, "ES").steps["theta"][:-1])
 
@@ -54,13 +55,13 @@ def test_a_summary_by_episode_skips_what_is_not_known(study):
     records = one(study, "ES")
     column = records.steps["episode"].astype(float)
     column[records.steps["episode"] == 1] = np.nan
-    np.testing.assert_array_equal(rdes.by_episode(records, column, np.max), [0, np.nan, 2, 3])
+    np.testing.assert_array_equal(metrics.by_episode(records, column, np.max), [0, np.nan, 2, 3])
 
 
 def test_the_correction_of_ges_is_gamma_times_w_phi_times_the_next_features(study):
     """Against a second solve in the next state, at steps where the features are smooth."""
     records = one(study, "GES")
-    parts, before = ges.directions(records), rdes.theta_before(records)
+    parts, before = directions(records), metrics.theta_before(records)
     nmpc, steps = paper.nmpc(), records.steps
     for k in (10, 20, 30):
         solution = nmpc.solve(steps["state"][k], before[k])
@@ -70,7 +71,7 @@ def test_the_correction_of_ges_is_gamma_times_w_phi_times_the_next_features(stud
 
 
 def test_es_has_no_correction(study):
-    parts = ges.directions(one(study, "ES"))
+    parts = directions(one(study, "ES"))
     assert parts.share < 1e-6
     assert parts.net == pytest.approx(1)
 
@@ -82,9 +83,9 @@ def test_a_target_runs_ahead_where_the_next_features_are_longer(study):
     made_up = type(records)(
         records.experiment, {**records.steps, "features": features}, records.evaluations, {}
     )
-    ahead = ges.next_over_this(made_up)
+    ahead = metrics.next_over_this(made_up)
     np.testing.assert_allclose(np.unique(ahead.round(9)), [0.97 / 3, 0.97 * 3], rtol=1e-6)
-    assert ges.parallel_share(made_up) == 1
+    assert metrics.parallel_share(made_up) == 1
 
 
 @pytest.mark.parametrize(
@@ -123,7 +124,7 @@ def test_a_run_that_was_stopped_early_can_be_drawn(study):
     runs = {e: stopped if r is full else r for e, r in study.items()}
     figure = rdes.figure_1(Study(runs))
     assert heading(figure).startswith("Divergence: DES in 1 of 2")
-    rdes.online_errors(Study(runs))
+    metrics.online_errors(Study(runs))
 
 
 def test_the_chain_s_figure_names_the_ratio_from_which_gradient_td_converges():

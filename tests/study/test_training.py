@@ -254,7 +254,7 @@ def test_weights_that_are_not_numbers_or_absurd_are_a_divergence(sound, name, ab
         return dataclasses.replace(weights, **{name: vector})
 
     steps = []
-    with pytest.raises(Diverged, match=f"{name} left the numbers a solver is given"):
+    with pytest.raises(Diverged, match=rf"(?s)^{name} .*left the numbers"):
         steps.extend(train(leap(spoil)(sound), sound, first_weights(), quiet(2, 5)))
     assert places(steps) == [(0, 0), (0, 1), (0, 2)]
     assert not np.abs(getattr(steps[-1].weights, name)[4]) <= 1e6  # the step itself is kept

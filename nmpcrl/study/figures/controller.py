@@ -11,7 +11,7 @@ from matplotlib.patches import Circle
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
-from nmpcrl.study.figures.style import PAGE, subplots
+from nmpcrl.study.figures.style import page, subplots
 from nmpcrl.study.training import Rollout
 
 INK, LESS, MORE = "#222222", "#1B7F79", "#882255"  # none of them is a learner's
@@ -26,8 +26,6 @@ SYMBOLS = {
     "heading_f": r"\theta_{\varphi_f}",
     "c": r"\theta_c",
 }  # of paper.THETA_NAMES, between dollar signs
-
-page: Any = plt.rc_context(PAGE)  # as a decorator; matplotlib's types do not know that it is one
 
 
 def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:

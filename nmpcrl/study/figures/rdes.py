@@ -4,17 +4,15 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nmpcrl import Vector
 from nmpcrl.study import metrics
 from nmpcrl.study.claims import diverged
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.figures.style import LOOKS, PAGE, subplots
+from nmpcrl.study.figures.style import LOOKS, page, subplots
 from nmpcrl.study.imitation import Imitation
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Study
@@ -23,40 +21,7 @@ DECAYS = {"step": "noise decays per step", "episode": "noise decays per episode"
 CEILING = 1.3  # multiple of theta_init's noise-free cost at which the panels without noise end
 
 
-def theta_before(records: Records) -> Vector:
-    """theta that each step was solved with, shape (steps, d)."""
-    return np.vstack([records.experiment["theta"], records.steps["theta"][:-1]])
-
-
-def online_error(records: Records) -> Vector:
-    """What each step took for Q(s+, a+) minus what it was; nan where that is not known.
-
-    The next step of the episode solves in s+, but with the theta that this step moved. Its value is
-    carried back by the gradient: V_theta(s+) = V_theta'(s+) - phi+'(theta' - theta) to first order.
-    """
-    steps = records.steps
-    move = steps["theta"] - theta_before(records)
-    solved = steps["value"][1:] - np.sum(steps["features"][1:] * move[:-1], axis=1)
-    same_episode = steps["episode"][1:] == steps["episode"][:-1]
-    error = np.where(same_episode, steps["next_value"][:-1] - solved, np.nan)
-    return np.append(error, np.nan)
-
-
-def by_episode(records: Records, column: Vector, summary: Callable[[Vector], float]) -> Vector:
-    """`summary` of the known values of a column in each episode, shape (episodes,)."""
-    episodes, known = records.steps["episode"], np.isfinite(column)
-    result = np.full(records.experiment["episodes"], np.nan)
-    for episode in np.unique(episodes[known]):
-        result[episode] = summary(column[known & (episodes == episode)])
-    return result
-
-
-def root_mean_square(values: Vector) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(values**2)))
-
-
-@plt.rc_context(PAGE)
+@page
 def literal_and_gated(literal: Records, gated: Records) -> Figure:
     """theta_x over the first two episodes, with and without waiting for the first fit."""
     figure, axes = subplots(height=2.9)
@@ -75,7 +40,7 @@ def literal_and_gated(literal: Records, gated: Records) -> Figure:
     return figure
 
 
-@plt.rc_context(PAGE)
+@page
 def online_errors(study: Study, learners: tuple[str, ...] = ("DES", "RDES")) -> Figure:
     """Root mean square of the online error in each episode, one panel a reading of the decay."""
     decays = study.values_of("decay")
@@ -84,7 +49,9 @@ def online_errors(study: Study, learners: tuple[str, ...] = ("DES", "RDES")) -> 
     for panel, decay in zip(axes[0], decays, strict=True):
         for learner in learners:
             for records in study.select(learner=learner, decay=decay).values():
-                error = by_episode(records, online_error(records), root_mean_square)
+                error = metrics.by_episode(
+                    records, metrics.online_error(records), metrics.root_mean_square
+                )
                 panel.semilogy(np.arange(1, error.size + 1), error, **thin(learner))
                 known = error[np.isfinite(error)]
                 last[learner].extend(known[known.size // 2 :])
@@ -95,7 +62,7 @@ def online_errors(study: Study, learners: tuple[str, ...] = ("DES", "RDES")) -> 
     return headed(figure, f"In the second half of training, the next value is off by {means}")
 
 
-@plt.rc_context(PAGE)
+@page
 def held_out_errors(imitations: Iterable[Imitation]) -> Figure:
     """Error of the two networks on each held-out episode of some runs."""
     imitations = tuple(imitations)
@@ -118,7 +85,7 @@ def held_out_errors(imitations: Iterable[Imitation]) -> Figure:
     return figure
 
 
-@plt.rc_context(PAGE)
+@page
 def figure_1(study: Study) -> Figure:
     """Figure 1 of the paper, DES against RDES, with the noise-free cost and the frozen arm."""
     figure = learning_curves(study, ("DES", "RDES"))
@@ -126,7 +93,7 @@ def figure_1(study: Study) -> Figure:
     return headed(figure, f"Divergence: {', '.join(counts)} runs")
 
 
-@plt.rc_context(PAGE)
+@page
 def learning_curves(study: Study, learners: tuple[str, ...]) -> Figure:
     """Summed RL cost of each training episode above, cost without noise below; frozen beside.
 

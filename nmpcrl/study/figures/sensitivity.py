@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.study import Study
-from nmpcrl.study.figures.controller import INK, LESS, MORE, SYMBOLS, page
-from nmpcrl.study.figures.style import LOOKS, subplots
+from nmpcrl.study.figures.controller import INK, LESS, MORE, SYMBOLS
+from nmpcrl.study.figures.style import LOOKS, page, subplots
 from nmpcrl.study.metrics import noise_free_cost, training_cost
 from nmpcrl.study.paper import THETA_NAMES
 from nmpcrl.study.records import Records

@@ -19,6 +19,8 @@ PAGE: dict[Any, Any] = {
     "lines.linewidth": 1.6,
 }
 
+page: Any = plt.rc_context(PAGE)  # as a decorator; matplotlib's types do not know that it is one
+
 
 @dataclass(frozen=True)
 class Look:
