@@ -16,7 +16,8 @@ from nmpcrl.control.program import SOLVERS, Program
 from nmpcrl.control.solution import Solution, SolverError, short
 from nmpcrl.control.task import Task
 
-ABSURD = 1e6  # no state or theta beyond this reaches a solver: fatrop never returns from some
+ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
+FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
 
 __all__ = ["ABSURD", "Nmpc", "Solution", "SolverError"]
 
@@ -81,7 +82,7 @@ class Nmpc:
             SolverError: no optimum was found; carries the status, the state and theta.
         """
         began = time.perf_counter()
-        state = _checked("state", state, self.plant.n)
+        state = _checked("state", state, self.plant.n, FAR)
         theta = _checked("theta", theta, 2 * self.plant.n + self.plant.m + 1)
         if action is None:
             return self._free.solve(state, theta, guess, began=began)
@@ -115,15 +116,15 @@ class Nmpc:
         return Program(transcribe(*problem, fix_action=fix_action), self.task, self.solver)
 
 
-def _checked(name: str, vector: Vector, size: int) -> Vector:
+def _checked(name: str, vector: Vector, size: int, largest: float = ABSURD) -> Vector:
     try:
         vector = np.array(vector, dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {vector!r} must hold {size} numbers") from None
     if vector.shape != (size,):
         raise ValueError(f"{name} has shape {vector.shape}; it must be ({size},)")
-    if not (np.abs(vector) <= ABSURD).all():  # also false for nan
+    if not (np.abs(vector) <= largest).all():  # also false for nan
         raise ValueError(
-            f"{name} {short(vector)} must hold finite numbers of size at most {ABSURD:g}"
+            f"{name} {short(vector)} must hold finite numbers of size at most {largest:g}"
         )
     return vector

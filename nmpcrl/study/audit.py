@@ -61,7 +61,7 @@ def audit(study: Study, curvature: Curvature) -> tuple[Assumption, ...]:
         ),
         Assumption(
             "the update follows the gradient of the MSPBE",
-            "Eq. (16) drops the curvature term, whose size beside the printed direction is"
+            "the paper's (16) drops the curvature term, whose size beside the printed direction is"
             f" {dropped:.1e} in the median",
             holds=dropped == 0,
         ),

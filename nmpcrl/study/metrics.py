@@ -57,14 +57,21 @@ def gain(records: Records) -> float:
 
 
 def wander(records: Records) -> float:
-    """Range of the noise-free cost over the second half of training, as a share of the first's."""
+    """Range of the noise-free cost over the second half of training, as a share of the first's.
+
+    Infinite where a rollout failed, or training did not get that far.
+    """
     episode, cost = noise_free_cost(records)
     late = cost[episode >= records.experiment["episodes"] / 2]
-    return float((late.max() - late.min()) / initial_cost(records)) if late.size else np.inf
+    if not late.size or not np.isfinite(late).all():
+        return np.inf
+    return float((late.max() - late.min()) / initial_cost(records))
 
 
 def excess(records: Records, frozen: Records, last: int = 20) -> float:
     """Median training cost of the last episodes over that of the frozen arm under the same noise.
+
+    An episode that was cut short, or never reached, costs infinitely much.
 
     Args:
         records: a run.
@@ -72,9 +79,7 @@ def excess(records: Records, frozen: Records, last: int = 20) -> float:
         last: how many episodes count; at most the second half of training.
     """
     window = -min(last, max(1, records.experiment["episodes"] // 2))
-    late = training_cost(records)[window:]
-    if np.isnan(late).any():
-        return np.inf
+    late = np.nan_to_num(training_cost(records)[window:], nan=np.inf)
     return float(np.median(late) / np.median(training_cost(frozen)[window:]))
 
 

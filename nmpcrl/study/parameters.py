@@ -44,7 +44,7 @@ def parameter_vector(owner: object, name: str, size: int) -> None:
     """The field is a list of `size` numbers that a solver can be given; it becomes a tuple."""
     given = getattr(owner, name)
     try:
-        vector = tuple(float(value) for value in given)
+        vector = () if isinstance(given, str | bytes) else tuple(float(value) for value in given)
     except (TypeError, ValueError):
         vector = ()
     if len(vector) != size or not all(isfinite(v) and abs(v) <= ABSURD for v in vector):

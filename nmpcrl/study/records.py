@@ -6,7 +6,6 @@ Analyses read records and nothing else. Loading never unpickles.
 import json
 import os
 import tempfile
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,7 +66,7 @@ class Records:
         arrays = {f"steps/{name}": column for name, column in self.steps.items()}
         arrays |= {f"evaluations/{name}": column for name, column in self.evaluations.items()}
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".half-", suffix=".npz")
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".half-", suffix=".tmp")
         try:
             with os.fdopen(handle, "wb") as file:
                 np.savez_compressed(file, about=np.array(about), **arrays)  # type: ignore[arg-type]
@@ -96,7 +95,7 @@ class Records:
             return cls(about["experiment"], tables["steps"], tables["evaluations"], about["facts"])
         except FileNotFoundError:
             raise
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        except Exception as error:
             raise DamagedRecords(f"{path} is damaged, or not a run") from error
 
     @staticmethod
@@ -106,5 +105,5 @@ class Records:
             with np.load(path, allow_pickle=False) as file:
                 about = json.loads(str(file["about"]))
             return about["experiment"], about["facts"]
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        except Exception as error:
             raise DamagedRecords(f"{path} is damaged, or not a run") from error

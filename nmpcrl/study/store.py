@@ -109,10 +109,12 @@ def fetch_all(
         RuntimeError: workers were killed again and again.
     """
     experiments = tuple(dict.fromkeys(experiments))
-    for _ in range(ATTEMPTS):
+    for left in reversed(range(ATTEMPTS + 1)):
         missing = [e for e in experiments if not _is_whole(path_of(e))]
         if not missing:
             return Study({e: fetch(e) for e in experiments})
+        if not left:
+            break
         try:
             if executor is not None:
                 _train(missing, executor, progress=progress)
@@ -122,8 +124,8 @@ def fetch_all(
         except BrokenProcessPool:
             if executor is not None:
                 raise
-    left = ", ".join(str(e) for e in experiments if not path_of(e).exists())
-    raise RuntimeError(f"workers were killed {ATTEMPTS} times; these runs are missing: {left}")
+    names = ", ".join(str(e) for e in missing)
+    raise RuntimeError(f"workers were killed {ATTEMPTS} times; these runs are missing: {names}")
 
 
 def stored() -> dict[Path, tuple[dict[str, Any], dict[str, Any]]]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
+from nmpcrl.control.solution import short
 from nmpcrl.learning import Learner, Transition, Update, Weights
 
 Counts = NDArray[np.int_]
@@ -146,7 +147,7 @@ def absurd(weights: Weights) -> str:
     """Which of the weights no solve can be asked with, if any, and its value."""
     for name, vector in (("theta", weights.theta), ("w", weights.w)):
         if not (np.abs(vector) <= ABSURD).all():  # also false for nan
-            return f"{name} = {vector}"
+            return f"{name} = {short(vector)}"
     return ""
 
 

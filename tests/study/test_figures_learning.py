@@ -124,7 +124,7 @@ def test_a_run_that_was_stopped_early_can_be_drawn(study):
     runs = {e: stopped if r is full else r for e, r in study.items()}
     figure = rdes.figure_1(Study(runs))
     assert heading(figure).startswith("Divergence: DES in 1 of 2")
-    metrics.online_errors(Study(runs))
+    rdes.online_errors(Study(runs))
 
 
 def test_the_chain_s_figure_names_the_ratio_from_which_gradient_td_converges():
