@@ -212,7 +212,7 @@ def _train(missing: list[Experiment], executor: Executor, *, progress: bool) -> 
     """Run `missing` and show how far they are; the first failure is raised when all have ended."""
     total = sum(e.episodes for e in missing)
     with (
-        tqdm(total=total, unit="ep", disable=not progress) as bar,
+        tqdm(total=total, unit="ep", disable=not progress, mininterval=_interval()) as bar,
         _without_main(),
         SPAWN.Manager() as manager,
     ):
@@ -226,6 +226,11 @@ def _train(missing: list[Experiment], executor: Executor, *, progress: bool) -> 
             _show(reports, bar)
         for future in ended:
             future.result()
+
+
+def _interval() -> float:
+    """Seconds between two states of the bar: a log keeps every one, a terminal the last."""
+    return 0.1 if sys.stderr.isatty() else 30.0
 
 
 def _fetch_and_report(experiment: Experiment, reports: Any) -> None:

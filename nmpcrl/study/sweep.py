@@ -40,9 +40,18 @@ def sweep(**axes: Any) -> tuple[Experiment, ...]:
 
 
 def main_study(
-    episodes: int = paper.EPISODES, seeds: Sequence[int] = (0, 1), layout: str = "A"
+    episodes: int = paper.EPISODES,
+    seeds: Sequence[int] = (0, 1),
+    layout: str = "A",
+    **others: Any,
 ) -> tuple[Experiment, ...]:
-    """The runs that the book shows: every learner, both readings of the decay, some seeds."""
-    return sweep(
-        learner=LEARNERS, decay=tuple(DECAYS), seed=seeds, episodes=episodes, layout=layout
-    )
+    """The runs that the book shows: every learner, both readings of the decay, some seeds.
+
+    Args:
+        episodes: length of a run.
+        seeds: one run of each learner and reading for each.
+        layout: of the obstacles.
+        others: further fields of `Experiment`, as `sweep` takes them.
+    """
+    grid = {"learner": LEARNERS, "decay": tuple(DECAYS), "seed": seeds}
+    return sweep(**grid, episodes=episodes, layout=layout, **others)
