@@ -28,16 +28,25 @@ SOLVERS: dict[str, dict[str, Any]] = {
         "bound_relax_factor": 0.0,
     },
 }
-WARM: dict[str, dict[str, Any]] = {  # what is different with a guess
-    "fatrop": {"mu_init": 0.1},
+
+
+def _ipopt_from(mu: float, push: float) -> dict[str, Any]:
+    """Ipopt's options for a start that is known: its first barrier, and how far off the bounds."""
+    near = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
+    pushes = {f"warm_start_{name}": push for name in near}
+    return {"warm_start_init_point": "yes", "mu_init": mu} | pushes
+
+
+STARTS: dict[str, dict[str, dict[str, Any]]] = {  # the better the start, the less it is moved
+    "fatrop": {
+        "standing": {},
+        "shifted": {"bound_push": 1e-3},
+        "same": {"mu_init": 1e-4, "bound_push": 1e-6},
+    },
     "ipopt": {
-        "warm_start_init_point": "yes",
-        "mu_init": 1e-3,
-        "warm_start_bound_push": 1e-4,
-        "warm_start_slack_bound_push": 1e-4,
-        "warm_start_mult_bound_push": 1e-4,
-        "warm_start_bound_frac": 1e-4,
-        "warm_start_slack_bound_frac": 1e-4,
+        "standing": {},
+        "shifted": _ipopt_from(mu=1e-3, push=1e-4),
+        "same": _ipopt_from(mu=1e-6, push=1e-8),
     },
 }
 
@@ -49,8 +58,10 @@ class Program:
         self._ocp = ocp
         self._task = task
         self._name = solver
-        self._cold = _solver(ocp, solver, SOLVERS[solver])
-        self._warm = _solver(ocp, solver, SOLVERS[solver] | WARM[solver])
+        self._solvers = {
+            start: _solver(ocp, solver, SOLVERS[solver] | options)
+            for start, options in STARTS[solver].items()
+        }
         self._sensitivity = Sensitivity(ocp)
         self._bounds = {
             "lbx": ca.DM(ocp.lower),
@@ -64,8 +75,12 @@ class Program:
     ) -> Solution:
         """Solve for p = (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         p = np.concatenate([state, theta, *action])
-        solver = self._cold if guess is None else self._warm
-        z, lam, nu = self._standing(state) if guess is None else self._from(guess, state)
+        if guess is None:
+            start, (z, lam, nu) = "standing", self._standing(state)
+        else:
+            start = "same" if np.array_equal(guess.state, state) else "shifted"
+            z, lam, nu = self._from(guess, state, same=start == "same")
+        solver = self._solvers[start]
         result = solver(p=p, x0=z, lam_g0=lam, lam_x0=nu, **self._bounds)
         stats = solver.stats()
         z, lam, nu = (result[key].full().ravel() for key in ("x", "lam_g", "lam_x"))
@@ -103,8 +118,8 @@ class Program:
         z[ocp.states] = state
         return z, np.zeros(ocp.equality.size), np.zeros(ocp.lower.size)
 
-    def _from(self, guess: Solution, state: Vector) -> tuple[Vector, Vector, Vector]:
-        """The guess itself if it was solved in `state`; else one stage later, its end repeated.
+    def _from(self, guess: Solution, state: Vector, *, same: bool) -> tuple[Vector, Vector, Vector]:
+        """The guess itself if it was solved in the same state; else one stage later, its end twice.
 
         Shifting divides every stage's discount by gamma, and with it the multipliers.
         """
@@ -114,7 +129,6 @@ class Program:
                 f"the guess has states of shape {old.states.shape} and slacks of shape"
                 f" {old.slacks.shape}; this problem's are {ocp.states.shape} and {ocp.slacks.shape}"
             )
-        same = np.array_equal(guess.state, state)
         z, nu = np.zeros(ocp.lower.size), np.zeros(ocp.lower.size)
         lam = np.zeros(ocp.equality.size)
         scale = 1.0 if same else 1.0 / ocp.gamma
