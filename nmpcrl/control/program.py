@@ -30,13 +30,12 @@ SOLVERS: dict[str, dict[str, Any]] = {
 }
 
 
-def _ipopt_from(mu: float, push: float) -> dict[str, Any]:
-    """Ipopt's options for a start that is known: its first barrier, and how far off the bounds."""
-    near = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
-    pushes = {f"warm_start_{name}": push for name in near}
-    return {"warm_start_init_point": "yes", "mu_init": mu} | pushes
-
-
+_NEAR = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
+_WARM_IPOPT = {
+    "warm_start_init_point": "yes",
+    "mu_init": 1e-3,
+    **{f"warm_start_{name}": 1e-4 for name in _NEAR},
+}
 STARTS: dict[str, dict[str, dict[str, Any]]] = {  # the better the start, the less it is moved
     "fatrop": {
         "standing": {},
@@ -45,8 +44,8 @@ STARTS: dict[str, dict[str, dict[str, Any]]] = {  # the better the start, the le
     },
     "ipopt": {
         "standing": {},
-        "shifted": _ipopt_from(mu=1e-3, push=1e-4),
-        "same": _ipopt_from(mu=1e-6, push=1e-8),
+        "shifted": _WARM_IPOPT,
+        "same": _WARM_IPOPT,
     },
 }
 
