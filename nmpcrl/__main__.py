@@ -1,6 +1,7 @@
 """The command `nmpcrl`: train a run, list what is stored, judge a run without noise."""
 
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import click
@@ -64,7 +65,7 @@ def runs() -> None:
             "episodes": fields["episodes"],
             "final cost": f"{facts['final_cost']:.1f}",
             "minutes": f"{facts['seconds'] / 60:.1f}",
-            "stopped": facts["stopped"],
+            "stopped": shorten(facts["stopped"], 60, placeholder=" ..."),
         }
         for path, (fields, facts) in stored().items()
     ]

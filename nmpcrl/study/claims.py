@@ -94,7 +94,8 @@ def des_diverges_and_rdes_does_not(study: Study) -> Verdict:
         "DES diverges within 300 episodes; RDES does not.",
         _contrast(study, des, rdes),
         f"{_count(des)} runs of DES and {_count(rdes)} of RDES diverged; their training cost ended"
-        f" at {excess['DES']:.2f} and {excess['RDES']:.2f} times the frozen arm's (medians)."
+        f" at {_shown(excess['DES'], '.2f')} and {_shown(excess['RDES'], '.2f')} times the frozen"
+        " arm's (medians; an episode that a failed solve cut short counts as ∞)."
         f" {_scope(study)}",
         "Other layouts and the untold details of the network; Algorithm 1 read literally"
         " (departure G).",
@@ -244,7 +245,7 @@ def learning_beats_the_frozen_theta(study: Study) -> Verdict:
         name: _median(_runs(study, name, lambda _, __, r: metrics.gain(r)).values())
         for name in ("ES", "DES", "RDES", "GES")
     }
-    listed = ", ".join(f"{name} {value:+.1%}" for name, value in gains.items())
+    listed = ", ".join(f"{name} {_shown(value, '+.1%')}" for name, value in gains.items())
     return Verdict(
         "C9",
         "Learning with RDES and GES beats theta_init without noise.",
@@ -340,6 +341,11 @@ def _scope(study: Study) -> str:
 def _plural(name: str, count: int) -> str:
     word = "reading" if name == "decay" else name
     return word if count == 1 else f"{word}s"
+
+
+def _shown(value: float, form: str) -> str:
+    """A number as a sentence shows it; the cost of what could not be finished is infinite."""
+    return f"{value:{form}}" if np.isfinite(value) else str(value).replace("inf", "∞")
 
 
 def _median(values: Iterable[float]) -> float:

@@ -305,3 +305,11 @@ def test_runs_shorter_than_the_paper_s_decide_nothing_about_learning():
 def test_one_seed_is_enough_to_judge_and_the_evidence_says_that_it_is_one():
     first = judge(study({}, seeds=(0,)))[0]
     assert "1 layout, 1 seed, 1 reading of the decay; 300 episodes" in first.evidence
+
+
+def test_what_could_not_be_finished_is_shown_as_infinite_and_never_as_inf():
+    run = {"training": np.nan, "judged": np.inf}
+    evidence = [v.evidence for v in judge(study({"DES": [run, run]}))]
+    assert not any("inf" in sentence for sentence in evidence)
+    assert "∞ and" in evidence[0]
+    assert "DES -∞" in evidence[-1]
