@@ -308,8 +308,11 @@ def test_one_seed_is_enough_to_judge_and_the_evidence_says_that_it_is_one():
 
 
 def test_what_could_not_be_finished_is_shown_as_infinite_and_never_as_inf():
-    run = {"training": np.nan, "judged": np.inf}
-    evidence = [v.evidence for v in judge(study({"DES": [run, run]}))]
+    run = {"judged": np.inf}
+    runs = study({"DES": [run, run]})
+    for records_ in runs.select(learner="DES").values():
+        records_.steps["status"][-11:] = 2
+    evidence = [verdict.evidence for verdict in judge(runs)]
     assert not any("inf" in sentence for sentence in evidence)
-    assert "∞ and" in evidence[0]
+    assert "ended at ∞ and" in evidence[0]
     assert "DES -∞" in evidence[-1]
