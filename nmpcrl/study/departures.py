@@ -62,7 +62,7 @@ DEPARTURES = {
         " buffer holds a mini-batch, 127 steps later.",
         reading="Gated: theta waits for the first fit. `gated = False` is Algorithm 1 literally.",
         why="An untrained network predicts about 0, so the TD error is about -Q, and theta_x falls"
-        " from 1 to about 0.33 within the first episode.",
+        " from 1 to about a third within the first episode.",
         variant="gated",
     ),
     "H": Departure(
