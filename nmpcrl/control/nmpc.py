@@ -5,21 +5,29 @@
 """
 
 import time
+import warnings
 from functools import cached_property
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control.compile import CannotCompile
+from nmpcrl.control.interior_point import InteriorPoint
 from nmpcrl.control.ocp import transcribe
 from nmpcrl.control.plant import Plant
-from nmpcrl.control.program import SOLVERS, Program
+from nmpcrl.control.program import SOLVERS as CASADI_SOLVERS
+from nmpcrl.control.program import Program
+from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, short
 from nmpcrl.control.task import Task
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
 
-__all__ = ["ABSURD", "Nmpc", "Solution", "SolverError"]
+SOLVERS = ("riccati", *CASADI_SOLVERS)
+FALLBACK = "fatrop"  # where the default cannot be compiled
+
+__all__ = ["ABSURD", "SOLVERS", "Nmpc", "Solution", "SolverError"]
 
 
 class Nmpc:
@@ -32,7 +40,7 @@ class Nmpc:
         horizon: int = 10,
         gamma: float = 0.97,
         slack_weight: float = 100.0,
-        solver: str = "fatrop",
+        solver: str = SOLVERS[0],
     ) -> None:
         """Check and keep the problem; it is transcribed at the first solve.
 
@@ -42,7 +50,8 @@ class Nmpc:
             horizon: N, the number of planned inputs.
             gamma: discount factor, 0 < gamma <= 1.
             slack_weight: omega, the cost of a unit of each slack.
-            solver: "fatrop" or "ipopt".
+            solver: "riccati", which is compiled for the plant at its first solve and gives way to
+                "fatrop" with a warning where that cannot be done; "fatrop"; or "ipopt".
         """
         if isinstance(horizon, bool) or not isinstance(horizon, int | np.integer) or horizon < 1:
             raise ValueError(f"horizon = {horizon!r} must be a whole number, 1 or more")
@@ -94,36 +103,60 @@ class Nmpc:
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
-        return self._program(solution).value_hessian(solution)
+        return self._variant(solution).sensitivity.hessian(*_point(solution))
 
     def kkt_residual(self, solution: Solution) -> float:
         """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`."""
-        return self._program(solution).kkt_residual(solution)
+        return self._variant(solution).sensitivity.kkt_residual(*_point(solution))
 
-    def _program(self, solution: Solution) -> Program:
+    def _variant(self, solution: Solution) -> "_Variant":
         return self._fixed if solution.ocp.fixed_action.size else self._free
 
     @cached_property
-    def _free(self) -> Program:
-        return self._transcribed(fix_action=False)
+    def _free(self) -> "_Variant":
+        return _Variant(self, fix_action=False)
 
     @cached_property
-    def _fixed(self) -> Program:
-        return self._transcribed(fix_action=True)
+    def _fixed(self) -> "_Variant":
+        return _Variant(self, fix_action=True)
 
-    def _transcribed(self, *, fix_action: bool) -> Program:
-        problem = (self.plant, self.task, self.horizon, self.gamma, self.slack_weight)
-        return Program(transcribe(*problem, fix_action=fix_action), self.task, self.solver)
+
+class _Variant:
+    """Eq. (2) with u_0 free or fixed: transcribed, with its sensitivities and a solver."""
+
+    def __init__(self, nmpc: Nmpc, *, fix_action: bool) -> None:
+        plant, task = nmpc.plant, nmpc.task
+        problem = (plant, task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
+        self._ocp = transcribe(*problem, fix_action=fix_action)
+        if nmpc.solver == "riccati":
+            try:
+                self.solve = InteriorPoint(self._ocp, plant, task).solve
+                return
+            except CannotCompile as error:
+                warnings.warn(f"{error}: {FALLBACK} solves instead of riccati", stacklevel=2)
+                nmpc.solver = FALLBACK
+        self.solve = Program(self._ocp, self.sensitivity, task, nmpc.solver).solve
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity:
+        return Sensitivity(self._ocp)
+
+
+def _point(solution: Solution) -> tuple[Vector, Vector, Vector, Vector]:
+    action = solution.action[: solution.ocp.fixed_action.size]
+    p = np.concatenate([solution.state, solution.theta, action])
+    return solution.primal, p, solution.constraint_duals, solution.bound_duals
 
 
 def _checked(name: str, vector: Vector, size: int, largest: float = ABSURD) -> Vector:
+    """A copy of `vector`, once its shape and its numbers are known to be right."""
     try:
         vector = np.array(vector, dtype=float)
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {vector!r} must hold {size} numbers") from None
     if vector.shape != (size,):
         raise ValueError(f"{name} has shape {vector.shape}; it must be ({size},)")
-    if not (np.abs(vector) <= largest).all():  # also false for nan
+    if not vector.dot(vector) <= largest**2 and not (np.abs(vector) <= largest).all():
         raise ValueError(
             f"{name} {short(vector)} must hold finite numbers of size at most {largest:g}"
         )

@@ -32,12 +32,12 @@ class Theta(NamedTuple):
         return cls(theta[:n], theta[n : n + m], theta[n + m : 2 * n + m], theta[2 * n + m :])
 
 
-def stage_cost(state: ca.SX, action: ca.SX, theta: Theta, target: Vector) -> ca.SX:
+def stage_cost(state: ca.SX, action: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
     """L(s, u, theta) of the paper: ||s - s_ref||^2 and ||u||^2, weighted by theta squared."""
     return ca.sumsqr(theta.stage * (state - target)) + ca.sumsqr(theta.inputs * action)
 
 
-def terminal_cost(state: ca.SX, theta: Theta, target: Vector) -> ca.SX:
+def terminal_cost(state: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
     """Gamma(s, theta) of the paper: ||s - s_ref||^2, weighted by theta squared."""
     return ca.sumsqr(theta.terminal * (state - target))
 

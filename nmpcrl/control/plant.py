@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.control.machine_code import callable_of
 
 Dynamics = Callable[[ca.SX, ca.SX], ca.SX]
 
@@ -67,15 +68,20 @@ class Plant:
     def transition(self) -> ca.Function:
         """The discrete dynamics f(state, action) of Eq. (18), as a CasADi function."""
         state, action = ca.SX.sym("state", self.n), ca.SX.sym("action", self.m)
-        return ca.Function("f", [state, action], [rk4(self.dynamics, state, action, self.period)])
+        later = rk4(self.dynamics, state, action, self.period)
+        return ca.Function("f", [state, action], [later], ["state", "action"], ["later"])
 
     def step(self, state: Vector, action: Vector) -> Vector:
         """The state one period later, shape (n,): Eq. (18)."""
-        return self.transition(state, action).full().ravel()
+        return self._step(state, action)
+
+    @cached_property
+    def _step(self) -> Callable[[Vector, Vector], Vector]:
+        return callable_of(self.transition)
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""
-        return np.clip(action, self.lower, self.upper)
+        return np.minimum(np.maximum(action, self.lower), self.upper)
 
 
 def differential_drive(period: float = 0.2) -> Plant:

@@ -1,4 +1,4 @@
-"""One transcription of the OCP and its solver: where guesses are made and results are read."""
+"""One transcription of the OCP and a solver of CasADi: where guesses are made and results read."""
 
 import time
 from typing import Any
@@ -6,10 +6,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from nmpcrl import Matrix, Vector
+from nmpcrl import Vector
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
-from nmpcrl.control.solution import Solution, SolverError
+from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.task import Task
 
 TOLERANCE = 1e-8  # of the solvers, on their own scaled KKT residual
@@ -51,17 +51,17 @@ STARTS: dict[str, dict[str, dict[str, Any]]] = {  # the better the start, the le
 
 
 class Program:
-    """An OCP, its solver and its sensitivities."""
+    """An OCP and one of CasADi's solvers."""
 
-    def __init__(self, ocp: Ocp, task: Task, solver: str) -> None:
+    def __init__(self, ocp: Ocp, sensitivity: Sensitivity, task: Task, solver: str) -> None:
         self._ocp = ocp
+        self._sensitivity = sensitivity
         self._task = task
         self._name = solver
         self._solvers = {
             start: _solver(ocp, solver, SOLVERS[solver] | options)
             for start, options in STARTS[solver].items()
         }
-        self._sensitivity = Sensitivity(ocp)
         self._bounds = {
             "lbx": ca.DM(ocp.lower),
             "ubx": ca.DM(ocp.upper),
@@ -95,20 +95,9 @@ class Program:
             features=features,
             iterations=int(stats["iter_count"]),
             seconds=time.perf_counter() - began,
-            status="solved",
-            primal=z,
-            constraint_duals=lam,
-            bound_duals=nu,
+            point=np.concatenate([z, lam, nu]),
             ocp=self._ocp,
         )
-
-    def value_hessian(self, solution: Solution) -> Matrix:
-        """See `Sensitivity.hessian`."""
-        return self._sensitivity.hessian(*_point(solution))
-
-    def kkt_residual(self, solution: Solution) -> float:
-        """See `Sensitivity.kkt_residual`."""
-        return self._sensitivity.kkt_residual(*_point(solution))
 
     def _standing(self, state: Vector) -> tuple[Vector, Vector, Vector]:
         """Stay at `state` for the whole horizon; slacks take up what overlaps there."""
@@ -123,11 +112,7 @@ class Program:
         Shifting divides every stage's discount by gamma, and with it the multipliers.
         """
         ocp, old = self._ocp, guess.ocp
-        if old.states.shape != ocp.states.shape or old.slacks.shape != ocp.slacks.shape:
-            raise ValueError(
-                f"the guess has states of shape {old.states.shape} and slacks of shape"
-                f" {old.slacks.shape}; this problem's are {ocp.states.shape} and {ocp.slacks.shape}"
-            )
+        check_shape(guess, ocp)
         z, nu = np.zeros(ocp.lower.size), np.zeros(ocp.lower.size)
         lam = np.zeros(ocp.equality.size)
         scale = 1.0 if same else 1.0 / ocp.gamma
@@ -171,9 +156,3 @@ def _status(name: str, stats: dict[str, Any]) -> str:
 
 def _shift(indices: np.ndarray, same: bool) -> np.ndarray:
     return indices if same else np.concatenate([indices[1:], indices[-1:]])
-
-
-def _point(solution: Solution) -> tuple[Vector, Vector, Vector, Vector]:
-    action = solution.action[: solution.ocp.fixed_action.size]
-    p = np.concatenate([solution.state, solution.theta, action])
-    return solution.primal, p, solution.constraint_duals, solution.bound_duals

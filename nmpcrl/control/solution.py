@@ -45,11 +45,30 @@ class Solution:
     features: Vector  # phi, the value's gradient in theta, shape (2n + m + 1,)
     iterations: int  # of the solver
     seconds: float  # wall time of the solve and the gradient [s]
-    status: str  # "solved"
-    primal: Vector  # z, in the order of `ocp`
-    constraint_duals: Vector  # multipliers lam of the constraints, in the order of `ocp`
-    bound_duals: Vector  # multipliers nu of the bounds on z
+    point: Vector  # z, lam and nu, one after the other, each in the order of `ocp`
     ocp: Ocp  # says where each part lies
+    restarts: int = 0  # how often the solver had to begin again
+    violation: float = 0.0  # how far the plan leaves the box, in the unit of the state
+
+    @property
+    def status(self) -> str:
+        """ "solved", or "restarted" if not from the start that was asked for."""
+        return "restarted" if self.restarts else "solved"
+
+    @property
+    def primal(self) -> Vector:
+        """The variables z."""
+        return self.point[: self.ocp.lower.size]
+
+    @property
+    def constraint_duals(self) -> Vector:
+        """The multipliers lam of the constraints."""
+        return self.point[self.ocp.lower.size : -self.ocp.lower.size]
+
+    @property
+    def bound_duals(self) -> Vector:
+        """The multipliers nu of the bounds on z."""
+        return self.point[-self.ocp.lower.size :]
 
     @cached_property
     def states(self) -> Matrix:
@@ -69,12 +88,12 @@ class Solution:
     @property
     def action(self) -> Vector:
         """u_0, shape (m,): the policy of Eq. (4), or the action that was fixed."""
-        return self.inputs[0]
+        return self.point.take(self.ocp.inputs[0])
 
     @property
     def next_action(self) -> Vector:
         """u_1, shape (m,): what the plan does next; u_0 when the horizon is 1."""
-        return self.inputs[min(1, len(self.inputs) - 1)]
+        return self.point.take(self.ocp.inputs[min(1, len(self.ocp.inputs) - 1)])
 
     @cached_property
     def multipliers(self) -> Multipliers:
@@ -94,3 +113,17 @@ class Solution:
 def short(vector: Vector) -> str:
     """A vector as a message shows it, on one line with four digits."""
     return np.array2string(np.asarray(vector), precision=4, max_line_width=1000)
+
+
+def check_shape(guess: Solution, ocp: Ocp) -> None:
+    """Refuse a guess from a problem with another horizon, plant or number of obstacles.
+
+    Raises:
+        ValueError: it is one.
+    """
+    old = guess.ocp
+    if old.states.shape != ocp.states.shape or old.slacks.shape != ocp.slacks.shape:
+        raise ValueError(
+            f"the guess has states of shape {old.states.shape} and slacks of shape"
+            f" {old.slacks.shape}; this problem's are {ocp.states.shape} and {ocp.slacks.shape}"
+        )

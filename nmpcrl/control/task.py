@@ -1,11 +1,15 @@
 """The task: where to go, what to avoid, and the cost that reinforcement learning minimises."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.control.machine_code import callable_of
 
 
 @dataclass(frozen=True)
@@ -91,10 +95,22 @@ class Task:
 
     def stage_cost(self, state: Vector, action: Vector) -> float:
         """The RL stage cost l(s, a), Eq. (20)."""
-        tracking = float(self.weights @ (state - self.target) ** 2)
-        if self.distance(state) < self.near:
-            return tracking + float(np.linalg.norm(action))
-        return tracking + self.collision_penalty(state)
+        return _compiled_charge(self, len(action))(state, action)
+
+    def charge(self, inputs: int) -> ca.Function:
+        """Eq. (20) in symbols, as a CasADi function of the state and so many inputs."""
+        state, action = ca.SX.sym("state", self.start.size), ca.SX.sym("action", inputs)
+        away = state - self.target
+        xi = overlap(state[0], state[1], *map(ca.DM, self.discs))
+        upsilon = self.penalty * ca.sum1(ca.fmax(0, xi + self.margin))
+        near = ca.norm_2(away) < self.near
+        cost = ca.dot(self.weights, away**2) + ca.if_else(near, ca.norm_2(action), upsilon)
+        return ca.Function("charge", [state, action], [cost], ["state", "action"], ["cost"])
+
+
+@cache
+def _compiled_charge(task: Task, inputs: int) -> Callable[[Vector, Vector], float]:
+    return callable_of(task.charge(inputs))
 
 
 def overlap(x: Any, y: Any, centre_x: Any, centre_y: Any, clearance: Any) -> Any:

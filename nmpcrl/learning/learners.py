@@ -10,7 +10,7 @@
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from nmpcrl import Vector
 from nmpcrl.learning.bootstrap import (
@@ -79,7 +79,7 @@ def semi_gradient(alpha: float) -> UpdateRule:
     """Eq. (9): move theta along delta phi."""
 
     def rule(weights: Weights, delta: float, phi: Vector, _: Vector | None) -> Weights:
-        return replace(weights, theta=semi_gradient_step(weights.theta, delta, phi, alpha))
+        return Weights(semi_gradient_step(weights.theta, delta, phi, alpha), weights.w)
 
     return rule
 

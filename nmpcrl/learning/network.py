@@ -1,7 +1,10 @@
 """The network that imitates the NMPC's value. The only home of torch."""
 
+from itertools import pairwise
+
 import numpy as np
 import torch
+from torch import Tensor
 
 from nmpcrl import Vector
 
@@ -13,6 +16,9 @@ class QNetwork:
 
     Learns in place. Activation, initialisation (torch's own), no normalisation, an unlimited buffer
     and one mini-batch a step are this package's reading: the paper names none.  # departure H
+
+    Backpropagation is written out, in place and without autograd: on matrices this small, modules
+    and `torch.optim` take longer than the arithmetic.
     """
 
     def __init__(
@@ -35,21 +41,17 @@ class QNetwork:
             capacity: room in the buffer at the start; it doubles when full.
         """
         self._rng = rng
-        self._batch = batch
-        self._size = 0
-        self._inputs = torch.empty(capacity, inputs)
-        self._targets = torch.empty(capacity, 1)
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(int(rng.integers(2**63)))
-            self._model = torch.nn.Sequential(
-                torch.nn.Linear(inputs, hidden),
-                torch.nn.ReLU(),
-                torch.nn.Linear(hidden, hidden),
-                torch.nn.ReLU(),
-                torch.nn.Linear(hidden, 1),
-            )
-        self._adam = torch.optim.Adam(self._model.parameters(), lr=learning_rate, fused=True)
-        self._loss = torch.nn.MSELoss()
+        self._learning_rate = learning_rate
+        self._buffer = np.ones((capacity, inputs + 2), np.float32)  # rows of input, 1, target
+        self._size = 0  # rows of the buffer that are filled
+        self._drawn = np.ones((batch, inputs + 2), np.float32)  # the rows of a fit
+        widths = (inputs, hidden, hidden, 1)
+        self._weights = _first_weights(widths, seed=int(rng.integers(2**63)))
+        self._gradient, self._mean, self._square = torch.zeros(3, len(self._weights))
+        self._fits = torch.zeros(())
+        self._matrices = _matrices(self._weights, widths), _matrices(self._gradient, widths)
+        self._batch = self._layers(torch.from_numpy(self._drawn[:, :-1]))  # looks at those rows
+        self._one = self._layers(torch.ones(1, inputs + 1))  # predicts a single value
 
     def __len__(self) -> int:
         """How many examples are remembered."""
@@ -58,30 +60,122 @@ class QNetwork:
     @property
     def ready(self) -> bool:
         """Whether the buffer holds a mini-batch: line 12 of Algorithm 1."""
-        return self._size >= self._batch
+        return self._size >= len(self._drawn)
 
     def remember(self, inputs: Vector, target: float) -> None:
         """Store one example; `inputs` has the length given at the start."""
-        if self._size == len(self._targets):
-            self._inputs = torch.cat([self._inputs, torch.empty_like(self._inputs)])
-            self._targets = torch.cat([self._targets, torch.empty_like(self._targets)])
-        self._inputs[self._size] = torch.from_numpy(inputs)
-        self._targets[self._size] = target
+        if self._size == len(self._buffer):
+            self._buffer = np.concatenate([self._buffer, np.ones_like(self._buffer)])
+        row = self._buffer[self._size]
+        row[:-2], row[-1] = inputs, target
         self._size += 1
 
     def fit(self) -> float:
         """One Adam step on a mini-batch drawn without replacement; its loss before the step."""
+        batch = len(self._drawn)
         if not self.ready:
-            raise ValueError(f"{self._size} examples are too few for a batch of {self._batch}")
-        drawn = torch.from_numpy(self._rng.choice(self._size, self._batch, replace=False))
-        self._adam.zero_grad()
-        loss = self._loss(self._model(self._inputs[drawn]), self._targets[drawn])
-        loss.backward()
-        self._adam.step()
-        return loss.item()
+            raise ValueError(f"{self._size} examples are too few for a batch of {batch}")
+        rows = self._rng.choice(self._size, batch, replace=False)
+        self._buffer.take(rows, axis=0, out=self._drawn, mode="clip")
+        error = _forward(self._batch).numpy() - self._drawn[:, -1:]
+        _backward(self._batch, torch.from_numpy(2 / batch * error))
+        self._descend()
+        return float(np.vdot(error, error)) / batch
 
-    @torch.inference_mode()
     def predict(self, inputs: Vector) -> Vector:
         """The value of one input (k,) or of many (..., k); the result drops the last axis."""
-        tensor = torch.as_tensor(inputs, dtype=torch.float32)
-        return self._model(tensor).squeeze(-1).numpy().astype(float)
+        *shape, k = inputs.shape
+        rows = inputs.reshape(-1, k)
+        layers = self._one if len(rows) == 1 else self._layers(torch.ones(len(rows), k + 1))
+        layers[0].x.numpy()[:, :-1] = rows
+        return _forward(layers).numpy().astype(float).reshape(shape)
+
+    def _layers(self, x: Tensor) -> "Layers":
+        """The three layers, with room for the rows of `x`."""
+        (W1, W2, W3), (dW1, dW2, dW3) = self._matrices
+        first = _Layer(x, W1, dW1)
+        second = _Layer(first.y, W2, dW2)
+        return first, second, _Layer(second.y, W3, dW3)
+
+    def _descend(self) -> None:
+        """Adam: the kernel under torch.optim.Adam(fused=True), whose way there takes 100 us."""
+        self._fits += 1
+        torch._fused_adam_(
+            [self._weights],
+            [self._gradient],
+            [self._mean],
+            [self._square],
+            [],
+            [self._fits],
+            lr=self._learning_rate,
+            beta1=0.9,
+            beta2=0.999,
+            eps=1e-8,
+            weight_decay=0.0,
+            amsgrad=False,
+            maximize=False,
+        )
+
+
+class _Layer:
+    """out = x W for many rows x at once; each ends in a one, so that W ends in the bias."""
+
+    def __init__(self, x: Tensor, W: Tensor, dW: Tensor) -> None:
+        """Make room and every view: a view made at each use would take as long as its use.
+
+        Args:
+            x: rows, shape (rows, in + 1); the `y` of the layer before.
+            W: weights, shape (in + 1, out).
+            dW: where `differentiate` leaves the loss's derivative in W.
+        """
+        self.x, self.W, self.dW = x, W, dW
+        self.y = torch.ones(len(x), W.shape[1] + 1)
+        self.out = self.y[:, :-1]
+        self._x_transposed, self._W_transposed = x.T, W[:-1].T
+
+    def forward(self) -> Tensor:
+        """Compute `out` from `x`."""
+        return torch.mm(self.x, self.W, out=self.out)
+
+    def backward(self, d: Tensor) -> Tensor:
+        """The loss's derivative in x, from d, that in `out`."""
+        return torch.mm(d, self._W_transposed)
+
+    def differentiate(self, d: Tensor) -> None:
+        """Compute `dW` from d, the loss's derivative in `out`."""
+        torch.mm(self._x_transposed, d, out=self.dW)
+
+
+Layers = tuple[_Layer, _Layer, _Layer]
+
+
+def _forward(layers: Layers) -> Tensor:
+    first, second, third = layers
+    first.forward().relu_()
+    second.forward().relu_()
+    return third.forward()
+
+
+def _backward(layers: Layers, d3: Tensor) -> None:
+    """Compute every layer's `dW` from d3, the loss's derivative in the output."""
+    first, second, third = layers
+    d2 = third.backward(d3).mul_(second.out.sign())  # the slope of a ReLU is its output's sign
+    d1 = second.backward(d2).mul_(first.out.sign())
+    for layer, d in zip(layers, (d1, d2, d3), strict=True):
+        layer.differentiate(d)
+
+
+def _first_weights(widths: tuple[int, ...], seed: int) -> Tensor:
+    """What torch draws for linear layers of these widths, in one vector."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        layers = [torch.nn.Linear(*pair) for pair in pairwise(widths)]
+    matrices = [torch.cat([layer.weight.T, layer.bias[None]]) for layer in layers]
+    return torch.cat([matrix.flatten() for matrix in matrices]).detach()
+
+
+def _matrices(vector: Tensor, widths: tuple[int, ...]) -> list[Tensor]:
+    """The parts of a vector of all weights, as one matrix (in + 1, out) a layer."""
+    shapes = [(k + 1, out) for k, out in pairwise(widths)]
+    parts = vector.split([rows * columns for rows, columns in shapes])
+    return [part.view(shape) for part, shape in zip(parts, shapes, strict=True)]

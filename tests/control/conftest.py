@@ -8,6 +8,7 @@ import pytest
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Obstacle, Plant, Task
+from nmpcrl.control.nmpc import SOLVERS
 from nmpcrl.study import paper
 
 # Where theta is drawn from: around what learning visits, all of it positive.
@@ -18,7 +19,7 @@ TIE = 1e-2  # a start this close to an obstacle's boundary has a kink within fin
 Draw = Callable[..., Iterator[tuple[Vector, Vector]]]
 
 
-@pytest.fixture(scope="session", params=["fatrop", "ipopt"])
+@pytest.fixture(scope="session", params=SOLVERS)
 def solver(request) -> str:
     """Each solver in turn."""
     return request.param
@@ -27,7 +28,7 @@ def solver(request) -> str:
 @pytest.fixture(scope="session")
 def controllers() -> dict[str, Nmpc]:
     """The paper's controller with each solver."""
-    return {name: paper.nmpc(solver=name) for name in ("fatrop", "ipopt")}
+    return {name: paper.nmpc(solver=name) for name in SOLVERS}
 
 
 @pytest.fixture

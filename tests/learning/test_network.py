@@ -59,6 +59,70 @@ def learner_like(examples):
     return taught(examples, batch=300, capacity=1000)
 
 
+def model_of(learner):
+    """The same network of torch's modules, which autograd differentiates."""
+    layers = [layer.W.clone() for layer in learner._one]
+    linear = [torch.nn.Linear(len(W) - 1, W.shape[1]) for W in layers]
+    for module, W in zip(linear, layers, strict=True):
+        module.weight.data, module.bias.data = W[:-1].T.contiguous(), W[-1]
+    return torch.nn.Sequential(
+        linear[0], torch.nn.ReLU(), linear[1], torch.nn.ReLU(), linear[2], torch.nn.Flatten(0)
+    )
+
+
+def in_one_vector(model, part=lambda parameter: parameter.detach()):
+    """Weights, or `part` of them, in the order of `QNetwork`."""
+    pairs = [(part(m.weight), part(m.bias)) for m in model if isinstance(m, torch.nn.Linear)]
+    return torch.cat([torch.cat([weight.T, bias[None]]).flatten() for weight, bias in pairs])
+
+
+def beside_modules(inputs=14, **options):
+    """A network, its modules, and a function for their loss that leaves its gradient in them."""
+    examples = rows(128, inputs)
+    learner = taught(examples, inputs=inputs, **options)
+    model = model_of(learner)
+    x, target = (torch.from_numpy(part).float() for part in examples)
+
+    def loss():
+        model.zero_grad()
+        value = torch.nn.functional.mse_loss(model(x), target)
+        value.backward()
+        return value.item()
+
+    return learner, model, loss
+
+
+@pytest.mark.parametrize("inputs", [2, 5, 14])
+def test_the_gradient_is_that_of_autograd(inputs):
+    learner, model, loss = beside_modules(inputs)
+    assert learner.fit() == pytest.approx(loss(), rel=1e-5)
+    expected = in_one_vector(model, lambda parameter: parameter.grad)
+    assert expected.abs().max() > 0.1
+    torch.testing.assert_close(learner._gradient, expected, rtol=1e-4, atol=1e-6)
+
+
+def test_it_descends_as_torchs_adam_does():
+    learner, model, loss = beside_modules(learning_rate=1e-3)
+    adam = torch.optim.Adam(model.parameters(), lr=1e-3)
+    for _ in range(30):
+        assert learner.fit() == pytest.approx(loss(), rel=1e-4)
+        adam.step()
+    torch.testing.assert_close(learner._weights, in_one_vector(model), rtol=1e-3, atol=1e-4)
+
+
+def test_the_first_weights_are_those_of_torchs_linear_layers():
+    torch.manual_seed(int(np.random.default_rng(7).integers(2**63)))
+    sizes = [(14, 64), (64, 64), (64, 1)]
+    model = torch.nn.Sequential(*(torch.nn.Linear(*size) for size in sizes))
+    assert torch.equal(network(inputs=14, seed=7)._weights, in_one_vector(model))
+
+
+def test_it_predicts_what_torchs_modules_do():
+    learner, inputs = network(), rows(20)[0]
+    expected = model_of(learner)(torch.from_numpy(inputs).float()).detach()
+    np.testing.assert_allclose(learner.predict(inputs), expected, rtol=1e-5, atol=1e-6)
+
+
 def test_it_is_ready_once_it_holds_a_batch():
     learner = network(batch=3)
     ready = []
@@ -133,8 +197,7 @@ def test_predicting_teaches_nothing():
 
 def test_it_has_two_hidden_layers_of_64():
     """With 14 inputs, (14 + 1) 64 + (64 + 1) 64 + 65 weights: Table I."""
-    learner = network(inputs=14)
-    assert sum(p.numel() for p in learner._model.parameters()) == 15 * 64 + 65 * 64 + 65
+    assert len(network(inputs=14)._weights) == 15 * 64 + 65 * 64 + 65
 
 
 def test_what_it_is_told_is_copied():

@@ -1,0 +1,133 @@
+"""CasADi writes the mathematics, numba compiles it: `source` turns a Function into Python.
+
+An SX Function is a list of scalar instructions. Each becomes one line of Python on floats, with
+common subexpressions eliminated first, so numba compiles what a careful hand would have written.
+"""
+
+import math
+
+import casadi as ca
+
+UNARY = {
+    ca.OP_ASSIGN: "{}",
+    ca.OP_NEG: "-{}",
+    ca.OP_EXP: "math.exp({})",
+    ca.OP_LOG: "math.log({})",
+    ca.OP_SQRT: "math.sqrt({})",
+    ca.OP_SQ: "{0} * {0}",
+    ca.OP_TWICE: "2.0 * {}",
+    ca.OP_INV: "1.0 / {}",
+    ca.OP_SIN: "math.sin({})",
+    ca.OP_COS: "math.cos({})",
+    ca.OP_TAN: "math.tan({})",
+    ca.OP_ASIN: "math.asin({})",
+    ca.OP_ACOS: "math.acos({})",
+    ca.OP_ATAN: "math.atan({})",
+    ca.OP_SINH: "math.sinh({})",
+    ca.OP_COSH: "math.cosh({})",
+    ca.OP_TANH: "math.tanh({})",
+    ca.OP_ASINH: "math.asinh({})",
+    ca.OP_ACOSH: "math.acosh({})",
+    ca.OP_ATANH: "math.atanh({})",
+    ca.OP_EXPM1: "math.expm1({})",
+    ca.OP_LOG1P: "math.log1p({})",
+    ca.OP_ERF: "math.erf({})",
+    ca.OP_FABS: "abs({})",
+    ca.OP_FLOOR: "np.floor({})",
+    ca.OP_CEIL: "np.ceil({})",
+    ca.OP_SIGN: "math.copysign(1.0, {0}) if {0} < 0.0 or {0} > 0.0 else {0}",
+    ca.OP_NOT: "1.0 if {} == 0.0 else 0.0",
+}
+BINARY = {
+    ca.OP_ADD: "{} + {}",
+    ca.OP_SUB: "{} - {}",
+    ca.OP_MUL: "{} * {}",
+    ca.OP_DIV: "{} / {}",
+    ca.OP_POW: "{} ** {}",
+    ca.OP_CONSTPOW: "{} ** {}",
+    ca.OP_FMIN: "min({}, {})",
+    ca.OP_FMAX: "max({}, {})",
+    ca.OP_ATAN2: "math.atan2({}, {})",
+    ca.OP_HYPOT: "math.hypot({}, {})",
+    ca.OP_COPYSIGN: "math.copysign({}, {})",
+    ca.OP_FMOD: "math.fmod({}, {})",
+    ca.OP_LT: "1.0 if {} < {} else 0.0",
+    ca.OP_LE: "1.0 if {} <= {} else 0.0",
+    ca.OP_EQ: "1.0 if {} == {} else 0.0",
+    ca.OP_NE: "1.0 if {} != {} else 0.0",
+    ca.OP_AND: "1.0 if {} != 0.0 and {} != 0.0 else 0.0",
+    ca.OP_OR: "1.0 if {} != 0.0 or {} != 0.0 else 0.0",
+    ca.OP_IF_ELSE_ZERO: "({1} if {0} != 0.0 else 0.0)",
+}
+
+
+class CannotCompile(Exception):
+    """An expression holds what cannot be compiled, or numba is missing: the message says which."""
+
+
+def source(function: ca.Function) -> str:
+    """The Python function of the same name, as text; needs `math` and NumPy as `np`.
+
+    Vectors come as arrays (k,), matrices as (k, l). A single scalar result is returned; otherwise
+    each result is written, zeros included, into an array that follows the arguments.
+
+    Raises:
+        CannotCompile: an operation is not known here, or the function is no expression of scalars.
+    """
+    if not function.is_a("SXFunction"):
+        raise CannotCompile(f"{function.name()} is not an SX function")
+    names = [function.name_in(i) for i in range(function.n_in())]
+    out = ca.Function(function.name(), *_expressions(function), names, function.name_out())
+    returned = returns(function)
+    lines = [_line(out, k, returned=returned) for k in range(out.n_instructions())]
+    results = [] if returned else [f"{name}_" for name in out.name_out()]
+    return "\n    ".join([f"def {out.name()}({', '.join(names + results)}):", *lines]) + "\n"
+
+
+def returns(function: ca.Function) -> bool:
+    """Whether the compiled function returns its result, a scalar, instead of writing it."""
+    return function.n_out() == 1 and function.size_out(0) == (1, 1)
+
+
+def _expressions(function: ca.Function) -> tuple[list[ca.SX], list[ca.SX]]:
+    """Arguments and dense results, common subexpressions eliminated."""
+    arguments = function.sx_in()
+    return arguments, ca.cse([ca.densify(result) for result in function.call(arguments)])
+
+
+def _line(function: ca.Function, k: int, *, returned: bool) -> str:
+    """Instruction k; work variables are called w0, w1, ..."""
+    operation, into = function.instruction_id(k), function.instruction_output(k)
+    of = function.instruction_input(k)
+    if operation == ca.OP_CONST:
+        return f"w{into[0]} = {_number(function.instruction_constant(k))}"
+    if operation == ca.OP_INPUT:
+        entry = _entry(function.sparsity_in(of[0]), of[1])
+        return f"w{into[0]} = {function.name_in(of[0])}[{entry}]"
+    if operation == ca.OP_OUTPUT:
+        if returned:
+            return f"return w{of[0]}"
+        entry = _entry(function.sparsity_out(into[0]), into[1])
+        return f"{function.name_out(into[0])}_[{entry}] = w{of[0]}"
+    template = UNARY.get(operation) or BINARY.get(operation)
+    if template is None:
+        raise CannotCompile(
+            f"{function.name()} holds CasADi's {_name(operation)}, which is not known here"
+        )
+    return f"w{into[0]} = " + template.format(*(f"w{i}" for i in of))
+
+
+def _number(value: float) -> str:
+    return repr(value) if math.isfinite(value) else f"math.{value}".replace("math.-", "-math.")
+
+
+def _entry(sparsity: ca.Sparsity, nonzero: int) -> str:
+    """The index of a nonzero in the dense argument or result."""
+    rows, columns = sparsity.get_triplet()
+    vector = sparsity.size2() == 1
+    return str(rows[nonzero]) if vector else f"{rows[nonzero]}, {columns[nonzero]}"
+
+
+def _name(operation: int) -> str:
+    """What CasADi calls an operation."""
+    return next(n for n in dir(ca) if n.startswith("OP_") and getattr(ca, n) == operation)

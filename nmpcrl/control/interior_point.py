@@ -1,0 +1,133 @@
+"""The solver of `riccati` compiled for a plant and called for one OCP: starts and second tries."""
+
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.control.machine_code import load, own_source
+from nmpcrl.control.ocp import Ocp
+from nmpcrl.control.plant import Plant
+from nmpcrl.control.solution import Solution, SolverError, check_shape
+from nmpcrl.control.stages import write
+from nmpcrl.control.task import Task
+
+TOLERANCE = 1e-8  # of the KKT conditions, relative to the largest multiplier
+WARM_LIMIT = 40  # iterations from a guess
+COLD_LIMIT = 200  # iterations from standing still
+PERTURBED = 4  # starts from random inputs, after everything else
+NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
+COLD, SHIFTED, NEAR, SAME = range(4)  # as in `riccati`
+ENDS = ("solved", "found no descent", "ran out of iterations", "met numbers that are not finite")
+UNBOUNDED = 1e20  # stands for an input without a bound
+
+Start = tuple[int, Vector, int]  # kind, (z, lam, nu), iterations allowed
+
+
+class InteriorPoint:
+    """An OCP and its compiled solver; solves as `Program` does."""
+
+    def __init__(self, ocp: Ocp, plant: Plant, task: Task) -> None:
+        """Load the machine code, or compile it.
+
+        Raises:
+            CannotCompile: numba is missing, or the plant holds an operation that is not known.
+        """
+        self._ocp = ocp
+        self._kernel = kernel(plant)
+        self._fixed = int(ocp.fixed_action.size > 0)
+        self._standing = np.zeros(2 * ocp.lower.size + ocp.equality.size)
+        self._size = self._standing.size + ocp.theta.numel()
+        self._no_action = np.zeros(plant.m)
+        self._plant = plant
+        sides = [
+            (state, sign, limit[state])
+            for sign, limit in ((-1.0, task.lower), (1.0, task.upper))
+            for state in np.flatnonzero(np.isfinite(limit))
+        ]
+        self._problem = (
+            task.target,
+            np.maximum(plant.lower, -UNBOUNDED),
+            np.minimum(plant.upper, UNBOUNDED),
+            np.reshape(np.transpose(task.discs), (-1, 3)).copy(),
+            np.reshape(np.array(sides, float), (-1, 3)),
+            ocp.gamma ** np.arange(len(ocp.states), dtype=float),
+            ocp.slack_weight,
+        )
+
+    def solve(
+        self, state: Vector, theta: Vector, guess: Solution | None, *action: Vector, began: float
+    ) -> Solution:
+        """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
+        given = action[0] if action else self._no_action
+        arguments = (*self._problem, state, theta, given, self._fixed)
+        for restarts, (start, point, limit) in enumerate(self._starts(state, guess)):
+            out = np.empty(self._size)
+            value, iterations, end, violation, error = self._kernel(
+                *arguments, start, limit, TOLERANCE, point, out
+            )
+            if end == 0.0:
+                return Solution(
+                    state,
+                    theta,
+                    value,
+                    out[self._standing.size :],
+                    int(iterations),
+                    time.perf_counter() - began,
+                    out[: self._standing.size],
+                    self._ocp,
+                    restarts,
+                    violation,
+                )
+        raise SolverError(
+            f"riccati found no optimum from {restarts + 1} starts (the last {ENDS[int(end)]} after"
+            f" {iterations:.0f} iterations with a relative error of {error:.1e})",
+            state,
+            theta,
+        )
+
+    def _starts(self, state: Vector, guess: Solution | None) -> Iterator[Start]:
+        """The guess, standing still, and random inputs."""
+        if guess is not None:
+            point = self._from(guess)
+            if guess.state.tolist() == state.tolist():  # a tenth of the time of np.array_equal
+                yield SAME, point, WARM_LIMIT
+                yield NEAR, point, WARM_LIMIT
+            else:
+                yield SHIFTED, point, WARM_LIMIT
+        yield COLD, self._standing, COLD_LIMIT
+        lower, upper = np.maximum(self._plant.lower, -1.0), np.minimum(self._plant.upper, 1.0)
+        for seed in range(PERTURBED):
+            point = self._standing.copy()
+            point[self._ocp.inputs] = np.random.default_rng(seed).uniform(
+                lower, upper, self._ocp.inputs.shape
+            )
+            yield COLD, point, COLD_LIMIT
+
+    def _from(self, guess: Solution) -> Vector:
+        """The guess's z, lam and nu in the order of this OCP."""
+        ocp, old = self._ocp, guess.ocp
+        if old is ocp:
+            return guess.point
+        check_shape(guess, ocp)
+        z, nu = guess.primal, guess.bound_duals
+        lam = np.zeros(ocp.equality.size)
+        lam[ocp.obstacles] = guess.constraint_duals[old.obstacles]
+        return np.concatenate([z, lam, nu])
+
+
+@cache
+def kernel(plant: Plant) -> Callable[..., tuple[float, float, float, float, float]]:
+    """`riccati.solve` as machine code for a plant.
+
+    Raises:
+        CannotCompile: numba is missing, or the plant holds an operation that is not known.
+    """
+    texts = {
+        "__init__": "from .riccati import solve\n",
+        "model": write(plant),
+        "riccati": own_source("riccati"),
+    }
+    return load("riccati", texts, NOTICE).solve
