@@ -99,9 +99,11 @@ DEPARTURES = {
     "M": Departure(
         gap="The state box is hard and the obstacle constraint soft; noise can push the state out"
         " of the box, where Eq. (2) may have no solution.",
-        reading="The box holds for the predicted states 1, ..., N. A solve that fails is tried once"
-        " more from a standing start; then the episode ends, is recorded, and the next begins. Ten"
-        " such episodes in a row end the run.",
+        reading="The box holds for the predicted states 1, ..., N. riccati holds it by an exact"
+        " penalty: where no plan can keep to the box, it returns one that leaves it least, and"
+        " records by how much. A solve that fails, as CasADi's solvers do there, is tried once more"
+        " from a standing start; then the episode ends, is recorded, and the next begins. Ten such"
+        " episodes in a row end the run.",
         why="The paper does not say; this keeps what was learned and counts what failed.",
     ),
     "N": Departure(

@@ -1,15 +1,18 @@
 """An `Experiment` is a frozen value that names one run; `run` carries it out."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from nmpcrl.control import Plant
 from nmpcrl.learning import (
     Learner,
     QNetwork,
+    Successor,
     Weights,
     deep_expected_sarsa,
     expected_sarsa,
@@ -19,7 +22,7 @@ from nmpcrl.learning import (
 )
 from nmpcrl.study import paper
 from nmpcrl.study.parameters import number, one_of, parameter_vector, true_or_false, whole
-from nmpcrl.study.records import Records, Table
+from nmpcrl.study.records import Field, Records, Table
 from nmpcrl.study.training import (
     Diverged,
     Exploration,
@@ -34,9 +37,18 @@ from nmpcrl.study.training import (
 
 LEARNERS = ("ES", "DES", "RDES", "GES", "frozen")
 DECAYS = {"step": count_steps, "episode": count_episodes}
-SOLVERS = ("fatrop", "ipopt")
+SOLVERS = ("riccati", "fatrop", "ipopt")
 
 SOLVED, RESTARTED, FAILED = range(3)  # the status column
+UNKNOWN = Successor(np.nan)  # of a step that was not bootstrapped
+UNSOLVED: Any = SimpleNamespace(  # stands in for a solve that failed or was not asked for
+    value=np.nan,
+    features=np.nan,
+    restarts=0,
+    violation=np.nan,  # max(a, nan) is a
+    iterations=0,
+    seconds=0.0,
+)
 
 
 @dataclass(frozen=True)
@@ -60,7 +72,7 @@ class Experiment:
     theta: tuple[float, ...] = paper.THETA_INIT
     steps: int = paper.STEPS  # of an episode
     horizon: int = paper.HORIZON
-    solver: str = "fatrop"
+    solver: str = "riccati"
     evaluate_every: int = 10  # episodes between rollouts without noise
 
     def __post_init__(self) -> None:
@@ -92,20 +104,20 @@ def run(experiment: Experiment, on_episode: Callable[[int, float], None] | None 
         paper.nmpc(experiment.layout, horizon=experiment.horizon, solver=experiment.solver)
     )
     learner, weights, explore = prepare(experiment, controller)
-    steps, evaluations = Table(), Table()
-    evaluations.append(**_evaluation(controller, weights, 0, experiment.steps))
+    steps, evaluations = _tables(experiment, controller.nmpc.plant)
+    evaluations.append(_evaluation(controller, weights, 0, experiment.steps))
     stopped, cost, began = "finished", 0.0, time.perf_counter()
     try:
         for step in train(learner, controller, weights, explore):
             seconds = time.perf_counter() - began
-            steps.append(**_row(step, experiment.alpha, seconds))
+            steps.append(_row(step, seconds))
             cost += step.cost
             if step.failure or step.time == experiment.steps - 1:
                 done = step.episode + 1
                 due = done % experiment.evaluate_every == 0 or done == experiment.episodes
                 if due and not absurd(step.weights):
                     row = _evaluation(controller, step.weights, done, experiment.steps)
-                    evaluations.append(**row)
+                    evaluations.append(row)
                 if on_episode:
                     on_episode(done, cost)
                 cost = 0.0
@@ -113,12 +125,22 @@ def run(experiment: Experiment, on_episode: Callable[[int, float], None] | None 
     except Diverged as error:
         stopped = f"diverged: {error}"
     table, judged = steps.columns(), evaluations.columns()
+    table["alpha_phi2"] = experiment.alpha * (table["features"] ** 2).sum(axis=1)
     facts = {
         "stopped": stopped,
         "seconds": float(table["seconds"].sum()),
         "final_cost": float(judged["cost"][-1]),  # of the last rollout without noise
     }
     return Records(asdict(experiment), table, judged, facts)
+
+
+def compile_ahead(experiments: Iterable[Experiment]) -> None:
+    """Compile what the runs will call, so that their processes find it done."""
+    for layout, solver in dict.fromkeys((e.layout, e.solver) for e in experiments):
+        nmpc = paper.nmpc(layout, solver=solver)
+        solution = nmpc.solve(nmpc.task.start, np.array(paper.THETA_INIT))
+        nmpc.plant.step(solution.state, solution.action)
+        nmpc.task.stage_cost(solution.state, solution.action)
 
 
 def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, Weights, Exploration]:
@@ -163,46 +185,80 @@ def _learner(experiment: Experiment, controller: Persistent, rng: np.random.Gene
     return frozen(controller)
 
 
-def _row(step: Step, alpha: float, seconds: float) -> dict[str, Any]:
-    """The row of `Records.steps` for one step of training."""
-    solution, update = step.solution, step.update
-    successor = update.successor if update else None
-    solutions = [s for s in (solution, successor and successor.solution) if s]
-    restarted = any(s.status == "restarted" for s in solutions)
-    phi = solution.features if solution else np.full(step.weights.theta.size, np.nan)
-    return {
-        "episode": step.episode,
-        "time": step.time,
-        "state": step.state,
-        "action": step.action,
-        "cost": step.cost,
-        "value": solution.value if solution else np.nan,
-        "next_value": successor.value if successor else np.nan,
-        "delta": np.nan if update is None or update.delta is None else update.delta,
-        "features": phi,
-        "alpha_phi2": alpha * float(phi @ phi),
-        "theta": step.weights.theta,
-        "w": step.weights.w,
-        "loss": successor.loss if successor else np.nan,
-        "status": FAILED if step.failure else RESTARTED if restarted else SOLVED,
-        "iterations": sum(s.iterations for s in solutions),
-        "solves": len(solutions),
-        "solve_seconds": sum(s.seconds for s in solutions),
-        "fit_seconds": successor.seconds if successor else 0.0,
-        "seconds": seconds,
-    }
+def _tables(experiment: Experiment, plant: Plant) -> tuple[Table, Table]:
+    """Room for `Records.steps` and `Records.evaluations`."""
+    n, m, d, steps = plant.n, plant.m, len(experiment.theta), experiment.steps
+    step: list[Field] = [
+        ("episode", int),
+        ("time", int),
+        ("state", float, n),
+        ("action", float, m),
+        ("cost", float),
+        ("value", float),
+        ("next_value", float),
+        ("delta", float),
+        ("features", float, d),
+        ("theta", float, d),
+        ("w", float, d),
+        ("loss", float),
+        ("status", int),
+        ("restarts", int),
+        ("violation", float),
+        ("iterations", int),
+        ("solves", int),
+        ("solve_seconds", float),
+        ("fit_seconds", float),
+        ("seconds", float),
+    ]
+    evaluation: list[Field] = [
+        ("episode", int),
+        ("theta", float, d),
+        ("cost", float),
+        ("states", float, (steps, n)),
+        ("actions", float, (steps, m)),
+    ]
+    rollouts = experiment.episodes // experiment.evaluate_every + 2  # the first and the last
+    return Table(step, experiment.episodes * steps), Table(evaluation, rollouts)
+
+
+def _row(step: Step, seconds: float) -> tuple[Any, ...]:
+    """The row of `Records.steps` for one step of training, in the order of `_tables`."""
+    update = step.update
+    successor = (update and update.successor) or UNKNOWN
+    first, second = step.solution or UNSOLVED, successor.solution or UNSOLVED
+    restarts = first.restarts + second.restarts
+    return (
+        step.episode,
+        step.time,
+        step.state,
+        step.action,
+        step.cost,
+        first.value,
+        successor.value,
+        np.nan if update is None or update.delta is None else update.delta,
+        first.features,
+        step.weights.theta,
+        step.weights.w,
+        successor.loss,
+        FAILED if step.failure else RESTARTED if restarts else SOLVED,
+        restarts,
+        max(first.violation, second.violation),
+        first.iterations + second.iterations,
+        (first is not UNSOLVED) + (second is not UNSOLVED),
+        first.seconds + second.seconds,
+        successor.seconds,
+        seconds,
+    )
 
 
 def _evaluation(
     controller: Persistent, weights: Weights, episode: int, steps: int
-) -> dict[str, Any]:
+) -> tuple[Any, ...]:
     """The row of `Records.evaluations` for the policy of `weights`."""
     rollout = evaluate(controller, weights.theta, steps)
     missing = ((0, steps - len(rollout.states)), (0, 0))
-    return {
-        "episode": episode,
-        "theta": weights.theta,
-        "cost": rollout.cost,
-        "states": np.pad(rollout.states, missing, constant_values=np.nan),
-        "actions": np.pad(rollout.actions, missing, constant_values=np.nan),
-    }
+    states, actions = (
+        np.pad(driven, missing, constant_values=np.nan)
+        for driven in (rollout.states, rollout.actions)
+    )
+    return episode, weights.theta, rollout.cost, states, actions

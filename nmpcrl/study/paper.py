@@ -46,7 +46,7 @@ def task(layout: str = "A") -> Task:
     )
 
 
-def nmpc(layout: str = "A", *, horizon: int = HORIZON, solver: str = "fatrop") -> Nmpc:
+def nmpc(layout: str = "A", *, horizon: int = HORIZON, solver: str = "riccati") -> Nmpc:
     """The paper's controller, Eq. (2) with Table I, among the obstacles of a named layout."""
     return Nmpc(
         plant=differential_drive(),

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Column = NDArray[Any]
+Field = tuple[str, type] | tuple[str, type, int | tuple[int, ...]]  # name, type[, shape]
 
 
 class DamagedRecords(ValueError):
@@ -21,25 +22,22 @@ class DamagedRecords(ValueError):
 
 
 class Table:
-    """Rows of named numbers and arrays, gathered into columns."""
+    """Rows of named numbers and arrays, with room for all from the start."""
 
-    def __init__(self) -> None:
-        self._rows: list[tuple[Any, ...]] = []
-        self._names: tuple[str, ...] = ()
+    def __init__(self, fields: list[Field], capacity: int) -> None:
+        """Make room for `capacity` rows of `fields`, as `np.dtype` takes them."""
+        self._rows = np.empty(capacity, fields)
+        self._size = 0
 
-    def append(self, **row: Any) -> None:
-        """Add a row; every row has the names of the first."""
-        self._names = self._names or tuple(row)
-        if tuple(row) != self._names:
-            raise ValueError(f"row {tuple(row)} does not have the columns {self._names}")
-        self._rows.append(tuple(row.values()))
+    def append(self, row: tuple[Any, ...]) -> None:
+        """Fill the next row; one value a field, in their order."""
+        self._rows[self._size] = row
+        self._size += 1
 
     def columns(self) -> dict[str, Column]:
-        """One array a name, its first axis the rows."""
-        return {
-            name: np.array(values)
-            for name, values in zip(self._names, zip(*self._rows, strict=True), strict=False)
-        }
+        """One array a name, its first axis the rows that were filled."""
+        filled = self._rows[: self._size]
+        return {name: filled[name].copy() for name in filled.dtype.fields or ()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +45,10 @@ class Records:
     """One run.
 
     Columns of `steps`, one row per step of training: episode, time, state (n,), action (m,), cost,
-    value, next_value, delta, features (d,), alpha_phi2 (alpha ||phi||^2), theta (d,), w (d,), loss,
-    status (0 solved, 1 after a restart, 2 failed), iterations, solves, solve_seconds, fit_seconds,
-    seconds. theta and w are those after the step. What a step does not have is nan.
+    value, next_value, delta, features (d,), theta (d,), w (d,), loss, status (0 solved, 1 after a
+    restart, 2 failed), restarts, violation (how far a plan leaves the box [m]), iterations, solves,
+    solve_seconds, fit_seconds, seconds, alpha_phi2 (alpha ||phi||^2). theta and w are those after
+    the step. What a step does not have is nan.
 
     Columns of `evaluations`, one row per rollout without noise: episode (so many were trained),
     theta (d,), cost (infinite where a solve failed), states (K + 1, n), actions (K + 1, m).

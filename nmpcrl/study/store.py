@@ -17,7 +17,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from multiprocessing import get_context
 from pathlib import Path
 from queue import Empty
@@ -27,10 +27,10 @@ from typing import Any
 from tqdm import tqdm
 
 import nmpcrl
-from nmpcrl.study.experiment import Experiment, run
+from nmpcrl.study.experiment import Experiment, compile_ahead, run
 from nmpcrl.study.records import DamagedRecords, Records
 
-LIBRARIES = ("casadi", "numpy", "torch")
+LIBRARIES = ("casadi", "numba", "numpy", "torch")
 MATHEMATICS = ("control", "learning", "study/paper.py", "study/training.py", "study/experiment.py")
 SPAWN = get_context("spawn")  # a fork would copy the threads' locks but not the threads
 ATTEMPTS = 3  # how often a run is started whose worker was killed
@@ -115,6 +115,7 @@ def fetch_all(
             return Study({e: fetch(e) for e in experiments})
         if not left:
             break
+        compile_ahead(missing)
         try:
             if executor is not None:
                 _train(missing, executor, progress=progress)
@@ -159,15 +160,26 @@ def key(experiment: Experiment) -> str:
 
 def versions() -> dict[str, str]:
     """The versions that a run depends on."""
-    return {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}}
+    return {"python": platform.python_version(), **{name: _version(name) for name in LIBRARIES}}
+
+
+def _version(library: str) -> str:
+    try:
+        return version(library)
+    except PackageNotFoundError:  # only numba may be missing: fatrop then solves
+        return "absent"
 
 
 @cache
 def _mathematics() -> str:
-    """A digest of the source in `MATHEMATICS`, without comments, docstrings and layout."""
+    return digest(MATHEMATICS)
+
+
+def digest(places: Iterable[str]) -> str:
+    """A digest of the source in some places, without comments, docstrings and layout."""
     root = Path(nmpcrl.__file__).parent
-    digest = hashlib.sha256()
-    for place in MATHEMATICS:
+    found = hashlib.sha256()
+    for place in places:
         path = root / place
         for file in sorted(path.glob("*.py")) if path.is_dir() else [path]:
             tree = ast.parse(file.read_text())
@@ -175,8 +187,8 @@ def _mathematics() -> str:
                 documented = ast.Module | ast.ClassDef | ast.FunctionDef
                 if isinstance(node, documented) and ast.get_docstring(node) is not None:
                     del node.body[0]
-            digest.update(ast.dump(tree).encode())
-    return digest.hexdigest()
+            found.update(ast.dump(tree).encode())
+    return found.hexdigest()
 
 
 def _is_whole(path: Path) -> bool:

@@ -73,7 +73,7 @@ def timings(rdes=0.5, ges=1.0) -> pd.DataFrame:
     return pd.DataFrame(
         [
             {"solver": solver, "learner": learner, "ms_per_step": ms, "ms_per_fit": 0.1}
-            for solver in ("ipopt", "fatrop")
+            for solver in ("ipopt", "fatrop", "riccati")
             for learner, ms in per_step.items()
         ]
     )

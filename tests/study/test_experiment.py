@@ -44,7 +44,7 @@ REFUSED = [
     ("learner", "SARSA", "must be one of ES, DES, RDES, GES, frozen"),
     ("learner", "es", "must be one of ES, DES, RDES, GES, frozen"),
     ("decay", "year", "must be one of step, episode"),
-    ("solver", "acados", "must be one of fatrop, ipopt"),
+    ("solver", "acados", "must be one of riccati, fatrop, ipopt"),
     ("alpha", -1e-7, "must be a positive number"),
     ("alpha", 0, "must be a positive number"),
     ("alpha", np.nan, "must be a positive number"),
@@ -336,10 +336,34 @@ def test_failures_and_restarts_are_recorded(monkeypatch):
     s = records.steps
     np.testing.assert_array_equal(s["episode"], [0] * 4 + [1] * 6)
     np.testing.assert_array_equal(s["status"], [0, 1, 0, 2] + [0] * 6)
+    np.testing.assert_array_equal(s["restarts"], [0, 1, 0, 0] + [0] * 6)
+    np.testing.assert_array_equal(np.isnan(s["violation"]), s["status"] == 2)
+    assert np.isnan(s["features"][3]).all()
     assert np.isnan(s["cost"][3])
     assert np.isnan(s["action"][3]).all()
     assert np.isfinite(s["theta"]).all()
     assert records.facts["stopped"] == "finished"
+
+
+def test_a_steps_restarts_add_up_and_its_worst_violation_counts(monkeypatch):
+    """The first and the second solve of ES, three steps after a rollout of three."""
+    restarts = [0, 0, 0] + [0, 1, 2, 2, 0, 0] + [0, 0, 0]
+    violation = [0, 0, 0] + [0.3, 0.1, 0.0, 0.2, 0.0, 0.0] + [0, 0, 0]
+
+    class Reporting(Nmpc):
+        def solve(self, state, theta, guess=None, action=None):
+            solution = super().solve(state, theta, guess, action)
+            return dataclasses.replace(
+                solution, restarts=restarts.pop(0), violation=violation.pop(0)
+            )
+
+    monkeypatch.setattr(
+        paper, "nmpc", lambda layout, **_: Reporting(differential_drive(), paper.task(layout))
+    )
+    s = run(Experiment(learner="ES", episodes=1, steps=3)).steps
+    np.testing.assert_array_equal(s["restarts"], [1, 4, 0])
+    np.testing.assert_array_equal(s["violation"], [0.3, 0.2, 0.0])
+    assert not restarts
 
 
 def test_a_run_that_fails_ten_times_in_a_row_says_why_it_stopped(monkeypatch):

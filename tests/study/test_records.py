@@ -190,16 +190,34 @@ def test_no_code_of_a_file_is_run(path, tmp_path, name):
 
 
 def test_rows_become_columns():
-    table = Table()
-    table.append(episode=0, theta=np.ones(3))
-    table.append(episode=1, theta=np.zeros(3))
+    table = Table([("episode", int), ("theta", float, 3)], capacity=2)
+    table.append((0, np.ones(3)))
+    table.append((1, np.zeros(3)))
     columns = table.columns()
+    assert list(columns) == ["episode", "theta"]
     np.testing.assert_array_equal(columns["episode"], [0, 1])
     np.testing.assert_array_equal(columns["theta"], [[1, 1, 1], [0, 0, 0]])
 
 
-def test_every_row_has_the_columns_of_the_first():
-    table = Table()
-    table.append(episode=0, cost=1.0)
-    with pytest.raises(ValueError, match="does not have the columns"):
-        table.append(episode=0, costs=1.0)
+def test_columns_have_the_rows_that_were_filled_and_are_whole_arrays():
+    table = Table([("episode", int), ("states", float, (5, 3))], capacity=1000)
+    table.append((7, np.ones((5, 3))))
+    columns = table.columns()
+    assert columns["episode"].tolist() == [7]
+    assert columns["states"].shape == (1, 5, 3)
+    assert all(column.flags.c_contiguous and column.base is None for column in columns.values())
+
+
+def test_what_a_row_does_not_have_is_nan_in_all_of_a_field():
+    table = Table([("theta", float, 3)], capacity=1)
+    table.append((np.nan,))
+    assert np.isnan(table.columns()["theta"]).all()
+
+
+def test_a_row_of_another_length_is_refused_and_so_is_one_too_many():
+    table = Table([("episode", int), ("cost", float)], capacity=1)
+    with pytest.raises(ValueError, match="tuple of length 1"):
+        table.append((0,))
+    table.append((0, 1.0))
+    with pytest.raises(IndexError):
+        table.append((1, 1.0))

@@ -68,7 +68,7 @@ def test_what_is_stored_says_what_it_depends_on():
     assert facts == records.facts
     assert facts["key"] == key(QUICK)
     assert facts["stopped"] == "finished"
-    assert set(facts["versions"]) == {"python", "casadi", "numpy", "torch"}
+    assert set(facts["versions"]) == {"python", "casadi", "numba", "numpy", "torch"}
 
 
 @pytest.mark.parametrize(

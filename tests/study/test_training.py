@@ -166,6 +166,7 @@ def test_a_failed_solve_is_tried_once_more_from_a_standing_start():
     controller = Persistent(Faulty(lambda call: call == 2))
     steps = training(controller, quiet(1, 4))
     assert [step.solution.status for step in steps] == ["solved", "solved", "restarted", "solved"]
+    assert [step.solution.restarts for step in steps] == [0, 0, 1, 0]
     assert controller.nmpc.guesses[2] is steps[1].solution
     assert controller.nmpc.guesses[3] is None
     assert all(not step.failure for step in steps)

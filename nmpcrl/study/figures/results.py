@@ -3,7 +3,8 @@
 Figs. 1 and 2 are with the chapters that explain them: `rdes.figure_1` and `ges.figure_2`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,10 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
+from nmpcrl import Vector
 from nmpcrl.control import Task
 from nmpcrl.study import metrics, paper
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.figures.rdes import DECAYS, headed, thin
-from nmpcrl.study.figures.style import LOOKS, PAGE, subplots
+from nmpcrl.study.figures.style import LOOKS, PAGE, page, subplots
 from nmpcrl.study.records import Column, Records
 from nmpcrl.study.store import Study
 
@@ -69,6 +72,41 @@ def paths(study: Study) -> Figure:
     apart = _apart(study)
     found = f"Side by side, the robots of RDES and GES come to be up to {apart:.2f} m apart"
     return _finished(figure, found if np.isfinite(apart) else CUT_SHORT)
+
+
+@page
+def twins(nudges: Mapping[Experiment, Vector], solvers: Vector, start: float) -> Figure:
+    """How far twins are apart against episodes; `nudges` by run, `solvers` for riccati and Ipopt.
+
+    Both hold `twins.separation`, one number a step; `start` is how far apart the nudged ones begin.
+    """
+    decays = tuple(dict.fromkeys(e.decay for e in nudges))
+    figure, axes = subplots(1, len(decays), 3.4, sharex=True, sharey=True, squeeze=False)
+    for axis, decay in zip(axes[0], decays, strict=True):
+        for experiment, apart in nudges.items():
+            if experiment.decay == decay:
+                _envelope(axis, apart, experiment.steps, **thin(experiment.learner))
+        axis.axhline(start, **LIMIT)
+        axis.set_title(DECAYS[decay], **SUBTITLE)
+        axis.set(xlabel="episode", yscale="log")
+    steps = next(iter(nudges)).steps
+    _envelope(axes[0, 0], solvers, steps, color="0.45", linewidth=2.4, linestyle="-")
+    axes[0, 0].set_ylabel("largest difference in θ")
+    learners = dict.fromkeys(experiment.learner for experiment in nudges)
+    handles = [Line2D([], [], label=name, **LOOKS[name].line) for name in learners]
+    handles.append(Line2D([], [], color="0.45", linewidth=2.4, label="ES, riccati and Ipopt"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    grown = sorted({e.learner for e, apart in nudges.items() if apart[-1] > start})
+    found = "Of all learners' twins, none end further apart than they began"
+    if grown:
+        found = f"A difference of {start:.0e} grows in runs of {' and '.join(grown)}"
+    return headed(figure, found)
+
+
+def _envelope(axis: Axes, apart: Vector, steps: int, **line: Any) -> None:
+    """The largest difference in each episode."""
+    whole = apart[: len(apart) // steps * steps].reshape(-1, steps)
+    axis.plot(np.arange(1, len(whole) + 1), whole.max(axis=1), **line)
 
 
 def _against_time(

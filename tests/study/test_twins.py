@@ -1,0 +1,56 @@
+"""Twins: what is moved, and how their distance is counted."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.study import twins
+from nmpcrl.study.experiment import Experiment, run
+from nmpcrl.study.figures import results
+from nmpcrl.study.records import Records
+
+SHORT = {"episodes": 2, "seeds": [3], "layout": "A"}
+
+
+def with_theta(*rows) -> Records:
+    return Records({}, {"theta": np.array(rows)}, {}, {})
+
+
+def test_a_twin_differs_from_its_run_in_the_twelfth_digit_of_theta_x():
+    experiment = Experiment()
+    twin = twins.nudged(experiment)
+    moved = np.array(twin.theta) - experiment.theta
+    assert moved[0] == pytest.approx(twins.NUDGE, rel=1e-3)
+    assert not moved[1:].any()
+    assert twin.seed == experiment.seed
+
+
+def test_every_learner_that_moves_has_a_twin_in_both_readings_of_the_decay():
+    found = [(e.learner, e.decay) for e, _ in twins.pairs(**SHORT)]
+    moving = ("ES", "DES", "RDES", "GES")
+    assert sorted(found) == sorted((name, decay) for name in moving for decay in ("step", "episode"))
+
+
+def test_the_other_solver_gets_a_run_as_long_as_it_can_afford():
+    for episodes, expected in ((300, twins.SOLVER_EPISODES), (4, 4)):
+        one, other = twins.solver_pair(Experiment(episodes=episodes))
+        assert (one.solver, other.solver) == ("riccati", "ipopt")
+        assert one.episodes == other.episodes == expected
+
+
+def test_separation_is_the_largest_difference_over_the_steps_that_both_made():
+    one, other = with_theta([1, 2], [3, 4], [5, 6]), with_theta([1, 2], [2.5, 4.25])
+    np.testing.assert_array_equal(twins.separation(one, other), [0, 0.5])
+
+
+def test_a_run_learns_the_same_with_our_solver_as_with_ipopt():
+    """Until rounding separates them; two episodes of a learner that settles are far from it."""
+    one, other = (run(e) for e in twins.solver_pair(Experiment(episodes=2)))
+    assert twins.separation(one, other).max() < 1e-6
+
+
+@pytest.mark.parametrize(("end", "title"), [(1e-13, "none end further apart"), (1e-2, "of DES")])
+def test_the_figure_of_twins_says_whose_difference_grew(end, title):
+    experiment = Experiment(learner="DES", steps=5, episodes=2)
+    apart = np.geomspace(1e-12, end, 10)
+    figure = results.twins({experiment: apart}, np.full(10, 1e-10), twins.NUDGE)
+    assert title in figure.get_suptitle()
