@@ -7,9 +7,10 @@
 Each build has its own place, in the last column, and five steps, each a function:
 
 1. `ask`      run the two first cells of each chapter, its parameters and their check: a bad value
-              ends here, in one sentence; a good one says which experiments the chapter needs
+              ends here, in one sentence; a good one says which experiments the chapter needs,
+              and what is to be done `beforehand`, with the machine to itself
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
-3. `train`    those experiments whose runs are not stored
+3. `train`    those experiments whose runs are not stored, once the solver is compiled
 4. `execute`  the chapters of the mirror with papermill, two at a time, into PLACE/executed
 5. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html
 
@@ -47,7 +48,7 @@ from tqdm import tqdm
 logging.getLogger("papermill").setLevel(logging.ERROR)  # a page without parameters is no news
 
 ROOT = Path(__file__).resolve().parent.parent
-SMOKE = {"episodes": 4}
+SMOKE = {"episodes": 4, "length": "smoke"}
 INDEX = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><title>{title}</title>
@@ -119,11 +120,14 @@ def refuse_unknown(notebook: Path, given: dict) -> None:
             )
 
 
-def ask(notebook: Path, given: dict) -> tuple:
-    """The experiments a chapter needs: run its parameters cell, set `given`, run its check cell."""
+def ask(notebook: Path, given: dict) -> tuple[tuple, tuple]:
+    """What a chapter needs: run its parameters cell, set `given`, run its check cell.
+
+    Returns the `experiments` that cell names, and what is to be called `beforehand`.
+    """
     cells = [cell for cell in nbformat.read(notebook, 4).cells if cell.cell_type == "code"]
     if not cells or "parameters" not in cells[0].metadata.get("tags", []):
-        return ()
+        return (), ()
     names = {"__name__": "__main__"}
     try:
         exec(cells[0].source, names)
@@ -131,7 +135,7 @@ def ask(notebook: Path, given: dict) -> tuple:
         exec(cells[1].source, names)
     except ValueError as error:  # ParameterError: the chapter's own sentence
         raise Failure(str(error)) from error
-    return tuple(names.get("experiments", ()))
+    return tuple(names.get("experiments", ())), tuple(names.get("beforehand", ()))
 
 
 def nearest(name: str, names) -> str:
@@ -165,8 +169,10 @@ def mirror(place: Path, announcement: str) -> Path:
 
 def train(experiments: tuple) -> None:
     """Run what is not stored yet; the bar is fetch_all's."""
-    from nmpcrl.study import fetch_all  # only here: a refusal should not wait for it
+    from nmpcrl.study import Experiment, fetch_all  # only here: a refusal should not wait for it
+    from nmpcrl.study.experiment import compile_ahead
 
+    compile_ahead(experiments or (Experiment(),))  # a chapter's page is no place for its notice
     if experiments:
         fetch_all(experiments, progress=True)
 
@@ -280,10 +286,12 @@ def values(pairs, raw, texts) -> dict:
 def build(place: Path, jobs: dict[Path, dict], announcement: str, strict: bool) -> Path:
     """The five steps."""
     with told(place / "logs/build.log"):
-        asked = [ask(notebook, given) for notebook, given in jobs.items()]
+        needs = [ask(notebook, given) for notebook, given in jobs.items()]
         shutil.rmtree(place / "html", ignore_errors=True)
         mirror(place, announcement)
-        train(tuple(dict.fromkeys(one for experiments in asked for one in experiments)))
+        train(tuple(dict.fromkeys(one for experiments, _ in needs for one in experiments)))
+        for call in (call for _, beforehand in needs for call in beforehand):
+            call()
         execute_all(place, jobs)
         render(place, strict)
     return place / "html"

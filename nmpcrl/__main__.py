@@ -92,6 +92,24 @@ def evaluate(run: str) -> None:
         click.echo(f"{name:38} {value}")
 
 
+@main.command()
+@click.option("--full", "length", flag_value="full", default=True, help="Minutes; the default.")
+@click.option("--short", "length", flag_value="short", help="As short as the book needs it.")
+@click.option("--smoke", "length", flag_value="smoke", help="To see that it works.")
+@click.option("--again", is_flag=True, help="Measure even if there is a benchmark of this code.")
+def bench(length: str, again: bool) -> None:
+    """Measure how long solves, steps and runs take, and hold it against what is to be reached."""
+    from nmpcrl.study.bench import fetch, measure, targets  # nothing else here needs them
+
+    measured = measure.measure(length) if again else fetch(length)
+    rows = targets.rows(measured)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        click.echo(" | ".join(map(str.ljust, row, widths)))
+    about = measured["about"]
+    click.echo(f"{measure.path()}: {about['length']}, {about['date']}, {about['seconds']:.0f} s")
+
+
 def _verdict(records: Records) -> str:
     """The noise-free cost before and after, in a sentence."""
     before, after = metrics.initial_cost(records), metrics.final_cost(records)

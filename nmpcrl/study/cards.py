@@ -6,6 +6,7 @@ from dataclasses import fields
 from html import escape
 
 from nmpcrl.study.audit import Assumption
+from nmpcrl.study.bench.targets import Target
 from nmpcrl.study.claims import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
@@ -16,6 +17,11 @@ BADGES = {
     PARTLY: "verdict-partly",
     NOT: "verdict-not-reproduced",
     UNDECIDABLE: "verdict-undecidable",
+}
+MET = {
+    True: ("reached", BADGES[REPRODUCED]),
+    False: ("missed", BADGES[NOT]),
+    None: ("not measured", BADGES[UNDECIDABLE]),
 }
 HELD = {True: ("holds", BADGES[REPRODUCED]), False: ("does not hold", BADGES[NOT])}
 
@@ -40,6 +46,15 @@ def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
         (escape(a.theorem), f"{_badge(*HELD[a.holds])}<br>{escape(a.here)}") for a in assumptions
     )
     return _table(caption, ("The theorem assumes", "Here"), rows)
+
+
+def target_table(targets: Iterable[Target], caption: str) -> str:
+    """One row a figure to reach, in HTML: what was measured, and whether that is enough."""
+    rows = (
+        (escape(t.what), escape(t.to_reach), f"{_badge(*MET[t.reached])}<br>{escape(t.measured)}")
+        for t in targets
+    )
+    return _table(caption, ("What", "To reach", "Here"), rows)
 
 
 def evidence(verdicts: Iterable[Verdict]) -> str:

@@ -1,10 +1,13 @@
 """Table II: what a step of each learner costs, measured with the learners in turn."""
 
+import time
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from nmpcrl.control.nmpc import SOLVERS
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, prepare
 from nmpcrl.study.training import Persistent, Step, train
@@ -14,12 +17,13 @@ PAPER_HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}  # Table II: training time 
 
 def time_learners(
     learners: tuple[str, ...] = ("ES", "GES", "RDES", "DES"),
-    solvers: tuple[str, ...] = ("fatrop", "ipopt"),
+    solvers: tuple[str, ...] = SOLVERS,
     steps: int = 400,
+    turn: int = 1,
 ) -> pd.DataFrame:
     """Time of one learning step, one row a learner and solver.
 
-    All take one step each in turn, in this process and with one thread, so that a change of the
+    All take some steps each in turn, in this process and with one thread, so that a change of the
     machine's speed meets all alike; in a new order each time, because whoever follows a network's
     fit finds the processor's cache full of it. Counting starts when the networks are fitted.
 
@@ -27,26 +31,30 @@ def time_learners(
         learners: names, as `Experiment` knows them.
         solvers: names, as `Experiment` knows them.
         steps: how many steps of each count.
+        turn: how many steps each takes at a time. With one, a solver as fast as riccati spends half
+            of its time on fetching its code back into the cache.
 
     Returns:
-        Columns solver, learner, solves (per step), ms_per_step, ms_per_solve, ms_per_fit (medians;
-        nan where there is no fit), hours (the median step times the paper's 300 x 130 steps), and
-        hours_paper (Table II; nan for DES, which is not in it).
+        Columns solver, learner, solves (per step), ms_per_step, ms_per_solve, ms_per_fit (nan where
+        there is no fit), ms_per_rest (plant, cost, update and the loop around them), which are
+        medians, hours (the median step times the paper's 300 x 130 steps), and hours_paper (Table
+        II; nan for DES, which is not in it).
     """
     runs = {
-        (solver, learner): _steps(Experiment(learner=learner, solver=solver))
+        (solver, learner): learn(learner, solver=solver)
         for solver in solvers
         for learner in learners
     }
     times: dict[tuple[str, str], list[tuple[float, ...]]] = {name: [] for name in runs}
     names, rng = list(runs), np.random.default_rng(0)
-    for _ in range(paper.BATCH + steps):
+    for first in range(0, paper.BATCH + steps, turn):
         for i in rng.permutation(len(names)):
-            times[names[i]].append(_parts(next(runs[names[i]])))
+            for _ in range(min(turn, paper.BATCH + steps - first)):
+                times[names[i]].append(_timed(runs[names[i]]))
     rows = []
     for (solver, learner), parts in times.items():
-        solves, solving, fitting = np.array(parts[paper.BATCH :]).T
-        step = float(np.median(solving + fitting))
+        solves, solving, fitting, whole = np.array(parts[paper.BATCH :]).T
+        step = float(np.median(whole))
         rows.append(
             {
                 "solver": solver,
@@ -55,6 +63,7 @@ def time_learners(
                 "ms_per_step": 1e3 * step,
                 "ms_per_solve": 1e3 * float(np.median(solving / solves)),
                 "ms_per_fit": 1e3 * float(np.median(fitting)) if fitting.any() else np.nan,
+                "ms_per_rest": 1e3 * float(np.median(whole - solving - fitting)),
                 "hours": step * paper.EPISODES * paper.STEPS / 3600,
                 "hours_paper": PAPER_HOURS.get(learner, np.nan),
             }
@@ -68,17 +77,23 @@ def ratio(timings: pd.DataFrame, solver: str, learner: str, reference: str = "ES
     return float(per_step[learner] / per_step[reference])
 
 
-def _steps(experiment: Experiment) -> Iterator[Step]:
+def learn(learner: str, **fields: Any) -> Iterator[Step]:
+    """The steps of one run as they are made; `fields` are those of `Experiment`."""
+    experiment = Experiment(learner=learner, **fields)
     controller = Persistent(paper.nmpc(solver=experiment.solver))
-    learner, weights, explore = prepare(experiment, controller)
-    return train(learner, controller, weights, explore)
+    learning, weights, explore = prepare(experiment, controller)
+    return train(learning, controller, weights, explore)
 
 
-def _parts(step: Step) -> tuple[float, float, float]:
-    """Number of solves, their time and the network's time [s]; failed steps do not occur here."""
+def _timed(steps: Iterator[Step]) -> tuple[float, float, float, float]:
+    """The next step's number of solves, their time, the network's and all [s]; none fails here."""
+    began = time.perf_counter()
+    step = next(steps)
+    whole = time.perf_counter() - began
     if step.solution is None or step.update is None:
         raise RuntimeError(f"a solve failed while timing: {step.failure}")
     successor = step.update.successor
     second = successor.solution if successor else None
     solving = step.solution.seconds + (second.seconds if second else 0.0)
-    return (2.0 if second else 1.0), solving, successor.seconds if successor else 0.0
+    fitting = successor.seconds if successor else 0.0
+    return (2.0 if second else 1.0), solving, fitting, whole

@@ -1,6 +1,7 @@
 """Twins: runs that begin a rounding error apart, and how far apart they end."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ def nudged(experiment: Experiment) -> Experiment:
     return replace(experiment, theta=(first + NUDGE, *rest))
 
 
-def pairs(**fields) -> tuple[Pair, ...]:
+def pairs(**fields: Any) -> tuple[Pair, ...]:
     """Every learner's run and its nudged twin; `fields` as `main_study` takes them."""
     moving = [e for e in main_study(**fields) if e.learner != "frozen"]
     return tuple((e, nudged(e)) for e in moving)

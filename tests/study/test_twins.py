@@ -27,7 +27,8 @@ def test_a_twin_differs_from_its_run_in_the_twelfth_digit_of_theta_x():
 def test_every_learner_that_moves_has_a_twin_in_both_readings_of_the_decay():
     found = [(e.learner, e.decay) for e, _ in twins.pairs(**SHORT)]
     moving = ("ES", "DES", "RDES", "GES")
-    assert sorted(found) == sorted((name, decay) for name in moving for decay in ("step", "episode"))
+    wanted = [(name, decay) for name in moving for decay in ("step", "episode")]
+    assert sorted(found) == sorted(wanted)
 
 
 def test_the_other_solver_gets_a_run_as_long_as_it_can_afford():

@@ -1,0 +1,229 @@
+"""The benchmark as a whole: measured into a dict of columns, kept as one JSON file."""
+
+import hashlib
+import json
+import os
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from nmpcrl.study import paper, store
+from nmpcrl.study.bench.growth import growth
+from nmpcrl.study.bench.learning import against_mpcrl, learners
+from nmpcrl.study.bench.runs import at_once, first_calls, whole_runs
+from nmpcrl.study.bench.solves import interleaved, own_loop, parts
+from nmpcrl.study.parameters import ParameterError
+
+Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
+
+ALL = ("ES", "GES", "RDES", "DES")
+MODULES = ("fresh", "growth", "learning", "measure", "rival", "runs", "solves")
+SOURCES = (*store.MATHEMATICS, "study/timing.py", *(f"study/bench/{name}.py" for name in MODULES))
+
+
+@dataclass(frozen=True)
+class Length:
+    """How much is measured."""
+
+    episodes: int  # of the recorded closed loops, each with and without noise
+    problems: int  # of each of their episodes
+    loops: int  # episodes of the default solver's own loop, and of every other small measure
+    turns: int  # learning steps of every learner with every solver
+    rounds: int  # of mpcrl
+    rival_steps: int  # of each round
+    run: int  # episodes of a whole run
+    learners: tuple[str, ...]  # whose whole runs are measured
+    seeds: int  # runs at once
+    seed_run: int  # episodes of each
+    firsts: int  # first calls with machine code that is kept
+    compile: bool  # whether to compile the solver anew
+
+
+LENGTHS = {  # from the shortest
+    "smoke": Length(
+        episodes=1,
+        problems=20,
+        loops=1,
+        turns=20,
+        rounds=1,
+        rival_steps=8,
+        run=4,
+        learners=("ES", "RDES"),
+        seeds=0,
+        seed_run=0,
+        firsts=1,
+        compile=False,
+    ),
+    "short": Length(
+        episodes=1,
+        problems=paper.STEPS,
+        loops=10,
+        turns=120,
+        rounds=2,
+        rival_steps=40,
+        run=30,
+        learners=ALL,
+        seeds=6,
+        seed_run=150,
+        firsts=3,
+        compile=True,
+    ),
+    "full": Length(
+        episodes=4,
+        problems=paper.STEPS,
+        loops=40,
+        turns=400,
+        rounds=5,
+        rival_steps=60,
+        run=paper.EPISODES,
+        learners=ALL,
+        seeds=12,
+        seed_run=paper.EPISODES,
+        firsts=5,
+        compile=True,
+    ),
+}
+
+
+def fetch(length: str = "full", *, progress: bool = True) -> Bench:
+    """The benchmark: read if this code was measured here, and at least so long; else measured.
+
+    Args:
+        length: "smoke", "short" or "full".
+        progress: whether to show a bar on standard error.
+
+    Raises:
+        ParameterError: there is no such length.
+    """
+    check(length)
+    kept = stored()
+    names = list(LENGTHS)
+    if kept and names.index(kept["about"]["length"]) >= names.index(length):
+        return kept
+    return measure(length, progress=progress)
+
+
+def check(length: object) -> None:
+    """Refuse a length that there is not.
+
+    Raises:
+        ParameterError: there is none of this name.
+    """
+    if length not in list(LENGTHS):
+        raise ParameterError(f"length = {length!r} must be one of {', '.join(LENGTHS)}")
+
+
+def stored() -> Bench | None:
+    """What is in the file, if it is of this code, these versions and this machine."""
+    try:
+        kept = json.loads(path().read_text())
+        return kept if kept["about"]["key"] == key() else None
+    except FileNotFoundError:
+        return None
+    except (ValueError, LookupError, TypeError) as error:
+        print(f"{path()} is damaged ({error}) and is measured again", file=sys.stderr)
+        return None
+
+
+def measure(length: str, *, progress: bool = True) -> Bench:
+    """Measure everything, and store it."""
+    size, began = LENGTHS[length], time.perf_counter()
+    about: dict[str, Any] = {
+        "length": length,
+        "key": key(),
+        "date": datetime.now(UTC).date().isoformat(),
+        "machine": machine(),
+        "versions": versions(),
+    }
+    bench: Bench = {"about": about}
+    bar = tqdm(_stages(size), "benchmark", disable=not progress, leave=False)
+    for name, stage in bar:
+        bar.set_description(f"benchmark ({length}): {name}")
+        bench |= stage()
+    about["seconds"] = time.perf_counter() - began
+    _save(bench)
+    return bench
+
+
+def _stages(size: Length) -> list[tuple[str, Callable[[], Bench]]]:
+    """What is measured, in order; what needs a quiet machine is not behind what starts many."""
+
+    def runs() -> Bench:
+        totals, progress = whole_runs(size.learners, size.run)
+        return {"runs": totals, "episodes": progress}
+
+    def steps() -> Bench:
+        rival = against_mpcrl(size.rounds, size.rival_steps)
+        return {"learners": learners(size.turns), "rival": rival}
+
+    return [
+        ("every solver", lambda: {"solves": interleaved(size.episodes, size.problems)}),
+        ("its own loop", lambda: {"loop": own_loop(size.loops, paper.STEPS)}),
+        ("parts of a step", lambda: {"parts": parts(size.loops)}),
+        ("growth", lambda: {"growth": growth(max(3, size.loops // 2), paper.STEPS)}),
+        ("learning steps", steps),
+        ("whole runs", runs),
+        ("runs at once", lambda: {"parallel": at_once(size.seeds, size.seed_run)}),
+        ("first call", lambda: {"first": first_calls(size.firsts, compile_too=size.compile)}),
+    ]
+
+
+def path() -> Path:
+    """The file, in the folder of the runs."""
+    return store.folder() / "bench.json"
+
+
+def key() -> str:
+    """A digest of all that the times depend on, but for what else the machine does."""
+    depends = [store.digest(SOURCES), versions(), machine()]
+    return hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
+
+
+def versions() -> dict[str, str | None]:
+    """The versions that the times depend on."""
+    try:
+        rival = version("mpcrl")
+    except PackageNotFoundError:
+        rival = None
+    return {**store.versions(), "mpcrl": rival}
+
+
+def machine() -> dict[str, Any]:
+    """What is known of the machine."""
+    return {
+        "processor": _processor(),
+        "architecture": platform.machine(),
+        "cores": os.cpu_count(),
+        "system": platform.system(),
+    }
+
+
+def _processor() -> str:
+    """The processor's name, where the system tells it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown"
+
+
+def _save(bench: Bench) -> None:
+    """Write the whole file beside its place, then rename it."""
+    path().parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path().parent, prefix=".half-", suffix=".tmp")
+    try:
+        with os.fdopen(handle, "w") as file:
+            json.dump(bench, file)
+        Path(name).replace(path())
+    finally:
+        Path(name).unlink(missing_ok=True)

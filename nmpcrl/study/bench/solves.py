@@ -1,0 +1,160 @@
+"""How long one solve takes: every solver on the same problems, and the default in its own loop."""
+
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.control import Nmpc, Solution, SolverError, interior_point, usual
+from nmpcrl.learning import QNetwork
+from nmpcrl.study import paper
+
+Columns = dict[str, list[Any]]  # lists of one length, by name
+Solve = Callable[..., Any]  # (state, theta, guess) -> what has value and iterations
+
+THETA = np.array(paper.THETA_INIT)
+LOOPS = {"without noise": 0.0, "with noise": paper.NOISE}  # that of training's first episode
+WIDTH = 3 + 2 + len(THETA)  # of what RDES tells its network: (s, a, theta)
+STRETCH = 26  # problems that a solver is given at a time: then its code is in the caches, as in use
+
+
+def solvers() -> dict[str, Solve]:
+    """From the default to what is slowest, all with the value's gradient."""
+    named: dict[str, Solve] = {
+        name: paper.nmpc(solver=name).solve for name in ("riccati", "fatrop", "ipopt")
+    }
+    return named | {"ipopt MX": usual.mx(paper.nmpc()), "rebuilt": usual.rebuilt(paper.nmpc())}
+
+
+def interleaved(episodes: int, steps: int) -> Columns:
+    """Every solver on the problems of the same recorded closed loops, each from its own last plan.
+
+    The solvers take turns, a stretch of problems each, in an order drawn anew every time, so that
+    a change of the machine's speed meets all alike.
+
+    Returns:
+        A row a solve: loop, solver, warm (false for the first of an episode), seconds, iterations
+        (None where it failed), excess (of the value over the best of all solvers, relative to the
+        best or to 1, whichever is larger).
+    """
+    rng, named = np.random.default_rng(0), solvers()
+    for solve in named.values():
+        solve(np.array(paper.START), THETA, None)  # the first call compiles
+    rows = []
+    for loop, noise in LOOPS.items():
+        for _ in range(episodes):
+            states = [state for state, _, _ in drive(paper.nmpc(), noise, rng, steps)]
+            rows += [(loop, *row) for row in _episode(states, named, rng)]
+    names = ("loop", "solver", "warm", "seconds", "iterations", "excess")
+    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
+
+
+def _episode(
+    states: list[Vector], named: dict[str, Solve], rng: np.random.Generator
+) -> Iterator[tuple[Any, ...]]:
+    plans: dict[str, list[Any]] = {name: [] for name in named}
+    times: dict[str, list[float]] = {name: [] for name in named}
+    for first in range(0, len(states), STRETCH):
+        for name in rng.permutation(list(named)):
+            guess = plans[name][-1] if first else None
+            for state in states[first : first + STRETCH]:
+                began = time.perf_counter()
+                try:
+                    guess = named[name](state, THETA, guess)
+                except SolverError:
+                    guess = None
+                times[name].append(time.perf_counter() - began)
+                plans[name].append(guess)
+    for t in range(len(states)):
+        found = {name: plans[name][t] for name in named}
+        best = min(plan.value for plan in found.values() if plan)
+        for name, plan in found.items():
+            excess = (plan.value - best) / max(1.0, best) if plan else None
+            yield name, t > 0, times[name][t], plan and plan.iterations, excess
+
+
+def own_loop(episodes: int, steps: int) -> Columns:
+    """The default solver alone with the plant, the loops in turn: seconds of each warm solve."""
+    nmpc, rng = paper.nmpc(), np.random.default_rng(1)
+    columns: Columns = {"loop": [], "seconds": []}
+    for _ in range(episodes):
+        for loop, noise in LOOPS.items():
+            times = [seconds for _, _, seconds in drive(nmpc, noise, rng, steps)][1:]
+            columns["loop"] += [loop] * len(times)
+            columns["seconds"] += times
+    return columns
+
+
+def drive(
+    nmpc: Nmpc, noise: float, rng: np.random.Generator, steps: int
+) -> Iterator[tuple[Vector, Solution, float]]:
+    """The closed loop from the start: each state, its solution, and how long the solve took [s]."""
+    state, solution = nmpc.task.start, None
+    for _ in range(steps):
+        began = time.perf_counter()
+        solution = nmpc.solve(state, THETA, solution)
+        yield state, solution, time.perf_counter() - began
+        action = nmpc.plant.clip(solution.action + rng.normal(scale=noise, size=nmpc.plant.m))
+        state = nmpc.plant.step(state, action)
+
+
+def parts(episodes: int) -> Columns:
+    """What a solve and the rest of a learning step are made of: part, seconds (medians).
+
+    Measured in the closed loop without noise, of which so many episodes are driven.
+    """
+    (nmpc, compiled), network = _watched(), _network()
+    spent: dict[str, list[float]] = {}
+    for _ in range(episodes):
+        for state, solution, seconds in drive(nmpc, 0.0, np.random.default_rng(0), paper.STEPS):
+            inner, action = compiled[-1], solution.action
+            spent.setdefault("solve, compiled part", []).append(inner)
+            spent.setdefault("solve, Python around it", []).append(seconds - inner)
+            again = partial(nmpc.solve, state, THETA, solution)
+            _time(spent, "solve from a solution in the same state", again)
+            _time(spent, "step of the plant", partial(nmpc.plant.step, state, action))
+            _time(spent, "cost of a step", partial(nmpc.task.stage_cost, state, action))
+    for _ in range(episodes * paper.STEPS):
+        _time(spent, "fit of the network", network.fit)
+        _time(spent, "prediction of the network", partial(network.predict, np.ones(WIDTH)))
+    return {"part": list(spent), "seconds": [float(np.median(times)) for times in spent.values()]}
+
+
+def _time(spent: dict[str, list[float]], name: str, call: Callable[[], Any]) -> None:
+    began = time.perf_counter()
+    call()
+    spent.setdefault(name, []).append(time.perf_counter() - began)
+
+
+def _watched() -> tuple[Nmpc, list[float]]:
+    """A controller that has solved once, and a list to which it adds its machine code's times."""
+    seconds: list[float] = []
+
+    def watched(plant: Any) -> Solve:
+        kernel = original(plant)
+
+        def timed(*arguments: Any) -> Any:
+            began = time.perf_counter()
+            result = kernel(*arguments)
+            seconds.append(time.perf_counter() - began)
+            return result
+
+        return timed
+
+    original, nmpc = interior_point.kernel, paper.nmpc()
+    with patch.object(interior_point, "kernel", watched):
+        nmpc.solve(nmpc.task.start, THETA)
+    return nmpc, seconds
+
+
+def _network() -> QNetwork:
+    """RDES's network with an episode in its buffer."""
+    rng = np.random.default_rng(0)
+    network = QNetwork(WIDTH, rng, learning_rate=paper.ZETA, batch=paper.BATCH)
+    for row in rng.normal(size=(paper.STEPS, WIDTH)):
+        network.remember(row, 0.0)
+    return network

@@ -1,0 +1,214 @@
+"""Figures of the appendix on performance: functions of what `bench.fetch` returns."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from nmpcrl.study import paper
+from nmpcrl.study.bench import summary
+from nmpcrl.study.bench.summary import Bench
+from nmpcrl.study.figures.rdes import headed
+from nmpcrl.study.figures.style import LOOKS, page, subplots
+
+NAMES = {
+    "riccati": "riccati",
+    "fatrop": "fatrop",
+    "ipopt": "Ipopt, SX",
+    "ipopt MX": "Ipopt, MX",
+    "rebuilt": "rebuilt each time",
+}
+MARKERS = {"riccati": "o", "fatrop": "s", "ipopt": "^", "ipopt MX": "v", "rebuilt": "D"}
+PARTS = {  # of a learning step: column of `time_learners`, colour and hatching
+    "solves": ("#0072B2", ""),
+    "network": ("#E69F00", "//"),
+    "the rest": ("0.8", ""),
+}
+INK = "0.25"
+SUBTITLE: dict[str, Any] = {"fontsize": "medium", "fontweight": "normal"}
+
+
+@page
+def solve_times(bench: Bench) -> Figure:
+    """Time of a warm solve by solver, a panel a loop: median, up to p95, and the longest."""
+    table = summary.solvers(bench)
+    loops = table.index.unique("loop")
+    figure, axes = subplots(1, len(loops), 2.9, sharex=True, sharey=True, squeeze=False)
+    for panel, loop in zip(axes[0], loops, strict=True):
+        for row, (solver, one) in enumerate(table.loc[loop].iterrows()):
+            marker = MARKERS[str(solver)]
+            panel.plot([one["median"], one.p95], [row, row], color=INK, linewidth=3.5, alpha=0.35)
+            panel.plot(one["max"], row, "|", color=INK, markersize=8)
+            panel.plot(one["median"], row, marker, color=INK)
+            if one.times > 1:
+                place = {"textcoords": "offset points", "ha": "center", "fontsize": "small"}
+                panel.annotate(f"{one.times:.0f}×", (one["median"], row), (0, 7), **place)
+        panel.set_title(loop, **SUBTITLE)
+        panel.set(xscale="log", xlabel="time of a solve [µs]", ylim=(len(NAMES) - 0.4, -0.6))
+    axes[0, 0].set_yticks(range(len(NAMES)), NAMES.values())
+    medians = table.loc[loops[0]]["median"]
+    fastest, slowest = medians.idxmin(), medians.idxmax()
+    times = medians[slowest] / medians[fastest]
+    found = (
+        f"{NAMES[fastest]} is fastest; {NAMES[slowest]}, a solve takes {times:.0f} times as long"
+    )
+    return headed(figure, found)
+
+
+@page
+def learning_steps(bench: Bench) -> Figure:
+    """What a learning step is made of, a panel a solver, a bar a learner."""
+    table = summary.learners(bench)
+    solvers = table.solver.unique()
+    figure, axes = subplots(1, len(solvers), 2.6, sharey=True, squeeze=False)
+    for panel, solver in zip(axes[0], solvers, strict=True):
+        parts = _parts(table[table.solver == solver])
+        left = np.zeros(len(parts))
+        for name, (color, hatch) in PARTS.items():
+            style = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}
+            panel.barh(parts.index, parts[name], 0.65, left, label=name, **style)
+            left += parts[name]
+        panel.set_title(NAMES[solver], **SUBTITLE)
+        panel.set_xlabel("ms a step")
+    axes[0, 0].invert_yaxis()
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    shares = {}
+    for solver in (solvers[0], solvers[-1]):
+        rdes = _parts(table[table.solver == solver]).loc["RDES"]
+        shares[NAMES[solver]] = rdes["network"] / rdes.sum()
+    found = " and ".join(f"{share:.0%} with {name}" for name, share in shares.items())
+    return headed(figure, f"Of a step of RDES the network takes {found}")
+
+
+def _parts(table: pd.DataFrame) -> pd.DataFrame:
+    """Milliseconds of each part, a row a learner."""
+    mine = table.set_index("learner")
+    columns = (mine.solves * mine.ms_per_solve, mine.ms_per_fit.fillna(0.0), mine.ms_per_rest)
+    return pd.DataFrame(dict(zip(PARTS, columns, strict=True)))
+
+
+@page
+def whole_runs(bench: Bench) -> Figure:
+    """Seconds of a run, memory over its episodes, and the same runs by one worker and by more."""
+    figure, (bars, lines, workers) = subplots(1, 3, 2.9, width_ratios=(1.25, 1.1, 0.8))
+    runs = summary.runs(bench)
+    for name, run in runs.iterrows():
+        bars.bar(name, run.seconds, 0.65, color=LOOKS[str(name)].color)
+        hours = "–" if np.isnan(run.hours_paper) else f"{run.hours_paper:.0f} h"
+        text = f"{run.seconds:.1f} s\n({hours})"
+        bars.annotate(text, (name, run.seconds), (0, 3), **_ABOVE)
+    bars.set(ylabel=f"{paper.EPISODES} episodes [s]", ylim=(0, 1.35 * runs.seconds.max()))
+    bars.set_title("time (the paper's)", **SUBTITLE)
+    episodes = pd.DataFrame(bench["episodes"])
+    for name in runs.index:
+        one = episodes[episodes.learner == name]
+        lines.plot(one.episode, one.memory / 1e6, label=name, **LOOKS[name].line)
+    lines.set(xlabel="episode", ylabel="memory [MB]", ylim=(0, 1.4 * runs.memory.max()))
+    lines.set_title("memory", **SUBTITLE)
+    lines.legend(ncols=2, fontsize="small", loc="lower center")
+    _draw_workers(workers, bench)
+    count, times = summary.speed_up(bench)
+    found = f"ES takes {runs.seconds['ES']:.1f} s and RDES {runs.seconds['RDES']:.1f} s"
+    more = f"; {count} workers are {times:.2f} times as fast as one" if count > 1 else ""
+    return headed(figure, found + more)
+
+
+_ABOVE: dict[str, Any] = {
+    "textcoords": "offset points",
+    "ha": "center",
+    "va": "bottom",
+    "fontsize": "small",
+}
+
+
+def _draw_workers(axes: Axes, bench: Bench) -> None:
+    table = pd.DataFrame(bench["parallel"])
+    axes.set_title("at once", **SUBTITLE)
+    if table.empty:
+        axes.annotate("not measured", (0.5, 0.5), xycoords="axes fraction", ha="center")
+        axes.set_axis_off()
+        return
+    ideal = table.seconds[0] * table.workers[0] / table.workers
+    names = [str(workers) for workers in table.workers]
+    axes.bar(names, table.seconds, 0.6, color="0.65")
+    for name, seconds in zip(names, ideal, strict=True):
+        axes.hlines(seconds, int(name == names[-1]) - 0.4, int(name == names[-1]) + 0.4, INK)
+    axes.set(xlabel="workers", ylabel=f"{table.runs[0]} runs of ES [s]")
+
+
+@page
+def growth(bench: Bench) -> Figure:
+    """An iteration against the number of stages and of obstacles, with a straight line."""
+    figure, axes = subplots(1, 2, 3.0, sharey=True)
+    found = []
+    kinds = (("horizon", "a stage"), ("obstacles", "an obstacle"))
+    for panel, (varied, part) in zip(axes, kinds, strict=True):
+        times = summary.growth(bench, varied).iteration
+        slope, fixed = np.polyfit(times.index, times, 1, w=1 / times)
+        ends = np.array([0, times.index[-1]])
+        panel.plot(ends, fixed + slope * ends, color="0.6", linestyle="--", label="straight line")
+        panel.plot(times.index, times, "o", color=INK, label="measured")
+        panel.set(xlabel=f"{part.split()[1]}s", xlim=(0, None), ylim=(0, None))
+        low, high = summary.marginal(bench, varied)
+        found.append(f"{low:.2f} to {high:.2f} µs {part}")
+    axes[0].set_ylabel("time of an iteration [µs]")
+    axes[0].legend(loc="upper left")
+    return headed(figure, f"An iteration takes {' and '.join(found)} more")
+
+
+@page
+def saving(bench: Bench) -> Figure:
+    """Claim C3: a step of RDES over one of ES, against the time of one solve."""
+    model, measured = summary.saving(bench), summary.measured_ratios(bench)
+    medians = summary.solvers(bench)["median"].groupby("solver").min() / 1e3
+    figure, axes = subplots(height=3.7)
+    theirs = 1e3 * summary.PAPER_SOLVE
+    times = np.geomspace(0.6 * measured.solve.min(), 2.5 * theirs, 300)
+    axes.plot(times, model.ratio(times), color=LOOKS["RDES"].color, label="computed")
+    axes.axhline(0.5, color="0.5", linewidth=0.9, linestyle=(0, (2, 2)))
+    axes.axhline(1.0, color="0.5", linewidth=0.9)
+    for solver, one in measured.iterrows():
+        _mark(axes, str(solver), one.solve, one.ratio, filled=True)
+    for solver in ("ipopt MX", "rebuilt"):
+        _mark(axes, solver, medians[solver], model.ratio(medians[solver]), filled=False)
+    axes.plot(theirs, 0.5, "*", color=INK, markersize=11, zorder=3)
+    axes.annotate("the paper", (theirs, 0.5), (0, -14), ha="center", **SMALL)
+    if model.break_even > 0:
+        axes.axvline(model.break_even, color="0.5", linewidth=0.9, linestyle="--")
+        text = f" break-even:\n {model.break_even:.2f} ms"
+        place = (model.break_even, 0.97)
+        axes.annotate(text, place, xycoords=("data", "axes fraction"), va="top", fontsize="small")
+    axes.set(xscale="log", xlabel="time of one solve [ms]", ylabel="step of RDES / step of ES")
+    axes.set(ylim=(0, 1.1 * max(measured.ratio.max(), model.ratio(times[0]))))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    return headed(figure, _found(measured.ratio, model))
+
+
+PLACES = {  # of a name, from its point
+    "riccati": ((6, 4), "left"),
+    "fatrop": ((-4, 7), "right"),
+    "ipopt": ((4, 7), "left"),
+    "ipopt MX": ((0, -15), "right"),
+    "rebuilt": ((0, -15), "center"),
+}
+SMALL: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small"}
+
+
+def _mark(axes: Axes, solver: str, solve: float, ratio: float, *, filled: bool) -> None:
+    """A solver's point; hollow where its learners were not run and the curve is followed."""
+    face = INK if filled else "white"
+    axes.plot(solve, ratio, MARKERS[solver], color=INK, markerfacecolor=face, zorder=3)
+    place, side = PLACES[solver]
+    axes.annotate(NAMES[solver], (solve, ratio), place, ha=side, **SMALL)
+
+
+def _found(ratios: pd.Series, model: summary.Saving) -> str:
+    slowest = (
+        f"With {NAMES[str(ratios.idxmax())]}, RDES takes {ratios.max():.2f} times as long as ES"
+    )
+    if ratios.max() > 1:
+        return f"{slowest}; the break-even is at {model.break_even:.2f} ms"
+    return f"RDES saves time with every solver: {slowest[0].lower()}{slowest[1:]}"

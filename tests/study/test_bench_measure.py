@@ -1,0 +1,118 @@
+"""When a benchmark is read and when it is measured, and what the command prints."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from nmpcrl.__main__ import main
+from nmpcrl.study import ParameterError
+from nmpcrl.study.bench import measure
+
+
+@pytest.fixture
+def counted(tmp_path, monkeypatch):
+    """The lengths that were measured, in a folder of their own; measuring takes no time."""
+    lengths = []
+
+    def stages(size):
+        lengths.append(next(name for name, one in measure.LENGTHS.items() if one == size))
+        return [("nothing", lambda: {"nothing": {"seconds": [1.0]}})]
+
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    monkeypatch.setattr(measure, "_stages", stages)
+    return lengths
+
+
+def fetch(length):
+    return measure.fetch(length, progress=False)
+
+
+def test_what_was_measured_is_read_again(counted):
+    first = fetch("short")
+    assert fetch("short") == first
+    assert counted == ["short"]
+
+
+@pytest.mark.parametrize(
+    ("kept", "asked", "again"),
+    [("full", "short", False), ("short", "smoke", False), ("smoke", "short", True)],
+)
+def test_a_longer_benchmark_serves_for_a_shorter_one(counted, kept, asked, again):
+    fetch(kept)
+    found = fetch(asked)
+    assert counted == [kept, asked] if again else [kept]
+    assert found["about"]["length"] == (asked if again else kept)
+
+
+@pytest.mark.parametrize("changed", ["versions", "machine"])
+def test_other_versions_or_another_machine_measure_again(counted, monkeypatch, changed):
+    fetch("short")
+    monkeypatch.setattr(measure, changed, lambda: {"other": "one"})
+    fetch("short")
+    assert counted == ["short", "short"]
+
+
+def test_another_source_measures_again(counted, monkeypatch):
+    fetch("short")
+    monkeypatch.setattr(measure.store, "digest", lambda _: "other")
+    fetch("short")
+    assert counted == ["short", "short"]
+
+
+@pytest.mark.parametrize("content", ["{", "[]", "{}"])
+def test_a_damaged_file_is_told_and_measured_again(counted, capsys, content):
+    fetch("short")
+    measure.path().write_text(content)
+    fetch("short")
+    assert counted == ["short", "short"]
+    assert "is damaged" in capsys.readouterr().err
+
+
+def test_the_file_is_whole_and_alone(counted):
+    bench = fetch("short")
+    assert json.loads(measure.path().read_text()) == bench
+    assert list(measure.path().parent.iterdir()) == [measure.path()]
+
+
+def test_a_benchmark_says_where_and_of_what_it_is(counted):
+    about = fetch("short")["about"]
+    assert about["machine"].keys() == {"processor", "architecture", "cores", "system"}
+    assert {"python", "casadi", "numpy", "torch", "mpcrl"} <= about["versions"].keys()
+
+
+@pytest.mark.parametrize("length", ["long", "", None, True, 3, ["full"]])
+def test_a_length_that_there_is_not_is_refused(counted, length):
+    with pytest.raises(ParameterError, match="must be one of smoke, short, full"):
+        fetch(length)
+    assert not counted
+
+
+def test_the_sources_of_a_benchmark_exist():
+    assert measure.store.digest(measure.SOURCES)
+
+
+@pytest.fixture
+def command(counted, measured, monkeypatch):
+    stage = [("all", lambda: {name: part for name, part in measured.items() if name != "about"})]
+    stages = measure._stages
+    monkeypatch.setattr(measure, "_stages", lambda size: [*stages(size), *stage])
+    return lambda *words: CliRunner().invoke(main, ["bench", *words])
+
+
+def test_the_command_prints_a_row_a_figure_and_where_it_is_kept(command, counted):
+    done = command()
+    assert done.exit_code == 0, done.output
+    assert counted == ["full"]
+    lines = [line for line in done.stdout.splitlines() if " | " in line]
+    assert len(lines) == 17
+    assert sum(line.rstrip().endswith("| reached") for line in lines) == 16
+    assert f"{measure.path()}: full, " in done.stdout
+
+
+def test_the_command_measures_again_only_when_told(command, counted):
+    command("--short")
+    command("--smoke")
+    assert counted == ["short"]
+    command("--smoke", "--again")
+    assert counted == ["short", "smoke"]

@@ -1,0 +1,151 @@
+"""From measured columns to numbers and verdicts; no clock is read here."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.study import cards, paper
+from nmpcrl.study.bench import summary, targets
+
+
+def outcomes(measured) -> dict[str, bool | None]:
+    return {target.what: target.reached for target in targets.targets(measured)}
+
+
+def missed(measured) -> list[str]:
+    return [what for what, reached in outcomes(measured).items() if reached is False]
+
+
+def test_the_paper_s_hours_are_0_83_s_a_solve():
+    assert pytest.approx(0.83, abs=0.005) == summary.PAPER_SOLVE
+
+
+def test_a_cold_solve_does_not_count(measured):
+    table = summary.solvers(measured)
+    assert table.loc[("with noise", "riccati"), "max"] == pytest.approx(40.0)
+    assert table.loc[("with noise", "fatrop"), "times"] == pytest.approx(20.0)
+
+
+def test_a_value_above_the_best_is_a_worse_minimum_and_no_value_a_failure(measured):
+    solves = measured["solves"]
+    warm = [
+        i
+        for i, (loop, solver) in enumerate(zip(solves["loop"], solves["solver"], strict=True))
+        if (loop, solver) == ("with noise", "ipopt") and solves["warm"][i]
+    ]
+    solves["excess"][warm[0]] = 2e-6
+    solves["excess"][warm[1]] = 0.5e-6
+    solves["excess"][warm[2]] = solves["iterations"][warm[2]] = None
+    row = summary.solvers(measured).loc[("with noise", "ipopt")]
+    assert row.worse == pytest.approx(1 / 4)
+    assert row.failed == pytest.approx(1 / 4)
+    assert row.iterations == pytest.approx(5)
+
+
+def test_a_run_of_the_paper_s_length_is_taken_as_it_is(measured):
+    assert summary.runs(measured).seconds["ES"] == 4.0
+
+
+def test_a_shorter_run_is_extended_by_its_later_episodes(measured):
+    measured["runs"]["episodes"] = [30] * 4
+    measured["runs"]["seconds"] = [2.0] * 4
+    episodes = measured["episodes"]
+    kept = [i for i, episode in enumerate(episodes["episode"]) if episode <= 30]
+    measured["episodes"] = {name: [column[i] for i in kept] for name, column in episodes.items()}
+    seconds = summary.runs(measured).seconds["ES"]
+    assert seconds == pytest.approx(2.0 + (paper.EPISODES - 30) * 0.01)
+    assert any("extended from 30 episodes" in t.measured for t in targets.targets(measured))
+
+
+def test_memory_grows_from_a_tenth_of_the_episodes_on(measured):
+    memory = measured["episodes"]["memory"]
+    memory[:5] = [300_000_000] * 5  # while things are loaded
+    memory[299] = 440_000_000
+    assert summary.runs(measured).growth["ES"] == pytest.approx(0.1)
+    assert missed(measured) == ["memory of a run"]
+
+
+@pytest.mark.parametrize(("varied", "each"), [("horizon", 0.5), ("obstacles", 0.25)])
+def test_what_one_more_adds_is_constant_where_time_is_linear(measured, varied, each):
+    assert summary.marginal(measured, varied) == pytest.approx((each, each))
+    assert summary.most_growth(measured, varied) == pytest.approx(1.0)
+
+
+def test_quadratic_growth_is_seen(measured):
+    grown = measured["growth"]
+    grown["seconds"] = [1e-8 * size**2 for size in grown["size"]]
+    assert summary.most_growth(measured, "horizon") == pytest.approx(80 / 5)
+    assert len(missed(measured)) == 2
+
+
+def test_the_ratio_of_the_learners_comes_down_to_one_half_and_breaks_even_where_it_says():
+    model = summary.Saving(network=0.2, rest=0.03, rest_rdes=0.05)
+    assert model.ratio(1e9) == pytest.approx(0.5)
+    assert model.break_even == pytest.approx(0.22)
+    assert model.ratio(model.break_even) == pytest.approx(1.0)
+    assert model.ratio(model.solve_at(0.55)) == pytest.approx(0.55)
+    assert (np.diff(model.ratio(np.geomspace(0.01, 1e3))) < 0).all()
+
+
+def test_the_parts_are_those_of_the_fastest_solver(measured):
+    assert summary.saving(measured) == summary.Saving(0.2, 0.02, 0.02)
+
+
+def test_learners_whose_steps_are_the_sum_of_these_parts_lie_on_the_curve(measured):
+    model, ran = summary.saving(measured), summary.measured_ratios(measured)
+    assert list(ran.index) == ["riccati", "fatrop", "ipopt"]
+    assert ran.ratio.to_numpy() == pytest.approx(model.ratio(ran.solve.to_numpy()))
+
+
+def test_what_was_not_measured_is_unknown(measured):
+    measured["parallel"] = {"workers": [], "seconds": [], "runs": [], "episodes": []}
+    measured["rival"] = {"learner": [], "seconds": []}
+    measured["first"] = {name: column[1:] for name, column in measured["first"].items()}
+    assert np.isnan(summary.speed_up(measured)[1])
+    assert np.isnan(summary.rival(measured)).all()
+    assert np.isnan(summary.first_call(measured, cached=False)[0])
+    unknown = [what for what, reached in outcomes(measured).items() if reached is None]
+    assert len(unknown) == 3
+    assert not missed(measured)
+
+
+def test_every_figure_can_be_reached(measured):
+    assert len(outcomes(measured)) == 16
+    assert all(outcomes(measured).values())
+
+
+@pytest.mark.parametrize(
+    ("part", "column", "value", "count"),
+    [
+        ("loop", "seconds", 46e-6, 2),
+        ("runs", "seconds", 23.0, 4),
+        ("parallel", "seconds", 10.0, 1),
+        ("rival", "seconds", 1e-3, 1),
+        ("first", "notice", False, 1),
+        ("first", "solve", 41.0, 2),
+        ("episodes", "memory", 700_000_000, 1),
+        ("solves", "seconds", 1e-3, 3),
+    ],
+)
+def test_every_figure_can_be_missed(measured, part, column, value, count):
+    measured[part][column] = [value] * len(measured[part][column])
+    assert len(missed(measured)) == count
+
+
+def test_a_run_that_had_to_share_the_processor_says_so(measured):
+    measured["runs"]["processor"][0] = 3.0
+    (told,) = [t.measured for t in targets.targets(measured) if "the processor" in t.measured]
+    assert told == "4.0 s, the processor 75% of it"
+
+
+def test_the_card_has_a_row_and_a_badge_for_every_figure(measured):
+    measured["loop"]["seconds"] = [1e-3] * 10
+    html = cards.target_table(targets.targets(measured), "some machine")
+    assert html.count("<tr>") == 1 + 16
+    assert html.count(">missed<") == 2
+    assert html.count(">reached<") == 14
+
+
+def test_the_printed_table_has_the_same_rows(measured):
+    header, *rows = targets.rows(measured)
+    assert header == ("what", "to reach", "measured", "outcome")
+    assert [row[0] for row in rows] == list(outcomes(measured))

@@ -1,0 +1,90 @@
+"""Figures of the benchmark: titles follow from the numbers, whichever way they fall."""
+
+import matplotlib.pyplot as plt
+import pytest
+
+from nmpcrl.study.figures import performance
+
+DRAWN = (
+    performance.solve_times,
+    performance.learning_steps,
+    performance.whole_runs,
+    performance.growth,
+    performance.saving,
+)
+
+
+def slower(measured, factor):
+    """The benchmark on which every solve of a learner takes `factor` times as long."""
+    table = measured["learners"]
+    for i, solves in enumerate(table["solves"]):
+        table["ms_per_step"][i] += (factor - 1) * solves * table["ms_per_solve"][i]
+        table["ms_per_solve"][i] *= factor
+    return measured
+
+
+@pytest.mark.parametrize("draw", DRAWN)
+def test_every_figure_has_a_finding_and_axes_with_units(measured, draw):
+    figure = draw(measured)
+    assert figure.get_suptitle()
+    named = [axis.get_xlabel() + axis.get_ylabel() for axis in figure.axes]
+    assert any("[" in name or "ms" in name or "step of" in name for name in named)
+    plt.close(figure)
+
+
+def test_the_fastest_and_the_slowest_solver_are_named(measured):
+    title = performance.solve_times(measured).get_suptitle()
+    assert title == "riccati is fastest; rebuilt each time, a solve takes 1000 times as long"
+    solves = measured["solves"]
+    solves["seconds"] = [
+        1e-6 if solver == "fatrop" else seconds
+        for solver, seconds in zip(solves["solver"], solves["seconds"], strict=True)
+    ]
+    assert performance.solve_times(measured).get_suptitle().startswith("fatrop is fastest")
+
+
+def test_the_network_s_share_is_told_for_the_fastest_and_the_slowest_solver(measured):
+    title = performance.learning_steps(measured).get_suptitle()
+    assert title == "Of a step of RDES the network takes 77% with riccati and 9% with Ipopt, SX"
+
+
+def test_a_step_s_bar_is_the_sum_of_its_parts(measured):
+    panel = performance.learning_steps(measured).axes[0]
+    ends = [bar.get_x() + bar.get_width() for bar in panel.patches[-4:]]
+    assert ends == pytest.approx(measured["learners"]["ms_per_step"][:4])
+
+
+def test_what_one_more_costs_is_told(measured):
+    title = performance.growth(measured).get_suptitle()
+    assert "0.50 to 0.50 µs a stage" in title
+    assert "0.25 to 0.25 µs an obstacle" in title
+
+
+def test_runs_and_workers_are_told(measured):
+    title = performance.whole_runs(measured).get_suptitle()
+    assert title == "ES takes 4.0 s and RDES 16.0 s; 2 workers are 1.90 times as fast as one"
+
+
+def test_workers_that_were_not_measured_are_not_told(measured):
+    measured["parallel"] = {name: [] for name in measured["parallel"]}
+    figure = performance.whole_runs(measured)
+    assert figure.get_suptitle() == "ES takes 4.0 s and RDES 16.0 s"
+    assert "not measured" in [text.get_text() for text in figure.axes[2].texts]
+
+
+def test_with_a_fast_solver_the_network_costs_more_than_it_saves(measured):
+    title = performance.saving(measured).get_suptitle()
+    assert (
+        title == "With riccati, RDES takes 2.60 times as long as ES; the break-even is at 0.20 ms"
+    )
+
+
+def test_with_slow_solvers_it_saves_time(measured):
+    title = performance.saving(slower(measured, 100)).get_suptitle()
+    assert title.startswith("RDES saves time with every solver: with riccati, RDES takes 0.5")
+
+
+def test_every_solver_and_the_paper_have_a_point(measured):
+    axes = performance.saving(measured).axes[0]
+    names = {text.get_text() for text in axes.texts}
+    assert {*performance.NAMES.values(), "the paper"} <= names
