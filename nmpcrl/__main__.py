@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from nmpcrl import __version__
 from nmpcrl.study import DamagedRecords, Experiment, ParameterError, Records, fetch, metrics, paper
-from nmpcrl.study.experiment import DECAYS, LEARNERS
+from nmpcrl.study.experiment import DECAYS, LEARNERS, SOLVERS
 from nmpcrl.study.store import folder, path_of, stored
 
 HELP = {"help_option_names": ["-h", "--help"]}
@@ -33,6 +33,7 @@ def main() -> None:
 )
 @click.option("--alpha", default=paper.ALPHA, show_default=True, help="Step size of theta.")
 @click.option("--beta", default=paper.BETA, show_default=True, help="Step size of w.")
+@click.option("--solver", default=SOLVERS[0], show_default=True, help="Or fatrop, or ipopt.")
 @click.option("--literal", is_flag=True, help="Algorithm 1 literally: do not wait for the network.")
 def train(literal: bool, **fields: Any) -> None:
     """Train one run and store it; a stored one is read."""
@@ -107,7 +108,8 @@ def bench(length: str, again: bool) -> None:
     for row in rows:
         click.echo(" | ".join(map(str.ljust, row, widths)))
     about = measured["about"]
-    click.echo(f"{measure.path()}: {about['length']}, {about['date']}, {about['seconds']:.0f} s")
+    took = f"{about['length']}, {about['date']}, {about['seconds']:.0f} s"
+    click.echo(f"{measure.path()}: {took}; other programs had {about['others']:.0%} of the cores")
 
 
 def _verdict(records: Records) -> str:

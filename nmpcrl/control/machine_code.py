@@ -148,7 +148,10 @@ def _prepared(package: str, texts: Mapping[str, str]) -> Path:
     """The package's folder, its text written whole; a temporary one where no other can be."""
     place = folder() / package
     if place.exists():
-        return place
+        if all(_says(place / f"{module}.py", text) for module, text in texts.items()):
+            return place
+        print(f"{place} is damaged and is compiled again", file=sys.stderr)
+        shutil.rmtree(place)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         drafted = Path(tempfile.mkdtemp(dir=place.parent, prefix=".draft"))
@@ -166,6 +169,10 @@ def _prepared(package: str, texts: Mapping[str, str]) -> Path:
         except OSError:  # another process was faster
             shutil.rmtree(drafted)
     return place
+
+
+def _says(path: Path, text: str) -> bool:
+    return path.is_file() and path.read_bytes() == text.encode()
 
 
 def _import(package: str, place: Path) -> ModuleType:

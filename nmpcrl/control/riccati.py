@@ -63,6 +63,7 @@ BOX_WEIGHT = 1e4  # W of the box: an exact penalty, so that no state is infeasib
 KAPPA = 100.0  # mu falls when KKT with mu is violated by less than so many mu
 ARMIJO = 1e-4
 ROUNDING = 1e-14  # of the barrier function, relative
+ALMOST = 1.0 - 4e-16  # of W is the most for lam, or W - lam is rounded to 0
 SHORTEST = 1e-10  # step that the search tries
 LARGEST_DELTA = 1e12
 TIE = 1e-6  # a start this close to an obstacle's boundary is on it, not in it  # departure L
@@ -271,6 +272,8 @@ def row_residuals(lam, weights, sigma, slack, mu):
     total = 0.0
     for t in range(lam.size):
         low, high = lam[t] * slack[t] - mu, (weights[t] - lam[t]) * sigma[t] - mu
+        if lam[t] >= ALMOST * weights[t]:
+            high = 0.0
         total += low * low + high * high
     return total
 
@@ -526,7 +529,7 @@ def search(task, point, trial, mu, step, length, total, slope):
 
 
 @inlined
-def advance(duals, step, length):
+def advance(task, duals, step, length):
     """Move the multipliers along the step."""
     for i in range(len(duals.below)):
         for a in range(NU):
@@ -534,7 +537,8 @@ def advance(duals, step, length):
             duals.above[i, a] += length * step.above[i, a]
     for i in range(len(duals.lam)):
         for j in range(duals.lam.shape[1]):
-            duals.lam[i, j] += length * step.lam[i, j]
+            most = ALMOST * task.weights[i, j]
+            duals.lam[i, j] = min(duals.lam[i, j] + length * step.lam[i, j], most)
 
 
 @inlined
@@ -620,7 +624,7 @@ def recentre(task, point, duals, mu):
                 duals.below[i, a] = mu / (point.u[i, a] - task.lower[a])
                 duals.above[i, a] = mu / (task.upper[a] - point.u[i, a])
         for j in range(duals.lam.shape[1]):
-            duals.lam[i, j] = mu / point.slack[i, j]
+            duals.lam[i, j] = min(mu / point.slack[i, j], ALMOST * task.weights[i, j])
 
 
 @inlined
@@ -631,7 +635,7 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
         linearise(task, point, duals, stages)
         slopes, products, largest = residuals(task, point, duals, stages, mu)
         error = max(slopes / largest, products, mu)
-        if not error < np.inf:
+        if not slopes + products < np.inf:  # `max` may lose a nan
             ended = BROKEN
             break
         goal = tolerance * min(1.0, max(abs(objective), 1e-4 * largest))
@@ -662,7 +666,7 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
         if reached == reached:
             point, trial, centred = trial, point, False
             objective, total = reached, reached_total
-            advance(duals, step, dual)
+            advance(task, duals, step, dual)
         elif centred:
             ended = SOLVED if error <= tolerance else STALLED
             break

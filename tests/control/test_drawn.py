@@ -6,14 +6,13 @@ problem is written with CasADi: its KKT conditions, and an Ipopt that solves it 
 
 import json
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nmpcrl.control import Nmpc, Obstacle, Plant, Solution, SolverError, Task, differential_drive
@@ -184,8 +183,10 @@ def residual(solution: Solution) -> float:
     _, g, slope, _ = (part.full().ravel() for part in parts)
     equality = solution.ocp.equality
     excess, multiplier, of_box = sides(solution)
-    inside = np.where(multiplier > 0, multiplier * np.minimum(excess, 0), 0)
-    outside = np.where(of_box & (excess > 0), (weight - multiplier) * excess, 0)
+    multiplier[solution.ocp.slacks[0]] = 0  # nothing is planned about them  # departure L
+    with np.errstate(invalid="ignore"):  # infinite bounds
+        inside = np.where(multiplier > 0, multiplier * np.minimum(excess, 0), 0)
+        outside = np.where(of_box & (excess > 0), (weight - multiplier) * excess, 0)
     length = np.abs(solution.states).max(initial=1)
     violations = (
         (slope + nu) / max(scale, np.abs(lam).max(), np.abs(nu).max()),
@@ -204,3 +205,319 @@ def beyond(solution: Solution) -> np.ndarray:
     """How far the predicted states leave the box."""
     excess, _, of_box = sides(solution)
     return np.maximum(excess[of_box], 0)
+
+
+@cache
+def penalised(ocp: Ocp) -> tuple[ca.Function, dict[str, np.ndarray]]:
+    """Ipopt on Eq. (2) with the box as a penalty, and its bounds; the last parameter is W."""
+    box = np.zeros(ocp.lower.size, bool)
+    box[ocp.states[1:]] = True
+    z, weight = ocp.variables, ca.SX.sym("weight")
+    over = [(-1, a, ocp.lower[a]) for a in np.flatnonzero(box & np.isfinite(ocp.lower))]
+    over += [(1, a, ocp.upper[a]) for a in np.flatnonzero(box & np.isfinite(ocp.upper))]
+    t = ca.SX.sym("t", len(over))
+    left = [sign * (z[int(a)] - limit) - t[i] for i, (sign, a, limit) in enumerate(over)]
+    nlp = {
+        "x": ca.vertcat(z, t),
+        "p": ca.vertcat(ocp.parameters, weight),
+        "f": ocp.objective + weight * ca.sum1(t),
+        "g": ca.vertcat(ocp.constraints, *left),
+    }
+    exact = {"print_level": 0, "sb": "yes", "tol": 1e-10, "max_iter": 1000}
+    exact |= {"max_wall_time": 10.0, "bound_relax_factor": 0.0, "acceptable_iter": 0}
+    bounds = {
+        "lbx": np.append(np.where(box, -np.inf, ocp.lower), np.zeros(len(over))),
+        "ubx": np.append(np.where(box, np.inf, ocp.upper), np.full(len(over), np.inf)),
+        "lbg": np.append(np.where(ocp.equality, 0, -np.inf), np.full(len(over), -np.inf)),
+        "ubg": np.zeros(ocp.equality.size + len(over)),
+    }
+    return ca.nlpsol("penalised", "ipopt", nlp, {"print_time": False, "ipopt": exact}), bounds
+
+
+def total(solution: Solution) -> float:
+    """The value and what the box charges."""
+    return solution.value + box_weight(solution) * beyond(solution).sum()
+
+
+def ipopts(solution: Solution) -> tuple[float, np.ndarray] | None:
+    """Ipopt's `total` and states for the same problem, from standing still; None if it fails."""
+    ocp = solution.ocp
+    solver, bounds = penalised(ocp)
+    z = np.zeros(ocp.lower.size)
+    z[ocp.states] = solution.state
+    weight = box_weight(solution) if solution.violation > 1e-6 else 1e4 * unit(solution.theta)
+    start = np.append(z, np.zeros(bounds["lbx"].size - z.size))
+    found = solver(x0=start, p=np.append(parameters(solution), weight), **bounds)
+    if not solver.stats()["success"]:
+        return None
+    return float(found["f"]), found["x"].full().ravel()[ocp.states]
+
+
+def judged(nmpc: Nmpc, solution: Solution) -> None:
+    """Everything that holds for whatever is called solved."""
+    plant = nmpc.plant
+    assert np.isfinite([solution.value, solution.violation]).all()
+    assert np.isfinite(solution.point).all()
+    assert np.isfinite(solution.features).all()
+    assert (plant.lower <= solution.inputs).all()
+    assert (solution.inputs <= plant.upper).all()
+    assert solution.violation == pytest.approx(beyond(solution).max(initial=0), abs=1e-9)
+    assert residual(solution) <= KKT
+    arguments = solution.primal, parameters(solution), solution.constraint_duals
+    value, _, _, features = conditions(solution.ocp)(*arguments)
+    assert solution.value == pytest.approx(float(value), rel=1e-9, abs=1e-12)
+    scale = np.abs(features.full()).max(initial=1)
+    np.testing.assert_allclose(solution.features, features.full().ravel(), atol=1e-9 * scale)
+
+
+# Two thousand problems
+
+
+@pytest.fixture(scope="module")
+def mass(point_mass) -> Plant:
+    """Another plant: linear, with four states."""
+    return point_mass(bound=2.0)
+
+
+@pytest.mark.parametrize(("name", "layouts", "failures"), [("robot", 44, 8), ("mass", 12, 3)])
+def test_of_thousands_of_problems_nearly_all_are_solved_and_none_wrongly(
+    name, layouts, failures, mass
+):
+    """2,200 of the robot and 600 of the mass; about one in a thousand is given up, and says so."""
+    ended = {"failed": 0, "restarted": 0}
+    for layout in range(layouts):
+        rng = np.random.default_rng([1, layout])
+        nmpc = controller(rng, ROBOT if name == "robot" else mass)
+        for _ in range(50):
+            problem = drawn(rng, nmpc)
+            try:
+                solution = problem.solve(nmpc)
+            except SolverError:
+                ended["failed"] += 1
+                continue
+            judged(nmpc, solution)
+            ended["restarted"] += solution.status == "restarted"
+    assert ended["failed"] <= failures
+    assert ended["restarted"] <= 12
+
+
+def test_values_are_ipopts_or_those_of_another_minimum():
+    """Compared with a problem that tolerates the box being left; at most 3 % are worse."""
+    compared, elsewhere, worse = 0, 0, 0
+    for layout in range(24):
+        rng = np.random.default_rng([2, layout])
+        nmpc = controller(rng, longest=10)
+        for _ in range(10):
+            problem = drawn(rng, nmpc)
+            solution = problem.solve(nmpc)
+            found = ipopts(solution)
+            if found is None:
+                continue
+            compared += 1
+            value, states = found
+            allowed = 1e-6 * abs(value) + 1e-7 * unit(problem.theta)
+            if abs(total(solution) - value) <= allowed:
+                continue
+            elsewhere += 1
+            if total(solution) > value:
+                worse += 1
+                assert np.abs(solution.states - states).max() > 1e-2  # elsewhere, not inexact
+    assert compared >= 200
+    assert elsewhere <= 0.15 * compared  # mostly better ones
+    assert worse <= 0.03 * compared
+
+
+def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
+    same = 0
+    for state, theta in draw(100, seed=40):
+        solution = controllers["riccati"].solve(state, theta)
+        assert solution.violation <= 1e-6
+        ipopt = controllers["ipopt"].solve(state, theta)
+        if solution.value != pytest.approx(ipopt.value, rel=1e-6):
+            assert np.abs(solution.states - ipopt.states).max() > 1e-2
+            continue
+        same += 1
+        scale = np.abs(ipopt.features).max()
+        np.testing.assert_allclose(solution.features, ipopt.features, atol=1e-5 * scale)
+    assert same >= 92
+
+
+def test_from_the_same_guess_no_more_than_one_in_two_hundred_is_worse_than_ipopts():
+    """After a step, after a noisy one, and after a change of theta."""
+    compared, worse = 0, 0
+    for layout in range(24):
+        rng = np.random.default_rng([3, layout])
+        nmpc = controller(rng, longest=10)
+        ipopt = Nmpc(
+            nmpc.plant,
+            nmpc.task,
+            horizon=nmpc.horizon,
+            gamma=nmpc.gamma,
+            slack_weight=nmpc.slack_weight,
+            solver="ipopt",
+        )
+        for _ in range(8):
+            state, theta = drawn_state(rng, nmpc), drawn_theta(rng, nmpc)
+            guess = nmpc.solve(state, theta)
+            noisy = ROBOT.clip(guess.action + rng.normal(scale=0.3, size=2))
+            for after, weights in (
+                (ROBOT.step(state, guess.action), theta),
+                (ROBOT.step(state, noisy), theta),
+                (state, theta * rng.uniform(0.95, 1.05, 9)),
+            ):
+                try:
+                    other = ipopt.solve(after, weights, guess)
+                except SolverError:  # the state lies outside the box
+                    continue
+                value = nmpc.solve(after, weights, guess).value
+                compared += 1
+                worse += value > other.value * (1 + 1e-6) + 1e-7 * unit(weights)
+    assert compared >= 250
+    assert worse <= 0.005 * compared
+
+
+def test_features_are_the_differences_of_the_value_away_from_kinks():
+    """Along drawn directions; a solve that falls into another minimum shows in the curvature."""
+    compared, jumped, step = 0, 0, 1e-4
+    for layout in range(20):
+        rng = np.random.default_rng([4, layout])
+        nmpc = controller(rng, longest=10)
+        for _ in range(10):
+            problem = drawn(rng, nmpc)
+            excess = nmpc.task.overlap(problem.state) + problem.theta[-1]
+            if np.abs(excess).min(initial=1) < 1e-2:
+                continue
+            solution = problem.solve(nmpc)
+            if solution.violation > 1e-6:  # then the features are those of `total`
+                continue
+            along = rng.normal(size=9) * np.maximum(np.abs(problem.theta), 1e-2)
+            above, below = (
+                problem._replace(theta=problem.theta + d).solve(nmpc, solution).value
+                for d in (step * along, -step * along)
+            )
+            slope, size = (above - below) / (2 * step), abs(solution.features) @ abs(along)
+            bend = (above - 2 * solution.value + below) / step
+            if abs(bend) > 0.05 * size + 1e-6 * unit(problem.theta):
+                jumped += 1
+                continue
+            compared += 1
+            exact = solution.features @ along
+            assert slope == pytest.approx(exact, abs=1e-5 * size + 1e-5 * unit(problem.theta))
+    assert compared >= 100
+    assert jumped <= 6
+
+
+# Whatever hypothesis thinks of
+
+coordinate, weight = st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)
+problems = st.builds(
+    Problem,
+    state=st.tuples(coordinate, coordinate, st.floats(-100, 100)).map(np.array),
+    theta=st.tuples(*[weight] * 8, st.floats(-5, 5)).map(np.array),
+    action=st.none() | st.tuples(st.floats(-0.6, 0.6), st.floats(-1.5, 1.5)).map(np.array),
+)
+usual = st.builds(
+    Problem,
+    state=st.tuples(st.floats(-3, 9), st.floats(-3, 9), st.floats(-4, 4)).map(np.array),
+    theta=st.tuples(*[st.floats(0.1, 2)] * 8, st.floats(-0.3, 0.3)).map(np.array),
+    action=st.none(),
+)
+LAYOUTS = [controller(np.random.default_rng([5, layout])) for layout in range(30)]
+
+
+@settings(derandomize=True, deadline=None, max_examples=400)
+@given(problem=problems | usual, nmpc=st.sampled_from(LAYOUTS))
+def test_whatever_is_asked_the_answer_is_a_solution_or_an_error(problem, nmpc):
+    try:
+        solution = problem.solve(nmpc)
+    except SolverError:
+        return
+    judged(nmpc, solution)
+
+
+def mirrored(nmpc: Nmpc) -> Nmpc:
+    """The same world with y for -y."""
+    task, flip = nmpc.task, np.array([1.0, -1.0, -1.0])
+    lower, upper = np.sort([task.lower * flip, task.upper * flip], axis=0)
+    other = Task(
+        start=task.start * flip,
+        target=task.target * flip,
+        lower=lower,
+        upper=upper,
+        obstacles=tuple(Obstacle(one.x, -one.y, one.diameter) for one in task.obstacles),
+    )
+    return Nmpc(
+        nmpc.plant,
+        other,
+        horizon=nmpc.horizon,
+        gamma=nmpc.gamma,
+        slack_weight=nmpc.slack_weight,
+    )
+
+
+PAIRS = [(one, mirrored(one)) for one in LAYOUTS if one.horizon <= 10]
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(problem=usual, pair=st.sampled_from(PAIRS))
+def test_a_mirrored_world_has_mirrored_plans(problem, pair):
+    flip = np.array([1.0, -1.0, -1.0])
+    one = problem.solve(pair[0])
+    other = problem._replace(state=problem.state * flip).solve(pair[1])
+    assert other.value == pytest.approx(one.value, rel=1e-6, abs=1e-7)
+    np.testing.assert_allclose(other.states[-1] * flip, one.states[-1], atol=1e-2)
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(problem=usual, nmpc=st.sampled_from(LAYOUTS))
+def test_solving_again_from_the_solution_costs_an_iteration_or_two(problem, nmpc):
+    try:
+        solution = problem.solve(nmpc)
+    except SolverError:
+        return
+    again = problem.solve(nmpc, solution)
+    assert again.iterations <= 4
+    assert again.value == pytest.approx(solution.value, rel=1e-6, abs=1e-7)
+
+
+# The hardest that were found
+
+
+def remembered(case: dict, mass: Plant) -> tuple[Nmpc, Problem]:
+    lower, upper = (
+        np.array([sign * np.inf if v is None else v for v in case[side]])
+        for side, sign in (("lower", -1), ("upper", 1))
+    )
+    task = Task(
+        start=np.array(case["target"]),
+        target=np.array(case["target"]),
+        lower=lower,
+        upper=upper,
+        obstacles=tuple(Obstacle(*disc) for disc in case["obstacles"]),
+        weights=np.ones(lower.size),
+    )
+    nmpc = Nmpc(
+        ROBOT if lower.size == 3 else mass,
+        task,
+        horizon=case["horizon"],
+        gamma=case["gamma"],
+        slack_weight=case["slack_weight"],
+    )
+    action = None if case["action"] is None else np.array(case["action"])
+    return nmpc, Problem(np.array(case["state"]), np.array(case["theta"]), action)
+
+
+@pytest.mark.parametrize("case", HARDEST, ids=lambda case: case["why"])
+def test_the_hardest_problems_stay_solved(case, mass):
+    """Values of an earlier solve, checked against Ipopt; a better minimum is welcome."""
+    nmpc, problem = remembered(case, mass)
+    try:
+        solution = problem.solve(nmpc)
+    except SolverError:
+        assert case["value"] is None  # known to be given up, at least on some machines
+        return
+    judged(nmpc, solution)
+    assert solution.violation <= case["violation"] + 1e-6
+    if case["value"] is not None:
+        allowed = 1e-6 * abs(case["value"]) + 1e-9 * unit(problem.theta)
+        assert total(solution) <= case["value"] + allowed

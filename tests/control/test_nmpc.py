@@ -219,7 +219,7 @@ def test_lists_of_numbers_will_do(robot):
         ({"gamma": np.nan}, "gamma = nan must lie in"),
         ({"slack_weight": 0.0}, "slack_weight = 0.0 must be a positive number"),
         ({"slack_weight": np.inf}, "slack_weight = inf must be a positive number"),
-        ({"solver": "acados"}, "solver = 'acados' must be one of fatrop, ipopt"),
+        ({"solver": "acados"}, "solver = 'acados' must be one of riccati, fatrop, ipopt"),
     ],
 )
 def test_a_controller_refuses_nonsense_and_says_which(changed, message):

@@ -14,6 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+import psutil
 from tqdm import tqdm
 
 from nmpcrl.study import paper, store
@@ -141,6 +142,7 @@ def measure(length: str, *, progress: bool = True) -> Bench:
         "length": length,
         "key": key(),
         "date": datetime.now(UTC).date().isoformat(),
+        "others": psutil.cpu_percent(1.0) / 100,  # share of the cores that is in use already
         "machine": machine(),
         "versions": versions(),
     }

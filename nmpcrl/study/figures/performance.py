@@ -144,19 +144,19 @@ def growth(bench: Bench) -> Figure:
     """An iteration against the number of stages and of obstacles, with a straight line."""
     figure, axes = subplots(1, 2, 3.0, sharey=True)
     found = []
-    kinds = (("horizon", "a stage"), ("obstacles", "an obstacle"))
-    for panel, (varied, part) in zip(axes, kinds, strict=True):
+    kinds = (("horizon", "stages"), ("obstacles", "obstacles"))
+    for panel, (varied, parts) in zip(axes, kinds, strict=True):
         times = summary.growth(bench, varied).iteration
         slope, fixed = np.polyfit(times.index, times, 1, w=1 / times)
         ends = np.array([0, times.index[-1]])
         panel.plot(ends, fixed + slope * ends, color="0.6", linestyle="--", label="straight line")
         panel.plot(times.index, times, "o", color=INK, label="measured")
-        panel.set(xlabel=f"{part.split()[1]}s", xlim=(0, None), ylim=(0, None))
+        panel.set(xlabel=parts, xlim=(0, None), ylim=(0, None))
         low, high = summary.marginal(bench, varied)
-        found.append(f"{low:.2f} to {high:.2f} µs {part}")
+        found.append(f"{low:.2f} to {high:.2f} µs")
     axes[0].set_ylabel("time of an iteration [µs]")
     axes[0].legend(loc="upper left")
-    return headed(figure, f"An iteration takes {' and '.join(found)} more")
+    return headed(figure, f"A stage adds {found[0]} to an iteration, an obstacle {found[1]}")
 
 
 @page

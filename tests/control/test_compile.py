@@ -1,0 +1,150 @@
+"""What numba makes of CasADi's expressions equals CasADi, for every operation and every layout."""
+
+import inspect
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from nmpcrl.control import differential_drive, model
+from nmpcrl.control.compile import BINARY, UNARY, CannotCompile, source
+from nmpcrl.control.machine_code import callable_of, compiled, load
+from nmpcrl.control.stages import functions, write
+
+SPECIAL = [
+    0.0,
+    1.0,
+    -1.0,
+    0.5,
+    -0.5,
+    2.0,
+    -3.5,
+    7.0,
+    1e-300,
+    1e19,
+    -1e19,
+    1e300,
+    np.inf,
+    -np.inf,
+    np.nan,
+]
+NUMBERS = np.concatenate([SPECIAL, np.random.default_rng(0).normal(scale=3, size=25)])
+NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
+x, y = ca.SX.sym("x"), ca.SX.sym("y")
+
+
+def same(found, exact):
+    np.testing.assert_allclose(found, exact, rtol=2e-15, atol=0)  # nan equals nan
+
+
+@pytest.fixture(scope="module")
+def unary():
+    """All unary operations of one number, by CasADi and by numba."""
+    results = ca.vertcat(*(ca.SX.unary(operation, x) for operation in UNARY))
+    function = ca.Function("unary", [x], [results], ["x"], ["all"])
+    return function, callable_of(function)
+
+
+@pytest.fixture(scope="module")
+def binary():
+    """All binary operations of two numbers, by CasADi and by numba."""
+    results = ca.vertcat(*(ca.SX.binary(operation, x, y) for operation in BINARY))
+    function = ca.Function("binary", [x, y], [results], ["x", "y"], ["all"])
+    return function, callable_of(function)
+
+
+@pytest.mark.parametrize("index", range(len(UNARY)), ids=[NAMES[k] for k in UNARY])
+def test_an_operation_of_one_number_is_casadis(unary, index):
+    casadi, code = unary
+    for number in NUMBERS:
+        same(code([number])[index], casadi(number).full()[index, 0])
+
+
+@pytest.mark.parametrize("index", range(len(BINARY)), ids=[NAMES[k] for k in BINARY])
+def test_an_operation_of_two_numbers_is_casadis(binary, index):
+    casadi, code = binary
+    for one in NUMBERS[::2]:
+        for other in NUMBERS:
+            same(code([one], [other])[index], casadi(one, other).full()[index, 0])
+
+
+def test_an_operation_that_is_not_known_is_named():
+    unknown = ca.Function("f", [x], [ca.erfinv(x)], ["x"], ["r"])
+    with pytest.raises(CannotCompile, match="f holds CasADi's OP_ERFINV, which is not known here"):
+        source(unknown)
+
+
+def test_a_function_that_is_no_expression_of_scalars_is_refused():
+    z = ca.MX.sym("z", 2)
+    with pytest.raises(CannotCompile, match="g is not an SX function"):
+        source(ca.Function("g", [z], [2 * z], ["z"], ["r"]))
+
+
+def test_matrices_vectors_scalars_and_zeros_are_laid_out_right():
+    a, b = ca.SX.sym("a", 3), ca.SX.sym("b", 2, 3)
+    results = {
+        "matrix": b @ ca.diag(a),
+        "vector": b @ a,
+        "scalar": ca.dot(a, a),
+        "sparse": ca.diag(a),
+        "zeros": ca.SX(2, 2),
+        "constant": ca.SX([1.5, -np.inf, 3]),
+    }
+    function = ca.Function("layout", [a, b], [*results.values()], ["a", "b"], [*results])
+    rng = np.random.default_rng(1)
+    one, other = rng.normal(size=3), rng.normal(size=(2, 3))
+    shapes = [r.shape if r.shape[1] > 1 else (r.shape[0],) for r in results.values()]
+    out = [np.full(shape, np.nan) for shape in shapes]
+    compiled(function)(one, other, *out)
+    for found, exact in zip(out, function(one, other), strict=True):
+        same(found, exact.full().reshape(found.shape))
+
+
+def test_one_scalar_is_returned():
+    function = ca.Function("product", [x, y], [x * y], ["x", "y"], ["r"])
+    assert compiled(function)(np.array([3.0]), np.array([4.0])) == 12.0
+    assert callable_of(function)([3], [4]) == 12.0
+
+
+def test_the_entries_of_a_sparse_argument_are_found():
+    lower = ca.SX.sym("z", ca.Sparsity.lower(2))
+    function = ca.Function("corner", [lower], [2 * lower[1, 1]], ["z"], ["r"])
+    assert compiled(function)(np.array([[1.0, 0.0], [3.0, 4.0]])) == 8.0
+
+
+PLANTS = ["robot", "mass"]
+
+
+@pytest.fixture
+def plant(request, point_mass):
+    """Each plant in turn."""
+    return differential_drive() if request.param == "robot" else point_mass()
+
+
+@pytest.mark.parametrize("plant", PLANTS, indirect=True)
+def test_the_stages_have_the_arguments_that_model_promises(plant):
+    for function in functions(plant):
+        promised = [*inspect.signature(getattr(model, function.name())).parameters]
+        header = source(function).splitlines()[0]
+        assert header == f"def {function.name()}({', '.join(promised)}):"
+    promised = {name for name, _ in inspect.getmembers(model, inspect.isfunction)}
+    assert {function.name() for function in functions(plant)} == promised
+
+
+@pytest.mark.parametrize("plant", PLANTS, indirect=True)
+def test_the_compiled_stages_are_casadis(plant):
+    texts = {"__init__": "", "model": write(plant).replace("forceinline=True", "cache=True")}
+    package = load("stages", {"__init__": "from . import model\n", "model": texts["model"]})
+    module, rng = package.model, np.random.default_rng(2)
+    assert (plant.n, plant.m, 2 * plant.n + plant.m + 1) == (module.NX, module.NU, module.NTHETA)
+    for function in functions(plant):
+        arguments = [rng.normal(size=function.size1_in(i)) for i in range(function.n_in())]
+        exact = [r.full() for r in function.call([ca.DM(a) for a in arguments])]
+        code = getattr(module, function.name())
+        if function.n_out() == 1 and function.size_out(0) == (1, 1):
+            assert code(*arguments) == pytest.approx(exact[0].item(), rel=1e-14)
+            continue
+        out = [np.full(r.shape if r.shape[1] > 1 else r.shape[:1], np.nan) for r in exact]
+        code(*arguments, *out)
+        for found, right in zip(out, exact, strict=True):
+            np.testing.assert_allclose(found, right.reshape(found.shape), rtol=1e-13, atol=1e-14)

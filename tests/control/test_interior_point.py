@@ -1,0 +1,135 @@
+"""riccati: the box as a penalty, second tries, how it gives up, and what replaces it."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.special import erfinv
+
+from nmpcrl.control import Nmpc, Plant, SolverError, Task, interior_point, machine_code
+from nmpcrl.study import paper
+
+THETA = np.array(paper.THETA_INIT)
+START = np.array(paper.START)
+WARNING = "fatrop solves instead of riccati"
+
+
+@pytest.fixture
+def riccati(controllers) -> Nmpc:
+    """The paper's controller with the solver of this package."""
+    return controllers["riccati"]
+
+
+@pytest.mark.parametrize(
+    "state", [(-3.05, 2.0, 0.0), (9.0, 9.4, 1.0), (50.0, 1.0, 0.0), (1e3, -1e3, 9)]
+)
+def test_from_outside_there_is_a_plan_that_says_how_far_it_leaves_the_box(riccati, state):
+    solution = riccati.solve(np.array(state), THETA)
+    later, task = solution.states[1:], riccati.task
+    excess = np.maximum(later - task.upper, task.lower - later).max()
+    assert solution.violation == pytest.approx(max(0, excess), abs=1e-9)
+    reach = 0.6 * riccati.plant.period  # of one step
+    outside = np.maximum(solution.states - task.upper, task.lower - solution.states).max()
+    assert solution.violation >= outside - reach - 1e-9
+    assert (np.abs(solution.inputs) <= riccati.plant.upper).all()
+
+
+def test_from_far_outside_the_plan_drives_towards_the_box_as_fast_as_it_can(riccati):
+    solution = riccati.solve(np.array([50.0, 1.0, np.pi]), THETA)
+    np.testing.assert_allclose(np.diff(solution.states[:, 0]), -0.12, atol=1e-4)
+
+
+def test_inside_nothing_is_violated_whatever_a_slack_costs(riccati):
+    """The box outweighs the obstacles even where these are dear."""
+    task = paper.task()
+    for omega in (1.0, 100.0, 1e4):
+        nmpc = Nmpc(riccati.plant, task, slack_weight=omega)
+        for obstacle in task.obstacles:
+            state = np.array([obstacle.x, -2.99, -np.pi / 2])
+            assert nmpc.solve(state, THETA).violation <= 1e-6
+
+
+def test_a_guess_that_is_no_use_is_followed_by_a_cold_start(riccati, monkeypatch):
+    other = THETA * np.linspace(0.5, 2, 9)
+    guess, cold = riccati.solve(START, THETA), riccati.solve(START + 0.1, other)
+    assert (cold.restarts, cold.status) == (0, "solved")
+    monkeypatch.setattr(interior_point, "WARM_LIMIT", 1)
+    shifted = riccati.solve(START + 0.1, other, guess)
+    assert (shifted.restarts, shifted.status) == (1, "restarted")
+    same = riccati.solve(START, other, guess)
+    assert (same.restarts, same.status) == (2, "restarted")
+    assert shifted.value == cold.value
+
+
+def test_a_guess_of_nans_does_no_harm(riccati):
+    guess, exact = riccati.solve(START, THETA), riccati.solve(START, THETA)
+    guess.point[:] = np.nan
+    for state in (START, START + 1e-3):
+        solution = riccati.solve(state, THETA, guess)
+        assert np.isfinite(solution.point).all()
+        assert solution.value == pytest.approx(exact.value, rel=1e-2)
+
+
+def test_when_it_gives_up_it_says_what_it_tried(riccati, monkeypatch):
+    monkeypatch.setattr(interior_point, "COLD_LIMIT", 1)
+    with pytest.raises(SolverError) as caught:
+        riccati.solve(START, THETA)
+    assert caught.value.status.startswith(
+        "riccati found no optimum from 5 starts (the last ran out of iterations after 1 iteration"
+    )
+    assert "with a relative error of" in caught.value.status
+    assert "in state [-2.5  1.5  0. ] with theta [1." in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def strange() -> Plant:
+    """A plant that cannot be compiled: its dynamics hold an operation that `compile` lacks."""
+    return Plant(
+        dynamics=lambda state, action: ca.erfinv(action),
+        state_names=("x", "y"),
+        action_names=("u", "v"),
+        lower=[-0.9, -0.9],
+        upper=[0.9, 0.9],
+    )
+
+
+def field() -> Task:
+    """Nothing but a target."""
+    two = np.array([1.0, 1.0])
+    return Task(0 * two, two, -9 * two, 9 * two, (), weights=two)
+
+
+def warned(caught) -> list[str]:
+    return [str(one.message) for one in caught if WARNING in str(one.message)]
+
+
+@pytest.mark.parametrize("reason", ["no numba", "the plant"])
+def test_where_nothing_can_be_compiled_fatrop_solves_and_says_so_once(monkeypatch, recwarn, reason):
+    if reason == "no numba":
+        monkeypatch.setattr(machine_code, "numba_version", lambda: None)
+        nmpc, state, theta, action = paper.nmpc(), START, THETA, np.array([0.3, 0.1])
+    else:
+        nmpc, state, action = Nmpc(strange(), field()), np.zeros(2), np.array([0.3, 0.1])
+        theta = np.array([1, 1, 0.1, 0.1, 1, 1, 0.0])
+    assert nmpc.kkt_residual(nmpc.solve(state, theta)) < 1e-4
+    assert nmpc.solve(state, theta, action=action).value > 0
+    nmpc.solve(state, theta)
+    said = warned(recwarn)
+    assert len(said) == 1
+    assert ("numba is not installed" if reason == "no numba" else "OP_ERFINV") in said[0]
+    assert nmpc.solver == "fatrop"
+
+
+@pytest.mark.parametrize("reason", ["no numba", "the plant"])
+def test_where_nothing_can_be_compiled_plant_and_task_compute_as_before(monkeypatch, reason):
+    if reason == "no numba":
+        compiled, task = paper.nmpc().plant.step(START, np.array([0.5, 0.3])), paper.task()
+        cost = task.stage_cost(START, np.array([0.5, 0.3]))
+        monkeypatch.setattr(machine_code, "numba_version", lambda: None)
+        again = paper.nmpc()
+        np.testing.assert_allclose(again.plant.step(START, np.array([0.5, 0.3])), compiled)
+        assert paper.task().stage_cost(START, np.array([0.5, 0.3])) == pytest.approx(cost)
+    else:
+        stepped = strange().step(np.array([1.0, 2.0]), np.array([0.5, -0.5]))
+        np.testing.assert_allclose(stepped, [1, 2] + 0.2 * erfinv([0.5, -0.5]))
+        assert isinstance(stepped, np.ndarray)
+        assert isinstance(field().stage_cost(np.zeros(2), np.zeros(2)), float)

@@ -1,0 +1,139 @@
+"""Machine code is compiled once, found again, and compiled again when something happened to it."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from nmpcrl.control import machine_code
+
+TEXT = """
+from numba import float64, njit
+
+@njit(float64(float64), cache=True)
+def double(x):
+    return 2.0 * x
+"""
+SCRIPT = f"""
+from nmpcrl.control.machine_code import load
+print(load("tiny", {{"__init__": {TEXT!r}}}, "Compiling ...").double(4.0))
+"""
+SOLVE = """
+import numpy as np
+from nmpcrl.study import paper
+print(round(paper.nmpc().solve(np.array(paper.START), np.array(paper.THETA_INIT)).value))
+"""
+
+
+def said(cache: Path | None, script: str = SCRIPT, answer: str = "8.0") -> list[str]:
+    """What another process that needs the code prints on standard error."""
+    chosen = {} if cache is None else {"NMPCRL_CACHE": str(cache)}
+    command = [sys.executable, "-c", script]
+    ended = subprocess.run(command, capture_output=True, text=True, env=os.environ | chosen)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.strip() == answer
+    return ended.stderr.splitlines()
+
+
+@pytest.fixture
+def full(tmp_path) -> Path:
+    """A cache in which the code is already."""
+    first = said(tmp_path)
+    assert len(first) == 1
+    assert first[0].startswith("Compiling ... done in ")
+    return tmp_path
+
+
+def test_a_second_process_does_not_compile(full):
+    assert said(full) == []
+
+
+def test_a_process_finds_the_solver_that_another_compiled(controllers):
+    controllers["riccati"].solve([-2.5, 1.5, 0.0], [1, 1, 0.05, 0.05, 0.05, 1, 1, 0.1, 0.001])
+    assert said(None, SOLVE, "1037") == []
+
+
+@pytest.mark.parametrize(
+    ("pattern", "damage"),
+    [
+        ("*.nbi", "emptied"),
+        ("*.nbi", "cut"),
+        ("*.nbc", "emptied"),
+        ("*.nbc", "cut"),
+        ("*.nbc", "garbled"),
+        ("__init__.py", "emptied"),
+        ("__init__.py", "garbled"),
+    ],
+)
+def test_a_damaged_file_is_noticed_and_compiled_again(full, pattern, damage):
+    (file,) = full.rglob(pattern)
+    content = file.read_bytes()
+    changed = {"emptied": b"", "cut": content[: len(content) // 2], "garbled": b"= " + content}
+    file.write_bytes(changed[damage])
+    lines = said(full)
+    assert len(lines) == 2
+    assert "is damaged" in lines[0]
+    assert lines[0].endswith("and is compiled again")
+    assert lines[1].startswith("Compiling ... done in ")
+    assert said(full) == []
+
+
+def test_an_interrupted_compilation_is_repeated(full):
+    (complete,) = full.rglob(machine_code.COMPLETE)
+    complete.unlink()
+    lines = said(full)
+    assert len(lines) == 1
+    assert lines[0].startswith("Compiling ... done in ")
+    assert said(full) == []
+
+
+def test_an_interruption_leaves_nothing_that_counts_as_complete(tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
+    text = TEXT + "\nraise KeyboardInterrupt\n"
+    with pytest.raises(KeyboardInterrupt):
+        machine_code.load("stopped", {"__init__": text})
+    assert not [*tmp_path.rglob(machine_code.COMPLETE)]
+    assert not [name for name in sys.modules if name.startswith("stopped_")]
+
+
+def test_where_nothing_can_be_written_the_code_is_compiled_for_now(tmp_path):
+    (tmp_path / "file").touch()
+    lines = said(tmp_path / "file" / "cache")
+    assert len(lines) == 2
+    assert "cannot be written" in lines[0]
+    assert lines[0].endswith("compiling for now only")
+
+
+def test_two_processes_at_once_do_not_disturb_each_other(tmp_path):
+    command, chosen = [sys.executable, "-c", SCRIPT], {"NMPCRL_CACHE": str(tmp_path)}
+    started = [
+        subprocess.Popen(command, env=os.environ | chosen, stdout=-1, stderr=-1) for _ in range(2)
+    ]
+    for process in started:
+        out, _ = process.communicate(timeout=60)
+        assert out.strip() == b"8.0"
+    assert said(tmp_path) == []
+
+
+def test_other_text_or_another_numba_is_other_code(tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
+    machine_code.load("tiny", {"__init__": "x = 1\n"})
+    machine_code.load("tiny", {"__init__": "x = 2\n"})
+    monkeypatch.setattr(machine_code, "numba_version", lambda: "0.1")
+    assert machine_code.load("tiny", {"__init__": "x = 1\n"}).x == 1
+    assert len([*tmp_path.iterdir()]) == 3
+
+
+@pytest.mark.parametrize(
+    "chosen", [{}, {"XDG_CACHE_HOME": "/somewhere"}, {"NMPCRL_CACHE": "/here"}]
+)
+def test_the_cache_is_where_the_user_wants_it(monkeypatch, chosen):
+    for name in ("NMPCRL_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in chosen.items():
+        monkeypatch.setenv(name, value)
+    places = {"XDG_CACHE_HOME": Path("/somewhere/nmpcrl"), "NMPCRL_CACHE": Path("/here")}
+    name = next(iter(chosen), None)
+    assert machine_code.folder() == places.get(name, Path.home() / ".cache/nmpcrl")
