@@ -37,7 +37,12 @@ class Multipliers:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """An optimum of Eq. (2) for one state and one theta."""
+    """An optimum of Eq. (2) for one state and one theta.
+
+    Where no plan can keep to the box, riccati returns the one that leaves it least: `violation`
+    says by how much, `value` is Eq. (2a) along it, and `features` is the gradient of that value
+    together with the penalty for leaving the box.
+    """
 
     state: Vector  # s, shape (n,)
     theta: Vector  # shape (2n + m + 1,)
