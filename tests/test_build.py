@@ -168,3 +168,11 @@ def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(sm
     assert "intro.md:3: WARNING" in result.stderr
     assert "ch:two" in result.stderr
     assert not (small / "_build/html").exists()
+
+
+def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
+    experiments, beforehand = build.ask(ROOT / "book/performance.ipynb", {"length": "smoke"})
+    assert not experiments
+    (call,) = beforehand
+    assert call.func.__name__ == "fetch"
+    assert call.args == ("smoke",)
