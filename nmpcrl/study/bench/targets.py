@@ -19,7 +19,7 @@ SPEED_UP = 1.8  # of two workers
 FIRST = {True: 1.0, False: 40.0}  # [s] with machine code kept from before, and without
 MEMORY = 600.0  # [MB]
 BUSY = 0.95  # share of its time that the processor works on a run, unless others want it, too
-FLAT = 0.1  # share by which memory may grow after a tenth of the episodes
+FLAT = 0.05  # share by which memory may grow after a tenth of the episodes
 
 
 @dataclass(frozen=True)
