@@ -45,20 +45,15 @@ from .model import (
     step,
 )
 
-COLD, SHIFTED, NEAR, SAME = 0, 1, 2, 3  # starts: from inputs alone, a stage later, as it is, ...
-SOLVED, STALLED, LIMIT, BROKEN = (
-    0,
-    1,
-    2,
-    3,
-)  # ends: ..., no descent, too many iterations, not finite
-START_MU = (10.0, 1e-3, 1e-3, 1e-9)  # of each start
-PUSH = (
-    1e-2,
-    1e-3,
-    1e-3,
-    1e-9,
-)  # how far inside its bounds an input starts, in parts of their distance
+# How a solve starts: from inputs alone; from a guess, a stage later; from a guess as it is; from a
+# guess in the same state, where only theta has moved.
+COLD, SHIFTED, NEAR, SAME = 0, 1, 2, 3
+START_MU = (10.0, 1e-3, 1e-3, 1e-9)
+PUSH = (1e-2, 1e-3, 1e-3, 1e-9)  # inside its bounds an input starts, in parts of their distance
+
+# How it ends: well; without descent; with too many iterations; with numbers that are not finite.
+SOLVED, STALLED, LIMIT, BROKEN = 0, 1, 2, 3
+
 BOX_WEIGHT = 1e4  # W of the box: an exact penalty, so that no state is infeasible
 KAPPA = 100.0  # mu falls when KKT with mu is violated by less than so many mu
 ARMIJO = 1e-4

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.study.figures.controller import INK, LESS, MORE
+from nmpcrl.study.figures.rdes import headed
 from nmpcrl.study.figures.style import page, subplots
 from nmpcrl.study.horizons import growth
 
@@ -68,13 +69,8 @@ def sparsity(by_kind: Matrix, by_stage: Matrix, folded: Matrix, step: int) -> Fi
     corner = len(folded) - step - 0.5
     look: dict[str, Any] = {"fill": False, "ec": MORE, "lw": 1.8, "zorder": 5, "clip_on": False}
     panels[2].add_patch(Rectangle((corner, corner), step, step, **look))
-    figure.suptitle(
-        f"Stage by stage, no entry is farther than {bandwidth(by_stage)} from the diagonal",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
-    )
-    return figure
+    far = bandwidth(by_stage)
+    return headed(figure, f"Stage by stage, no entry is farther than {far} from the diagonal")
 
 
 def bandwidth(matrix: Matrix) -> int:
@@ -132,9 +128,8 @@ def convergence(traces: Mapping[str, pd.DataFrame], tolerance: float) -> Figure:
     right.set(xlabel="iteration (no unit)", ylabel="relative (no unit)")
     right.set_title("Distance to the final value")
     counts = ", ".join(f"{name} {len(iterates) - 1}" for name, iterates in traces.items())
-    figure.suptitle(f"Iterations: {counts}", x=0.01, ha="left", fontweight="bold")
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return figure
+    return headed(figure, f"Iterations: {counts}")
 
 
 @page
@@ -152,15 +147,9 @@ def horizons(timings: pd.DataFrame) -> Figure:
     right.set(title="An iteration", ylabel="time [µs]")
     first = next(name for name in SOLVERS if name in set(timings.solver))
     solve, iteration = (growth(timings, column)[first] for column in columns)
-    figure.suptitle(
-        f"With {first} a solve grows like $N^{{{solve:.2f}}}$,"
-        f" an iteration like $N^{{{iteration:.2f}}}$",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
-    )
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return figure
+    orders = f"a solve grows like $N^{{{solve:.2f}}}$, an iteration like $N^{{{iteration:.2f}}}$"
+    return headed(figure, f"With {first} {orders}")
 
 
 def _against_horizon(axes: Axes, timings: pd.DataFrame, column: str) -> None:
