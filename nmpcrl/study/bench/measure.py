@@ -74,7 +74,7 @@ LENGTHS = {  # from the shortest
         run=30,
         learners=ALL,
         seeds=6,
-        seed_run=150,
+        seed_run=paper.EPISODES,
         firsts=3,
         compile=True,
     ),
