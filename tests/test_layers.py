@@ -14,7 +14,7 @@ LAYERS = ("control", "learning", "study")  # each may import those to its left
 DISK = {"io", "json", "os", "pathlib", "pickle", "shutil", "sqlite3", "tempfile"}
 HOMES = {  # foreign library -> where alone it may be imported
     "casadi": "control/",
-    "numba": "control/riccati.py",
+    "numba": ("control/riccati.py", "control/hessian.py"),
     "torch": "learning/network.py",
     "matplotlib": "study/figures",
 }

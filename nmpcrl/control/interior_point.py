@@ -1,8 +1,9 @@
 """The solver of `riccati` compiled for a plant and called for one OCP: starts and second tries."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
+from types import ModuleType
 
 import numpy as np
 
@@ -10,11 +11,11 @@ from nmpcrl import Vector
 from nmpcrl.control.machine_code import load, own_source
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.plant import Plant
+from nmpcrl.control.program import TIE, TOLERANCE
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.stages import write
 from nmpcrl.control.task import Task
 
-TOLERANCE = 1e-8  # of the KKT conditions, relative to the largest multiplier
 WARM_LIMIT = 40  # iterations from a guess
 COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
@@ -29,14 +30,24 @@ Start = tuple[int, Vector, int]  # kind, (z, lam, nu), iterations allowed
 class InteriorPoint:
     """An OCP and its compiled solver; solves as `Program` does."""
 
-    def __init__(self, ocp: Ocp, plant: Plant, task: Task) -> None:
-        """Load the machine code, or compile it.
+    def __init__(
+        self,
+        ocp: Ocp,
+        plant: Plant,
+        task: Task,
+        *,
+        ties_active: bool = False,
+        soft_box: bool = False,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        """Load the machine code, or compile it; the options are those of `Nmpc`.
 
         Raises:
             CannotCompile: numba is missing, or the plant holds an operation that is not known.
         """
         self._ocp = ocp
-        self._kernel = kernel(plant)
+        code = kernel(plant)
+        self._kernel, self._product = code.solve, code.hessian_times
         self._fixed = int(ocp.fixed_action.size > 0)
         self._standing = np.zeros(2 * ocp.lower.size + ocp.equality.size)
         self._size = self._standing.size + ocp.theta.numel()
@@ -55,7 +66,10 @@ class InteriorPoint:
             np.reshape(np.array(sides, float), (-1, 3)),
             ocp.gamma ** np.arange(len(ocp.states), dtype=float),
             ocp.slack_weight,
+            int(soft_box),
+            -TIE if ties_active else TIE,
         )
+        self._tolerance = tolerance
 
     def solve(
         self, state: Vector, theta: Vector, guess: Solution | None, *action: Vector, began: float
@@ -66,7 +80,7 @@ class InteriorPoint:
         for restarts, (start, point, limit) in enumerate(self._starts(state, guess)):
             out = np.empty(self._size)
             value, iterations, end, violation, error = self._kernel(
-                *arguments, start, limit, TOLERANCE, point, out
+                *arguments, start, limit, self._tolerance, point, out
             )
             if end == 0.0:
                 return Solution(
@@ -87,6 +101,13 @@ class InteriorPoint:
             state,
             theta,
         )
+
+    def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
+        """The Hessian of the value in theta, times a vector (d,); None at no strict minimum."""
+        action = solution.action if self._fixed else self._no_action
+        out = np.empty(vector.size)
+        arguments = (*self._problem, solution.state, solution.theta, action, self._fixed)
+        return out if self._product(*arguments, solution.point, vector, out) else None
 
     def _starts(self, state: Vector, guess: Solution | None) -> Iterator[Start]:
         """The guess, standing still, and random inputs."""
@@ -119,15 +140,16 @@ class InteriorPoint:
 
 
 @cache
-def kernel(plant: Plant) -> Callable[..., tuple[float, float, float, float, float]]:
-    """`riccati.solve` as machine code for a plant.
+def kernel(plant: Plant) -> ModuleType:
+    """`riccati.solve` and `hessian.hessian_times` as machine code for a plant.
 
     Raises:
         CannotCompile: numba is missing, or the plant holds an operation that is not known.
     """
     texts = {
-        "__init__": "from .riccati import solve\n",
+        "__init__": "from .hessian import hessian_times\nfrom .riccati import solve\n",
         "model": write(plant),
         "riccati": own_source("riccati"),
+        "hessian": own_source("hessian"),
     }
-    return load("riccati", texts, NOTICE).solve
+    return load("riccati", texts, NOTICE)

@@ -74,3 +74,33 @@ def end_slope(x: Any, theta: Any, target: Any, slope_: Any) -> None:
 def path_slope(x: Any, theta: Any, disc: Any, slope_: Any) -> None:
     """Gradient of `path` in theta."""
     raise NotImplementedError
+
+
+def turn(x: Any, u: Any, theta: Any, target: Any, w: Any, lx_: Any, lu_: Any) -> None:
+    """How the gradient of `cost` in x and u changes while theta moves along w."""
+    raise NotImplementedError
+
+
+def turn_end(x: Any, theta: Any, target: Any, w: Any, lx_: Any) -> None:
+    """How the gradient of `end` in x changes while theta moves along w."""
+    raise NotImplementedError
+
+
+def turn_path(x: Any, theta: Any, disc: Any, w: Any, hx_: Any) -> None:
+    """How the gradient of `path` in x changes while theta moves along w."""
+    raise NotImplementedError
+
+
+def bend(x: Any, u: Any, theta: Any, target: Any, dx: Any, du: Any, w: Any, slope_: Any) -> None:
+    """How `cost_slope` changes while x, u and theta move along dx, du and w."""
+    raise NotImplementedError
+
+
+def bend_end(x: Any, theta: Any, target: Any, dx: Any, w: Any, slope_: Any) -> None:
+    """How `end_slope` changes while x and theta move along dx and w."""
+    raise NotImplementedError
+
+
+def bend_path(x: Any, theta: Any, disc: Any, dx: Any, w: Any, slope_: Any) -> None:
+    """How `path_slope` changes while x and theta move along dx and w."""
+    raise NotImplementedError

@@ -7,6 +7,7 @@
 import time
 import warnings
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -16,13 +17,15 @@ from nmpcrl.control.interior_point import InteriorPoint
 from nmpcrl.control.ocp import transcribe
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.program import SOLVERS as CASADI_SOLVERS
-from nmpcrl.control.program import Program
+from nmpcrl.control.program import TOLERANCE, Program
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, short
 from nmpcrl.control.task import Task
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
+
+LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
 
 SOLVERS = ("riccati", *CASADI_SOLVERS)
 FALLBACK = "fatrop"  # where the default cannot be compiled
@@ -41,6 +44,10 @@ class Nmpc:
         gamma: float = 0.97,
         slack_weight: float = 100.0,
         solver: str = SOLVERS[0],
+        *,
+        ties_active: bool = False,
+        soft_box: bool = False,
+        tolerance: float = TOLERANCE,
     ) -> None:
         """Check and keep the problem; it is transcribed at the first solve.
 
@@ -52,6 +59,11 @@ class Nmpc:
             slack_weight: omega, the cost of a unit of each slack.
             solver: "riccati", which is compiled for the plant at its first solve and gives way to
                 "fatrop" with a warning where that cannot be done; "fatrop"; or "ipopt".
+            ties_active: whether a state exactly on an obstacle's boundary counts as in it: the
+                other side of a kink in theta_c.  # departure L
+            soft_box: whether leaving the box costs `slack_weight` a metre, as entering an obstacle
+                does, instead of being forbidden; riccati only.  # departure M
+            tolerance: of the KKT conditions.
         """
         if isinstance(horizon, bool) or not isinstance(horizon, int | np.integer) or horizon < 1:
             raise ValueError(f"horizon = {horizon!r} must be a whole number, 1 or more")
@@ -61,6 +73,11 @@ class Nmpc:
             raise ValueError(f"slack_weight = {slack_weight} must be a positive number")
         if solver not in SOLVERS:
             raise ValueError(f"solver = {solver!r} must be one of {', '.join(SOLVERS)}")
+        if not LEAST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE:
+            allowed = f"[{LEAST_TOLERANCE:g}, {LARGEST_TOLERANCE:g}]"
+            raise ValueError(f"tolerance = {tolerance} must lie in {allowed}")
+        if soft_box and solver != "riccati":
+            raise ValueError(f"soft_box = {soft_box} is for riccati, not for {solver}")
         if task.start.size != plant.n:
             raise ValueError(f"the task has {task.start.size} states and the plant {plant.n}")
         self.plant = plant
@@ -69,6 +86,8 @@ class Nmpc:
         self.gamma = float(gamma)
         self.slack_weight = float(slack_weight)
         self.solver = solver
+        self.soft_box = soft_box
+        self.options: dict[str, Any] = {"ties_active": ties_active, "tolerance": float(tolerance)}
 
     def solve(
         self,
@@ -105,6 +124,15 @@ class Nmpc:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
         return self._variant(solution).sensitivity.hessian(*_point(solution))
 
+    def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
+        """The product of `value_hessian` with a vector of shape (d,); in microseconds by riccati.
+
+        Raises:
+            ValueError: the vector has another shape, is not finite or is absurdly large.
+        """
+        vector = _checked("vector", vector, solution.theta.size)
+        return self._variant(solution).hessian_times(solution, vector)
+
     def kkt_residual(self, solution: Solution) -> float:
         """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`."""
         return self._variant(solution).sensitivity.kkt_residual(*_point(solution))
@@ -128,14 +156,30 @@ class _Variant:
         plant, task = nmpc.plant, nmpc.task
         problem = (plant, task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
         self._ocp = transcribe(*problem, fix_action=fix_action)
+        self._interior_point: InteriorPoint | None = None
         if nmpc.solver == "riccati":
             try:
-                self.solve = InteriorPoint(self._ocp, plant, task).solve
+                point = InteriorPoint(
+                    self._ocp, plant, task, soft_box=nmpc.soft_box, **nmpc.options
+                )
+                self._interior_point, self.solve = point, point.solve
                 return
             except CannotCompile as error:
+                if nmpc.soft_box:
+                    raise ValueError(
+                        f"{error}: no other solver than riccati has soft_box"
+                    ) from error
                 warnings.warn(f"{error}: {FALLBACK} solves instead of riccati", stacklevel=2)
                 nmpc.solver = FALLBACK
-        self.solve = Program(self._ocp, self.sensitivity, task, nmpc.solver).solve
+        self.solve = Program(self._ocp, self.sensitivity, task, nmpc.solver, **nmpc.options).solve
+
+    def hessian_times(self, solution: Solution, vector: Vector) -> Vector:
+        """As `Nmpc.value_hessian_times`; by dense algebra where there is no machine code."""
+        fast = self._interior_point
+        product = fast.hessian_times(solution, vector) if fast else None
+        if product is None:
+            return self.sensitivity.hessian(*_point(solution)) @ vector
+        return product
 
     @cached_property
     def sensitivity(self) -> Sensitivity:

@@ -53,13 +53,24 @@ STARTS: dict[str, dict[str, dict[str, Any]]] = {  # the better the start, the le
 class Program:
     """An OCP and one of CasADi's solvers."""
 
-    def __init__(self, ocp: Ocp, sensitivity: Sensitivity, task: Task, solver: str) -> None:
+    def __init__(
+        self,
+        ocp: Ocp,
+        sensitivity: Sensitivity,
+        task: Task,
+        solver: str,
+        *,
+        ties_active: bool = False,
+        tolerance: float = TOLERANCE,
+    ) -> None:
+        """Make the solver; the options are those of `Nmpc`."""
         self._ocp = ocp
+        self._tie = -TIE if ties_active else TIE
         self._sensitivity = sensitivity
         self._task = task
         self._name = solver
         self._solvers = {
-            start: _solver(ocp, solver, SOLVERS[solver] | options)
+            start: _solver(ocp, solver, SOLVERS[solver] | options | {"tol": tolerance})
             for start, options in STARTS[solver].items()
         }
         self._bounds = {
@@ -135,7 +146,7 @@ class Program:
         theta_c is omega inside an obstacle and 0 outside. On the boundary any number in between
         satisfies KKT and each solver returns another; here it is 0.  # departure L
         """
-        inside = self._task.overlap(state) + theta[-1] > TIE
+        inside = self._task.overlap(state) + theta[-1] > self._tie
         lam[self._ocp.obstacles[0]] = np.where(inside, self._ocp.slack_weight, 0.0)
         nu[self._ocp.slacks[0]] = np.where(inside, 0.0, -self._ocp.slack_weight)
 

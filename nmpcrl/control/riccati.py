@@ -61,7 +61,6 @@ ROUNDING = 1e-14  # of the barrier function, relative
 ALMOST = 1.0 - 4e-16  # of W is the most for lam, or W - lam is rounded to 0
 SHORTEST = 1e-10  # step that the search tries
 LARGEST_DELTA = 1e12
-TIE = 1e-6  # a start this close to an obstacle's boundary is on it, not in it  # departure L
 
 fast = {"contract", "arcp", "nsz", "reassoc", "afn"}  # not nnan, ninf: bad numbers must show
 options: dict[str, Any] = {"error_model": "numpy", "fastmath": fast}
@@ -413,6 +412,19 @@ def feedback(L, F, f, K, k):
 @inlined
 def newton_step(task, point, duals, stages, mu, step):
     """Step 6: the step; the primal and the dual length that stay inside bounds; the descent."""
+    sweep(task, stages, step)
+    rows_along(task, stages, step.x, step.lam)
+    slope = descent(task, point, stages, mu, step)
+    scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
+    tau = max(0.99, 1.0 - max(mu, 1e-5))
+    primal, dual = bounds_along(task, point, duals, mu, step, tau)
+    inside = inside_rows(duals.lam.ravel(), step.lam.ravel(), task.weights.ravel(), tau)
+    return primal, min(dual, inside), slope
+
+
+@inlined
+def sweep(task, stages, step):
+    """The step of inputs and states, forwards along the feedback."""
     for a in range(NX):
         step.x[0, a] = 0.0
     for i in range(len(step.u)):
@@ -429,13 +441,6 @@ def newton_step(task, point, duals, stages, mu, step):
             for b in range(NU):
                 total += stages.B[i, a, b] * step.u[i, b]
             step.x[i + 1, a] = total
-    rows_along(task, stages, step.x, step.lam)
-    slope = descent(task, point, stages, mu, step)
-    scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
-    tau = max(0.99, 1.0 - max(mu, 1e-5))
-    primal, dual = bounds_along(task, point, duals, mu, step, tau)
-    inside = inside_rows(duals.lam.ravel(), step.lam.ravel(), task.weights.ravel(), tau)
-    return primal, min(dual, inside), slope
 
 
 @inlined
@@ -537,7 +542,7 @@ def advance(task, duals, step, length):
 
 
 @inlined
-def scaled(theta, target, lower, upper, discs, sides, discount, slack_weight, first):
+def scaled(theta, target, lower, upper, discs, sides, discount, slack_weight, soft_box, first):
     """The task divided by max(1, theta^2), and that factor."""
     factor = 1.0
     for a in range(NTHETA):
@@ -549,7 +554,8 @@ def scaled(theta, target, lower, upper, discs, sides, discount, slack_weight, fi
         rate[i] = discount[i] / factor
         for j in range(weights.shape[1]):
             if i > 0:
-                weights[i - 1, j] = slack_weight * rate[i] if j < len(discs) else strict
+                slack = soft_box or j < len(discs)
+                weights[i - 1, j] = slack_weight * rate[i] if slack else strict
     return Task(theta, target, lower, upper, discs, sides, rate, weights, first), factor
 
 
@@ -672,7 +678,7 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
 
 
 @inlined
-def report(task, point, duals, stages, objective, factor, slack_weight, out):
+def report(task, point, duals, stages, objective, factor, slack_weight, soft_box, tie, out):
     """Write the solution in the order of `Ocp`, and the value's gradient; see `Sensitivity`."""
     last, obstacles = len(point.u), len(task.discs)
     variables, constraints = place(task, last)
@@ -707,7 +713,9 @@ def report(task, point, duals, stages, objective, factor, slack_weight, out):
             for j in range(len(task.sides)):
                 a, sign = int(task.sides[j, 0]), task.sides[j, 1]
                 out[nu + at + a] += sign * factor * duals.lam[i - 1, obstacles + j]
-                violation = max(violation, point.h[i - 1, obstacles + j])
+                beyond = max(0.0, point.h[i - 1, obstacles + j])
+                violation = max(violation, beyond)
+                value += rate * slack_weight * beyond if soft_box else 0.0
         at += NX
         if i < last:
             for a in range(NU):
@@ -717,7 +725,7 @@ def report(task, point, duals, stages, objective, factor, slack_weight, out):
         for j in range(obstacles):
             weight = rate * slack_weight
             h = path(point.x[i], task.theta, task.discs[j])
-            multiplier = weight if h > TIE else 0.0
+            multiplier = weight if h > tie else 0.0
             if i > 0:
                 multiplier = factor * duals.lam[i - 1, j]
             value += weight * max(0.0, h)
@@ -736,27 +744,9 @@ def add(out, at, times, vector):
         out[at + a] += times * vector[a]
 
 
-vector, matrix = float64[::1], float64[:, ::1]
-SIGNATURE = types.UniTuple(float64, 5)(
-    vector, vector, vector, matrix, matrix, vector, float64,  # the problem
-    vector, vector, vector, int64,  # state, theta, action, whether u_0 is the action
-    int64, int64, float64,  # start, limit, tolerance
-    vector, vector,  # guess and result
-)  # fmt: skip
-
-
-@njit(SIGNATURE, cache=True, **options)
-def solve(
-    target, lower, upper, discs, sides, discount, slack_weight,
-    state, theta, action, fixed, start, limit, tolerance, guess, out,
-):  # fmt: skip
-    """Solve Eq. (2); see `InteriorPoint` for the arguments.
-
-    Returns value, iterations, the end, the violation of the box, and the relative error; `out`
-    receives z, lam and nu in the order of `Ocp`, as `guess` has them, and then the gradient.
-    """
-    task, factor = scaled(theta, target, lower, upper, discs, sides, discount, slack_weight, fixed)
-    N, M, rows = len(discount) - 1, len(discs), len(discs) + len(sides)
+@inlined
+def room(N, M, rows):
+    """Space for an iterate, a trial of the next one, multipliers, derivatives and a step."""
     point = Point(
         np.empty((N + 1, NX)), np.empty((N, NU)),
         np.empty((N, rows)), np.empty((N, rows)), np.empty((N, rows)),
@@ -776,6 +766,36 @@ def solve(
         np.empty((N, NU, NX)), np.empty((N, NU)), np.empty((N + 1, NX)), np.empty((N, NU)),
         np.empty((N, rows)), np.empty((N, NU)), np.empty((N, NU)),
     )  # fmt: skip
+    return point, trial, duals, stages, step
+
+
+vector, matrix = float64[::1], float64[:, ::1]
+PROBLEM = (
+    vector, vector, vector, matrix, matrix, vector, float64, int64, float64,  # see InteriorPoint
+    vector, vector, vector, int64,  # state, theta, action, whether u_0 is the action
+)  # fmt: skip
+SIGNATURE = types.UniTuple(float64, 5)(
+    *PROBLEM,
+    int64, int64, float64,  # start, limit, tolerance
+    vector, vector,  # guess and result
+)  # fmt: skip
+
+
+@njit(SIGNATURE, cache=True, **options)
+def solve(
+    target, lower, upper, discs, sides, discount, slack_weight, soft_box, tie,
+    state, theta, action, fixed, start, limit, tolerance, guess, out,
+):  # fmt: skip
+    """Solve Eq. (2); see `InteriorPoint` for the arguments.
+
+    Returns value, iterations, the end, the violation of the box, and the relative error; `out`
+    receives z, lam and nu in the order of `Ocp`, as `guess` has them, and then the gradient.
+    """
+    task, factor = scaled(
+        theta, target, lower, upper, discs, sides, discount, slack_weight, soft_box, fixed
+    )
+    N, M, rows = len(discount) - 1, len(discs), len(discs) + len(sides)
+    point, trial, duals, stages, step = room(N, M, rows)
     mu = START_MU[start]
     begin(task, point, duals, state, action, start, mu, factor, guess)
     for a in range(NX):
@@ -785,5 +805,7 @@ def solve(
     point, objective, iterations, ended, error = iterate(
         task, point, trial, duals, stages, step, mu, objective, total, limit, tolerance
     )
-    value, violation = report(task, point, duals, stages, objective, factor, slack_weight, out)
+    value, violation = report(
+        task, point, duals, stages, objective, factor, slack_weight, soft_box, tie, out
+    )
     return value, float(iterations), float(ended), violation, error

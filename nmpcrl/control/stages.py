@@ -42,6 +42,8 @@ def functions(plant: Plant) -> list[ca.Function]:
     x, u, theta = ca.SX.sym("x", n), ca.SX.sym("u", m), ca.SX.sym("theta", 2 * n + m + 1)
     target, disc = ca.SX.sym("target", n), ca.SX.sym("disc", 3)
     discount, costate = ca.SX.sym("discount"), ca.SX.sym("costate", n)
+    dx, du = ca.SX.sym("dx", n), ca.SX.sym("du", m)
+    w = ca.SX.sym("w", 2 * n + m + 1)
     weights = Theta.split(theta, n, m)
 
     step = plant.transition(x, u)
@@ -62,6 +64,12 @@ def functions(plant: Plant) -> list[ca.Function]:
     end_hessian, end_gradient = ca.hessian(discount * end, x)
     path_hessian, path_gradient = ca.hessian(path, x)
 
+    def along(gradient: ca.SX, *moved: tuple[ca.SX, ca.SX]) -> ca.SX:
+        """The derivative of a gradient while each variable moves along its direction."""
+        variables, directions = (ca.vertcat(*part) for part in zip(*moved, strict=True))
+        return ca.jtimes(gradient, variables, directions)
+
+    cost_slope, end_slope, path_slope = (ca.gradient(f, theta) for f in (cost, end, path))
     stage = {"x": x, "u": u, "theta": theta, "target": target}
     last = {"x": x, "theta": theta, "target": target}
     obstacle = {"x": x, "theta": theta, "disc": disc}
@@ -76,9 +84,34 @@ def functions(plant: Plant) -> list[ca.Function]:
             "expand_end", {**last, "discount": discount}, {"lx": end_gradient, "Q": end_hessian}
         ),
         _function("expand_path", obstacle, {"hx": path_gradient, "hxx": path_hessian}),
-        _function("cost_slope", stage, {"slope": ca.gradient(cost, theta)}),
-        _function("end_slope", last, {"slope": ca.gradient(end, theta)}),
-        _function("path_slope", obstacle, {"slope": ca.gradient(path, theta)}),
+        _function("cost_slope", stage, {"slope": cost_slope}),
+        _function("end_slope", last, {"slope": end_slope}),
+        _function("path_slope", obstacle, {"slope": path_slope}),
+        _function(
+            "turn",
+            {**stage, "w": w},
+            {
+                "lx": along(ca.gradient(cost, x), (theta, w)),
+                "lu": along(ca.gradient(cost, u), (theta, w)),
+            },
+        ),
+        _function("turn_end", {**last, "w": w}, {"lx": along(ca.gradient(end, x), (theta, w))}),
+        _function("turn_path", {**obstacle, "w": w}, {"hx": along(path_gradient, (theta, w))}),
+        _function(
+            "bend",
+            {**stage, "dx": dx, "du": du, "w": w},
+            {"slope": along(cost_slope, (x, dx), (u, du), (theta, w))},
+        ),
+        _function(
+            "bend_end",
+            {**last, "dx": dx, "w": w},
+            {"slope": along(end_slope, (x, dx), (theta, w))},
+        ),
+        _function(
+            "bend_path",
+            {**obstacle, "dx": dx, "w": w},
+            {"slope": along(path_slope, (x, dx), (theta, w))},
+        ),
     ]
 
 

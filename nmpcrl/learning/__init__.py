@@ -1,20 +1,24 @@
 """How the parameters of the NMPC move: a learner is a bootstrap and an update rule."""
 
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, SecondSolve, Successor, Transition
+from nmpcrl.learning.controls import frozen, random_direction, step_matched
 from nmpcrl.learning.learners import (
     Learner,
     Update,
     Weights,
     deep_expected_sarsa,
     expected_sarsa,
-    frozen,
     gradient_expected_sarsa,
+    gradient_tdc,
+    q_learning,
     regularized_deep_expected_sarsa,
 )
 from nmpcrl.learning.network import QNetwork
 from nmpcrl.learning.updates import (
     auxiliary_step,
+    curvature_correction,
     gradient_td_step,
+    project,
     semi_gradient_step,
     td_error,
 )
@@ -30,12 +34,18 @@ __all__ = [
     "Update",
     "Weights",
     "auxiliary_step",
+    "curvature_correction",
     "deep_expected_sarsa",
     "expected_sarsa",
     "frozen",
     "gradient_expected_sarsa",
     "gradient_td_step",
+    "gradient_tdc",
+    "project",
+    "q_learning",
+    "random_direction",
     "regularized_deep_expected_sarsa",
     "semi_gradient_step",
+    "step_matched",
     "td_error",
 ]

@@ -29,7 +29,7 @@ class Successor:
     value: float  # Q(s+, a+)
     features: Vector | None = None  # phi+, shape (d,); None from a network
     solution: Solution | None = None  # of the second solve, a guess for the next first one
-    loss: float = np.nan  # of the network's fit in this step
+    loss: float = np.nan  # of the network's last fit in this step
     seconds: float = 0.0  # spent on fit and prediction [s]; a solve keeps its own time
 
 
@@ -48,6 +48,9 @@ class Controller(Protocol):
         action: Vector | None = None,
     ) -> Solution:
         """See `nmpcrl.control.Nmpc.solve`."""
+
+    def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
+        """See `nmpcrl.control.Nmpc.value_hessian_times`; only exact TDC asks for it."""
 
 
 class Bootstrap(Protocol):
@@ -80,6 +83,7 @@ class Imitation:
     network: QNetwork
     with_theta: bool
     gated: bool = True  # wait for the first fit; Algorithm 1 read literally does not  # departure G
+    fits: int = 1  # mini-batches a step  # departure H
 
     def __call__(self, transition: Transition, theta: Vector) -> Successor | None:
         """Remember (s, a[, theta]) -> Q, fit, and predict Q(s+, a+) with a+ = u_1 of the plan."""
@@ -90,7 +94,10 @@ class Imitation:
         )
         if self.gated and not self.network.ready:
             return None
-        loss = self.network.fit() if self.network.ready else np.nan
+        loss = np.nan
+        if self.network.ready:
+            for _ in range(self.fits):
+                loss = self.network.fit()
         inputs = self.inputs(transition.next_state, solution.next_action, theta)
         value = float(self.network.predict(inputs))
         return Successor(value, loss=loss, seconds=time.perf_counter() - began)

@@ -1,18 +1,22 @@
 """The learners: learner = bootstrap x update rule.
 
-| learner | next value        | theta moves by                  |
-|---------|-------------------|---------------------------------|
-| ES      | a second solve    | a semi-gradient                 |
-| DES     | a network (s, a)  | a semi-gradient                 |
-| RDES    | ... (s, a, theta) | a semi-gradient                 |
-| GES     | a second solve    | gradient TD with the weights w  |
-| frozen  | not asked         | nothing: the control arm        |
+| learner | next value        | theta moves by                             |
+|---------|-------------------|--------------------------------------------|
+| ES      | a second solve    | a semi-gradient                            |
+| DES     | a network (s, a)  | a semi-gradient                            |
+| RDES    | ... (s, a, theta) | a semi-gradient                            |
+| GES     | a second solve    | gradient TD with the weights w             |
+| TDC     | a second solve    | gradient TD with its curvature, projected  |
+| QL      | a second solve    | a semi-gradient of Q(s, a), u_0 = a fixed  |
+
+The control arms that they are held against are in `controls`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from nmpcrl import Vector
+from nmpcrl.control import Solution
 from nmpcrl.learning.bootstrap import (
     Bootstrap,
     Controller,
@@ -24,7 +28,9 @@ from nmpcrl.learning.bootstrap import (
 from nmpcrl.learning.network import QNetwork
 from nmpcrl.learning.updates import (
     auxiliary_step,
+    curvature_correction,
     gradient_td_step,
+    project,
     semi_gradient_step,
     td_error,
 )
@@ -38,8 +44,8 @@ class Weights:
     w: Vector  # auxiliary weights of gradient TD, shape (d,)
 
 
-# (weights, delta, phi, phi+) -> weights
-UpdateRule = Callable[[Weights, float, Vector, Vector | None], Weights]
+# (weights, delta, solution in s, what is known of s+) -> weights
+UpdateRule = Callable[[Weights, float, Solution, Successor], Weights]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,15 +77,16 @@ class Learner:
             return Update(weights)
         solution = transition.solution
         delta = td_error(transition.cost, self.gamma, solution.value, successor.value)
-        moved = self.rule(weights, delta, solution.features, successor.features)
-        return Update(moved, successor, delta)
+        return Update(self.rule(weights, delta, solution, successor), successor, delta)
 
 
 def semi_gradient(alpha: float) -> UpdateRule:
     """Eq. (9): move theta along delta phi."""
 
-    def rule(weights: Weights, delta: float, phi: Vector, _: Vector | None) -> Weights:
-        return Weights(semi_gradient_step(weights.theta, delta, phi, alpha), weights.w)
+    def rule(weights: Weights, delta: float, solution: Solution, _: Successor) -> Weights:
+        return Weights(
+            semi_gradient_step(weights.theta, delta, solution.features, alpha), weights.w
+        )
 
     return rule
 
@@ -87,16 +94,50 @@ def semi_gradient(alpha: float) -> UpdateRule:
 def gradient_td(alpha: float, beta: float, gamma: float) -> UpdateRule:
     """Eq. (16): move theta and w, both from the old ones."""
 
-    def rule(weights: Weights, delta: float, phi: Vector, phi_next: Vector | None) -> Weights:
-        if phi_next is None:
+    def rule(weights: Weights, delta: float, solution: Solution, successor: Successor) -> Weights:
+        if successor.features is None:
             raise ValueError(
                 "gradient TD needs the next state's features: bootstrap by SecondSolve"
             )
-        theta, w = weights.theta, weights.w
+        theta, w, phi = weights.theta, weights.w, solution.features
         return Weights(
-            theta=gradient_td_step(theta, w, delta, phi, phi_next, alpha=alpha, gamma=gamma),
+            theta=gradient_td_step(
+                theta, w, delta, phi, successor.features, alpha=alpha, gamma=gamma
+            ),
             w=auxiliary_step(w, delta, phi, beta),
         )
+
+    return rule
+
+
+def exact_gradient_td(
+    nmpc: Controller,
+    alpha: float,
+    beta: float,
+    *,
+    curvature: bool,
+    projection: tuple[float, float] | None,
+) -> UpdateRule:
+    """Nonlinear TDC (Maei et al. 2009): `gradient_td` with what Eq. (16) drops.
+
+    Args:
+        nmpc: knows the Hessian of its value.
+        alpha: step size of theta.
+        beta: step size of w.
+        curvature: whether to subtract h, `curvature_correction`.
+        projection: least and largest value of a component of theta; None for no projection.
+    """
+    printed = gradient_td(alpha, beta, nmpc.gamma)
+
+    def rule(weights: Weights, delta: float, solution: Solution, successor: Successor) -> Weights:
+        moved = printed(weights, delta, solution, successor)
+        theta = moved.theta
+        if curvature:
+            hessian_w = nmpc.value_hessian_times(solution, weights.w)
+            theta = theta - alpha * curvature_correction(
+                delta, solution.features, weights.w, hessian_w
+            )
+        return Weights(project(theta, *projection) if projection else theta, moved.w)
 
     return rule
 
@@ -107,18 +148,18 @@ def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
 
 
 def deep_expected_sarsa(
-    nmpc: Controller, network: QNetwork, alpha: float, *, gated: bool = True
+    nmpc: Controller, network: QNetwork, alpha: float, *, gated: bool = True, fits: int = 1
 ) -> Learner:
     """DES: a network of 5 inputs, (s, a), instead of the second solve."""
-    bootstrap = Imitation(network, with_theta=False, gated=gated)
+    bootstrap = Imitation(network, with_theta=False, gated=gated, fits=fits)
     return Learner("DES", bootstrap, semi_gradient(alpha), nmpc.gamma)
 
 
 def regularized_deep_expected_sarsa(
-    nmpc: Controller, network: QNetwork, alpha: float, *, gated: bool = True
+    nmpc: Controller, network: QNetwork, alpha: float, *, gated: bool = True, fits: int = 1
 ) -> Learner:
     """RDES, the paper's first method: the network of DES is told theta as well, 14 inputs."""
-    bootstrap = Imitation(network, with_theta=True, gated=gated)
+    bootstrap = Imitation(network, with_theta=True, gated=gated, fits=fits)
     return Learner("RDES", bootstrap, semi_gradient(alpha), nmpc.gamma)
 
 
@@ -127,10 +168,26 @@ def gradient_expected_sarsa(nmpc: Controller, alpha: float, beta: float) -> Lear
     return Learner("GES", SecondSolve(nmpc), gradient_td(alpha, beta, nmpc.gamma), nmpc.gamma)
 
 
-def frozen(nmpc: Controller) -> Learner:
-    """The control arm: the same exploration and the same noise, and theta never moves."""
+def gradient_tdc(
+    nmpc: Controller,
+    alpha: float,
+    beta: float,
+    *,
+    curvature: bool = True,
+    projection: tuple[float, float] | None = None,
+) -> Learner:
+    """TDC, exact nonlinear gradient TD: two solves a step and a product with the value's Hessian.
 
-    def nothing(transition: Transition, theta: Vector) -> None:
-        return None
+    Arguments as in `exact_gradient_td`; without curvature and projection it is GES.
+    """
+    rule = exact_gradient_td(nmpc, alpha, beta, curvature=curvature, projection=projection)
+    return Learner("TDC", SecondSolve(nmpc), rule, nmpc.gamma)
 
-    return Learner("frozen", nothing, lambda weights, *_: weights, nmpc.gamma)
+
+def q_learning(nmpc: Controller, alpha: float) -> Learner:
+    """QL: two solves a step, semi-gradient of the action value proper (Gros and Zanon 2020).
+
+    A step's transition must hold the solution with u_0 = a fixed, whose value is Q_theta(s, a). In
+    the next state the policy minimises Q, so its value is V_theta(s+): a solve with u_0 free.
+    """
+    return Learner("QL", SecondSolve(nmpc), semi_gradient(alpha), nmpc.gamma)

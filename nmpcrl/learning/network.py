@@ -1,5 +1,7 @@
 """The network that imitates the NMPC's value. The only home of torch."""
 
+import sys
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -10,12 +12,20 @@ from nmpcrl import Vector
 
 torch.set_num_threads(1)  # matrices this small only get slower with more
 
+# In place, and its slope from what it made; that of a ReLU is its output's sign.
+Activation = tuple[Callable[[Tensor], Tensor], Callable[[Tensor], Tensor]]
+ACTIVATIONS: dict[str, Activation] = {
+    "relu": (Tensor.relu_, Tensor.sign),
+    "tanh": (Tensor.tanh_, lambda y: 1 - y * y),
+}
+
 
 class QNetwork:
     """Inputs - 64 - 64 - 1 with ReLU, trained by Adam on a growing replay buffer: Eq. (10).
 
     Learns in place. Activation, initialisation (torch's own), no normalisation, an unlimited buffer
-    and one mini-batch a step are this package's reading: the paper names none.  # departure H
+    and one mini-batch a step are this package's reading: the paper names none, and the options
+    read it otherwise.  # departure H
 
     Backpropagation is written out, in place and without autograd: on matrices this small, modules
     and `torch.optim` take longer than the arithmetic.
@@ -29,6 +39,10 @@ class QNetwork:
         batch: int = 128,
         hidden: int = 64,
         capacity: int = 1024,
+        *,
+        activation: str = "relu",
+        memory: int | None = None,
+        scales: tuple[Vector | float, float] = (1.0, 1.0),
     ) -> None:
         """Draw the weights and make room.
 
@@ -39,11 +53,21 @@ class QNetwork:
             batch: n, the size of a mini-batch; no fit before the buffer holds as many.
             hidden: neurons in each of the two hidden layers.
             capacity: room in the buffer at the start; it doubles when full.
+            activation: of the hidden layers, "relu" or "tanh".
+            memory: how many of the latest examples are kept; all by default.
+            scales: what inputs (one number, or one each) and target are divided by inside.
         """
+        if activation not in ACTIVATIONS:
+            raise ValueError(f"activation = {activation!r} must be one of {', '.join(ACTIVATIONS)}")
+        if memory is not None and memory < batch:
+            raise ValueError(f"memory = {memory} must hold at least a batch of {batch}")
+        self._activation = ACTIVATIONS[activation]
+        self._memory = memory or sys.maxsize
+        self._input_scale, self._target_scale = scales
         self._rng = rng
         self._learning_rate = learning_rate
         self._buffer = np.ones((capacity, inputs + 2), np.float32)  # rows of input, 1, target
-        self._size = 0  # rows of the buffer that are filled
+        self._seen = 0  # examples so far
         self._drawn = np.ones((batch, inputs + 2), np.float32)  # the rows of a fit
         widths = (inputs, hidden, hidden, 1)
         self._weights = _first_weights(widths, seed=int(rng.integers(2**63)))
@@ -55,40 +79,43 @@ class QNetwork:
 
     def __len__(self) -> int:
         """How many examples are remembered."""
-        return self._size
+        return min(self._seen, self._memory)
 
     @property
     def ready(self) -> bool:
         """Whether the buffer holds a mini-batch: line 12 of Algorithm 1."""
-        return self._size >= len(self._drawn)
+        return self._seen >= len(self._drawn)
 
     def remember(self, inputs: Vector, target: float) -> None:
         """Store one example; `inputs` has the length given at the start."""
-        if self._size == len(self._buffer):
+        at = self._seen % self._memory
+        if at == len(self._buffer):
             self._buffer = np.concatenate([self._buffer, np.ones_like(self._buffer)])
-        row = self._buffer[self._size]
-        row[:-2], row[-1] = inputs, target
-        self._size += 1
+        row = self._buffer[at]
+        row[:-2], row[-1] = inputs / self._input_scale, target / self._target_scale
+        self._seen += 1
 
     def fit(self) -> float:
         """One Adam step on a mini-batch drawn without replacement; its loss before the step."""
         batch = len(self._drawn)
         if not self.ready:
-            raise ValueError(f"{self._size} examples are too few for a batch of {batch}")
-        rows = self._rng.choice(self._size, batch, replace=False)
+            raise ValueError(f"{len(self)} examples are too few for a batch of {batch}")
+        rows = self._rng.choice(len(self), batch, replace=False)
         self._buffer.take(rows, axis=0, out=self._drawn, mode="clip")
-        error = _forward(self._batch).numpy() - self._drawn[:, -1:]
-        _backward(self._batch, torch.from_numpy(2 / batch * error))
+        activate, slope = self._activation
+        error = _forward(self._batch, activate).numpy() - self._drawn[:, -1:]
+        _backward(self._batch, slope, torch.from_numpy(2 / batch * error))
         self._descend()
-        return float(np.vdot(error, error)) / batch
+        return float(np.vdot(error, error)) / batch * self._target_scale**2
 
     def predict(self, inputs: Vector) -> Vector:
         """The value of one input (k,) or of many (..., k); the result drops the last axis."""
         *shape, k = inputs.shape
         rows = inputs.reshape(-1, k)
         layers = self._one if len(rows) == 1 else self._layers(torch.ones(len(rows), k + 1))
-        layers[0].x.numpy()[:, :-1] = rows
-        return _forward(layers).numpy().astype(float).reshape(shape)
+        layers[0].x.numpy()[:, :-1] = rows / self._input_scale
+        value = _forward(layers, self._activation[0]).numpy().astype(float)
+        return value.reshape(shape) * self._target_scale
 
     def _layers(self, x: Tensor) -> "Layers":
         """The three layers, with room for the rows of `x`."""
@@ -149,18 +176,18 @@ class _Layer:
 Layers = tuple[_Layer, _Layer, _Layer]
 
 
-def _forward(layers: Layers) -> Tensor:
+def _forward(layers: Layers, activate: Callable[[Tensor], Tensor]) -> Tensor:
     first, second, third = layers
-    first.forward().relu_()
-    second.forward().relu_()
+    activate(first.forward())
+    activate(second.forward())
     return third.forward()
 
 
-def _backward(layers: Layers, d3: Tensor) -> None:
+def _backward(layers: Layers, slope: Callable[[Tensor], Tensor], d3: Tensor) -> None:
     """Compute every layer's `dW` from d3, the loss's derivative in the output."""
     first, second, third = layers
-    d2 = third.backward(d3).mul_(second.out.sign())  # the slope of a ReLU is its output's sign
-    d1 = second.backward(d2).mul_(first.out.sign())
+    d2 = third.backward(d3).mul_(slope(second.out))
+    d1 = second.backward(d2).mul_(slope(first.out))
     for layer, d in zip(layers, (d1, d2, d3), strict=True):
         layer.differentiate(d)
 

@@ -1,5 +1,7 @@
 """The update rules, one equation a function. Here delta, phi and w are the paper's symbols."""
 
+import numpy as np
+
 from nmpcrl import Vector
 
 
@@ -33,3 +35,26 @@ def gradient_td_step(
 def auxiliary_step(w: Vector, delta: float, phi: Vector, beta: float) -> Vector:
     """w of GES, the second line of Eq. (16): least mean squares of delta on phi, shape (d,)."""
     return w + beta * (delta - phi @ w) * phi
+
+
+def curvature_correction(delta: float, phi: Vector, w: Vector, hessian_w: Vector) -> Vector:
+    """h of nonlinear TDC (Maei et al. 2009), which Eq. (16) drops, shape (d,).  # departure K
+
+    Args:
+        delta: TD error.
+        phi: gradient of Q_theta(s, a), shape (d,).
+        w: auxiliary weights, shape (d,).
+        hessian_w: the Hessian of Q_theta(s, a) in theta, times w, shape (d,).
+    """
+    return (delta - phi @ w) * hessian_w
+
+
+def project(theta: Vector, least: float, most: float) -> Vector:
+    """The nearest theta with every component in [least, most]: the compact set of Maei et al."""
+    return np.minimum(np.maximum(theta, least), most)
+
+
+def of_length(direction: Vector, length: float) -> Vector:
+    """A step along `direction` of Euclidean norm `length`; none where there is no direction."""
+    norm = np.linalg.norm(direction)
+    return direction * (length / norm) if norm > 0 else np.zeros_like(direction)

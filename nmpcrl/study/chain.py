@@ -7,11 +7,12 @@ so theta = 0 is exactly right. Tsitsiklis and Van Roy (1997); Sutton and Barto (
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.learning import Weights, td_error
+from nmpcrl.learning import Successor, Weights, td_error
 from nmpcrl.learning.learners import UpdateRule
 
 FIRST, SECOND = 0, 1
@@ -47,7 +48,9 @@ class Chain:
 def sampled_step(chain: Chain, rule: UpdateRule, weights: Weights, state: int) -> Weights:
     """One update made in `state`."""
     delta = chain.delta(weights.theta, state)
-    return rule(weights, delta, PHI[state], PHI_NEXT[state])
+    here: Any = Successor(float(PHI[state] @ weights.theta), PHI[state])  # stands in for a solution
+    there = Successor(float(PHI_NEXT[state] @ weights.theta), PHI_NEXT[state])
+    return rule(weights, delta, here, there)
 
 
 def expected_step(chain: Chain, rule: UpdateRule, weights: Weights) -> Weights:

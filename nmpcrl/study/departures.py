@@ -24,11 +24,13 @@ DEPARTURES = {
         why="One flipped sign repairs everything: start and target then each lie 0.5 m inside a"
         " wall, and 11 m at 0.6 m/s take 92 of the 129 steps. With the printed box the robot parks"
         " at x = 3 m and never comes within d_t of the target.",
+        variant="box = 'printed'",
     ),
     "B": Departure(
         gap="The centres of the four obstacles are nowhere given.",
-        reading="Named layouts; A, with centres (0.5, 2.2), (3, 0.5), (5.5, 2.8) and (7, 0.3) m,"
-        " is the default.",
+        reading="Six named layouts; A, with centres (0.5, 2.2), (3, 0.5), (5.5, 2.8) and (7, 0.3) m,"
+        " is the default, and the others are the first that a seeded sampler drew and a screening"
+        " let through, before anything was trained in them.",
         why="Every verdict is about the layouts it was measured in, and says so.",
         variant="layout",
     ),
@@ -50,12 +52,14 @@ DEPARTURES = {
         gap="The noise may carry an action out of the action space; nothing says what happens.",
         reading="The action is clipped to the action space.",
         why="A robot that can drive at 0.6 m/s cannot be told to drive at 1.6 m/s.",
+        variant="clipped",
     ),
     "F": Departure(
         gap="Q(s, a) is the value of an OCP whose first input is free, so it does not depend on a.",
         reading="As written: it is V_theta(s), the value of Eq. (2).",
         why="The paper says that on-policy learning need not fix u_0 = a; but the applied action"
         " is noisy. `Nmpc.solve(state, theta, action=a)` gives the action value proper.",
+        variant="constrained",
     ),
     "G": Departure(
         gap="Algorithm 1 moves theta from the first step on, but first fits the network when the"
@@ -70,6 +74,7 @@ DEPARTURES = {
         " step are not given.",
         reading="ReLU, torch's default initialisation, none, unlimited, one.",
         why="The plainest choices.",
+        variant="network",
     ),
     "I": Departure(
         gap="How the baseline DES is configured is not given.",
@@ -87,6 +92,7 @@ DEPARTURES = {
         " TDC (Maei et al. 2009).",
         reading="As printed; its size is measured from the Hessian of Eq. (2).",
         why="Features that depend on theta have a derivative of their own.",
+        variant="learner = 'TDC'",
     ),
     "L": Departure(
         gap="Where the start of a plan lies exactly on an obstacle's boundary, the derivative of"
@@ -95,6 +101,7 @@ DEPARTURES = {
         " 1e-6.",
         why="Without noise the robot slides along boundaries, so this happens at many steps, and"
         " solvers return any number in between unless a side is chosen.",
+        variant="ties_active",
     ),
     "M": Departure(
         gap="The state box is hard and the obstacle constraint soft; noise can push the state out"
@@ -105,6 +112,7 @@ DEPARTURES = {
         " from a standing start; then the episode ends, is recorded, and the next begins. Ten such"
         " episodes in a row end the run.",
         why="The paper does not say; this keeps what was learned and counts what failed.",
+        variant="box = 'soft'",
     ),
     "N": Departure(
         gap="d_o = 0.35 'm' is added to an overlap that has no dimension.",

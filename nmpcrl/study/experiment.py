@@ -3,12 +3,13 @@
 import gc
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from nmpcrl import Vector
 from nmpcrl.control import Plant
 from nmpcrl.learning import (
     Learner,
@@ -19,10 +20,21 @@ from nmpcrl.learning import (
     expected_sarsa,
     frozen,
     gradient_expected_sarsa,
+    gradient_tdc,
+    q_learning,
+    random_direction,
     regularized_deep_expected_sarsa,
+    step_matched,
 )
 from nmpcrl.study import paper
-from nmpcrl.study.parameters import number, one_of, parameter_vector, true_or_false, whole
+from nmpcrl.study.parameters import (
+    ParameterError,
+    number,
+    one_of,
+    parameter_vector,
+    true_or_false,
+    whole,
+)
 from nmpcrl.study.records import Field, Records, Table
 from nmpcrl.study.training import (
     Diverged,
@@ -36,9 +48,17 @@ from nmpcrl.study.training import (
     train,
 )
 
-LEARNERS = ("ES", "DES", "RDES", "GES", "frozen")
+PAPER = ("ES", "DES", "RDES", "GES")  # the paper's learners
+CONTROLS = ("frozen", "matched", "random")  # what a learner is held against
+LEARNERS = (*PAPER, "TDC", "QL", *CONTROLS)
+MAIN = (*PAPER, "TDC", "frozen")  # of the main table
+NETWORK_LEARNERS = ("DES", "RDES")
 DECAYS = {"step": count_steps, "episode": count_episodes}
 SOLVERS = ("riccati", "fatrop", "ipopt")
+NETWORKS = ("plain", "normalised", "tanh", "small buffer", "four fits")  # departure H
+SMALL_BUFFER = 10 * paper.STEPS  # examples
+THETA_SET = (0.0, 10.0)  # each component of theta is projected into it by TDC
+LEAST_SCALE = 1e-3  # that an input of the normalised network is divided by
 
 SOLVED, RESTARTED, FAILED = range(3)  # the status column
 UNKNOWN = Successor(np.nan)  # of a step that was not bootstrapped
@@ -70,10 +90,19 @@ class Experiment:
     beta: float = paper.BETA
     zeta: float = paper.ZETA
     gated: bool = True  # False: Algorithm 1 literally  # departure G
+    clipped: bool = True  # False: the noise may leave the action space  # departure E
+    constrained: bool = False  # True: Q(s, a), with u_0 = a fixed, instead of V(s)  # departure F
+    network: str = "plain"  # departure H
+    box: str = "hard"  # departures A and M
+    ties_active: bool = False  # the other side of the kink in theta_c  # departure L
+    curvature: bool = True  # of TDC: subtract h
+    projected: bool = True  # of TDC: keep theta in `THETA_SET`
+    beta_tdc: float = paper.BETA_TDC  # step size of w in TDC
     theta: tuple[float, ...] = paper.THETA_INIT
     steps: int = paper.STEPS  # of an episode
     horizon: int = paper.HORIZON
     solver: str = "riccati"
+    tolerance: float = 1e-8  # of the solver
     evaluate_every: int = 10  # episodes between rollouts without noise
 
     def __post_init__(self) -> None:
@@ -81,14 +110,28 @@ class Experiment:
         one_of(self, "layout", tuple(paper.LAYOUTS))
         one_of(self, "decay", tuple(DECAYS))
         one_of(self, "solver", SOLVERS)
+        one_of(self, "network", NETWORKS)
+        one_of(self, "box", paper.BOXES)
         whole(self, "seed", least=0)
         for name in ("episodes", "steps", "horizon", "evaluate_every"):
             whole(self, name, least=1)
-        for name in ("alpha", "beta", "zeta"):
+        for name in ("alpha", "beta", "beta_tdc", "zeta"):
             number(self, name, "a positive number", lambda value: value > 0)
         number(self, "decay_rate", "a number in (0, 1]", lambda value: 0 < value <= 1)
-        true_or_false(self, "gated")
+        number(self, "tolerance", "a number in [1e-12, 1e-2]", lambda value: 1e-12 <= value <= 1e-2)
+        for name in ("gated", "clipped", "constrained", "ties_active", "curvature", "projected"):
+            true_or_false(self, name)
         parameter_vector(self, "theta", len(paper.THETA_INIT))
+        if self.values_actions and not self.clipped:
+            raise ParameterError(
+                f"clipped = False leaves actions that {self.learner} with constrained ="
+                f" {self.constrained} cannot value: they are outside the OCP's bounds"
+            )
+
+    @property
+    def values_actions(self) -> bool:
+        """Whether Q(s, a) proper is learned, with u_0 = a fixed, and not V(s)."""
+        return self.constrained or self.learner == "QL"
 
     def __str__(self) -> str:
         return f"{self.learner} in layout {self.layout}, decay per {self.decay}, seed {self.seed}"
@@ -109,15 +152,14 @@ def run(experiment: Experiment, on_episode: Callable[[int, float], None] | None 
 
 
 def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None) -> Records:
-    controller = Persistent(
-        paper.nmpc(experiment.layout, horizon=experiment.horizon, solver=experiment.solver)
-    )
+    controller = controller_of(experiment)
     learner, weights, explore = prepare(experiment, controller)
     steps, evaluations = _tables(experiment, controller.nmpc.plant)
     evaluations.append(_evaluation(controller, weights, 0, experiment.steps))
     stopped, cost, began = "finished", 0.0, time.perf_counter()
     try:
-        for step in train(learner, controller, weights, explore):
+        options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
+        for step in train(learner, controller, weights, explore, **options):
             seconds = time.perf_counter() - began
             steps.append(_row(step, seconds))
             cost += step.cost
@@ -144,23 +186,48 @@ def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None
     return Records(asdict(experiment), table, judged, facts)
 
 
+def controller_of(experiment: Experiment) -> Persistent:
+    """The controller whose theta is learned."""
+    nmpc = paper.nmpc(
+        experiment.layout,
+        horizon=experiment.horizon,
+        solver=experiment.solver,
+        box=experiment.box,
+        ties_active=experiment.ties_active,
+        tolerance=experiment.tolerance,
+    )
+    return Persistent(nmpc)
+
+
+def frozen_arm(experiment: Experiment) -> Experiment:
+    """The control arm of a run: the same noise and the same controller, and theta never moves."""
+    usual = Experiment()
+    learned = ("alpha", "beta", "zeta", "gated", "constrained", "network", "curvature", "projected")
+    kept = {name: getattr(usual, name) for name in (*learned, "beta_tdc", "ties_active")}
+    return replace(experiment, learner="frozen", **kept)
+
+
 def compile_ahead(experiments: Iterable[Experiment]) -> None:
     """Compile what the runs will call, so that their processes find it done."""
-    for layout, solver in dict.fromkeys((e.layout, e.solver) for e in experiments):
-        nmpc = paper.nmpc(layout, solver=solver)
-        solution = nmpc.solve(nmpc.task.start, np.array(paper.THETA_INIT))
+    kinds = {(e.layout, e.box, e.solver, e.learner == "TDC"): e for e in experiments}
+    for experiment in kinds.values():
+        controller = controller_of(experiment)
+        nmpc, theta = controller.nmpc, np.array(paper.THETA_INIT)
+        solution = nmpc.solve(nmpc.task.start, theta)
         nmpc.plant.step(solution.state, solution.action)
         nmpc.task.stage_cost(solution.state, solution.action)
+        if experiment.learner == "TDC":
+            nmpc.value_hessian_times(solution, theta)
 
 
 def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, Weights, Exploration]:
     """The learner, its first weights and its noise: all that `train` needs besides `controller`.
 
-    One child of the seed for the noise and one for the network, so that all learners of a seed meet
-    the same noise.
+    One child of the seed each for the noise, the network and a control's directions, so that all
+    learners of a seed meet the same noise.
     """
-    noise, network = (
-        np.random.default_rng(c) for c in np.random.SeedSequence(experiment.seed).spawn(2)
+    noise, network, directions = (
+        np.random.default_rng(c) for c in np.random.SeedSequence(experiment.seed).spawn(3)
     )
     plant = controller.nmpc.plant
     shape = (experiment.episodes, experiment.steps)
@@ -170,29 +237,77 @@ def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, We
     )
     theta = np.array(experiment.theta)
     weights = Weights(theta, np.full(theta.size, paper.W_INIT))
-    return _learner(experiment, controller, network), weights, explore
+    if experiment.learner in NETWORK_LEARNERS:
+        learner = _network_learner(experiment, controller, network)
+    else:
+        learner = _solving_learner(experiment, controller, directions)
+    return learner, weights, explore
 
 
-def _learner(experiment: Experiment, controller: Persistent, rng: np.random.Generator) -> Learner:
-    plant, alpha = controller.nmpc.plant, experiment.alpha
-
-    def network(inputs: int) -> QNetwork:
-        return QNetwork(inputs, rng, learning_rate=experiment.zeta, batch=paper.BATCH)
-
+def _solving_learner(
+    experiment: Experiment, controller: Persistent, rng: np.random.Generator
+) -> Learner:
+    """A learner that asks the NMPC for the next value, or asks for none."""
+    alpha, beta = experiment.alpha, experiment.beta
     match experiment.learner:
         case "ES":
             return expected_sarsa(controller, alpha)
         case "GES":
-            return gradient_expected_sarsa(controller, alpha, experiment.beta)
-        case "DES":
-            inputs = plant.n + plant.m
-            return deep_expected_sarsa(controller, network(inputs), alpha, gated=experiment.gated)
-        case "RDES":
-            inputs = plant.n + plant.m + len(experiment.theta)
-            return regularized_deep_expected_sarsa(
-                controller, network(inputs), alpha, gated=experiment.gated
+            return gradient_expected_sarsa(controller, alpha, beta)
+        case "TDC":
+            return gradient_tdc(
+                controller,
+                alpha,
+                experiment.beta_tdc,
+                curvature=experiment.curvature,
+                projection=THETA_SET if experiment.projected else None,
             )
+        case "QL":
+            return q_learning(controller, alpha)
+        case "matched":
+            return step_matched(controller, alpha, beta)
+        case "random":
+            return random_direction(controller, alpha, rng)
     return frozen(controller)
+
+
+def _network_learner(
+    experiment: Experiment, controller: Persistent, rng: np.random.Generator
+) -> Learner:
+    """A learner that asks a network for the next value: DES or RDES."""
+    plant, told = controller.nmpc.plant, experiment.learner == "RDES"
+    options: dict[str, Any] = {
+        "normalised": {"scales": _scales(controller, experiment.theta, told=told)},
+        "tanh": {"activation": "tanh"},
+        "small buffer": {"memory": SMALL_BUFFER},
+    }
+    inputs = plant.n + plant.m + told * len(experiment.theta)
+    network = QNetwork(
+        inputs,
+        rng,
+        learning_rate=experiment.zeta,
+        batch=paper.BATCH,
+        **options.get(experiment.network, {}),
+    )
+    make = regularized_deep_expected_sarsa if told else deep_expected_sarsa
+    fits = 4 if experiment.network == "four fits" else 1
+    return make(controller, network, experiment.alpha, gated=experiment.gated, fits=fits)
+
+
+def _scales(
+    controller: Persistent, theta: tuple[float, ...], *, told: bool
+) -> tuple[Vector, float]:
+    """What the inputs and the target of the normalised network are divided by.
+
+    A state by the box's half width, or pi where it has none; an action by its bound; theta by
+    theta_init; the value by that of theta_init at the start.
+    """
+    nmpc = controller.nmpc
+    half = (nmpc.task.upper - nmpc.task.lower) / 2
+    state = np.where(np.isfinite(half), half, np.pi)
+    parts = [state, nmpc.plant.upper, *([np.abs(theta)] if told else [])]
+    value = nmpc.solve(nmpc.task.start, np.array(theta)).value
+    return np.maximum(np.concatenate(parts), LEAST_SCALE), max(abs(value), LEAST_SCALE)
 
 
 def _tables(experiment: Experiment, plant: Plant) -> tuple[Table, Table]:
@@ -235,8 +350,9 @@ def _row(step: Step, seconds: float) -> tuple[Any, ...]:
     """The row of `Records.steps` for one step of training, in the order of `_tables`."""
     update = step.update
     successor = (update and update.successor) or UNKNOWN
-    first, second = step.solution or UNSOLVED, successor.solution or UNSOLVED
-    restarts = first.restarts + second.restarts
+    first = step.solution or UNSOLVED
+    solves = list(dict.fromkeys(filter(None, (step.plan, step.solution, successor.solution))))
+    restarts = sum(solve.restarts for solve in solves)
     return (
         step.episode,
         step.time,
@@ -252,10 +368,10 @@ def _row(step: Step, seconds: float) -> tuple[Any, ...]:
         successor.loss,
         FAILED if step.failure else RESTARTED if restarts else SOLVED,
         restarts,
-        max(first.violation, second.violation),
-        first.iterations + second.iterations,
-        (first is not UNSOLVED) + (second is not UNSOLVED),
-        first.seconds + second.seconds,
+        max((solve.violation for solve in solves), default=np.nan),
+        sum(solve.iterations for solve in solves),
+        len(solves),
+        sum(solve.seconds for solve in solves),
         successor.seconds,
         seconds,
     )

@@ -61,11 +61,15 @@ def wander(records: Records) -> float:
 
     Infinite where a rollout failed, or training did not get that far.
     """
-    episode, cost = noise_free_cost(records)
-    late = cost[episode >= records.experiment["episodes"] / 2]
+    return wander_of(*noise_free_cost(records), records.experiment["episodes"])
+
+
+def wander_of(episode: Column, cost: Vector, episodes: int) -> float:
+    """`wander` from the rollouts' episodes and costs; the first one judged theta_init."""
+    late = cost[episode >= episodes / 2]
     if not late.size or not np.isfinite(late).all():
         return np.inf
-    return float((late.max() - late.min()) / initial_cost(records))
+    return float((late.max() - late.min()) / cost[0])
 
 
 def excess(records: Records, frozen: Records, last: int = 20) -> float:

@@ -1,15 +1,19 @@
 """Every number of the paper: Table I and the task. Where it is silent or contradicts itself, see
 `DEPARTURES`."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 
 from nmpcrl.control import Nmpc, Obstacle, Task, differential_drive
 from nmpcrl.study.departures import DEPARTURES
 
-__all__ = ["DEPARTURES", "LAYOUTS", "nmpc", "task"]
+__all__ = ["DEPARTURES", "LAYOUTS", "controller", "nmpc", "task", "task_among"]
 
 ALPHA = 1e-7  # step size of theta
 BETA = 1e-8  # step size of w  # departure J
+BETA_TDC = 1.5e-7  # ours, for exact TDC: above alpha; beta ||phi||^2 = 0.57 at theta_init
 ZETA = 1e-2  # learning rate of the network
 GAMMA = 0.97
 W_INIT = 1e-4  # every component of w
@@ -25,34 +29,68 @@ DECAY_RATE = 0.99  # c_epsilon, which is not given  # departure C
 
 START = (-2.5, 1.5, 0.0)  # x [m], y [m], heading [rad]
 TARGET = (8.5, 2.0, np.pi / 2)
-LOWER = (-3.0, -3.0, -np.inf)  # printed as [-9, 3]^2, which excludes the target  # departure A
+LOWER = (-3.0, -3.0, -np.inf)  # departure A
 UPPER = (9.0, 9.0, np.inf)
+PRINTED_LOWER = (-9.0, -9.0, -np.inf)  # the box as printed excludes the target  # departure A
+PRINTED_UPPER = (3.0, 3.0, np.inf)
+BOXES = ("hard", "soft", "printed")  # departures A and M
 
 LAYOUTS = {  # centres of the four obstacles [m]; the paper shows none  # departure B
     "A": ((0.5, 2.2), (3.0, 0.5), (5.5, 2.8), (7.0, 0.3)),
+    # The others are drawn and screened by `layouts.drawn`; the gaps of the last three close.
+    "B": ((-0.3, 3.2), (2.9, 4.3), (3.2, 0.5), (6.9, 0.8)),
+    "C": ((-1.1, 3.3), (0.9, 2.0), (2.5, 4.6), (4.0, -1.3)),
+    "D": ((1.4, -0.3), (3.7, 2.4), (4.6, -0.2), (7.2, -1.0)),
+    "E": ((0.6, 3.4), (2.6, 1.1), (4.3, 3.2), (7.3, -0.8)),
+    "F": ((1.0, 3.2), (2.5, 1.1), (3.6, 4.3), (5.0, -0.5)),
 }
 
 
-def task(layout: str = "A") -> Task:
-    """The robot's task among the four obstacles of a named layout."""
+def task(layout: str = "A", *, box: str = BOXES[0]) -> Task:
+    """The robot's task among the four obstacles of a named layout, in one of `BOXES`."""
     if layout not in LAYOUTS:
         raise ValueError(f"layout = {layout!r} must be one of {', '.join(LAYOUTS)}")
+    if box not in BOXES:
+        raise ValueError(f"box = {box!r} must be one of {', '.join(BOXES)}")
+    return task_among(LAYOUTS[layout], printed_box=box == "printed")
+
+
+def task_among(centres: Iterable[tuple[float, float]], *, printed_box: bool = False) -> Task:
+    """The robot's task among obstacles with these centres [m]."""
     return Task(
         start=np.array(START),
         target=np.array(TARGET),
-        lower=np.array(LOWER),
-        upper=np.array(UPPER),
-        obstacles=tuple(Obstacle(x, y) for x, y in LAYOUTS[layout]),
+        lower=np.array(PRINTED_LOWER if printed_box else LOWER),
+        upper=np.array(PRINTED_UPPER if printed_box else UPPER),
+        obstacles=tuple(Obstacle(x, y) for x, y in centres),
+        target_may_lie_outside=printed_box,
     )
 
 
-def nmpc(layout: str = "A", *, horizon: int = HORIZON, solver: str = "riccati") -> Nmpc:
-    """The paper's controller, Eq. (2) with Table I, among the obstacles of a named layout."""
+def nmpc(
+    layout: str = "A",
+    *,
+    horizon: int = HORIZON,
+    solver: str = "riccati",
+    box: str = BOXES[0],
+    **options: Any,
+) -> Nmpc:
+    """The paper's controller, Eq. (2) with Table I, among the obstacles of a named layout.
+
+    Args:
+        layout: a name in `LAYOUTS`.
+        horizon: N.
+        solver: as `Nmpc` takes it.
+        box: one of `BOXES`.
+        options: further ones of `Nmpc`.
+    """
+    return controller(
+        task(layout, box=box), horizon=horizon, solver=solver, soft_box=box == "soft", **options
+    )
+
+
+def controller(task: Task, **options: Any) -> Nmpc:
+    """The paper's controller, Eq. (2) with Table I, for any task; `options` are those of `Nmpc`."""
     return Nmpc(
-        plant=differential_drive(),
-        task=task(layout),
-        horizon=horizon,
-        gamma=GAMMA,
-        slack_weight=SLACK_WEIGHT,
-        solver=solver,
+        differential_drive(), task, **{"gamma": GAMMA, "slack_weight": SLACK_WEIGHT} | options
     )

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Column = NDArray[Any]
+Tables = dict[str, dict[str, Column]]  # columns by name, by the name of their table
 Field = tuple[str, type] | tuple[str, type, int | tuple[int, ...]]  # name, type[, shape]
 
 
@@ -61,19 +62,8 @@ class Records:
 
     def save(self, path: Path) -> None:
         """Write the whole file beside `path`, then rename it into place."""
-        about = json.dumps({"experiment": self.experiment, "facts": self.facts})
-        arrays = {f"steps/{name}": column for name, column in self.steps.items()}
-        arrays |= {f"evaluations/{name}": column for name, column in self.evaluations.items()}
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".half-", suffix=".tmp")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                np.savez_compressed(file, about=np.array(about), **arrays)  # type: ignore[arg-type]
-                file.flush()
-                os.fsync(file.fileno())
-            Path(name).replace(path)
-        finally:
-            Path(name).unlink(missing_ok=True)
+        about = {"experiment": self.experiment, "facts": self.facts}
+        save_arrays(path, about, {"steps": self.steps, "evaluations": self.evaluations})
 
     @classmethod
     def load(cls, path: Path) -> "Records":
@@ -83,19 +73,8 @@ class Records:
             FileNotFoundError: there is none.
             DamagedRecords: it cannot be read whole.
         """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                about = json.loads(str(file["about"]))
-                tables: dict[str, dict[str, Column]] = {"steps": {}, "evaluations": {}}
-                for key in file.files:
-                    table, _, name = key.partition("/")
-                    if name:
-                        tables[table][name] = file[key]
-            return cls(about["experiment"], tables["steps"], tables["evaluations"], about["facts"])
-        except FileNotFoundError:
-            raise
-        except Exception as error:
-            raise DamagedRecords(f"{path} is damaged, or not a run") from error
+        about, tables = load_arrays(path, ("steps", "evaluations"))
+        return cls(about["experiment"], tables["steps"], tables["evaluations"], about["facts"])
 
     @staticmethod
     def about(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -106,3 +85,46 @@ class Records:
             return about["experiment"], about["facts"]
         except Exception as error:
             raise DamagedRecords(f"{path} is damaged, or not a run") from error
+
+
+def save_arrays(path: Path, about: dict[str, Any], tables: Tables) -> None:
+    """Write columns and facts beside `path`, whole, then rename the file into place."""
+    arrays = {
+        f"{table}/{name}": column
+        for table, columns in tables.items()
+        for name, column in columns.items()
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".half-", suffix=".tmp")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)  # type: ignore[arg-type]
+            file.flush()
+            os.fsync(file.fileno())
+        Path(name).replace(path)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def load_arrays(path: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], Tables]:
+    """The facts and the tables of these names from a file that `save_arrays` wrote.
+
+    Raises:
+        FileNotFoundError: there is none.
+        DamagedRecords: it cannot be read whole.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            about = json.loads(str(file["about"]))
+            tables: Tables = {name: {} for name in names}
+            for key in file.files:
+                table, _, name = key.partition("/")
+                if name:
+                    tables[table][name] = file[key]
+        if not (set(about) >= {"experiment", "facts"} and all(tables.values())):
+            raise LookupError("a table or the facts are missing")
+        return about, tables
+    except FileNotFoundError:
+        raise
+    except Exception as error:
+        raise DamagedRecords(f"{path} is damaged, or not a run") from error

@@ -1,4 +1,4 @@
-"""Many experiments at once: grids of field values, and the grid that the book shows."""
+"""Many experiments at once: grids of field values, and the grid that a chapter shows."""
 
 from collections.abc import Sequence
 from dataclasses import fields
@@ -6,7 +6,7 @@ from itertools import product
 from typing import Any
 
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import DECAYS, LEARNERS, Experiment
+from nmpcrl.study.experiment import DECAYS, PAPER, Experiment
 from nmpcrl.study.parameters import ParameterError
 
 
@@ -45,7 +45,7 @@ def main_study(
     layout: str = "A",
     **others: Any,
 ) -> tuple[Experiment, ...]:
-    """The runs that the book shows: every learner, both readings of the decay, some seeds.
+    """The runs that a chapter shows: the paper's learners, both readings of the decay, some seeds.
 
     Args:
         episodes: length of a run.
@@ -53,5 +53,5 @@ def main_study(
         layout: of the obstacles.
         others: further fields of `Experiment`, as `sweep` takes them.
     """
-    grid = {"learner": LEARNERS, "decay": tuple(DECAYS), "seed": seeds}
+    grid = {"learner": (*PAPER, "frozen"), "decay": tuple(DECAYS), "seed": seeds}
     return sweep(**grid, episodes=episodes, layout=layout, **others)

@@ -27,7 +27,7 @@ def interpreted(plant: Plant) -> ModuleType:
     """
     plain = ModuleType("riccati")
     names = vars(plain)
-    names.update(kernel(plant).py_func.__globals__)  # type: ignore[attr-defined]
+    names.update(kernel(plant).solve.py_func.__globals__)
     for name, found in list(names.items()):
         if hasattr(found, "py_func"):
             names[name] = FunctionType(found.py_func.__code__, names, name)

@@ -52,6 +52,10 @@ class Persistent:
             solution = self.nmpc.solve(state, theta, None, action)
             return replace(solution, restarts=solution.restarts + 1)
 
+    def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
+        """As `Nmpc.value_hessian_times`."""
+        return self.nmpc.value_hessian_times(solution, vector)
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -63,7 +67,8 @@ class Step:
     weights: Weights  # after the step
     action: Vector  # a, noise included, shape (m,); nan where no action was found
     cost: float = np.nan  # l(s, a); nan where no action was found
-    solution: Solution | None = None
+    plan: Solution | None = None  # whose first input is the policy of Eq. (4)
+    solution: Solution | None = None  # whose value is learned; the plan, unless that is Q(s, a)
     update: Update | None = None
     failure: str = ""  # what the solver said, if it failed
 
@@ -96,20 +101,34 @@ def count_episodes(episodes: int, steps: int) -> Counts:
 
 
 def train(
-    learner: Learner, controller: Persistent, weights: Weights, explore: Exploration
+    learner: Learner,
+    controller: Persistent,
+    weights: Weights,
+    explore: Exploration,
+    *,
+    clipped: bool = True,
+    constrained: bool = False,
 ) -> Iterator[Step]:
     """Algorithm 1: as many episodes and steps as `explore` has noise for.
 
     A solve that fails twice ends the episode, and learning goes on from the next one.
 
+    Args:
+        learner: moves the weights.
+        controller: acts, and is what is learned.
+        weights: to start with.
+        explore: the noise.
+        clipped: whether actions are kept in the action space.  # departure E
+        constrained: whether Q(s, a) is solved for, with u_0 = a, instead of V(s).  # departure F
+
     Raises:
         Diverged: theta is no longer usable, or `PATIENCE` episodes in a row ended early.
     """
-    episodes = len(explore.scale)
+    lesson = _Lesson(learner, controller, explore, clipped, constrained)
     failed = 0
-    for episode in range(episodes):
+    for episode in range(len(explore.scale)):
         failure = ""
-        for step in _episode(learner, controller, weights, explore, episode):
+        for step in lesson.episode(episode, weights):
             weights, failure = step.weights, step.failure
             yield step
             if absurd(weights):
@@ -119,35 +138,47 @@ def train(
             raise Diverged(f"{PATIENCE} episodes in a row ended in a failed solve: {failure}")
 
 
-def _episode(
-    learner: Learner,
-    controller: Persistent,
-    weights: Weights,
-    explore: Exploration,
-    episode: int,
-) -> Iterator[Step]:
-    plant, task = controller.nmpc.plant, controller.nmpc.task
-    state, guess = task.start, None
-    for t in range(explore.scale.shape[1]):
-        try:
-            solution = controller.solve(state, weights.theta, guess)
-        except SolverError as error:
-            nothing = np.full(plant.m, np.nan)
-            yield Step(episode, t, state, weights, nothing, failure=str(error))
-            return
-        action = plant.clip(explore(solution.action, episode, t))  # departure E
-        next_state = plant.step(state, action)
-        cost = task.stage_cost(state, action)
-        transition = Transition(state, action, cost, next_state, solution)
-        try:
-            update = learner.step(weights, transition)
-        except SolverError as error:
-            yield Step(episode, t, state, weights, action, cost, solution, failure=str(error))
-            return
-        weights = update.weights
-        yield Step(episode, t, state, weights, action, cost, solution, update)
-        guess = (update.successor and update.successor.solution) or solution
-        state = next_state
+@dataclass(frozen=True, eq=False)
+class _Lesson:
+    """What an episode needs, as in `train`."""
+
+    learner: Learner
+    controller: Persistent
+    explore: Exploration
+    clipped: bool
+    constrained: bool
+
+    def episode(self, episode: int, weights: Weights) -> Iterator[Step]:
+        """The steps of one episode; the last one says so if a solve failed."""
+        controller, constrained = self.controller, self.constrained
+        plant, task = controller.nmpc.plant, controller.nmpc.task
+        state, guess = task.start, None
+        nothing = np.full(plant.m, np.nan)
+        for t in range(self.explore.scale.shape[1]):
+            try:
+                plan = controller.solve(state, weights.theta, guess)
+            except SolverError as error:
+                yield Step(episode, t, state, weights, nothing, failure=str(error))
+                return
+            action = self.explore(plan.action, episode, t)
+            action = plant.clip(action) if self.clipped else action  # departure E
+            next_state = plant.step(state, action)
+            cost = task.stage_cost(state, action)
+            solution = None
+            try:
+                solution = (
+                    controller.solve(state, weights.theta, plan, action) if constrained else plan
+                )
+                transition = Transition(state, action, cost, next_state, solution)
+                update = self.learner.step(weights, transition)
+            except SolverError as error:
+                what = (state, weights, action, cost, plan, solution)
+                yield Step(episode, t, *what, failure=str(error))
+                return
+            weights = update.weights
+            yield Step(episode, t, state, weights, action, cost, plan, solution, update)
+            guess = (update.successor and update.successor.solution) or solution
+            state = next_state
 
 
 def absurd(weights: Weights) -> str:

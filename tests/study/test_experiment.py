@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.study import Experiment, ParameterError, experiment, main_study, paper, run, sweep
-from nmpcrl.study.experiment import DECAYS, LEARNERS, prepare
+from nmpcrl.study.experiment import DECAYS, LEARNERS, PAPER, prepare
 from nmpcrl.study.training import Persistent
 
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
@@ -41,9 +41,19 @@ REFUSED = [
     ("seed", False, "must be a whole number, 0 or more"),
     ("layout", "Z", "must be one of A"),
     ("layout", 1, "must be one of A"),
-    ("learner", "SARSA", "must be one of ES, DES, RDES, GES, frozen"),
-    ("learner", "es", "must be one of ES, DES, RDES, GES, frozen"),
+    ("learner", "SARSA", "must be one of ES, DES, RDES, GES, TDC, QL, frozen, matched, random"),
+    ("learner", "es", "must be one of ES, DES, RDES, GES, TDC, QL, frozen, matched, random"),
     ("decay", "year", "must be one of step, episode"),
+    ("network", "deep", "must be one of plain, normalised, tanh, small buffer, four fits"),
+    ("box", "open", "must be one of hard, soft, printed"),
+    ("clipped", 0, "must be true or false"),
+    ("constrained", "yes", "must be true or false"),
+    ("ties_active", None, "must be true or false"),
+    ("curvature", 1.0, "must be true or false"),
+    ("projected", "off", "must be true or false"),
+    ("beta_tdc", 0.0, "must be a positive number"),
+    ("tolerance", 0.1, "must be a number in [1e-12, 1e-2]"),
+    ("tolerance", 1e-13, "must be a number in [1e-12, 1e-2]"),
     ("solver", "acados", "must be one of riccati, fatrop, ipopt"),
     ("alpha", -1e-7, "must be a positive number"),
     ("alpha", 0, "must be a positive number"),
@@ -102,6 +112,11 @@ def test_whatever_a_field_is_given_it_is_taken_or_refused_by_name(name, value):
     assert refusal.startswith(f"{name} = ")
 
 
+@pytest.mark.parametrize("valued", [{"constrained": True}, {"learner": "QL"}])
+def test_actions_out_of_bounds_cannot_be_valued(valued):
+    assert message_of(Experiment, clipped=False, **valued).startswith("clipped = False ")
+
+
 def test_a_list_that_arrived_as_text_shows_how_to_write_it():
     message = message_of(sweep, seed="[3]", episodes=20)
     assert message.startswith("seeds = '[3]' ")
@@ -136,10 +151,10 @@ def test_theta_is_one_value_of_a_sweep_not_an_axis():
     assert only.theta == (2.0,) * 9
 
 
-def test_the_study_of_the_book_is_five_learners_two_decays_and_the_seeds():
+def test_the_study_of_a_chapter_is_five_learners_two_decays_and_the_seeds():
     experiments = main_study(episodes=7, seeds=[4, 5])
     assert len(experiments) == len(set(experiments)) == 5 * 2 * 2
-    assert {e.learner for e in experiments} == set(LEARNERS)
+    assert {e.learner for e in experiments} == {*PAPER, "frozen"}
     assert {e.decay for e in experiments} == set(DECAYS)
     assert {(e.seed, e.episodes, e.layout) for e in experiments} == {(4, 7, "A"), (5, 7, "A")}
 
@@ -326,7 +341,10 @@ def faulty(fails):
                 raise SolverError(f"call {self.calls - 1} failed", state, theta)
             return super().solve(state, theta, guess, action)
 
-    return lambda layout, **options: Faulty(differential_drive(), paper.task(layout), **options)
+    def nmpc(layout, *, box, **options):
+        return Faulty(differential_drive(), paper.task(layout, box=box), **options)
+
+    return nmpc
 
 
 def test_failures_and_restarts_are_recorded(monkeypatch):

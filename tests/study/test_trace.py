@@ -33,7 +33,7 @@ def stopped(nmpc, state, theta, limit: int) -> tuple[float, float]:
 
     def limited(*arguments):
         *most, start, _, tolerance, point, out = arguments
-        value, iterations, _, violation, error = kernel(nmpc.plant)(
+        value, iterations, _, violation, error = kernel(nmpc.plant).solve(
             *most, start, limit, tolerance, point, out
         )
         reached.append((value, error))

@@ -97,6 +97,32 @@ def test_the_action_is_the_policys_with_noise_and_clipped(sound):
     assert clipped > 0
 
 
+def test_an_action_that_is_not_clipped_is_the_wish(sound):
+    explore = noisy(1, 8)
+    steps = list(train(frozen(sound), sound, first_weights(), explore, clipped=False))
+    for step in steps:
+        wish = step.solution.action + explore.noise[step.episode, step.time]
+        np.testing.assert_array_equal(step.action, wish)
+    assert any((np.abs(step.action) > sound.nmpc.plant.upper).any() for step in steps)
+
+
+def test_where_actions_are_valued_the_solution_has_the_applied_action_first(sound):
+    weights = first_weights()
+    steps = train(es(sound), sound, weights, noisy(2, 5), constrained=True)
+    for step in steps:
+        np.testing.assert_allclose(step.solution.action, step.action, atol=1e-12)
+        afresh = sound.solve(step.state, weights.theta, None, step.action)
+        assert step.solution.value == pytest.approx(afresh.value, rel=1e-6)
+        assert step.solution.value >= step.plan.value - 1e-6
+        free = sound.solve(step.state, weights.theta)
+        assert step.plan.value == pytest.approx(free.value, rel=1e-6)
+        weights = step.weights
+
+
+def test_where_states_are_valued_the_solution_is_the_plan(sound):
+    assert all(step.solution is step.plan for step in training(sound, noisy(1, 5), es))
+
+
 def test_weights_go_from_step_to_step_and_from_episode_to_episode(sound):
     weights = first_weights()
     for step in training(sound, noisy(2, 4), es):

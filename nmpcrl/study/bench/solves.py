@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
 
@@ -134,16 +135,16 @@ def _watched() -> tuple[Nmpc, list[float]]:
     """A controller that has solved once, and a list to which it adds its machine code's times."""
     seconds: list[float] = []
 
-    def watched(plant: Any) -> Solve:
-        kernel = original(plant)
+    def watched(plant: Any) -> SimpleNamespace:
+        code = original(plant)
 
         def timed(*arguments: Any) -> Any:
             began = time.perf_counter()
-            result = kernel(*arguments)
+            result = code.solve(*arguments)
             seconds.append(time.perf_counter() - began)
             return result
 
-        return timed
+        return SimpleNamespace(solve=timed, hessian_times=code.hessian_times)
 
     original, nmpc = interior_point.kernel, paper.nmpc()
     with patch.object(interior_point, "kernel", watched):

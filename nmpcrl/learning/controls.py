@@ -1,0 +1,67 @@
+"""Control arms: what a learner is held against, under the same noise.
+
+| control | theta moves by                                                 |
+|---------|----------------------------------------------------------------|
+| frozen  | nothing                                                        |
+| matched | the direction of ES, as far as GES would move                  |
+| random  | a direction drawn uniformly, as far as ES would move           |
+"""
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.control import Solution
+from nmpcrl.learning.bootstrap import Controller, SecondSolve, Successor, Transition
+from nmpcrl.learning.learners import (
+    Learner,
+    UpdateRule,
+    Weights,
+    gradient_td,
+    semi_gradient,
+)
+from nmpcrl.learning.updates import of_length
+
+
+def frozen(nmpc: Controller) -> Learner:
+    """The same exploration and the same noise, and theta never moves."""
+
+    def nothing(transition: Transition, theta: Vector) -> None:
+        return None
+
+    return Learner("frozen", nothing, lambda weights, *_: weights, nmpc.gamma)
+
+
+def step_matched(nmpc: Controller, alpha: float, beta: float) -> Learner:
+    """ES whose steps are as long as those of GES: is it the direction, or the length?"""
+    rule = as_far_as(gradient_td(alpha, beta, nmpc.gamma), semi_gradient(alpha))
+    return Learner("matched", SecondSolve(nmpc), rule, nmpc.gamma)
+
+
+def random_direction(nmpc: Controller, alpha: float, rng: np.random.Generator) -> Learner:
+    """Steps as long as those of ES, in directions that know nothing.
+
+    Args:
+        nmpc: the controller.
+        alpha: step size of ES.
+        rng: draws the directions.
+    """
+
+    def anywhere(weights: Weights, *_: object) -> Weights:
+        return Weights(weights.theta + rng.normal(size=weights.theta.size), weights.w)
+
+    rule = as_far_as(semi_gradient(alpha), anywhere)
+    return Learner("random", SecondSolve(nmpc), rule, nmpc.gamma)
+
+
+def as_far_as(length: UpdateRule, direction: UpdateRule) -> UpdateRule:
+    """Move theta where one rule would, as far as the other would, which also moves w."""
+
+    def rule(weights: Weights, delta: float, solution: Solution, successor: Successor) -> Weights:
+        moved = length(weights, delta, solution, successor)
+        turned = direction(weights, delta, solution, successor)
+        step = of_length(
+            turned.theta - weights.theta, float(np.linalg.norm(moved.theta - weights.theta))
+        )
+        return Weights(weights.theta + step, moved.w)
+
+    return rule

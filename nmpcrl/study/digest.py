@@ -1,0 +1,257 @@
+"""What a study keeps of a run: tables by episode and by rollout instead of by step.
+
+A run's records take megabytes, most of them noise, and are trained again in seconds; a digest
+takes a hundredth of that and is enough for every figure, verdict and mechanism of the study.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl import Vector
+from nmpcrl.control import Task
+from nmpcrl.study import metrics, paper
+from nmpcrl.study.experiment import Experiment, controller_of, frozen_arm
+from nmpcrl.study.imitation import imitate
+from nmpcrl.study.metrics import LAST, TOUCH
+from nmpcrl.study.records import Column, Records, load_arrays, save_arrays
+
+SIZES = (TOUCH, 0.01, 0.1, np.inf)  # of an overlap Xi: small, medium and large violations
+LATE = 20  # episodes that stand for the end of training; at most the second half
+IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
+
+
+@dataclass(frozen=True, eq=False)
+class Digest:
+    """One run, in short.
+
+    Columns of `episodes`, each of shape (episodes,) unless said: cost (summed RL cost; nan where
+    the episode was cut short or never reached), steps, failed (0 or 1), restarts, inside (states
+    in an obstacle, by `SIZES`, shape (episodes, 3)), overlap (largest Xi), outside (states out of
+    the box), inputs (actions out of bounds), alpha_phi2 (largest alpha ||phi||^2), over (steps with
+    that above 2), delta (root mean square), loss (mean), bias and error (mean and root mean square
+    of the predicted minus the true next value), theta and w (at the end, shape (episodes, d)),
+    iterations (mean), seconds.
+
+    Columns of `evaluations`, one row per rollout without noise: episode (so many were trained),
+    theta (d,), cost (infinite where a solve failed), inside (3 counts), overlap (largest Xi),
+    distance (to the target at the end).
+    """
+
+    experiment: dict[str, Any]  # the fields of the Experiment
+    episodes: dict[str, Column]
+    evaluations: dict[str, Column]
+    states: Column  # of the last rollout without noise, shape (K + 1, n); nan after a failed solve
+    actions: Column  # shape (K + 1, m)
+    facts: dict[str, Any]  # those of the records, and `imitation` where C6 asks for it
+
+    def save(self, path: Path) -> None:
+        """Write the whole file beside `path`, then rename it into place."""
+        rollout = {"states": self.states, "actions": self.actions}
+        tables = {"episodes": self.episodes, "evaluations": self.evaluations, "rollout": rollout}
+        save_arrays(path, {"experiment": self.experiment, "facts": self.facts}, tables)
+
+    @classmethod
+    def load(cls, path: Path) -> "Digest":
+        """Read a file that `save` wrote.
+
+        Raises:
+            FileNotFoundError: there is none.
+            DamagedRecords: it cannot be read whole.
+        """
+        about, tables = load_arrays(path, ("episodes", "evaluations", "rollout"))
+        return cls(
+            about["experiment"],
+            tables["episodes"],
+            tables["evaluations"],
+            tables["rollout"]["states"],
+            tables["rollout"]["actions"],
+            about["facts"],
+        )
+
+    @property
+    def name(self) -> Experiment:
+        """The experiment as the value that names the run."""
+        return Experiment(**self.experiment)
+
+
+def digest(records: Records) -> Digest:
+    """The digest of a run; for a whole run of RDES also how well networks imitate it."""
+    experiment = Experiment(**records.experiment)
+    nmpc = controller_of(experiment).nmpc
+    facts = dict(records.facts)
+    if experiment.learner == IMITATED and experiment.episodes >= paper.EPISODES:
+        imitation = imitate(records)
+        facts["imitation"] = {
+            which: imitation.error(which) for which in ("with_theta", "without_theta")
+        }
+    evaluated = records.evaluations
+    states, actions = metrics.final_rollout(records)
+    evaluations = {name: evaluated[name] for name in ("episode", "theta", "cost")}
+    overlap = nmpc.task.overlap(evaluated["states"]).max(axis=-1)
+    evaluations["inside"] = _sizes(overlap).sum(axis=1)
+    evaluations["overlap"] = np.fmax.reduce(overlap, axis=1)
+    evaluations["distance"] = _distance(evaluated["states"], nmpc.task)
+    episodes = _episodes(records, nmpc.task, nmpc.plant.lower, nmpc.plant.upper)
+    return Digest(records.experiment, episodes, evaluations, states, actions, facts)
+
+
+def row(digest: Digest) -> dict[str, Any]:
+    """One flat row of summary: the experiment's fields, then what became of it."""
+    experiment, episodes, evaluations = digest.experiment, digest.episodes, digest.evaluations
+    fields = experiment | {"theta": " ".join(f"{value!r}" for value in experiment["theta"])}
+    late = slice(-min(LATE, max(1, experiment["episodes"] // 2)), None)
+    cost = evaluations["cost"]
+    summary = {
+        "stopped": digest.facts["stopped"],
+        "initial_cost": float(cost[0]),
+        "final_cost": float(cost[-LAST:].mean()),
+        "best_cost": float(cost.min()),
+        "wander": metrics.wander_of(evaluations["episode"], cost, experiment["episodes"]),
+        "training_cost": float(np.median(np.nan_to_num(episodes["cost"][late], nan=np.inf))),
+        "cut_short": int(np.isnan(episodes["cost"]).sum()),
+        "failed": int(episodes["failed"].sum()),
+        "restarts": int(episodes["restarts"].sum()),
+        "outside": int(episodes["outside"].sum()),
+        "inputs": int(episodes["inputs"].sum()),
+        "steps_done": int(episodes["steps"].sum()),
+        "over": float(episodes["over"].sum() / max(1, episodes["steps"].sum())),
+        "bias": _median(episodes["bias"][late]),
+        "error": _median(episodes["error"][late]),
+        "distance": float(evaluations["distance"][-1]),
+        "iterations": float(np.nanmean(episodes["iterations"])),
+        "seconds": float(digest.facts["seconds"]),
+    }
+    for name, table in (("inside", episodes), ("eval_inside", evaluations)):
+        counts = table["inside"].sum(axis=0)
+        summary |= {
+            f"{name}_{size}": int(count)
+            for size, count in zip(("small", "medium", "large"), counts, strict=True)
+        }
+    summary |= {
+        "worst_overlap": float(np.nanmax(episodes["overlap"])),
+        "eval_worst_overlap": float(np.nanmax(evaluations["overlap"])),
+    }
+    theta = _last_known(episodes["theta"], experiment["theta"])
+    summary |= {f"theta_{i}": float(value) for i, value in enumerate(theta)}
+    imitation = digest.facts.get("imitation", {})
+    summary |= {
+        "imitation_with": imitation.get("with_theta", np.nan),
+        "imitation_without": imitation.get("without_theta", np.nan),
+    }
+    return fields | summary
+
+
+def table(digests: Mapping[Experiment, Digest] | Iterable[Digest]) -> pd.DataFrame:
+    """One `row` a run, with `excess`: its training cost over that of its frozen arm.
+
+    `excess` is nan where that arm is not among the runs.
+    """
+    listed = list(digests.values() if isinstance(digests, Mapping) else digests)
+    rows = {one.name: row(one) for one in listed}
+    for experiment, values in rows.items():
+        arm = rows.get(frozen_arm(experiment))
+        values["excess"] = values["training_cost"] / arm["training_cost"] if arm else np.nan
+    return pd.DataFrame(list(rows.values()))
+
+
+def tidy(digests: Iterable[Digest]) -> pd.DataFrame:
+    """One row an episode of each run: what names the run, and the columns that are numbers."""
+    named = ("learner", "layout", "decay", "seed")
+    frames = []
+    for one in digests:
+        columns = {name: one.experiment[name] for name in named}
+        columns |= {"episode": np.arange(one.experiment["episodes"])}
+        columns |= {name: c for name, c in one.episodes.items() if c.ndim == 1}
+        columns |= {
+            f"theta_{name}": one.episodes["theta"][:, i] for i, name in enumerate(paper.THETA_NAMES)
+        }
+        frames.append(pd.DataFrame(columns))
+    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+
+
+def _episodes(records: Records, task: Task, lower: Vector, upper: Vector) -> dict[str, Column]:
+    """The columns of `Digest.episodes`."""
+    steps = records.steps
+    by = _ByEpisode(steps["episode"], records.experiment["episodes"])
+    overlap = task.overlap(steps["state"]).max(axis=-1)
+    out = np.any((steps["state"] < task.lower) | (steps["state"] > task.upper), axis=1)
+    beyond = np.any((steps["action"] < lower - TOUCH) | (steps["action"] > upper + TOUCH), axis=1)
+    wrong = metrics.online_error(records)
+    return {
+        "cost": metrics.training_cost(records),
+        "steps": by.sum(np.ones(len(overlap))).astype(int),
+        "failed": by.sum(steps["status"] == 2).astype(int),
+        "restarts": by.sum(steps["restarts"]).astype(int),
+        "inside": np.stack([by.sum(size) for size in _sizes(overlap).T], axis=1).astype(int),
+        "overlap": by.reduce(np.fmax, overlap),
+        "outside": by.sum(out).astype(int),
+        "inputs": by.sum(beyond).astype(int),
+        "alpha_phi2": by.reduce(np.fmax, steps["alpha_phi2"]),
+        "over": by.sum(steps["alpha_phi2"] > 2).astype(int),
+        "delta": np.sqrt(by.mean(steps["delta"] ** 2)),
+        "loss": by.mean(steps["loss"]),
+        "bias": by.mean(wrong),
+        "error": np.sqrt(by.mean(wrong**2)),
+        "theta": by.last(steps["theta"]),
+        "w": by.last(steps["w"]),
+        "iterations": by.mean(steps["iterations"].astype(float)),
+        "seconds": by.sum(steps["seconds"]),
+    }
+
+
+class _ByEpisode:
+    """Summaries of a column in each episode; what has no step, or no known value, is nan."""
+
+    def __init__(self, episode: Column, episodes: int) -> None:
+        self._episode, self._episodes = episode, episodes
+        self._reached, self._first = np.unique(episode, return_index=True)
+
+    def sum(self, column: Column) -> Vector:
+        return np.bincount(self._episode, column, minlength=self._episodes).astype(float)
+
+    def mean(self, column: Column) -> Vector:
+        known = np.isfinite(column)
+        count = self.sum(known)
+        return np.divide(
+            self.sum(np.where(known, column, 0.0)),
+            count,
+            np.full(count.shape, np.nan),
+            where=count > 0,
+        )
+
+    def reduce(self, function: np.ufunc, column: Column) -> Vector:
+        return self._spread(function.reduceat(column, self._first))
+
+    def last(self, column: Column) -> Column:
+        return self._spread(column[np.append(self._first[1:], len(column)) - 1])
+
+    def _spread(self, reached: Column) -> Column:
+        result = np.full((self._episodes, *reached.shape[1:]), np.nan)
+        result[self._reached] = reached
+        return result
+
+
+def _sizes(overlap: Column) -> Column:
+    """Whether overlaps are of each of `SIZES`, along a new last axis of length 3."""
+    return np.stack([(overlap > low) & (overlap <= high) for low, high in pairwise(SIZES)], axis=-1)
+
+
+def _distance(states: Column, task: Task) -> Vector:
+    """Distance to the target at the end of each rollout, shape (rollouts,)."""
+    return np.linalg.norm(states[:, -1] - task.target, axis=-1)
+
+
+def _median(values: Vector) -> float:
+    return float(np.nanmedian(values)) if np.isfinite(values).any() else np.nan
+
+
+def _last_known(theta: Column, first: Iterable[float]) -> Vector:
+    """theta after the last episode that was reached."""
+    reached = np.flatnonzero(np.isfinite(theta).all(axis=1))
+    return theta[reached[-1]] if reached.size else np.array(list(first))

@@ -1,0 +1,159 @@
+"""Which layouts of the obstacles a study may use, decided before anything is trained.
+
+`screen` holds a layout against the criteria, `sampler` draws layouts, and `drawn` says which are
+the named ones: A is the first that we tried, the others are the first that a seeded sampler drew
+and the screening let through, so that nobody chose them for what is learned in them.
+
+A layout may be used if
+
+1. the straight way from start to target is blocked;
+2. start and target lie outside every penalty zone, Upsilon = 0;
+3. without noise, the controller with theta_init is at the target after K = 129 steps.
+
+It is called *closing* if a gap that this first drive goes through is closed at theta_c = 0.35,
+where learning may be heading (departure N), and *open* otherwise.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control import Task
+from nmpcrl.study import paper
+from nmpcrl.study.training import Persistent, evaluate
+
+ARRIVED = 0.5  # distance to the target, over all states, at which a drive has arrived
+SEED = 0  # of the sampler that drew the named layouts
+AREA = ((-1.5, 7.5), (-1.5, 5.0))  # of the drawn centres, x and y [m]
+APART = 2.2  # least distance of two drawn centres [m]: no disc touches another
+GRID = 0.1  # drawn centres are multiples of it [m]
+NAMED = {"open": 3, "closing": 3}  # how many layouts of each kind are named, A included
+
+Centres = tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class Screening:
+    """A layout held against the criteria."""
+
+    blocked: bool  # 1: the straight way
+    clear: bool  # 2: start and target
+    arrives: bool  # 3: the drive of theta_init
+    closing: bool  # a gap of this drive is closed at theta_c = d_o
+
+    @property
+    def passed(self) -> bool:
+        """Whether the layout may be used."""
+        return self.blocked and self.clear and self.arrives
+
+    @property
+    def kind(self) -> str:
+        """ "closing" or "open"."""
+        return "closing" if self.closing else "open"
+
+
+def screen(centres: Centres) -> Screening:
+    """Hold a layout against the criteria; nothing is trained for it."""
+    task = paper.task_among(centres)
+    blocked = bool(_distances(task.start[:2], task.target[:2], centres).min() < _keep_out(task, 0))
+    clear = task.collision_penalty(task.start) == 0 == task.collision_penalty(task.target)
+    if not (blocked and clear):
+        return Screening(blocked, clear, arrives=False, closing=False)
+    theta = np.array(paper.THETA_INIT)
+    drive = evaluate(Persistent(paper.controller(task)), theta, paper.STEPS)
+    arrives = not drive.failure and task.distance(drive.states[-1]) <= ARRIVED
+    narrow = [width <= 0 for width in gaps(task, drive.states[:, :2], task.margin).values()]
+    return Screening(blocked, clear, arrives=bool(arrives), closing=any(narrow))
+
+
+def gaps(task: Task, path: Matrix, theta_c: float) -> dict[tuple[int, int], float]:
+    """How wide the gaps are that a path goes through, once theta_c widens the obstacles [m].
+
+    A gap lies between two obstacles if the path crosses the line between their centres, and
+    between an obstacle and a wall if it crosses the shortest line between them. Not above 0, it is
+    closed to plans that keep Eq. (2f).
+
+    Args:
+        task: obstacles and walls.
+        path: positions, shape (steps, 2).
+        theta_c: tightens Eq. (2f).
+
+    Returns:
+        The width of each gap, by the numbers of its two sides; walls are -1 (left), -2 (bottom),
+        -3 (right) and -4 (top).
+    """
+    centres, keep_out = np.transpose(task.discs[:2]), _keep_out(task, theta_c)
+    widths = {}
+    for i, j in combinations(range(len(centres)), 2):
+        if _crosses(path, centres[i], centres[j]):
+            widths[i, j] = float(np.linalg.norm(centres[i] - centres[j])) - 2 * keep_out
+    walls = [(0, task.lower[0]), (1, task.lower[1]), (0, task.upper[0]), (1, task.upper[1])]
+    for i, centre in enumerate(centres):
+        for number, (axis, limit) in enumerate(walls, start=1):
+            foot = centre.copy()
+            foot[axis] = limit
+            if np.isfinite(limit) and _crosses(path, centre, foot):
+                widths[i, -number] = abs(limit - centre[axis]) - keep_out
+    return widths
+
+
+def sampler(seed: int = SEED) -> Iterator[Centres]:
+    """Layouts of four obstacles, without end; the centres are apart, on a grid, and that is all."""
+    rng = np.random.default_rng(seed)
+    (left, right), (bottom, top) = AREA
+    while True:
+        drawn = rng.uniform((left, bottom), (right, top), (4, 2))
+        centres = np.round(np.round(drawn / GRID) * GRID, 6)
+        pairs = combinations(centres, 2)
+        if all(np.linalg.norm(one - other) >= APART for one, other in pairs):
+            yield tuple((float(x), float(y)) for x, y in sorted(centres.tolist()))
+
+
+def drawn() -> dict[str, Centres]:
+    """The named layouts after A: the first that `sampler` draws, until there are `NAMED` of a kind.
+
+    `paper.LAYOUTS` holds them; a test draws them again.
+    """
+    wanted = dict(NAMED)
+    wanted[screen(paper.LAYOUTS["A"]).kind] -= 1
+    found: dict[str, Centres] = {}
+    for centres in sampler():
+        screening = screen(centres)
+        if screening.passed and wanted[screening.kind]:
+            wanted[screening.kind] -= 1
+            found[chr(ord("B") + len(found))] = centres
+        if not any(wanted.values()):
+            return found
+    raise AssertionError("the sampler does not end")
+
+
+def _keep_out(task: Task, theta_c: float) -> float:
+    """Distance [m] from an obstacle's centre at which Xi + theta_c = 0."""
+    clearance = task.discs[2].max()
+    return float(clearance / 2 * np.sqrt(1 + theta_c))
+
+
+def _distances(start: Vector, end: Vector, points: Sequence[Sequence[float]]) -> Vector:
+    """Distance of each point, shape (k, 2), from the segment between two points."""
+    along = end - start
+    away = np.asarray(points) - start
+    share = np.clip(away @ along / (along @ along), 0, 1)
+    return np.linalg.norm(away - share[:, None] * along, axis=1)
+
+
+def _crosses(path: Matrix, one: Vector, other: Vector) -> bool:
+    """Whether a path, shape (steps, 2), crosses the segment between two points."""
+    before, after = path[:-1], path[1:]
+    sides = _side(one, other, before) * _side(one, other, after) <= 0
+    ends = _side(before, after, one) * _side(before, after, other) <= 0
+    moved = (before != after).any(axis=1)
+    return bool((sides & ends & moved).any())
+
+
+def _side(one: Matrix, other: Matrix, point: Matrix) -> Vector:
+    """Positive where a point lies to the left of the way from one point to another."""
+    along, away = np.asarray(other) - one, np.asarray(point) - one
+    return along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0]

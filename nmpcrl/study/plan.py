@@ -1,0 +1,124 @@
+"""The study: which runs decide the claims, and what each is called.
+
+The main table varies what the paper leaves open and no single value can be chosen for: layout,
+reading of the exploration decay, and seed. The variants change one other thing at a time.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+from nmpcrl.study import paper
+from nmpcrl.study.experiment import (
+    DECAYS,
+    MAIN,
+    NETWORK_LEARNERS,
+    NETWORKS,
+    PAPER,
+    Experiment,
+    frozen_arm,
+)
+from nmpcrl.study.sweep import sweep
+from nmpcrl.study.twins import nudged
+
+LAYOUTS = tuple(paper.LAYOUTS)
+SEEDS = tuple(range(10))
+VARIED: dict[str, Any] = {"layout": ("A", "D"), "seed": tuple(range(5))}  # one open, one closing
+FRESH: dict[str, Any] = {"layouts": ("A", "B", "D"), "seeds": tuple(range(5))}
+MAIN_TABLE = "main"
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One thing read otherwise, all else as in the main table."""
+
+    departure: str  # its letter in `DEPARTURES`, or "" where the paper is followed elsewhere
+    changed: str  # in words
+    fields: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    learners: tuple[str, ...] = PAPER
+
+
+def _variants() -> dict[str, Variant]:
+    found = {}
+    for decay, rates in {"step": (0.9, 0.999, 0.9999), "episode": (0.95, 0.98, 0.995)}.items():
+        for rate in rates:
+            changed = f"c_epsilon = {rate:g} per {decay}"
+            found[changed] = Variant("C", changed, {"decay": decay, "decay_rate": rate})
+    found |= {
+        "printed box": Variant("A", "the box as printed, [-9, 3]^2", {"box": "printed"}),
+        "soft box": Variant("M", "the box as soft as the obstacles", {"box": "soft"}),
+        "no clipping": Variant("E", "actions may leave the action space", {"clipped": False}),
+        "Q(s, a)": Variant("F", "u_0 = a fixed where the value is learned", {"constrained": True}),
+        "literal": Variant("G", "theta moves from step 1", {"gated": False}, NETWORK_LEARNERS),
+        "other side of the kink": Variant("L", "ties count as active", {"ties_active": True}),
+    }
+    for network in NETWORKS[1:]:
+        found[network] = Variant("H", f"network: {network}", {"network": network}, NETWORK_LEARNERS)
+    for factor in (0.1, 10, 100):
+        changed = f"beta x {factor:g}"
+        found[changed] = Variant("J", changed, {"beta": factor * paper.BETA}, ("GES",))
+    for factor in (0.1, 0.3, 3):
+        changed = f"alpha x {factor:g}"
+        found[changed] = Variant("", changed, {"alpha": factor * paper.ALPHA})
+    for horizon in (5, 20):
+        found[f"N = {horizon}"] = Variant("", f"horizon N = {horizon}", {"horizon": horizon})
+    found["tolerance 1e-5"] = Variant("", "a looser solver", {"tolerance": 1e-5})
+    theta = nudged(Experiment()).theta
+    found["nudged"] = Variant("", "theta_init moved by 1e-12", {"theta": theta})
+    return found
+
+
+VARIANTS = _variants()
+
+
+def main_table(
+    learners: tuple[str, ...] = MAIN,
+    layouts: tuple[str, ...] = LAYOUTS,
+    seeds: tuple[int, ...] = SEEDS,
+    episodes: int = paper.EPISODES,
+) -> tuple[Experiment, ...]:
+    """Every learner in every layout, in both readings of the decay, with every seed."""
+    return sweep(
+        learner=learners, layout=layouts, decay=tuple(DECAYS), seed=seeds, episodes=episodes
+    )
+
+
+def fresh(episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:
+    """The part of the main table that `make book` trains on the reader's machine."""
+    return main_table(**FRESH, episodes=episodes)
+
+
+def controls(episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:
+    """Learners that only some cells need: matched steps, random directions, and Q-learning."""
+    return sweep(
+        learner=("matched", "random", "QL"), decay=tuple(DECAYS), episodes=episodes, **VARIED
+    )
+
+
+def variant(name: str, episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:
+    """The runs of one variant, with the frozen arms that they are held against."""
+    one = VARIANTS[name]
+    runs = sweep(learner=one.learners, episodes=episodes, **VARIED | dict(one.fields))
+    return (*runs, *dict.fromkeys(map(frozen_arm, runs)))
+
+
+def study(episodes: int = paper.EPISODES) -> dict[Experiment, str]:
+    """Every run of the study with the part that it belongs to, the main table first.
+
+    A run that two parts share is named after the first.
+    """
+    parts = {MAIN_TABLE: main_table(episodes=episodes), "controls": controls(episodes)}
+    parts |= {name: variant(name, episodes) for name in VARIANTS}
+    named: dict[Experiment, str] = {}
+    for name, runs in parts.items():
+        for experiment in runs:
+            named.setdefault(experiment, name)
+    return named
+
+
+def base_of(experiment: Experiment, name: str) -> Experiment:
+    """The run of the main table that a run of variant `name` is held against."""
+    usual = Experiment()
+    changed = {key: getattr(usual, key) for key in VARIANTS[name].fields if key != "decay"}
+    return replace(experiment, **changed)

@@ -1,0 +1,128 @@
+"""A digest says of a run what its records say, and a table puts runs side by side."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from nmpcrl.study import Experiment, metrics, paper, run
+from nmpcrl.study.digest import Digest, digest, row, table, tidy
+from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.records import DamagedRecords, Records
+
+SHORT = Experiment("RDES", episodes=4, steps=40, decay="episode", evaluate_every=2)
+
+
+@pytest.fixture(scope="module")
+def records():
+    return run(SHORT)
+
+
+@pytest.fixture(scope="module")
+def short(records):
+    return digest(records)
+
+
+def test_episodes_say_what_the_steps_say(records, short):
+    steps, episodes = records.steps, short.episodes
+    of = [steps["episode"] == k for k in range(4)]
+    np.testing.assert_allclose(episodes["cost"], [steps["cost"][k].sum() for k in of])
+    np.testing.assert_allclose(episodes["alpha_phi2"], [steps["alpha_phi2"][k].max() for k in of])
+    np.testing.assert_allclose(episodes["iterations"], [steps["iterations"][k].mean() for k in of])
+    np.testing.assert_array_equal(episodes["theta"], [steps["theta"][k][-1] for k in of])
+    np.testing.assert_array_equal(episodes["steps"], [40] * 4)
+    delta = [steps["delta"][k][np.isfinite(steps["delta"][k])] for k in of]
+    known = [k for k in range(4) if delta[k].size]
+    assert 3 in known
+    assert 0 not in known
+    for k in range(4):
+        expected = np.sqrt(np.mean(delta[k] ** 2)) if k in known else np.nan
+        np.testing.assert_allclose(episodes["delta"][k], expected)
+
+
+def test_every_state_in_an_obstacle_is_counted_by_how_far_it_is_in():
+    """States at chosen overlaps of layout A's first obstacle, far from the others."""
+    centre, clearance = paper.LAYOUTS["A"][0], 2.5
+
+    def at(xi):
+        return [centre[0], centre[1] + clearance / 2 * np.sqrt(1 - xi), 0.0]
+
+    state = np.array([at(xi) for xi in (-0.1, 0.005, 0.05, 0.06, 0.5, 0.0)])
+    steps, n = run(replace(SHORT, learner="frozen", episodes=2, steps=3)).steps, len(state)
+    steps |= {"state": state, "action": np.tile([0.7, 0.0], (n, 1))}
+    evaluations = {
+        "episode": np.array([0, 2]),
+        "theta": np.ones((2, 9)),
+        "cost": np.array([5.0, np.inf]),
+        "states": np.array([state[:3], [*state[3:5], [np.nan] * 3]]),
+        "actions": np.zeros((2, 3, 2)),
+    }
+    experiment = asdict(replace(SHORT, learner="frozen", episodes=2, steps=3))
+    facts = {"stopped": "finished", "seconds": 1.0}
+    found = digest(Records(experiment, steps, evaluations, facts))
+    np.testing.assert_array_equal(found.episodes["inside"], [[1, 1, 0], [0, 1, 1]])
+    np.testing.assert_allclose(found.episodes["overlap"], [0.05, 0.5])
+    np.testing.assert_array_equal(found.episodes["inputs"], [3, 3])
+    np.testing.assert_array_equal(found.evaluations["inside"], [[1, 1, 0], [0, 1, 1]])
+    assert np.isnan(found.evaluations["distance"][1])
+    summary = row(found)
+    assert (summary["inside_small"], summary["inside_medium"], summary["inside_large"]) == (1, 2, 1)
+    assert summary["final_cost"] == np.inf
+    assert summary["best_cost"] == 5.0
+
+
+def test_what_was_never_reached_is_not_known():
+    exploding = run(Experiment("ES", episodes=3, steps=6, alpha=1e5))
+    found = digest(exploding)
+    assert found.facts["stopped"].startswith("diverged")
+    assert np.isnan(found.episodes["cost"]).all()
+    assert np.isnan(found.episodes["overlap"][1:]).all()
+    assert row(found)["training_cost"] == np.inf
+    assert row(found)["cut_short"] == 3
+    np.testing.assert_array_equal(found.episodes["theta"][0], exploding.steps["theta"][-1])
+
+
+def test_a_digest_is_stored_and_read_again(short, tmp_path):
+    path = tmp_path / "one.npz"
+    short.save(path)
+    read = Digest.load(path)
+    assert read.name == SHORT
+    for name, column in short.episodes.items():
+        np.testing.assert_array_equal(read.episodes[name], column)
+    np.testing.assert_array_equal(read.states, short.states)
+    assert read.facts == short.facts
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(DamagedRecords, match="damaged, or not a run"):
+        Digest.load(path)
+
+
+def test_records_are_not_taken_for_a_digest(records, tmp_path):
+    records.save(tmp_path / "run.npz")
+    with pytest.raises(DamagedRecords):
+        Digest.load(tmp_path / "run.npz")
+
+
+def test_a_row_measures_as_the_metrics_do(records, short):
+    summary = row(short)
+    assert summary["final_cost"] == metrics.final_cost(records)
+    assert summary["initial_cost"] == metrics.initial_cost(records)
+    assert summary["wander"] == metrics.wander(records)
+    theta = [summary[f"theta_{i}"] for i in range(9)]
+    np.testing.assert_array_equal(theta, metrics.final_theta(records))
+    assert summary["learner"] == "RDES"
+    assert summary["seed"] == 0
+
+
+def test_the_table_holds_each_run_against_its_frozen_arm(records, short):
+    arm = run(frozen_arm(SHORT))
+    frame = table([short, digest(arm)]).set_index("learner")
+    assert frame.excess["frozen"] == 1
+    assert frame.excess["RDES"] == metrics.excess(records, arm)
+    assert np.isnan(table([short]).excess[0])
+
+
+def test_the_tidy_table_has_a_row_an_episode(short):
+    frame = tidy([short])
+    assert len(frame) == 4
+    np.testing.assert_array_equal(frame["theta_c"], short.episodes["theta"][:, -1])
+    assert set(frame.learner) == {"RDES"}

@@ -1,0 +1,68 @@
+"""The study as a list of runs: what varies, and what each run is held against."""
+
+from collections import Counter
+from dataclasses import asdict
+
+import pytest
+
+from nmpcrl.study import Experiment, paper, plan
+from nmpcrl.study.experiment import MAIN, frozen_arm
+
+
+def differing(one: Experiment, other: Experiment) -> set[str]:
+    first, second = asdict(one), asdict(other)
+    return {name for name in first if first[name] != second[name]}
+
+
+def test_the_main_table_has_every_learner_layout_reading_and_seed():
+    runs = plan.main_table()
+    assert len(runs) == len(set(runs)) == len(MAIN) * 6 * 2 * 10
+    assert {e.episodes for e in runs} == {paper.EPISODES}
+    usual = Experiment()
+    assert all(differing(e, usual) <= {"learner", "layout", "decay", "seed"} for e in runs)
+
+
+def test_the_study_begins_with_the_main_table_and_names_every_run_once():
+    study = plan.study()
+    names = list(study.values())
+    main = len(plan.main_table())
+    assert set(names[:main]) == {plan.MAIN_TABLE}
+    assert plan.MAIN_TABLE not in names[main:]
+    assert set(names) == {plan.MAIN_TABLE, "controls", *plan.VARIANTS}
+
+
+def test_what_is_trained_afresh_is_a_part_of_the_main_table_with_every_learner():
+    fresh = set(plan.fresh())
+    assert fresh < set(plan.main_table())
+    assert {e.learner for e in fresh} == set(MAIN)
+    assert len({e.layout for e in fresh}) >= 3
+    assert len({e.seed for e in fresh}) >= 5
+
+
+def test_every_run_of_the_study_has_its_frozen_arm_in_the_study():
+    study = plan.study()
+    assert {frozen_arm(e) for e in study} <= set(study)
+
+
+@pytest.mark.parametrize("name", plan.VARIANTS)
+def test_a_variant_changes_one_thing(name):
+    variant = plan.VARIANTS[name]
+    for experiment in plan.variant(name):
+        if experiment.learner != "frozen":
+            base = plan.base_of(experiment, name)
+            assert differing(experiment, base) == set(variant.fields) - {"decay"}
+            assert base in set(plan.main_table())
+
+
+def test_variants_name_departures_that_there_are_and_no_two_are_the_same():
+    letters = {variant.departure for variant in plan.VARIANTS.values()} - {""}
+    assert letters <= set(paper.DEPARTURES)
+    fields = Counter(str(sorted(dict(v.fields).items())) for v in plan.VARIANTS.values())
+    assert max(fields.values()) == 1
+
+
+def test_a_frozen_arm_meets_the_same_noise_and_ignores_what_only_learning_uses():
+    run = Experiment("GES", seed=3, layout="D", decay="episode", beta=1.0, alpha=2.0, horizon=5)
+    arm = frozen_arm(run)
+    assert differing(run, arm) == {"learner", "alpha", "beta"}
+    assert frozen_arm(arm) == arm
