@@ -5,12 +5,14 @@ from collections.abc import Iterable
 from dataclasses import fields
 from html import escape
 
+import pandas as pd
+
 from nmpcrl.study.audit import Assumption
 from nmpcrl.study.bench.targets import Target
-from nmpcrl.study.claims import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.store import Study
+from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Verdict
 
 BADGES = {
     REPRODUCED: "verdict-reproduced",
@@ -18,12 +20,26 @@ BADGES = {
     NOT: "verdict-not-reproduced",
     UNDECIDABLE: "verdict-undecidable",
 }
+WORDS = {REPRODUCED: "yes", PARTLY: "partly", NOT: "no", UNDECIDABLE: "open"}  # in narrow cells
 MET = {
     True: ("reached", BADGES[REPRODUCED]),
     False: ("missed", BADGES[NOT]),
     None: ("not measured", BADGES[UNDECIDABLE]),
 }
 HELD = {True: ("holds", BADGES[REPRODUCED]), False: ("does not hold", BADGES[NOT])}
+
+
+def claim_table(claims: Iterable[Claim], caption: str) -> str:
+    """One row a claim, in HTML: what will be asked of each run, and how it will be decided."""
+    rows = (
+        (
+            f"<strong>{escape(c.name)}</strong> {escape(c.statement)}",
+            f"{escape(c.question)}<br>{escape(_sentence(c.measure))}",
+            f"{escape(_sentence(c.threshold))}<br>{escape(_sentence(c.test))}",
+        )
+        for c in claims
+    )
+    return _table(caption, ("Claim", "What is asked and measured", "Threshold and test"), rows)
 
 
 def verdict_table(verdicts: Iterable[Verdict], scope: str) -> str:
@@ -34,10 +50,41 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str) -> str:
         scope: what they rest on, a sentence for the caption.
     """
     rows = (
-        (f"<strong>{v.claim}</strong> {escape(v.statement)}", _badge(v.outcome, BADGES[v.outcome]))
+        (
+            f"<strong>{escape(v.claim)}</strong> {escape(v.statement)}",
+            f"{_badge(v.outcome, BADGES[v.outcome])}{_share(v)}",
+        )
         for v in verdicts
     )
     return _table(scope, ("The paper claims", "Here"), rows)
+
+
+def spread_table(verdicts: Iterable[Verdict], caption: str) -> str:
+    """One row a claim, in HTML: its outcome overall, in each layout, and in each reading."""
+    decided = [v for v in verdicts if v.by_layout]
+    layouts = dict.fromkeys(name for v in decided for name in v.by_layout)
+    decays = dict.fromkeys(name for v in decided for name in v.by_decay)
+    header = ("Claim", "All", *(f"Layout {name}" for name in layouts))
+    rows = (
+        (
+            f"<strong>{escape(v.claim)}</strong>",
+            _word(v.outcome),
+            *(_word(v.by_layout.get(name)) for name in layouts),
+            *(_word(v.by_decay.get(name)) for name in decays),
+        )
+        for v in decided
+    )
+    return _table(caption, (*header, *(f"Per {name}" for name in decays)), rows, headed=True)
+
+
+def flip_table(flips: pd.DataFrame, caption: str) -> str:
+    """One row a variant and one column a claim, in HTML; where a verdict flips, what it was."""
+    claims, cells = list(flips.claim.unique()), flips.set_index(["variant", "claim"])
+    rows = (
+        (escape(str(variant)), *(_flip(cells.loc[variant, claim]) for claim in claims))
+        for variant in flips.variant.unique()
+    )
+    return _table(caption, ("Variant", *claims), rows, headed=True)
 
 
 def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
@@ -67,13 +114,16 @@ def evidence(verdicts: Iterable[Verdict]) -> str:
     )
 
 
-def scope(study: Study) -> str:
-    """What a study covers, in a sentence."""
-    layouts, seeds, readings, episodes = (
-        study.values_of(name) for name in ("layout", "seed", "decay", "episodes")
-    )
+def scope(runs: Study | pd.DataFrame) -> str:
+    """What a study, or the table of its runs, covers, in a sentence."""
+    names = ("layout", "seed", "decay", "episodes")
+    if isinstance(runs, pd.DataFrame):
+        values = [tuple(runs[name].unique().tolist()) for name in names]
+    else:
+        values = [runs.values_of(name) for name in names]
+    layouts, seeds, readings, episodes = values
     return (
-        f"Judged from {len(study)} runs of {_all(episodes)} episodes: {_named('layout', layouts)},"
+        f"Judged from {len(runs)} runs of {_all(episodes)} episodes: {_named('layout', layouts)},"
         f" {_named('seed', seeds)}, exploration that decays per {_all(readings, ' and per ')}."
     )
 
@@ -88,25 +138,58 @@ def departure(letter: str) -> str:
 
 
 def _options(names: list[str]) -> str:
-    """The fields of `Experiment` that choose a variant, with their defaults."""
+    """The fields of `Experiment`, or the one value, that choose a variant, with the defaults."""
     defaults = {field.name: field.default for field in fields(Experiment)}
-    given = ", ".join(f"`{name}` (here `{defaults[name]!r}`)" for name in names)
-    return f"Set {given}, as in `sweep({names[0]}=...)`."
+    options = dict(name.partition(" = ")[::2] for name in names)
+    shown = {name: f"{name} = {value}" if value else name for name, value in options.items()}
+    given = ", ".join(f"`{shown[name]}` (here `{defaults[name]!r}`)" for name in options)
+    first, value = next(iter(options.items()))
+    return f"Set {given}, as in `sweep({first}={value or '...'})`."
 
 
-def _table(caption: str, header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """A table whose cells are HTML already."""
-    left = 'scope="col" style="text-align: left"'  # the theme turns headers to the right
-    head = "".join(f"<th {left}>{escape(name)}</th>" for name in header)
-    body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+def _table(
+    caption: str, header: tuple[str, ...], rows: Iterable[tuple[str, ...]], *, headed: bool = False
+) -> str:
+    """A table whose cells are HTML already; `headed` if the first cell of a row is its name."""
+    left = 'style="text-align: left"'  # the theme turns headers to the right
+    head = "".join(f'<th scope="col" {left}>{escape(name)}</th>' for name in header)
+    body = "".join(f"<tr>{_row(row, left if headed else '')}</tr>" for row in rows)
     return (
         f'<table class="table dataframe"><caption>{escape(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
     )
 
 
+def _row(cells: tuple[str, ...], left: str) -> str:
+    first, *others = cells
+    name = f'<th scope="row" {left}>{first}</th>' if left else f"<td>{first}</td>"
+    return name + "".join(f"<td>{cell}</td>" for cell in others)
+
+
 def _badge(text: str, style: str) -> str:
     return f'<span class="{style}">{text}</span>'
+
+
+def _word(outcome: str | None) -> str:
+    """An outcome in a narrow cell: colour and word; nothing where nothing was judged."""
+    return _badge(WORDS[outcome], BADGES[outcome]) if outcome else ""
+
+
+def _flip(cell: pd.Series) -> str:
+    """The cell of a variant and a claim, a row of `flips`."""
+    return _word(cell.outcome) + (f"<br>was {WORDS[cell.base]}" if cell.flips else "")
+
+
+def _share(verdict: Verdict) -> str:
+    """The share on which a verdict rests and its interval, below its badge."""
+    if verdict.share is None or verdict.interval is None:
+        return ""
+    low, high = verdict.interval
+    return f"<br>{verdict.share:.0%} [{low:.0%}, {high:.0%}]"
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _linked(text: str) -> str:

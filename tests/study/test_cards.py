@@ -1,19 +1,31 @@
 """What pages show of verdicts, assumptions and departures."""
 
 import re
+from dataclasses import asdict
 
+import pandas as pd
 import pytest
+from bs4 import BeautifulSoup
 
 from nmpcrl.study import Study, cards, main_study
+from nmpcrl.study.additions import ADDITIONS
 from nmpcrl.study.audit import Assumption
-from nmpcrl.study.claims import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
+from nmpcrl.study.claims import CLAIMS, NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study.paper import DEPARTURES
 
 OUTCOMES = (REPRODUCED, PARTLY, NOT, UNDECIDABLE)
 
 
-def verdict(outcome: str, statement: str = "a < b & c.") -> Verdict:
-    return Verdict("C1", statement, outcome, "4 of 4 runs.", "Elsewhere (departure G).")
+def verdict(outcome: str, **judged) -> Verdict:
+    return Verdict(
+        "C1", "a < b & c.", outcome, "4 of 4 runs.", "Elsewhere (departure G).", **judged
+    )
+
+
+def cells(table: str) -> list[list[str]]:
+    """The words of a table, row by row, its header included."""
+    rows = BeautifulSoup(table, "html.parser").find_all("tr")
+    return [[cell.get_text("|") for cell in row.find_all(["th", "td"])] for row in rows]
 
 
 @pytest.mark.parametrize("outcome", OUTCOMES)
@@ -21,6 +33,49 @@ def test_a_verdict_has_a_badge_of_its_own_and_says_it_in_words(outcome):
     table = cards.verdict_table([verdict(outcome)], "All of it.")
     assert f'<span class="{cards.BADGES[outcome]}">{outcome}</span>' in table
     assert len(set(cards.BADGES.values())) == len(OUTCOMES)
+
+
+def test_a_verdict_shows_its_share_and_interval_where_it_has_one():
+    shares = {"share": 0.75, "interval": (0.5, 0.875)}
+    judged = cells(cards.verdict_table([verdict(PARTLY, **shares), verdict(NOT)], "All of it."))
+    assert [row[1] for row in judged[1:]] == [f"{PARTLY}|75% [50%, 88%]", NOT]
+
+
+def test_a_claim_is_shown_with_all_that_was_fixed_beforehand():
+    claims = [*CLAIMS.values(), *ADDITIONS.values()]
+    shown = cells(cards.claim_table(claims, "Fixed beforehand."))[1:]
+    for claim, row in zip(claims, shown, strict=True):
+        text = " ".join(row).lower()
+        fixed = asdict(claim) | {"would_change": ""}  # that is said of the verdict
+        assert all(part.lower() in text for part in fixed.values())
+
+
+def test_a_claim_is_shown_in_each_layout_and_reading_in_colour_and_in_words():
+    parts = {"by_layout": {"A": REPRODUCED, "B": NOT}, "by_decay": {"step": UNDECIDABLE}}
+    table = cards.spread_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
+    assert cells(table) == [
+        ["Claim", "All", "Layout A", "Layout B", "Per step"],
+        ["C1", "partly", "yes", "no", "open"],  # and no row of what has no layouts
+    ]
+    for outcome in (PARTLY, *parts["by_layout"].values(), UNDECIDABLE):
+        assert f'<span class="{cards.BADGES[outcome]}">{cards.WORDS[outcome]}</span>' in table
+    assert '<th scope="row"' in table
+
+
+def test_a_layout_in_which_a_claim_was_not_asked_is_left_empty():
+    first, second = (verdict(NOT, by_layout={name: NOT}) for name in "AB")
+    table = cells(cards.spread_table([first, second], "All of it."))
+    assert [row[2:] for row in table[1:]] == [["no", ""], ["", "no"]]
+
+
+def test_a_verdict_that_a_variant_flips_is_shown_with_what_it_was():
+    flips = pd.DataFrame(
+        [("<hot>", "C1", NOT, REPRODUCED, True), ("<hot>", "C2", PARTLY, PARTLY, False)],
+        columns=["variant", "claim", "outcome", "base", "flips"],
+    )
+    table = cards.flip_table(flips, "What flips.")
+    assert cells(table) == [["Variant", "C1", "C2"], ["<hot>", "no|was yes", "partly"]]
+    assert "&lt;hot&gt;" in table
 
 
 def test_what_a_claim_says_cannot_break_the_page():
@@ -52,8 +107,20 @@ def test_the_scope_of_one_seed_is_in_the_singular():
     assert "layout A, seed 3, exploration" in cards.scope(study)
 
 
+def test_a_table_of_runs_covers_what_its_study_covers():
+    experiments = main_study(episodes=7, seeds=(3, 5))
+    table = pd.DataFrame([asdict(one) for one in experiments])
+    assert cards.scope(table) == cards.scope(Study(dict.fromkeys(experiments, None)))
+
+
 @pytest.mark.parametrize("letter", DEPARTURES)
 def test_a_departure_shows_all_of_its_entry(letter):
     shown, entry = cards.departure(letter), DEPARTURES[letter]
     assert all(part in shown for part in (entry.gap, entry.reading, entry.why))
     assert ("To run another reading" in shown) == bool(entry.variant)
+
+
+def test_a_variant_that_is_one_value_of_a_field_is_shown_as_it_is_set():
+    shown = cards.departure("M")
+    assert "Set `box = 'soft'` (here `'hard'`), as in `sweep(box='soft')`." in shown
+    assert "as in `sweep(decay=...)`." in cards.departure("C")

@@ -1,0 +1,92 @@
+"""What the verdicts depend on: variants, layouts and readings of the decay against claims."""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from nmpcrl.study.claims import Paths, judge_runs
+from nmpcrl.study.experiment import PAPER
+from nmpcrl.study.plan import MAIN_TABLE
+from nmpcrl.study.verdicts import CELL, UNDECIDABLE, Verdict
+
+COLUMNS = ("variant", "claim", "outcome", "base", "flips", "share", "base_share", "pairs", "p")
+
+
+def flips(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFrame:
+    """Every variant against the claims that runs decide, beside the same cells of the main table.
+
+    A learner of the paper that a variant does not run is one that it does not change, so its runs
+    of the main table stand in for it. A variant without any of them (the controls) is left out.
+
+    Args:
+        runs: of `digest.table`, with a column `variant`.
+        paths: as `judge` takes them, of the variants and of the main table.
+        base: the `variant` of the main table's rows.
+
+    Returns:
+        One row a variant and claim, in order, with the columns variant, claim, outcome, base (the
+        outcome of the main table in the cells of the variant), flips (both are decided, and
+        differ), share, base_share, pairs (how many answered) and p (the chance of shares so
+        different if the variant changed nothing: Fisher's exact test, as if runs were independent).
+    """
+    paper = runs[runs.learner.isin(PAPER)]
+    usual = paper[paper.variant == base]
+    rows = []
+    for name, changed in paper[paper.variant != base].groupby("variant", sort=False):
+        before = usual.merge(changed[CELL].drop_duplicates(), on=CELL)
+        kept = before[~before.learner.isin(changed.learner)]
+        after = judge_runs(pd.concat([changed, kept], ignore_index=True), paths)
+        for verdict, other in zip(after, judge_runs(before, paths), strict=True):
+            judged, held_against = (Cell(v.outcome, *v.counts["all"]) for v in (verdict, other))
+            rows.append(_row(str(name), verdict.claim, judged, held_against))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def spread(verdicts: Iterable[Verdict]) -> pd.DataFrame:
+    """Every layout and reading of the decay against the claims, with the columns of `flips`.
+
+    `base` is the outcome over all of them, and `base_share` the share in the others.
+    """
+    rows = []
+    for verdict in verdicts:
+        named = {name: f"layout {name}" for name in verdict.by_layout}
+        named |= {name: f"decay per {name}" for name in verdict.by_decay}
+        outcomes = verdict.by_layout | verdict.by_decay
+        for name, variant in named.items():
+            yes, of = verdict.counts[name]
+            all_yes, all_of = verdict.counts["all"]
+            others = Cell(verdict.outcome, all_yes - yes, all_of - of)
+            rows.append(_row(variant, verdict.claim, Cell(outcomes[name], yes, of), others))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+class Cell(NamedTuple):
+    """An outcome and the answers that it rests on."""
+
+    outcome: str
+    yes: int
+    of: int
+
+    @property
+    def share(self) -> float:
+        """Share of yes; nan without answers."""
+        return self.yes / self.of if self.of else np.nan
+
+
+def _row(variant: str, claim: str, judged: Cell, base: Cell) -> dict[str, Any]:
+    decided = UNDECIDABLE not in (judged.outcome, base.outcome)
+    answers = [[cell.yes, cell.of - cell.yes] for cell in (judged, base)]
+    return {
+        "variant": variant,
+        "claim": claim,
+        "outcome": judged.outcome,
+        "base": base.outcome,
+        "flips": decided and judged.outcome != base.outcome,
+        "share": judged.share,
+        "base_share": base.share,
+        "pairs": judged.of,
+        "p": float(stats.fisher_exact(answers).pvalue) if judged.of and base.of else np.nan,
+    }

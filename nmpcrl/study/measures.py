@@ -1,0 +1,144 @@
+"""The number behind each claim that runs decide, one a run: to be drawn, and held against borders.
+
+`claims` puts its questions to whole runs; here is what the questions look at.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl.study import claims
+from nmpcrl.study.claims import Paths, experiment_of
+from nmpcrl.study.experiment import PAPER
+from nmpcrl.study.metrics import TOUCH
+from nmpcrl.study.statistics import rate
+from nmpcrl.study.verdicts import CELL, arms, read
+
+Values = pd.DataFrame  # one row a cell of layout, decay and seed, one column an arm; nan: unknown
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What a claim is decided by, and where yes ends."""
+
+    label: str  # of an axis
+    border: float  # as fixed in `claims`
+    of: Callable[[pd.DataFrame, Paths], Values]
+    contrast: bool = False  # asked: is the first arm above the border, and the second not?
+    at_least: bool = False  # asked of each number: is it at least the border? Else: at most?
+
+
+def holds(measure: Measure, values: Values, border: float | None = None) -> pd.Series:
+    """Yes or no for each number, or pair of numbers, that is known.
+
+    Args:
+        measure: of a claim.
+        values: of `measure.of`.
+        border: another one than the claim's.
+    """
+    limit = measure.border if border is None else border
+    if measure.contrast:
+        first, second = (values.dropna()[name] for name in values)
+        return (first > limit) & (second <= limit)
+    numbers = values.stack()
+    return numbers >= limit if measure.at_least else numbers <= limit
+
+
+def at_borders(measure: Measure, values: Values, borders: Iterable[float]) -> pd.DataFrame:
+    """What would become of a claim at other borders than its own, which stays where it is.
+
+    Returns:
+        Columns border, share (of yes), low and high (its interval) and outcome, by the rule of
+        `verdicts` for those that are known; no row where none is.
+    """
+    rows = []
+    for border in borders:
+        answers = holds(measure, values, border)
+        if len(answers):
+            yes, of = int(answers.sum()), len(answers)
+            share = rate(yes, of)
+            rows.append((border, share.value, share.low, share.high, read(yes, of)))
+    return pd.DataFrame(rows, columns=["border", "share", "low", "high", "outcome"])
+
+
+def _excess(runs: pd.DataFrame, _: Paths) -> Values:
+    """Training cost over the frozen arm's; infinite where the run was stopped."""
+
+    def excess(arm: pd.DataFrame) -> pd.Series:
+        return arm.excess.mask(arm.stopped.notna() & (arm.stopped != "finished"), np.inf)
+
+    return _beside(runs, ("DES", "RDES"), excess)
+
+
+def _wander(runs: pd.DataFrame, _: Paths) -> Values:
+    """Range of the noise-free cost over theta_init's; infinite where the run diverged."""
+
+    def wander(arm: pd.DataFrame) -> pd.Series:
+        diverged = claims.divergence(arm)
+        return arm.wander.mask(diverged.fillna(False).astype(bool), np.inf).where(diverged.notna())
+
+    return _beside(runs, ("ES", "GES"), wander)
+
+
+def _apart(runs: pd.DataFrame, paths: Paths) -> Values:
+    """How far RDES and GES are apart, in paths or in costs, whichever is more.
+
+    In shares of `SAME_PATH` and `SAME_COST`; infinite where a drive failed.
+    """
+    rdes, ges = arms(runs, "RDES", "GES")
+    drives = {
+        (row["learner"], *(row[name] for name in CELL)): paths.get(experiment_of(row))
+        for row in runs[runs.learner.isin(("RDES", "GES"))].to_dict("records")
+    }
+    pairs = [(drives.get(("RDES", *c)), drives.get(("GES", *c))) for c in rdes.index]
+    known = [one is not None and other is not None for one, other in pairs]
+    path = pd.Series([claims.apart(*pair) for pair in pairs], rdes.index, dtype=float)
+    cost = claims.costlier(rdes, ges).abs()
+    worse = np.maximum(path / claims.SAME_PATH, cost / claims.SAME_COST).fillna(np.inf)
+    whole = rdes.stopped.notna() & ges.stopped.notna()
+    return pd.DataFrame({"RDES and GES": worse.where(whole & known)})
+
+
+def _told(runs: pd.DataFrame, _: Paths) -> Values:
+    """Held-out error of the network that is told theta over that of the one that is not."""
+    return _beside(
+        runs, ("RDES",), lambda arm: arm.imitation_with / arm.imitation_without, among=PAPER
+    )
+
+
+def _inside(runs: pd.DataFrame, _: Paths) -> Values:
+    """Largest Xi of the drives without noise, 0 if none was above; infinite for a wrong input."""
+    return _beside(
+        runs, PAPER, lambda arm: arm.eval_worst_overlap.clip(lower=0).mask(arm.inputs > 0, np.inf)
+    )
+
+
+def _gain(runs: pd.DataFrame, _: Paths) -> Values:
+    """Share of theta_init's noise-free cost that is saved in the end."""
+    return _beside(runs, ("RDES", "GES"), claims.gain)
+
+
+def _beside(
+    runs: pd.DataFrame,
+    learners: tuple[str, ...],
+    number: Callable[[pd.DataFrame], pd.Series],
+    *,
+    among: tuple[str, ...] = (),
+) -> Values:
+    """A number of each learner's runs, side by side."""
+    found = arms(runs, *learners, among=among)
+    return pd.DataFrame(
+        {name: number(arm).astype(float) for name, arm in zip(learners, found, strict=True)}
+    )
+
+
+MEASURES = {  # of C7, its weaker question: the stronger one has no border to speak of
+    "C1": Measure("training cost / frozen arm's", claims.DIVERGED, _excess, contrast=True),
+    "C2": Measure("range of noise-free cost", claims.UNSTABLE, _wander, contrast=True),
+    "C5": Measure("apart / what counts as the same", 1.0, _apart),
+    "C6": Measure("error with θ / without", claims.MORE_ACCURATE, _told),
+    "C7": Measure("largest Ξ without noise", TOUCH, _inside),
+    "C9": Measure("fall of noise-free cost", claims.BETTER, _gain, at_least=True),
+}

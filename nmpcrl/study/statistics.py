@@ -1,0 +1,162 @@
+"""What a sample of runs says of all runs: estimates with intervals of 95 %.
+
+Scores are summed up as Agarwal et al. (2021) propose: by the interquartile mean and the probability
+of improvement, with a percentile bootstrap that draws within each stratum, here a layout. What is
+inferred holds for these layouts, not for others. Rates get Wilson's (1927) interval, which also has
+a width where all runs agree; a bootstrap would return the one share that it saw.
+
+A failed rollout costs infinitely much and counts as that: it is worse than any that arrived, and it
+ties with another failure. nan is refused, because it cannot be said what it would stand for.
+"""
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from nmpcrl import Vector
+
+CONFIDENCE = 0.95
+RESAMPLES = 2000  # of the bootstrap
+SEED = 0  # of the bootstrap: the same runs give the same interval
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and its interval; nan bounds where there are too few runs for one."""
+
+    value: float
+    low: float
+    high: float
+
+    def __format__(self, form: str) -> str:
+        low, high = format(self.low, form), format(self.high, form)
+        return f"{format(self.value, form)} [{low}, {high}]"
+
+
+def rate(held: int, of: int) -> Estimate:
+    """Share of independent runs in which something held, with Wilson's interval.
+
+    For runs of several layouts it is at least as wide as it need be: a fixed number of runs in each
+    varies less than the same number drawn from the mixture (Hoeffding 1956).
+
+    Raises:
+        ValueError: there are no runs, or more held than there are.
+    """
+    if not 0 <= held <= of or not of:
+        raise ValueError(f"{held} of {of} runs is not a rate")
+    interval = stats.binomtest(held, of).proportion_ci(CONFIDENCE, method="wilson")
+    return Estimate(held / of, float(interval.low), float(interval.high))
+
+
+def interquartile_mean(scores: Vector, strata: Sequence[Hashable]) -> Estimate:
+    """Mean of the middle half of the scores: a mean that a quarter of failures cannot move.
+
+    Infinite where more runs failed than that.
+
+    Args:
+        scores: one a run, shape (runs,).
+        strata: the layout of each run.
+
+    Raises:
+        ValueError: a score is nan, or there are none.
+    """
+    known = _known(scores)
+
+    def middle(*drawn: Vector) -> Vector:
+        return stats.trim_mean(known[np.concatenate(drawn, axis=-1)], 0.25, axis=-1)
+
+    return _bootstrapped(middle, strata)
+
+
+def probability_of_improvement(
+    first: Vector, second: Vector, strata: Sequence[Hashable]
+) -> Estimate:
+    """Probability that a run of the first learner costs less than one of the second.
+
+    Within a layout every run of the one is held against every run of the other, a tie counting one
+    half (Mann and Whitney's U); the layouts weigh the same. Runs of one seed meet the same noise,
+    so the bootstrap draws them together.
+
+    Args:
+        first: costs, shape (runs,).
+        second: costs of the runs with the same layout, decay and seed, shape (runs,).
+        strata: the layout of each pair.
+
+    Raises:
+        ValueError: a cost is nan, there are none, or the two differ in number.
+    """
+    ours, theirs = _known(first), _known(second)
+    if len(ours) != len(theirs):
+        raise ValueError(f"{len(ours)} runs cannot be paired with {len(theirs)}")
+
+    def better(*drawn: Vector) -> Vector:
+        wins = []
+        for pairs in drawn:
+            one, other = ours[pairs][..., :, None], theirs[pairs][..., None, :]
+            wins.append(((one < other) + 0.5 * (one == other)).mean(axis=(-2, -1)))
+        return np.mean(wins, axis=0)
+
+    return _bootstrapped(better, strata)
+
+
+def performance_profile(scores: Vector, thresholds: Vector) -> pd.DataFrame:
+    """Share of the runs whose score reaches each threshold, with the interval of `rate`.
+
+    Args:
+        scores: one a run, the higher the better, shape (runs,).
+        thresholds: tau, in the order wanted.
+
+    Returns:
+        Columns threshold, share, low and high. The band is pointwise.
+
+    Raises:
+        ValueError: a score is nan, or there are none.
+    """
+    known = _known(scores)
+    reached = [rate(int((known >= tau).sum()), len(known)) for tau in thresholds]
+    return pd.DataFrame(
+        {
+            "threshold": np.asarray(thresholds, float),
+            "share": [one.value for one in reached],
+            "low": [one.low for one in reached],
+            "high": [one.high for one in reached],
+        }
+    )
+
+
+def _known(scores: Vector) -> Vector:
+    values = np.asarray(scores, float)
+    unknown = int(np.isnan(values).sum())
+    if unknown or not values.size:
+        raise ValueError(f"{unknown} of {values.size} scores are nan; a failed run scores infinity")
+    return values
+
+
+def _bootstrapped(statistic: Callable[..., Vector], strata: Sequence[Hashable]) -> Estimate:
+    """The statistic of all runs, and its percentile interval under draws within each stratum.
+
+    Args:
+        statistic: of the numbers of the runs drawn from each stratum, shapes (..., runs in it).
+        strata: the stratum of each run. One with a single run has no spread to draw from, and the
+            bounds are nan.
+    """
+    codes, names = pd.factorize(pd.Series(list(strata)))
+    members = [np.flatnonzero(codes == code) for code in range(len(names))]
+    value = float(statistic(*members))
+    if min(map(len, members)) < 2:
+        return Estimate(value, np.nan, np.nan)
+    with np.errstate(invalid="ignore"):  # SciPy's own quantiles interpolate between infinities
+        drawn = stats.bootstrap(
+            members,
+            lambda *samples, axis: statistic(*samples),
+            n_resamples=RESAMPLES,
+            method="percentile",
+            vectorized=True,
+            rng=np.random.default_rng(SEED),
+        ).bootstrap_distribution
+    tail = (1 - CONFIDENCE) / 2
+    low, high = np.quantile(drawn, (tail, 1 - tail), method="inverted_cdf")
+    return Estimate(value, float(low), float(high))

@@ -1,0 +1,225 @@
+"""How a claim is put to many runs, and how their answers become a verdict.
+
+A claim is put to each run, or to each pair of runs with the same layout, decay and seed, as a
+question with the answer yes or no. The share of yes is then read by one rule. It was fixed before
+the study was trained, and is not to be moved after:
+
+- reproduced: the interval of the share lies above `MAJORITY`, and the share is at least
+  `NEARLY_ALL`;
+- not reproduced: the interval lies below `MAJORITY`, and the share is at most `NEARLY_NONE`;
+- not decidable: so few runs were asked that even one answer from all of them would leave the
+  interval about `MAJORITY`, or the answers that are missing would decide;
+- partly reproduced: all else, so that it depends on layout, decay or seed whether the claim holds.
+
+The interval alone would not do: of 1000 runs, 55 % are surely more than half, and surely not what
+"DES diverges" says. Nor would the share alone: two of two runs are all there are. The interval is
+Wilson's everywhere, over all layouts too, where a bootstrap would be sure of what it saw in all
+runs; `statistics.rate` says why it is not too narrow there.
+
+What is missing (a run that was not made, or is shorter than the paper's, or has no frozen arm to be
+held against) is no answer: a verdict stands if it is the same whatever the missing ones would say.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl.study import paper
+from nmpcrl.study.statistics import Estimate, rate
+
+MAJORITY = 0.5
+NEARLY_ALL = 0.9
+NEARLY_NONE = 0.1
+
+REPRODUCED = "reproduced"
+PARTLY = "partly reproduced"
+NOT = "not reproduced"
+UNDECIDABLE = "not decidable here"
+
+CELL = ["layout", "decay", "seed"]  # what two runs share that are held against each other
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What the paper says, or we do, and how it is decided: fixed before the study was trained."""
+
+    name: str  # "C1"
+    statement: str
+    question: str  # what each run, or pair of runs, is asked
+    measure: str  # the numbers that answer it
+    threshold: str  # and the border between yes and no
+    test: str = "share of yes, with its interval"
+    would_change: str = ""  # where another verdict is to be expected
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of one claim."""
+
+    claim: str  # "C1"
+    statement: str  # what the paper says
+    outcome: str  # one of the four above
+    evidence: str  # the numbers
+    would_change: str  # where another verdict is to be expected
+    share: float | None = None  # of the answers, how many are yes; None where no run is asked
+    interval: tuple[float, float] | None = None  # of the share; the missing may say what they like
+    by_layout: dict[str, str] = field(default_factory=dict)  # the outcome in each
+    by_decay: dict[str, str] = field(default_factory=dict)  # and in each reading of the decay
+    counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
+
+
+@dataclass(frozen=True)
+class Answers:
+    """How many runs say yes, no, and nothing."""
+
+    yes: int
+    no: int
+    missing: int = 0
+
+    @property
+    def outcome(self) -> str:
+        """The rule at the top, whatever the missing ones would say."""
+        asked = self.yes + self.no + self.missing
+        least, most = read(self.yes, asked), read(self.yes + self.missing, asked)
+        return least if least == most else UNDECIDABLE
+
+    @property
+    def share(self) -> Estimate | None:
+        """Share of yes among the answers; its interval also covers what the missing may say."""
+        answered, asked = self.yes + self.no, self.yes + self.no + self.missing
+        if not answered:
+            return None
+        low, high = rate(self.yes, asked).low, rate(self.yes + self.missing, asked).high
+        return Estimate(self.yes / answered, low, high)
+
+
+def read(yes: int, of: int) -> str:
+    """The rule at the top, for `yes` of `of` answers of which none is missing."""
+    if not of or rate(of, of).low <= MAJORITY:
+        return UNDECIDABLE
+    share = rate(yes, of)
+    if share.low > MAJORITY and share.value >= NEARLY_ALL:
+        return REPRODUCED
+    if share.high < MAJORITY and share.value <= NEARLY_NONE:
+        return NOT
+    return PARTLY
+
+
+def count(answers: pd.Series) -> Answers:
+    """The answers of some runs: True, False, or missing."""
+    known = answers.dropna().astype(bool)
+    return Answers(int(known.sum()), int((~known).sum()), int(answers.isna().sum()))
+
+
+def settle(
+    claim: Claim,
+    answers: pd.Series,
+    evidence: str,
+    *,
+    weaker: pd.Series | None = None,
+    unit: str = "pairs",
+) -> Verdict:
+    """The verdict on a claim, overall, in each layout and in each reading of the decay.
+
+    Args:
+        claim: what was asked.
+        answers: True, False or missing, indexed by layout, decay, seed and whatever else.
+        evidence: what the numbers are, in sentences.
+        weaker: answers to a weaker question, which a yes to the first implies. Where that one is
+            not refuted, the claim is partly reproduced.
+        unit: what was asked, in the plural.
+    """
+
+    def outcome(group: pd.Series) -> str:
+        strict = count(group).outcome
+        if weaker is None or strict != NOT:
+            return strict
+        lenient = count(weaker[group.index]).outcome
+        return lenient if lenient in (NOT, UNDECIDABLE) else PARTLY
+
+    whole = count(answers)
+    layouts, decays = _groups(answers, "layout"), _groups(answers, "decay")
+    parts = {"all": answers} | layouts | decays
+    return Verdict(
+        claim.name,
+        claim.statement,
+        outcome(answers),
+        f"{evidence} {_held(whole, unit)} {scope(answers)}",
+        claim.would_change,
+        whole.share.value if whole.share else None,
+        (whole.share.low, whole.share.high) if whole.share else None,
+        {name: outcome(group) for name, group in layouts.items()},
+        {name: outcome(group) for name, group in decays.items()},
+        {name: (count(part).yes, int(part.notna().sum())) for name, part in parts.items()},
+    )
+
+
+def arms(
+    runs: pd.DataFrame, *learners: str, among: tuple[str, ...] = ()
+) -> tuple[pd.DataFrame, ...]:
+    """The runs of each learner, in the same order of layout, decay and seed.
+
+    A run that is missing, or shorter than the paper's, is a row of nan.
+
+    Args:
+        runs: of `digest.table`, all of one setting.
+        learners: whose runs are wanted.
+        among: the learners in whose cells they are wanted; by default themselves.
+
+    Raises:
+        ValueError: a learner has two runs in one cell, so that the runs are of several settings.
+    """
+    asked = runs[runs.learner.isin(among or learners)]
+    cells = pd.MultiIndex.from_frame(asked[CELL].drop_duplicates())
+    return tuple(_arm(runs, learner).reindex(cells) for learner in learners)
+
+
+def _arm(runs: pd.DataFrame, learner: str) -> pd.DataFrame:
+    whole = runs[(runs.learner == learner) & (runs.episodes >= paper.EPISODES)].set_index(CELL)
+    twice = whole.index[whole.index.duplicated()]
+    if len(twice):
+        cell = ", ".join(f"{n} {value}" for n, value in zip(CELL, twice[0], strict=True))
+        raise ValueError(
+            f"{learner} has several runs in {cell}: judge the runs of one setting at a time"
+        )
+    return whole
+
+
+def answered(holds: pd.Series, *frames: pd.DataFrame) -> pd.Series:
+    """Answers that are missing where a run of one of the arms is."""
+    known = np.logical_and.reduce([frame.stopped.notna() for frame in frames])
+    return holds.astype("boolean").where(known)
+
+
+def scope(answers: pd.Series) -> str:
+    """What the answers cover."""
+    counts = {name: answers.index.unique(name).size for name in CELL}
+    names = {"layout": "layout", "decay": "reading", "seed": "seed"}
+    parts = [f"{n} {names[name]}{'' if n == 1 else 's'}" for name, n in counts.items()]
+    return f"({parts[0]}, {parts[1]} of the decay, {parts[2]}.)"
+
+
+def _groups(answers: pd.Series, level: str) -> dict[str, pd.Series]:
+    labels = answers.index.get_level_values(level)
+    return {name: answers[labels == name] for name in labels.unique()}
+
+
+def _held(answers: Answers, unit: str) -> str:
+    missing = f"; {answers.missing} {unit} are missing" if answers.missing else ""
+    if answers.share is None:
+        return f"No {unit} are there to be asked{missing}."
+    asked = answers.yes + answers.no
+    return f"It holds in {answers.yes} of {asked} {unit}: {answers.share:.0%}{missing}."
+
+
+def shown(value: float, form: str) -> str:
+    """A number as a sentence shows it; the cost of what could not be finished is infinite."""
+    return f"{value:{form}}" if np.isfinite(value) else str(value).replace("inf", "∞")
+
+
+def median(values: Iterable[float]) -> float:
+    """Of those that are known; nan where none is."""
+    known = np.array([value for value in values if not np.isnan(value)])
+    return float(np.median(known)) if known.size else np.nan
