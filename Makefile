@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book smoke chapter bench test check clean
+.PHONY: help book smoke chapter study bench test check clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 16
@@ -20,6 +20,9 @@ smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/h
 
 chapter: .venv/ready  ## One chapter: make chapter CHAPTER=03_rdes P="-p episodes 20"
 	@$(BIN)/python book/build.py --chapter "$(CHAPTER)" $(P)
+
+study: .venv/ready  ## Train the whole study, or what is missing of it: hours, and it can be interrupted
+	@$(BIN)/python -m nmpcrl study
 
 bench: .venv/ready  ## Measure how long solves, steps and runs take, and print what is reached
 	@$(BIN)/python -m nmpcrl bench

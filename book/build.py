@@ -7,10 +7,12 @@
 Each build has its own place, in the last column, and five steps, each a function:
 
 1. `ask`      run the two first cells of each chapter, its parameters and their check: a bad value
-              ends here, in one sentence; a good one says which experiments the chapter needs,
-              and what is to be done `beforehand`, with the machine to itself
+              ends here, in one sentence; a good one says which `experiments` the chapter needs
+              whole, of which runs it needs `digests`, and what is to be done `beforehand`, with
+              the machine to itself
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
-3. `train`    those experiments whose runs are not stored, once the solver is compiled
+3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
+              the published ones end the build
 4. `execute`  the chapters of the mirror with papermill, two at a time, into PLACE/executed
 5. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html
 
@@ -48,7 +50,7 @@ from tqdm import tqdm
 logging.getLogger("papermill").setLevel(logging.ERROR)  # a page without parameters is no news
 
 ROOT = Path(__file__).resolve().parent.parent
-SMOKE = {"episodes": 4, "length": "smoke"}
+SMOKE = {"episodes": 4, "length": "smoke", "layouts": ["A", "D"], "seeds": [0, 1], "budget": 40}
 INDEX = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><title>{title}</title>
@@ -120,14 +122,17 @@ def refuse_unknown(notebook: Path, given: dict) -> None:
             )
 
 
-def ask(notebook: Path, given: dict) -> tuple[tuple, tuple]:
+NEEDS = ("experiments", "digests", "beforehand")
+
+
+def ask(notebook: Path, given: dict) -> dict[str, tuple]:
     """What a chapter needs: run its parameters cell, set `given`, run its check cell.
 
-    Returns the `experiments` that cell names, and what is to be called `beforehand`.
+    Returns what that cell gives each of `NEEDS`.
     """
     cells = [cell for cell in nbformat.read(notebook, 4).cells if cell.cell_type == "code"]
     if not cells or "parameters" not in cells[0].metadata.get("tags", []):
-        return (), ()
+        return dict.fromkeys(NEEDS, ())
     names = {"__name__": "__main__"}
     try:
         exec(cells[0].source, names)
@@ -135,7 +140,7 @@ def ask(notebook: Path, given: dict) -> tuple[tuple, tuple]:
         exec(cells[1].source, names)
     except ValueError as error:  # ParameterError: the chapter's own sentence
         raise Failure(str(error)) from error
-    return tuple(names.get("experiments", ())), tuple(names.get("beforehand", ()))
+    return {need: tuple(names.get(need, ())) for need in NEEDS}
 
 
 def nearest(name: str, names) -> str:
@@ -167,14 +172,21 @@ def mirror(place: Path, announcement: str) -> Path:
     return source
 
 
-def train(experiments: tuple) -> None:
-    """Run what is not stored yet; the bar is fetch_all's."""
-    from nmpcrl.study import Experiment, fetch_all  # only here: a refusal should not wait for it
+def train(experiments: tuple, digests: tuple) -> None:
+    """Run what is not stored yet; the bars are the store's."""
+    from nmpcrl.study import Experiment, published  # only here: a refusal should not wait for it
     from nmpcrl.study.experiment import compile_ahead
+    from nmpcrl.study.harvest import fetch_digests
+    from nmpcrl.study.store import fetch_all
 
-    compile_ahead(experiments or (Experiment(),))  # a chapter's page is no place for its notice
-    if experiments:
-        fetch_all(experiments, progress=True)
+    compile_ahead((*experiments, *digests) or (Experiment(),))  # no page is a place for its notice
+    fetch_all(experiments, progress=True)
+    contradictions = published.compare(fetch_digests(digests), published.load())
+    if len(contradictions):
+        raise Failure(
+            "Runs that were trained here contradict the published ones:\n"
+            f"{contradictions.to_string(index=False)}"
+        )
 
 
 def execute(notebook: Path, target: Path, log: Path, given: dict) -> tuple[float, str]:
@@ -289,8 +301,9 @@ def build(place: Path, jobs: dict[Path, dict], announcement: str, strict: bool) 
         needs = [ask(notebook, given) for notebook, given in jobs.items()]
         shutil.rmtree(place / "html", ignore_errors=True)
         mirror(place, announcement)
-        train(tuple(dict.fromkeys(one for experiments, _ in needs for one in experiments)))
-        for call in (call for _, beforehand in needs for call in beforehand):
+        wanted = {n: tuple(dict.fromkeys(one for need in needs for one in need[n])) for n in NEEDS}
+        train(wanted["experiments"], wanted["digests"])
+        for call in wanted["beforehand"]:
             call()
         execute_all(place, jobs)
         render(place, strict)

@@ -1,5 +1,6 @@
-"""The command `nmpcrl`: train a run, list what is stored, judge a run without noise."""
+"""The command `nmpcrl`: train a run or the whole study, list and judge what is stored."""
 
+from contextlib import nullcontext
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -110,6 +111,88 @@ def bench(length: str, again: bool) -> None:
     about = measured["about"]
     took = f"{about['length']}, {about['date']}, {about['seconds']:.0f} s"
     click.echo(f"{measure.path()}: {took}; other programs had {about['others']:.0%} of the cores")
+
+
+@main.command()
+@click.option("--part", "parts", multiple=True, help="Only this part: main, controls or a variant.")
+@click.option("--workers", type=click.IntRange(1), help="Processes; as many as cores by default.")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster that trains instead.")
+@click.option("--dry-run", is_flag=True, help="Only say how much is to be done.")
+@click.option("--table", type=click.Path(dir_okay=False, path_type=Path), help="Episodes, as CSV.")
+@click.option("--publish", is_flag=True, help="Judge the whole study and write book/published.")
+def study(
+    parts: tuple[str, ...],
+    workers: int | None,
+    scheduler: str | None,
+    dry_run: bool,
+    table: Path | None,
+    publish: bool,
+) -> None:
+    """Train whatever is missing of the study; interrupt it and start it again as you like."""
+    from nmpcrl.study import cluster, digest, harvest, plan, whole
+
+    chosen = plan.study()
+    unknown = set(parts) - set(chosen.values())
+    if unknown:
+        known = ", ".join(dict.fromkeys(chosen.values()))
+        raise click.ClickException(f"there is no part {min(unknown)!r}; there are {known}")
+    chosen = {e: name for e, name in chosen.items() if not parts or name in parts}
+    missing = [e for e in chosen if not harvest.is_stored(e)]
+    hours = sum(map(harvest.seconds_of, missing)) / 3600
+    click.echo(
+        f"{len(chosen) - len(missing)} of {len(chosen)} runs are stored in {harvest.folder()};"
+        f" the others take about {hours:.1f} hours of one core"
+    )
+    if dry_run:
+        return
+    try:
+        with cluster.executor(scheduler) if scheduler else nullcontext() as executor:
+            found = harvest.fetch_digests(
+                chosen, executor=executor, workers=workers, strict=publish
+            )
+    except (cluster.NoCluster, harvest.Failed) as error:
+        raise click.ClickException(str(error)) from None
+    if len(found) < len(chosen):
+        click.echo(f"{len(chosen) - len(found)} runs failed; why is in {harvest.folder()}")
+    if table:
+        digest.tidy(found.values()).to_csv(table, index=False, float_format="%.7g")
+        click.echo(f"{table}: {table.stat().st_size / 1e6:.0f} MB")
+    if publish:
+        if parts:
+            raise click.ClickException("only the whole study is published: leave --part away")
+        click.echo(f"{whole.publish(found, chosen)}: published")
+
+
+@main.command()
+@click.option("--sample", type=click.IntRange(0), default=0, help="Train so many runs for it.")
+def verify(sample: int) -> None:
+    """Hold the runs that were trained here against the published ones."""
+    from nmpcrl.study import harvest, published
+
+    try:
+        known = published.load()
+    except published.Damaged as error:
+        raise click.ClickException(str(error)) from None
+    if not known.rows:
+        raise click.ClickException(f"nothing is published in {published.place()}")
+    everything = list(known.rows)
+    every = max(1, len(everything) // max(1, sample))
+    drawn = everything[::every][:sample]
+    own = [e for e in everything if e in set(drawn) or harvest.is_stored(e)]
+    if not own:
+        raise click.ClickException(
+            "no run of the study was trained here; --sample 5 trains five for this"
+        )
+    found = harvest.fetch_digests(own)
+    wrong = published.compare(found, known)
+    exact = published.comparable(found, known)
+    click.echo(
+        f"{len(found)} runs: {len(exact)} held against the published ones bit for bit,"
+        f" {len(found) - len(exact)} by distribution, {len(wrong)} contradictions"
+    )
+    if len(wrong):
+        click.echo(wrong.to_string(index=False))
+        raise SystemExit(1)
 
 
 def _verdict(records: Records) -> str:

@@ -171,8 +171,9 @@ def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(sm
 
 
 def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
-    experiments, beforehand = build.ask(ROOT / "book/performance.ipynb", {"length": "smoke"})
-    assert not experiments
-    (call,) = beforehand
+    needs = build.ask(ROOT / "book/performance.ipynb", {"length": "smoke"})
+    assert not needs["experiments"]
+    assert not needs["digests"]
+    (call,) = needs["beforehand"]
     assert call.func.__name__ == "fetch"
     assert call.args == ("smoke",)

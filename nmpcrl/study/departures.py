@@ -28,7 +28,7 @@ DEPARTURES = {
     ),
     "B": Departure(
         gap="The centres of the four obstacles are nowhere given.",
-        reading="Six named layouts; A, with centres (0.5, 2.2), (3, 0.5), (5.5, 2.8) and (7, 0.3) m,"
+        reading="Six named layouts; A, with centres (0.5, 2.2), (3, 0.5), (5.5, 2.8), (7, 0.3) m,"
         " is the default, and the others are the first that a seeded sampler drew and a screening"
         " let through, before anything was trained in them.",
         why="Every verdict is about the layouts it was measured in, and says so.",

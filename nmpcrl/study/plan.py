@@ -4,7 +4,7 @@ The main table varies what the paper leaves open and no single value can be chos
 reading of the exploration decay, and seed. The variants change one other thing at a time.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
@@ -73,9 +73,9 @@ VARIANTS = _variants()
 
 
 def main_table(
-    learners: tuple[str, ...] = MAIN,
-    layouts: tuple[str, ...] = LAYOUTS,
-    seeds: tuple[int, ...] = SEEDS,
+    learners: Sequence[str] = MAIN,
+    layouts: Sequence[str] = LAYOUTS,
+    seeds: Sequence[int] = SEEDS,
     episodes: int = paper.EPISODES,
 ) -> tuple[Experiment, ...]:
     """Every learner in every layout, in both readings of the decay, with every seed."""

@@ -22,7 +22,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from queue import Empty
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from tqdm import tqdm
 
@@ -37,13 +37,16 @@ ATTEMPTS = 3  # how often a run is started whose worker was killed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
-class Study(Mapping[Experiment, Records]):
+Run = TypeVar("Run")  # Records, or the Digest of them
+
+
+class Study(Mapping[Experiment, Run]):
     """Runs by experiment, in the order they were asked for."""
 
-    def __init__(self, runs: Mapping[Experiment, Records]) -> None:
+    def __init__(self, runs: Mapping[Experiment, Run]) -> None:
         self._runs = dict(runs)
 
-    def __getitem__(self, experiment: Experiment) -> Records:
+    def __getitem__(self, experiment: Experiment) -> Run:
         return self._runs[experiment]
 
     def __iter__(self) -> Iterator[Experiment]:
@@ -52,7 +55,7 @@ class Study(Mapping[Experiment, Records]):
     def __len__(self) -> int:
         return len(self._runs)
 
-    def select(self, **fields: Any) -> "Study":
+    def select(self, **fields: Any) -> "Study[Run]":
         """The runs whose experiment has these field values: `select(learner="ES", seed=0)`."""
         return Study(
             {
@@ -84,7 +87,7 @@ def fetch(experiment: Experiment, **options: Any) -> Records:
         path.replace(aside)
         print(f"{error}; it is kept as {aside.name} and the run is done again", file=sys.stderr)
     records = run(experiment, **options)
-    records.facts.update(versions=versions(), machine=platform.machine(), key=key(experiment))
+    records.facts.update(provenance(experiment))
     records.save(path)
     return records
 
@@ -95,7 +98,7 @@ def fetch_all(
     executor: Executor | None = None,
     workers: int | None = None,
     progress: bool = True,
-) -> Study:
+) -> Study[Records]:
     """`fetch` for many: what is missing is trained in parallel, one thread a process.
 
     Args:
@@ -120,7 +123,7 @@ def fetch_all(
             if executor is not None:
                 _train(missing, executor, progress=progress)
             else:
-                with _processes(min(workers or os.cpu_count() or 1, len(missing))) as pool:
+                with processes(min(workers or os.cpu_count() or 1, len(missing))) as pool:
                     _train(missing, pool, progress=progress)
         except BrokenProcessPool:
             if executor is not None:
@@ -147,9 +150,18 @@ def folder() -> Path:
 
 def path_of(experiment: Experiment) -> Path:
     """The file of one experiment."""
+    return folder() / f"{name_of(experiment)}-{key(experiment)[:10]}.npz"
+
+
+def name_of(experiment: Experiment) -> str:
+    """The run's name for people; the key says the rest."""
     e = experiment
-    name = f"{e.learner}-{e.layout}-{e.decay}-seed{e.seed}-{e.episodes}ep-{key(e)[:10]}.npz"
-    return folder() / name
+    return f"{e.learner}-{e.layout}-{e.decay}-seed{e.seed}-{e.episodes}ep"
+
+
+def provenance(experiment: Experiment) -> dict[str, Any]:
+    """The facts that say where a run was made, and what its numbers depend on."""
+    return {"versions": versions(), "machine": platform.machine(), "key": key(experiment)}
 
 
 def key(experiment: Experiment) -> str:
@@ -199,7 +211,7 @@ def _is_whole(path: Path) -> bool:
     return True
 
 
-def _processes(workers: int) -> ProcessPoolExecutor:
+def processes(workers: int) -> ProcessPoolExecutor:
     """Worker processes with one thread each; the setting is inherited, so it is made here."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
     quiet = (signal.SIGINT, signal.SIG_DFL)  # an interrupt ends a worker without a traceback
@@ -207,7 +219,7 @@ def _processes(workers: int) -> ProcessPoolExecutor:
 
 
 @contextmanager
-def _without_main() -> Iterator[None]:
+def without_main() -> Iterator[None]:
     """Hide the caller's script from new processes, which would otherwise run it again.
 
     So a script needs no `if __name__ == "__main__"`, and one read from standard input works too.
@@ -224,8 +236,8 @@ def _train(missing: list[Experiment], executor: Executor, *, progress: bool) -> 
     """Run `missing` and show how far they are; the first failure is raised when all have ended."""
     total = sum(e.episodes for e in missing)
     with (
-        tqdm(total=total, unit="ep", disable=not progress, mininterval=_interval()) as bar,
-        _without_main(),
+        tqdm(total=total, unit="ep", disable=not progress, mininterval=interval()) as bar,
+        without_main(),
         SPAWN.Manager() as manager,
     ):
         reports = manager.Queue()
@@ -240,7 +252,7 @@ def _train(missing: list[Experiment], executor: Executor, *, progress: bool) -> 
             future.result()
 
 
-def _interval() -> float:
+def interval() -> float:
     """Seconds between two states of the bar: a log keeps every one, a terminal the last."""
     return 0.1 if sys.stderr.isatty() else 30.0
 

@@ -1,0 +1,133 @@
+"""Where a chapter's evidence comes from: runs trained here, published ones, or both.
+
+`book/published` holds the whole study as it was trained once. A reader's machine trains a part of
+it afresh, which takes the place of the published runs of the same name; so a figure or a verdict
+can rest on both, and says so.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import pandas as pd
+
+from nmpcrl.study import paper, plan
+from nmpcrl.study.digest import Digest, table
+from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
+from nmpcrl.study.harvest import fetch_digests
+from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.published import load
+from nmpcrl.study.records import Column
+from nmpcrl.study.store import Study
+
+SOURCES = ("fresh", "published")
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """Runs, their summaries, and where each comes from."""
+
+    digests: Study[Digest]  # a published one has fewer columns: see `Published`
+    runs: pd.DataFrame  # `digest.table` with `variant` and `source`, one row a run, in that order
+
+    @cached_property
+    def main(self) -> "Evidence":
+        """The runs of the main table alone."""
+        return self.where(self.runs.variant == plan.MAIN_TABLE)
+
+    def where(self, holds: Iterable[bool]) -> "Evidence":
+        """The runs for which it holds."""
+        kept = list(holds)
+        chosen = {
+            one: digest
+            for (one, digest), keep in zip(self.digests.items(), kept, strict=True)
+            if keep
+        }
+        return Evidence(Study(chosen), self.runs[kept].reset_index(drop=True))
+
+    @property
+    def mark(self) -> str:
+        """What was trained here and what is published, for a caption."""
+        fresh = int((self.runs.source == "fresh").sum())
+        counts = {"trained for this page": fresh, "published": len(self.runs) - fresh}
+        parts = [f"{count} runs {where}" for where, count in counts.items() if count]
+        return ", ".join(parts) or "no runs"
+
+
+def needed(
+    source: str,
+    *,
+    learners: Sequence[str] = MAIN,
+    layouts: Sequence[str] = plan.LAYOUTS,
+    seeds: Sequence[int] = plan.SEEDS,
+    episodes: int = paper.EPISODES,
+) -> tuple[Experiment, ...]:
+    """The runs of the main table that have to be trained here.
+
+    All that is asked for and not published, if `source` is "fresh", and of what is published
+    `plan.fresh`; none if it is "published".
+
+    Raises:
+        ParameterError: a value is not what it may be, or something asked for is not published.
+    """
+    if source not in SOURCES:
+        raise ParameterError(f"study = {source!r} must be one of {', '.join(SOURCES)}")
+    asked = _asked(learners, layouts, seeds, episodes)
+    known = load().digests
+    if source == "published":
+        for experiment in asked:
+            if experiment not in known:
+                raise ParameterError(
+                    f"study = 'published' holds no run of {experiment} over {experiment.episodes}"
+                    " episodes; study = 'fresh' trains it"
+                )
+        return ()
+    afresh = set(plan.fresh())
+    return tuple(e for e in asked if e in afresh or e not in known)
+
+
+def gather(
+    source: str, *, variants: bool = False, **asked: Sequence[str] | Sequence[int] | int
+) -> Evidence:
+    """The runs that a chapter rests on; what `needed` names is trained if it is not stored.
+
+    Args:
+        source: "fresh" or "published".
+        variants: whether to add the published controls and variants.
+        asked: as `needed` takes it.
+
+    Raises:
+        ParameterError: as `needed`.
+    """
+    here = fetch_digests(needed(source, **asked))  # type: ignore[arg-type]
+    published = load()
+    wanted: dict[Experiment, str] = dict.fromkeys(_asked(**asked), plan.MAIN_TABLE)  # type: ignore[arg-type]
+    if variants:
+        wanted = {
+            e: name for e, name in published.variants.items() if name != plan.MAIN_TABLE
+        } | wanted
+    digests: dict[Experiment, Digest] = {
+        e: here[e] if e in here else published.digests[e] for e in wanted
+    }
+    rows = {**published.rows, **dict(zip(here, table(here).to_dict("records"), strict=True))}
+    runs = pd.DataFrame([rows[e] for e in wanted])
+    runs["variant"] = list(wanted.values())
+    runs["source"] = ["fresh" if e in here else "published" for e in wanted]
+    arms = [rows.get(frozen_arm(e), {}).get("training_cost") for e in wanted]
+    runs["excess"] = runs.training_cost / pd.Series(arms, dtype=float)
+    return Evidence(Study(digests), runs)
+
+
+def paths(evidence: Evidence) -> Mapping[Experiment, Column]:
+    """States of each run's last drive without noise, as `claims.judge` takes them."""
+    return {experiment: digest.states for experiment, digest in evidence.digests.items()}
+
+
+def _asked(
+    learners: Sequence[str] = MAIN,
+    layouts: Sequence[str] = plan.LAYOUTS,
+    seeds: Sequence[int] = plan.SEEDS,
+    episodes: int = paper.EPISODES,
+) -> tuple[Experiment, ...]:
+    runs = plan.main_table(learners, layouts, seeds, episodes)
+    return tuple(dict.fromkeys((*runs, *map(frozen_arm, runs))))

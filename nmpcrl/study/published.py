@@ -1,0 +1,248 @@
+"""The whole study as it was trained once, in `book/published`, small enough to go with the book.
+
+- `runs.csv`: one row a run, `digest.row`, with the part of the study it belongs to and its key;
+- `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
+  theta of the rollouts without noise, and the states of the last one;
+- `verdicts.json`: what became of each claim;
+- `about.json`: code, libraries and machine.
+"""
+
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+import nmpcrl
+from nmpcrl.study import harvest, store
+from nmpcrl.study.bench.measure import machine
+from nmpcrl.study.claims import experiment_of
+from nmpcrl.study.digest import Digest, row
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.records import Column
+from nmpcrl.study.verdicts import Verdict
+
+CELL = ("learner", "layout", "decay")  # runs that differ in nothing but the seed
+MEASURES = (
+    "final_cost",
+    "training_cost",
+)  # by which runs on another machine are held against these
+SLACK = (
+    0.01  # of theta_init's cost, that a run on another machine may be out of the published spread
+)
+EXACT = 1e-6  # relative: the cost of theta_init, which no noise and no learning moves
+
+
+class Damaged(ValueError):
+    """What is published cannot be read."""
+
+
+@dataclass(frozen=True, eq=False)
+class Published:
+    """The published study; empty where nothing is published.
+
+    Of a digest it holds episodes["cost"], evaluations["episode"], ["theta"] and ["cost"], states
+    and the facts "stopped" and "seconds"; single precision but for the summaries in `rows`.
+    """
+
+    digests: Mapping[Experiment, Digest] = field(default_factory=dict)
+    variants: Mapping[Experiment, str] = field(default_factory=dict)  # the part each belongs to
+    rows: Mapping[Experiment, dict[str, Any]] = field(default_factory=dict)  # of `runs.csv`
+    verdicts: tuple[Verdict, ...] = ()
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+
+def place() -> Path:
+    """The folder, or what the environment variable NMPCRL_PUBLISHED says."""
+    beside = Path(nmpcrl.__file__).parent.parent / "book" / "published"
+    return Path(os.environ.get("NMPCRL_PUBLISHED", beside))
+
+
+def publish(
+    digests: Mapping[Experiment, Digest],
+    variants: Mapping[Experiment, str],
+    verdicts: Sequence[Verdict],
+) -> Path:
+    """Write all files anew; the same content gives the same bytes, but for the date.
+
+    Args:
+        digests: the runs.
+        variants: the part of the study that each belongs to.
+        verdicts: on the claims.
+
+    Returns:
+        Where they are.
+    """
+    folder = place()
+    folder.mkdir(parents=True, exist_ok=True)
+    labels = {e: {"variant": variants[e], "key": harvest.key(e)} for e in digests}
+    runs = pd.DataFrame([row(one) | labels[e] for e, one in digests.items()])
+    runs.to_csv(folder / "runs.csv", index=False)
+    curves: dict[str, Any] = _curves(list(digests.values()))
+    np.savez_compressed(folder / "curves.npz", **curves)
+    _write(folder / "verdicts.json", [asdict(verdict) for verdict in verdicts])
+    about = {
+        "date": datetime.now(UTC).date().isoformat(),
+        "code": harvest.key(Experiment()),
+        "versions": store.versions(),
+        "machine": machine(),
+        "runs": runs.variant.value_counts(sort=False).to_dict(),
+        "hours": float(runs.seconds.sum() / 3600),
+    }
+    _write(folder / "about.json", about)
+    return folder
+
+
+def load() -> Published:
+    """What is published.
+
+    Raises:
+        Damaged: a file is missing, or not what `publish` wrote.
+    """
+    return _load(place())
+
+
+@cache
+def _load(folder: Path) -> Published:
+    if not (folder / "runs.csv").exists():
+        return Published()
+    try:
+        runs = pd.read_csv(folder / "runs.csv", float_precision="round_trip")
+        rows = {experiment_of(one): one for one in runs.to_dict("records")}
+        with np.load(folder / "curves.npz", allow_pickle=False) as file:
+            curves = {name: file[name] for name in file.files}
+        verdicts = json.loads((folder / "verdicts.json").read_text())
+        about = json.loads((folder / "about.json").read_text())
+        return Published(
+            {e: _digest(one, curves, i) for i, (e, one) in enumerate(rows.items())},
+            {e: one["variant"] for e, one in rows.items()},
+            rows,
+            tuple(_verdict(one) for one in verdicts),
+            about,
+        )
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise Damaged(
+            f"{folder} is damaged ({error}); `git checkout` or `nmpcrl study --publish` mends it"
+        ) from error
+
+
+def compare(fresh: Mapping[Experiment, Digest], published: Published) -> pd.DataFrame:
+    """Where runs that were trained here contradict the published ones: one row each, none if none.
+
+    Where code, versions and machine are the same, every run must be the same to the last bit.
+    Elsewhere rounding differs, and learning may make much of that. So theta_init's cost must agree
+    to `EXACT`, and of the runs of a learner, layout and reading of the decay at least half must lie
+    within the spread of the published ones, widened on both sides by itself and by `SLACK`.
+    """
+    rows = {e: row(one) for e, one in fresh.items() if e in published.rows}
+    exact = comparable(rows, published)
+    wrong = [_unequal(e, rows[e], published.rows[e]) for e in sorted(exact, key=str)]
+    others = {e: one for e, one in rows.items() if e not in exact}
+    wrong += _out_of_spread(others, published)
+    names = [*CELL, "seed", "what", "here", "published"]
+    return pd.DataFrame([one for one in wrong if one], columns=names)
+
+
+def comparable(runs: Iterable[Experiment], published: Published) -> set[Experiment]:
+    """Those of which code, versions and machine are the ones of the published runs."""
+    if published.about.get("machine") != machine():
+        return set()
+    known = published.rows
+    return {e for e in runs if e in known and known[e]["key"] == harvest.key(e)}
+
+
+def _unequal(e: Experiment, here: dict[str, Any], there: dict[str, Any]) -> tuple[Any, ...] | None:
+    """The first number in which two runs differ that should be the same."""
+    compared = [*MEASURES, "initial_cost", *(f"theta_{i}" for i in range(len(e.theta)))]
+    for name in compared:
+        if here[name] != there[name]:
+            return e.learner, e.layout, e.decay, e.seed, name, here[name], str(there[name])
+    return None
+
+
+def _out_of_spread(
+    rows: Mapping[Experiment, dict[str, Any]], published: Published
+) -> list[tuple[Any, ...]]:
+    """The rule for runs of another machine; see `compare`."""
+    wrong: list[tuple[Any, ...]] = []
+    if not rows:
+        return wrong
+    known = pd.DataFrame([published.rows[e] for e in published.rows])
+    known = known[known.variant.isin({published.variants[e] for e in rows})]
+    for cell, group in pd.DataFrame(list(rows.values())).groupby(list(CELL)):
+        there = known[(known[list(CELL)] == cell).all(axis=1)]
+        start = float(there.initial_cost.iloc[0])
+        for seed, here in zip(group.seed, group.initial_cost, strict=True):
+            if abs(here / start - 1) > EXACT:
+                wrong.append((*cell, seed, "initial_cost", here, str(start)))
+        for name in MEASURES:
+            low, high = _widened(there[name].to_numpy(float), SLACK * start)
+            outside = ~group[name].between(low, high)
+            if outside.mean() > 0.5:
+                middle = float(group[name].median())
+                wrong.append((*cell, "all", name, middle, f"{low:.1f} to {high:.1f}"))
+    return wrong
+
+
+def _widened(values: Column, slack: float) -> tuple[float, float]:
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return -np.inf, np.inf
+    spread = float(np.ptp(finite)) + slack
+    most = np.inf if finite.size < values.size else float(finite.max()) + spread
+    return float(finite.min()) - spread, most
+
+
+def _curves(digests: list[Digest]) -> dict[str, Column]:
+    """Columns of all runs, padded with nan to one length; shape (runs, ...)."""
+    return {
+        "cost": _padded([one.episodes["cost"] for one in digests]),
+        "judged_after": _padded([one.evaluations["episode"] for one in digests]),
+        "judged_cost": _padded([one.evaluations["cost"] for one in digests]),
+        "judged_theta": _padded([one.evaluations["theta"] for one in digests]),
+        "states": _padded([one.states for one in digests]),
+    }
+
+
+def _padded(columns: list[Column]) -> Column:
+    longest = max(map(len, columns))
+    result = np.full((len(columns), longest, *columns[0].shape[1:]), np.nan, np.float32)
+    for into, column in zip(result, columns, strict=True):
+        into[: len(column)] = column
+    return result
+
+
+def _digest(summary: dict[str, Any], curves: Mapping[str, Column], i: int) -> Digest:
+    judged = np.isfinite(curves["judged_after"][i])
+    experiment = asdict(experiment_of(summary))
+    return Digest(
+        experiment,
+        {"cost": curves["cost"][i][: experiment["episodes"]]},
+        {
+            "episode": curves["judged_after"][i][judged].astype(int),
+            "theta": curves["judged_theta"][i][judged],
+            "cost": curves["judged_cost"][i][judged],
+        },
+        curves["states"][i][: experiment["steps"]],
+        np.empty((0, 0)),
+        {"stopped": summary["stopped"], "seconds": summary["seconds"]},
+    )
+
+
+def _verdict(stored: dict[str, Any]) -> Verdict:
+    """A verdict as JSON has it, with its tuples again."""
+    interval = stored["interval"] and tuple(stored["interval"])
+    counts = {name: tuple(pair) for name, pair in stored["counts"].items()}
+    return Verdict(**stored | {"interval": interval, "counts": counts})
+
+
+def _write(path: Path, content: Any) -> None:
+    half = path.with_suffix(".half")
+    half.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+    half.replace(path)

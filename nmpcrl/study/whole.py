@@ -1,0 +1,47 @@
+"""The whole study judged: everything that `published` keeps, from the digests of all runs."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from nmpcrl.study import digest, published
+from nmpcrl.study.additions import judge_additions
+from nmpcrl.study.audit import audit
+from nmpcrl.study.claims import judge
+from nmpcrl.study.curvature import dropped_curvature
+from nmpcrl.study.digest import Digest
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.plan import MAIN_TABLE
+from nmpcrl.study.store import fetch_all
+from nmpcrl.study.timing import time_learners
+from nmpcrl.study.verdicts import Verdict
+
+AUDITED = Experiment("GES")  # whose whole run C8 is measured in
+TIMED = 200  # steps of each learner, for C3 and C4
+
+
+def publish(runs: Mapping[Experiment, Digest], variants: Mapping[Experiment, str]) -> Path:
+    """Judge the study, and write `book/published` anew.
+
+    Args:
+        runs: all of `plan.study`.
+        variants: the part of the study that each belongs to.
+    """
+    return published.publish(runs, variants, verdicts(runs, variants))
+
+
+def verdicts(
+    runs: Mapping[Experiment, Digest], variants: Mapping[Experiment, str]
+) -> tuple[Verdict, ...]:
+    """The verdicts on the paper's claims and on our additions."""
+    table = digest.table(runs)
+    parts = [variants[e] for e in runs]
+    main = table[[part == MAIN_TABLE for part in parts]]
+    added = table[[part in (MAIN_TABLE, "controls") for part in parts]]
+    study = fetch_all([AUDITED], progress=False)
+    claimed = judge(
+        main,
+        paths={e: one.states for e, one in runs.items()},
+        timings=time_learners(steps=TIMED),
+        assumptions=audit(study, dropped_curvature(study[AUDITED])),
+    )
+    return (*claimed, *judge_additions(added))
