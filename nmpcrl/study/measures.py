@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,8 @@ from nmpcrl.study.metrics import TOUCH
 from nmpcrl.study.statistics import rate
 from nmpcrl.study.verdicts import CELL, arms, read
 
-Values = pd.DataFrame  # one row a cell of layout, decay and seed, one column an arm; nan: unknown
+# One row a cell of layout, decay and seed, one column an arm; nan is unknown.
+Values: TypeAlias = pd.DataFrame
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,8 @@ def at_borders(measure: Measure, values: Values, borders: Iterable[float]) -> pd
             yes, of = int(answers.sum()), len(answers)
             share = rate(yes, of)
             rows.append((border, share.value, share.low, share.high, read(yes, of)))
-    return pd.DataFrame(rows, columns=["border", "share", "low", "high", "outcome"])
+    names = ["border", "share", "low", "high"]
+    return pd.DataFrame(rows, columns=[*names, "outcome"]).astype(dict.fromkeys(names, float))
 
 
 def _excess(runs: pd.DataFrame, _: Paths) -> Values:
@@ -93,7 +96,7 @@ def _apart(runs: pd.DataFrame, paths: Paths) -> Values:
         for row in runs[runs.learner.isin(("RDES", "GES"))].to_dict("records")
     }
     pairs = [(drives.get(("RDES", *c)), drives.get(("GES", *c))) for c in rdes.index]
-    known = [one is not None and other is not None for one, other in pairs]
+    known = np.array([one is not None and other is not None for one, other in pairs], bool)
     path = pd.Series([claims.apart(*pair) for pair in pairs], rdes.index, dtype=float)
     cost = claims.costlier(rdes, ges).abs()
     worse = np.maximum(path / claims.SAME_PATH, cost / claims.SAME_COST).fillna(np.inf)

@@ -39,8 +39,9 @@ class Estimate:
 def rate(held: int, of: int) -> Estimate:
     """Share of independent runs in which something held, with Wilson's interval.
 
-    For runs of several layouts it is at least as wide as it need be: a fixed number of runs in each
-    varies less than the same number drawn from the mixture (Hoeffding 1956).
+    For runs of several layouts it errs on the wide side: a fixed number of runs in each varies less
+    than as many drawn from the mixture (Hoeffding 1956). That runs of one seed meet the same noise
+    in every layout is left out of account.
 
     Raises:
         ValueError: there are no runs, or more held than there are.

@@ -2,7 +2,7 @@
 
 A claim is put to each run, or to each pair of runs with the same layout, decay and seed, as a
 question with the answer yes or no. The share of yes is then read by one rule. It was fixed before
-the study was trained, and is not to be moved after:
+any result of the study was looked at, and is not to be moved after:
 
 - reproduced: the interval of the share lies above `MAJORITY`, and the share is at least
   `NEARLY_ALL`;
@@ -43,7 +43,7 @@ CELL = ["layout", "decay", "seed"]  # what two runs share that are held against 
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper says, or we do, and how it is decided: fixed before the study was trained."""
+    """What the paper says, or we do, and how it is decided: fixed before a result was seen."""
 
     name: str  # "C1"
     statement: str
@@ -161,7 +161,8 @@ def arms(
 ) -> tuple[pd.DataFrame, ...]:
     """The runs of each learner, in the same order of layout, decay and seed.
 
-    A run that is missing, or shorter than the paper's, is a row of nan.
+    A run that is missing, or shorter than the paper's, is a row of nan. One that had to be stopped
+    left no policy to drive with, so its final cost is infinite, whatever the last rollout cost.
 
     Args:
         runs: of `digest.table`, all of one setting.
@@ -184,7 +185,7 @@ def _arm(runs: pd.DataFrame, learner: str) -> pd.DataFrame:
         raise ValueError(
             f"{learner} has several runs in {cell}: judge the runs of one setting at a time"
         )
-    return whole
+    return whole.assign(final_cost=whole.final_cost.where(whole.stopped == "finished", np.inf))
 
 
 def answered(holds: pd.Series, *frames: pd.DataFrame) -> pd.Series:

@@ -215,6 +215,14 @@ def test_two_policies_that_both_fail_are_not_the_same():
     assert claims.rdes_and_ges_reach_the_same_policy(runs, failed).outcome == NOT
 
 
+def test_a_run_that_had_to_be_stopped_left_no_policy_however_low_its_last_cost():
+    runs = study(lambda _: {"final_cost": 500.0, "stopped": "diverged: theta"})
+    outcomes = {v.claim: v.outcome for v in claims.judge_runs(runs, paths(runs))}
+    assert outcomes["C5"] == outcomes["C9"] == NOT
+    runs = study(of("TDC", final_cost=500.0, stopped="diverged: theta"))
+    assert additions.tdc_is_at_least_as_good_as_ges(runs).outcome == NOT
+
+
 def test_a_path_that_is_not_there_is_no_answer():
     runs = study()
     assert claims.rdes_and_ges_reach_the_same_policy(runs, {}).outcome == UNDECIDABLE
@@ -317,7 +325,7 @@ def test_a_run_that_got_stuck_or_failed_is_said_to_be_so_and_counts():
     runs = study(both(of("RDES", (0,), final_cost=np.inf), of("GES", (1,), distance=5.0)))
     evidence = claims.learning_beats_the_frozen_theta(runs).evidence
     assert "2 end more than 0.5 away" in evidence
-    assert "in 2 runs one of the last three failed" in evidence
+    assert "in 2 runs one of the last three failed or training was stopped" in evidence
 
 
 # All of them

@@ -174,7 +174,7 @@ def runs(*named: tuple[str, str, int], episodes: int = 300) -> pd.DataFrame:
             {"learner": learner, "layout": layout, "decay": "step", "seed": seed}
             for learner, layout, seed in named
         ]
-    ).assign(episodes=episodes, stopped="finished", number=np.arange(len(named)))
+    ).assign(episodes=episodes, stopped="finished", final_cost=9.0, number=np.arange(len(named)))
 
 
 def test_arms_are_in_the_same_order_and_a_missing_run_leaves_a_gap():
