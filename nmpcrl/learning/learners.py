@@ -59,7 +59,7 @@ class Update:
 
 @dataclass(frozen=True)
 class Learner:
-    """A bootstrap and an update rule; a step is pure but for the network a bootstrap trains."""
+    """A bootstrap and an update rule; a step is pure but for a network or generator they hold."""
 
     name: str
     bootstrap: Bootstrap

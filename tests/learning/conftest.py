@@ -1,4 +1,4 @@
-"""A controller that needs no solver: its value is linear in theta, so all has a closed form."""
+"""Controllers that need no solver: value, features and Hessian have a closed form."""
 
 from dataclasses import dataclass, field
 from types import SimpleNamespace
@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from nmpcrl.learning import Transition
+from nmpcrl.learning import Transition, Weights
 
 
 @dataclass
@@ -14,19 +14,46 @@ class LinearController:
     """V_theta(s) = phi(s)' theta, and a plan that is easy to recognise."""
 
     gamma: float = 0.9
-    calls: list = field(default_factory=list)  # (state, theta, guess) of every solve
+    calls: list = field(default_factory=list)  # (state, theta, guess, action) of every solve
+    products: list = field(default_factory=list)  # (solution, vector) of every Hessian product
 
     def solve(self, state, theta, guess=None, action=None):
-        self.calls.append((state, theta, guess))
-        phi = np.asarray(state, float)
+        self.calls.append((state, theta, guess, action))
+        state = np.asarray(state, float)
         return SimpleNamespace(
-            state=phi,
+            state=state,
             theta=theta.copy(),
-            value=float(phi @ theta),
-            features=phi,
+            value=self.value(state, theta),
+            features=self.features(state, theta),
             action=np.array([0.1, 0.2]),
             next_action=np.array([0.3, 0.4]),
         )
+
+    def value_hessian_times(self, solution, vector):
+        self.products.append((solution, vector))
+        return self.hessian(solution.state, solution.theta) @ vector
+
+    def value(self, state, theta):
+        return float(state @ theta)
+
+    def features(self, state, theta):
+        return state
+
+    def hessian(self, state, theta):
+        return np.zeros((state.size, state.size))
+
+
+class QuadraticController(LinearController):
+    """V_theta(s) = (s' theta)^2: the simplest value that is curved in theta."""
+
+    def value(self, state, theta):
+        return float(state @ theta) ** 2
+
+    def features(self, state, theta):
+        return 2 * (state @ theta) * state
+
+    def hessian(self, state, theta):
+        return 2 * np.outer(state, state)
 
 
 @dataclass
@@ -49,7 +76,7 @@ class RecordingNetwork:
     def fit(self):
         assert self.ready
         self.fits += 1
-        return 0.25
+        return 0.25 * self.fits
 
     def predict(self, inputs):
         self.asked.append(inputs)
@@ -63,17 +90,29 @@ def controller() -> LinearController:
 
 
 @pytest.fixture
+def quadratic() -> QuadraticController:
+    """A value function that is quadratic in theta, with gamma = 0.9."""
+    return QuadraticController()
+
+
+@pytest.fixture
 def network() -> RecordingNetwork:
     """A network that is ready after three examples and always answers 7."""
     return RecordingNetwork()
 
 
 @pytest.fixture
-def transition(controller):
-    """From one state to another under a linear controller, as `train` would hand it over."""
+def weights() -> Weights:
+    """theta = (1, 0.5, -1) and w = (0.1, 0, 0.2)."""
+    return Weights(np.array([1.0, 0.5, -1.0]), np.array([0.1, 0.0, 0.2]))
 
-    def build(theta, state=(1.0, 2.0, 3.0), after=(0.5, 0.0, -1.0), cost=4.0) -> Transition:
-        state, after = np.array(state, float), np.array(after, float)
+
+@pytest.fixture
+def transition(controller):
+    """From one state to another as `train` would hand it over; the controller is linear."""
+
+    def build(theta, *, cost=4.0, controller=controller) -> Transition:
+        state, after = np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.0, -1.0])
         solution = controller.solve(state, theta)
         controller.calls.clear()
         return Transition(state, np.array([-0.6, 1.0]), cost, after, solution)

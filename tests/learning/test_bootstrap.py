@@ -20,10 +20,11 @@ def test_the_second_solve_values_the_next_state_under_the_given_theta(controller
 def test_the_second_solve_starts_from_the_first(controller, transition):
     step = transition(THETA)
     SecondSolve(controller)(step, THETA)
-    ((state, theta, guess),) = controller.calls
+    ((state, theta, guess, action),) = controller.calls
     assert state is step.next_state
     assert theta is THETA
     assert guess is step.solution
+    assert action is None
 
 
 def test_a_second_solve_has_no_network_time(controller, transition):
@@ -83,6 +84,16 @@ def test_literally_the_untrained_network_is_asked_from_the_first_step(network, t
     assert network.fits == 3
     assert np.isnan(answers[1].loss)
     assert answers[2].loss == 0.25
+
+
+@pytest.mark.parametrize("gated", [True, False])
+def test_as_many_mini_batches_are_fitted_a_step_as_are_asked_for(network, transition, gated):
+    imitate = Imitation(network, with_theta=True, gated=gated, fits=4)
+    losses = [
+        answer.loss for answer in (imitate(transition(THETA), THETA) for _ in range(5)) if answer
+    ]
+    assert network.fits == 3 * 4
+    assert losses[-3:] == [0.25 * 4, 0.25 * 8, 0.25 * 12]  # of the last fit in the step
 
 
 def test_the_network_fits_before_it_is_asked(network, transition):

@@ -16,7 +16,11 @@ from nmpcrl.learning import (
     expected_sarsa,
     frozen,
     gradient_expected_sarsa,
+    gradient_tdc,
+    q_learning,
+    random_direction,
     regularized_deep_expected_sarsa,
+    step_matched,
 )
 from nmpcrl.learning.learners import gradient_td
 
@@ -35,17 +39,24 @@ def learners(controller, network):
         "DES": deep_expected_sarsa(controller, network, ALPHA),
         "RDES": regularized_deep_expected_sarsa(controller, network, ALPHA),
         "GES": gradient_expected_sarsa(controller, ALPHA, BETA),
+        "TDC": gradient_tdc(controller, ALPHA, BETA),
+        "QL": q_learning(controller, ALPHA),
         "frozen": frozen(controller),
+        "matched": step_matched(controller, ALPHA, BETA),
+        "random": random_direction(controller, ALPHA, np.random.default_rng(0)),
     }
+
+
+NAMES = tuple(learners(SimpleNamespace(gamma=0.9), None))
 
 
 def test_the_table_of_pairings(controller, network):
     table = learners(controller, network)
     assert {name: learner.name for name, learner in table.items()} == {n: n for n in table}
-    assert isinstance(table["ES"].bootstrap, SecondSolve)
-    assert isinstance(table["GES"].bootstrap, SecondSolve)
-    assert isinstance(table["DES"].bootstrap, Imitation)
-    assert isinstance(table["RDES"].bootstrap, Imitation)
+    for name in ("ES", "GES", "TDC", "QL", "matched", "random"):
+        assert isinstance(table[name].bootstrap, SecondSolve)
+    for name in ("DES", "RDES"):
+        assert isinstance(table[name].bootstrap, Imitation)
     assert not table["DES"].bootstrap.with_theta
     assert table["RDES"].bootstrap.with_theta
     assert all(learner.gamma == controller.gamma for learner in table.values())
@@ -103,16 +114,16 @@ def test_a_literal_learner_moves_from_the_first_step(
     assert update.delta == pytest.approx(4.0 + 0.9 * 7.0 + 1.0)
 
 
-def test_frozen_never_moves_and_asks_for_nothing(controller, transition, weights):
-    learner = frozen(controller)
-    for cost in (0.0, 4.0, 1e9):
-        update = learner.step(weights, transition(THETA, cost=cost))
-        assert update.weights is weights
-        assert update.delta is None
-    assert controller.calls == []
+@pytest.mark.parametrize("make", [deep_expected_sarsa, regularized_deep_expected_sarsa])
+def test_a_deep_learner_fits_as_often_a_step_as_it_is_told(
+    controller, network, transition, weights, make
+):
+    network.batch = 1
+    make(controller, network, ALPHA, fits=4).step(weights, transition(THETA))
+    assert network.fits == 4
 
 
-@pytest.mark.parametrize("name", ["ES", "DES", "RDES", "GES", "frozen"])
+@pytest.mark.parametrize("name", sorted({*NAMES} - {"random"}))  # it draws
 def test_a_step_is_pure(controller, network, transition, weights, name):
     network.batch = 1
     learner, step = learners(controller, network)[name], transition(THETA)
@@ -144,6 +155,47 @@ def test_a_failed_second_solve_is_the_callers_to_judge(controller, transition, w
         expected_sarsa(broken, ALPHA).step(weights, step)
 
 
+@pytest.mark.parametrize("name", ["ES", "GES", "TDC", "QL", "matched", "random"])
+def test_the_next_action_is_the_policys_own(controller, network, transition, weights, name):
+    """The next state is solved with u_0 free, even where the value learned has it fixed."""
+    step = transition(THETA)
+    learners(controller, network)[name].step(weights, step)
+    ((state, theta, _, action),) = controller.calls
+    assert state is step.next_state
+    assert theta is weights.theta
+    assert action is None
+
+
+def test_from_the_same_solution_q_learning_moves_as_es_does(controller, transition, weights):
+    step = transition(THETA)
+    es, ql = (make(controller, ALPHA).step(weights, step) for make in (expected_sarsa, q_learning))
+    np.testing.assert_array_equal(ql.weights.theta, es.weights.theta)
+    np.testing.assert_array_equal(ql.weights.w, W)
+
+
+class Bandit:
+    """One state, Q_theta(a) = theta_0 + theta_1 a + theta_2 a^2, and the best action is taken."""
+
+    gamma = 0.9
+
+    def solve(self, state, theta, guess=None, action=None):
+        a = -theta[1] / (2 * theta[2]) if action is None else action
+        features = np.array([1.0, a, a**2])
+        return SimpleNamespace(value=features @ theta, features=features)
+
+
+def test_q_learning_finds_the_value_of_every_action_from_random_ones():
+    """Whatever is done, the best is done next: Q(a) = c(a) + gamma min c / (1 - gamma)."""
+    bandit, rng = Bandit(), np.random.default_rng(0)
+    learner = q_learning(bandit, 0.1)
+    weights = Weights(np.array([0.0, 0.0, 1.0]), np.zeros(3))
+    for a in rng.uniform(-1, 1, 5000):
+        solution = bandit.solve(None, weights.theta, action=a)
+        cost = 3 + 2 * (a - 0.5) ** 2
+        weights = learner.step(weights, Transition(None, a, cost, None, solution)).weights
+    np.testing.assert_allclose(weights.theta, [3.5 + 27, -2, 2], rtol=1e-6)
+
+
 def ring(controller, learner, steps):
     """Three states in a ring with costs 1, 2, 3; the features tell them apart, so V is exact."""
     states, costs = np.eye(3), (1.0, 2.0, 3.0)
@@ -156,11 +208,12 @@ def ring(controller, learner, steps):
     return weights
 
 
-@pytest.mark.parametrize("name", ["ES", "GES"])
+@pytest.mark.parametrize("name", ["ES", "GES", "TDC"])
 def test_learning_settles_at_the_bellman_equations_solution(controller, network, name):
     learner = {
         "ES": expected_sarsa(controller, 0.5),
         "GES": gradient_expected_sarsa(controller, 0.4, 0.4),
+        "TDC": gradient_tdc(controller, 0.4, 0.4, projection=(0.0, 100.0)),
     }[name]
     exact = np.linalg.solve(np.eye(3) - 0.9 * np.roll(np.eye(3), 1, axis=1), [1.0, 2.0, 3.0])
     weights = ring(controller, learner, 9000)

@@ -6,6 +6,9 @@ import torch
 
 from nmpcrl.learning import QNetwork
 
+SCALED = {"scales": (np.array([4.0, 0.3]), 250.0)}  # for two inputs
+OPTIONS = [{}, {"activation": "tanh"}, SCALED, {"activation": "tanh", **SCALED}]
+
 
 def network(inputs=2, seed=0, **options):
     return QNetwork(inputs, np.random.default_rng(seed), **options)
@@ -28,8 +31,9 @@ def error(learner, examples):
     return np.sqrt(np.mean((learner.predict(inputs) - targets) ** 2))
 
 
-def test_it_learns_a_known_function():
-    learner, held_out = taught(rows(1000)), rows(500, seed=2)
+@pytest.mark.parametrize("activation", ["relu", "tanh"])
+def test_it_learns_a_known_function(activation):
+    learner, held_out = taught(rows(1000), activation=activation), rows(500, seed=2)
     before = error(learner, held_out)
     for _ in range(600):
         learner.fit()
@@ -38,9 +42,11 @@ def test_it_learns_a_known_function():
     assert error(learner, held_out) < 0.1 * spread
 
 
-def test_the_loss_is_the_mean_squared_error_before_the_step():
+@pytest.mark.parametrize("options", OPTIONS)
+def test_the_loss_is_the_mean_squared_error_before_the_step(options):
+    """In the caller's units, whatever the network divides by inside."""
     examples = rows(64)
-    learner = taught(examples, batch=64)
+    learner = taught(examples, batch=64, **options)
     before = error(learner, examples) ** 2
     assert learner.fit() == pytest.approx(before, rel=1e-5)
     assert error(learner, examples) ** 2 != pytest.approx(before, rel=1e-5)
@@ -59,14 +65,14 @@ def learner_like(examples):
     return taught(examples, batch=300, capacity=1000)
 
 
-def model_of(learner):
+def model_of(learner, activation=torch.nn.ReLU):
     """The same network of torch's modules, which autograd differentiates."""
     layers = [layer.W.clone() for layer in learner._one]
     linear = [torch.nn.Linear(len(W) - 1, W.shape[1]) for W in layers]
     for module, W in zip(linear, layers, strict=True):
         module.weight.data, module.bias.data = W[:-1].T.contiguous(), W[-1]
     return torch.nn.Sequential(
-        linear[0], torch.nn.ReLU(), linear[1], torch.nn.ReLU(), linear[2], torch.nn.Flatten(0)
+        linear[0], activation(), linear[1], activation(), linear[2], torch.nn.Flatten(0)
     )
 
 
@@ -76,11 +82,11 @@ def in_one_vector(model, part=lambda parameter: parameter.detach()):
     return torch.cat([torch.cat([weight.T, bias[None]]).flatten() for weight, bias in pairs])
 
 
-def beside_modules(inputs=14, **options):
+def beside_modules(inputs=14, activation="relu", **options):
     """A network, its modules, and a function for their loss that leaves its gradient in them."""
     examples = rows(128, inputs)
-    learner = taught(examples, inputs=inputs, **options)
-    model = model_of(learner)
+    learner = taught(examples, inputs=inputs, activation=activation, **options)
+    model = model_of(learner, {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}[activation])
     x, target = (torch.from_numpy(part).float() for part in examples)
 
     def loss():
@@ -93,16 +99,18 @@ def beside_modules(inputs=14, **options):
 
 
 @pytest.mark.parametrize("inputs", [2, 5, 14])
-def test_the_gradient_is_that_of_autograd(inputs):
-    learner, model, loss = beside_modules(inputs)
+@pytest.mark.parametrize("activation", ["relu", "tanh"])
+def test_the_gradient_is_that_of_autograd(inputs, activation):
+    learner, model, loss = beside_modules(inputs, activation)
     assert learner.fit() == pytest.approx(loss(), rel=1e-5)
     expected = in_one_vector(model, lambda parameter: parameter.grad)
     assert expected.abs().max() > 0.1
     torch.testing.assert_close(learner._gradient, expected, rtol=1e-4, atol=1e-6)
 
 
-def test_it_descends_as_torchs_adam_does():
-    learner, model, loss = beside_modules(learning_rate=1e-3)
+@pytest.mark.parametrize("activation", ["relu", "tanh"])
+def test_it_descends_as_torchs_adam_does(activation):
+    learner, model, loss = beside_modules(activation=activation, learning_rate=1e-3)
     adam = torch.optim.Adam(model.parameters(), lr=1e-3)
     for _ in range(30):
         assert learner.fit() == pytest.approx(loss(), rel=1e-4)
@@ -207,3 +215,56 @@ def test_what_it_is_told_is_copied():
     expected = (float(learner.predict(inputs)) - 1.0) ** 2
     inputs[:] = 50.0
     assert learner.fit() == pytest.approx(expected, rel=1e-5)
+
+
+def test_scales_are_as_if_the_caller_had_divided():
+    inputs, targets = rows(200)
+    input_scale, target_scale = SCALED["scales"]
+    scaled = taught((inputs, targets), **SCALED)
+    plain = taught((inputs / input_scale, targets / target_scale))
+    for _ in range(20):
+        assert scaled.fit() == pytest.approx(plain.fit() * target_scale**2, rel=1e-12)
+    for some in (inputs[:7], inputs[0]):
+        np.testing.assert_array_equal(
+            scaled.predict(some), plain.predict(some / input_scale) * target_scale
+        )
+
+
+def test_with_scales_a_large_target_is_learned_as_fast_as_a_small_one():
+    """Adam's steps are as long for either, so without scales the large one stays far away."""
+    inputs, targets = rows(1000)
+    large = (inputs, 1000 + 1000 * targets)
+    scaled, plain = taught(large, scales=(1.0, 1000.0)), taught(large)
+    for _ in range(300):
+        scaled.fit()
+        plain.fit()
+    spread = large[1].std()
+    assert error(scaled, large) < 0.2 * spread
+    assert error(plain, large) > 2 * error(scaled, large)
+
+
+@pytest.mark.parametrize("capacity", [4, 64, 1024])
+@pytest.mark.parametrize("count", [64, 65, 100, 300])
+def test_with_a_memory_only_the_latest_examples_are_kept(count, capacity):
+    """With a batch as large as the memory, the loss is over every row that is left."""
+    inputs, targets = rows(count)
+    learner = taught((inputs, targets), batch=64, memory=64, capacity=capacity)
+    assert len(learner) == 64
+    expected = error(network(), (inputs[-64:], targets[-64:])) ** 2
+    assert learner.fit() == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_memory_that_is_not_full_changes_nothing():
+    limited, unlimited = taught(rows(200), memory=200), taught(rows(200))
+    assert [limited.fit() for _ in range(5)] == [unlimited.fit() for _ in range(5)]
+    np.testing.assert_array_equal(limited._weights, unlimited._weights)
+
+
+def test_a_memory_smaller_than_a_mini_batch_is_refused():
+    with pytest.raises(ValueError, match="memory = 127 must hold at least a batch of 128"):
+        network(memory=127)
+
+
+def test_an_activation_that_is_not_known_is_refused():
+    with pytest.raises(ValueError, match="activation = 'gelu' must be one of relu, tanh"):
+        network(activation="gelu")

@@ -1,0 +1,227 @@
+"""Exact nonlinear gradient TD: it descends the projected Bellman error, and Eq. (16) does not."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from nmpcrl.learning import (
+    Transition,
+    Weights,
+    expected_sarsa,
+    gradient_expected_sarsa,
+    gradient_tdc,
+)
+
+ALPHA, BETA = 0.1, 0.01
+
+
+def test_tdc_by_hand(quadratic, transition, weights):
+    """s'theta = -1 and s+'theta = 3/2; the old w everywhere."""
+    update = gradient_tdc(quadratic, ALPHA, BETA).step(
+        weights, transition(weights.theta, controller=quadratic)
+    )
+    s, after = np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.0, -1.0])
+    delta = 4.0 + 0.9 * 2.25 - 1.0
+    phi, phi_next = -2 * s, 3 * after
+    overlap = -2 * (0.1 + 0.6)  # w'phi
+    h = (delta - overlap) * 2 * s * (0.1 + 0.6)
+    assert update.delta == pytest.approx(delta)
+    np.testing.assert_allclose(
+        update.weights.theta,
+        weights.theta + ALPHA * (delta * phi - 0.9 * overlap * phi_next - h),
+    )
+    np.testing.assert_allclose(update.weights.w, weights.w + BETA * (delta - overlap) * phi)
+
+
+def test_the_hessian_is_that_of_the_first_solution_times_the_old_w(quadratic, transition, weights):
+    step = transition(weights.theta, controller=quadratic)
+    gradient_tdc(quadratic, ALPHA, BETA).step(weights, step)
+    ((solution, vector),) = quadratic.products
+    assert solution is step.solution
+    assert vector is weights.w
+
+
+def test_with_w_zero_tdc_is_the_semi_gradient(quadratic, transition, weights):
+    weights = Weights(weights.theta, np.zeros(3))
+    step = transition(weights.theta, controller=quadratic)
+    tdc = gradient_tdc(quadratic, ALPHA, BETA).step(weights, step)
+    es = expected_sarsa(quadratic, ALPHA).step(weights, step)
+    np.testing.assert_array_equal(tdc.weights.theta, es.weights.theta)
+    assert tdc.weights.w @ tdc.weights.w > 0
+
+
+def test_where_the_value_is_linear_tdc_is_ges(controller, transition, weights):
+    step = transition(weights.theta)
+    tdc = gradient_tdc(controller, ALPHA, BETA).step(weights, step)
+    ges = gradient_expected_sarsa(controller, ALPHA, BETA).step(weights, step)
+    np.testing.assert_array_equal(tdc.weights.theta, ges.weights.theta)
+    np.testing.assert_array_equal(tdc.weights.w, ges.weights.w)
+
+
+def test_without_curvature_and_projection_tdc_is_ges_and_asks_for_no_hessian(
+    quadratic, transition, weights
+):
+    step = transition(weights.theta, controller=quadratic)
+    tdc = gradient_tdc(quadratic, ALPHA, BETA, curvature=False).step(weights, step)
+    ges = gradient_expected_sarsa(quadratic, ALPHA, BETA).step(weights, step)
+    np.testing.assert_array_equal(tdc.weights.theta, ges.weights.theta)
+    np.testing.assert_array_equal(tdc.weights.w, ges.weights.w)
+    assert quadratic.products == []
+
+
+@pytest.mark.parametrize("curvature", [True, False])
+def test_theta_is_projected_and_w_is_not(quadratic, transition, weights, curvature):
+    step = transition(weights.theta, controller=quadratic)
+    free = gradient_tdc(quadratic, ALPHA, 10.0, curvature=curvature).step(weights, step).weights
+    least, most = -1.5, 0.6
+    assert ((free.theta < least) | (free.theta > most)).any()
+    assert ((free.theta > least) & (free.theta < most)).any()
+    held = (
+        gradient_tdc(quadratic, ALPHA, 10.0, curvature=curvature, projection=(least, most))
+        .step(weights, step)
+        .weights
+    )
+    np.testing.assert_array_equal(held.theta, np.clip(free.theta, least, most))
+    np.testing.assert_array_equal(held.w, free.w)
+    assert (np.abs(held.w) > most).any()
+
+
+@dataclass
+class Process:
+    """A Markov chain with costs, visited so often in each state."""
+
+    states: np.ndarray  # one row a state, shape (S, n)
+    P: np.ndarray  # P[i, j], how likely j follows i, shape (S, S)
+    costs: np.ndarray  # shape (S,)
+    visits: np.ndarray  # shape (S,), sums to 1
+
+    def expected_step(self, learner, controller, weights):
+        """The mean of a learner's step over all transitions."""
+        theta, w = np.zeros_like(weights.theta), np.zeros_like(weights.w)
+        for i, state in enumerate(self.states):
+            solution = controller.solve(state, weights.theta)
+            for j in np.flatnonzero(self.P[i]):
+                step = Transition(state, np.zeros(2), self.costs[i], self.states[j], solution)
+                moved = learner.step(weights, step).weights
+                theta += self.visits[i] * self.P[i, j] * moved.theta
+                w += self.visits[i] * self.P[i, j] * moved.w
+        return Weights(theta, w)
+
+    def fit(self, controller, theta):
+        """The least-squares fit of the features to the Bellman errors: its weights and itself."""
+        values = np.array([controller.value(state, theta) for state in self.states])
+        features = np.array([controller.features(state, theta) for state in self.states])
+        errors = self.costs + controller.gamma * self.P @ values - values
+        root = np.sqrt(self.visits)
+        w = np.linalg.lstsq(root[:, None] * features, root * errors, rcond=None)[0]
+        return w, features @ w
+
+    def projected_bellman_error(self, controller, theta):
+        """Eq. (14), with the projection on the value's tangent space in theta: from definition."""
+        _, projected = self.fit(controller, theta)
+        return self.visits @ projected**2
+
+
+def drawn_process(seed):
+    """Six states in three dimensions, so that the features cannot fit every Bellman error."""
+    rng = np.random.default_rng(seed)
+    return Process(
+        states=rng.normal(size=(6, 3)),
+        P=rng.dirichlet(np.ones(6), size=6),
+        costs=rng.uniform(0, 3, 6),
+        visits=rng.dirichlet(np.full(6, 5.0)),
+    )
+
+
+THETA = np.array([1.0, 0.5, -1.0])
+
+
+def descent(process, controller):
+    """Minus half the gradient of the projected Bellman error in THETA, by central differences."""
+    units = 1e-5 * np.eye(THETA.size)
+    ahead, behind = (
+        [process.projected_bellman_error(controller, THETA + sign * unit) for unit in units]
+        for sign in (1, -1)
+    )
+    return -(np.array(ahead) - behind) / 2e-5 / 2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_with_w_at_its_best_theta_descends_the_projected_bellman_error(quadratic, seed):
+    """Maei et al. (2009): the expected step is minus half the gradient."""
+    process = drawn_process(seed)
+    w, _ = process.fit(quadratic, THETA)
+    moved = process.expected_step(gradient_tdc(quadratic, 1.0, 1.0), quadratic, Weights(THETA, w))
+    expected = descent(process, quadratic)
+    np.testing.assert_allclose(moved.theta - THETA, expected, rtol=1e-6, atol=1e-7)
+    np.testing.assert_allclose(moved.w, w, atol=1e-12)  # w has nothing left to learn
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_eq_16_as_printed_misses_that_gradient_where_the_value_is_curved(quadratic, seed):
+    process = drawn_process(seed)
+    w, _ = process.fit(quadratic, THETA)
+    printed = gradient_expected_sarsa(quadratic, 1.0, 1.0)
+    moved = process.expected_step(printed, quadratic, Weights(THETA, w))
+    expected = descent(process, quadratic)
+    missed = np.linalg.norm(moved.theta - THETA - expected)
+    assert missed > 0.02 * np.linalg.norm(expected)
+
+
+class Spiral:
+    """Three values that wind outwards as theta grows: exp(theta A) v.
+
+    Nothing costs anything, so the right values are 0 and theta should fall for ever; TD lets it
+    grow. Tsitsiklis and Van Roy (1997); a test problem of Maei et al. (2009) as well.
+    """
+
+    gamma = 0.9
+    process = Process(
+        states=np.arange(3)[:, None],
+        P=np.array([[0.5, 0.0, 0.5], [0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]),
+        costs=np.zeros(3),
+        visits=np.full(3, 1 / 3),
+    )
+    growth, turn = 0.05, np.sqrt(3) / 2  # the eigenvalues of A where the values live
+    Q = np.array([[1.0, 0.5, 1.5], [1.5, 1.0, 0.5], [0.5, 1.5, 1.0]])
+    A = Q + growth * np.eye(3)
+
+    def values(self, theta):
+        v, (t,) = np.array([1.0, -0.7, -0.3]), theta
+        turned = np.cos(self.turn * t) * v + np.sin(self.turn * t) / self.turn * self.Q @ v
+        return np.exp(self.growth * t) * turned
+
+    def solve(self, state, theta, *_):
+        values, (i,) = self.values(theta), state
+        return SimpleNamespace(
+            value=values[i],
+            features=(self.A @ values)[[i]],
+            hessian=(self.A @ self.A @ values)[i],
+        )
+
+    def value_hessian_times(self, solution, vector):
+        return solution.hessian * vector
+
+    def follow(self, learner, updates):
+        """The size of the values, which should be 0, after each of the expected updates."""
+        weights, sizes = Weights(np.zeros(1), np.zeros(1)), []
+        for _ in range(updates):
+            weights = self.process.expected_step(learner, self, weights)
+            sizes.append(np.linalg.norm(self.values(weights.theta)))
+        return np.array(sizes)
+
+
+def test_on_the_spiral_of_tsitsiklis_and_van_roy_es_diverges():
+    spiral = Spiral()
+    sizes = spiral.follow(expected_sarsa(spiral, 0.1), 500)
+    assert (np.diff(sizes) > 0).all()
+    assert sizes[-1] > 2 * sizes[0]
+
+
+def test_on_the_spiral_of_tsitsiklis_and_van_roy_tdc_converges():
+    spiral = Spiral()
+    sizes = spiral.follow(gradient_tdc(spiral, 30.0, 1.0), 1000)
+    assert (np.diff(sizes[20:]) < 0).all()  # once w has learned enough
+    assert sizes[-1] < 0.4 * sizes[0]
