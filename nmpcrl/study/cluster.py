@@ -44,15 +44,17 @@ def executor(address: str, *, patience: float = 30.0) -> Iterator[Executor]:
         except TimeoutError:
             raise NoCluster(f"the scheduler at {address} has no worker") from None
         _refuse_others(client)
-        pool = client.get_executor(pure=False)
-        pool.workers = len(client.scheduler_info(n_workers=-1)["workers"])
-        yield pool
+        yield client.get_executor(pure=False)
 
 
 def _refuse_others(client: Any) -> None:
-    """Numbers may only come from workers that would make the same ones."""
+    """Say at once if a worker would make other numbers; one that joins later says it itself."""
     ours = _signature()
-    for worker, theirs in client.run(_signature).items():
+    try:
+        signatures = client.run(_signature)
+    except (ImportError, AttributeError) as error:
+        raise NoCluster(f"a worker does not have this package: {error}") from None
+    for worker, theirs in signatures.items():
         if theirs != ours:
             raise NoCluster(
                 f"the worker {worker} has other code or other versions of what the numbers depend"

@@ -16,7 +16,7 @@ from nmpcrl.study.digest import Digest, table
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
 from nmpcrl.study.harvest import fetch_digests
 from nmpcrl.study.parameters import ParameterError
-from nmpcrl.study.published import load
+from nmpcrl.study.published import fates_of, load
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import Study
 
@@ -109,7 +109,8 @@ def gather(
     digests: dict[Experiment, Digest] = {
         e: here[e] if e in here else published.digests[e] for e in wanted
     }
-    rows = {**published.rows, **dict(zip(here, table(here).to_dict("records"), strict=True))}
+    made = table(here).join(fates_of(here)) if here else table(here)
+    rows = {**published.rows, **dict(zip(here, made.to_dict("records"), strict=True))}
     runs = pd.DataFrame([rows[e] for e in wanted])
     runs["variant"] = list(wanted.values())
     runs["source"] = ["fresh" if e in here else "published" for e in wanted]

@@ -8,13 +8,20 @@ import json
 import os
 import sys
 import tempfile
+import threading
 import traceback
-from collections.abc import Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import (
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    as_completed,
+)
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -27,11 +34,19 @@ from nmpcrl.study.experiment import NETWORK_LEARNERS, Experiment, compile_ahead,
 from nmpcrl.study.records import DamagedRecords, Records
 
 SUMMARISES = ("study/digest.py", "study/metrics.py", "study/imitation.py")  # besides the run itself
-AHEAD = 4  # runs that wait for each worker: it need not, and an interruption forgets few
+ALONE = threading.Lock()  # of a process: torch's generator, which draws weights, is its only one
 
 
 class Failed(RuntimeError):
     """Some runs of a study could not be made; the others are stored."""
+
+
+class Killed(RuntimeError):
+    """The worker of a run was killed, and so were those that tried again."""
+
+
+class OtherCode(RuntimeError):
+    """A worker would make other numbers than who asked for them."""
 
 
 def fetch_digests(
@@ -44,45 +59,35 @@ def fetch_digests(
 ) -> store.Study[Digest]:
     """The digests of many runs: read if they are stored, otherwise trained, digested and stored.
 
-    A run that fails is recorded with its reason beside the digests and does not stop the others;
-    the next call tries it again.
+    A run that fails, or whose worker is killed again and again, is recorded with its reason beside
+    the digests and does not stop the others; the next call tries it again.
 
     Args:
         experiments: the runs wanted.
         executor: runs them, such as `cluster.executor` gives; by default processes on this machine.
         workers: how many processes; by default as many as there are cores.
-        progress: whether to show a bar with runs done, running and failed, and the time left.
-        strict: whether a failure is raised when all others are done, or just left out.
+        progress: whether to show a bar with runs done and failed, and the time left.
+        strict: whether a failure is raised when all others are done, or only said.
 
     Raises:
         Failed: runs failed, and `strict` holds.
-        RuntimeError: workers were killed again and again.
     """
     wanted = tuple(dict.fromkeys(experiments))
+    missing = [e for e in wanted if not is_stored(e)]
     failures: dict[Experiment, str] = {}
-    for left in reversed(range(store.ATTEMPTS + 1)):
-        missing = [e for e in wanted if not is_stored(e) and e not in failures]
-        if not missing:
-            break
-        if not left:
-            raise RuntimeError(
-                f"workers were killed {store.ATTEMPTS} times; {len(missing)} runs are missing:"
-                f" {missing[0]}, ..."
-            )
-        try:  # the long ones first, so that no worker is alone with one at the end
-            with _workers(executor, workers, len(missing)) as (pool, count):
-                failures |= _harvest(
-                    sorted(missing, key=seconds_of, reverse=True), pool, count, progress
-                )
-        except BrokenProcessPool:
-            if executor is not None:
-                raise
-    if failures and strict:
+    if missing:
+        compile_ahead(missing)
+        with nullcontext(executor) if executor else _processes(workers, len(missing)) as pool:
+            failures = _harvest(missing, pool, progress=progress)
+    if failures:
         first, reason = next(iter(failures.items()))
-        raise Failed(
+        said = (
             f"{len(failures)} of {len(wanted)} runs failed, {first} because of {reason};"
             f" each has its reason in {folder()}"
         )
+        if strict:
+            raise Failed(said)
+        print(said, file=sys.stderr)
     return store.Study({e: _read(e) for e in wanted if e not in failures})
 
 
@@ -124,14 +129,21 @@ def seconds_of(experiment: Experiment) -> float:
     return each * experiment.episodes * experiment.steps * experiment.horizon / whole
 
 
-def make(experiment: Experiment) -> Digest:
-    """What a worker does: train a run, unless it is stored whole, and digest it."""
-    try:
-        records = Records.load(store.path_of(experiment))
-    except (FileNotFoundError, DamagedRecords):
-        records = run(experiment)
-    records.facts.update(store.provenance(experiment))
-    return digest(records)
+def make(experiment: Experiment, expected: str) -> Digest:
+    """What a worker does: train a run, unless it is stored whole, and digest it.
+
+    Raises:
+        OtherCode: this worker would make other numbers than who asked.
+    """
+    if key(experiment) != expected:
+        raise OtherCode("the worker has other code, or other versions of what the numbers need")
+    with ALONE:
+        try:
+            records = Records.load(store.path_of(experiment))
+        except (FileNotFoundError, DamagedRecords):
+            records = run(experiment)
+        records.facts.update(store.provenance(experiment))
+        return digest(records)
 
 
 @cache
@@ -144,50 +156,84 @@ def _read(experiment: Experiment) -> Digest:
 
 
 @contextmanager
-def _workers(
-    executor: Executor | None, workers: int | None, runs: int
-) -> Iterator[tuple[Executor, int]]:
-    """Who trains, and how many they are."""
-    if executor is not None:
-        yield executor, max(1, getattr(executor, "workers", os.cpu_count() or 1))
-        return
-    count = min(workers or os.cpu_count() or 1, runs)
-    with store.processes(count) as pool:
-        yield pool, count
+def _processes(workers: int | None, runs: int) -> Iterator[Executor]:
+    """Processes of this machine, no more than there are runs."""
+    slots = Slots(min(workers or os.cpu_count() or 1, runs))
+    try:
+        yield slots
+    except BaseException:
+        slots.shutdown(wait=False, cancel_futures=True)
+        raise
+    slots.shutdown()
+
+
+class Slots(Executor):
+    """Processes of one worker each: one that is killed takes down no run but its own.
+
+    That run is tried again in a new process, and fails after `store.ATTEMPTS`.
+    """
+
+    def __init__(self, slots: int) -> None:
+        self._threads = ThreadPoolExecutor(slots)
+        self._own = threading.local()  # each thread's process
+        self._all: list[ProcessPoolExecutor] = []
+        self._closed = False
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """As `Executor.submit`."""
+        return self._threads.submit(self._call, partial(fn, *args, **kwargs))
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """As `Executor.shutdown`; without waiting, processes are ended at once."""
+        self._closed = True
+        if not wait:
+            for process in self._all:
+                kill(process)
+        self._threads.shutdown(wait=True, cancel_futures=cancel_futures)
+        for process in self._all:
+            process.shutdown()
+
+    def _call(self, call: Callable[[], Any]) -> Any:
+        for _ in range(store.ATTEMPTS):
+            if not hasattr(self._own, "process"):
+                self._own.process = store.processes(1)
+                self._all.append(self._own.process)
+            try:
+                return self._own.process.submit(call).result()
+            except BrokenProcessPool:
+                del self._own.process
+                if self._closed:
+                    break
+        raise Killed(f"its worker was killed {store.ATTEMPTS} times")
+
+
+def kill(pool: ProcessPoolExecutor) -> None:
+    """End the processes of a pool at once."""
+    for process in list((pool._processes or {}).values()):
+        process.kill()
 
 
 def _harvest(
-    missing: list[Experiment], executor: Executor, workers: int, progress: bool
+    missing: list[Experiment], executor: Executor, *, progress: bool
 ) -> dict[Experiment, str]:
     """Store every digest as it comes; return what failed, with the reasons."""
-    compile_ahead(missing)
     failures: dict[Experiment, str] = {}
-    waiting = iter(missing)
-    pending: dict[Future[Digest], Experiment] = {}
-    with (
-        tqdm(
-            total=len(missing), unit="run", disable=not progress, mininterval=store.interval()
-        ) as bar,
-        store.without_main(),
-    ):
-        while True:
-            for experiment in _some(waiting, AHEAD * workers - len(pending)):
-                pending[executor.submit(make, experiment)] = experiment
-            if not pending:
-                return failures
-            bar.set_postfix_str(
-                f"{min(workers, len(pending))} running, {len(failures)} failed", refresh=False
-            )
-            for future in wait(pending, timeout=1.0, return_when=FIRST_COMPLETED).done:
-                experiment = pending.pop(future)
+    with store.without_main():
+        # the long ones first, so that no worker is alone with one at the end
+        ordered = sorted(missing, key=seconds_of, reverse=True)
+        pending = {executor.submit(make, e, key(e)): e for e in ordered}
+        with tqdm(
+            total=len(pending), unit="run", disable=not progress, mininterval=store.interval()
+        ) as bar:
+            for future in as_completed(pending):
+                experiment = pending[future]
                 reason = _keep(experiment, future)
                 if reason:
                     failures[experiment] = reason
+                running = sum(one.running() for one in pending)
+                bar.set_postfix_str(f"{running} running, {len(failures)} failed", refresh=False)
                 bar.update()
-
-
-def _some(waiting: Iterator[Experiment], most: int) -> list[Experiment]:
-    return [experiment for _, experiment in zip(range(most), waiting, strict=False)]
+    return failures
 
 
 def _keep(experiment: Experiment, future: "Future[Digest]") -> str:
@@ -196,8 +242,6 @@ def _keep(experiment: Experiment, future: "Future[Digest]") -> str:
     reason = path.with_suffix(".failed.json")
     try:
         made = future.result()
-    except BrokenProcessPool:
-        raise
     except Exception as error:
         said = f"{type(error).__name__}: {error}"
         trace = "".join(traceback.format_exception(error))

@@ -9,12 +9,14 @@
 
 import json
 import os
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
@@ -25,10 +27,14 @@ from nmpcrl.study.bench.measure import machine
 from nmpcrl.study.claims import experiment_of
 from nmpcrl.study.digest import Digest, row
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.mechanisms import fates
 from nmpcrl.study.records import Column
 from nmpcrl.study.verdicts import Verdict
 
-CELL = ("learner", "layout", "decay")  # runs that differ in nothing but the seed
+FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
+SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
+CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
+FATE = ["ending", "wrong", "episode", "mechanism"]  # of `mechanisms.fates`
 MEASURES = (
     "final_cost",
     "training_cost",
@@ -83,6 +89,7 @@ def publish(
     folder.mkdir(parents=True, exist_ok=True)
     labels = {e: {"variant": variants[e], "key": harvest.key(e)} for e in digests}
     runs = pd.DataFrame([row(one) | labels[e] for e, one in digests.items()])
+    runs = runs.join(fates_of(digests))
     runs.to_csv(folder / "runs.csv", index=False)
     curves: dict[str, Any] = _curves(list(digests.values()))
     np.savez_compressed(folder / "curves.npz", **curves)
@@ -96,7 +103,17 @@ def publish(
         "hours": float(runs.seconds.sum() / 3600),
     }
     _write(folder / "about.json", about)
+    _load.cache_clear()
     return folder
+
+
+def fates_of(digests: Mapping[Experiment, Digest]) -> pd.DataFrame:
+    """`FATE` of each run, in order; nothing is said of the frozen arms."""
+    moved = [e for e in digests if e.learner != "frozen"]
+    told = fates(digests)[FATE].to_dict("records")
+    known = dict(zip(moved, told, strict=True))
+    silent = {"ending": "", "wrong": "", "episode": pd.NA, "mechanism": ""}
+    return pd.DataFrame([known.get(e, silent) for e in digests], columns=FATE)
 
 
 def load() -> Published:
@@ -110,13 +127,16 @@ def load() -> Published:
 
 @cache
 def _load(folder: Path) -> Published:
-    if not (folder / "runs.csv").exists():
+    if not any((folder / name).exists() for name in FILES):
         return Published()
     try:
         runs = pd.read_csv(folder / "runs.csv", float_precision="round_trip")
+        runs = runs.fillna({name: "" for name in FATE if name != "episode"})
         rows = {experiment_of(one): one for one in runs.to_dict("records")}
         with np.load(folder / "curves.npz", allow_pickle=False) as file:
             curves = {name: file[name] for name in file.files}
+        if {len(rows)} != {len(column) for column in curves.values()}:
+            raise ValueError("runs.csv and curves.npz are not of the same runs")
         verdicts = json.loads((folder / "verdicts.json").read_text())
         about = json.loads((folder / "about.json").read_text())
         return Published(
@@ -126,7 +146,7 @@ def _load(folder: Path) -> Published:
             tuple(_verdict(one) for one in verdicts),
             about,
         )
-    except (OSError, ValueError, LookupError, TypeError) as error:
+    except (OSError, EOFError, ValueError, LookupError, TypeError, BadZipFile, zlib.error) as error:
         raise Damaged(
             f"{folder} is damaged ({error}); `git checkout` or `nmpcrl study --publish` mends it"
         ) from error
@@ -174,9 +194,9 @@ def _out_of_spread(
     if not rows:
         return wrong
     known = pd.DataFrame([published.rows[e] for e in published.rows])
-    known = known[known.variant.isin({published.variants[e] for e in rows})]
-    for cell, group in pd.DataFrame(list(rows.values())).groupby(list(CELL)):
-        there = known[(known[list(CELL)] == cell).all(axis=1)]
+    cells = dict(list(known.groupby(SEEDLESS)))
+    for named, group in pd.DataFrame(list(rows.values())).groupby(SEEDLESS):
+        there, cell = cells[named], tuple(group[list(CELL)].iloc[0])
         start = float(there.initial_cost.iloc[0])
         for seed, here in zip(group.seed, group.initial_cost, strict=True):
             if abs(here / start - 1) > EXACT:
