@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -98,13 +99,27 @@ def publish(
         "date": datetime.now(UTC).date().isoformat(),
         "code": harvest.key(Experiment()),
         "versions": store.versions(),
-        "machine": machine(),
+        "machine": here(),
         "runs": runs.variant.value_counts(sort=False).to_dict(),
         "hours": float(runs.seconds.sum() / 3600),
     }
     _write(folder / "about.json", about)
     _load.cache_clear()
     return folder
+
+
+def here() -> dict[str, Any]:
+    """What is known of this machine, the abilities of its processor included.
+
+    Machine code is made for these; processors of one name may differ in them.
+    """
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    kept = ("flags", "Features", "cpu family", "model\t")
+    told = sorted({line for line in lines if line.startswith(kept)})
+    return {**machine(), "abilities": sha256("\n".join(told).encode()).hexdigest()[:16]}
 
 
 def fates_of(digests: Mapping[Experiment, Digest]) -> pd.DataFrame:
@@ -171,7 +186,7 @@ def compare(fresh: Mapping[Experiment, Digest], published: Published) -> pd.Data
 
 def comparable(runs: Iterable[Experiment], published: Published) -> set[Experiment]:
     """Those of which code, versions and machine are the ones of the published runs."""
-    if published.about.get("machine") != machine():
+    if published.about.get("machine") != here():
         return set()
     known = published.rows
     return {e for e in runs if e in known and known[e]["key"] == harvest.key(e)}
