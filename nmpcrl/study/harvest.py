@@ -230,8 +230,9 @@ def _harvest(
                 reason = _keep(experiment, future)
                 if reason:
                     failures[experiment] = reason
-                running = sum(one.running() for one in pending)
-                bar.set_postfix_str(f"{running} running, {len(failures)} failed", refresh=False)
+                running = sum(one.running() for one in pending)  # a cluster does not tell
+                said = [f"{running} running"] * (running > 0) + [f"{len(failures)} failed"]
+                bar.set_postfix_str(", ".join(said), refresh=False)
                 bar.update()
     return failures
 

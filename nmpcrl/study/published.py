@@ -35,7 +35,8 @@ from nmpcrl.study.verdicts import Verdict
 FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
-FATE = ["ending", "wrong", "episode", "mechanism"]  # of `mechanisms.fates`
+WORDS = ["ending", "wrong", "mechanism"]  # of `mechanisms.fates`, as the next
+FATE = [*WORDS, "episode"]
 MEASURES = (
     "final_cost",
     "training_cost",
@@ -102,6 +103,7 @@ def publish(
         "machine": here(),
         "runs": runs.variant.value_counts(sort=False).to_dict(),
         "hours": float(runs.seconds.sum() / 3600),
+        "files": _sums(folder),
     }
     _write(folder / "about.json", about)
     _load.cache_clear()
@@ -145,15 +147,17 @@ def _load(folder: Path) -> Published:
     if not any((folder / name).exists() for name in FILES):
         return Published()
     try:
-        runs = pd.read_csv(folder / "runs.csv", float_precision="round_trip")
-        runs = runs.fillna({name: "" for name in FATE if name != "episode"})
+        about = json.loads((folder / "about.json").read_text())
+        if about["files"] != _sums(folder):
+            raise ValueError("a file is not the one that about.json speaks of")
+        runs = pd.read_csv(folder / "runs.csv", dtype=dict.fromkeys(WORDS, str))
+        runs = runs.fillna(dict.fromkeys(WORDS, ""))
         rows = {experiment_of(one): one for one in runs.to_dict("records")}
         with np.load(folder / "curves.npz", allow_pickle=False) as file:
             curves = {name: file[name] for name in file.files}
         if {len(rows)} != {len(column) for column in curves.values()}:
             raise ValueError("runs.csv and curves.npz are not of the same runs")
         verdicts = json.loads((folder / "verdicts.json").read_text())
-        about = json.loads((folder / "about.json").read_text())
         return Published(
             {e: _digest(one, curves, i) for i, (e, one) in enumerate(rows.items())},
             {e: one["variant"] for e, one in rows.items()},
@@ -232,6 +236,12 @@ def _widened(values: Column, slack: float) -> tuple[float, float]:
     spread = float(np.ptp(finite)) + slack
     most = np.inf if finite.size < values.size else float(finite.max()) + spread
     return float(finite.min()) - spread, most
+
+
+def _sums(folder: Path) -> dict[str, str]:
+    """What tells that the files belong together and are whole."""
+    contents = {name: (folder / name).read_bytes() for name in FILES[:-1]}
+    return {name: sha256(content).hexdigest() for name, content in contents.items()}
 
 
 def _curves(digests: list[Digest]) -> dict[str, Column]:

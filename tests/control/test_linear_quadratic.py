@@ -82,6 +82,15 @@ def test_the_hessian_is_the_curvature_of_riccatis_value(nmpc, horizon, error):
     np.testing.assert_allclose(found, exact, atol=1e-5 * np.abs(exact).max())
 
 
+def test_the_hessian_times_a_vector_is_the_curvature_of_riccatis_value_along_it(
+    nmpc, horizon, error
+):
+    along, solution = np.linspace(-1, 1, THETA.size), nmpc.solve(STATE, THETA)
+    exact = hessian(THETA, error, horizon)
+    found = nmpc.value_hessian_times(solution, along)
+    np.testing.assert_allclose(found, exact @ along, atol=1e-5 * np.abs(exact).max())
+
+
 def test_the_action_value_is_one_step_and_riccati_from_there(nmpc, horizon, error):
     action = np.array([4.0, -1.0])
     step = THETA[:4] ** 2 @ error**2 + THETA[4:6] ** 2 @ action**2

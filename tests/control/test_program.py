@@ -99,14 +99,14 @@ def test_the_same_solve_gives_the_same_bits(robot, draw):
         np.testing.assert_array_equal(one.primal, other.primal)
 
 
-def beside(count, solver, theta_c=0.1, inward=0.0, angle=1.0):
+def beside(count, solver, theta_c=0.1, inward=0.0, angle=1.0, **options):
     """A controller that starts on the boundary of `count` obstacles, or `inward` of it [m]."""
     radius = 1.25 * np.sqrt(1 + theta_c) - inward
     start = np.array([2 + radius * np.cos(angle), 2 + radius * np.sin(angle), 0.3])
     box = np.array([9.0, 9.0, np.inf])
     obstacles = (Obstacle(2.0, 2.0),) * count
     task = Task(start, target=np.array([8.5, 5.0, 1.0]), lower=-box, upper=box, obstacles=obstacles)
-    return Nmpc(differential_drive(), task, solver=solver)
+    return Nmpc(differential_drive(), task, solver=solver, **options)
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -142,6 +142,46 @@ def test_the_kink_is_where_differences_say_it_is(solver, theta):
     above, below = (nmpc.solve(here.state, theta + d, here).value for d in (step, -step))
     assert (here.value - below) / 1e-4 == pytest.approx(here.features[-1], abs=0.1)
     assert (above - here.value) / 1e-4 == pytest.approx(here.features[-1] + OMEGA, abs=0.1)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+@pytest.mark.parametrize("angle", [1.0, 0.3])
+def test_with_ties_active_the_other_side_of_the_kink_is_chosen(solver, theta, count, angle):
+    """The value and the plan stay as they are; the features are those inside, not outside."""
+    theta[-1] = 0.1
+    solutions = {}
+    for active in (False, True):
+        nmpc = beside(count, solver, angle=angle, ties_active=active)
+        solutions[active] = nmpc.solve(nmpc.task.start, theta)
+        assert nmpc.kkt_residual(solutions[active]) < 1e-4
+    one, other = solutions[False], solutions[True]
+    assert other.value == one.value
+    np.testing.assert_array_equal(other.primal, one.primal)
+    expected = one.features + np.append(np.zeros(8), count * OMEGA)
+    np.testing.assert_allclose(other.features, expected, rtol=1e-12)
+    np.testing.assert_array_equal(other.multipliers.obstacles[0], OMEGA)
+    np.testing.assert_array_equal(other.multipliers.slacks[0], 0)
+
+
+def test_with_ties_active_the_features_are_the_upper_difference(solver, theta):
+    """Cf. `test_the_kink_is_where_differences_say_it_is`, where they are the lower one."""
+    theta[-1] = 0.1
+    nmpc, step = beside(1, solver, ties_active=True), np.append(np.zeros(8), 1e-4)
+    here = nmpc.solve(nmpc.task.start, theta)
+    above, below = (nmpc.solve(here.state, theta + d, here).value for d in (step, -step))
+    assert (above - here.value) / 1e-4 == pytest.approx(here.features[-1], abs=0.1)
+    assert (here.value - below) / 1e-4 == pytest.approx(here.features[-1] - OMEGA, abs=0.1)
+
+
+@pytest.mark.parametrize("inward", [-1e-4, 1e-4])
+def test_off_a_boundary_ties_do_not_matter(solver, theta, inward):
+    theta[-1] = 0.1
+    one, other = (
+        nmpc.solve(nmpc.task.start, theta)
+        for nmpc in (beside(2, solver, inward=inward, ties_active=a) for a in (False, True))
+    )
+    np.testing.assert_array_equal(other.features, one.features)
+    np.testing.assert_array_equal(other.point, one.point)
 
 
 of_casadi = pytest.mark.parametrize("solver", CASADI_SOLVERS)  # to these the box is hard

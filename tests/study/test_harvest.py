@@ -1,0 +1,409 @@
+"""A study is trained run by run: nothing twice, nothing lost, and a failure stops no other run."""
+
+import contextlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nmpcrl
+from nmpcrl.study import Experiment, fetch, harvest, run, store, sweep
+from nmpcrl.study.digest import Digest, digest
+from nmpcrl.study.harvest import Failed, fetch_digests
+from nmpcrl.study.store import THREADS
+
+QUICK = Experiment("frozen", episodes=2, steps=3, evaluate_every=1)
+SIX = sweep(learner="frozen", seed=tuple(range(6)), episodes=1, steps=2)
+THREE = SIX[:3]
+CLOCK = "seconds"
+
+MADE_ELSEWHERE = """
+import os, signal, time
+from pathlib import Path
+
+from nmpcrl.study import harvest
+
+LOG = Path({log!r})
+
+
+def make(experiment, *expected):
+    first = f"began {{experiment.seed}} " not in LOG.read_text()
+    note("began", experiment)
+    time.sleep({pause})
+    if experiment.seed in {killed} and (first or {always}):
+        os.kill(os.getpid(), signal.SIGKILL)
+    made = harvest.make(experiment, *expected)
+    note("ended", experiment)
+    return made
+
+
+def note(what, experiment):
+    with LOG.open("a") as log:
+        log.write(f"{{what}} {{experiment.seed}} {{os.getpid()}}\\n")
+"""
+
+
+@pytest.fixture(autouse=True)
+def digests(tmp_path, monkeypatch) -> Path:
+    """A folder of this test's own; and what is set for workers is unset after it."""
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    for name in THREADS:
+        monkeypatch.setenv(name, os.environ.get(name, "1"))
+    return tmp_path / "runs" / "digests"
+
+
+@pytest.fixture
+def trained(monkeypatch) -> list[Experiment]:
+    """What is trained from here on, in this process."""
+    found: list[Experiment] = []
+    monkeypatch.setattr(harvest, "run", lambda e: (found.append(e), run(e))[1])
+    return found
+
+
+@pytest.fixture
+def workers(tmp_path, monkeypatch):
+    """Let workers note what they do, and let the runs of some seeds kill them, once or always."""
+
+    def watch(killed: tuple[int, ...] = (), *, always: bool = False, pause: float = 0) -> Path:
+        log = tmp_path / "log"
+        log.touch()
+        text = MADE_ELSEWHERE.format(log=str(log), killed=killed, always=always, pause=pause)
+        (tmp_path / "made_elsewhere.py").write_text(text)
+        monkeypatch.syspath_prepend(tmp_path)
+        monkeypatch.delitem(sys.modules, "made_elsewhere", raising=False)
+        import made_elsewhere
+
+        monkeypatch.setattr(harvest, "make", made_elsewhere.make)
+        return log
+
+    return watch
+
+
+def here(experiments, **options):
+    """The digests, made in this process one after the other."""
+    with ThreadPoolExecutor(1) as executor:
+        return fetch_digests(experiments, executor=executor, progress=False, **options)
+
+
+def times(log: Path, what: str) -> list[int]:
+    """The seeds that have begun or ended, as often as they did."""
+    lines = [line.split() for line in log.read_text().splitlines()]
+    return sorted(int(seed) for said, seed, _ in lines if said == what)
+
+
+def assert_same_digest(one: Digest, other: Digest):
+    for columns, others in (
+        (one.episodes, other.episodes),
+        (one.evaluations, other.evaluations),
+        ({"states": one.states}, {"states": other.states}),
+        ({"actions": one.actions}, {"actions": other.actions}),
+    ):
+        for name in set(columns) - {CLOCK}:
+            np.testing.assert_array_equal(columns[name], others[name])
+
+
+def test_what_is_fetched_is_the_digest_of_the_run():
+    experiments = sweep(learner=("RDES", "GES"), episodes=2, steps=65)
+    study = fetch_digests(experiments, workers=2, progress=False)
+    assert list(study) == list(experiments)
+    for experiment in experiments:
+        assert_same_digest(study[experiment], digest(run(experiment)))
+
+
+def test_a_digest_is_stored_among_the_runs_and_says_what_it_depends_on(digests):
+    found = here([QUICK])[QUICK]
+    (path,) = digests.iterdir()
+    assert path == harvest.path_of(QUICK)
+    assert path.name.startswith("frozen-A-step-seed0-2ep-")
+    assert_same_digest(Digest.load(path), found)
+    assert found.facts["key"] == store.key(QUICK)
+    assert found.facts["versions"] == store.versions()
+    assert store.stored() == {}  # the run itself is not kept
+
+
+def test_a_stored_digest_is_read_and_not_made_again(trained):
+    first = here([QUICK])
+    again = here([QUICK, QUICK])
+    assert trained == [QUICK]
+    assert_same_digest(again[QUICK], first[QUICK])
+
+
+def test_a_run_that_is_stored_whole_is_digested_and_not_trained_again(trained):
+    records = fetch(QUICK)
+    found = here([QUICK])
+    assert trained == []
+    assert_same_digest(found[QUICK], digest(records))
+    assert found[QUICK].facts["seconds"] == records.facts["seconds"]
+
+
+def test_a_stored_run_that_is_damaged_is_trained_again(trained):
+    fetch(QUICK)
+    store.path_of(QUICK).write_bytes(b"")
+    assert_same_digest(here([QUICK])[QUICK], digest(run(QUICK)))
+    assert trained == [QUICK]
+
+
+def test_a_damaged_digest_is_put_aside_and_made_again(digests, trained, capsys):
+    first = here([QUICK])
+    path = harvest.path_of(QUICK)
+    path.write_bytes(path.read_bytes()[:-200])
+    assert_same_digest(here([QUICK])[QUICK], first[QUICK])
+    assert trained == [QUICK, QUICK]
+    assert sorted(p.suffix for p in digests.iterdir()) == [".damaged", ".npz"]
+    assert "is kept as" in capsys.readouterr().err
+
+
+@pytest.fixture
+def keys(tmp_path, monkeypatch):
+    """The keys of a run and of its digest, after a change of a copy of the package."""
+    copy = tmp_path / "nmpcrl"
+    shutil.copytree(Path(nmpcrl.__file__).parent, copy, ignore=shutil.ignore_patterns("*.pyc"))
+    monkeypatch.setattr(nmpcrl, "__file__", str(copy / "__init__.py"))
+    for module, name in ((store, "_mathematics"), (harvest, "_summary")):
+        monkeypatch.setattr(module, name, getattr(module, name).__wrapped__)
+
+    def after(place=None, before="", changed=""):
+        if place:
+            text = (copy / place).read_text()
+            assert before in text
+            (copy / place).write_text(text.replace(before, changed, 1))
+        return store.key(QUICK), harvest.key(QUICK)
+
+    return after
+
+
+@pytest.mark.parametrize(
+    ("place", "before", "changed"),
+    [
+        ("study/digest.py", "LATE = 20", "LATE = 21"),
+        ("study/metrics.py", "LAST = 3", "LAST = 4"),
+        ("study/imitation.py", "FITS = 4000", "FITS = 4001"),
+    ],
+)
+def test_a_change_of_what_is_kept_makes_other_digests_of_the_same_runs(
+    keys, place, before, changed
+):
+    (run_before, digest_before), (run_after, digest_after) = keys(), keys(place, before, changed)
+    assert run_before == run_after
+    assert digest_before != digest_after
+
+
+def test_a_change_of_the_mathematics_makes_other_runs_and_other_digests(keys):
+    before, after = keys(), keys("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6")
+    assert before[0] != after[0]
+    assert before[1] != after[1]
+
+
+def test_a_comment_changes_neither(keys):
+    assert keys() == keys("study/digest.py", "# episodes that stand", "# how many stand")
+
+
+def test_every_field_has_a_part_in_the_key():
+    others = [QUICK, replace(QUICK, seed=1), replace(QUICK, alpha=2e-7), replace(QUICK, horizon=9)]
+    assert len({harvest.key(e) for e in others}) == len(others)
+    assert len({harvest.path_of(e) for e in others}) == len(others)
+
+
+@pytest.fixture
+def mistaken(monkeypatch):
+    """Let the runs of one seed fail; undone by calling what is returned."""
+
+    def run_but_one(experiment):
+        if experiment.seed == 1:
+            raise ArithmeticError("a mistake")
+        return run(experiment)
+
+    monkeypatch.setattr(harvest, "run", run_but_one)
+    return lambda: monkeypatch.setattr(harvest, "run", run)
+
+
+def test_a_run_that_fails_is_told_at_the_end_and_stops_no_other(mistaken):
+    with pytest.raises(Failed, match="1 of 3 runs failed") as raised:
+        here(THREE)
+    for part in (str(THREE[1]), "ArithmeticError: a mistake"):
+        assert part in str(raised.value)
+    assert [harvest.is_stored(e) for e in THREE] == [True, False, True]
+
+
+def test_what_did_not_fail_can_be_had_without_the_rest(mistaken):
+    assert list(here(THREE, strict=False)) == [THREE[0], THREE[2]]
+
+
+def test_why_a_run_failed_is_written_down_beside_the_digests(mistaken, digests):
+    here(THREE, strict=False)
+    (note,) = digests.glob("*.failed.json")
+    said = json.loads(note.read_text())
+    assert said["reason"] == "ArithmeticError: a mistake"
+    assert "run_but_one" in said["traceback"]
+    theta = tuple(said["experiment"]["theta"])
+    assert Experiment(**said["experiment"] | {"theta": theta}) == THREE[1]
+
+
+def test_what_failed_is_tried_again_and_the_note_goes(mistaken, digests, trained):
+    here(THREE, strict=False)
+    mistaken()
+    assert list(here(THREE)) == list(THREE)
+    assert list(digests.glob("*.failed.json")) == []
+
+
+def test_long_runs_begin_first(trained):
+    short = Experiment("ES", episodes=1, steps=2)
+    experiments = [
+        short,
+        Experiment("frozen", episodes=1, steps=2, horizon=20),
+        Experiment("DES", episodes=1, steps=2),
+        Experiment("RDES", episodes=2, steps=2),
+    ]
+    study = here(experiments)
+    assert [e.learner for e in trained] == ["RDES", "DES", "frozen", "ES"]
+    assert list(study) == experiments
+
+
+def test_a_bar_counts_the_runs(mistaken, capsys):
+    with ThreadPoolExecutor(1) as executor:
+        fetch_digests(THREE, executor=executor, strict=False)
+    shown = capsys.readouterr().err
+    assert "3/3" in shown
+    assert "running" in shown
+    assert "1 failed" in shown
+
+
+def test_nothing_to_do_needs_nobody(capsys):
+    here([QUICK])
+    capsys.readouterr()
+    assert list(fetch_digests([QUICK])) == [QUICK]
+    assert list(fetch_digests([])) == []
+    assert capsys.readouterr().err == ""
+
+
+def test_a_killed_worker_is_replaced_and_what_had_ended_is_not_done_again(workers):
+    log = workers(killed=(3,))
+    study = fetch_digests(SIX, workers=1, progress=False)
+    assert list(study) == list(SIX)
+    assert times(log, "began") == [0, 1, 2, 3, 3, 4, 5]
+    assert times(log, "ended") == [0, 1, 2, 3, 4, 5]
+
+
+def test_a_run_that_always_kills_its_worker_is_a_failure_like_any_other(workers, digests):
+    log = workers(killed=(1,), always=True)
+    with pytest.raises(Failed, match="1 of 3 runs failed"):
+        fetch_digests(THREE, workers=1, progress=False)
+    assert [harvest.is_stored(e) for e in THREE] == [True, False, True]
+    assert times(log, "ended") == [0, 2]
+    (note,) = digests.glob("*.failed.json")
+    assert "killed" in json.loads(note.read_text())["reason"]
+
+
+class Breaking(Executor):
+    """Loses the worker of the second run; all runs have ended before anyone looks."""
+
+    def __init__(self) -> None:
+        self.submitted = 0
+
+    def submit(self, function, /, *arguments, **options):
+        future: Future = Future()
+        self.submitted += 1
+        if self.submitted == 2:
+            future.set_exception(BrokenProcessPool("a worker was killed"))
+        else:
+            future.set_result(function(*arguments, **options))
+        return future
+
+
+def test_what_an_executor_of_the_callers_loses_is_a_failure_and_the_rest_is_kept():
+    with pytest.raises(Failed, match=r"1 of 3 runs failed.*BrokenProcessPool"):
+        fetch_digests(THREE, executor=Breaking(), progress=False)
+    assert [harvest.is_stored(e) for e in THREE] == [True, False, True]
+
+
+def test_a_worker_with_other_code_trains_nothing(monkeypatch, trained):
+    """A worker of a cluster may join late; so each compares keys before each run."""
+    experiment, make = QUICK, harvest.make
+    elsewhere = store.versions() | {"numpy": "0.0.1"}
+
+    def with_other_versions(*arguments):
+        monkeypatch.setattr(store, "versions", lambda: elsewhere)
+        try:
+            return make(*arguments)
+        finally:
+            monkeypatch.undo()
+
+    monkeypatch.setattr(harvest, "make", with_other_versions)
+    with pytest.raises(Failed, match="other code, or other versions"):
+        here([experiment])
+    assert trained == []
+
+
+INTERRUPTED = """
+import made_elsewhere
+from nmpcrl.study import harvest, sweep
+
+harvest.make = made_elsewhere.make
+runs = sweep(learner="frozen", seed=tuple(range(6)), episodes=1, steps=2)
+harvest.fetch_digests(runs, workers=2)
+"""
+
+
+@pytest.fixture
+def interrupted(tmp_path):
+    """A program that trains six runs, started in a session of its own as in a terminal."""
+    program = subprocess.Popen(
+        [sys.executable, "-c", INTERRUPTED],
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    yield program
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(program.pid, signal.SIGKILL)
+    program.communicate()
+
+
+def test_an_interrupted_study_goes_on_where_it_was(workers, digests, request):
+    log = workers(pause=2)
+    program = request.getfixturevalue("interrupted")
+    wait_until(lambda: any(digests.glob("*.npz")))
+    began = len(times(log, "began"))
+    os.killpg(program.pid, signal.SIGINT)  # as a terminal does: the whole group is told
+    said = program.communicate(timeout=240)[1]
+    assert program.returncode != 0
+    assert said.count("Traceback") <= 1  # of the program, and of none of its workers
+    stored = {path: path.stat().st_mtime_ns for path in digests.glob("*.npz")}
+    assert 1 <= len(stored) < 6
+    assert began - len(stored) <= 2  # as many as there were workers
+    assert len(times(log, "began")) == began  # none is begun after the interruption
+    log.write_text("")
+    fetch_digests(SIX, workers=2, progress=False)
+    assert len(times(log, "began")) == 6 - len(stored)
+    assert {path: path.stat().st_mtime_ns for path in stored} == stored
+
+
+def wait_until(holds, seconds: float = 240.0):
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "this was waited for in vain"
+        time.sleep(0.02)
+
+
+def test_one_who_asks_while_another_trains_finds_whole_files_only(digests):
+    """Two calls at once may train a run twice, and both end well."""
+    studies = []
+    threads = [threading.Thread(target=lambda: studies.append(here(THREE))) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [list(study) for study in studies] == [list(THREE)] * 2
+    assert {path.suffix for path in digests.iterdir()} == {".npz"}

@@ -1,0 +1,328 @@
+"""The published study: read as it was written, small, refused when damaged, and held against."""
+
+import json
+import shutil
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nmpcrl.study import Experiment, harvest, paper, plan, published, run, sweep
+from nmpcrl.study.digest import digest, row, table
+from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.published import FILES, Damaged, Published, compare, load, publish
+from nmpcrl.study.verdicts import PARTLY, REPRODUCED, Verdict
+
+RUNS = (
+    *sweep(learner=("ES", "frozen"), seed=(0, 1, 2, 3), episodes=4, steps=6, evaluate_every=2),
+    *sweep(learner=("ES", "frozen"), seed=(0, 1), episodes=4, steps=6, evaluate_every=2, horizon=2),
+)
+LABELS = {e: "main" if e.horizon == paper.HORIZON else "N = 2" for e in RUNS}
+VERDICTS = (
+    Verdict("C1", "It converges.", PARTLY, "It holds in 3 of 4 pairs.", "With another c_epsilon."),
+    Verdict(
+        "C2",
+        "It is fast.",
+        REPRODUCED,
+        "4 of 4 pairs: 100 %.",
+        "",
+        1.0,
+        (0.51, 1.0),
+        {"A": REPRODUCED},
+        {"step": REPRODUCED},
+        {"all": (4, 4), "A": (4, 4)},
+    ),
+)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch) -> Path:
+    """What is published here is this test's own."""
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "published"))
+    return tmp_path / "published"
+
+
+@pytest.fixture(scope="module")
+def digests():
+    """A small study: four seeds of two learners, and a variant of two."""
+    return {e: digest(run(e)) for e in RUNS}
+
+
+@pytest.fixture
+def known(digests) -> Published:
+    publish(digests, LABELS, VERDICTS)
+    return load()
+
+
+@pytest.fixture
+def elsewhere(monkeypatch):
+    """From here on this is another machine."""
+    there = published.here() | {"processor": "another"}
+    return lambda: monkeypatch.setattr(published, "machine", lambda: there)
+
+
+def changed(one, **rollouts):
+    """A digest whose rollouts without noise came out otherwise."""
+    return replace(one, evaluations=one.evaluations | rollouts)
+
+
+def test_where_nothing_is_published_there_is_nothing(folder):
+    for found in (load(), folder.mkdir() or load()):
+        assert (found.digests, found.variants, found.rows) == ({}, {}, {})
+        assert found.verdicts == ()
+
+
+def test_what_is_published_is_in_four_files(known, folder):
+    assert {path.name for path in folder.iterdir()} == set(FILES)
+
+
+def test_the_summaries_are_read_bit_for_bit_and_in_order(known, digests):
+    assert list(known.rows) == list(RUNS)
+    for experiment, one in digests.items():
+        for name, value in row(one).items():
+            np.testing.assert_equal(known.rows[experiment][name], value)
+        assert known.rows[experiment]["key"] == harvest.key(experiment)
+        assert known.variants[experiment] == LABELS[experiment]
+
+
+def test_the_digests_have_what_figures_need_in_single_precision(known, digests):
+    assert list(known.digests) == list(RUNS)
+    for experiment, one in digests.items():
+        found = known.digests[experiment]
+        assert found.name == experiment
+        pairs = [(found.episodes["cost"], one.episodes["cost"]), (found.states, one.states)]
+        pairs += [(found.evaluations[k], one.evaluations[k]) for k in ("episode", "theta", "cost")]
+        for published_column, column in pairs:
+            assert published_column.shape == column.shape
+            np.testing.assert_allclose(published_column, column, rtol=1e-6)
+        assert found.facts["stopped"] == one.facts["stopped"]
+
+
+def test_runs_that_failed_are_read_as_they_were(digests):
+    """A drive that failed costs infinitely much and has states that are not known."""
+    first, *others = digests
+    cost, states = np.array([5.0, np.inf, np.inf]), digests[first].states.copy()
+    states[2:] = np.nan
+    facts = digests[first].facts | {"stopped": 'diverged: ", | "'}
+    diverged = replace(changed(digests[first], cost=cost), states=states, facts=facts)
+    publish({first: diverged} | {e: digests[e] for e in others}, LABELS, VERDICTS)
+    found = load()
+    assert found.rows[first]["final_cost"] == np.inf
+    assert found.rows[first]["stopped"] == 'diverged: ", | "'
+    np.testing.assert_array_equal(found.digests[first].evaluations["cost"], cost)
+    np.testing.assert_array_equal(np.isnan(found.digests[first].states), np.isnan(states))
+
+
+def test_runs_of_other_lengths_are_not_padded(digests):
+    longer = Experiment("frozen", episodes=7, steps=9, evaluate_every=1)
+    publish(digests | {longer: digest(run(longer))}, LABELS | {longer: "longer"}, VERDICTS)
+    found = load().digests
+    assert found[longer].episodes["cost"].shape == (7,)
+    assert found[longer].evaluations["cost"].shape == (8,)
+    assert found[longer].states.shape == (9, 3)
+    assert found[RUNS[0]].episodes["cost"].shape == (4,)
+    assert found[RUNS[0]].evaluations["cost"].shape == (3,)
+    assert found[RUNS[0]].states.shape == (6, 3)
+
+
+def test_verdicts_are_read_as_they_were(known):
+    assert known.verdicts == VERDICTS
+
+
+def test_what_is_published_says_what_made_it(known):
+    about = known.about
+    assert about["code"] == harvest.key(Experiment())
+    assert about["machine"] == published.here()
+    assert set(about["versions"]) >= {"python", "numpy", "torch", "casadi"}
+    assert about["runs"] == {"main": 8, "N = 2": 4}
+
+
+def test_the_same_content_gives_the_same_bytes(known, digests, folder):
+    before = {name: (folder / name).read_bytes() for name in FILES}
+    shutil.rmtree(folder)
+    publish(digests, LABELS, VERDICTS)
+    again = {name: (folder / name).read_bytes() for name in FILES}
+    about, about_again = (json.loads(files.pop("about.json")) for files in (before, again))
+    assert again == before
+    assert about_again | {"date": about["date"]} == about
+
+
+def test_what_is_published_anew_takes_the_place_of_what_was_read(known, digests):
+    fewer = [RUNS[0], frozen_arm(RUNS[0])]
+    publish({e: digests[e] for e in fewer}, LABELS, VERDICTS)
+    assert list(load().digests) == fewer
+
+
+def test_the_whole_study_takes_20_megabytes_at_most(digests, folder):
+    """Runs of full length whose numbers no compression makes smaller."""
+    rng, full, n = np.random.default_rng(0), Experiment(), 40
+    rollouts = full.episodes // full.evaluate_every + 1
+    noise = {}
+    for experiment in sweep(learner=("ES", "frozen"), seed=tuple(range(n // 2))):
+        one = digests[RUNS[0]]
+        episodes = {k: rng.normal(size=(300, *c.shape[1:])) for k, c in one.episodes.items()}
+        judged = {k: rng.normal(size=(rollouts, *c.shape[1:])) for k, c in one.evaluations.items()}
+        judged |= {"episode": np.arange(rollouts) * full.evaluate_every}
+        states = rng.normal(size=(129, 3))
+        noise[experiment] = replace(
+            one, experiment=asdict(experiment), episodes=episodes, evaluations=judged, states=states
+        )
+    publish(noise, dict.fromkeys(noise, "main"), VERDICTS)
+    each = sum(path.stat().st_size for path in folder.iterdir()) / n
+    assert each * len(plan.study()) < 20e6
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_missing_file_is_said_in_a_sentence(known, folder, name):
+    (folder / name).unlink()
+    assert_refused(folder)
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("left", [0.0, 0.3, 0.6, 0.97])
+def test_a_file_that_was_cut_is_said_in_a_sentence(known, folder, name, left):
+    whole = (folder / name).read_bytes()
+    (folder / name).write_bytes(whole[: int(left * len(whole))])
+    assert_refused(folder)
+
+
+def test_a_file_with_a_few_bytes_changed_is_said_in_a_sentence(known, folder):
+    """The archive has a checksum of each of its columns."""
+    whole = bytearray((folder / "curves.npz").read_bytes())
+    middle = len(whole) // 2
+    whole[middle : middle + 8] = bytes(byte ^ 0xFF for byte in whole[middle : middle + 8])
+    (folder / "curves.npz").write_bytes(whole)
+    assert_refused(folder)
+
+
+def test_a_table_that_lost_its_last_rows_is_said_in_a_sentence(known, folder):
+    lines = (folder / "runs.csv").read_text().splitlines(keepends=True)
+    (folder / "runs.csv").write_text("".join(lines[:-2]))
+    assert_refused(folder)
+
+
+def test_a_table_without_a_column_is_said_in_a_sentence(known, folder):
+    runs = pd.read_csv(folder / "runs.csv").drop(columns="layout")
+    runs.to_csv(folder / "runs.csv", index=False)
+    assert_refused(folder)
+
+
+def assert_refused(folder):
+    published._load.cache_clear()
+    with pytest.raises(Damaged, match="is damaged") as refused:
+        load()
+    said = str(refused.value)
+    assert str(folder) in said
+    assert "\n" not in said
+
+
+def test_what_is_published_does_not_contradict_itself(known, digests, elsewhere):
+    assert compare(digests, known).empty
+    elsewhere()
+    assert compare(digests, known).empty
+
+
+def test_runs_that_are_not_published_contradict_nothing(known, digests):
+    other = Experiment("frozen", seed=9, episodes=4, steps=6, evaluate_every=2)
+    assert compare({other: digest(run(other))}, known).empty
+
+
+@pytest.mark.parametrize("where", ["cost", "theta"])
+def test_on_the_same_machine_the_last_bit_counts(known, digests, where):
+    first = RUNS[0]
+    column = digests[first].evaluations[where].copy()
+    column[-1] = np.nextafter(column[-1], np.inf)
+    episodes = digests[first].episodes | {
+        "theta": np.nextafter(digests[first].episodes["theta"], 9)
+    }
+    wrong = compare(
+        {first: replace(changed(digests[first], **{where: column}), episodes=episodes)}, known
+    )
+    assert len(wrong) == 1
+    assert (wrong.learner[0], wrong.layout[0], wrong.seed[0]) == ("ES", "A", 0)
+
+
+def test_on_another_machine_the_last_bit_does_not_count(known, digests, elsewhere):
+    elsewhere()
+    moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in digests.items()}
+    assert compare(moved, known).empty
+
+
+def test_with_other_code_the_last_bit_does_not_count(known, digests, monkeypatch):
+    monkeypatch.setattr(harvest, "key", lambda _: "another")
+    moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in digests.items()}
+    assert compare(moved, known).empty
+
+
+def test_the_cost_of_theta_init_must_agree_on_every_machine(known, digests, elsewhere):
+    elsewhere()
+    first = RUNS[0]
+    cost = digests[first].evaluations["cost"].copy()
+    cost[0] *= 1 + 1e-4
+    wrong = compare({first: changed(digests[first], cost=cost)}, known)
+    assert list(wrong.what) == ["initial_cost"]
+
+
+def spread(digests, costs):
+    """The runs of ES in the main table, with these final costs."""
+    runs = [e for e in RUNS if e.learner == "ES" and LABELS[e] == "main"]
+    found = {}
+    for experiment, cost in zip(runs, costs, strict=True):
+        one = digests[experiment]
+        start = one.evaluations["cost"][0]
+        found[experiment] = changed(one, cost=np.array([start, *[cost * start] * 2]))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("here", "contradicts"),
+    [
+        ((0.6, 0.7, 0.8, 0.9), False),  # the same
+        ((0.9, 0.6, 0.7, 0.8), False),  # each seed otherwise, all within
+        ((0.4, 1.1, 0.7, 0.8), False),  # a bit outside
+        ((5.0, 0.7, 0.8, 0.9), False),  # one of four far outside
+        ((5.0, 5.0, 5.0, 0.9), True),  # most far outside
+        ((0.1, 0.1, 0.1, 0.1), True),  # all much better
+        ((np.inf,) * 4, True),  # all failed
+    ],
+)
+def test_on_another_machine_most_runs_must_lie_in_the_published_spread(
+    digests, elsewhere, here, contradicts
+):
+    theirs = spread(digests, (0.6, 0.7, 0.8, 0.9))
+    publish(digests | theirs, LABELS, VERDICTS)
+    elsewhere()
+    wrong = compare(spread(digests, here), load())
+    assert list(wrong.what.unique()) == (["final_cost"] if contradicts else [])
+
+
+def test_where_published_runs_failed_failures_are_no_contradiction(digests, elsewhere):
+    publish(digests | spread(digests, (0.6, 0.7, np.inf, np.inf)), LABELS, VERDICTS)
+    elsewhere()
+    assert compare(spread(digests, (np.inf, np.inf, np.inf, 0.7)), load()).empty
+
+
+def test_a_variant_is_held_against_itself_alone(known, digests, elsewhere):
+    """Its theta_init costs otherwise than that of the main table."""
+    main, variant = RUNS[0], next(e for e in RUNS if e.horizon == 2)
+    assert row(digests[main])["initial_cost"] != row(digests[variant])["initial_cost"]
+    elsewhere()
+    assert compare(digests, known).empty
+    as_main = replace(digests[main], experiment=digests[variant].experiment)
+    assert "initial_cost" in set(compare({variant: as_main}, known).what)
+
+
+def test_the_rows_make_the_same_table_as_the_digests(known, digests):
+    """So a chapter may take either."""
+    names = [*(one.name for one in fields(Experiment)), "final_cost", "training_cost", "seconds"]
+    pd.testing.assert_frame_equal(
+        pd.DataFrame(list(known.rows.values()))[names], table(digests)[names], check_dtype=False
+    )
+
+
+def test_about_is_json_that_people_can_read(known, folder):
+    text = (folder / "about.json").read_text()
+    assert json.loads(text) == known.about
+    assert len(text.splitlines()) > 5
