@@ -1,21 +1,29 @@
 """What the reference pages say of the code is so."""
 
+import ast
 import re
+import shlex
 from importlib import import_module
 from pathlib import Path
 
 import build
+import click
 import pytest
 
+from nmpcrl.__main__ import main
 from nmpcrl.study.paper import DEPARTURES
 
 ROOT = Path(__file__).resolve().parents[2]
 NOTATION = (ROOT / "book/notation.md").read_text()
+REPRODUCE = (ROOT / "book/reproduce.md").read_text()
 PACKAGES = ("control", "learning", "study")
 MODULES = {path.stem: path for name in PACKAGES for path in (ROOT / "nmpcrl" / name).glob("*.py")}
 
 ROWS = re.findall(r"^\| \((\d+)([a-f]?)\) \| (.*) \| (.*) \|$", NOTATION, flags=re.M)
-FUNCTIONS = sorted({name for *_, cell in ROWS for name in re.findall(r"`([\w.]+)`", cell)})
+ADDED = NOTATION.partition("## Equations that the paper does not have\n")[2]
+ADDED_ROWS = re.findall(r"^\| (?!what it is|-)(.*) \| (.*) \|$", ADDED, flags=re.M)
+CELLS = [cell for *_, cell in ROWS + ADDED_ROWS]
+FUNCTIONS = sorted({name for cell in CELLS for name in re.findall(r"`([\w.]+)`", cell)})
 
 
 def find(name: str) -> object:
@@ -39,6 +47,27 @@ def test_a_function_named_beside_an_equation_exists(name):
     assert find(name) is not None
 
 
+def test_every_equation_that_is_added_has_a_function():
+    assert len(ADDED_ROWS) > 10
+    for what, cell in ADDED_ROWS:
+        assert re.search(r"`\w+\.\w+", cell), what
+
+
+def defined(text: str) -> set[str]:
+    """The public functions at the top of a module."""
+    tree = ast.parse(text)
+    return {
+        node.name
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
+    }
+
+
+@pytest.mark.parametrize("module", ["updates", "controls"])
+def test_every_update_and_every_control_is_beside_an_equation(module):
+    assert {f"{module}.{name}" for name in defined(MODULES[module].read_text())} <= set(FUNCTIONS)
+
+
 @pytest.mark.parametrize("name", ["sensitivity.Sensitivity.value_and_gradient", "training.train"])
 def test_the_functions_named_below_the_table_exist(name):
     assert f"`{name}`" in NOTATION
@@ -52,8 +81,47 @@ def test_every_departure_has_a_section_that_renders_it():
 
 
 def test_the_parameters_of_the_chapters_are_those_that_they_declare():
-    text = (ROOT / "book/reproduce.md").read_text()
-    rows = re.findall(r"^\| `(\d\d_\w+|solver|performance)` \| (.*) \|$", text, flags=re.M)
+    rows = re.findall(r"^\| `(\d\d_\w+|solver|performance)` \| (.*) \|$", REPRODUCE, flags=re.M)
     told = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}
     declared = {name: build.parameters(ROOT / path) for name, path in build.notebooks().items()}
     assert told == {name: parameters for name, parameters in declared.items() if parameters}
+
+
+def blocks(language: str) -> list[str]:
+    """The code of the page on commands in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", REPRODUCE, flags=re.M | re.S)
+
+
+def commands() -> list[list[str]]:
+    """The lines that call `nmpcrl`, each split as a shell would."""
+    lines = [line for block in blocks("bash") for line in block.splitlines()]
+    return [shlex.split(line)[1:] for line in lines if line.startswith("nmpcrl ")]
+
+
+@pytest.mark.parametrize("words", commands(), ids=" ".join)
+def test_the_commands_that_the_page_shows_are_accepted(words):
+    name, *rest = words
+    with main.make_context("nmpcrl", words) as context:
+        main.commands[name].make_context(name, rest, context)
+
+
+def test_the_options_that_the_page_lists_are_those_of_the_command():
+    told = re.findall(r"^\| `(--[\w-]+)(?: [A-Z]+)?` \|", REPRODUCE, flags=re.M)
+    options = [one for one in main.commands["study"].params if isinstance(one, click.Option)]
+    assert set(told) == {option.opts[0] for option in options}
+
+
+@pytest.mark.parametrize("code", blocks("python"))
+def test_what_the_page_imports_is_there(code):
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.ImportFrom):
+            module = import_module(node.module)
+            for alias in node.names:
+                assert hasattr(module, alias.name) or import_module(f"{node.module}.{alias.name}")
+
+
+def test_the_make_targets_that_the_page_lists_exist():
+    makefile = (ROOT / "Makefile").read_text()
+    targets = set(re.findall(r"^(\w+):", makefile, flags=re.M))
+    told = set(re.findall(r"^\| `make (\w+)", REPRODUCE, flags=re.M))
+    assert told == targets - {"help"}

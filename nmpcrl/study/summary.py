@@ -1,0 +1,121 @@
+"""The sentences of the one-page summary that rest on numbers: Markdown, from what is published."""
+
+from collections.abc import Iterable, Sequence
+
+import pandas as pd
+
+from nmpcrl.study import plan
+from nmpcrl.study.departures import DEPARTURES
+from nmpcrl.study.published import Published
+from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
+
+NOTHING = (
+    "Nothing is published in this copy yet; `nmpcrl study --publish` trains the study, judges it"
+    " and publishes it."
+)
+HOLDS = {  # of a claim that is no paper's
+    REPRODUCED: "It holds.",
+    PARTLY: "It holds in part.",
+    NOT: "It does not hold.",
+    UNDECIDABLE: "It is not decidable here.",
+}
+LAYOUT, DECAY = "B", "C"  # the departures that the main table itself reads in several ways
+
+
+def effort(found: Published) -> str:
+    """What was trained, where, with what, and how long that took."""
+    if not found.rows:
+        return NOTHING
+    about, episodes = found.about, {e.episodes for e in found.rows}
+    parts = dict(about["runs"])
+    main, controls = parts.pop(plan.MAIN_TABLE, 0), parts.pop("controls", 0)
+    libraries = listed([f"{name} {version}" for name, version in about["versions"].items()])
+    machine = about["machine"]
+    return (
+        f"These are {len(found.rows):,} runs of {listed(sorted(episodes))} episodes: {main:,} in"
+        f" the main table, {controls:,} with other learners for comparison, and"
+        f" {sum(parts.values()):,} in {len(parts)} variants. Their clocks add up to"
+        f" {about['hours']:.1f} hours of one core, on a machine with {machine['cores']}"
+        f" cores ({machine['processor']}, {machine['system']}), with {libraries}."
+    )
+
+
+def outcomes(verdicts: Sequence[Verdict]) -> str:
+    """How many claims met each fate, and which."""
+    if not verdicts:
+        return NOTHING
+    fates = []
+    for outcome in (REPRODUCED, PARTLY, NOT, UNDECIDABLE):
+        names = [v.claim for v in verdicts if v.outcome == outcome]
+        if names:
+            fates.append(f"{len(names)} {outcome} ({listed(names)})")
+    return f"Of {len(verdicts)} claims: {listed(fates)}."
+
+
+def spread(verdicts: Iterable[Verdict]) -> str:
+    """On which claims the layouts, and the readings of the decay, disagree."""
+    asked = [v for v in verdicts if v.by_layout]
+    layouts = [v.claim for v in asked if disagree(v.by_layout.values())]
+    decays = [v.claim for v in asked if disagree(v.by_decay.values())]
+    if not asked:
+        return ""
+    return (
+        f"Verdicts that are not the same in every layout: {listed(layouts)}; in both readings of"
+        f" the decay: {listed(decays)}."
+    )
+
+
+def changes(flips: pd.DataFrame) -> str:
+    """How many variants change a verdict; `flips` as `flips.flips` returns it."""
+    variants = flips.variant.unique()
+    if not len(variants):
+        return ""
+    return (
+        f"Of {len(variants)} variants, each with one thing changed,"
+        f" {_flipped(flips).variant.nunique()} change at least one verdict."
+    )
+
+
+def hinges(verdicts: Iterable[Verdict], flips: pd.DataFrame) -> dict[str, tuple[str, ...]]:
+    """The departures on which a verdict depends: letter -> claims, both in order."""
+    found: dict[str, set[str]] = {letter: set() for letter in DEPARTURES}
+    for verdict in verdicts:
+        if disagree(verdict.by_layout.values()):
+            found[LAYOUT].add(verdict.claim)
+        if disagree(verdict.by_decay.values()):
+            found[DECAY].add(verdict.claim)
+    for variant, claim in _flipped(flips)[["variant", "claim"]].itertuples(index=False):
+        letter = plan.VARIANTS[variant].departure
+        if letter:
+            found[letter].add(claim)
+    return {letter: tuple(sorted(claims)) for letter, claims in found.items() if claims}
+
+
+def questions(hinges: dict[str, tuple[str, ...]]) -> str:
+    """One item a departure on which a verdict depends: what the paper leaves open, and which."""
+    if not hinges:
+        return "Nothing was found on which a verdict depends."
+    return "\n".join(
+        f"- {DEPARTURES[letter].gap} It matters to {listed(claims)} ({{ref}}`departure-{letter}`)."
+        for letter, claims in hinges.items()
+    )
+
+
+def ours(verdicts: Iterable[Verdict]) -> str:
+    """One item a claim of our own: what it says, and whether that holds."""
+    return "\n".join(f"- {v.claim}. {v.statement} *{HOLDS[v.outcome]}*" for v in verdicts)
+
+
+def disagree(outcomes: Iterable[str]) -> bool:
+    """Whether there are two different ones among those that are decided."""
+    return len(set(outcomes) - {UNDECIDABLE}) > 1
+
+
+def listed(names: Iterable[object]) -> str:
+    """ "a, b and c", or "none"."""
+    *most, last = [str(name) for name in names] or ["none"]
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def _flipped(flips: pd.DataFrame) -> pd.DataFrame:
+    return flips[flips.flips.astype(bool)]  # without rows the column has no type of its own

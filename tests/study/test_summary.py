@@ -1,0 +1,144 @@
+"""What the one-page summary says of numbers that a test makes up."""
+
+import re
+
+import pandas as pd
+import pytest
+
+from nmpcrl.study import Experiment, summary
+from nmpcrl.study.departures import DEPARTURES
+from nmpcrl.study.flips import COLUMNS
+from nmpcrl.study.plan import VARIANTS
+from nmpcrl.study.published import Published
+from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
+
+ABOUT = {
+    "runs": {"main": 1200, "controls": 60, "soft box": 40, "tanh": 20},
+    "hours": 12.34,
+    "versions": {"python": "3.11.9", "casadi": "3.8.2"},
+    "machine": {
+        "processor": "Abacus 9",
+        "architecture": "x86_64",
+        "cores": 2,
+        "system": "Linux",
+    },
+}
+
+
+def verdict(claim: str, outcome: str, layouts: str = "", decays: str = "") -> Verdict:
+    """One whose outcomes in layouts A, B, ... and per step, per episode are letters: y, p, n, o."""
+    read = {"y": REPRODUCED, "p": PARTLY, "n": NOT, "o": UNDECIDABLE}
+    return Verdict(
+        claim,
+        "It is so.",
+        outcome,
+        "evidence",
+        "elsewhere",
+        by_layout={name: read[letter] for name, letter in zip("ABCDEF", layouts, strict=False)},
+        by_decay={
+            name: read[letter] for name, letter in zip(("step", "episode"), decays, strict=False)
+        },
+    )
+
+
+def table(*rows: tuple[str, str, bool]) -> pd.DataFrame:
+    """What `flips` returns, as far as it matters here."""
+    frame = pd.DataFrame(rows, columns=["variant", "claim", "flips"])
+    return frame.reindex(columns=list(COLUMNS))
+
+
+def test_the_effort_names_runs_hours_machine_and_versions():
+    found = Published(rows={Experiment(seed=s): {} for s in range(1320)}, about=ABOUT)
+    said = summary.effort(found)
+    for part in ("1,320 runs of 300 episodes", "1,200 in", "60 with", "60 in 2 variants"):
+        assert part in said
+    for part in (
+        "12.3 hours",
+        "machine with 2 cores (Abacus 9, Linux)",
+        "python 3.11.9 and casadi 3.8.2",
+    ):
+        assert part in said
+    assert found.about["runs"]["main"] == 1200  # what was read is not taken apart
+
+
+def test_where_nothing_is_published_the_page_says_so_and_what_to_do():
+    for said in (summary.effort(Published()), summary.outcomes(())):
+        assert "Nothing is published" in said
+        assert "`nmpcrl study --publish`" in said
+    assert summary.spread(()) == summary.changes(table()) == ""
+    assert summary.hinges((), table()) == {}
+    assert summary.questions({}).startswith("Nothing was found")
+
+
+def test_the_outcomes_are_counted_and_each_claim_is_named_once():
+    judged = [verdict("C1", REPRODUCED), verdict("C2", NOT), verdict("C3", REPRODUCED)]
+    said = summary.outcomes(judged)
+    assert said == "Of 3 claims: 2 reproduced (C1 and C3) and 1 not reproduced (C2)."
+    assert UNDECIDABLE not in said
+
+
+@pytest.mark.parametrize(
+    ("layouts", "decays", "disagreeing"),
+    [
+        ("yyyy", "yy", (False, False)),
+        ("yyny", "yy", (True, False)),
+        ("yypy", "yn", (True, True)),
+        ("yyoy", "yo", (False, False)),  # what is not decided contradicts nothing
+        ("oooo", "oo", (False, False)),
+    ],
+)
+def test_layouts_and_readings_disagree_where_two_decided_verdicts_differ(
+    layouts, decays, disagreeing
+):
+    judged = [verdict("C5", PARTLY, layouts, decays), verdict("C8", NOT)]
+    by_layout, by_decay = re.findall(r": (\S+?)[;.]", summary.spread(judged))
+    assert (by_layout == "C5", by_decay == "C5") == disagreeing
+    hinges = summary.hinges(judged, table())
+    assert ("B" in hinges, "C" in hinges) == disagreeing
+
+
+def test_variants_that_change_a_verdict_are_counted_once():
+    flips = table(("soft box", "C1", True), ("soft box", "C2", True), ("tanh", "C1", False))
+    said = summary.changes(flips)
+    assert said == "Of 2 variants, each with one thing changed, 1 change at least one verdict."
+
+
+def test_claims_of_our_own_hold_or_do_not_and_are_not_called_reproduced():
+    said = summary.ours([verdict("B1", NOT), verdict("B2", PARTLY)])
+    assert said.splitlines() == [
+        "- B1. It is so. *It does not hold.*",
+        "- B2. It is so. *It holds in part.*",
+    ]
+    assert set(summary.HOLDS) == {REPRODUCED, PARTLY, NOT, UNDECIDABLE}
+
+
+def test_a_departure_hinges_on_every_variant_that_reads_it_otherwise():
+    assert (VARIANTS["tanh"].departure, VARIANTS["four fits"].departure) == ("H", "H")
+    assert VARIANTS["alpha x 3"].departure == ""
+    flips = table(
+        ("tanh", "C6", True),
+        ("four fits", "C1", True),
+        ("four fits", "C6", True),
+        ("soft box", "C5", False),
+        ("alpha x 3", "C9", True),  # the paper is clear about alpha
+    )
+    assert summary.hinges([verdict("C2", PARTLY, "yn", "yy")], flips) == {
+        "B": ("C2",),
+        "H": ("C1", "C6"),
+    }
+
+
+def test_a_question_quotes_the_gap_and_leads_to_its_entry():
+    said = summary.questions({"B": ("C2",), "H": ("C1", "C6")})
+    first, second = said.splitlines()
+    assert first.startswith(f"- {DEPARTURES['B'].gap} ")
+    assert first.endswith("matters to C2 ({ref}`departure-B`).")
+    assert "C1 and C6 ({ref}`departure-H`)." in second
+
+
+@pytest.mark.parametrize(
+    ("names", "text"),
+    [((), "none"), (("a",), "a"), (("a", "b"), "a and b"), ((1, 2, 3), "1, 2 and 3")],
+)
+def test_names_are_listed_as_a_sentence_has_them(names, text):
+    assert summary.listed(names) == text
