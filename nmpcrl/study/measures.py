@@ -3,7 +3,7 @@
 `claims` puts its questions to whole runs; here is what the questions look at.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -30,6 +30,7 @@ class Measure:
     of: Callable[[pd.DataFrame, Paths], Values]
     contrast: bool = False  # asked: is the first arm above the border, and the second not?
     at_least: bool = False  # asked of each number: is it at least the border? Else: at most?
+    nothing: float = 0.0  # the number of a run in which nothing is to be seen
 
 
 def holds(measure: Measure, values: Values, border: float | None = None) -> pd.Series:
@@ -44,7 +45,7 @@ def holds(measure: Measure, values: Values, border: float | None = None) -> pd.S
     if measure.contrast:
         first, second = (values.dropna()[name] for name in values)
         return (first > limit) & (second <= limit)
-    numbers = values.stack()
+    numbers = values.stack().dropna()
     return numbers >= limit if measure.at_least else numbers <= limit
 
 
@@ -64,6 +65,34 @@ def at_borders(measure: Measure, values: Values, borders: Iterable[float]) -> pd
             rows.append((border, share.value, share.low, share.high, read(yes, of)))
     names = ["border", "share", "low", "high"]
     return pd.DataFrame(rows, columns=[*names, "outcome"]).astype(dict.fromkeys(names, float))
+
+
+def steady(measure: Measure, values: Values) -> bool:
+    """Whether the verdict stays with a border half and twice as far from nothing."""
+    far = measure.border - measure.nothing
+    around = measure.nothing + far * np.array([0.5, 1.0, 2.0])
+    return at_borders(measure, values, around).outcome.nunique() <= 1
+
+
+def saved(runs: pd.DataFrame) -> pd.Series:
+    """Share of theta_init's noise-free cost that each run of `digest.table` saves in the end.
+
+    Minus infinity where a drive failed, and where training had to be stopped.
+    """
+    return claims.gain(runs).where(runs.stopped == "finished", -np.inf)
+
+
+def achieved(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
+    """Share of what is possible in its layout that each run saves in the end.
+
+    1 is as good as what is possible and 0 as theta_init; nan where nothing is known to be possible.
+
+    Args:
+        runs: of `digest.table`.
+        possible: share of theta_init's noise-free cost that can be saved, by layout.
+    """
+    known = {layout: share for layout, share in possible.items() if share > 0}
+    return saved(runs) / runs.layout.map(known).astype(float)
 
 
 def _excess(runs: pd.DataFrame, _: Paths) -> Values:
@@ -88,7 +117,7 @@ def _wander(runs: pd.DataFrame, _: Paths) -> Values:
 def _apart(runs: pd.DataFrame, paths: Paths) -> Values:
     """How far RDES and GES are apart, in paths or in costs, whichever is more.
 
-    In shares of `SAME_PATH` and `SAME_COST`; infinite where a drive failed.
+    In shares of `SAME_PATH` and `SAME_COST`; infinite where a drive failed or a run was stopped.
     """
     rdes, ges = arms(runs, "RDES", "GES")
     drives = {
@@ -100,6 +129,7 @@ def _apart(runs: pd.DataFrame, paths: Paths) -> Values:
     path = pd.Series([claims.apart(*pair) for pair in pairs], rdes.index, dtype=float)
     cost = claims.costlier(rdes, ges).abs()
     worse = np.maximum(path / claims.SAME_PATH, cost / claims.SAME_COST).fillna(np.inf)
+    worse = worse.mask(np.isinf(rdes.final_cost), np.inf)  # two that failed are not the same
     whole = rdes.stopped.notna() & ges.stopped.notna()
     return pd.DataFrame({"RDES and GES": worse.where(whole & known)})
 
@@ -138,10 +168,12 @@ def _beside(
 
 
 MEASURES = {  # of C7, its weaker question: the stronger one has no border to speak of
-    "C1": Measure("training cost / frozen arm's", claims.DIVERGED, _excess, contrast=True),
+    "C1": Measure(
+        "training cost / frozen arm's", claims.DIVERGED, _excess, contrast=True, nothing=1.0
+    ),
     "C2": Measure("range of noise-free cost", claims.UNSTABLE, _wander, contrast=True),
     "C5": Measure("apart / what counts as the same", 1.0, _apart),
-    "C6": Measure("error with θ / without", claims.MORE_ACCURATE, _told),
+    "C6": Measure("error with θ / without", claims.MORE_ACCURATE, _told, nothing=1.0),
     "C7": Measure("largest Ξ without noise", TOUCH, _inside),
     "C9": Measure("fall of noise-free cost", claims.BETTER, _gain, at_least=True),
 }

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.study.digest import Digest
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.records import Records
 from nmpcrl.study.sweep import main_study
 
 NUDGE = 1e-12  # added to theta_x at the start
@@ -35,7 +35,7 @@ def solver_pair(experiment: Experiment) -> Pair:
     return short, replace(short, solver=OTHER_SOLVER)
 
 
-def separation(one: Records, other: Records) -> Vector:
-    """The largest difference of any component of theta, after each step that both made."""
-    steps = min(len(one.steps["theta"]), len(other.steps["theta"]))
-    return np.abs(one.steps["theta"][:steps] - other.steps["theta"][:steps]).max(axis=1)
+def separation(one: Digest, other: Digest) -> Vector:
+    """The largest difference of any component of theta, after each episode that both reached."""
+    apart = np.abs(one.episodes["theta"] - other.episodes["theta"]).max(axis=1)
+    return apart[np.isfinite(apart)]

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from nmpcrl.study import twins
+from nmpcrl.study.digest import Digest, digest
 from nmpcrl.study.experiment import Experiment, run
 from nmpcrl.study.figures import results
-from nmpcrl.study.records import Records
 
 SHORT = {"episodes": 2, "seeds": [3], "layout": "A"}
 
 
-def with_theta(*rows) -> Records:
-    return Records({}, {"theta": np.array(rows)}, {}, {})
+def with_theta(*rows) -> Digest:
+    nothing = np.empty((0, 0))
+    return Digest({}, {"theta": np.array(rows, float)}, {}, nothing, nothing, {})
 
 
 def test_a_twin_differs_from_its_run_in_the_twelfth_digit_of_theta_x():
@@ -38,14 +39,15 @@ def test_the_other_solver_gets_a_run_as_long_as_it_can_afford():
         assert one.episodes == other.episodes == expected
 
 
-def test_separation_is_the_largest_difference_over_the_steps_that_both_made():
-    one, other = with_theta([1, 2], [3, 4], [5, 6]), with_theta([1, 2], [2.5, 4.25])
+def test_separation_is_the_largest_difference_over_the_episodes_that_both_reached():
+    one = with_theta([1, 2], [3, 4], [5, 6])
+    other = with_theta([1, 2], [2.5, 4.25], [np.nan, np.nan])
     np.testing.assert_array_equal(twins.separation(one, other), [0, 0.5])
 
 
 def test_a_run_learns_the_same_with_our_solver_as_with_ipopt():
     """Until rounding separates them; two episodes of a learner that settles are far from it."""
-    one, other = (run(e) for e in twins.solver_pair(Experiment(episodes=2)))
+    one, other = (digest(run(e)) for e in twins.solver_pair(Experiment(episodes=2)))
     assert twins.separation(one, other).max() < 1e-6
 
 

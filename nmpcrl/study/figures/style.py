@@ -41,8 +41,18 @@ LOOKS = {
     "DES": Look("#000000", "--", "s"),
     "RDES": Look("#009E73", "-.", "^"),
     "GES": Look("#D55E00", (0, (5, 1)), "D"),
+    "TDC": Look("#CC79A7", (0, (4, 1, 1, 1, 1, 1)), "v"),
+    "QL": Look("#56B4E9", (0, (8, 3)), "P"),
     "frozen": Look("#8A8A8A", ":", "x"),
+    "matched": Look("#E69F00", (0, (2, 1)), "<"),
+    "random": Look("#8C5A2B", (0, (1, 1)), ">"),
 }
+
+
+def marked(figure: Figure, mark: str) -> Figure:
+    """The figure with a line below that says where its runs come from."""
+    figure.supxlabel(mark, x=0.99, ha="right", fontsize="x-small", color="0.35")
+    return figure
 
 
 def subplots(

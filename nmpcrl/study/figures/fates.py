@@ -1,0 +1,140 @@
+"""Figures of chapter 5 on why runs went wrong: how many for which reason, and one run of each."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from nmpcrl.study import paper
+from nmpcrl.study.digest import Digest
+from nmpcrl.study.evidence import Evidence
+from nmpcrl.study.figures.claims import FEW
+from nmpcrl.study.figures.open import closes_at, plain
+from nmpcrl.study.figures.rdes import headed
+from nmpcrl.study.figures.results import LIMIT, SUBTITLE
+from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.study.mechanisms import (
+    ENDINGS,
+    MECHANISMS,
+    OVER_PREDICTED,
+    OVERSHOOT,
+    WELL,
+    rise,
+)
+from nmpcrl.study.records import Column
+
+GOOD = "0.92"  # the grey of what went well
+PATTERNS = (  # colour and hatching of what did not, in order
+    ("#D55E00", ""),
+    ("#0072B2", "////"),
+    ("#E69F00", "\\\\\\\\"),
+    ("#56B4E9", "...."),
+    ("0.55", ""),
+)
+STOPPED = "stopped in training"
+SEEN = (-1.0, 3.0)  # of theta_c
+AROUND = 60  # episodes shown before and after the rise
+
+
+@page
+def reasons(found: Evidence) -> Figure:
+    """How many runs of each learner met which mechanism, and how their last drives ended."""
+    moved = found.runs[found.runs.learner != "frozen"]
+    figure, axes = subplots(1, 2, 1.5 + 0.32 * moved.learner.nunique(), sharey=True)
+    ends = moved.ending.mask(moved.wrong == "stopped", STOPPED)
+    kinds = (moved.mechanism, (*MECHANISMS, WELL)), (ends, (STOPPED, *ENDINGS[1:], ENDINGS[0]))
+    for axis, (said, names) in zip(axes, kinds, strict=True):
+        counts = pd.crosstab(moved.learner, said)
+        counts = counts.reindex(moved.learner.unique(), columns=list(names), fill_value=0)
+        looks = dict(zip(names, (*PATTERNS[: len(names) - 1], (GOOD, "")), strict=True))
+        _stacked(axis, counts, looks)
+        handles = [Rectangle((0, 0), 1, 1, **_look(*look)) for look in looks.values()]
+        axis.legend(handles, names, loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
+        axis.set_xlabel("runs")
+    axes[0].set_title("what was at work when the cost rose", **SUBTITLE)
+    axes[1].set_title("how the last drive ended", **SUBTITLE)
+    axes[0].invert_yaxis()
+    wrong = moved.mechanism[moved.mechanism != WELL].value_counts()
+    listed = ", ".join(f"{count} {name}" for name, count in wrong.items())
+    title = f"{wrong.sum()} of {len(moved)} runs went wrong{': ' if listed else ''}{listed}"
+    return marked(headed(figure, title), found.mark)
+
+
+@page
+def traced(examples: Mapping[str, Digest], first_drives: Mapping[str, Column]) -> Figure:
+    """One run of each mechanism, a column each: what its digest says around the rise of the cost.
+
+    Args:
+        examples: a run by mechanism.
+        first_drives: by mechanism, the states of theta_init's drive in the same layout.
+    """
+    if not examples:
+        figure, axis = subplots(height=0.6)
+        axis.set_axis_off()
+        return headed(figure, "No run went wrong")
+    figure, axes = subplots(4, len(examples), 6.2, sharex="col", squeeze=False)
+    for column, (name, run) in zip(axes.T, examples.items(), strict=True):
+        _trace(column, run, first_drives[name])
+        e = run.name
+        column[0].set_title(f"{name}\n{e.learner}, {e.layout}, per {e.decay}", **SUBTITLE)
+        column[-1].set_xlabel("episode")
+    labels = (
+        "cost, noise-free\n/ at the start",
+        "largest α‖φ‖²",
+        "share of the\nnetwork in δ",
+        "θ_c",
+    )
+    for axis, label in zip(axes[:, 0], labels, strict=True):
+        axis.set_ylabel(label)
+    figure.align_ylabels(axes[:, 0])
+    names = ", ".join(examples)
+    mark = f"{len(examples)} runs trained here; grey: the episodes in which the cost rose"
+    return marked(headed(figure, f"One run of each kind: {names}"), mark)
+
+
+def _trace(column: Column, run: Digest, first_drive: Column) -> None:
+    """The four panels of one run."""
+    task = paper.task(run.name.layout, box=run.name.box)
+    window, color = rise(run), LOOKS[run.name.learner].color
+    shown = slice(max(0, window.start - AROUND), window.stop + AROUND)
+    episodes = np.arange(1, run.experiment["episodes"] + 1)[shown]
+    cost = run.evaluations["cost"] / run.evaluations["cost"][0]
+    near = (run.evaluations["episode"] >= shown.start) & (run.evaluations["episode"] <= shown.stop)
+    column[0].plot(run.evaluations["episode"][near], cost[near], "o-", color=color, markersize=3)
+    with np.errstate(invalid="ignore"):
+        share = paper.GAMMA * run.episodes["bias"] / run.episodes["delta"]
+    curves = (run.episodes["alpha_phi2"], share, run.episodes["theta"][:, -1])
+    for axis, curve in zip(column[1:], curves, strict=True):
+        axis.plot(episodes, curve[shown], color=color)
+    column[1].set_yscale("log")
+    low, high = column[1].get_ylim()
+    if high / low < FEW:
+        plain(column[1].yaxis)
+    low, high = column[3].get_ylim()
+    column[3].set_ylim(max(low, SEEN[0]), min(high, SEEN[1]))
+    limits = (1.0, OVERSHOOT, OVER_PREDICTED, closes_at(task, first_drive[:, :2]))
+    for axis, limit in zip(column, limits, strict=True):
+        axis.axvspan(window.start, window.stop, color="0.9", zorder=0)
+        axis.axhline(limit, **LIMIT)
+        axis.xaxis.set_major_locator(MaxNLocator(3, integer=True))
+
+
+def _stacked(axis: Axes, counts: pd.DataFrame, looks: Mapping[str, tuple[str, str]]) -> None:
+    """A bar a learner, with the number in each part that has room for it."""
+    left = np.zeros(len(counts))
+    for name, look in looks.items():
+        bars = axis.barh(counts.index, counts[name], 0.7, left, **_look(*look))
+        enough = 0.06 * counts.sum(axis=1).max()
+        labels = [str(n) if n > enough else "" for n in counts[name]]
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
+        axis.bar_label(bars, labels, label_type="center", fontsize="x-small", bbox=box)
+        left += counts[name].to_numpy()
+
+
+def _look(color: str, hatch: str) -> dict[str, Any]:
+    return {"facecolor": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}
