@@ -2,26 +2,30 @@
 
 CMA-ES (Hansen 2016) minimises the noise-free cost that learning is judged by, which no learner
 ever sees, within a stated budget of drives. It is no learner: it needs whole drives without noise.
+What it finds bounds the family's best from one side only; a longer search may find better.
 """
 
 import json
+import os
 import sys
-from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable, Mapping
+from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
-from itertools import repeat
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import cma
 import numpy as np
+from tqdm import tqdm
 
 from nmpcrl import Vector
-from nmpcrl.study import paper
-from nmpcrl.study.store import SPAWN, digest, folder, versions
+from nmpcrl.study import paper, store
+from nmpcrl.study.parameters import one_of, whole
 from nmpcrl.study.training import Persistent, evaluate
 
-BUDGET = 3000  # drives without noise that a search may make
+BUDGET = 2000  # drives without noise that a search may make
+LEAST = 40  # drives: the first one and some generations
 SPREAD = 0.3  # of the first drives, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
@@ -30,83 +34,141 @@ SOURCES = ("control", "study/paper.py", "study/training.py", "study/search.py")
 
 
 @dataclass(frozen=True)
+class Search:
+    """One search; the same one finds the same theta.
+
+    Raises:
+        ParameterError: a field is not what it may be.
+    """
+
+    layout: str = "A"
+    seed: int = 0  # of the candidates that are drawn
+    budget: int = BUDGET
+
+    def __post_init__(self) -> None:
+        one_of(self, "layout", tuple(paper.LAYOUTS))
+        whole(self, "seed", least=0)
+        whole(self, "budget", least=LEAST)
+
+
+@dataclass(frozen=True)
 class Found:
-    """Where a search ended."""
+    """Where a search ended, and each improvement on the way; the first drive is theta_init's."""
 
-    layout: str
-    seed: int
-    budget: int
-    initial: float  # noise-free cost of theta_init
-    cost: float  # noise-free cost of theta
     theta: tuple[float, ...]
-    drives: tuple[int, ...]  # after so many drives ...
-    best: tuple[float, ...]  # ... this was the lowest cost so far
+    made: int  # drives in all
+    drives: tuple[int, ...]  # at this one, from 1 on, ...
+    best: tuple[float, ...]  # ... the lowest cost so far fell to this
+
+    @property
+    def initial(self) -> float:
+        """Noise-free cost of theta_init."""
+        return self.best[0]
+
+    @property
+    def cost(self) -> float:
+        """Noise-free cost of theta."""
+        return self.best[-1]
+
+    @property
+    def gain(self) -> float:
+        """Share of theta_init's cost that theta saves."""
+        return 1 - self.cost / self.initial
 
 
-def search(layout: str, seed: int = 0, budget: int = BUDGET) -> Found:
+def search(wanted: Search) -> Found:
     """Look for the theta of least noise-free cost in a layout, from theta_init."""
-    controller = Persistent(paper.nmpc(layout))
+    controller = Persistent(paper.nmpc(wanted.layout))
 
     def cost(scaled: Vector) -> float:
-        found = evaluate(controller, np.asarray(scaled) * SCALE, paper.STEPS).cost
-        return found if np.isfinite(found) else FAILED
+        return evaluate(controller, np.asarray(scaled) * SCALE, paper.STEPS).cost
 
     start = np.array(paper.THETA_INIT) / SCALE
     options = {
-        "bounds": [list(LOWER / SCALE), list(UPPER / SCALE)],
-        "maxfevals": budget,
-        "seed": seed + 1,  # 0 would mean the clock
+        "bounds": [LOWER / SCALE, UPPER / SCALE],
+        "seed": wanted.seed + 1,  # 0 would mean the clock
         "verbose": -9,
     }
     strategy = cma.CMAEvolutionStrategy(start, SPREAD, options)
-    initial = cost(start)
-    drives, best = [1], [initial]
-    theta, made = start, 1
-    while not strategy.stop() and made < budget:
+    tried, costs = [start], [cost(start)]
+    while not strategy.stop() and len(costs) + strategy.popsize <= wanted.budget:
         asked = strategy.ask()
-        costs = [cost(one) for one in asked]
-        strategy.tell(asked, costs)
-        made += len(asked)
-        if min(costs) < best[-1]:
-            theta = asked[int(np.argmin(costs))]
-        drives.append(made)
-        best.append(min(best[-1], *costs))
-    found = tuple(float(value) for value in np.asarray(theta) * SCALE)
-    return Found(layout, seed, budget, initial, best[-1], found, tuple(drives), tuple(best))
+        found = [cost(one) for one in asked]
+        strategy.tell(asked, [min(one, FAILED) for one in found])
+        tried += asked
+        costs += found
+    return _found(np.array(tried) * SCALE, np.array(costs))
 
 
-def fetch(layouts: Iterable[str], seeds: Iterable[int] = (0,), budget: int = BUDGET) -> list[Found]:
-    """`search` in each layout with each seed: read what is stored, search for the rest."""
-    wanted = [(layout, seed) for layout in layouts for seed in seeds]
-    place = folder() / "search.json"
-    key = f"{digest(SOURCES)} {sorted(versions().items())} {budget}"
-    kept = _kept(place, key)
-    missing = [pair for pair in wanted if pair not in kept]
+def fetch(
+    searches: Iterable[Search], *, workers: int | None = None, progress: bool = True
+) -> dict[Search, Found]:
+    """`search` for many: read what is stored, search for the rest in parallel, and store it.
+
+    Args:
+        searches: those wanted.
+        workers: how many processes; by default as many as there are cores.
+        progress: whether to show a bar.
+    """
+    wanted = tuple(dict.fromkeys(searches))
+    kept = _kept()
+    missing = [one for one in wanted if one not in kept]
     if missing:
-        with ProcessPoolExecutor(mp_context=SPAWN) as pool:
-            found = pool.map(search, *zip(*missing, strict=True), repeat(budget))
-            kept |= dict(zip(missing, found, strict=True))
-        place.parent.mkdir(parents=True, exist_ok=True)
-        half = place.with_suffix(".half")
-        half.write_text(json.dumps({"key": key, "found": [asdict(one) for one in kept.values()]}))
-        half.replace(place)
-    return [kept[pair] for pair in wanted]
+        processes = min(workers or os.cpu_count() or 1, len(missing))
+        with store.processes(processes) as pool, store.without_main():
+            pending = {pool.submit(search, one): one for one in missing}
+            bar = tqdm(as_completed(pending), "searches", len(pending), disable=not progress)
+            for done in bar:
+                kept[pending[done]] = done.result()
+                _keep(kept)
+    return {one: kept[one] for one in wanted}
 
 
-def _kept(place: Path, key: str) -> dict[tuple[str, int], Found]:
-    """The searches in the file, if they are of this code, these versions and this budget."""
+def _found(tried: Vector, costs: Vector) -> Found:
+    """The result of drives with these thetas, shape (drives, d), and costs, shape (drives,)."""
+    lowest = np.minimum.accumulate(costs)
+    fell = np.flatnonzero(np.r_[True, lowest[1:] < lowest[:-1]])
+    return Found(
+        theta=tuple(tried[fell[-1]].tolist()),
+        made=len(costs),
+        drives=tuple((fell + 1).tolist()),
+        best=tuple(lowest[fell].tolist()),
+    )
+
+
+def _place() -> Path:
+    return store.folder() / "search.json"
+
+
+def _key() -> dict[str, Any]:
+    """All that the numbers depend on."""
+    return {"code": store.digest(SOURCES), **store.versions(), "cma": version("cma")}
+
+
+def _kept() -> dict[Search, Found]:
+    """The searches in the file, if they are of this code and these versions."""
+    place = _place()
     try:
         kept = json.loads(place.read_text())
-        if kept["key"] != key:
+        if kept["key"] != _key():
             return {}
-        found = [Found(**_tuples(one)) for one in kept["found"]]
+        return {Search(**one): Found(**_tuples(found)) for one, found in kept["searches"]}
     except FileNotFoundError:
         return {}
     except (ValueError, LookupError, TypeError) as error:
         print(f"{place} is damaged ({error}) and is searched again", file=sys.stderr)
         return {}
-    return {(one.layout, one.seed): one for one in found}
 
 
-def _tuples(fields: dict[str, Any]) -> dict[str, Any]:
-    return {k: tuple(v) if isinstance(v, list) else v for k, v in fields.items()}
+def _keep(found: Mapping[Search, Found]) -> None:
+    """Write the whole file beside its place, then rename it."""
+    place = _place()
+    place.parent.mkdir(parents=True, exist_ok=True)
+    half = place.with_suffix(".half")
+    searches = [[asdict(one), asdict(result)] for one, result in found.items()]
+    half.write_text(json.dumps({"key": _key(), "searches": searches}))
+    half.replace(place)
+
+
+def _tuples(fields: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: tuple(v) if isinstance(v, list) else v for name, v in fields.items()}

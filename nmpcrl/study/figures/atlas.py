@@ -1,0 +1,204 @@
+"""Figures of chapter 6: the map of the verdicts, and what lies behind some of its cells."""
+
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.study.atlas import WHOLE, groups
+from nmpcrl.study.cards import WORDS
+from nmpcrl.study.claims import experiment_of
+from nmpcrl.study.digest import Digest
+from nmpcrl.study.evidence import Evidence, paths
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.figures.open import plain
+from nmpcrl.study.figures.rdes import headed
+from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.study.measures import MEASURES, Values
+from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+
+ASKED = {  # at the head of a column
+    "C1": "DES diverges,\nRDES does not",
+    "C2": "ES is unstable,\nGES is not",
+    "C5": "RDES and GES:\nsame policy",
+    "C6": "θ helps the\nnetwork",
+    "C7": "constraints\nhold",
+    "C9": "RDES and GES\nbeat $\\theta_\\mathrm{init}$",
+}
+FILLS = {  # with the colour of the word; the darker, the more is left of the claim
+    REPRODUCED: ("#1a6b3c", "white"),
+    PARTLY: ("#e0b050", "black"),
+    NOT: ("#f6d5d2", "black"),
+    UNDECIDABLE: ("white", "0.45"),
+}
+SYMBOLS = {"c_epsilon": r"$c_\epsilon$", "alpha x": "α ×", "beta x": "β ×"}
+SCALES: dict[str, dict[str, Any]] = {  # others are logarithmic
+    "C7": {"value": "symlog", "linthresh": 1e-6},
+    "C9": {"value": "symlog", "linthresh": 0.1},
+}
+MOST_COST = 1.5  # of theta_init's, that is drawn
+
+
+@page
+def verdict_map(atlas: pd.DataFrame, mark: str) -> Figure:
+    """What becomes of each claim in each row; a frame where it is not what it is held against.
+
+    Args:
+        atlas: of `atlas.atlas`.
+        mark: where the runs come from.
+    """
+    claims, rows = list(atlas.claim.unique()), list(atlas.variant.unique())
+    letters = dict(zip(atlas.variant, atlas.departure, strict=True))
+    height = dict(zip(rows, _heights([letters[row] for row in rows]), strict=True))
+    figure, axes = subplots(height=0.22 * max(height.values(), default=0) + 1.4)
+    for cell in atlas.to_dict("records"):
+        _cell(axes, claims.index(cell["claim"]), height[cell["variant"]], cell)
+    for row, y in height.items():
+        axes.text(-0.1, y, named(row), ha="right", va="center", fontsize=8)
+        axes.text(-2.3, y, letters[row], ha="center", va="center", fontsize=8)
+    axes.text(-2.3, -0.8, "departure", ha="center", va="bottom", fontsize=7.5)
+    for i, claim in enumerate(claims):
+        head = f"{claim}\n{ASKED[claim]}"
+        axes.text(i + 0.5, -0.8, head, ha="center", va="bottom", fontsize=7.5)
+    axes.set(xlim=(-2.5, len(claims)), ylim=(max(height.values(), default=0) + 0.7, -3.0))
+    axes.set_axis_off()
+    return marked(headed(figure, _flipped(atlas)), mark)
+
+
+@page
+def telling(cells: pd.DataFrame, found: Evidence) -> Figure:
+    """What lies behind some cells: a row each, the claim's measure and the costs of its runs.
+
+    Args:
+        cells: of `atlas.telling`.
+        found: runs and digests of the main table and of the variants.
+    """
+    if cells.empty:
+        figure, axes = subplots(height=0.6)
+        axes.set_axis_off()
+        return headed(figure, "No verdict flips in what was run here")
+    figure, grid = subplots(
+        len(cells), 2, 2.5 * len(cells) + 0.3, squeeze=False, width_ratios=(1, 1)
+    )
+    for (left, right), cell in zip(grid, cells.to_dict("records"), strict=True):
+        here, usual = groups(found.runs, cell["variant"])
+        measure, where = MEASURES[cell["claim"]], paths(found)
+        values = measure.of(here, where), measure.of(usual, where)
+        _strips(left, cell["claim"], *values)
+        learners = [name for name in LOOKS if any(name in arm.split() for arm in values[0])]
+        _costs(right, found.digests, here, usual, learners)
+        left.set_title(f"{cell['claim']}: {cell['outcome']}; was: {cell['base']}", fontsize=9)
+        right.set_title(f"{named(cell['variant'])} (bands: without it)", fontsize=9)
+    listed = ", ".join(f"{row.claim} by {named(row.variant)}" for row in cells.itertuples())
+    return marked(headed(figure, f"What moves verdicts most: {listed}"), found.mark)
+
+
+def named(row: str) -> str:
+    """The name of a row of the map, with symbols."""
+    for word, symbol in SYMBOLS.items():
+        row = row.replace(word, symbol)
+    return row
+
+
+def _heights(letters: list[str]) -> list[float]:
+    """Where each row of the map lies, with some room between departures."""
+    steps = [1.0 + 0.4 * (one != other) for one, other in pairwise(letters)]
+    return np.cumsum([0.0, *steps]).tolist()
+
+
+def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
+    """Colour, word and share of yes; framed, and with what it was before, if it flips."""
+    fill, ink = FILLS[cell["outcome"]]
+    place, size = (column + 0.03, y - 0.46), (0.94, 0.92)
+    axes.add_patch(Rectangle(place, *size, facecolor=fill, edgecolor="0.8", linewidth=0.5))
+    text = WORDS[cell["outcome"]]
+    if cell["flips"]:
+        text = f"{WORDS[cell['base']]} → {text}"
+        axes.add_patch(Rectangle(place, *size, fill=False, edgecolor="black", linewidth=1.8))
+    elif 0 < cell["share"] < 1:
+        text += f" {cell['share']:.0%}"
+    axes.text(column + 0.5, y, text, ha="center", va="center", color=ink, fontsize=7.5)
+
+
+def _flipped(atlas: pd.DataFrame) -> str:
+    """How many cells flip, and of which claims none does."""
+    decided = atlas[(atlas.variant != WHOLE) & (atlas.outcome != UNDECIDABLE)]
+    decided = decided[decided.base != UNDECIDABLE]
+    flips = decided.groupby("claim", sort=False).flips.sum()
+    never = [str(claim) for claim, count in flips.items() if not count]
+    steady = f"; those on {' and '.join(never)} never" if never and flips.any() else ""
+    return f"{int(flips.sum())} of {len(decided)} decided verdicts flip{steady}"
+
+
+def _strips(axes: Axes, claim: str, here: Values, usual: Values) -> None:
+    """The measure of each run, arm by arm: hollow as usual, filled where something is varied."""
+    measure = MEASURES[claim]
+    low, high = _finite_range(pd.concat([here, usual]), measure.border)
+    for i, arm in enumerate(here):
+        look = LOOKS[arm.split()[-1]]
+        for shift, values, face in ((-0.2, usual, "none"), (0.2, here, look.color)):
+            numbers = values[arm].dropna().clip(low, high)
+            x = i + shift + np.linspace(-0.12, 0.12, len(numbers))
+            style: dict[str, Any] = {
+                "color": look.color,
+                "markerfacecolor": face,
+                "markersize": 4,
+                "alpha": 0.8,
+            }
+            axes.plot(x, numbers, look.marker, linestyle="", **style)
+    axes.axhline(measure.border, color="0.35", linewidth=0.9, linestyle=(0, (2, 2)))
+    axes.set_yscale(**SCALES.get(claim, {"value": "log"}))
+    if claim in SCALES:
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    else:
+        plain(axes.yaxis)
+    axes.set_xticks(range(len(here.columns)), list(here))
+    axes.set_ylabel(measure.label, fontsize=8)
+
+
+def _costs(
+    axes: Axes,
+    digests: Mapping[Experiment, Digest],
+    here: pd.DataFrame,
+    usual: pd.DataFrame,
+    learners: Iterable[str],
+) -> None:
+    """Noise-free cost over training: a line a run here, and the quartiles of the usual ones."""
+    for name in learners:
+        look = LOOKS[name]
+        episode, costs = _curves(digests, usual[usual.learner == name])
+        quartiles = np.percentile(costs, (25, 75), axis=0)
+        axes.fill_between(episode, *quartiles, color=look.color, alpha=0.2, linewidth=0)
+        episode, costs = _curves(digests, here[here.learner == name])
+        lines = axes.plot(episode, costs.T, **look.line, linewidth=1.0, alpha=0.8)
+        lines[0].set_label(name)
+    low, high = axes.get_ylim()
+    axes.set(xlabel="episode", ylabel="noise-free cost / first", ylim=(low, min(high, MOST_COST)))
+    axes.legend(fontsize=7.5)
+
+
+def _curves(digests: Mapping[Experiment, Digest], runs: pd.DataFrame) -> tuple[Vector, Matrix]:
+    """After which episodes, and the noise-free costs over theta_init's, shape (runs, rollouts).
+
+    What a run did not reach, and a failed drive, costs more than is drawn.
+    """
+    judged = [digests[experiment_of(row)].evaluations for row in runs.to_dict("records")]
+    episode = max((one["episode"] for one in judged), key=len)
+    costs = np.full((len(judged), len(episode)), 2 * MOST_COST)
+    for row, one in zip(costs, judged, strict=True):
+        row[: len(one["cost"])] = np.minimum(one["cost"] / one["cost"][0], 2 * MOST_COST)
+    return episode, costs
+
+
+def _finite_range(values: Values, border: float) -> tuple[float, float]:
+    """What stands for minus infinity and for infinity among these."""
+    numbers = values.to_numpy().ravel()
+    finite = np.append(numbers[np.isfinite(numbers)], border)
+    return finite.min() - 0.5 * abs(finite.min()), finite.max() + 0.5 * abs(finite.max())

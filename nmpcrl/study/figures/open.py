@@ -1,0 +1,189 @@
+"""Figures of chapter 6: layouts, theta_c among them, and where the borders of the claims lie.
+
+The map of the verdicts is in `figures.atlas`.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control import Task
+from nmpcrl.study import paper
+from nmpcrl.study.digest import Digest
+from nmpcrl.study.driving import closes_at
+from nmpcrl.study.evidence import Evidence
+from nmpcrl.study.figures.controller import draw_task
+from nmpcrl.study.figures.rdes import headed
+from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.study.layouts import gaps
+from nmpcrl.study.measures import MEASURES, Values, at_borders, steady
+from nmpcrl.study.verdicts import NEARLY_ALL, NEARLY_NONE
+
+LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
+OPEN, CLOSED = "#1B7F79", "#882255"  # a gap; neither is a learner's colour
+LEARNING = ("ES", "RDES", "GES", "TDC")  # whose theta_c is drawn; that of DES may go anywhere
+NEAR = 0.05  # of theta_c from d_o
+NARROW = 1.0  # a gap that is drawn leaves less than this [m]
+SEEN = (-0.1, 0.6)  # of theta_c; what goes beyond ends at the edge
+BORDERS = {  # at which each claim is decided once more
+    "C1": np.geomspace(1.02, 15, 60),
+    "C2": np.geomspace(0.005, 1.5, 60),
+    "C5": np.geomspace(0.1, 30, 60),
+    "C6": np.geomspace(0.3, 1.3, 60),
+    "C7": np.geomspace(1e-8, 1.0, 60),
+    "C9": np.linspace(-0.05, 0.15, 60),
+}
+
+
+@page
+def layouts(drives: Mapping[str, Matrix]) -> Figure:
+    """The layouts, theta_init's first drive in each, and the gaps that it goes through.
+
+    Args:
+        drives: states of the drive without noise, shape (K + 1, n), by layout.
+    """
+    rows = -(-len(drives) // 3)
+    figure, grid = subplots(rows, 3, 2.0 * rows + 0.4, squeeze=False, sharex=True, sharey=True)
+    margin, closing = paper.task().margin, 0
+    for axes, (name, states) in zip(grid.flat, drives.items(), strict=False):
+        task = paper.task(name)
+        widths = gaps(task, states[:, :2], margin)
+        narrowest = min(widths.values(), default=np.inf)
+        closing += narrowest <= 0
+        draw_task(axes, task, labels=False)
+        axes.plot(*states[:, :2].T, color="black", linewidth=1.1)
+        for sides, width in widths.items():
+            if width < NARROW:
+                _gap(axes, task, sides, shut=width <= 0)
+        kind = "closing" if narrowest <= 0 else "open"
+        axes.set_title(f"{name}: {kind}, {narrowest:+.2f} m", fontsize=9)
+    grid[0, 0].set_ylim(-3.0, 6.0)
+    for axes in grid.flat[len(drives) :]:
+        axes.set_visible(False)
+    figure.supxlabel("x [m]", fontsize=9)
+    figure.supylabel("y [m]", fontsize=9)
+    count = f"{closing} of {len(drives)} layouts"
+    finding = rf"In {count}, a gap of the first drive is closed at $\theta_c$ = {margin:g}"
+    return headed(figure, finding)
+
+
+@page
+def theta_c(found: Evidence) -> Figure:
+    """theta_c over training, a column a layout and a row a reading of the decay."""
+    names, decays = (found.digests.values_of(field) for field in ("layout", "decay"))
+    options = {"sharex": True, "sharey": True, "squeeze": False}
+    figure, grid = subplots(len(decays), len(names), 1.9 * len(decays) + 0.9, **options)
+    margin = paper.task().margin
+    ends: list[float] = []
+    for row, decay in zip(grid, decays, strict=True):
+        for axes, name in zip(row, names, strict=True):
+            runs = found.digests.select(layout=name, decay=decay)
+            ends += _ways_of_theta_c(axes, runs)
+            axes.axhline(margin, **LIMIT)
+            for run in list(runs.select(learner="frozen").values())[:1]:
+                shut = closes_at(paper.task(name), run.states[:, :2])
+                axes.axhline(shut, color=CLOSED, linewidth=0.9, linestyle=":")
+        row[0].set(ylabel=rf"$\theta_c$, decay per {decay}", ylim=SEEN)
+    for axes, name in zip(grid[0], names, strict=True):
+        axes.set_title(name, fontsize=9.5)
+    for axes in grid[-1]:
+        axes.set_xlabel("episode")
+    handles = [Line2D([], [], label=name, **LOOKS[name].line) for name in LEARNING]
+    handles.append(Line2D([], [], label="$d_o$", **LIMIT))
+    handles.append(Line2D([], [], label="a gap closes", color=CLOSED, linestyle=":"))
+    figure.legend(handles=handles, loc="outside lower left", ncols=3, fontsize="small")
+    beyond = np.array(ends) - margin
+    near, past = int((np.abs(beyond) <= NEAR).sum()), int((beyond > NEAR).sum())
+    finding = (
+        rf"Of {len(ends)} runs, {near} end with $\theta_c$ within {NEAR:g} of $d_o$ = {margin:g},"
+        f" and {past} far above it"
+    )
+    return marked(headed(figure, finding), found.mark)
+
+
+@page
+def borders(values: Mapping[str, Values], mark: str) -> Figure:
+    """What would become of each claim at other borders than its own.
+
+    Args:
+        values: of each claim's measure, over the main table.
+        mark: where the runs come from.
+    """
+    figure, grid = subplots(2, 3, 4.6, sharey=True)
+    for axes, (claim, measured) in zip(grid.flat, values.items(), strict=True):
+        measure = MEASURES[claim]
+        curve = at_borders(measure, measured, np.sort([*BORDERS[claim], measure.border]))
+        axes.plot(curve.border, curve.share, color="black")
+        axes.fill_between(curve.border, curve.low, curve.high, color="0.85", linewidth=0)
+        axes.axvline(measure.border, **LIMIT)
+        for share in (NEARLY_NONE, NEARLY_ALL):
+            axes.axhline(share, color="0.7", linewidth=0.7)
+        axes.set(xscale="linear" if claim == "C9" else "log", ylim=(-0.03, 1.03))
+        if claim in ("C1", "C6"):  # less than two decades
+            plain(axes.xaxis)
+        axes.set_xlabel(measure.label, fontsize=8)
+        low, high = same_verdict(curve, measure.border)
+        axes.set_title(f"{claim}: same {low:.2g} to {high:.2g}", fontsize=9)
+    for row in grid:
+        row[0].set_ylabel("share of yes")
+    stay = sum(steady(MEASURES[claim], measured) for claim, measured in values.items())
+    finding = f"{stay} of {len(values)} verdicts stay with a border half as far, and twice as far"
+    return marked(headed(figure, finding), mark)
+
+
+def plain(axis: Axis) -> None:
+    """Write the ticks of a logarithmic axis as 0.5, 1, 2 and not as powers of ten."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(NullLocator())
+
+
+def same_verdict(curve: pd.DataFrame, border: float) -> tuple[float, float]:
+    """Between which borders, around a claim's own, its verdict stays what it is.
+
+    nan where nothing is known.
+
+    Args:
+        curve: of `at_borders`, in ascending order.
+        border: one of them.
+    """
+    if curve.empty:
+        return np.nan, np.nan
+    own = int(np.argmin(np.abs(curve.border - border)))
+    other = np.flatnonzero(curve.outcome != curve.outcome.iloc[own])
+    first = max(other[other < own], default=-1) + 1
+    last = min(other[other > own], default=len(curve)) - 1
+    return float(curve.border.iloc[first]), float(curve.border.iloc[last])
+
+
+def _ways_of_theta_c(axes: Axes, runs: Mapping[Any, Digest]) -> list[float]:
+    """Draw theta_c of every run that is shown; return where each ends."""
+    ends = []
+    for run in runs.values():
+        if run.name.learner in LEARNING:
+            values: Vector = run.evaluations["theta"][:, -1]
+            line = LOOKS[run.name.learner].line
+            axes.plot(run.evaluations["episode"], values, **line, alpha=0.5, linewidth=0.9)
+            ends.append(float(values[-1]))
+    return ends
+
+
+def _gap(axes: Axes, task: Task, sides: tuple[int, int], *, shut: bool) -> None:
+    """The line between the two sides of a gap, numbered as `gaps` does."""
+    centres = np.transpose(task.discs[:2])
+    one, other = centres[sides[0]], centres[sides[0]].copy()
+    if sides[1] >= 0:
+        other = centres[sides[1]]
+    else:  # a wall: left, bottom, right, top are -1 to -4
+        axis = (-sides[1] - 1) % 2
+        other[axis] = (task.lower if sides[1] >= -2 else task.upper)[axis]
+    color, line = (CLOSED, (0, (1, 0.6))) if shut else (OPEN, "-")
+    axes.plot(*np.transpose([one, other]), color=color, linestyle=line, linewidth=2.2)

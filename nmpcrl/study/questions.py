@@ -1,0 +1,70 @@
+"""What one should ask the authors, and which of our verdicts the answers would decide."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from nmpcrl.study.summary import listed
+
+
+@dataclass(frozen=True)
+class Question:
+    """One gap of the paper as a question."""
+
+    ask: str
+    departures: tuple[str, ...]  # that read what is asked for; in the order of their weight
+
+
+QUESTIONS = (
+    Question("Where do the centres of the four obstacles lie?", ("B",)),
+    Question("What is $c_\\epsilon$, and does its exponent count time steps or episodes?", ("C",)),
+    Question(
+        "What makes a run diverge or unstable, and two policies the same? How many runs stand"
+        " behind each curve?",
+        ("P",),
+    ),
+    Question(
+        "Which activation, first weights, scaling, buffer and number of fits a step has the"
+        " network, and does $\\vtheta$ wait for the first fit?",
+        ("H", "G"),
+    ),
+    Question("Does DES differ from RDES in the network's inputs only?", ("I",)),
+    Question("Is the state space $[-3, 9]^2$, and is it as hard as it is written?", ("A", "M")),
+    Question("Is $\\beta$ meant to be smaller than $\\alpha$?", ("J",)),
+    Question(
+        "Is the first input free in the value that is learned, and are noisy actions clipped?",
+        ("F", "E"),
+    ),
+    Question(
+        "Which solver was used, and what does it return where $V$ has a kink in $\\theta_c$?",
+        ("L",),
+    ),
+)
+
+
+def to_ask(decides: Mapping[str, Collection[str]], varied: Collection[str]) -> str:
+    """The questions as a numbered list in Markdown, each with what hangs on it here.
+
+    Args:
+        decides: claims whose verdicts depend on a departure, by its letter.
+        varied: the letters of the departures that were read in several ways.
+    """
+    return "\n".join(
+        f"{number}. **{question.ask}** {_links(question)} {_weight(question, decides, varied)}"
+        for number, question in enumerate(QUESTIONS, start=1)
+    )
+
+
+def _links(question: Question) -> str:
+    refs = " and ".join(f"{{ref}}`{letter} <departure-{letter}>`" for letter in question.departures)
+    return f"(departure{'s' if len(question.departures) > 1 else ''} {refs})."
+
+
+def _weight(
+    question: Question, decides: Mapping[str, Collection[str]], varied: Collection[str]
+) -> str:
+    claims = sorted({claim for letter in question.departures for claim in decides.get(letter, ())})
+    if claims:
+        return f"The answer would decide {listed(claims)}."
+    if set(question.departures) & set(varied):
+        return "No verdict hung on it in what was run."
+    return "It was not varied here."

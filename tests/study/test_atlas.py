@@ -1,0 +1,148 @@
+"""The map: which rows it has, what each is held against, and which cells are shown."""
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nmpcrl.study import Experiment, claims, plan
+from nmpcrl.study.atlas import WHOLE, atlas, departure, groups, left_out, telling
+from nmpcrl.study.departures import DEPARTURES
+from nmpcrl.study.experiment import PAPER, frozen_arm
+from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED
+
+LITERAL, CLIPPED = "literal", "no clipping"
+PLACE = np.zeros((3, 3))
+
+
+def summary(experiment: Experiment, variant: str, **unlike) -> dict:
+    """The row of a run that saved a tenth and in which nothing went wrong."""
+    counts = {f"{name}_{size}": 0 for name in ("inside", "eval_inside") for size in claims.SIZES}
+    return (
+        asdict(experiment)
+        | {"theta": " ".join(map(repr, experiment.theta)), "variant": variant}
+        | {"stopped": "finished", "initial_cost": 1000.0, "final_cost": 900.0, "wander": 0.0}
+        | {"excess": 1.0, "inputs": 0, "outside": 0, "distance": 0.1, "steps_done": 39_000}
+        | {"worst_overlap": -0.1, "eval_worst_overlap": -0.1}
+        | {"imitation_with": 0.5, "imitation_without": 1.0}
+        | counts
+        | {f"theta_{i}": value for i, value in enumerate(experiment.theta)}
+        | unlike
+    )
+
+
+def study(**unlike) -> pd.DataFrame:
+    """The main table on two layouts, and two variants; `unlike` is so of the literal RDES."""
+    main = plan.main_table((*PAPER, "frozen"), ("A", "D"), tuple(range(5)))
+    rows = [summary(one, plan.MAIN_TABLE) for one in main]
+    rows += [
+        summary(one, LITERAL, **(unlike if one.learner == "RDES" else {}))
+        for one in plan.variant(LITERAL)
+        if one.learner != "frozen"
+    ]
+    rows += [summary(one, CLIPPED) for one in plan.variant(CLIPPED)]
+    return pd.DataFrame(rows)
+
+
+def paths(runs: pd.DataFrame) -> dict[Experiment, np.ndarray]:
+    return {claims.experiment_of(row): PLACE for row in runs.to_dict("records")}
+
+
+@pytest.fixture(scope="module")
+def costly():
+    """The literal runs of RDES end costlier than they began."""
+    runs = study(final_cost=1200.0)
+    return runs, atlas(runs, paths(runs))
+
+
+def test_the_rows_are_the_whole_its_parts_and_the_variants_in_order(costly):
+    _, found = costly
+    parts = ["layout A", "layout D", "decay per step", "decay per episode"]
+    assert found.variant.unique().tolist() == [WHOLE, *parts, LITERAL, CLIPPED]
+    assert found.claim.unique().tolist() == ["C1", "C2", "C5", "C6", "C7", "C9"]
+    assert not found.duplicated(["variant", "claim"]).any()
+
+
+def test_a_change_flips_the_cells_of_its_own_row_and_no_others(costly):
+    _, found = costly
+    flipped = found[found.flips.astype(bool)]
+    assert set(zip(flipped.variant, flipped.claim, strict=True)) == {
+        (LITERAL, "C5"),
+        (LITERAL, "C9"),
+    }
+    ends = flipped.set_index("claim")
+    assert (ends.base["C5"], ends.outcome["C5"]) == (REPRODUCED, NOT)
+    assert (ends.base["C9"], ends.outcome["C9"]) == (REPRODUCED, PARTLY)  # GES still saves
+
+
+def test_the_row_of_the_whole_repeats_the_verdicts(costly):
+    runs, found = costly
+    main = runs[runs.variant == plan.MAIN_TABLE]
+    whole = found[found.variant == WHOLE].set_index("claim")
+    for verdict in claims.judge_runs(main, paths(runs)):
+        assert whole.outcome[verdict.claim] == verdict.outcome
+        assert whole.share[verdict.claim] == verdict.share
+
+
+def test_every_row_has_the_letter_of_its_departure():
+    letters = [departure(name) for name in (WHOLE, "layout A", "decay per step", LITERAL)]
+    assert letters == ["", "B", "C", "G"]
+    assert {departure(name) for name in plan.VARIANTS} <= {*DEPARTURES, ""}
+
+
+def test_what_was_not_run_is_left_out_and_named(costly):
+    runs, _ = costly
+    assert set(left_out(runs)) == set(plan.VARIANTS) - {LITERAL, CLIPPED}
+
+
+def test_a_part_is_held_against_the_rest_of_the_main_table(costly):
+    runs, _ = costly
+    here, usual = groups(runs, "layout D")
+    assert (set(here.layout), set(usual.layout)) == ({"D"}, {"A"})
+    assert set(here.variant) == set(usual.variant) == {plan.MAIN_TABLE}
+    here, usual = groups(runs, "decay per episode")
+    assert (set(here.decay), set(usual.decay)) == ({"episode"}, {"step"})
+
+
+def test_a_variant_is_held_against_its_own_cells_and_borrows_who_it_does_not_change(costly):
+    runs, _ = costly
+    here, usual = groups(runs, LITERAL)
+    assert set(usual.variant) == {plan.MAIN_TABLE}
+    assert set(here.decay) == set(usual.decay) == {"step"}
+    origin = here.groupby("learner").variant.unique().map(list).to_dict()
+    assert origin["DES"] == origin["RDES"] == [LITERAL]
+    assert origin["ES"] == origin["GES"] == origin["frozen"] == [plan.MAIN_TABLE]
+
+
+def cells(*rows: tuple[str, str, bool, float]) -> pd.DataFrame:
+    return pd.DataFrame(rows, columns=["variant", "claim", "flips", "p"])
+
+
+def test_the_most_telling_cells_are_the_surest_of_different_claims_and_rows():
+    found = telling(
+        cells(
+            ("one", "C1", True, 0.02),
+            ("one", "C2", True, 0.001),
+            ("one", "C5", False, 1e-9),
+            ("two", "C2", True, 0.002),
+            ("two", "C9", True, 0.3),
+            ("three", "C1", True, 0.03),
+        )
+    )
+    assert list(zip(found.variant, found.claim, strict=True)) == [
+        ("one", "C2"),
+        ("three", "C1"),
+        ("two", "C9"),
+    ]
+
+
+def test_where_nothing_flips_there_is_nothing_to_tell():
+    assert telling(cells(("one", "C1", False, 0.001))).empty
+
+
+def test_runs_that_are_too_short_decide_nothing():
+    short = [replace(one, episodes=4) for one in plan.main_table(PAPER, ("A",), (0, 1))]
+    short += [frozen_arm(one) for one in short]
+    runs = pd.DataFrame([summary(one, plan.MAIN_TABLE) for one in dict.fromkeys(short)])
+    assert not atlas(runs, paths(runs)).flips.any()

@@ -1,0 +1,308 @@
+"""A study on a Dask cluster: a scheduler and workers of this machine, in processes of their own.
+
+The workers have a folder of runs of their own, as on machines that share no disk.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nmpcrl.study import Experiment, cluster, harvest, run, store, sweep
+from nmpcrl.study.cluster import NoCluster
+from nmpcrl.study.digest import digest
+from nmpcrl.study.harvest import Failed, fetch_digests
+
+pytest.importorskip("distributed", reason="needs the extra nmpcrl[cluster]")
+
+TEN = sweep(learner="frozen", seed=tuple(range(10)), episodes=1, steps=2)
+PATIENCE = 240.0  # [s]; the machine may be busy
+
+NOTING = """
+import os, time
+from pathlib import Path
+
+from nmpcrl.study import experiment as plain, harvest
+
+LOG = Path({log!r})
+
+
+def run(experiment):
+    note("began", experiment)
+    time.sleep({pause})
+    if experiment.seed in {killing}:
+        os.kill(os.getpid(), 9)
+    records = plain.run(experiment)
+    note("ended", experiment)
+    return records
+
+
+def note(what, experiment):
+    with LOG.open("a") as log:
+        log.write(f"{{what}} {{experiment.seed}} {{os.getpid()}}\\n")
+
+
+harvest.run = run
+"""
+MISTAKEN = """
+from nmpcrl.study import harvest
+
+
+def run(experiment):
+    raise ArithmeticError("a mistake")
+
+
+harvest.run = run
+"""
+OTHER_VERSIONS = """
+from nmpcrl.study import store
+
+store.LIBRARIES = store.LIBRARIES[1:]
+"""
+WITHOUT_PACKAGE = """
+import sys
+
+sys.modules["nmpcrl"] = None
+"""
+
+
+@pytest.fixture(autouse=True)
+def runs(tmp_path, monkeypatch) -> Path:
+    """A folder of this test's own."""
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    return tmp_path / "runs"
+
+
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory):
+    """Start a part of Dask; all that were started end with the module."""
+    started = []
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    variables = {
+        "NMPCRL_RUNS": str(elsewhere / "runs"),
+        "OMP_NUM_THREADS": "1",
+        "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",  # as book/cluster.md has it
+    }
+
+    def start(*arguments: str) -> subprocess.Popen:
+        command = [sys.executable, "-m", "dask", *arguments, "--no-dashboard"]
+        with (elsewhere / f"{len(started)}.log").open("w") as log:
+            started.append(
+                subprocess.Popen(
+                    command, cwd=elsewhere, env=os.environ | variables, stdout=log, stderr=log
+                )
+            )
+        return started[-1]
+
+    start.elsewhere = elsewhere
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture(scope="module")
+def address(dask) -> str:
+    """Of a scheduler without workers."""
+    file = dask.elsewhere / "scheduler.json"
+    dask("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
+    wait_until(file.exists)
+    return json.loads(file.read_text())["address"]
+
+
+@pytest.fixture
+def worker(dask, address, tmp_path):
+    """Start a worker that first executes a text; it ends with the test."""
+    started = []
+
+    def start(text: str = "", *options: str) -> subprocess.Popen:
+        name = f"worker{len(started)}"
+        preload = tmp_path / f"{name}.py"
+        preload.write_text(text)
+        usual = ("--nthreads", "1", "--no-nanny", "--name", f"{tmp_path.name}-{name}")
+        started.append(dask("worker", address, *usual, "--preload", str(preload), *options))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.terminate()
+    for process in started:
+        process.wait(timeout=PATIENCE)
+
+
+@pytest.fixture
+def log(tmp_path) -> Path:
+    (tmp_path / "log").touch()
+    return tmp_path / "log"
+
+
+def noting(log: Path, *, pause: float = 0, killing: tuple[int, ...] = ()) -> str:
+    """What lets a worker note what it does; the runs of some seeds kill it."""
+    return NOTING.format(log=str(log), pause=pause, killing=killing)
+
+
+def noted(log: Path) -> list[tuple[str, int, int]]:
+    lines = [line.split() for line in log.read_text().splitlines()]
+    return [(what, int(seed), int(pid)) for what, seed, pid in lines]
+
+
+def seeds(log: Path, what: str) -> list[int]:
+    return sorted(seed for said, seed, _ in noted(log) if said == what)
+
+
+def wait_until(holds):
+    end = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < end, "this was waited for in vain"
+        time.sleep(0.02)
+
+
+def on_cluster(address, experiments, **options):
+    with cluster.executor(address, patience=PATIENCE) as executor:
+        return fetch_digests(experiments, executor=executor, progress=False, **options)
+
+
+def test_a_cluster_trains_what_this_machine_would_train_and_needs_no_shared_disk(
+    address, worker, dask, runs
+):
+    worker()
+    experiments = sweep(learner=("RDES", "GES"), episodes=2, steps=65)
+    study = on_cluster(address, experiments)
+    for experiment in experiments:
+        ours, theirs = digest(run(experiment)), study[experiment]
+        for name in set(ours.episodes) - {"seconds"}:
+            np.testing.assert_array_equal(theirs.episodes[name], ours.episodes[name])
+    assert {path.parent.name for path in runs.rglob("*.npz")} == {"digests"}
+    assert not (dask.elsewhere / "runs").exists()
+
+
+def test_a_killed_worker_loses_nothing_and_what_is_stored_is_not_run_again(address, worker, log):
+    six = TEN[:6]
+    pair = [worker(noting(log, pause=3)), worker(noting(log, pause=3))]
+    killed: list[int] = []
+
+    def kill_one_at_work():
+        wait_until(lambda: victims(log))
+        pid, seed = victims(log)[0]
+        os.kill(pid, signal.SIGKILL)
+        killed.append(seed)
+
+    killer = threading.Thread(target=kill_one_at_work)
+    killer.start()
+    study = on_cluster(address, six)
+    killer.join()
+    assert list(study) == list(six)
+    assert seeds(log, "began") == sorted([*range(6), *killed])
+    assert seeds(log, "ended") == list(range(6))
+    assert sorted(process.poll() is None for process in pair) == [False, True]
+
+
+def victims(log: Path) -> list[tuple[int, int]]:
+    """Workers that are at a run and have had others, all of which are stored: id and seed."""
+    last = {pid: (what, seed) for what, seed, pid in noted(log)}
+    ended = {pid: [seed for w, seed, p in noted(log) if (w, p) == ("ended", pid)] for pid in last}
+    return [
+        (pid, seed)
+        for pid, (what, seed) in last.items()
+        if what == "began" and ended[pid] and all(harvest.is_stored(TEN[e]) for e in ended[pid])
+    ]
+
+
+def test_a_run_that_kills_every_worker_fails_and_the_others_end(address, worker, log):
+    """Dask gives it up after `distributed.scheduler.allowed-failures`; nannies replace workers."""
+    text = noting(log, killing=(1,))
+    worker(text, "--nanny")
+    with pytest.raises(Failed, match="1 of 3 runs failed"):
+        on_cluster(address, TEN[:3])
+    assert [harvest.is_stored(e) for e in TEN[:3]] == [True, False, True]
+    assert 2 <= seeds(log, "began").count(1) <= 5
+
+
+def test_a_run_that_fails_on_a_worker_is_told_with_its_reason(address, worker):
+    worker(MISTAKEN)
+    with pytest.raises(Failed, match="ArithmeticError: a mistake"):
+        on_cluster(address, TEN[:1])
+
+
+def test_a_worker_that_joins_while_others_train_trains_too(address, worker, log):
+    text = noting(log, pause=1)
+    worker(text)
+
+    def join_late():
+        wait_until(lambda: seeds(log, "began"))
+        worker(text)
+
+    helper = threading.Thread(target=join_late)
+    helper.start()
+    many = sweep(learner="frozen", seed=tuple(range(30)), episodes=1, steps=2)
+    on_cluster(address, many)
+    helper.join()
+    assert len({pid for _, _, pid in noted(log)}) == 2
+    assert seeds(log, "ended") == list(range(30))
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [(OTHER_VERSIONS, "other versions"), (WITHOUT_PACKAGE, "does not have this package")],
+    ids=["other versions", "no package"],
+)
+def test_workers_that_would_make_other_numbers_are_refused_in_a_sentence(
+    address, worker, text, reason
+):
+    worker(text)
+    with pytest.raises(NoCluster, match=reason) as refused:
+        on_cluster(address, TEN)
+    assert "\n" not in str(refused.value)
+    assert not any(map(harvest.is_stored, TEN))
+
+
+def test_a_worker_with_other_versions_that_joins_late_trains_nothing(address, worker, log):
+    worker(noting(log, pause=1))
+
+    def join_late():
+        wait_until(lambda: seeds(log, "began"))
+        worker(OTHER_VERSIONS)
+
+    helper = threading.Thread(target=join_late)
+    helper.start()
+    study = on_cluster(address, TEN, strict=False)
+    helper.join()
+    for found in study.values():
+        assert found.facts["versions"] == store.versions()
+    assert seeds(log, "ended") == sorted(e.seed for e in study)
+
+
+def test_a_scheduler_without_workers_is_refused_in_a_sentence(address):
+    with (
+        pytest.raises(NoCluster, match=f"the scheduler at {address} has no worker"),
+        cluster.executor(address, patience=1),
+    ):
+        pass
+
+
+def test_an_address_where_no_scheduler_is_is_refused_in_a_sentence():
+    with (
+        pytest.raises(NoCluster, match=r"no scheduler answers at tcp://127[.]0[.]0[.]1:9"),
+        cluster.executor("tcp://127.0.0.1:9", patience=1),
+    ):
+        pass
+
+
+def test_without_dask_it_is_said_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with (
+        pytest.raises(NoCluster, match=r"pip install 'nmpcrl\[cluster\]'"),
+        cluster.executor("tcp://127.0.0.1:9"),
+    ):
+        pass
+
+
+def test_every_worker_is_asked_for_one_key():
+    assert cluster._signature() == harvest.key(Experiment())

@@ -1,0 +1,68 @@
+"""A drive in plain words: each number against a drive whose numbers can be read off."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.study import paper
+from nmpcrl.study.driving import closes_at, described
+from nmpcrl.study.layouts import gaps
+
+FAR = 1.25 * np.sqrt(1.35)  # from a centre; the penalty begins here [m]
+
+
+@pytest.fixture(scope="module")
+def task():
+    """One obstacle in the middle of the way, three at the upper wall."""
+    return paper.task_among(((3.0, 0.0), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
+
+
+def along(points: np.ndarray) -> np.ndarray:
+    """States with the target's heading at these positions, shape (k, 3)."""
+    return np.column_stack([points, np.full(len(points), np.pi / 2)])
+
+
+def test_a_straight_drive_is_as_long_as_its_ends_are_apart(task):
+    states = along(np.linspace([-2.5, 2.0], [8.5, 2.0], 12))
+    found = described(states, task, 0.5)
+    assert found.length == pytest.approx(11.0)
+    assert found.room == pytest.approx(np.hypot(0.5, 2.0) - 1.25)
+
+
+def test_the_robot_has_arrived_when_it_is_at_the_target_to_stay(task):
+    away = np.array([3.0, 0.1, 2.0, 0.6, 0.4, 0.0])
+    states = along(np.column_stack([8.5 - away, np.full(6, 2.0)]))
+    assert described(states, task, 0.5).arrival == pytest.approx(4 * 0.5)
+    assert described(states[:-2], task, 0.5).arrival == np.inf
+
+
+def test_a_drive_that_failed_never_arrives(task):
+    states = along(np.tile([8.5, 2.0], (4, 1)))
+    assert described(states, task, 0.5).arrival == 0
+    states[2:] = np.nan
+    assert described(states, task, 0.5).arrival == np.inf
+
+
+def test_coming_close_is_charged_only_within_the_margin_and_far_from_the_target(task):
+    beside, within = [3.0, FAR + 0.01], [3.0, 1.25]
+    assert described(along(np.array([beside])), task, 0.5).penalty == 0
+    assert described(along(np.array([beside, within])), task, 0.5).penalty == pytest.approx(
+        50 * 0.35
+    )
+    near = paper.task_among(((8.5, 3.2), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
+    assert described(along(np.array([[8.5, 2.1]])), near, 0.5).penalty == 0
+
+
+def test_inside_an_obstacle_the_room_is_negative(task):
+    assert described(along(np.array([[3.0, 1.0]])), task, 0.5).room == pytest.approx(-0.25)
+
+
+def test_a_gap_closes_where_its_width_is_nothing():
+    task = paper.task("A")
+    path = np.array([[5.5, 0.5], [7.5, 2.5]])
+    shut = closes_at(task, path)
+    assert min(gaps(task, path, shut).values()) == pytest.approx(0, abs=1e-12)
+    assert shut == pytest.approx((np.hypot(1.5, 2.5) / 2.5) ** 2 - 1)
+
+
+def test_a_path_through_no_gap_never_meets_a_closed_one():
+    assert closes_at(paper.task("A"), np.full((3, 2), [1.7, 1.4])) == np.inf

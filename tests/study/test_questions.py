@@ -1,0 +1,41 @@
+"""The questions: every one is about departures that exist, and says what hangs on it."""
+
+import re
+
+import pytest
+
+from nmpcrl.study.departures import DEPARTURES
+from nmpcrl.study.questions import QUESTIONS, to_ask
+
+
+def item(letter: str, text: str) -> str:
+    """The line of the question about a departure."""
+    (line,) = [line for line in text.splitlines() if f"`{letter} <departure-{letter}>`" in line]
+    return line
+
+
+def test_every_question_is_about_departures_that_exist_and_none_is_asked_twice():
+    letters = [letter for question in QUESTIONS for letter in question.departures]
+    assert set(letters) <= set(DEPARTURES)
+    assert len(letters) == len(set(letters))
+    assert all(question.ask.endswith("?") for question in QUESTIONS)
+
+
+def test_they_are_numbered_and_linked():
+    lines = to_ask({}, ()).splitlines()
+    assert [int(line.split(".")[0]) for line in lines] == list(range(1, len(QUESTIONS) + 1))
+    for line, question in zip(lines, QUESTIONS, strict=True):
+        assert re.findall(r"<departure-([A-Z])>", line) == list(question.departures)
+
+
+@pytest.mark.parametrize(
+    ("decides", "varied", "said"),
+    [
+        ({"H": ("C6", "C1")}, {"H"}, "would decide C1 and C6"),
+        ({"G": ("C1",), "H": ("C1",)}, {"H", "G"}, "would decide C1."),
+        ({}, {"G"}, "No verdict hung on it"),
+        ({}, set(), "It was not varied"),
+    ],
+)
+def test_each_says_what_its_departures_decide_together(decides, varied, said):
+    assert said in item("H", to_ask(decides, varied))

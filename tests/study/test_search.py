@@ -1,0 +1,136 @@
+"""The search: it finds a known best, keeps to its budget, and is made once."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from nmpcrl.study import ParameterError, paper, search
+from nmpcrl.study.search import LEAST, SCALE, Found, Search, fetch
+from nmpcrl.study.training import Persistent, evaluate
+
+BEST = np.array([0.5, 1.5, 0.1, 0.02, 0.08, 2.0, 0.3, 0.15, 0.3])  # of the bowl below
+FOUND = Found(paper.THETA_INIT, 40, (1, 7), (100.0, 80.0))
+
+
+@pytest.fixture(autouse=True)
+def runs(tmp_path, monkeypatch):
+    """A folder of this test's own."""
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def bowl(monkeypatch):
+    """Drives whose cost is 7 at `BEST`, grows with the distance, and is infinite far away."""
+
+    def drive(_, theta, steps):
+        away = np.linalg.norm((theta - BEST) / SCALE)
+        assert steps == paper.STEPS
+        return SimpleNamespace(cost=7 + away**2 if away < 3 else np.inf)
+
+    monkeypatch.setattr(search, "evaluate", drive)
+
+
+@pytest.fixture
+def searched(monkeypatch):
+    """The searches that are made from here on, in this process; all find the same."""
+    made = []
+
+    def note(wanted):
+        made.append(wanted)
+        return FOUND
+
+    monkeypatch.setattr(search, "search", note)
+    monkeypatch.setattr(search.store, "processes", lambda _: ThreadPoolExecutor(1))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("name", "nonsense"), [("layout", "Z"), ("seed", -1), ("seed", 0.5), ("budget", LEAST - 1)]
+)
+def test_a_search_refuses_nonsense_by_name(name, nonsense):
+    with pytest.raises(ParameterError, match=rf"{name} = {nonsense!r} must be"):
+        replace(Search(), **{name: nonsense})
+
+
+@pytest.mark.usefixtures("bowl")
+def test_the_least_cost_is_found_within_the_budget():
+    found = search.search(Search(budget=1500))
+    assert found.made <= 1500
+    assert found.cost == pytest.approx(7, abs=1e-3)
+    np.testing.assert_allclose((np.array(found.theta) - BEST) / SCALE, 0, atol=0.05)
+
+
+@pytest.mark.usefixtures("bowl")
+def test_it_starts_at_theta_init_and_notes_every_improvement():
+    found = search.search(Search(budget=200))
+    start = np.linalg.norm((paper.THETA_INIT - BEST) / SCALE)
+    assert found.drives[0] == 1
+    assert found.initial == pytest.approx(7 + start**2)
+    assert (np.diff(found.drives) > 0).all()
+    assert (np.diff(found.best) < 0).all()
+    assert found.gain == pytest.approx(1 - found.best[-1] / found.best[0])
+
+
+@pytest.mark.usefixtures("bowl")
+def test_the_same_search_finds_the_same_theta_and_another_seed_another():
+    short = Search(budget=100)
+    assert search.search(short) == search.search(short)
+    assert search.search(replace(short, seed=1)).theta != search.search(short).theta
+
+
+@pytest.mark.usefixtures("bowl")
+def test_theta_stays_within_its_bounds(monkeypatch):
+    seen, drive = [], search.evaluate
+
+    def note(controller, theta, steps):
+        seen.append(theta)
+        return drive(controller, theta, steps)
+
+    monkeypatch.setattr(search, "evaluate", note)
+    search.search(Search(budget=300))
+    assert (np.array(seen) >= search.LOWER - 1e-12).all()
+    assert (np.array(seen) <= search.UPPER + 1e-12).all()
+
+
+def test_where_all_drives_fail_theta_init_is_what_was_found(monkeypatch):
+    monkeypatch.setattr(search, "evaluate", lambda *_: SimpleNamespace(cost=np.inf))
+    found = search.search(Search(budget=LEAST))
+    assert found.theta == pytest.approx(paper.THETA_INIT)
+    assert (found.drives, found.best) == ((1,), (np.inf,))
+
+
+def test_a_search_in_processes_costs_what_a_drive_with_its_theta_costs():
+    wanted = Search("D", budget=LEAST)
+    found = fetch([wanted], workers=1, progress=False)[wanted]
+    controller = Persistent(paper.nmpc("D"))
+    drives = [
+        evaluate(controller, np.array(t), paper.STEPS) for t in (paper.THETA_INIT, found.theta)
+    ]
+    assert (found.initial, found.cost) == pytest.approx([drive.cost for drive in drives], rel=1e-9)
+    assert found.cost < found.initial
+
+
+def test_what_is_stored_is_read_and_only_the_rest_is_searched_for(searched):
+    first, second = Search("A"), Search("A", budget=LEAST)
+    assert fetch([first], progress=False) == {first: FOUND}
+    assert fetch([second, first], progress=False) == {second: FOUND, first: FOUND}
+    assert searched == [first, second]
+
+
+def test_other_code_or_versions_make_old_searches_worthless(searched, monkeypatch):
+    fetch([Search()], progress=False)
+    monkeypatch.setattr(search, "version", lambda _: "0.0")
+    fetch([Search()], progress=False)
+    assert len(searched) == 2
+
+
+def test_a_damaged_file_is_reported_and_searched_again(searched, runs, capsys):
+    fetch([Search()], progress=False)
+    (runs / "search.json").write_text("{")
+    assert fetch([Search()], progress=False) == {Search(): FOUND}
+    assert "is damaged" in capsys.readouterr().err
+    assert len(searched) == 2
