@@ -1,15 +1,44 @@
-"""The command `nmpcrl`, driven as a user drives it, on runs of two short episodes."""
+"""The command `nmpcrl`, driven as a user drives it, on runs of a few short episodes."""
 
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
 import pytest
 from click.testing import CliRunner
 
 from nmpcrl.__main__ import main
+from nmpcrl.study import Experiment, harvest, paper, plan, published, sweep, whole
+from nmpcrl.study.experiment import LEARNERS
+
+WHOLE = len(plan.study())
+SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
+STUDY = {
+    **dict.fromkeys(sweep(learner=("ES", "frozen"), seed=(0, 1), **SHORT), "main"),
+    **dict.fromkeys(sweep(learner=("ES", "frozen"), horizon=5, **SHORT), "N = 5"),
+}
 
 
 @pytest.fixture
 def command(tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "published"))
     return lambda *words: CliRunner().invoke(main, words)
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """A study of six short runs, judged by nobody."""
+    monkeypatch.setattr(plan, "study", lambda: dict(STUDY))
+    monkeypatch.setattr(whole, "verdicts", lambda runs, variants: ())
+
+
+@pytest.fixture
+def trained(command, small):
+    """The small study, trained in this process."""
+    with ThreadPoolExecutor(1) as executor:
+        return harvest.fetch_digests(STUDY, executor=executor, progress=False)
 
 
 def name_of_the_stored_run(tmp_path):
@@ -45,9 +74,9 @@ def test_training_again_reads_the_stored_run(command, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--learner", "SARSA"), "learner = 'SARSA' must be one of ES, DES, RDES, GES, frozen"),
+        (("--learner", "SARSA"), f"learner = 'SARSA' must be one of {', '.join(LEARNERS)}"),
         (("--episodes", "0"), "episodes = 0 must be a whole number, 1 or more"),
-        (("--layout", "Z"), "layout = 'Z' must be one of A"),
+        (("--layout", "Z"), f"layout = 'Z' must be one of {', '.join(paper.LAYOUTS)}"),
         (("--alpha", "-1"), "alpha = -1.0 must be a positive number"),
         (("--decay", "k"), "decay = 'k' must be one of step, episode"),
     ],
@@ -75,3 +104,153 @@ def test_a_damaged_file_is_named_and_left_alone(command, tmp_path):
     assert refused.exit_code == 1
     assert "is damaged, or not a run" in refused.output
     assert damaged.exists()
+
+
+def test_a_dry_run_says_how_much_is_to_be_done_and_does_nothing(command, small, tmp_path):
+    said = command("study", "--dry-run")
+    assert said.exit_code == 0, said.output
+    assert "0 of 6 runs are stored" in said.output
+    assert "hours of one core" in said.output
+    assert not (tmp_path / "runs").exists()
+
+
+def test_study_trains_what_is_missing(command, small):
+    asked = command("study", "--workers", "2")
+    assert asked.exit_code == 0, asked.output
+    assert all(map(harvest.is_stored, STUDY))
+    assert "6 of 6 runs are stored" in command("study", "--dry-run").output
+
+
+def test_study_trains_a_part_of_itself(command, small):
+    asked = command("study", "--part", "N = 5", "--workers", "1")
+    assert asked.exit_code == 0, asked.output
+    assert {STUDY[e] for e in STUDY if harvest.is_stored(e)} == {"N = 5"}
+
+
+def test_the_whole_study_takes_hours(command):
+    said = command("study", "--dry-run").output
+    assert f"0 of {WHOLE} runs are stored" in said
+    hours = float(said.split("take about ")[1].split()[0])
+    assert 1 < hours < 24
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--part", "mian"), "there is no part 'mian'; there are main, N = 5"),
+        (("--scheduler", "tcp://nowhere:1"), "no scheduler answers at tcp://nowhere:1"),
+    ],
+)
+def test_study_refuses_what_it_cannot_do_in_one_sentence(command, small, words, sentence):
+    refused = command("study", *words)
+    assert refused.exit_code == 1
+    assert f"Error: {sentence}" in refused.output
+
+
+def test_a_run_that_fails_is_told_and_the_others_are_kept(command, trained, monkeypatch):
+    (path,) = [harvest.path_of(e) for e in STUDY if e.learner == "ES" and e.seed == 1]
+    path.unlink()
+
+    def fail(experiment):
+        raise ArithmeticError("a mistake")
+
+    monkeypatch.setattr(harvest, "run", fail)
+    monkeypatch.setattr(harvest, "_processes", lambda *_: ThreadPoolExecutor(1))
+    told = command("study")
+    assert told.exit_code == 1
+    assert "1 of 6 runs failed" in told.output
+    assert "ArithmeticError: a mistake" in told.output
+
+
+def test_the_table_of_episodes_tells_every_run_from_every_other(command, trained, tmp_path):
+    asked = command("study", "--table", str(tmp_path / "episodes.csv.gz"))
+    assert asked.exit_code == 0, asked.output
+    frame = pd.read_csv(tmp_path / "episodes.csv.gz")
+    assert len(frame) == len(STUDY) * SHORT["episodes"]
+    names = ["variant", "learner", "layout", "decay", "seed", "episode"]
+    assert not frame.duplicated(names).any()
+    for experiment, one in trained.items():
+        mine = frame[
+            (frame.variant == STUDY[experiment])
+            & (frame.learner == experiment.learner)
+            & (frame.seed == experiment.seed)
+        ]
+        np.testing.assert_allclose(mine.cost, one.episodes["cost"], rtol=1e-6)
+
+
+def test_the_table_of_the_whole_study_takes_100_megabytes_at_most(command, trained, tmp_path):
+    """Every number as noisy as can be, in runs of full length."""
+    rng, shape = np.random.default_rng(0), (paper.EPISODES,)
+    noisy = {}
+    for seed in range(20):
+        experiment = Experiment(seed=seed)
+        one = next(iter(trained.values()))
+        episodes = {
+            name: rng.normal(size=shape + column.shape[1:])
+            if column.dtype.kind == "f"
+            else rng.integers(0, 130, size=shape + column.shape[1:])
+            for name, column in one.episodes.items()
+        }
+        fields = one.experiment | {"seed": seed, "episodes": paper.EPISODES}
+        noisy[experiment] = replace(one, experiment=fields, episodes=episodes)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plan, "study", lambda: dict.fromkeys(noisy, "main"))
+        patch.setattr(harvest, "is_stored", lambda _: True)
+        patch.setattr(harvest, "fetch_digests", lambda *_, **__: noisy)
+        asked = command("study", "--table", str(tmp_path / "episodes.csv.gz"))
+    assert asked.exit_code == 0, asked.output
+    size = (tmp_path / "episodes.csv.gz").stat().st_size
+    assert size / len(noisy) * WHOLE < 100e6
+
+
+def test_what_is_published_verifies_the_runs_it_was_made_of(command, trained):
+    asked = command("study", "--publish")
+    assert asked.exit_code == 0, asked.output
+    assert list(published.load().rows) == list(STUDY)
+    verified = command("verify")
+    assert verified.exit_code == 0, verified.output
+    assert "6 runs: 6 held against the published ones bit for bit" in verified.output
+    assert "0 contradictions" in verified.output
+
+
+def test_verify_names_what_contradicts_and_fails(command, trained, tmp_path):
+    command("study", "--publish")
+    wrong = next(e for e in STUDY if e.learner == "ES")
+    one = trained[wrong]
+    cost = one.evaluations["cost"].copy()
+    cost[-1] += 1e-9
+    replace(one, evaluations=one.evaluations | {"cost": cost}).save(harvest.path_of(wrong))
+    verified = command("verify")
+    assert verified.exit_code == 1
+    assert "1 contradictions" in verified.output
+    assert "final_cost" in verified.output
+    assert "ES" in verified.output
+
+
+def test_verify_trains_a_sample_where_nothing_was_trained(command, trained, tmp_path):
+    command("study", "--publish")
+    for experiment in STUDY:
+        harvest.path_of(experiment).unlink()
+    refused = command("verify")
+    assert refused.exit_code == 1
+    assert "--sample 5 trains five for this" in refused.output
+    verified = command("verify", "--sample", "2")
+    assert verified.exit_code == 0, verified.output
+    assert "2 runs: 2 held against the published ones bit for bit" in verified.output
+    assert sum(map(harvest.is_stored, STUDY)) == 2
+
+
+def test_verify_says_that_nothing_is_published(command, small):
+    refused = command("verify")
+    assert refused.exit_code == 1
+    assert refused.output.startswith("Error: nothing is published in ")
+
+
+def test_verify_says_that_what_is_published_is_damaged(command, trained, tmp_path):
+    command("study", "--publish")
+    (tmp_path / "published/curves.npz").write_bytes(b"")
+    published._load.cache_clear()
+    refused = command("verify")
+    assert refused.exit_code == 1
+    assert "is damaged" in refused.output
+    assert len(refused.output.splitlines()) == 1

@@ -8,6 +8,7 @@ table. See `flips` for both.
 
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from nmpcrl.study import plan
@@ -78,8 +79,9 @@ def departure(variant: str) -> str:
 def _whole(verdict: Verdict) -> dict[str, Any]:
     """The row of the whole main table, which flips nothing."""
     named = {"variant": WHOLE, "claim": verdict.claim, "outcome": verdict.outcome}
+    share = np.nan if verdict.share is None else verdict.share
     pairs = verdict.counts["all"][1]
-    return named | {"base": verdict.outcome, "flips": False, "share": verdict.share, "pairs": pairs}
+    return named | {"base": verdict.outcome, "flips": False, "share": share, "pairs": pairs}
 
 
 def _part(variant: str) -> tuple[str, str]:

@@ -52,8 +52,8 @@ def _refuse_others(client: Any) -> None:
     ours = _signature()
     try:
         signatures = client.run(_signature)
-    except (ImportError, AttributeError) as error:
-        raise NoCluster(f"a worker does not have this package: {error}") from None
+    except Exception as error:  # Dask wraps whatever went wrong over there
+        raise NoCluster(f"a worker cannot say which code it has: {error}") from None
     for worker, theirs in signatures.items():
         if theirs != ours:
             raise NoCluster(

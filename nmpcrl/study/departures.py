@@ -127,8 +127,8 @@ DEPARTURES = {
     ),
     "P": Departure(
         gap="'Diverges', 'unstable' and 'the same policy' are not defined.",
-        reading="The thresholds at the top of `claims.py`, and the rule in `verdicts.py`, fixed before any"
-        " result of the study was looked at.",
+        reading="The thresholds at the top of `claims.py` and the rule in `verdicts.py`, which were"
+        " fixed before any result of the study was looked at.",
         why="A verdict needs them.",
     ),
 }

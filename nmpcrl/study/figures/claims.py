@@ -230,7 +230,9 @@ def _by_layout(axis: Axes, values: Values, border: float) -> None:
             x = i + 0.19 * (column - (len(columns) - 1) / 2)
             dots = _dot(name, mfc=face, markersize=3, mew=0.7)
             axis.plot(x + _jitter(known.size, 0.07), known, **dots)
-            axis.hlines(np.median(known) if known.size else [], x - 0.09, x + 0.09, color=INK)
+            if known.size:  # of a half that is infinite and one that is not, the middle is neither
+                middle = np.quantile(known, 0.5, method="higher")
+                axis.hlines(middle, x - 0.09, x + 0.09, color=INK)
     axis.axhline(border, **LIMIT)
     axis.set_xlabel("layout")
     axis.set_xticks(range(len(layouts)), layouts)

@@ -85,9 +85,9 @@ def traced(examples: Mapping[str, Digest], first_drives: Mapping[str, Column]) -
         column[-1].set_xlabel("episode")
     labels = (
         "cost, noise-free\n/ at the start",
-        "largest α‖φ‖²",
+        r"largest $\alpha\,\Vert\phi\Vert^2$",
         "share of the\nnetwork in δ",
-        "θ_c",
+        r"$\theta_c$",
     )
     for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)

@@ -131,7 +131,8 @@ def borders(values: Mapping[str, Values], mark: str) -> Figure:
             plain(axes.xaxis)
         axes.set_xlabel(measure.label, fontsize=8)
         low, high = same_verdict(curve, measure.border)
-        axes.set_title(f"{claim}: same {low:.2g} to {high:.2g}", fontsize=9)
+        kept = f"same {low:.2g} to {high:.2g}" if len(curve) else "not decidable"
+        axes.set_title(f"{claim}: {kept}", fontsize=9)
     for row in grid:
         row[0].set_ylabel("share of yes")
     stay = sum(steady(MEASURES[claim], measured) for claim, measured in values.items())
