@@ -152,13 +152,14 @@ def study(
             )
     except (cluster.NoCluster, harvest.Failed) as error:
         raise click.ClickException(str(error)) from None
-    if len(found) < len(chosen):
-        click.echo(f"{len(chosen) - len(found)} runs failed; why is in {harvest.folder()}")
     if table:
-        digest.tidy(found.values()).to_csv(table, index=False, float_format="%.7g")
+        frames = [digest.tidy([one]).assign(variant=chosen[e]) for e, one in found.items()]
+        pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
         click.echo(f"{table}: {table.stat().st_size / 1e6:.0f} MB")
     if publish:
         click.echo(f"{whole.publish(found, chosen)}: published")
+    if len(found) < len(chosen):
+        raise SystemExit(1)  # what failed has been said
 
 
 @main.command()

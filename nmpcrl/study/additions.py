@@ -1,7 +1,7 @@
 """What we add to the paper: learners that it does not have, held against those that it has.
 
 Decided as the paper's claims are, by the thresholds of `claims` and the rule of `verdicts`, and
-fixed with them before a result was seen. A claim is judged wherever its learner was run.
+fixed with them before they were put to the study. A claim is judged wherever its learner was run.
 """
 
 import numpy as np

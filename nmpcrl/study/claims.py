@@ -1,7 +1,7 @@
 """The paper's claims, one function each: a question, a measure, a threshold and a verdict.
 
 The thresholds below, and the rule in `verdicts` by which the answers of many runs become a verdict,
-were fixed while the study was being trained and before any of its results was looked at, and are
+were fixed while the study was being trained and before any claim was put to it, and are
 not to be moved after. A first study, of two seeds in layout A, had been seen by then.
 # departure P
 

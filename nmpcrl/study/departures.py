@@ -128,7 +128,7 @@ DEPARTURES = {
     "P": Departure(
         gap="'Diverges', 'unstable' and 'the same policy' are not defined.",
         reading="The thresholds at the top of `claims.py` and the rule in `verdicts.py`, which were"
-        " fixed before any result of the study was looked at.",
+        " fixed before any claim was put to the study.",
         why="A verdict needs them.",
     ),
 }

@@ -14,7 +14,7 @@ from nmpcrl.study.records import Column
 class Drive:
     """What somebody would say who had watched it."""
 
-    arrival: float  # [s] until it is at the target to stay; infinite if it is not in the end
+    arrival: float  # [s] until it stays within `ARRIVED` of the target's place; infinite if never
     length: float  # of the road [m]
     room: float  # least distance of the robot's side from an obstacle's [m]; negative inside
     penalty: float  # sum of Upsilon over the drive, what it is charged for coming close
@@ -24,13 +24,13 @@ def described(states: Column, task: Task, period: float) -> Drive:
     """Look at the states of a drive, shape (K + 1, n), one a `period` [s]; nan after a failure."""
     driven = states[np.isfinite(states).all(axis=1)]
     away = np.linalg.norm(driven - task.target, axis=1)
-    late = np.flatnonzero(away > ARRIVED)
-    whole = len(driven) == len(states) and away[-1] <= ARRIVED
+    late = np.flatnonzero(np.linalg.norm((driven - task.target)[:, :2], axis=1) > ARRIVED)
+    missed = len(driven) < len(states) or len(driven) - 1 in late
     x, y, clearance = task.discs
     apart = np.hypot(driven[:, :1] - x, driven[:, 1:2] - y) - clearance / 2
     charged = driven[away >= task.near]  # nearer to the target, the input is charged instead
     return Drive(
-        arrival=period * (late[-1] + 1 if late.size else 0) if whole else np.inf,
+        arrival=np.inf if missed else period * int(max(late, default=-1) + 1),
         length=float(np.linalg.norm(np.diff(driven[:, :2], axis=0), axis=1).sum()),
         room=float(apart.min()),
         penalty=float(sum(map(task.collision_penalty, charged))),

@@ -223,11 +223,12 @@ def _harvest(
         ordered = sorted(missing, key=seconds_of, reverse=True)
         pending = {executor.submit(make, e, key(e)): e for e in ordered}
         with tqdm(
-            total=len(pending), unit="run", disable=not progress, mininterval=store.interval()
+            total=len(ordered), unit="run", disable=not progress, mininterval=store.interval()
         ) as bar:
             for future in as_completed(pending):
-                experiment = pending[future]
+                experiment = pending.pop(future)
                 reason = _keep(experiment, future)
+                del future  # while we hold it, Dask makes it again if it loses what we have stored
                 if reason:
                     failures[experiment] = reason
                 running = sum(one.running() for one in pending)  # a cluster does not tell

@@ -7,7 +7,7 @@ its last episodes. In these some ten episodes the mechanisms are looked for in t
 `MECHANISMS`, and the first one found is the one, because each can bring about those after it. What
 came first within these episodes, a digest cannot tell.
 
-The thresholds were fixed before a result of the study was seen, but after a look at the ranges of
+The thresholds were fixed before they were put to the study, but after a look at the ranges of
 these columns in five short runs. They sort runs, and decide no claim.
 """
 

@@ -2,7 +2,7 @@
 
 A claim is put to each run, or to each pair of runs with the same layout, decay and seed, as a
 question with the answer yes or no. The share of yes is then read by one rule. It was fixed before
-any result of the study was looked at, and is not to be moved after:
+any claim was put to the study, and is not to be moved after:
 
 - reproduced: the interval of the share lies above `MAJORITY`, and the share is at least
   `NEARLY_ALL`;
@@ -43,7 +43,7 @@ CELL = ["layout", "decay", "seed"]  # what two runs share that are held against 
 
 @dataclass(frozen=True)
 class Claim:
-    """What the paper says, or we do, and how it is decided: fixed before a result was seen."""
+    """What the paper says, or we do, and how it is decided: fixed before it was put to a run."""
 
     name: str  # "C1"
     statement: str

@@ -35,6 +35,12 @@ def test_the_robot_has_arrived_when_it_is_at_the_target_to_stay(task):
     assert described(states[:-2], task, 0.5).arrival == np.inf
 
 
+def test_where_it_looks_does_not_matter_to_arriving(task):
+    states = along(np.tile([8.5, 2.0], (3, 1)))
+    states[:, 2] = -np.pi / 2
+    assert described(states, task, 0.5).arrival == 0
+
+
 def test_a_drive_that_failed_never_arrives(task):
     states = along(np.tile([8.5, 2.0], (4, 1)))
     assert described(states, task, 0.5).arrival == 0

@@ -127,7 +127,7 @@ def source(tmp_path, monkeypatch):
         ("control/program.py", "MAX_ITERATIONS = 300", "MAX_ITERATIONS = 200"),
         ("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6"),
         ("study/training.py", "PATIENCE = 10", "PATIENCE = 11"),
-        ("study/experiment.py", "spawn(2)", "spawn(3)"),
+        ("study/experiment.py", "spawn(3)", "spawn(4)"),
     ],
 )
 def test_a_change_of_the_mathematics_changes_the_key(source, place, before, after):

@@ -32,13 +32,23 @@ PARTS: dict[
     "slow w": {"linestyle": "-."},
     "GES": LOOKS["GES"].line,
 }
+WITHOUT = {
+    "without h": "Without h",
+    "not projected": "Without projection",
+    "slow w": "With a slow w",
+}
 ROADS: dict[str, dict[str, Any]] = {
-    "theta_init": {"color": "0.45", "linestyle": ":"},
+    "init": {"color": "0.45", "linestyle": ":"},
     "learned": LOOKS["GES"].line,
+    "by hand": {"color": "#1B7F79", "linestyle": (0, (3, 1, 1, 1))},
     "best": {"color": "#882255", "linestyle": "-"},
 }
-NAMES = {"theta_init": r"$\theta_\mathrm{init}$", "learned": "learned", "best": "best found"}
-SAID = {"theta_init": "before learning", "learned": "after it", "best": "at best (medians)"}
+NAMES = {
+    "init": r"$\theta_\mathrm{init}$",
+    "learned": "learned",
+    "by hand": r"only $\theta_c = d_o$",
+    "best": "best found",
+}
 
 
 @page
@@ -53,10 +63,11 @@ def step_of_w(runs: Mapping[float, Digest]) -> Figure:
     for (beta, run), line in zip(runs.items(), ("--", "-", ":"), strict=False):
         size = run.episodes["alpha_phi2"] * beta / run.name.alpha
         episode = np.arange(1, len(size) + 1)
-        axes.plot(episode, size, color=LOOKS["TDC"].color, linestyle=line, label=f"β = {beta:g}")
+        label = rf"$\beta$ = {_scientific(beta)}"
+        axes.plot(episode, size, color=LOOKS["TDC"].color, linestyle=line, label=label)
         over = np.flatnonzero(size > OVERSHOOT)
         if over.size and not first:
-            first = f"At β = {beta:g}, it passes {OVERSHOOT:g} in episode {over[0] + 1}"
+            first = f"With {label}, it passes {OVERSHOOT:g} in episode {over[0] + 1}"
             lost = " and w is lost" if run.facts["stopped"] != "finished" else ""
     axes.axhline(OVERSHOOT, **LIMIT)
     axes.set(xlabel="episode", ylabel=r"largest $\beta\,\|\phi\|^2$", ylim=(0, 1.5 * OVERSHOOT))
@@ -65,32 +76,26 @@ def step_of_w(runs: Mapping[float, Digest]) -> Figure:
 
 
 @page
-def parts_of_tdc(runs: Mapping[str, Sequence[Digest]]) -> Figure:
+def parts_of_tdc(runs: Mapping[str, Digest]) -> Figure:
     """TDC with each of its parts left out: the noise-free cost, and the size of w.
 
     Args:
-        runs: some seeds each of what is in `PARTS`.
+        runs: by what is in `PARTS`.
     """
     figure, (left, right) = subplots(1, 2, 3.3)
-    for name, digests in runs.items():
+    for name, run in runs.items():
         look = {"color": LOOKS["TDC"].color} | PARTS[name]
-        for run in digests:
-            judged = run.evaluations
-            left.plot(judged["episode"], judged["cost"] / judged["cost"][0], **look)
-            size = np.linalg.norm(run.episodes["w"], axis=1)
-            right.plot(np.arange(1, len(size) + 1), size, **look)
+        judged, size = run.evaluations, np.linalg.norm(run.episodes["w"], axis=1)
+        left.plot(judged["episode"], judged["cost"] / judged["cost"][0], label=name, **look)
+        right.plot(np.arange(1, len(size) + 1), size, **look)
     left.set(xlabel="episode", ylabel="noise-free cost / first")
     right.set(xlabel="episode", ylabel="size of w", yscale="log")
-    handles = [
-        Line2D([], [], label=name, **{"color": LOOKS["TDC"].color} | PARTS[name]) for name in runs
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    ends = {name: np.median([_end(run) for run in digests]) for name, digests in runs.items()}
-    moved = {name: ends[name] - ends["TDC"] for name in ends if name not in ("TDC", "GES")}
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=len(runs))
+    moved = {name: _end(runs[name]) - _end(runs["TDC"]) for name in WITHOUT}
     most = max(moved, key=lambda name: abs(moved[name]))
-    return headed(
-        figure, f"What moves the end most is TDC {most}: by {moved[most]:+.1%} of the cost"
-    )
+    side = "lower" if moved[most] < 0 else "higher"
+    end = f"TDC ends {abs(moved[most]):.1%} of the first cost {side}"
+    return headed(figure, f"{WITHOUT[most]}, {end}; no other part does more")
 
 
 @page
@@ -149,7 +154,7 @@ def searches(found: Mapping[str, Found]) -> Figure:
 
 @page
 def roads(drives: Mapping[str, Mapping[str, Matrix]]) -> Figure:
-    """Three drives without noise in each layout: before learning, after it, and the best found.
+    """Drives without noise in each layout; a cross where one ends that does not arrive.
 
     Args:
         drives: states, shape (K + 1, n), by layout and by what is in `ROADS`.
@@ -160,6 +165,9 @@ def roads(drives: Mapping[str, Mapping[str, Matrix]]) -> Figure:
         draw_task(axes, paper.task(name), labels=False)
         for way, states in ways.items():
             axes.plot(*states[:, :2].T, linewidth=1.4, **ROADS[way])
+            if not _arrives(states, name):
+                place = states[np.isfinite(states).all(axis=1)][-1, :2]
+                axes.plot(*place, "X", color=ROADS[way]["color"], markersize=6)
         axes.set_title(name, fontsize=9.5)
     grid[0, 0].set_ylim(-3.0, 6.0)
     for axes in grid.flat[len(drives) :]:
@@ -169,21 +177,25 @@ def roads(drives: Mapping[str, Mapping[str, Matrix]]) -> Figure:
         axes.set_xlabel("x [m]")
     handles = [Line2D([], [], label=NAMES[way], **look) for way, look in ROADS.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-    return headed(figure, _charged(drives))
+    arrived = {
+        way: sum(_arrives(ways[way], name) for name, ways in drives.items()) for way in ROADS
+    }
+    return headed(
+        figure,
+        f"Arrived, of {len(drives)} layouts: {arrived['learned']} after learning,"
+        rf" {arrived['by hand']} with $\theta_c = d_o$ alone, {arrived['best']} at best",
+    )
 
 
-def _charged(drives: Mapping[str, Mapping[str, Matrix]]) -> str:
-    """What the drives are charged for coming close to obstacles, in the middle of the layouts."""
-    period = paper.nmpc().plant.period
-    penalty = pd.DataFrame(
-        {
-            name: {way: described(s, paper.task(name), period).penalty for way, s in ways.items()}
-            for name, ways in drives.items()
-        }
-    )
-    return "Charged for coming close to obstacles: " + ", ".join(
-        f"{cost:.0f} {SAID[way]}" for way, cost in penalty.median(axis=1).items()
-    )
+def _arrives(states: Matrix, layout: str) -> bool:
+    """Whether a drive in a layout ends at the target."""
+    return bool(np.isfinite(described(states, paper.task(layout), 1.0).arrival))
+
+
+def _scientific(value: float) -> str:
+    """ "2.5 x 10^-7", as mathematics."""
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return rf"${mantissa} \cdot 10^{{{int(exponent)}}}$"
 
 
 def _spaced(ends: Mapping[str, float], least: float) -> dict[str, float]:
@@ -210,6 +222,6 @@ def _strip(axes: Axes, x: int, learner: str, runs: pd.DataFrame, values: pd.Seri
 
 
 def _end(run: Digest) -> float:
-    """Final noise-free cost in shares of the first."""
+    """Final noise-free cost in shares of the first; infinite if a drive failed."""
     cost = run.evaluations["cost"]
     return float(cost[-LAST:].mean() / cost[0])

@@ -5,7 +5,7 @@ is dropped: what was cut short is drawn in the grey strip marked ∞.
 """
 
 import textwrap
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import NullFormatter, PercentFormatter
+from matplotlib.ticker import PercentFormatter
 
 from nmpcrl import Vector
 from nmpcrl.study import claims, verdicts
@@ -22,24 +22,28 @@ from nmpcrl.study.audit import Assumption
 from nmpcrl.study.curvature import Curvature
 from nmpcrl.study.evidence import Evidence, paths
 from nmpcrl.study.experiment import PAPER, Experiment
-from nmpcrl.study.figures.open import plain
+from nmpcrl.study.figures.panels import (
+    INK,
+    SUBTITLE,
+    dots,
+    jitter,
+    logarithmic,
+    part,
+    shares,
+    strips,
+)
 from nmpcrl.study.figures.performance import PARTS
 from nmpcrl.study.figures.rdes import headed, label_panel
-from nmpcrl.study.figures.results import LIMIT, SUBTITLE, part
 from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
-from nmpcrl.study.measures import MEASURES, Values
+from nmpcrl.study.measures import MEASURES
 from nmpcrl.study.records import Column, Records
-from nmpcrl.study.statistics import interquartile_mean, performance_profile, rate
+from nmpcrl.study.statistics import interquartile_mean, performance_profile
 from nmpcrl.study.timing import ratio
 from nmpcrl.study.verdicts import Verdict
 
 LINE = 84  # characters of a title
-DEEP = 1e4  # what is less than this part of a threshold is drawn as much
-LEAST = 1.5  # high over low of an axis that has hardly anything to show
-FEW = 20  # high over low of an axis on which powers of ten are too few
 SOLVERS = {"riccati": "riccati", "fatrop": "fatrop", "ipopt": "Ipopt"}
 LAGS = 30  # steps
-INK = "0.25"
 ABOVE: dict[str, Any] = {
     "xycoords": ("data", "axes fraction"),
     "ha": "center",
@@ -54,15 +58,15 @@ SIZE_MARKS = {"small": ("o", "0.6"), "medium": ("^", "0.35"), "large": ("s", "bl
 @page
 def divergence(found: Evidence, verdict: Verdict) -> Figure:
     """C1: training cost over the frozen arm's, and whether DES diverged where RDES did not."""
-    figure, shares, drawn = _measured(found, verdict)
-    return _finished(figure, shares, verdict, "DES diverged and RDES did not", "pairs", drawn)
+    figure, panel, drawn = _measured(found, verdict)
+    return _finished(figure, panel, verdict, "DES diverged and RDES did not", "pairs", drawn)
 
 
 @page
 def instability(found: Evidence, verdict: Verdict) -> Figure:
     """C2: range of the noise-free cost, and whether ES was unstable where GES was not."""
-    figure, shares, drawn = _measured(found, verdict)
-    return _finished(figure, shares, verdict, "ES was unstable and GES was not", "pairs", drawn)
+    figure, panel, drawn = _measured(found, verdict)
+    return _finished(figure, panel, verdict, "ES was unstable and GES was not", "pairs", drawn)
 
 
 @page
@@ -112,9 +116,9 @@ def same_policy(found: Evidence, verdict: Verdict) -> Figure:
 @page
 def held_out(found: Evidence, verdict: Verdict) -> Figure:
     """C6: the network's error on held-out pairs when it is told theta, over that when it is not."""
-    figure, shares, drawn = _measured(found, verdict)
+    figure, panel, drawn = _measured(found, verdict)
     finding = f"told θ, the network errs at most {claims.MORE_ACCURATE} times as much"
-    return _finished(figure, shares, verdict, finding, "runs", drawn)
+    return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
 @page
@@ -133,7 +137,7 @@ def violations(found: Evidence, verdict: Verdict) -> Figure:
         axis.set_ylim(-0.5, 2 * top)
     sizes = zip(SIZE_MARKS.values(), ("Ξ up to 0.01", "up to 0.1", "above"), strict=True)
     handles = [
-        Line2D([], [], label=name, **_dot("frozen", marker=m, color=c)) for (m, c), name in sizes
+        Line2D([], [], label=name, **dots("frozen", marker=m, color=c)) for (m, c), name in sizes
     ]
     figure.legend(handles=handles, loc="outside lower left", ncols=3, fontsize="small")
     return _finished(figure, axes[-1], verdict, "all constraints held", "runs", drawn)
@@ -167,9 +171,9 @@ def theorem(
 @page
 def gains(found: Evidence, verdict: Verdict) -> Figure:
     """C9: noise-free cost at the end over that at the start, of RDES and GES."""
-    figure, shares, drawn = _measured(found, verdict)
+    figure, panel, drawn = _measured(found, verdict)
     finding = f"learning saves {claims.BETTER:.0%} of the cost or more"
-    return _finished(figure, shares, verdict, finding, "runs", drawn)
+    return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
 @page
@@ -178,11 +182,11 @@ def learners(found: Evidence) -> Figure:
     figure, (middles, profile) = subplots(1, 2, 3.6)
     costs = {name: _final_costs(found, name) for name in found.digests.values_of("learner")}
     means = {name: interquartile_mean(*cost) for name, cost in costs.items()}
-    placed = _logarithmic(middles, "x", np.concatenate([cost for cost, _ in costs.values()]), 1.0)
+    placed = logarithmic(middles, "x", np.concatenate([cost for cost, _ in costs.values()]), 1.0)
     for row, (name, mean) in enumerate(means.items()):
         look = LOOKS[name]
         cost = placed(costs[name][0])
-        middles.plot(cost, row + _jitter(cost.size, 0.25), ".", color=look.color, alpha=0.25)
+        middles.plot(cost, row + jitter(cost.size, 0.25), ".", color=look.color, alpha=0.25)
         middles.plot(placed([mean.low, mean.high]), [row, row], color="black", linewidth=2.2)
         middles.plot(placed(mean.value), row, look.marker, color=look.color, mec="black")
         _profile(profile, 1 - costs[name][0], name)
@@ -209,58 +213,10 @@ def _measured(found: Evidence, verdict: Verdict) -> tuple[Figure, Axes, Evidence
     values, border, label = measure.of(found.runs, paths(found)), measure.border, measure.label
     if verdict.claim == "C9":  # a share that may be minus infinity; what is left of the cost is not
         values, border, label = 1 - values, 1 - border, "noise-free cost, end / start"
-    figure, (measured, shares) = _panels()
-    _by_layout(measured, values, border)
+    figure, (measured, panel) = _panels()
+    strips(measured, values, border)
     measured.set_ylabel(label)
-    return figure, shares, part(found, tuple(values))
-
-
-def _by_layout(axis: Axes, values: Values, border: float) -> None:
-    """Every run's number above its layout: learners side by side, the second reading hollow.
-
-    A short line is the median of a learner and reading; the dashed one is the claim's border.
-    """
-    placed = _logarithmic(axis, "y", values.to_numpy(float).ravel(), border)
-    layouts, decays = values.index.unique("layout"), values.index.unique("decay")
-    columns = [(name, decay) for name in values for decay in decays]
-    for column, (name, decay) in enumerate(columns):
-        face = LOOKS[name].color if decay == decays[0] else "white"
-        for i, layout in enumerate(layouts):
-            known = placed(values[name].xs((layout, decay), level=("layout", "decay")).dropna())
-            x = i + 0.19 * (column - (len(columns) - 1) / 2)
-            dots = _dot(name, mfc=face, markersize=3, mew=0.7)
-            axis.plot(x + _jitter(known.size, 0.07), known, **dots)
-            if known.size:  # of a half that is infinite and one that is not, the middle is neither
-                middle = np.quantile(known, 0.5, method="higher")
-                axis.hlines(middle, x - 0.09, x + 0.09, color=INK)
-    axis.axhline(border, **LIMIT)
-    axis.set_xlabel("layout")
-    axis.set_xticks(range(len(layouts)), layouts)
-    kinds = [Line2D([], [], label=name, **_dot(name)) for name in values]
-    for decay, face in zip(decays, (LOOKS["frozen"].color, "white"), strict=False):
-        look = _dot("frozen", marker="o", mfc=face)
-        kinds.append(Line2D([], [], label=f"noise per {decay}", **look))
-    axis.figure.legend(handles=kinds, loc="outside lower left", ncols=4, fontsize="small")
-
-
-def _shares(axis: Axes, verdict: Verdict) -> None:
-    """The share of yes with Wilson's interval: overall, in each layout, in each reading."""
-    names = {"all": "all"} | {name: name for name in verdict.by_layout}
-    names |= {name: f"per {name}" for name in verdict.by_decay}
-    for limit in (verdicts.NEARLY_NONE, verdicts.MAJORITY, verdicts.NEARLY_ALL):
-        axis.axvline(limit, **LIMIT)
-    labels = []
-    for row, name in enumerate(names):
-        yes, of = verdict.counts.get(name, (0, 0))
-        labels.append(f"{names[name]}  {yes}/{of}")
-        if of:
-            share = rate(yes, of)
-            axis.plot([share.low, share.high], [row, row], color=INK, linewidth=1.6)
-            axis.plot(share.value, row, "o", color="black", markersize=5 if name == "all" else 3.5)
-    axis.set_yticks(range(len(names)), labels, fontsize="small")
-    axis.set(xlim=(-0.04, 1.04), ylim=(len(names) - 0.5, -0.5))
-    axis.set_xticks((0, 0.5, 1), ("0", "0.5", "1"))
-    axis.set_xlabel("share of yes")
+    return figure, panel, part(found, tuple(values))
 
 
 def _pairs(drawn: Evidence) -> pd.DataFrame:
@@ -280,10 +236,10 @@ def _scatter(axis: Axes, pairs: pd.DataFrame, decay: str) -> None:
     """A letter a pair of one reading, in a panel that has room for both."""
     box = Rectangle((0, 0), claims.SAME_PATH, claims.SAME_COST, facecolor="0.88", edgecolor=INK)
     axis.add_patch(box)
-    across = _logarithmic(axis, "x", pairs.path.to_numpy(float), claims.SAME_PATH)
-    up = _logarithmic(axis, "y", pairs.cost.to_numpy(float), claims.SAME_COST)
+    across = logarithmic(axis, "x", pairs.path.to_numpy(float), claims.SAME_PATH)
+    up = logarithmic(axis, "y", pairs.cost.to_numpy(float), claims.SAME_COST)
     for one in pairs[pairs.decay == decay].dropna(subset="cost").itertuples():
-        letter = _dot("GES", marker=f"${one.layout}$", markersize=5.5, alpha=0.8)
+        letter = dots("GES", marker=f"${one.layout}$", markersize=5.5, alpha=0.8)
         axis.plot(across(one.path), up(one.cost), **letter)
     axis.set_xlabel("robots apart [m]")
 
@@ -296,7 +252,7 @@ def _counts(axis: Axes, runs: pd.DataFrame, column: str) -> None:
             (-0.27, 0, 0.27), SIZE_MARKS.items(), strict=True
         ):
             counts = runs[f"{column}_{size}"][runs.learner == name].to_numpy(float)
-            x = i + offset + _jitter(counts.size, 0.1)
+            x = i + offset + jitter(counts.size, 0.1)
             axis.plot(x, counts, marker, color=color, markersize=2.5, alpha=0.6)
             axis.annotate(f"{counts.sum():.0f}", (i + offset, 0.99), **ABOVE)
     axis.set_yscale("symlog", linthresh=1)
@@ -306,12 +262,11 @@ def _counts(axis: Axes, runs: pd.DataFrame, column: str) -> None:
 def _profile(axis: Axes, saved: Vector, learner: str) -> None:
     """Share of runs that save at least as much, with its pointwise band."""
     thresholds = np.linspace(*PROFILED, 121)
-    shares = performance_profile(saved, thresholds)
+    reached = performance_profile(saved, thresholds)
     look = LOOKS[learner]
-    axis.fill_between(
-        thresholds, shares.low, shares.high, color=look.color, alpha=0.12, linewidth=0
-    )
-    axis.plot(thresholds, shares.share, label=learner, **look.line)
+    band: dict[str, Any] = {"color": look.color, "alpha": 0.12, "linewidth": 0}
+    axis.fill_between(thresholds, reached.low, reached.high, **band)
+    axis.plot(thresholds, reached.share, label=learner, **look.line)
 
 
 def _bar(axis: Axes, row: float, mine: pd.Series, reference: pd.Series) -> float:
@@ -329,12 +284,6 @@ def _hatched(color: str, hatch: str) -> dict[str, Any]:
     return {"facecolor": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}
 
 
-def _dot(learner: str, **others: Any) -> dict[str, Any]:
-    look = LOOKS[learner]
-    style = {"color": look.color, "marker": look.marker, "linestyle": "", "markersize": 4}
-    return style | others
-
-
 def _final_costs(found: Evidence, learner: str) -> tuple[Vector, list[str]]:
     """Noise-free cost at the end over that at the start, and the layout, of each run.
 
@@ -345,49 +294,13 @@ def _final_costs(found: Evidence, learner: str) -> tuple[Vector, list[str]]:
     return cost.to_numpy(float), runs.layout.tolist()
 
 
-def _jitter(count: int, width: float) -> Vector:
-    """Places beside each other, so that no run hides another."""
-    return np.linspace(-width, width, count) if count > 1 else np.zeros(count)
-
-
-def _logarithmic(axis: Axes, which: str, values: Vector, border: float) -> Callable[[Any], Any]:
-    """Make the "x" or "y" axis logarithmic, with a grey strip at its end for what is infinite.
-
-    Args:
-        axis: whose axis it is.
-        which: "x" or "y".
-        values: all that will be drawn.
-        border: a threshold that is to be seen as well.
-
-    Returns:
-        What puts values where they are drawn: nan counts as infinite.
-    """
-    finite = [*values[np.isfinite(values) & (values > border / DEEP)], border]
-    high = max(finite)
-    low = min(*finite, high / LEAST)
-    room = (high / low) ** 0.06
-    start, middle, stop = high * room ** np.array([1, 2, 3])
-    axis.set(**{f"{which}scale": "log", f"{which}lim": (low / room, stop)})
-    if which == "x":
-        axis.axvspan(start, stop, color="0.93", zorder=0)
-        axis.text(middle, 0.01, "∞", transform=axis.get_xaxis_transform(), ha="center")
-    else:
-        axis.axhspan(start, stop, color="0.93", zorder=0)
-        axis.text(0.01, middle, "∞", transform=axis.get_yaxis_transform(), va="center")
-    ticks = {"x": axis.xaxis, "y": axis.yaxis}[which]
-    if high / low < FEW:
-        plain(ticks)
-    ticks.set_minor_formatter(NullFormatter())
-    return lambda drawn: np.clip(np.nan_to_num(drawn, nan=np.inf), low, middle)
-
-
 def _finished(
-    figure: Figure, shares: Axes, verdict: Verdict, finding: str, unit: str, drawn: Evidence
+    figure: Figure, panel: Axes, verdict: Verdict, finding: str, unit: str, drawn: Evidence
 ) -> Figure:
     """With the share of yes, the title, and where the runs come from."""
-    _shares(shares, verdict)
+    shares(panel, verdict)
     yes, of = verdict.counts["all"]
-    asked = f"{finding} in {yes} of {of} {unit}" if of else f"no {unit} are as long as the paper's"
+    asked = f"{finding} in {yes} of {of} {unit}" if of else f"there are no {unit} to be asked"
     _titled(figure, verdict, asked)
     return marked(figure, drawn.mark)
 

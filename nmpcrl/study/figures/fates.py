@@ -13,10 +13,9 @@ from matplotlib.ticker import MaxNLocator
 from nmpcrl.study import paper
 from nmpcrl.study.digest import Digest
 from nmpcrl.study.evidence import Evidence
-from nmpcrl.study.figures.claims import FEW
 from nmpcrl.study.figures.open import closes_at, plain
+from nmpcrl.study.figures.panels import FEW, LIMIT, SUBTITLE
 from nmpcrl.study.figures.rdes import headed
-from nmpcrl.study.figures.results import LIMIT, SUBTITLE
 from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study.mechanisms import (
     ENDINGS,
@@ -36,6 +35,7 @@ PATTERNS = (  # colour and hatching of what did not, in order
     ("#56B4E9", "...."),
     ("0.55", ""),
 )
+BELOW: dict[str, Any] = {"bbox_to_anchor": (0.5, 0), "borderaxespad": 3.2, "ncols": 2}
 STOPPED = "stopped in training"
 SEEN = (-1.0, 3.0)  # of theta_c
 AROUND = 60  # episodes shown before and after the rise
@@ -54,7 +54,7 @@ def reasons(found: Evidence) -> Figure:
         looks = dict(zip(names, (*PATTERNS[: len(names) - 1], (GOOD, "")), strict=True))
         _stacked(axis, counts, looks)
         handles = [Rectangle((0, 0), 1, 1, **_look(*look)) for look in looks.values()]
-        axis.legend(handles, names, loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2)
+        axis.legend(handles, names, loc="upper center", **BELOW)
         axis.set_xlabel("runs")
     axes[0].set_title("what was at work when the cost rose", **SUBTITLE)
     axes[1].set_title("how the last drive ended", **SUBTITLE)

@@ -1,0 +1,159 @@
+"""Figures of chapter 5: the learned policies at the wheel, Figs. 3 and 4 of the paper over seeds.
+
+A run that had to be stopped left no policy to drive with: it is counted, and not drawn.
+"""
+
+from collections import Counter
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from nmpcrl.control import Task
+from nmpcrl.study import metrics, paper
+from nmpcrl.study.digest import Digest
+from nmpcrl.study.evidence import Evidence
+from nmpcrl.study.figures.controller import draw_task
+from nmpcrl.study.figures.panels import LIMIT, SUBTITLE, bundle, legend, part, sourced
+from nmpcrl.study.figures.rdes import DECAYS
+from nmpcrl.study.figures.style import LOOKS, page, subplots
+from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.mechanisms import ending
+from nmpcrl.study.records import Column
+from nmpcrl.study.store import Study
+
+LEARNED = ("RDES", "GES")  # the paper's two methods, whose policies its Figs. 3 and 4 show
+SHOWN = ("frozen", *LEARNED)
+
+
+@page
+def controls(found: Evidence, layout: str) -> Figure:
+    """Fig. 3 of the paper: the inputs under the learned policies, without noise.
+
+    Drives whose inputs are not kept, as those of published runs, are left out.
+    """
+    drawn = _driving(part(found, SHOWN, layout))
+    drawn = drawn.where([digest.actions.size > 0 for digest in drawn.digests.values()])
+    plant = paper.nmpc(layout).plant
+    figure, axes = _against_time(drawn, "actions", plant.action_names, 4.2)
+    for i, row in enumerate(axes):
+        for axis in row:
+            axis.axhline(plant.lower[i], **LIMIT)
+            axis.axhline(plant.upper[i], **LIMIT)
+    learned = _learned(drawn)
+    outside = sum(metrics.input_violations(d.actions, plant.lower, plant.upper) for d in learned)
+    verb = f"{outside} inputs leave" if outside else "all inputs keep within"
+    title = f"In {len(learned)} drives of RDES and GES, {verb} their bounds"
+    return sourced(figure, title if learned else "Of no drive are the inputs kept", drawn)
+
+
+@page
+def states(found: Evidence, layout: str) -> Figure:
+    """Fig. 4 of the paper against time: the states under the learned policies."""
+    drawn = _driving(part(found, SHOWN, layout))
+    task, plant = paper.task(layout), paper.nmpc(layout).plant
+    figure, axes = _against_time(drawn, "states", plant.state_names, 5.4)
+    for i, row in enumerate(axes):
+        for axis in row:
+            axis.axhline(task.target[i], **LIMIT)
+    ends = np.array([task.distance(digest.states[-1]) for digest in _learned(drawn)])
+    arrived = int((ends <= ARRIVED).sum())
+    title = f"{arrived} of {ends.size} drives of RDES and GES end at the target"
+    return sourced(figure, f"In layout {layout}, {title}", drawn)
+
+
+@page
+def paths(found: Evidence, layout: str) -> Figure:
+    """Fig. 4 of the paper in the plane: where the learned policies drive, without noise.
+
+    One line a run and none for the median, for a median of places is no place that a robot was.
+    """
+    drawn = part(found, SHOWN, layout)
+    driving, decays = _driving(drawn), drawn.digests.values_of("decay")
+    figure, axes = subplots(1, len(decays), 3.5, sharey=True, squeeze=False)
+    for axis, decay in zip(axes[0], decays, strict=True):
+        _map(axis, paper.task(layout), driving.digests.select(decay=decay))
+        axis.set_title(DECAYS[decay], **SUBTITLE)
+        axis.set_xlabel("x [m]")
+    axes[0, 0].set_ylabel("y [m]")
+    legend(figure, SHOWN)
+    return sourced(figure, f"In layout {layout}: {_endings(_learned(drawn))}", drawn)
+
+
+@page
+def maps(found: Evidence) -> Figure:
+    """Where the learned policies drive in every layout, both readings of the decay."""
+    drawn = part(found, SHOWN)
+    layouts = drawn.digests.values_of("layout")
+    columns = min(3, len(layouts))
+    rows = -(-len(layouts) // columns)
+    figure, axes = subplots(
+        rows, columns, 1.95 * rows + 0.8, sharex=True, sharey=True, squeeze=False
+    )
+    for axis, layout in zip(axes.flat, layouts, strict=False):
+        runs = _driving(drawn).digests.select(layout=layout)
+        _map(axis, paper.task(layout), runs, names=False)
+        axis.set_title(layout, **SUBTITLE)
+    for axis in axes.flat[len(layouts) :]:
+        axis.set_axis_off()
+    for axis in axes[-1]:
+        axis.set_xlabel("x [m]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("y [m]")
+    legend(figure, SHOWN)
+    return sourced(figure, f"In all layouts: {_endings(_learned(drawn))}", drawn)
+
+
+def _against_time(
+    drawn: Evidence, name: str, components: tuple[str, ...], height: float
+) -> tuple[Figure, Column]:
+    """`states` or `actions` of the last rollouts: a row a component, a column a reading."""
+    decays, period = drawn.digests.values_of("decay"), paper.nmpc().plant.period
+    options = {"sharex": True, "sharey": "row", "squeeze": False}
+    figure, axes = subplots(len(components), max(1, len(decays)), height, **options)
+    for column, decay in zip(axes.T, decays, strict=False):
+        for learner in SHOWN:
+            runs = drawn.digests.select(learner=learner, decay=decay).values()
+            driven = np.array([getattr(digest, name) for digest in runs])
+            for i, axis in enumerate(column if driven.size else ()):
+                bundle(axis, period * np.arange(driven.shape[1]), driven[:, :, i], learner)
+        column[0].set_title(DECAYS[decay], **SUBTITLE)
+    for axis in axes[-1]:
+        axis.set_xlabel("time [s]")
+    for axis, component in zip(axes[:, 0], components, strict=True):
+        axis.set_ylabel(component)
+    legend(figure, SHOWN)
+    return figure, axes
+
+
+def _map(axis: Axes, task: Task, runs: Study[Digest], *, names: bool = True) -> None:
+    """Obstacles, start, target and drives; a mark where each drive ended."""
+    draw_task(axis, task, labels=names)
+    for learner in SHOWN:
+        look = LOOKS[learner]
+        for digest in runs.select(learner=learner).values():
+            known = digest.states[np.isfinite(digest.states).all(axis=1)]
+            axis.plot(known[:, 0], known[:, 1], **look.line, linewidth=0.9, alpha=0.7)
+            axis.plot(*known[-1, :2], look.marker, color=look.color, markersize=3.5)
+    axis.set(xlim=(task.lower[0], task.upper[0]), ylim=(-3, 6))
+
+
+def _learned(drawn: Evidence) -> list[Digest]:
+    """Every run of the paper's two methods."""
+    return [digest for e, digest in drawn.digests.items() if e.learner in LEARNED]
+
+
+def _driving(found: Evidence) -> Evidence:
+    """Without the runs that had to be stopped, which left no policy to drive with."""
+    return found.where(found.runs.stopped == "finished")
+
+
+def _endings(digests: list[Digest]) -> str:
+    """How many drives of runs end in which way, the most common first."""
+    ends = Counter(
+        ending(one.states, paper.task(one.name.layout))
+        if one.facts["stopped"] == "finished"
+        else "stopped in training"
+        for one in digests
+    )
+    return ", ".join(f"{count} {name}" for name, count in ends.most_common())

@@ -1,0 +1,157 @@
+"""What figures of chapter 5 are made of: bundles of runs, strips by layout, shares of yes."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
+
+from nmpcrl import Vector
+from nmpcrl.study import verdicts
+from nmpcrl.study.evidence import Evidence
+from nmpcrl.study.figures.open import plain
+from nmpcrl.study.figures.rdes import headed
+from nmpcrl.study.figures.style import LOOKS, marked
+from nmpcrl.study.measures import Values
+from nmpcrl.study.records import Column
+from nmpcrl.study.statistics import rate
+from nmpcrl.study.verdicts import Verdict
+
+LIMIT: dict[str, Any] = {"color": "0.4", "linewidth": 0.8, "linestyle": (0, (2, 2))}
+SUBTITLE: dict[str, Any] = {"loc": "left", "fontsize": "medium", "fontweight": "normal"}
+INK = "0.25"
+QUARTILES = (0.25, 0.5, 0.75)
+DEEP = 1e4  # what is less than this part of a threshold is drawn as much
+LEAST = 1.5  # high over low of an axis that has hardly anything to show
+FEW = 20  # high over low of an axis on which powers of ten are too few
+
+
+def part(found: Evidence, learners: tuple[str, ...], layout: str | None = None) -> Evidence:
+    """The runs of some learners, in one layout or in all, learner by learner."""
+    kept = found.runs.learner.isin(learners)
+    return found.where(kept & (found.runs.layout == layout) if layout else kept)
+
+
+def bundle(axis: Axes, along: Column, runs: Column, learner: str) -> None:
+    """A learner's runs, shape (runs, points): each thin, their quartiles a band, the median thick.
+
+    Values that are not known, after a failed solve, are left out.
+    """
+    color = LOOKS[learner].color
+    axis.plot(along, runs.T, color=color, linewidth=0.5, alpha=0.35)
+    known = np.isfinite(runs).any(axis=0)
+    low, middle, high = np.full((3, along.size), np.nan)
+    low[known], middle[known], high[known] = np.nanquantile(runs[:, known], QUARTILES, axis=0)
+    axis.fill_between(along, low, high, color=color, alpha=0.15, linewidth=0)
+    axis.plot(along, middle, **line(learner))
+
+
+def strips(axis: Axes, values: Values, border: float) -> None:
+    """Every run's number above its layout: learners side by side, the second reading hollow.
+
+    A short line is the median of a learner and reading; the dashed one is the claim's border.
+    """
+    placed = logarithmic(axis, "y", values.to_numpy(float).ravel(), border)
+    layouts, decays = values.index.unique("layout"), values.index.unique("decay")
+    columns = [(name, decay) for name in values for decay in decays]
+    for column, (name, decay) in enumerate(columns):
+        face = LOOKS[name].color if decay == decays[0] else "white"
+        for i, layout in enumerate(layouts):
+            known = placed(values[name].xs((layout, decay), level=("layout", "decay")).dropna())
+            x = i + 0.19 * (column - (len(columns) - 1) / 2)
+            look = dots(name, mfc=face, markersize=3, mew=0.7)
+            axis.plot(x + jitter(known.size, 0.07), known, **look)
+            if known.size:  # of a half that is infinite and one that is not, the middle is neither
+                middle = np.quantile(known, 0.5, method="higher")
+                axis.hlines(middle, x - 0.09, x + 0.09, color=INK)
+    axis.axhline(border, **LIMIT)
+    axis.set_xlabel("layout")
+    axis.set_xticks(range(len(layouts)), layouts)
+    kinds = [Line2D([], [], label=name, **dots(name)) for name in values]
+    for decay, face in zip(decays, (LOOKS["frozen"].color, "white"), strict=False):
+        look = dots("frozen", marker="o", mfc=face)
+        kinds.append(Line2D([], [], label=f"noise per {decay}", **look))
+    axis.figure.legend(handles=kinds, loc="outside lower left", ncols=4, fontsize="small")
+
+
+def shares(axis: Axes, verdict: Verdict) -> None:
+    """The share of yes with Wilson's interval: overall, in each layout, in each reading."""
+    names = {"all": "all"} | {name: name for name in verdict.by_layout}
+    names |= {name: f"per {name}" for name in verdict.by_decay}
+    for limit in (verdicts.NEARLY_NONE, verdicts.MAJORITY, verdicts.NEARLY_ALL):
+        axis.axvline(limit, **LIMIT)
+    labels = []
+    for row, name in enumerate(names):
+        yes, of = verdict.counts.get(name, (0, 0))
+        labels.append(f"{names[name]}  {yes}/{of}")
+        if of:
+            share = rate(yes, of)
+            axis.plot([share.low, share.high], [row, row], color=INK, linewidth=1.6)
+            axis.plot(share.value, row, "o", color="black", markersize=5 if name == "all" else 3.5)
+    axis.set_yticks(range(len(names)), labels, fontsize="small")
+    axis.set(xlim=(-0.04, 1.04), ylim=(len(names) - 0.5, -0.5))
+    axis.set_xticks((0, 0.5, 1), ("0", "0.5", "1"))
+    axis.set_xlabel("share of yes")
+
+
+def logarithmic(axis: Axes, which: str, values: Vector, border: float) -> Callable[[Any], Any]:
+    """Make the "x" or "y" axis logarithmic, with a grey strip at its end for what is infinite.
+
+    Args:
+        axis: whose axis it is.
+        which: "x" or "y".
+        values: all that will be drawn.
+        border: a threshold that is to be seen as well.
+
+    Returns:
+        What puts values where they are drawn: nan counts as infinite.
+    """
+    finite = [*values[np.isfinite(values) & (values > border / DEEP)], border]
+    high = max(finite)
+    low = min(*finite, high / LEAST)
+    room = (high / low) ** 0.06
+    start, middle, stop = high * room ** np.array([1, 2, 3])
+    axis.set(**{f"{which}scale": "log", f"{which}lim": (low / room, stop)})
+    if which == "x":
+        axis.axvspan(start, stop, color="0.93", zorder=0)
+        axis.text(middle, 0.01, "∞", transform=axis.get_xaxis_transform(), ha="center")
+    else:
+        axis.axhspan(start, stop, color="0.93", zorder=0)
+        axis.text(0.01, middle, "∞", transform=axis.get_yaxis_transform(), va="center")
+    ticks = {"x": axis.xaxis, "y": axis.yaxis}[which]
+    if high / low < FEW:
+        plain(ticks)
+    ticks.set_minor_formatter(NullFormatter())
+    return lambda drawn: np.clip(np.nan_to_num(drawn, nan=np.inf), low, middle)
+
+
+def jitter(count: int, width: float) -> Vector:
+    """Places beside each other, so that no run hides another."""
+    return np.linspace(-width, width, count) if count > 1 else np.zeros(count)
+
+
+def line(learner: str) -> dict[str, Any]:
+    """How a median is drawn."""
+    return {**LOOKS[learner].line, "linewidth": 1.6}
+
+
+def dots(learner: str, **others: Any) -> dict[str, Any]:
+    """How single runs are drawn as points."""
+    look = LOOKS[learner]
+    style = {"color": look.color, "marker": look.marker, "linestyle": "", "markersize": 4}
+    return style | others
+
+
+def legend(figure: Figure, learners: Iterable[str], *others: Line2D) -> None:
+    """One entry a learner, below all panels."""
+    handles = [Line2D([], [], label=name, **line(name)) for name in learners]
+    handles += others
+    figure.legend(handles=handles, loc="outside lower left", ncols=len(handles))
+
+
+def sourced(figure: Figure, title: str, drawn: Evidence) -> Figure:
+    """With the finding above and where the runs come from below."""
+    return marked(headed(figure, title), drawn.mark)
