@@ -12,11 +12,12 @@ import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import (
+    FIRST_COMPLETED,
     Executor,
     Future,
     ProcessPoolExecutor,
     ThreadPoolExecutor,
-    as_completed,
+    wait,
 )
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext
@@ -34,6 +35,7 @@ from nmpcrl.study.experiment import NETWORK_LEARNERS, Experiment, compile_ahead,
 from nmpcrl.study.records import DamagedRecords, Records
 
 SUMMARISES = ("study/digest.py", "study/metrics.py", "study/imitation.py")  # besides the run itself
+WAIT = 0.5  # [s]; what waits for longer may not notice an interrupt
 ALONE = threading.Lock()  # of a process: torch's generator, which draws weights, is its only one
 
 
@@ -177,6 +179,7 @@ class Slots(Executor):
         self._threads = ThreadPoolExecutor(slots)
         self._own = threading.local()  # each thread's process
         self._all: list[ProcessPoolExecutor] = []
+        self._closing = threading.Lock()  # a process is started before the end, or not at all
         self._closed = False
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
@@ -185,9 +188,9 @@ class Slots(Executor):
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """As `Executor.shutdown`; without waiting, processes are ended at once."""
-        self._closed = True
-        if not wait:
-            for process in self._all:
+        with self._closing:
+            self._closed = not wait
+            for process in self._all if self._closed else ():
                 kill(process)
         self._threads.shutdown(wait=True, cancel_futures=cancel_futures)
         for process in self._all:
@@ -195,16 +198,21 @@ class Slots(Executor):
 
     def _call(self, call: Callable[[], Any]) -> Any:
         for _ in range(store.ATTEMPTS):
+            try:
+                return self._begin(call).result()
+            except BrokenProcessPool:
+                del self._own.process
+        raise Killed(f"its worker was killed {store.ATTEMPTS} times")
+
+    def _begin(self, call: Callable[[], Any]) -> Future[Any]:
+        """Let this thread's process begin, unless all have been ended."""
+        with self._closing:
+            if self._closed:
+                raise Killed("the study was interrupted")
             if not hasattr(self._own, "process"):
                 self._own.process = store.processes(1)
                 self._all.append(self._own.process)
-            try:
-                return self._own.process.submit(call).result()
-            except BrokenProcessPool:
-                del self._own.process
-                if self._closed:
-                    break
-        raise Killed(f"its worker was killed {store.ATTEMPTS} times")
+            return self._own.process.submit(call)
 
 
 def kill(pool: ProcessPoolExecutor) -> None:
@@ -225,21 +233,26 @@ def _harvest(
         with tqdm(
             total=len(ordered), unit="run", disable=not progress, mininterval=store.interval()
         ) as bar:
-            for future in as_completed(pending):
-                experiment = pending.pop(future)
-                reason = _keep(experiment, future)
-                del future  # while we hold it, Dask makes it again if it loses what we have stored
-                if reason:
-                    failures[experiment] = reason
+            while pending:
+                done = wait(pending, timeout=WAIT, return_when=FIRST_COMPLETED).done
+                ended = len(done)
+                while done:
+                    failures |= _keep(done.pop(), pending)
                 running = sum(one.running() for one in pending)  # a cluster does not tell
                 said = [f"{running} running"] * (running > 0) + [f"{len(failures)} failed"]
                 bar.set_postfix_str(", ".join(said), refresh=False)
-                bar.update()
+                bar.update(ended)
     return failures
 
 
-def _keep(experiment: Experiment, future: "Future[Digest]") -> str:
-    """Store what a worker made, or why it made nothing; that reason is returned."""
+def _keep(
+    future: Future[Digest], pending: dict[Future[Digest], Experiment]
+) -> dict[Experiment, str]:
+    """Store what a worker made, or why it made nothing, which is returned.
+
+    The future is forgotten: as long as it is held, Dask makes a run again whose worker it loses.
+    """
+    experiment = pending.pop(future)
     path = path_of(experiment)
     reason = path.with_suffix(".failed.json")
     try:
@@ -248,10 +261,10 @@ def _keep(experiment: Experiment, future: "Future[Digest]") -> str:
         said = f"{type(error).__name__}: {error}"
         trace = "".join(traceback.format_exception(error))
         _write(reason, {"experiment": asdict(experiment), "reason": said, "traceback": trace})
-        return said
+        return {experiment: said}
     made.save(path)
     reason.unlink(missing_ok=True)
-    return ""
+    return {}
 
 
 def _write(path: Path, content: dict[str, Any]) -> None:

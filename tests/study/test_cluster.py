@@ -3,8 +3,12 @@
 The workers have a folder of runs of their own, as on machines that share no disk.
 """
 
+import ast
+import importlib
 import json
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -15,6 +19,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nmpcrl.__main__ import main
 from nmpcrl.study import Experiment, cluster, harvest, run, store, sweep
 from nmpcrl.study.cluster import NoCluster
 from nmpcrl.study.digest import digest
@@ -309,3 +314,37 @@ def test_without_dask_it_is_said_what_to_install(monkeypatch):
 
 def test_every_worker_is_asked_for_one_key():
     assert cluster._signature() == harvest.key(Experiment())
+
+
+PAGE = (Path(__file__).resolve().parents[2] / "book/cluster.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("text", blocks("python"), ids=["SLURM", "Kubernetes"])
+def test_the_programs_of_the_page_import_what_there_is(text):
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("nmpcrl"):
+            module = importlib.import_module(node.module)
+            for alias in node.names:
+                if not hasattr(module, alias.name):
+                    importlib.import_module(f"{node.module}.{alias.name}")
+
+
+def test_the_commands_of_the_page_have_the_options_they_are_given():
+    commands = [shlex.split(line) for block in blocks("bash") for line in block.splitlines()]
+    ours = [words[1:] for words in commands if words[0] == "nmpcrl"]
+    assert len(ours) == 2
+    for name, *options in ours:
+        main.commands[name].make_context(name, options)  # refuses what it does not know
+    for words in commands:
+        if words[0] == "dask":
+            shown = subprocess.run(
+                [sys.executable, "-m", "dask", words[1], "--help"],
+                capture_output=True,
+                text=True,
+                check=True,
+            )
+            assert all(word in shown.stdout for word in words if word.startswith("--"))

@@ -20,7 +20,7 @@ import pytest
 import nmpcrl
 from nmpcrl.study import Experiment, fetch, harvest, run, store, sweep
 from nmpcrl.study.digest import Digest, digest
-from nmpcrl.study.harvest import Failed, fetch_digests
+from nmpcrl.study.harvest import Failed, Killed, fetch_digests
 from nmpcrl.study.store import THREADS
 
 QUICK = Experiment("frozen", episodes=2, steps=3, evaluate_every=1)
@@ -390,6 +390,23 @@ def test_an_interrupted_study_goes_on_where_it_was(workers, digests, request):
     fetch_digests(SIX, workers=2, progress=False)
     assert len(times(log, "began")) == 6 - len(stored)
     assert {path: path.stat().st_mtime_ns for path in stored} == stored
+
+
+def test_a_process_that_starts_while_a_study_is_interrupted_is_ended_too(monkeypatch):
+    starting, processes = threading.Event(), store.processes
+
+    def slowly(workers):
+        starting.set()
+        time.sleep(0.5)
+        return processes(workers)
+
+    monkeypatch.setattr(store, "processes", slowly)
+    slots = harvest.Slots(1)
+    began, waits = slots.submit(time.sleep, 20), slots.submit(time.sleep, 20)
+    starting.wait()
+    slots.shutdown(wait=False, cancel_futures=True)
+    assert isinstance(began.exception(), Killed)
+    assert waits.cancelled()
 
 
 def wait_until(holds, seconds: float = 240.0):
