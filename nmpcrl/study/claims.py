@@ -79,6 +79,7 @@ CLAIMS = {
             f"diverged: stopped, or above {DIVERGED}",
             would_change="Other layouts and the untold details of the network; Algorithm 1 read"
             " literally (departure G).",
+            learners=("DES", "RDES"),
         ),
         Claim(
             "C2",
@@ -89,6 +90,7 @@ CLAIMS = {
             f"unstable: diverged, or above {UNSTABLE:.0%}",
             would_change="A larger step size: alpha ||phi||^2 decides where a semi-gradient step"
             " overshoots.",
+            learners=("ES", "GES"),
         ),
         Claim(
             "C3",
@@ -120,6 +122,7 @@ CLAIMS = {
             " not judged: two of them may drive alike)",
             f"at most {SAME_PATH} m and at most {SAME_COST:.0%}",
             would_change="A looser meaning of 'same', and longer training.",
+            learners=("RDES", "GES"),
         ),
         Claim(
             "C6",
@@ -129,6 +132,7 @@ CLAIMS = {
             f"at most {MORE_ACCURATE}",
             would_change="How far theta moves: where it hardly does, there is nothing to tell the"
             " network.",
+            learners=("RDES",),
         ),
         Claim(
             "C7",
@@ -139,6 +143,7 @@ CLAIMS = {
             f"none beyond {metrics.TOUCH:g}; partly if only the weaker question is not refuted",
             would_change="The obstacle constraint is soft, and noise is added after it was"
             " enforced.",
+            learners=PAPER,
         ),
         Claim(
             "C8",
@@ -158,6 +163,7 @@ CLAIMS = {
             f"at least {BETTER:.0%}",
             would_change="The layout, and theta_c: near d_o it removes the penalty altogether"
             " (departure N).",
+            learners=("RDES", "GES"),
         ),
     )
 }
@@ -205,7 +211,7 @@ def judge_runs(runs: pd.DataFrame, paths: Paths) -> tuple[Verdict, ...]:
 
 def des_diverges_and_rdes_does_not(runs: pd.DataFrame) -> Verdict:
     """C1, from Fig. 1."""
-    des, rdes = arms(runs, "DES", "RDES")
+    des, rdes = arms(runs, *CLAIMS["C1"].learners)
     gone, stayed = divergence(des), ~divergence(rdes)
     excess = [shown(median(arm.excess), ".2f") for arm in (des, rdes)]
     return settle(
@@ -219,7 +225,7 @@ def des_diverges_and_rdes_does_not(runs: pd.DataFrame) -> Verdict:
 
 def es_is_unstable_and_ges_is_stable(runs: pd.DataFrame) -> Verdict:
     """C2, from Fig. 2."""
-    es, ges = arms(runs, "ES", "GES")
+    es, ges = arms(runs, *CLAIMS["C2"].learners)
     swung, stayed = instability(es), ~instability(ges)
     wander = [shown(median(arm.wander), ".1%") for arm in (es, ges)]
     return settle(
@@ -247,7 +253,7 @@ def ges_takes_the_same_time(timings: pd.DataFrame) -> Verdict:
 
 def rdes_and_ges_reach_the_same_policy(runs: pd.DataFrame, paths: Paths) -> Verdict:
     """C5, from Figs. 3 and 4 and the conclusion."""
-    rdes, ges = arms(runs, "RDES", "GES")
+    rdes, ges = arms(runs, *CLAIMS["C5"].learners)
     driven = _driven(runs, paths)
     path = pd.Series(
         [apart(driven.get(("RDES", *cell)), driven.get(("GES", *cell))) for cell in rdes.index],
@@ -268,7 +274,7 @@ def rdes_and_ges_reach_the_same_policy(runs: pd.DataFrame, paths: Paths) -> Verd
 
 def theta_makes_the_network_more_accurate(runs: pd.DataFrame) -> Verdict:
     """C6, from Section III-A."""
-    (rdes,) = arms(runs, "RDES", among=PAPER)
+    (rdes,) = arms(runs, *CLAIMS["C6"].learners, among=PAPER)
     told = rdes.imitation_with / rdes.imitation_without
     return settle(
         CLAIMS["C6"],
@@ -282,7 +288,8 @@ def theta_makes_the_network_more_accurate(runs: pd.DataFrame) -> Verdict:
 
 def constraints_hold(runs: pd.DataFrame) -> Verdict:
     """C7, from Section III-A and the conclusion."""
-    every = pd.concat(arms(runs, *PAPER), keys=PAPER, names=["learner"])
+    asked = CLAIMS["C7"].learners
+    every = pd.concat(arms(runs, *asked), keys=asked, names=["learner"])
     training, judged = (_inside(every, name) for name in ("inside", "eval_inside"))
     kept = (judged.sum(axis=1) == 0) & (every.inputs == 0)
     whole = kept & (training.sum(axis=1) == 0)
@@ -316,7 +323,8 @@ def convergence_is_guaranteed(assumptions: tuple[Assumption, ...]) -> Verdict:
 
 def learning_beats_the_frozen_theta(runs: pd.DataFrame) -> Verdict:
     """C9, what the paper takes for granted."""
-    claimed = pd.concat(arms(runs, "RDES", "GES"), keys=("RDES", "GES"), names=["learner"])
+    asked = CLAIMS["C9"].learners
+    claimed = pd.concat(arms(runs, *asked), keys=asked, names=["learner"])
     gains = {name: median(gain(arm)) for name, arm in zip(PAPER, arms(runs, *PAPER), strict=True)}
     listed = ", ".join(f"{name} {shown(value, '+.1%')}" for name, value in gains.items())
     failed = int(np.isinf(claimed.final_cost).sum())

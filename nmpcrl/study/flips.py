@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nmpcrl.study.claims import Paths, judge_runs
+from nmpcrl.study.claims import CLAIMS, Paths, judge_runs
 from nmpcrl.study.experiment import PAPER
 from nmpcrl.study.plan import MAIN_TABLE
 from nmpcrl.study.verdicts import CELL, UNDECIDABLE, Verdict
@@ -19,7 +19,8 @@ def flips(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFr
     """Every variant against the claims that runs decide, beside the same cells of the main table.
 
     A learner of the paper that a variant does not run is one that it does not change, so its runs
-    of the main table stand in for it. A variant without any of them (the controls) is left out.
+    of the main table stand in for it. A claim that none of the changed learners is asked about is
+    left out, for there is nothing to flip, and so are the controls, which change none of them.
 
     Args:
         runs: of `digest.table`, with a column `variant`.
@@ -40,6 +41,8 @@ def flips(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFr
         kept = before[~before.learner.isin(changed.learner)]
         after = judge_runs(pd.concat([changed, kept], ignore_index=True), paths)
         for verdict, other in zip(after, judge_runs(before, paths), strict=True):
+            if not changed.learner.isin(CLAIMS[verdict.claim].learners).any():
+                continue
             judged, held_against = (Cell(v.outcome, *v.counts["all"]) for v in (verdict, other))
             rows.append(_row(str(name), verdict.claim, judged, held_against))
     return pd.DataFrame(rows, columns=list(COLUMNS))

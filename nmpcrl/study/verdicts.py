@@ -52,6 +52,7 @@ class Claim:
     threshold: str  # and the border between yes and no
     test: str = "share of yes, with its interval"
     would_change: str = ""  # where another verdict is to be expected
+    learners: tuple[str, ...] = ()  # whose runs answer, in the order of the question
 
 
 @dataclass(frozen=True)

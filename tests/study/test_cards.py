@@ -47,7 +47,8 @@ def test_a_claim_is_shown_with_all_that_was_fixed_beforehand():
     for claim, row in zip(claims, shown, strict=True):
         text = " ".join(row).lower()
         fixed = asdict(claim) | {"would_change": ""}  # that is said of the verdict
-        assert all(part.lower() in text for part in fixed.values())
+        words = (part.lower() for part in fixed.values() if isinstance(part, str))
+        assert all(part in text for part in words)
 
 
 def test_a_claim_is_shown_in_each_layout_and_reading_in_colour_and_in_words():
