@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from nmpcrl.study import published
+from nmpcrl.study import plan, published
 
 README = (Path(__file__).resolve().parent.parent / "README.md").read_text()
 
@@ -14,6 +14,9 @@ def test_the_table_of_claims_holds_the_published_verdicts():
     assert rows == verdicts
 
 
-def test_the_number_of_runs_is_that_of_the_published_main_table():
-    runs = published.load().about["runs"]["main"]
-    assert set(re.findall(r"(\d+) runs", README)) == {str(runs)}
+def test_the_numbers_of_runs_are_those_of_the_published_study():
+    parts = published.load().about["runs"]
+    varied = [parts[name] for name in plan.VARIANTS]
+    assert set(re.findall(r"(\d+) runs", README)) == {str(parts["main"]), str(sum(varied))}
+    assert f"in {len(varied)} ways" in README
+    assert f"trains\n{len(plan.fresh())} afresh" in README

@@ -19,6 +19,7 @@ HOLDS = {  # of a claim that is no paper's
     NOT: "It does not hold.",
     UNDECIDABLE: "It is not decidable here.",
 }
+SURE = 0.01  # of Fisher's test: what chance explains as rarely is called more than chance
 LAYOUT, DECAY = "B", "C"  # the departures that the main table itself reads in several ways
 
 
@@ -70,9 +71,11 @@ def changes(flips: pd.DataFrame) -> str:
     variants = flips.variant.unique()
     if not len(variants):
         return ""
+    flipped = _flipped(flips)
     return (
-        f"Of {len(variants)} variants, each with one thing changed,"
-        f" {_flipped(flips).variant.nunique()} change at least one verdict."
+        f"Of {len(variants)} variants, each with one thing changed, {flipped.variant.nunique()}"
+        f" change at least one verdict, {flipped[flipped.p < SURE].variant.nunique()} of them by"
+        f" more than chance explains (p < {SURE})."
     )
 
 

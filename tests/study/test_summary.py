@@ -98,9 +98,11 @@ def test_layouts_and_readings_disagree_where_two_decided_verdicts_differ(
 
 
 def test_variants_that_change_a_verdict_are_counted_once():
-    flips = table(("soft box", "C1", True), ("soft box", "C2", True), ("tanh", "C1", False))
-    said = summary.changes(flips)
-    assert said == "Of 2 variants, each with one thing changed, 1 change at least one verdict."
+    rows = [("soft box", "C1", True), ("soft box", "C2", True), ("tanh", "C1", False)]
+    said = summary.changes(table(*rows).assign(p=[0.3, 0.009, 0.001]))
+    assert said.startswith("Of 2 variants, each with one thing changed, 1 change at least one")
+    assert said.endswith("1 of them by more than chance explains (p < 0.01).")
+    assert ", 0 of them" in summary.changes(table(*rows).assign(p=[0.3, 0.01, 0.001]))
 
 
 def test_claims_of_our_own_hold_or_do_not_and_are_not_called_reproduced():
