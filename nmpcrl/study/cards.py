@@ -11,7 +11,7 @@ from nmpcrl.study.audit import Assumption
 from nmpcrl.study.bench.targets import Target
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.store import Study
+from nmpcrl.study.summary import listed
 from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Verdict
 
 BADGES = {
@@ -64,7 +64,7 @@ def spread_table(verdicts: Iterable[Verdict], caption: str) -> str:
     decided = [v for v in verdicts if v.by_layout]
     layouts = dict.fromkeys(name for v in decided for name in v.by_layout)
     decays = dict.fromkeys(name for v in decided for name in v.by_decay)
-    header = ("Claim", "All", *(f"Layout {name}" for name in layouts))
+    header = ("Claim", "All", *layouts, *(f"per {name}" for name in decays))
     rows = (
         (
             f"<strong>{escape(v.claim)}</strong>",
@@ -74,17 +74,7 @@ def spread_table(verdicts: Iterable[Verdict], caption: str) -> str:
         )
         for v in decided
     )
-    return _table(caption, (*header, *(f"Per {name}" for name in decays)), rows, headed=True)
-
-
-def flip_table(flips: pd.DataFrame, caption: str) -> str:
-    """One row a variant and one column a claim, in HTML; where a verdict flips, what it was."""
-    claims, cells = list(flips.claim.unique()), flips.set_index(["variant", "claim"])
-    rows = (
-        (escape(str(variant)), *(_flip(cells.loc[variant, claim]) for claim in claims))
-        for variant in flips.variant.unique()
-    )
-    return _table(caption, ("Variant", *claims), rows, headed=True)
+    return _table(caption, header, rows, headed=True)
 
 
 def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
@@ -114,17 +104,14 @@ def evidence(verdicts: Iterable[Verdict]) -> str:
     )
 
 
-def scope(runs: Study | pd.DataFrame) -> str:
-    """What a study, or the table of its runs, covers, in a sentence."""
+def scope(runs: pd.DataFrame) -> str:
+    """What the runs of `digest.table` cover, in a sentence."""
     names = ("layout", "seed", "decay", "episodes")
-    if isinstance(runs, pd.DataFrame):
-        values = [tuple(runs[name].unique().tolist()) for name in names]
-    else:
-        values = [runs.values_of(name) for name in names]
-    layouts, seeds, readings, episodes = values
+    layouts, seeds, readings, episodes = (tuple(runs[name].unique().tolist()) for name in names)
     return (
-        f"Judged from {len(runs)} runs of {_all(episodes)} episodes: {_named('layout', layouts)},"
-        f" {_named('seed', seeds)}, exploration that decays per {_all(readings, ' and per ')}."
+        f"Judged from {len(runs)} runs of {listed(episodes)} episodes: {_named('layout', layouts)};"
+        f" {_named('seed', seeds)}; exploration that decays"
+        f" {listed(f'per {reading}' for reading in readings)}."
     )
 
 
@@ -150,12 +137,12 @@ def _options(names: list[str]) -> str:
 def _table(
     caption: str, header: tuple[str, ...], rows: Iterable[tuple[str, ...]], *, headed: bool = False
 ) -> str:
-    """A table whose cells are HTML already; `headed` if the first cell of a row is its name."""
+    """A table whose cells are HTML already; `headed` if they are words in rows that have a name."""
     left = 'style="text-align: left"'  # the theme turns headers to the right
     head = "".join(f'<th scope="col" {left}>{escape(name)}</th>' for name in header)
     body = "".join(f"<tr>{_row(row, left if headed else '')}</tr>" for row in rows)
     return (
-        f'<table class="table dataframe"><caption>{escape(caption)}</caption>'
+        f'<table class="table dataframe{" words" * headed}"><caption>{escape(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
     )
 
@@ -173,11 +160,6 @@ def _badge(text: str, style: str) -> str:
 def _word(outcome: str | None) -> str:
     """An outcome in a narrow cell: colour and word; nothing where nothing was judged."""
     return _badge(WORDS[outcome], BADGES[outcome]) if outcome else ""
-
-
-def _flip(cell: pd.Series) -> str:
-    """The cell of a variant and a claim, a row of `flips`."""
-    return _word(cell.outcome) + (f"<br>was {WORDS[cell.base]}" if cell.flips else "")
 
 
 def _share(verdict: Verdict) -> str:
@@ -198,8 +180,8 @@ def _linked(text: str) -> str:
 
 
 def _named(name: str, values: tuple[object, ...]) -> str:
-    return f"{name}{'' if len(values) == 1 else 's'} {_all(values)}"
-
-
-def _all(values: tuple[object, ...], glue: str = " and ") -> str:
-    return glue.join(str(value) for value in values)
+    """ "seed 3", "layouts A and B", "seeds 0 to 9"."""
+    several = "s" if len(values) > 1 else ""
+    if len(values) > 2 and values == tuple(range(len(values))):
+        return f"{name}{several} 0 to {values[-1]}"
+    return f"{name}{several} {listed(values)}"

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
 
-from nmpcrl.study import Study, cards, main_study
+from nmpcrl.study import cards, main_study
 from nmpcrl.study.additions import ADDITIONS
 from nmpcrl.study.audit import Assumption
 from nmpcrl.study.claims import CLAIMS, NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
@@ -55,7 +55,7 @@ def test_a_claim_is_shown_in_each_layout_and_reading_in_colour_and_in_words():
     parts = {"by_layout": {"A": REPRODUCED, "B": NOT}, "by_decay": {"step": UNDECIDABLE}}
     table = cards.spread_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
     assert cells(table) == [
-        ["Claim", "All", "Layout A", "Layout B", "Per step"],
+        ["Claim", "All", "A", "B", "per step"],
         ["C1", "partly", "yes", "no", "open"],  # and no row of what has no layouts
     ]
     for outcome in (PARTLY, *parts["by_layout"].values(), UNDECIDABLE):
@@ -67,16 +67,6 @@ def test_a_layout_in_which_a_claim_was_not_asked_is_left_empty():
     first, second = (verdict(NOT, by_layout={name: NOT}) for name in "AB")
     table = cells(cards.spread_table([first, second], "All of it."))
     assert [row[2:] for row in table[1:]] == [["no", ""], ["", "no"]]
-
-
-def test_a_verdict_that_a_variant_flips_is_shown_with_what_it_was():
-    flips = pd.DataFrame(
-        [("<hot>", "C1", NOT, REPRODUCED, True), ("<hot>", "C2", PARTLY, PARTLY, False)],
-        columns=["variant", "claim", "outcome", "base", "flips"],
-    )
-    table = cards.flip_table(flips, "What flips.")
-    assert cells(table) == [["Variant", "C1", "C2"], ["<hot>", "no|was yes", "partly"]]
-    assert "&lt;hot&gt;" in table
 
 
 def test_what_a_claim_says_cannot_break_the_page():
@@ -95,23 +85,23 @@ def test_the_evidence_links_to_departures():
     assert "departure {ref}`G <departure-G>`" in cards.evidence([verdict(NOT)])
 
 
+def runs(seeds) -> pd.DataFrame:
+    return pd.DataFrame([asdict(one) for one in main_study(episodes=7, seeds=seeds)])
+
+
 def test_the_scope_names_layout_seeds_readings_and_length():
-    study = Study(dict.fromkeys(main_study(episodes=7, seeds=(3, 5)), None))
-    assert cards.scope(study) == (
-        "Judged from 20 runs of 7 episodes: layout A, seeds 3 and 5, exploration that decays per"
+    assert cards.scope(runs((3, 5))) == (
+        "Judged from 20 runs of 7 episodes: layout A; seeds 3 and 5; exploration that decays per"
         " step and per episode."
     )
 
 
-def test_the_scope_of_one_seed_is_in_the_singular():
-    study = Study(dict.fromkeys(main_study(episodes=7, seeds=(3,)), None))
-    assert "layout A, seed 3, exploration" in cards.scope(study)
-
-
-def test_a_table_of_runs_covers_what_its_study_covers():
-    experiments = main_study(episodes=7, seeds=(3, 5))
-    table = pd.DataFrame([asdict(one) for one in experiments])
-    assert cards.scope(table) == cards.scope(Study(dict.fromkeys(experiments, None)))
+@pytest.mark.parametrize(
+    ("seeds", "said"),
+    [((3,), "seed 3"), (tuple(range(10)), "seeds 0 to 9"), ((1, 2, 3), "seeds 1, 2 and 3")],
+)
+def test_the_scope_of_one_seed_is_in_the_singular_and_of_many_a_range(seeds, said):
+    assert f"layout A; {said}; exploration" in cards.scope(runs(seeds))
 
 
 @pytest.mark.parametrize("letter", DEPARTURES)
