@@ -149,7 +149,8 @@ def cut_short(run: Digest, window: slice) -> bool:
     """Whether solves failed: see `CUT_SHORT`."""
     judged = run.evaluations["episode"] == window.stop
     failed = np.isinf(run.evaluations["cost"][judged]).any()
-    return bool(failed or run.episodes["failed"][window].mean() >= CUT_SHORT)
+    shares = run.episodes["failed"][window]
+    return bool(failed or (shares.size and shares.mean() >= CUT_SHORT))
 
 
 def ending(states: Column, task: Task) -> str:
