@@ -11,7 +11,7 @@ from nmpcrl.study.audit import Assumption
 from nmpcrl.study.bench.targets import Target
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.summary import listed
+from nmpcrl.study.summary import SURE, listed
 from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Verdict
 
 BADGES = {
@@ -104,6 +104,25 @@ def evidence(verdicts: Iterable[Verdict]) -> str:
     )
 
 
+def dependence(verdicts: Iterable[Verdict], flipped: pd.DataFrame) -> str:
+    """One row a claim, in Markdown: its verdict, and what flips it, by departure.
+
+    Args:
+        verdicts: of `judge_runs`.
+        flipped: rows of `atlas.atlas`; those that chance hardly explains, by `SURE`, are bold.
+    """
+    rows = ["| Claim | Over all | Flipped by |", "|---|---|---|"]
+    for v in verdicts:
+        mine = flipped[flipped.claim == v.claim]
+        by = [
+            f"{_letter(str(letter))}: {listed(map(_weighed, group.variant, group.p))}"
+            for letter, group in mine.groupby("departure", sort=False)
+        ]
+        outcome = f"[{WORDS[v.outcome]}]{{.{BADGES[v.outcome]}}}{_share(v)}"
+        rows.append(f"| **{v.claim}** {v.statement} | {outcome} | {'<br>'.join(by) or 'nothing'} |")
+    return "\n".join(rows)
+
+
 def scope(runs: pd.DataFrame) -> str:
     """What the runs of `digest.table` cover, in a sentence."""
     names = ("layout", "seed", "decay", "episodes")
@@ -168,6 +187,15 @@ def _share(verdict: Verdict) -> str:
         return ""
     low, high = verdict.interval
     return f"<br>{verdict.share:.0%} [{low:.0%}, {high:.0%}]"
+
+
+def _letter(letter: str) -> str:
+    """A link to a departure; the paper is clear about what has none."""
+    return f"{{ref}}`{letter} <departure-{letter}>`" if letter else "beside the departures"
+
+
+def _weighed(variant: str, p: float) -> str:
+    return f"**{variant}**" if p < SURE else variant
 
 
 def _sentence(text: str) -> str:

@@ -1,7 +1,7 @@
 """What pages show of verdicts, assumptions and departures."""
 
 import re
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pandas as pd
 import pytest
@@ -67,6 +67,18 @@ def test_a_layout_in_which_a_claim_was_not_asked_is_left_empty():
     first, second = (verdict(NOT, by_layout={name: NOT}) for name in "AB")
     table = cells(cards.spread_table([first, second], "All of it."))
     assert [row[2:] for row in table[1:]] == [["no", ""], ["", "no"]]
+
+
+def test_what_flips_a_verdict_is_told_by_departure_and_bold_where_it_is_sure():
+    flipped = pd.DataFrame(
+        [("B", "layout E", "C1", 1e-9), ("B", "layout F", "C1", 0.5), ("", "N = 5", "C1", 0.01)],
+        columns=["departure", "variant", "claim", "p"],
+    )
+    table = cards.dependence([verdict(PARTLY), replace(verdict(NOT), claim="C2")], flipped)
+    first, second = table.splitlines()[2:]
+    flips = "{ref}`B <departure-B>`: **layout E** and layout F<br>beside the departures: N = 5"
+    assert first.endswith(f" | [partly]{{.{cards.BADGES[PARTLY]}}} | {flips} |")
+    assert second.endswith(f" | [no]{{.{cards.BADGES[NOT]}}} | nothing |")
 
 
 def test_what_a_claim_says_cannot_break_the_page():
