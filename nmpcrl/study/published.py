@@ -9,6 +9,7 @@
 
 import json
 import os
+import platform
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -37,13 +38,8 @@ SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # wha
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
 WORDS = ["ending", "wrong", "mechanism"]  # of `mechanisms.fates`, as the next
 FATE = [*WORDS, "episode"]
-MEASURES = (
-    "final_cost",
-    "training_cost",
-)  # by which runs on another machine are held against these
-SLACK = (
-    0.01  # of theta_init's cost, that a run on another machine may be out of the published spread
-)
+MEASURES = ("final_cost", "training_cost")  # by which runs of another machine are judged
+SLACK = 0.01  # of theta_init's cost, that they may be out of the published spread
 EXACT = 1e-6  # relative: the cost of theta_init, which no noise and no learning moves
 
 
@@ -111,9 +107,10 @@ def publish(
 
 
 def here() -> dict[str, Any]:
-    """What is known of this machine, the abilities of its processor included.
+    """What is known of this machine, the abilities of its processor and its C library included.
 
-    Machine code is made for these; processors of one name may differ in them.
+    Machine code is made for the former, and processors of one name may differ in them; sines and
+    cosines come from the latter.
     """
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
@@ -121,7 +118,8 @@ def here() -> dict[str, Any]:
         lines = []
     kept = ("flags", "Features", "cpu family", "model\t")
     told = sorted({line for line in lines if line.startswith(kept)})
-    return {**machine(), "abilities": sha256("\n".join(told).encode()).hexdigest()[:16]}
+    abilities = sha256("\n".join(told).encode()).hexdigest()[:16]
+    return {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities}
 
 
 def fates_of(digests: Mapping[Experiment, Digest]) -> pd.DataFrame:
