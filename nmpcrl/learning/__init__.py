@@ -1,7 +1,7 @@
 """How the parameters of the NMPC move: a learner is a bootstrap and an update rule."""
 
+from nmpcrl.learning.baselines import frozen, random_direction, step_matched
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, SecondSolve, Successor, Transition
-from nmpcrl.learning.controls import frozen, random_direction, step_matched
 from nmpcrl.learning.learners import (
     Learner,
     Update,

@@ -26,17 +26,7 @@ from nmpcrl.learning import (
     regularized_deep_expected_sarsa,
     step_matched,
 )
-from nmpcrl.study import paper
-from nmpcrl.study.parameters import (
-    ParameterError,
-    number,
-    one_of,
-    parameter_vector,
-    true_or_false,
-    whole,
-)
-from nmpcrl.study.records import Field, Records, Table
-from nmpcrl.study.training import (
+from nmpcrl.learning.training import (
     Diverged,
     Exploration,
     Persistent,
@@ -47,6 +37,16 @@ from nmpcrl.study.training import (
     evaluate,
     train,
 )
+from nmpcrl.study import paper
+from nmpcrl.study.parameters import (
+    ParameterError,
+    number,
+    one_of,
+    parameter_vector,
+    true_or_false,
+    whole,
+)
+from nmpcrl.study.records import Field, Records, Table
 
 PAPER = ("ES", "DES", "RDES", "GES")  # the paper's learners
 CONTROLS = ("frozen", "matched", "random")  # what a learner is held against

@@ -22,8 +22,8 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Task
+from nmpcrl.learning.training import Persistent, evaluate
 from nmpcrl.study import paper
-from nmpcrl.study.training import Persistent, evaluate
 
 ARRIVED = 0.5  # distance to the target, over all states, at which a drive has arrived
 SEED = 0  # of the sampler that drew the named layouts

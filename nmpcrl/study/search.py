@@ -20,9 +20,9 @@ import numpy as np
 from tqdm import tqdm
 
 from nmpcrl import Vector
+from nmpcrl.learning.training import Persistent, evaluate
 from nmpcrl.study import paper, store
 from nmpcrl.study.parameters import one_of, whole
-from nmpcrl.study.training import Persistent, evaluate
 
 BUDGET = 2000  # drives without noise that a search may make
 LEAST = 40  # drives: the first one and some generations
@@ -30,7 +30,7 @@ SPREAD = 0.3  # of the first drives, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
 FAILED = 1e6  # stands for the cost of a drive on which a solve failed
-SOURCES = ("control", "study/paper.py", "study/training.py", "study/search.py")
+SOURCES = ("control", "study/paper.py", "learning/training.py", "study/search.py")
 
 
 @dataclass(frozen=True)

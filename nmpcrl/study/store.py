@@ -31,7 +31,13 @@ from nmpcrl.study.experiment import Experiment, compile_ahead, run
 from nmpcrl.study.records import DamagedRecords, Records
 
 LIBRARIES = ("casadi", "numba", "numpy", "torch")
-MATHEMATICS = ("control", "learning", "study/paper.py", "study/training.py", "study/experiment.py")
+MATHEMATICS = (
+    "control",
+    "learning",
+    "study/paper.py",
+    "learning/training.py",
+    "study/experiment.py",
+)
 SPAWN = get_context("spawn")  # a fork would copy the threads' locks but not the threads
 ATTEMPTS = 3  # how often a run is started whose worker was killed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.control.nmpc import SOLVERS
+from nmpcrl.learning.training import Persistent, Step, train
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, prepare
-from nmpcrl.study.training import Persistent, Step, train
 
 PAPER_HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}  # Table II: training time of 300 episodes
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
+from nmpcrl.learning.training import Persistent
 from nmpcrl.study import Experiment, ParameterError, experiment, main_study, paper, run, sweep
 from nmpcrl.study.experiment import DECAYS, LEARNERS, PAPER, prepare
-from nmpcrl.study.training import Persistent
 
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
 SHORT = {"episodes": 2, "steps": 70, "evaluate_every": 2}  # the networks are ready after 128 steps

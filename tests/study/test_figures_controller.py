@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from matplotlib import pyplot
 
+from nmpcrl.learning.training import Persistent, Rollout, evaluate
 from nmpcrl.study import Records, Study, paper, sweep
 from nmpcrl.study.figures import controller, sensitivity
-from nmpcrl.study.training import Persistent, Rollout, evaluate
 
 LEARNERS, DECAYS, EPISODES, STEPS = ("ES", "frozen"), ("step", "episode"), 4, 5
 

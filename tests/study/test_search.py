@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from nmpcrl.learning.training import Persistent, evaluate
 from nmpcrl.study import ParameterError, paper, search
 from nmpcrl.study.search import LEAST, SCALE, Found, Search, fetch
-from nmpcrl.study.training import Persistent, evaluate
 
 BEST = np.array([0.5, 1.5, 0.1, 0.02, 0.08, 2.0, 0.3, 0.15, 0.3])  # of the bowl below
 FOUND = Found(paper.THETA_INIT, 40, (1, 7), (100.0, 80.0))

@@ -126,7 +126,7 @@ def source(tmp_path, monkeypatch):
         ("learning/updates.py", "cost + gamma * q_next - q", "cost + gamma * q_next - 2 * q"),
         ("control/program.py", "MAX_ITERATIONS = 300", "MAX_ITERATIONS = 200"),
         ("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6"),
-        ("study/training.py", "PATIENCE = 10", "PATIENCE = 11"),
+        ("learning/training.py", "PATIENCE = 10", "PATIENCE = 11"),
         ("study/experiment.py", "spawn(3)", "spawn(4)"),
     ],
 )

@@ -11,8 +11,8 @@ from matplotlib.patches import Circle
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
+from nmpcrl.learning.training import Rollout
 from nmpcrl.study.figures.style import page, subplots
-from nmpcrl.study.training import Rollout
 
 INK, LESS, MORE = "#222222", "#1B7F79", "#882255"  # none of them is a learner's
 SYMBOLS = {

@@ -9,9 +9,7 @@ import pytest
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.learning import Weights, expected_sarsa, frozen
-from nmpcrl.study import Experiment, paper
-from nmpcrl.study.experiment import DECAYS, prepare
-from nmpcrl.study.training import (
+from nmpcrl.learning.training import (
     PATIENCE,
     Diverged,
     Exploration,
@@ -21,6 +19,8 @@ from nmpcrl.study.training import (
     evaluate,
     train,
 )
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.experiment import DECAYS, prepare
 
 THETA = np.array(paper.THETA_INIT)
 
