@@ -101,16 +101,20 @@ def evaluate(run: str) -> None:
 @click.option("--again", is_flag=True, help="Measure even if there is a benchmark of this code.")
 def bench(length: str, again: bool) -> None:
     """Measure how long solves, steps and runs take, and hold it against what is to be reached."""
-    from nmpcrl.study.bench import fetch, measure, targets  # nothing else here needs them
+    from nmpcrl.bench import (
+        fetch,
+        suite,
+        targets,  # nothing else here needs them
+    )
 
-    measured = measure.measure(length) if again else fetch(length)
+    measured = suite.measure(length) if again else fetch(length)
     rows = targets.rows(measured)
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         click.echo(" | ".join(map(str.ljust, row, widths)))
     about = measured["about"]
     took = f"{about['length']}, {about['date']}, {about['seconds']:.0f} s"
-    click.echo(f"{measure.path()}: {took}; other programs had {about['others']:.0%} of the cores")
+    click.echo(f"{suite.path()}: {took}; other programs had {about['others']:.0%} of the cores")
 
 
 @main.command()

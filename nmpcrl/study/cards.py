@@ -7,8 +7,8 @@ from html import escape
 
 import pandas as pd
 
+from nmpcrl.bench.targets import Target
 from nmpcrl.study.audit import Assumption
-from nmpcrl.study.bench.targets import Target
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.summary import SURE, listed

@@ -17,13 +17,13 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
+from nmpcrl.bench.timing import ratio
 from nmpcrl.study import metrics, paper
 from nmpcrl.study.audit import Assumption
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records
 from nmpcrl.study.store import Study
-from nmpcrl.study.timing import ratio
 from nmpcrl.study.verdicts import (
     CELL,
     NOT,

@@ -38,7 +38,7 @@ def holds(measure: Measure, values: Values, border: float | None = None) -> pd.S
 
     Args:
         measure: of a claim.
-        values: of `measure.of`.
+        values: of `suite.of`.
         border: another one than the claim's.
     """
     limit = measure.border if border is None else border

@@ -1,6 +1,6 @@
 """The whole study as it was trained once, in `book/published`, small enough to go with the book.
 
-- `runs.csv`: one row a run, `digest.row`, with the part of the study it belongs to and its key;
+- `processes.csv`: one row a run, `digest.row`, with the part of the study it belongs to and its key;
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
 - `verdicts.json`: what became of each claim;
@@ -24,8 +24,8 @@ import numpy as np
 import pandas as pd
 
 import nmpcrl
+from nmpcrl.bench.suite import machine
 from nmpcrl.study import harvest, store
-from nmpcrl.study.bench.measure import machine
 from nmpcrl.study.claims import experiment_of
 from nmpcrl.study.digest import Digest, row
 from nmpcrl.study.experiment import Experiment
@@ -57,7 +57,7 @@ class Published:
 
     digests: Mapping[Experiment, Digest] = field(default_factory=dict)
     variants: Mapping[Experiment, str] = field(default_factory=dict)  # the part each belongs to
-    rows: Mapping[Experiment, dict[str, Any]] = field(default_factory=dict)  # of `runs.csv`
+    rows: Mapping[Experiment, dict[str, Any]] = field(default_factory=dict)  # of `processes.csv`
     verdicts: tuple[Verdict, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from nmpcrl.bench.timing import time_learners
 from nmpcrl.study import digest, published
 from nmpcrl.study.additions import judge_additions
 from nmpcrl.study.audit import audit
@@ -12,7 +13,6 @@ from nmpcrl.study.digest import Digest
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.plan import MAIN_TABLE
 from nmpcrl.study.store import fetch_all
-from nmpcrl.study.timing import time_learners
 from nmpcrl.study.verdicts import Verdict
 
 AUDITED = Experiment("GES")  # whose whole run C8 is measured in

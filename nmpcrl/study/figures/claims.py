@@ -17,6 +17,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import PercentFormatter
 
 from nmpcrl import Vector
+from nmpcrl.bench.timing import ratio
 from nmpcrl.study import claims, verdicts
 from nmpcrl.study.audit import Assumption
 from nmpcrl.study.curvature import Curvature
@@ -38,7 +39,6 @@ from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study.measures import MEASURES
 from nmpcrl.study.records import Column, Records
 from nmpcrl.study.statistics import interquartile_mean, performance_profile
-from nmpcrl.study.timing import ratio
 from nmpcrl.study.verdicts import Verdict
 
 LINE = 84  # characters of a title

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from nmpcrl.bench import summary
+from nmpcrl.bench.summary import Bench
 from nmpcrl.study import paper
-from nmpcrl.study.bench import summary
-from nmpcrl.study.bench.summary import Bench
 from nmpcrl.study.figures.rdes import headed
 from nmpcrl.study.figures.style import LOOKS, page, subplots
 

@@ -11,10 +11,10 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.bench.horizons import growth
 from nmpcrl.study.figures.controller import INK, LESS, MORE
 from nmpcrl.study.figures.rdes import headed
 from nmpcrl.study.figures.style import page, subplots
-from nmpcrl.study.horizons import growth
 
 STARTS = {"cold": (INK, "o-"), "shifted": (LESS, "s--"), "same state": (MORE, "D-.")}
 SOLVERS = {"riccati": (MORE, "o-"), "fatrop": (LESS, "s--"), "ipopt": (INK, "^:")}

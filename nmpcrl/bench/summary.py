@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nmpcrl.bench.solves import LOOPS
+from nmpcrl.bench.timing import PAPER_HOURS, ratio
 from nmpcrl.study import paper
-from nmpcrl.study.bench.solves import LOOPS
-from nmpcrl.study.timing import PAPER_HOURS, ratio
 
 Bench = dict[str, dict[str, Any]]
 

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.bench import learners, scaling, solves
 from nmpcrl.control import SolverError, usual
 from nmpcrl.study import paper
-from nmpcrl.study.bench import growth, learning, solves
 
 THETA = solves.THETA
 STEPS = 4
@@ -121,25 +121,25 @@ def test_a_solve_is_its_compiled_part_and_python(nmpc):
 
 
 def test_added_obstacles_do_not_change_the_plan():
-    few, many = growth._crowded(1), growth._crowded(max(growth.OBSTACLES))
-    assert len(many.task.obstacles) == max(growth.OBSTACLES)
+    few, many = scaling._crowded(1), scaling._crowded(max(scaling.OBSTACLES))
+    assert len(many.task.obstacles) == max(scaling.OBSTACLES)
     rng = np.random.default_rng(0)
     for state, solution, _ in solves.drive(few, 0.0, rng, 40):
         assert many.solve(state, THETA).value == pytest.approx(solution.value, rel=1e-6)
 
 
 def test_every_size_has_as_many_warm_solves():
-    table = pd.DataFrame(growth.growth(episodes=1, steps=3))
+    table = pd.DataFrame(scaling.growth(episodes=1, steps=3))
     counts = table.groupby(["varied", "size"]).size()
     assert list(counts.index) == [
-        *(("horizon", size) for size in growth.HORIZONS),
-        *(("obstacles", size) for size in growth.OBSTACLES),
+        *(("horizon", size) for size in scaling.HORIZONS),
+        *(("obstacles", size) for size in scaling.OBSTACLES),
     ]
     assert (counts == 2).all()
 
 
 def test_learners_are_timed_with_every_solver_and_what_is_missing_is_none():
-    columns = learning.learners(steps=2)
+    columns = learners.learners(steps=2)
     assert len(columns["solver"]) == 3 * 4
     fits = dict(zip(columns["learner"], columns["ms_per_fit"], strict=True))
     assert fits["ES"] is None
@@ -148,11 +148,11 @@ def test_learners_are_timed_with_every_solver_and_what_is_missing_is_none():
 
 def test_mpcrl_and_es_take_turns():
     pytest.importorskip("mpcrl")
-    columns = learning.against_mpcrl(rounds=2, steps=2)
+    columns = learners.against_mpcrl(rounds=2, steps=2)
     assert columns["learner"] == 2 * (2 * ["mpcrl"] + 10 * ["ES"])
     assert min(columns["seconds"]) > 0
 
 
 def test_without_mpcrl_there_is_nothing_to_compare_with(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "nmpcrl.study.bench.rival", None)
-    assert learning.against_mpcrl(rounds=1, steps=1) == {"learner": [], "seconds": []}
+    monkeypatch.setitem(__import__("sys").modules, "nmpcrl.bench.baseline_mpcrl", None)
+    assert learners.against_mpcrl(rounds=1, steps=1) == {"learner": [], "seconds": []}

@@ -4,11 +4,11 @@ import os
 
 import pytest
 
-from nmpcrl.study.bench import fresh, runs
+from nmpcrl.bench import fresh_process, processes
 
 
 def test_a_whole_run_reports_every_episode():
-    totals, progress = runs.whole_runs(("frozen",), episodes=3)
+    totals, progress = processes.whole_runs(("frozen",), episodes=3)
     assert totals["learner"] == ["frozen"]
     assert totals["episodes"] == [3]
     assert progress["episode"] == [1, 2, 3]
@@ -20,7 +20,7 @@ def test_a_whole_run_reports_every_episode():
 def test_runs_at_once_leave_neither_files_nor_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
     before = dict(os.environ)
-    measured = runs.at_once(runs=2, episodes=1)
+    measured = processes.at_once(runs=2, episodes=1)
     assert measured["workers"] == sorted({1, os.cpu_count()})
     assert min(measured["seconds"]) > 0
     assert not list(tmp_path.iterdir())
@@ -28,12 +28,12 @@ def test_runs_at_once_leave_neither_files_nor_environment(tmp_path, monkeypatch)
 
 
 def test_no_runs_at_once_are_no_rows():
-    assert not any(runs.at_once(runs=0, episodes=1).values())
+    assert not any(processes.at_once(runs=0, episodes=1).values())
 
 
 def test_a_first_call_with_machine_code_kept_says_nothing():
-    fresh.first_call()  # keeps it
-    measured = runs.first_calls(1, compile_too=False)
+    fresh_process.first_call()  # keeps it
+    measured = processes.first_calls(1, compile_too=False)
     assert measured["cached"] == [True]
     assert measured["notice"] == [False]
     assert measured["process"][0] > measured["solve"][0] > 0
@@ -41,4 +41,4 @@ def test_a_first_call_with_machine_code_kept_says_nothing():
 
 def test_a_measurement_that_fails_says_which_and_why():
     with pytest.raises(RuntimeError, match=r"measuring run SARSA 1 failed(.|\n)*SARSA"):
-        runs._alone("run", "SARSA", "1")
+        processes._alone("run", "SARSA", "1")

@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.study import paper, timing
+from nmpcrl.bench import timing
+from nmpcrl.study import paper
 
 
 @pytest.fixture(scope="module")

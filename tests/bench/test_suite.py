@@ -6,8 +6,8 @@ import pytest
 from click.testing import CliRunner
 
 from nmpcrl.__main__ import main
+from nmpcrl.bench import suite
 from nmpcrl.study import ParameterError
-from nmpcrl.study.bench import measure
 
 
 @pytest.fixture
@@ -16,16 +16,16 @@ def counted(tmp_path, monkeypatch):
     lengths = []
 
     def stages(size):
-        lengths.append(next(name for name, one in measure.LENGTHS.items() if one == size))
+        lengths.append(next(name for name, one in suite.LENGTHS.items() if one == size))
         return [("nothing", lambda: {"nothing": {"seconds": [1.0]}})]
 
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    monkeypatch.setattr(measure, "_stages", stages)
+    monkeypatch.setattr(suite, "_stages", stages)
     return lengths
 
 
 def fetch(length):
-    return measure.fetch(length, progress=False)
+    return suite.fetch(length, progress=False)
 
 
 def test_what_was_measured_is_read_again(counted):
@@ -55,7 +55,7 @@ def test_other_versions_or_another_machine_measure_again(counted, monkeypatch, c
 
 def test_another_source_measures_again(counted, monkeypatch):
     fetch("short")
-    monkeypatch.setattr(measure.store, "digest", lambda _: "other")
+    monkeypatch.setattr(suite.store, "digest", lambda _: "other")
     fetch("short")
     assert counted == ["short", "short"]
 
@@ -63,7 +63,7 @@ def test_another_source_measures_again(counted, monkeypatch):
 @pytest.mark.parametrize("content", ["{", "[]", "{}"])
 def test_a_damaged_file_is_told_and_measured_again(counted, capsys, content):
     fetch("short")
-    measure.path().write_text(content)
+    suite.path().write_text(content)
     fetch("short")
     assert counted == ["short", "short"]
     assert "is damaged" in capsys.readouterr().err
@@ -71,8 +71,8 @@ def test_a_damaged_file_is_told_and_measured_again(counted, capsys, content):
 
 def test_the_file_is_whole_and_alone(counted):
     bench = fetch("short")
-    assert json.loads(measure.path().read_text()) == bench
-    assert list(measure.path().parent.iterdir()) == [measure.path()]
+    assert json.loads(suite.path().read_text()) == bench
+    assert list(suite.path().parent.iterdir()) == [suite.path()]
 
 
 def test_a_benchmark_says_where_and_of_what_it_is(counted):
@@ -89,14 +89,14 @@ def test_a_length_that_there_is_not_is_refused(counted, length):
 
 
 def test_the_sources_of_a_benchmark_exist():
-    assert measure.store.digest(measure.SOURCES)
+    assert suite.store.digest(suite.SOURCES)
 
 
 @pytest.fixture
 def command(counted, measured, monkeypatch):
     stage = [("all", lambda: {name: part for name, part in measured.items() if name != "about"})]
-    stages = measure._stages
-    monkeypatch.setattr(measure, "_stages", lambda size: [*stages(size), *stage])
+    stages = suite._stages
+    monkeypatch.setattr(suite, "_stages", lambda size: [*stages(size), *stage])
     return lambda *words: CliRunner().invoke(main, ["bench", *words])
 
 
@@ -107,7 +107,7 @@ def test_the_command_prints_a_row_a_figure_and_where_it_is_kept(command, counted
     lines = [line for line in done.stdout.splitlines() if " | " in line]
     assert len(lines) == 17
     assert sum(line.rstrip().endswith("| reached") for line in lines) == 16
-    assert f"{measure.path()}: full, " in done.stdout
+    assert f"{suite.path()}: full, " in done.stdout
 
 
 def test_the_command_measures_again_only_when_told(command, counted):

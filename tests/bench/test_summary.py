@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from nmpcrl.bench import summary, targets
 from nmpcrl.study import cards, paper
-from nmpcrl.study.bench import summary, targets
 
 
 def outcomes(measured) -> dict[str, bool | None]:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nmpcrl.bench import summary
+from nmpcrl.bench.solves import LOOPS
+from nmpcrl.bench.summary import Bench
 from nmpcrl.study import paper
-from nmpcrl.study.bench import summary
-from nmpcrl.study.bench.solves import LOOPS
-from nmpcrl.study.bench.summary import Bench
 
 SOLVE = (45.0, 120.0)  # [us] median and 95th percentile of a solve in its own loop
 TIMES = {"fatrop": 15.0, "ipopt": 40.0, "ipopt MX": 90.0}  # as long as with riccati

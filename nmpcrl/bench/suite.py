@@ -17,18 +17,18 @@ from typing import Any
 import psutil
 from tqdm import tqdm
 
+from nmpcrl.bench.learners import against_mpcrl, learners
+from nmpcrl.bench.processes import at_once, first_calls, whole_runs
+from nmpcrl.bench.scaling import growth
+from nmpcrl.bench.solves import interleaved, own_loop, parts
 from nmpcrl.study import paper, store
-from nmpcrl.study.bench.growth import growth
-from nmpcrl.study.bench.learning import against_mpcrl, learners
-from nmpcrl.study.bench.runs import at_once, first_calls, whole_runs
-from nmpcrl.study.bench.solves import interleaved, own_loop, parts
 from nmpcrl.study.parameters import ParameterError
 
 Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
 
 ALL = ("ES", "GES", "RDES", "DES")
 MODULES = ("fresh", "growth", "learning", "measure", "rival", "runs", "solves")
-SOURCES = (*store.MATHEMATICS, "study/timing.py", *(f"study/bench/{name}.py" for name in MODULES))
+SOURCES = (*store.MATHEMATICS, "bench/timing.py", *(f"study/bench/{name}.py" for name in MODULES))
 
 
 @dataclass(frozen=True)

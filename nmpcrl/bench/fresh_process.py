@@ -1,4 +1,4 @@
-"""What is measured in a process of its own: `python -m nmpcrl.study.bench.fresh run ES 30`.
+"""What is measured in a process of its own: `python -m nmpcrl.bench.fresh_process run ES 30`.
 
 Prints one JSON object.
 """

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from nmpcrl.study.bench.solves import Columns
+from nmpcrl.bench.solves import Columns
 from nmpcrl.study.store import THREADS, fetch_all
 from nmpcrl.study.sweep import sweep
 
@@ -61,7 +61,7 @@ def first_calls(times: int, *, compile_too: bool) -> Columns:
     """The first call in a fresh process, whose machine code is kept from before or has to be made.
 
     Returns:
-        A row a process: cached, solve, step (seconds, as `fresh.first_call`), process (seconds from
+        A row a process: cached, solve, step (seconds, as `fresh_process.first_call`), process (seconds from
         its start to its end), notice (whether it said that it compiles).
     """
     columns: Columns = {"cached": [], "solve": [], "step": [], "process": [], "notice": []}
@@ -78,7 +78,7 @@ def first_calls(times: int, *, compile_too: bool) -> Columns:
 def _alone(*arguments: str) -> tuple[dict[str, Any], str]:
     """What `fresh` prints in a process of its own, and what that says on standard error."""
     done = subprocess.run(
-        [sys.executable, "-m", "nmpcrl.study.bench.fresh", *arguments],
+        [sys.executable, "-m", "nmpcrl.bench.fresh_process", *arguments],
         env=os.environ | dict.fromkeys(THREADS, "1"),
         capture_output=True,
         text=True,

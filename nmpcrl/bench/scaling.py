@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from nmpcrl.bench.solves import THETA, Columns
 from nmpcrl.control import Nmpc, Obstacle, Solution
 from nmpcrl.study import paper
-from nmpcrl.study.bench.solves import THETA, Columns
 
 HORIZONS = (5, 10, 20, 40, 80)
 OBSTACLES = (1, 4, 8, 16, 32)

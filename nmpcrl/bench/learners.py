@@ -2,8 +2,8 @@
 
 import time
 
-from nmpcrl.study import timing
-from nmpcrl.study.bench.solves import Columns
+from nmpcrl.bench import timing
+from nmpcrl.bench.solves import Columns
 
 TURN = 20  # steps that a learner takes at a time: then the caches hold what its own loop leaves
 
@@ -22,7 +22,7 @@ def against_mpcrl(rounds: int, steps: int) -> Columns:
     """
     columns: Columns = {"learner": [], "seconds": []}
     try:
-        from nmpcrl.study.bench.rival import time_mpcrl
+        from nmpcrl.bench.baseline_mpcrl import time_mpcrl
     except ImportError:
         return columns
     for _ in range(rounds):

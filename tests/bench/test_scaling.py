@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.bench.horizons import growth, time_horizons
 from nmpcrl.control import Nmpc, SolverError
 from nmpcrl.study import paper
-from nmpcrl.study.horizons import growth, time_horizons
 
 THETA = np.array(paper.THETA_INIT)
 STATES = [np.array(paper.START), np.array([8.0, 2.0, 1.0])]

@@ -7,7 +7,7 @@ from nmpcrl.study import paper
 
 pytest.importorskip("mpcrl")
 
-from nmpcrl.study.bench import rival
+from nmpcrl.bench import baseline_mpcrl
 
 pytestmark = pytest.mark.filterwarnings("ignore::FutureWarning")
 
@@ -26,10 +26,10 @@ def nmpc():
 
 @pytest.fixture
 def agent(nmpc):
-    return rival._agent(nmpc)
+    return baseline_mpcrl._agent(nmpc)
 
 
-class Watched(rival._World):
+class Watched(baseline_mpcrl._World):
     """A world that keeps its last transition."""
 
     def step(self, action):
@@ -78,6 +78,6 @@ def test_a_step_moves_theta_by_alpha_delta_phi(agent, nmpc):
 
 
 def test_every_step_has_a_time():
-    times = rival.time_mpcrl(steps=3)
+    times = baseline_mpcrl.time_mpcrl(steps=3)
     assert len(times) == 3
     assert min(times) > 0
