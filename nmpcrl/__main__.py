@@ -11,7 +11,8 @@ import pandas as pd
 from tqdm import tqdm
 
 from nmpcrl import __version__
-from nmpcrl.study import DamagedRecords, Experiment, ParameterError, Records, fetch, metrics, paper
+from nmpcrl.analysis import metrics
+from nmpcrl.study import DamagedRecords, Experiment, ParameterError, Records, fetch, paper
 from nmpcrl.study.experiment import DECAYS, LEARNERS, SOLVERS
 from nmpcrl.study.store import folder, path_of, stored
 
@@ -133,7 +134,8 @@ def study(
     publish: bool,
 ) -> None:
     """Train whatever is missing of the study; interrupt it and start it again as you like."""
-    from nmpcrl.study import cluster, digest, harvest, plan, whole
+    from nmpcrl.analysis import summaries, summary
+    from nmpcrl.study import cluster, plan, whole
 
     chosen = plan.study()
     unknown = set(parts) - set(chosen.values())
@@ -141,23 +143,23 @@ def study(
         known = ", ".join(dict.fromkeys(chosen.values()))
         raise click.ClickException(f"there is no part {min(unknown)!r}; there are {known}")
     chosen = {e: name for e, name in chosen.items() if not parts or name in parts}
-    missing = [e for e in chosen if not harvest.is_stored(e)]
-    hours = sum(map(harvest.seconds_of, missing)) / 3600
+    missing = [e for e in chosen if not summaries.is_stored(e)]
+    hours = sum(map(summaries.seconds_of, missing)) / 3600
     click.echo(
-        f"{len(chosen) - len(missing)} of {len(chosen)} runs are stored in {harvest.folder()};"
+        f"{len(chosen) - len(missing)} of {len(chosen)} runs are stored in {summaries.folder()};"
         f" the others take about {hours:.1f} hours of one core"
     )
     if dry_run:
         return
     try:
         with cluster.executor(scheduler) if scheduler else nullcontext() as executor:
-            found = harvest.fetch_digests(
+            found = summaries.fetch_digests(
                 chosen, executor=executor, workers=workers, strict=publish
             )
-    except (cluster.NoCluster, harvest.Failed) as error:
+    except (cluster.NoCluster, summaries.Failed) as error:
         raise click.ClickException(str(error)) from None
     if table:
-        frames = [digest.tidy([one]).assign(variant=chosen[e]) for e, one in found.items()]
+        frames = [summary.tidy([one]).assign(variant=chosen[e]) for e, one in found.items()]
         pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
         click.echo(f"{table}: {table.stat().st_size / 1e6:.0f} MB")
     if publish:
@@ -170,7 +172,8 @@ def study(
 @click.option("--sample", type=click.IntRange(0), default=0, help="Train so many runs for it.")
 def verify(sample: int) -> None:
     """Hold the runs that were trained here against the published ones."""
-    from nmpcrl.study import harvest, published
+    from nmpcrl.analysis import summaries
+    from nmpcrl.study import published
 
     try:
         known = published.load()
@@ -181,12 +184,12 @@ def verify(sample: int) -> None:
     everything = list(known.rows)
     every = max(1, len(everything) // max(1, sample))
     drawn = everything[::every][:sample]
-    own = [e for e in everything if e in set(drawn) or harvest.is_stored(e)]
+    own = [e for e in everything if e in set(drawn) or summaries.is_stored(e)]
     if not own:
         raise click.ClickException(
             "no run of the study was trained here; --sample 5 trains five for this"
         )
-    found = harvest.fetch_digests(own)
+    found = summaries.fetch_digests(own)
     wrong = published.compare(found, known)
     exact = published.comparable(found, known)
     click.echo(

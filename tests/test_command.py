@@ -9,7 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from nmpcrl.__main__ import main
-from nmpcrl.study import Experiment, harvest, paper, plan, published, sweep, whole
+from nmpcrl.analysis import summaries
+from nmpcrl.study import Experiment, paper, plan, published, sweep, whole
 from nmpcrl.study.experiment import LEARNERS
 
 WHOLE = len(plan.study())
@@ -38,7 +39,7 @@ def small(monkeypatch):
 def trained(command, small):
     """The small study, trained in this process."""
     with ThreadPoolExecutor(1) as executor:
-        return harvest.fetch_digests(STUDY, executor=executor, progress=False)
+        return summaries.fetch_digests(STUDY, executor=executor, progress=False)
 
 
 def name_of_the_stored_run(tmp_path):
@@ -117,14 +118,14 @@ def test_a_dry_run_says_how_much_is_to_be_done_and_does_nothing(command, small, 
 def test_study_trains_what_is_missing(command, small):
     asked = command("study", "--workers", "2")
     assert asked.exit_code == 0, asked.output
-    assert all(map(harvest.is_stored, STUDY))
+    assert all(map(summaries.is_stored, STUDY))
     assert "6 of 6 runs are stored" in command("study", "--dry-run").output
 
 
 def test_study_trains_a_part_of_itself(command, small):
     asked = command("study", "--part", "N = 5", "--workers", "1")
     assert asked.exit_code == 0, asked.output
-    assert {STUDY[e] for e in STUDY if harvest.is_stored(e)} == {"N = 5"}
+    assert {STUDY[e] for e in STUDY if summaries.is_stored(e)} == {"N = 5"}
 
 
 def test_the_whole_study_takes_hours(command):
@@ -148,14 +149,14 @@ def test_study_refuses_what_it_cannot_do_in_one_sentence(command, small, words, 
 
 
 def test_a_run_that_fails_is_told_and_the_others_are_kept(command, trained, monkeypatch):
-    (path,) = [harvest.path_of(e) for e in STUDY if e.learner == "ES" and e.seed == 1]
+    (path,) = [summaries.path_of(e) for e in STUDY if e.learner == "ES" and e.seed == 1]
     path.unlink()
 
     def fail(experiment):
         raise ArithmeticError("a mistake")
 
-    monkeypatch.setattr(harvest, "run", fail)
-    monkeypatch.setattr(harvest, "_processes", lambda *_: ThreadPoolExecutor(1))
+    monkeypatch.setattr(summaries, "run", fail)
+    monkeypatch.setattr(summaries, "_processes", lambda *_: ThreadPoolExecutor(1))
     told = command("study")
     assert told.exit_code == 1
     assert "1 of 6 runs failed" in told.output
@@ -195,8 +196,8 @@ def test_the_table_of_the_whole_study_takes_100_megabytes_at_most(command, train
         noisy[experiment] = replace(one, experiment=fields, episodes=episodes)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plan, "study", lambda: dict.fromkeys(noisy, "main"))
-        patch.setattr(harvest, "is_stored", lambda _: True)
-        patch.setattr(harvest, "fetch_digests", lambda *_, **__: noisy)
+        patch.setattr(summaries, "is_stored", lambda _: True)
+        patch.setattr(summaries, "fetch_digests", lambda *_, **__: noisy)
         asked = command("study", "--table", str(tmp_path / "episodes.csv.gz"))
     assert asked.exit_code == 0, asked.output
     size = (tmp_path / "episodes.csv.gz").stat().st_size
@@ -219,7 +220,7 @@ def test_verify_names_what_contradicts_and_fails(command, trained, tmp_path):
     one = trained[wrong]
     cost = one.evaluations["cost"].copy()
     cost[-1] += 1e-9
-    replace(one, evaluations=one.evaluations | {"cost": cost}).save(harvest.path_of(wrong))
+    replace(one, evaluations=one.evaluations | {"cost": cost}).save(summaries.path_of(wrong))
     verified = command("verify")
     assert verified.exit_code == 1
     assert "1 contradictions" in verified.output
@@ -230,14 +231,14 @@ def test_verify_names_what_contradicts_and_fails(command, trained, tmp_path):
 def test_verify_trains_a_sample_where_nothing_was_trained(command, trained, tmp_path):
     command("study", "--publish")
     for experiment in STUDY:
-        harvest.path_of(experiment).unlink()
+        summaries.path_of(experiment).unlink()
     refused = command("verify")
     assert refused.exit_code == 1
     assert "--sample 5 trains five for this" in refused.output
     verified = command("verify", "--sample", "2")
     assert verified.exit_code == 0, verified.output
     assert "2 runs: 2 held against the published ones bit for bit" in verified.output
-    assert sum(map(harvest.is_stored, STUDY)) == 2
+    assert sum(map(summaries.is_stored, STUDY)) == 2
 
 
 def test_verify_says_that_nothing_is_published(command, small):

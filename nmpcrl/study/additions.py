@@ -7,9 +7,9 @@ fixed with them before they were put to the study. A claim is judged wherever it
 import numpy as np
 import pandas as pd
 
+from nmpcrl.analysis.statistics import probability_of_improvement
 from nmpcrl.study.claims import BETTER, SAME_COST, costlier, gain
 from nmpcrl.study.experiment import PAPER
-from nmpcrl.study.statistics import probability_of_improvement
 from nmpcrl.study.verdicts import Claim, Verdict, answered, arms, median, settle, shown
 
 MEASURE = "final noise-free costs, in shares of theta_init's"

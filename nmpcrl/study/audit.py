@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nmpcrl.study import metrics, paper
-from nmpcrl.study.curvature import Curvature
+from nmpcrl.analysis import metrics
+from nmpcrl.analysis.curvature import Curvature
+from nmpcrl.study import paper
 from nmpcrl.study.store import Study
 
 

@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import Any
 
-from nmpcrl.study import harvest
+from nmpcrl.analysis import summaries
 from nmpcrl.study.experiment import Experiment
 
 
@@ -63,4 +63,4 @@ def _refuse_others(client: Any) -> None:
 
 
 def _signature() -> str:
-    return harvest.key(Experiment())
+    return summaries.key(Experiment())

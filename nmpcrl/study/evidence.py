@@ -11,10 +11,10 @@ from functools import cached_property
 
 import pandas as pd
 
+from nmpcrl.analysis.summaries import fetch_digests
+from nmpcrl.analysis.summary import Digest, table
 from nmpcrl.study import paper, plan
-from nmpcrl.study.digest import Digest, table
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
-from nmpcrl.study.harvest import fetch_digests
 from nmpcrl.study.parameters import ParameterError
 from nmpcrl.study.published import fates_of, load
 from nmpcrl.study.records import Column
@@ -28,7 +28,7 @@ class Evidence:
     """Runs, their summaries, and where each comes from."""
 
     digests: Study[Digest]  # a published one has fewer columns: see `Published`
-    runs: pd.DataFrame  # `digest.table` with `variant` and `source`, one row a run, in that order
+    runs: pd.DataFrame  # `summary.table` with `variant` and `source`, one row a run, in that order
 
     @cached_property
     def main(self) -> "Evidence":

@@ -10,11 +10,11 @@ from typing import TypeAlias
 import numpy as np
 import pandas as pd
 
+from nmpcrl.analysis.metrics import TOUCH
+from nmpcrl.analysis.statistics import rate
 from nmpcrl.study import claims
 from nmpcrl.study.claims import Paths, experiment_of
 from nmpcrl.study.experiment import PAPER
-from nmpcrl.study.metrics import TOUCH
-from nmpcrl.study.statistics import rate
 from nmpcrl.study.verdicts import CELL, arms, read
 
 # One row a cell of layout, decay and seed, one column an arm; nan is unknown.
@@ -75,7 +75,7 @@ def steady(measure: Measure, values: Values) -> bool:
 
 
 def saved(runs: pd.DataFrame) -> pd.Series:
-    """Share of theta_init's noise-free cost that each run of `digest.table` saves in the end.
+    """Share of theta_init's noise-free cost that each run of `summary.table` saves in the end.
 
     Minus infinity where a drive failed, and where training had to be stopped.
     """
@@ -88,7 +88,7 @@ def achieved(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
     1 is as good as what is possible and 0 as theta_init; nan where nothing is known to be possible.
 
     Args:
-        runs: of `digest.table`.
+        runs: of `summary.table`.
         possible: share of theta_init's noise-free cost that can be saved, by layout.
     """
     known = {layout: share for layout, share in possible.items() if share > 0}

@@ -16,13 +16,13 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import pandas as pd
 
+from nmpcrl.analysis.metrics import TOUCH
+from nmpcrl.analysis.summary import Digest, table
 from nmpcrl.control import Task
 from nmpcrl.study import paper
 from nmpcrl.study.claims import BETTER, divergence
-from nmpcrl.study.digest import Digest, table
 from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.layouts import ARRIVED, gaps
-from nmpcrl.study.metrics import TOUCH
 from nmpcrl.study.records import Column
 
 # A step with alpha ||phi||^2 above this overshoots: it turns the TD error round and makes it grow.
@@ -85,7 +85,7 @@ def counted(fates: pd.DataFrame, what: str = "mechanism") -> pd.DataFrame:
 
 
 def went_wrong(runs: pd.DataFrame) -> list[str]:
-    """What is wrong with each run of `digest.table`: "stopped", "training", "without noise", ""."""
+    """What is wrong with each run of `summary.table`: "stopped", "training", "without noise", ""."""
     signs = {
         "stopped": runs.stopped != "finished",
         "training": divergence(runs).fillna(False),

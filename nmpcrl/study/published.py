@@ -1,6 +1,6 @@
 """The whole study as it was trained once, in `book/published`, small enough to go with the book.
 
-- `processes.csv`: one row a run, `digest.row`, with the part of the study it belongs to and its key;
+- `processes.csv`: one row a run, `summary.row`, with the part of the study it belongs to and its key;
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
 - `verdicts.json`: what became of each claim;
@@ -24,10 +24,11 @@ import numpy as np
 import pandas as pd
 
 import nmpcrl
+from nmpcrl.analysis import summaries
+from nmpcrl.analysis.summary import Digest, row
 from nmpcrl.bench.suite import machine
-from nmpcrl.study import harvest, store
+from nmpcrl.study import store
 from nmpcrl.study.claims import experiment_of
-from nmpcrl.study.digest import Digest, row
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.mechanisms import fates
 from nmpcrl.study.records import Column
@@ -85,7 +86,7 @@ def publish(
     """
     folder = place()
     folder.mkdir(parents=True, exist_ok=True)
-    labels = {e: {"variant": variants[e], "key": harvest.key(e)} for e in digests}
+    labels = {e: {"variant": variants[e], "key": summaries.key(e)} for e in digests}
     runs = pd.DataFrame([row(one) | labels[e] for e, one in digests.items()])
     runs = runs.join(fates_of(digests))
     runs.to_csv(folder / "runs.csv", index=False)
@@ -94,7 +95,7 @@ def publish(
     _write(folder / "verdicts.json", [asdict(verdict) for verdict in verdicts])
     about = {
         "date": datetime.now(UTC).date().isoformat(),
-        "code": harvest.key(Experiment()),
+        "code": summaries.key(Experiment()),
         "versions": store.versions(),
         "machine": here(),
         "runs": runs.variant.value_counts(sort=False).to_dict(),
@@ -191,7 +192,7 @@ def comparable(runs: Iterable[Experiment], published: Published) -> set[Experime
     if published.about.get("machine") != here():
         return set()
     known = published.rows
-    return {e for e in runs if e in known and known[e]["key"] == harvest.key(e)}
+    return {e for e in runs if e in known and known[e]["key"] == summaries.key(e)}
 
 
 def _unequal(e: Experiment, here: dict[str, Any], there: dict[str, Any]) -> tuple[Any, ...] | None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.study.digest import Digest
+from nmpcrl.analysis.summary import Digest
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.sweep import main_study
 

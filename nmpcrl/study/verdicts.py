@@ -26,8 +26,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
+from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.study import paper
-from nmpcrl.study.statistics import Estimate, rate
 
 MAJORITY = 0.5
 NEARLY_ALL = 0.9
@@ -166,7 +166,7 @@ def arms(
     left no policy to drive with, so its final cost is infinite, whatever the last rollout cost.
 
     Args:
-        runs: of `digest.table`, all of one setting.
+        runs: of `summary.table`, all of one setting.
         learners: whose runs are wanted.
         among: the learners in whose cells they are wanted; by default themselves.
 

@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from nmpcrl.analysis import summary
+from nmpcrl.analysis.curvature import dropped_curvature
+from nmpcrl.analysis.summary import Digest
 from nmpcrl.bench.timing import time_learners
-from nmpcrl.study import digest, published
+from nmpcrl.study import published
 from nmpcrl.study.additions import judge_additions
 from nmpcrl.study.audit import audit
 from nmpcrl.study.claims import judge
-from nmpcrl.study.curvature import dropped_curvature
-from nmpcrl.study.digest import Digest
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.plan import MAIN_TABLE
 from nmpcrl.study.store import fetch_all
@@ -33,7 +34,7 @@ def verdicts(
     runs: Mapping[Experiment, Digest], variants: Mapping[Experiment, str]
 ) -> tuple[Verdict, ...]:
     """The verdicts on the paper's claims and on our additions."""
-    table = digest.table(runs)
+    table = summary.table(runs)
     parts = [variants[e] for e in runs]
     main = table[[part == MAIN_TABLE for part in parts]]
     added = table[[part in (MAIN_TABLE, "controls") for part in parts]]

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from nmpcrl.analysis.summary import Digest, table
 from nmpcrl.study import Experiment, Study, paper, plan
-from nmpcrl.study.digest import Digest, table
 from nmpcrl.study.evidence import Evidence
 from nmpcrl.study.published import fates_of
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nmpcrl.analysis.curvature import Curvature
 from nmpcrl.study import Experiment, Records, Study, paper
 from nmpcrl.study.audit import audit
-from nmpcrl.study.curvature import Curvature
 
 KINK = (0.5, 2.2 - 1.25 * np.sqrt(1 + paper.THETA_INIT[-1]), 0.0)  # Xi + theta_c = 0 in layout A
 

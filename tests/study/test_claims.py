@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.analysis.statistics import rate
+from nmpcrl.analysis.summary import digest, row, table
 from nmpcrl.study import Experiment, Study, additions, claims, paper, run
 from nmpcrl.study.audit import Assumption
 from nmpcrl.study.claims import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.study.digest import digest, row, table
 from nmpcrl.study.experiment import LEARNERS, PAPER
 from nmpcrl.study.flips import flips, spread
-from nmpcrl.study.statistics import rate
 
 START_COST = 1000.0  # noise-free cost of theta_init
 SEEDS = range(5)

@@ -20,10 +20,11 @@ import numpy as np
 import pytest
 
 from nmpcrl.__main__ import main
-from nmpcrl.study import Experiment, cluster, harvest, run, store, sweep
+from nmpcrl.analysis import summaries
+from nmpcrl.analysis.summaries import Failed, fetch_digests
+from nmpcrl.analysis.summary import digest
+from nmpcrl.study import Experiment, cluster, run, store, sweep
 from nmpcrl.study.cluster import NoCluster
-from nmpcrl.study.digest import digest
-from nmpcrl.study.harvest import Failed, fetch_digests
 
 pytest.importorskip("distributed", reason="needs the extra nmpcrl[cluster]")
 
@@ -34,7 +35,8 @@ NOTING = """
 import os, time
 from pathlib import Path
 
-from nmpcrl.study import experiment as plain, harvest
+from nmpcrl.study import experiment as plain
+from nmpcrl.analysis import summaries
 
 LOG = Path({log!r})
 
@@ -54,17 +56,17 @@ def note(what, experiment):
         log.write(f"{{what}} {{experiment.seed}} {{os.getpid()}}\\n")
 
 
-harvest.run = run
+summaries.run = run
 """
 MISTAKEN = """
-from nmpcrl.study import harvest
+from nmpcrl.analysis import summaries
 
 
 def run(experiment):
     raise ArithmeticError("a mistake")
 
 
-harvest.run = run
+summaries.run = run
 """
 OTHER_VERSIONS = """
 from nmpcrl.study import store
@@ -196,7 +198,7 @@ def test_a_killed_worker_loses_nothing_and_what_is_stored_is_not_run_again(addre
     def kill_one_at_work():
         wait_until(lambda: victims(log))
         pid, _ = victims(log)[0]
-        stored.extend(seed for seed in range(6) if harvest.is_stored(TEN[seed]))
+        stored.extend(seed for seed in range(6) if summaries.is_stored(TEN[seed]))
         os.kill(pid, signal.SIGKILL)
 
     killer = threading.Thread(target=kill_one_at_work)
@@ -219,7 +221,7 @@ def victims(log: Path) -> list[tuple[int, int]]:
     return [
         (pid, seed)
         for pid, (what, seed) in last.items()
-        if what == "began" and ended[pid] and all(harvest.is_stored(TEN[e]) for e in ended[pid])
+        if what == "began" and ended[pid] and all(summaries.is_stored(TEN[e]) for e in ended[pid])
     ]
 
 
@@ -229,7 +231,7 @@ def test_a_run_that_kills_every_worker_fails_and_the_others_end(address, worker,
     worker(text, "--nanny")
     with pytest.raises(Failed, match="1 of 3 runs failed"):
         on_cluster(address, TEN[:3])
-    assert [harvest.is_stored(e) for e in TEN[:3]] == [True, False, True]
+    assert [summaries.is_stored(e) for e in TEN[:3]] == [True, False, True]
     assert 2 <= seeds(log, "began").count(1) <= 5
 
 
@@ -268,7 +270,7 @@ def test_workers_that_would_make_other_numbers_are_refused_in_a_sentence(
     with pytest.raises(NoCluster, match=reason) as refused:
         on_cluster(address, TEN)
     assert "\n" not in str(refused.value)
-    assert not any(map(harvest.is_stored, TEN))
+    assert not any(map(summaries.is_stored, TEN))
 
 
 def test_a_worker_with_other_versions_that_joins_late_trains_nothing(address, worker, log):
@@ -313,7 +315,7 @@ def test_without_dask_it_is_said_what_to_install(monkeypatch):
 
 
 def test_every_worker_is_asked_for_one_key():
-    assert cluster._signature() == harvest.key(Experiment())
+    assert cluster._signature() == summaries.key(Experiment())
 
 
 PAGE = (Path(__file__).resolve().parents[2] / "book/cluster.md").read_text()

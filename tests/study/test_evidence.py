@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from nmpcrl.analysis.summaries import fetch_digests
+from nmpcrl.analysis.summary import table
 from nmpcrl.study import ParameterError, evidence, published
-from nmpcrl.study.digest import table
 from nmpcrl.study.evidence import gather, needed
 from nmpcrl.study.experiment import frozen_arm
-from nmpcrl.study.harvest import fetch_digests
 from nmpcrl.study.plan import fresh, main_table
 
 ASKED = {"learners": ["ES"], "layouts": ["A"], "seeds": [0], "episodes": 2}

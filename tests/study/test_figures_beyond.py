@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+from nmpcrl.analysis.policy_search import Found
+from nmpcrl.analysis.summary import Digest
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.digest import Digest
 from nmpcrl.study.figures import beyond
 from nmpcrl.study.figures.style import LOOKS
-from nmpcrl.study.search import Found
 
 EPISODES = 40
 THERE = np.linspace(paper.START, paper.TARGET, 30)  # a drive that arrives ...

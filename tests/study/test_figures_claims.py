@@ -6,13 +6,13 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+from nmpcrl.analysis.curvature import Curvature
+from nmpcrl.analysis.statistics import interquartile_mean, rate
 from nmpcrl.study import Experiment, claims
 from nmpcrl.study.audit import Assumption
-from nmpcrl.study.curvature import Curvature
 from nmpcrl.study.evidence import Evidence, paths
 from nmpcrl.study.figures import claims as figures
 from nmpcrl.study.records import Records
-from nmpcrl.study.statistics import interquartile_mean, rate
 from nmpcrl.study.verdicts import Verdict
 
 LAYOUTS, DECAYS, SEEDS = 2, 2, 4

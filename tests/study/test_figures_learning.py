@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from nmpcrl.study import Experiment, Study, metrics, paper, run, sweep
-from nmpcrl.study.chain import Chain
-from nmpcrl.study.curvature import dropped_curvature
-from nmpcrl.study.directions import directions
+from nmpcrl.analysis import metrics
+from nmpcrl.analysis.curvature import dropped_curvature
+from nmpcrl.analysis.gradient_td import directions
+from nmpcrl.analysis.imitation import imitate
+from nmpcrl.analysis.two_state import Chain
+from nmpcrl.study import Experiment, Study, paper, run, sweep
 from nmpcrl.study.figures import ges, rdes
-from nmpcrl.study.imitation import imitate
 
 SMALL = {"episodes": 4, "steps": 45, "evaluate_every": 2}
 

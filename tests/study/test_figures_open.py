@@ -9,9 +9,9 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from nmpcrl.analysis.summary import Digest, table
 from nmpcrl.study import Experiment, paper, plan
 from nmpcrl.study.atlas import atlas, telling
-from nmpcrl.study.digest import Digest, table
 from nmpcrl.study.evidence import Evidence, paths
 from nmpcrl.study.figures import atlas as maps
 from nmpcrl.study.figures import open as figures

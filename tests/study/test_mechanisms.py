@@ -5,8 +5,8 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from nmpcrl.analysis.summary import Digest
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.digest import Digest
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.mechanisms import (
     CUT_SHORT,

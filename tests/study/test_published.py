@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.study import Experiment, harvest, paper, plan, published, run, sweep
-from nmpcrl.study.digest import digest, row, table
+from nmpcrl.analysis import summaries
+from nmpcrl.analysis.summary import digest, row, table
+from nmpcrl.study import Experiment, paper, plan, published, run, sweep
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.published import FILES, Damaged, Published, compare, load, publish
 from nmpcrl.study.verdicts import PARTLY, REPRODUCED, Verdict
@@ -83,7 +84,7 @@ def test_the_summaries_are_read_bit_for_bit_and_in_order(known, digests):
     for experiment, one in digests.items():
         for name, value in row(one).items():
             np.testing.assert_equal(known.rows[experiment][name], value)
-        assert known.rows[experiment]["key"] == harvest.key(experiment)
+        assert known.rows[experiment]["key"] == summaries.key(experiment)
         assert known.variants[experiment] == LABELS[experiment]
 
 
@@ -133,7 +134,7 @@ def test_verdicts_are_read_as_they_were(known):
 
 def test_what_is_published_says_what_made_it(known):
     about = known.about
-    assert about["code"] == harvest.key(Experiment())
+    assert about["code"] == summaries.key(Experiment())
     assert about["machine"] == published.here()
     assert set(about["versions"]) >= {"python", "numpy", "torch", "casadi"}
     assert about["runs"] == {"main": 8, "N = 2": 4}
@@ -251,7 +252,7 @@ def test_on_another_machine_the_last_bit_does_not_count(known, digests, elsewher
 
 
 def test_with_other_code_the_last_bit_does_not_count(known, digests, monkeypatch):
-    monkeypatch.setattr(harvest, "key", lambda _: "another")
+    monkeypatch.setattr(summaries, "key", lambda _: "another")
     moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in digests.items()}
     assert compare(moved, known).empty
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from nmpcrl.analysis.summary import Digest, digest
 from nmpcrl.study import twins
-from nmpcrl.study.digest import Digest, digest
 from nmpcrl.study.experiment import Experiment, run
 from nmpcrl.study.figures import results
 

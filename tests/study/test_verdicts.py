@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nmpcrl.study.statistics import rate
+from nmpcrl.analysis.statistics import rate
 from nmpcrl.study.verdicts import (
     CELL,
     MAJORITY,

@@ -12,10 +12,10 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.analysis.summary import Digest
 from nmpcrl.study.atlas import WHOLE, groups
 from nmpcrl.study.cards import WORDS
 from nmpcrl.study.claims import experiment_of
-from nmpcrl.study.digest import Digest
 from nmpcrl.study.evidence import Evidence, paths
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.figures.open import plain

@@ -11,16 +11,16 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import PercentFormatter
 
 from nmpcrl import Matrix
+from nmpcrl.analysis.metrics import LAST
+from nmpcrl.analysis.policy_search import Found
+from nmpcrl.analysis.statistics import interquartile_mean
+from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.trajectory import described
 from nmpcrl.study import paper
-from nmpcrl.study.digest import Digest
-from nmpcrl.study.driving import described
 from nmpcrl.study.figures.controller import draw_task
 from nmpcrl.study.figures.rdes import headed
 from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study.mechanisms import OVERSHOOT
-from nmpcrl.study.metrics import LAST
-from nmpcrl.study.search import Found
-from nmpcrl.study.statistics import interquartile_mean
 
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
 PARTS: dict[
@@ -112,7 +112,7 @@ def strips(
     """A share of every run, layout by layout and learner by learner, with interquartile means.
 
     Args:
-        runs: of `digest.table`.
+        runs: of `summary.table`.
         values: one a run; infinite ones, and what is not `seen`, are drawn at the edge.
         learners: in the order in which they are drawn.
         label: what the share is of.

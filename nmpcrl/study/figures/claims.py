@@ -17,10 +17,11 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import PercentFormatter
 
 from nmpcrl import Vector
+from nmpcrl.analysis.curvature import Curvature
+from nmpcrl.analysis.statistics import interquartile_mean, performance_profile
 from nmpcrl.bench.timing import ratio
 from nmpcrl.study import claims, verdicts
 from nmpcrl.study.audit import Assumption
-from nmpcrl.study.curvature import Curvature
 from nmpcrl.study.evidence import Evidence, paths
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.figures.panels import (
@@ -38,7 +39,6 @@ from nmpcrl.study.figures.rdes import headed, label_panel
 from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study.measures import MEASURES
 from nmpcrl.study.records import Column, Records
-from nmpcrl.study.statistics import interquartile_mean, performance_profile
 from nmpcrl.study.verdicts import Verdict
 
 LINE = 84  # characters of a title

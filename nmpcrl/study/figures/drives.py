@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from nmpcrl.analysis import metrics
+from nmpcrl.analysis.summary import Digest
 from nmpcrl.control import Task
-from nmpcrl.study import metrics, paper
-from nmpcrl.study.digest import Digest
+from nmpcrl.study import paper
 from nmpcrl.study.evidence import Evidence
 from nmpcrl.study.figures.controller import draw_task
 from nmpcrl.study.figures.panels import LIMIT, SUBTITLE, bundle, legend, part, sourced

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from nmpcrl.analysis.summary import Digest
 from nmpcrl.study import paper
-from nmpcrl.study.digest import Digest
 from nmpcrl.study.evidence import Evidence
 from nmpcrl.study.figures.open import closes_at, plain
 from nmpcrl.study.figures.panels import FEW, LIMIT, SUBTITLE

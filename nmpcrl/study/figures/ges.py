@@ -3,12 +3,13 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from nmpcrl.analysis import metrics
+from nmpcrl.analysis.curvature import Curvature
+from nmpcrl.analysis.gradient_td import directions
+from nmpcrl.analysis.two_state import Chain, follow, growth
 from nmpcrl.learning.learners import gradient_td, semi_gradient
-from nmpcrl.study import metrics, paper
-from nmpcrl.study.chain import Chain, follow, growth
+from nmpcrl.study import paper
 from nmpcrl.study.claims import unstable
-from nmpcrl.study.curvature import Curvature
-from nmpcrl.study.directions import directions
 from nmpcrl.study.figures.rdes import (
     DECAYS,
     headed,

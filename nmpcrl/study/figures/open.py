@@ -15,10 +15,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.control import Task
 from nmpcrl.study import paper
-from nmpcrl.study.digest import Digest
-from nmpcrl.study.driving import closes_at
 from nmpcrl.study.evidence import Evidence
 from nmpcrl.study.figures.controller import draw_task
 from nmpcrl.study.figures.rdes import headed

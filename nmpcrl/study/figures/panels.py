@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from nmpcrl import Vector
+from nmpcrl.analysis.statistics import rate
 from nmpcrl.study import verdicts
 from nmpcrl.study.evidence import Evidence
 from nmpcrl.study.figures.open import plain
@@ -17,7 +18,6 @@ from nmpcrl.study.figures.rdes import headed
 from nmpcrl.study.figures.style import LOOKS, marked
 from nmpcrl.study.measures import Values
 from nmpcrl.study.records import Column
-from nmpcrl.study.statistics import rate
 from nmpcrl.study.verdicts import Verdict
 
 LIMIT: dict[str, Any] = {"color": "0.4", "linewidth": 0.8, "linestyle": (0, (2, 2))}

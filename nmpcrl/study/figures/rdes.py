@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from nmpcrl.study import metrics
+from nmpcrl.analysis import metrics
+from nmpcrl.analysis.imitation import Imitation
 from nmpcrl.study.claims import diverged
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.figures.style import LOOKS, page, subplots
-from nmpcrl.study.imitation import Imitation
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Study
 

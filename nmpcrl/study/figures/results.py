@@ -16,9 +16,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
 
 from nmpcrl import Vector
+from nmpcrl.analysis.summary import Digest
 from nmpcrl.study.cards import WORDS
 from nmpcrl.study.claims import divergence, instability
-from nmpcrl.study.digest import Digest
 from nmpcrl.study.evidence import Evidence
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.figures.panels import LIMIT, SUBTITLE, bundle, legend, line, part, sourced

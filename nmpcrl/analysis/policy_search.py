@@ -30,7 +30,7 @@ SPREAD = 0.3  # of the first drives, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
 FAILED = 1e6  # stands for the cost of a drive on which a solve failed
-SOURCES = ("control", "study/paper.py", "learning/training.py", "study/search.py")
+SOURCES = ("control", "study/paper.py", "learning/training.py", "analysis/policy_search.py")
 
 
 @dataclass(frozen=True)

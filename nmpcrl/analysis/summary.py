@@ -14,11 +14,12 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
+from nmpcrl.analysis import metrics
+from nmpcrl.analysis.imitation import imitate
+from nmpcrl.analysis.metrics import LAST, TOUCH
 from nmpcrl.control import Task
-from nmpcrl.study import metrics, paper
+from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, controller_of, frozen_arm
-from nmpcrl.study.imitation import imitate
-from nmpcrl.study.metrics import LAST, TOUCH
 from nmpcrl.study.records import Column, Records, load_arrays, save_arrays
 
 SIZES = (TOUCH, 0.01, 0.1, np.inf)  # of an overlap Xi: small, medium and large violations

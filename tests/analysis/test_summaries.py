@@ -18,9 +18,10 @@ import numpy as np
 import pytest
 
 import nmpcrl
-from nmpcrl.study import Experiment, fetch, harvest, run, store, sweep
-from nmpcrl.study.digest import Digest, digest
-from nmpcrl.study.harvest import Failed, Killed, fetch_digests
+from nmpcrl.analysis import summaries
+from nmpcrl.analysis.summaries import Failed, Killed, fetch_digests
+from nmpcrl.analysis.summary import Digest, digest
+from nmpcrl.study import Experiment, fetch, run, store, sweep
 from nmpcrl.study.store import THREADS
 
 QUICK = Experiment("frozen", episodes=2, steps=3, evaluate_every=1)
@@ -32,7 +33,7 @@ MADE_ELSEWHERE = """
 import os, signal, time
 from pathlib import Path
 
-from nmpcrl.study import harvest
+from nmpcrl.analysis import summaries
 
 LOG = Path({log!r})
 
@@ -43,7 +44,7 @@ def make(experiment, *expected):
     time.sleep({pause})
     if experiment.seed in {killed} and (first or {always}):
         os.kill(os.getpid(), signal.SIGKILL)
-    made = harvest.make(experiment, *expected)
+    made = summaries.make(experiment, *expected)
     note("ended", experiment)
     return made
 
@@ -67,7 +68,7 @@ def digests(tmp_path, monkeypatch) -> Path:
 def trained(monkeypatch) -> list[Experiment]:
     """What is trained from here on, in this process."""
     found: list[Experiment] = []
-    monkeypatch.setattr(harvest, "run", lambda e: (found.append(e), run(e))[1])
+    monkeypatch.setattr(summaries, "run", lambda e: (found.append(e), run(e))[1])
     return found
 
 
@@ -84,7 +85,7 @@ def workers(tmp_path, monkeypatch):
         monkeypatch.delitem(sys.modules, "made_elsewhere", raising=False)
         import made_elsewhere
 
-        monkeypatch.setattr(harvest, "make", made_elsewhere.make)
+        monkeypatch.setattr(summaries, "make", made_elsewhere.make)
         return log
 
     return watch
@@ -124,7 +125,7 @@ def test_what_is_fetched_is_the_digest_of_the_run():
 def test_a_digest_is_stored_among_the_runs_and_says_what_it_depends_on(digests):
     found = here([QUICK])[QUICK]
     (path,) = digests.iterdir()
-    assert path == harvest.path_of(QUICK)
+    assert path == summaries.path_of(QUICK)
     assert path.name.startswith("frozen-A-step-seed0-2ep-")
     assert_same_digest(Digest.load(path), found)
     assert found.facts["key"] == store.key(QUICK)
@@ -156,7 +157,7 @@ def test_a_stored_run_that_is_damaged_is_trained_again(trained):
 
 def test_a_damaged_digest_is_put_aside_and_made_again(digests, trained, capsys):
     first = here([QUICK])
-    path = harvest.path_of(QUICK)
+    path = summaries.path_of(QUICK)
     path.write_bytes(path.read_bytes()[:-200])
     assert_same_digest(here([QUICK])[QUICK], first[QUICK])
     assert trained == [QUICK, QUICK]
@@ -170,7 +171,7 @@ def keys(tmp_path, monkeypatch):
     copy = tmp_path / "nmpcrl"
     shutil.copytree(Path(nmpcrl.__file__).parent, copy, ignore=shutil.ignore_patterns("*.pyc"))
     monkeypatch.setattr(nmpcrl, "__file__", str(copy / "__init__.py"))
-    for module, name in ((store, "_mathematics"), (harvest, "_summary")):
+    for module, name in ((store, "_mathematics"), (summaries, "_summary")):
         monkeypatch.setattr(module, name, getattr(module, name).__wrapped__)
 
     def after(place=None, before="", changed=""):
@@ -178,7 +179,7 @@ def keys(tmp_path, monkeypatch):
             text = (copy / place).read_text()
             assert before in text
             (copy / place).write_text(text.replace(before, changed, 1))
-        return store.key(QUICK), harvest.key(QUICK)
+        return store.key(QUICK), summaries.key(QUICK)
 
     return after
 
@@ -186,9 +187,9 @@ def keys(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("place", "before", "changed"),
     [
-        ("study/digest.py", "LATE = 20", "LATE = 21"),
-        ("study/metrics.py", "LAST = 3", "LAST = 4"),
-        ("study/imitation.py", "FITS = 4000", "FITS = 4001"),
+        ("analysis/summary.py", "LATE = 20", "LATE = 21"),
+        ("analysis/metrics.py", "LAST = 3", "LAST = 4"),
+        ("analysis/imitation.py", "FITS = 4000", "FITS = 4001"),
     ],
 )
 def test_a_change_of_what_is_kept_makes_other_digests_of_the_same_runs(
@@ -206,13 +207,13 @@ def test_a_change_of_the_mathematics_makes_other_runs_and_other_digests(keys):
 
 
 def test_a_comment_changes_neither(keys):
-    assert keys() == keys("study/digest.py", "# episodes that stand", "# how many stand")
+    assert keys() == keys("analysis/summary.py", "# episodes that stand", "# how many stand")
 
 
 def test_every_field_has_a_part_in_the_key():
     others = [QUICK, replace(QUICK, seed=1), replace(QUICK, alpha=2e-7), replace(QUICK, horizon=9)]
-    assert len({harvest.key(e) for e in others}) == len(others)
-    assert len({harvest.path_of(e) for e in others}) == len(others)
+    assert len({summaries.key(e) for e in others}) == len(others)
+    assert len({summaries.path_of(e) for e in others}) == len(others)
 
 
 @pytest.fixture
@@ -224,8 +225,8 @@ def mistaken(monkeypatch):
             raise ArithmeticError("a mistake")
         return run(experiment)
 
-    monkeypatch.setattr(harvest, "run", run_but_one)
-    return lambda: monkeypatch.setattr(harvest, "run", run)
+    monkeypatch.setattr(summaries, "run", run_but_one)
+    return lambda: monkeypatch.setattr(summaries, "run", run)
 
 
 def test_a_run_that_fails_is_told_at_the_end_and_stops_no_other(mistaken):
@@ -233,7 +234,7 @@ def test_a_run_that_fails_is_told_at_the_end_and_stops_no_other(mistaken):
         here(THREE)
     for part in (str(THREE[1]), "ArithmeticError: a mistake"):
         assert part in str(raised.value)
-    assert [harvest.is_stored(e) for e in THREE] == [True, False, True]
+    assert [summaries.is_stored(e) for e in THREE] == [True, False, True]
 
 
 def test_what_did_not_fail_can_be_had_without_the_rest(mistaken):
@@ -298,7 +299,7 @@ def test_a_run_that_always_kills_its_worker_is_a_failure_like_any_other(workers,
     log = workers(killed=(1,), always=True)
     with pytest.raises(Failed, match="1 of 3 runs failed"):
         fetch_digests(THREE, workers=1, progress=False)
-    assert [harvest.is_stored(e) for e in THREE] == [True, False, True]
+    assert [summaries.is_stored(e) for e in THREE] == [True, False, True]
     assert times(log, "ended") == [0, 2]
     (note,) = digests.glob("*.failed.json")
     assert "killed" in json.loads(note.read_text())["reason"]
@@ -323,12 +324,12 @@ class Breaking(Executor):
 def test_what_an_executor_of_the_callers_loses_is_a_failure_and_the_rest_is_kept():
     with pytest.raises(Failed, match=r"1 of 3 runs failed.*BrokenProcessPool"):
         fetch_digests(THREE, executor=Breaking(), progress=False)
-    assert [harvest.is_stored(e) for e in THREE] == [True, False, True]
+    assert [summaries.is_stored(e) for e in THREE] == [True, False, True]
 
 
 def test_a_worker_with_other_code_trains_nothing(monkeypatch, trained):
     """A worker of a cluster may join late; so each compares keys before each run."""
-    experiment, make = QUICK, harvest.make
+    experiment, make = QUICK, summaries.make
     elsewhere = store.versions() | {"numpy": "0.0.1"}
 
     def with_other_versions(*arguments):
@@ -338,7 +339,7 @@ def test_a_worker_with_other_code_trains_nothing(monkeypatch, trained):
         finally:
             monkeypatch.undo()
 
-    monkeypatch.setattr(harvest, "make", with_other_versions)
+    monkeypatch.setattr(summaries, "make", with_other_versions)
     with pytest.raises(Failed, match="other code, or other versions"):
         here([experiment])
     assert trained == []
@@ -348,12 +349,13 @@ INTERRUPTED = """
 import signal
 
 import made_elsewhere
-from nmpcrl.study import harvest, sweep
+from nmpcrl.study import sweep
+from nmpcrl.analysis import summaries
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
-harvest.make = made_elsewhere.make
+summaries.make = made_elsewhere.make
 runs = sweep(learner="frozen", seed=tuple(range(6)), episodes=1, steps=2)
-harvest.fetch_digests(runs, workers=2)
+summaries.fetch_digests(runs, workers=2)
 """
 
 
@@ -401,7 +403,7 @@ def test_a_process_that_starts_while_a_study_is_interrupted_is_ended_too(monkeyp
         return processes(workers)
 
     monkeypatch.setattr(store, "processes", slowly)
-    slots = harvest.Slots(1)
+    slots = summaries.Slots(1)
     began, waits = slots.submit(time.sleep, 20), slots.submit(time.sleep, 20)
     starting.wait()
     slots.shutdown(wait=False, cancel_futures=True)

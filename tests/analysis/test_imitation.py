@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from nmpcrl.analysis.imitation import HELD_OUT, Imitation, imitate
 from nmpcrl.study import Experiment, run
-from nmpcrl.study.imitation import HELD_OUT, Imitation, imitate
 from nmpcrl.study.records import Records
 
 

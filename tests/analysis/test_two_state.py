@@ -5,9 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nmpcrl.learning import Weights
-from nmpcrl.learning.learners import gradient_td, semi_gradient
-from nmpcrl.study.chain import (
+from nmpcrl.analysis.two_state import (
     FIRST,
     PHI,
     SECOND,
@@ -21,6 +19,8 @@ from nmpcrl.study.chain import (
     projected_bellman_error,
     sampled_step,
 )
+from nmpcrl.learning import Weights
+from nmpcrl.learning.learners import gradient_td, semi_gradient
 
 CHAIN = Chain(gamma=0.97)
 ALPHA = 0.1

@@ -5,8 +5,9 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from nmpcrl.study import Experiment, metrics, paper, run
-from nmpcrl.study.digest import Digest, digest, row, table, tidy
+from nmpcrl.analysis import metrics
+from nmpcrl.analysis.summary import Digest, digest, row, table, tidy
+from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.records import DamagedRecords, Records
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from nmpcrl.analysis.trajectory import closes_at, described
 from nmpcrl.study import paper
-from nmpcrl.study.driving import closes_at, described
 from nmpcrl.study.layouts import gaps
 
 FAR = 1.25 * np.sqrt(1.35)  # from a centre; the penalty begins here [m]

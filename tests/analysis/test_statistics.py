@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from nmpcrl.study.statistics import (
+from nmpcrl.analysis.statistics import (
     CONFIDENCE,
     Estimate,
     interquartile_mean,

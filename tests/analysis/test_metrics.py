@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from nmpcrl.analysis import metrics
 from nmpcrl.control import Obstacle, Task
-from nmpcrl.study import metrics
 from nmpcrl.study.records import Records
 
 D = 9  # components of theta

@@ -29,12 +29,16 @@ from typing import Any
 
 from tqdm import tqdm
 
+from nmpcrl.analysis.summary import Digest, digest
 from nmpcrl.study import paper, store
-from nmpcrl.study.digest import Digest, digest
 from nmpcrl.study.experiment import NETWORK_LEARNERS, Experiment, compile_ahead, run
 from nmpcrl.study.records import DamagedRecords, Records
 
-SUMMARISES = ("study/digest.py", "study/metrics.py", "study/imitation.py")  # besides the run itself
+SUMMARISES = (
+    "analysis/summary.py",
+    "analysis/metrics.py",
+    "analysis/imitation.py",
+)  # besides the run itself
 WAIT = 0.5  # [s]; what waits for longer may not notice an interrupt
 ALONE = threading.Lock()  # of a process: torch's generator, which draws weights, is its only one
 

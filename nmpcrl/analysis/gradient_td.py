@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.study import metrics, paper
+from nmpcrl.analysis import metrics
+from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 
 

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from nmpcrl.analysis import policy_search
+from nmpcrl.analysis.policy_search import LEAST, SCALE, Found, Search, fetch
 from nmpcrl.learning.training import Persistent, evaluate
-from nmpcrl.study import ParameterError, paper, search
-from nmpcrl.study.search import LEAST, SCALE, Found, Search, fetch
+from nmpcrl.study import ParameterError, paper
 
 BEST = np.array([0.5, 1.5, 0.1, 0.02, 0.08, 2.0, 0.3, 0.15, 0.3])  # of the bowl below
 FOUND = Found(paper.THETA_INIT, 40, (1, 7), (100.0, 80.0))
@@ -31,7 +32,7 @@ def bowl(monkeypatch):
         assert steps == paper.STEPS
         return SimpleNamespace(cost=7 + away**2 if away < 3 else np.inf)
 
-    monkeypatch.setattr(search, "evaluate", drive)
+    monkeypatch.setattr(policy_search, "evaluate", drive)
 
 
 @pytest.fixture
@@ -43,8 +44,8 @@ def searched(monkeypatch):
         made.append(wanted)
         return FOUND
 
-    monkeypatch.setattr(search, "search", note)
-    monkeypatch.setattr(search.store, "processes", lambda _: ThreadPoolExecutor(1))
+    monkeypatch.setattr(policy_search, "search", note)
+    monkeypatch.setattr(policy_search.store, "processes", lambda _: ThreadPoolExecutor(1))
     return made
 
 
@@ -58,7 +59,7 @@ def test_a_search_refuses_nonsense_by_name(name, nonsense):
 
 @pytest.mark.usefixtures("bowl")
 def test_the_least_cost_is_found_within_the_budget():
-    found = search.search(Search(budget=1500))
+    found = policy_search.search(Search(budget=1500))
     assert found.made <= 1500
     assert found.cost == pytest.approx(7, abs=1e-3)
     np.testing.assert_allclose((np.array(found.theta) - BEST) / SCALE, 0, atol=0.05)
@@ -66,7 +67,7 @@ def test_the_least_cost_is_found_within_the_budget():
 
 @pytest.mark.usefixtures("bowl")
 def test_it_starts_at_theta_init_and_notes_every_improvement():
-    found = search.search(Search(budget=200))
+    found = policy_search.search(Search(budget=200))
     start = np.linalg.norm((paper.THETA_INIT - BEST) / SCALE)
     assert found.drives[0] == 1
     assert found.initial == pytest.approx(7 + start**2)
@@ -78,27 +79,27 @@ def test_it_starts_at_theta_init_and_notes_every_improvement():
 @pytest.mark.usefixtures("bowl")
 def test_the_same_search_finds_the_same_theta_and_another_seed_another():
     short = Search(budget=100)
-    assert search.search(short) == search.search(short)
-    assert search.search(replace(short, seed=1)).theta != search.search(short).theta
+    assert policy_search.search(short) == policy_search.search(short)
+    assert policy_search.search(replace(short, seed=1)).theta != policy_search.search(short).theta
 
 
 @pytest.mark.usefixtures("bowl")
 def test_theta_stays_within_its_bounds(monkeypatch):
-    seen, drive = [], search.evaluate
+    seen, drive = [], policy_search.evaluate
 
     def note(controller, theta, steps):
         seen.append(theta)
         return drive(controller, theta, steps)
 
-    monkeypatch.setattr(search, "evaluate", note)
-    search.search(Search(budget=300))
-    assert (np.array(seen) >= search.LOWER - 1e-12).all()
-    assert (np.array(seen) <= search.UPPER + 1e-12).all()
+    monkeypatch.setattr(policy_search, "evaluate", note)
+    policy_search.search(Search(budget=300))
+    assert (np.array(seen) >= policy_search.LOWER - 1e-12).all()
+    assert (np.array(seen) <= policy_search.UPPER + 1e-12).all()
 
 
 def test_where_all_drives_fail_theta_init_is_what_was_found(monkeypatch):
-    monkeypatch.setattr(search, "evaluate", lambda *_: SimpleNamespace(cost=np.inf))
-    found = search.search(Search(budget=LEAST))
+    monkeypatch.setattr(policy_search, "evaluate", lambda *_: SimpleNamespace(cost=np.inf))
+    found = policy_search.search(Search(budget=LEAST))
     assert found.theta == pytest.approx(paper.THETA_INIT)
     assert (found.drives, found.best) == ((1,), (np.inf,))
 
@@ -123,14 +124,14 @@ def test_what_is_stored_is_read_and_only_the_rest_is_searched_for(searched):
 
 def test_other_code_or_versions_make_old_searches_worthless(searched, monkeypatch):
     fetch([Search()], progress=False)
-    monkeypatch.setattr(search, "version", lambda _: "0.0")
+    monkeypatch.setattr(policy_search, "version", lambda _: "0.0")
     fetch([Search()], progress=False)
     assert len(searched) == 2
 
 
 def test_a_damaged_file_is_reported_and_searched_again(searched, runs, capsys):
     fetch([Search()], progress=False)
-    (runs / "search.json").write_text("{")
+    (runs / "policy_search.json").write_text("{")
     assert fetch([Search()], progress=False) == {Search(): FOUND}
     assert "is damaged" in capsys.readouterr().err
     assert len(searched) == 2

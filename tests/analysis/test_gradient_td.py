@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from nmpcrl.analysis.curvature import Curvature, dropped_curvature
 from nmpcrl.study import Experiment, paper, run
-from nmpcrl.study.curvature import Curvature, dropped_curvature
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.analysis import metrics
 from nmpcrl.learning import QNetwork
-from nmpcrl.study import metrics, paper
+from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 
 HELD_OUT = 5  # every fifth episode is kept from the networks

@@ -1,0 +1,1 @@
+"""From runs to numbers, without a verdict: metrics, summaries, statistics, and searches."""
