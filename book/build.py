@@ -175,7 +175,8 @@ def mirror(place: Path, announcement: str) -> Path:
 def train(experiments: tuple, digests: tuple) -> None:
     """Run what is not stored yet; the bars are the store's."""
     from nmpcrl.analysis.summaries import fetch_digests
-    from nmpcrl.study import Experiment, published  # only here: a refusal should not wait for it
+    from nmpcrl.claims import published  # only here: a refusal should not wait for it
+    from nmpcrl.study import Experiment
     from nmpcrl.study.experiment import compile_ahead
     from nmpcrl.study.store import fetch_all
 

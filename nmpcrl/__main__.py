@@ -135,7 +135,8 @@ def study(
 ) -> None:
     """Train whatever is missing of the study; interrupt it and start it again as you like."""
     from nmpcrl.analysis import summaries, summary
-    from nmpcrl.study import cluster, plan, whole
+    from nmpcrl.claims import publish
+    from nmpcrl.study import cluster, plan
 
     chosen = plan.study()
     unknown = set(parts) - set(chosen.values())
@@ -163,7 +164,7 @@ def study(
         pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
         click.echo(f"{table}: {table.stat().st_size / 1e6:.0f} MB")
     if publish:
-        click.echo(f"{whole.publish(found, chosen)}: published")
+        click.echo(f"{publish.publish(found, chosen)}: published")
     if len(found) < len(chosen):
         raise SystemExit(1)  # what failed has been said
 
@@ -173,7 +174,7 @@ def study(
 def verify(sample: int) -> None:
     """Hold the runs that were trained here against the published ones."""
     from nmpcrl.analysis import summaries
-    from nmpcrl.study import published
+    from nmpcrl.claims import published
 
     try:
         known = published.load()

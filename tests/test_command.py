@@ -10,7 +10,8 @@ from click.testing import CliRunner
 
 from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
-from nmpcrl.study import Experiment, paper, plan, published, sweep, whole
+from nmpcrl.claims import publish, published
+from nmpcrl.study import Experiment, paper, plan, sweep
 from nmpcrl.study.experiment import LEARNERS
 
 WHOLE = len(plan.study())
@@ -32,7 +33,7 @@ def command(tmp_path, monkeypatch):
 def small(monkeypatch):
     """A study of six short runs, judged by nobody."""
     monkeypatch.setattr(plan, "study", lambda: dict(STUDY))
-    monkeypatch.setattr(whole, "verdicts", lambda runs, variants: ())
+    monkeypatch.setattr(publish, "verdicts", lambda runs, variants: ())
 
 
 @pytest.fixture

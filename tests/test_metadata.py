@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from nmpcrl.study import published
-from nmpcrl.study.verdicts import NOT, REPRODUCED
+from nmpcrl.claims import published
+from nmpcrl.claims.rule import NOT, REPRODUCED
 
 ROOT = Path(__file__).resolve().parent.parent
 METADATA = yaml.safe_load((ROOT / "metadata.yaml").read_text())

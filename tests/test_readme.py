@@ -3,7 +3,8 @@
 import re
 from pathlib import Path
 
-from nmpcrl.study import plan, published
+from nmpcrl.claims import published
+from nmpcrl.study import plan
 
 README = (Path(__file__).resolve().parent.parent / "README.md").read_text()
 

@@ -8,11 +8,11 @@ from html import escape
 import pandas as pd
 
 from nmpcrl.bench.targets import Target
-from nmpcrl.study.audit import Assumption
+from nmpcrl.claims.assumptions import Assumption
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Verdict
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.summary import SURE, listed
-from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Verdict
 
 BADGES = {
     REPRODUCED: "verdict-reproduced",
@@ -109,7 +109,7 @@ def dependence(verdicts: Iterable[Verdict], flipped: pd.DataFrame) -> str:
 
     Args:
         verdicts: of `judge_runs`.
-        flipped: rows of `atlas.atlas`; those that chance hardly explains, by `SURE`, are bold.
+        flipped: rows of `robustness.atlas`; those that chance hardly explains, by `SURE`, are bold.
     """
     rows = ["| Claim | Over all | Flipped by |", "|---|---|---|"]
     for v in verdicts:

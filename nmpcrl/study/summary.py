@@ -4,10 +4,10 @@ from collections.abc import Iterable, Sequence
 
 import pandas as pd
 
+from nmpcrl.claims.published import Published
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study import plan
 from nmpcrl.study.departures import DEPARTURES
-from nmpcrl.study.published import Published
-from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 
 NOTHING = (
     "Nothing is published in this copy yet; `nmpcrl study --publish` trains the study, judges it"

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.summary import Digest, table
+from nmpcrl.claims.evidence import Evidence
+from nmpcrl.claims.published import fates_of
 from nmpcrl.study import Experiment, Study, paper, plan
-from nmpcrl.study.evidence import Evidence
-from nmpcrl.study.published import fates_of
 
 LOOPS = ("without noise", "with noise")
 SOLVERS = {"riccati": 40e-6, "fatrop": 0.8e-3, "ipopt": 2e-3, "ipopt MX": 4e-3, "rebuilt": 40e-3}

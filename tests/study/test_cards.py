@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
 
+from nmpcrl.claims.assumptions import Assumption
+from nmpcrl.claims.own_claims import ADDITIONS
+from nmpcrl.claims.paper_claims import CLAIMS, NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study import cards, main_study
-from nmpcrl.study.additions import ADDITIONS
-from nmpcrl.study.audit import Assumption
-from nmpcrl.study.claims import CLAIMS, NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study.paper import DEPARTURES
 
 OUTCOMES = (REPRODUCED, PARTLY, NOT, UNDECIDABLE)

@@ -8,12 +8,13 @@ from matplotlib.figure import Figure
 
 from nmpcrl.analysis.curvature import Curvature
 from nmpcrl.analysis.statistics import interquartile_mean, rate
-from nmpcrl.study import Experiment, claims
-from nmpcrl.study.audit import Assumption
-from nmpcrl.study.evidence import Evidence, paths
+from nmpcrl.claims import paper_claims
+from nmpcrl.claims.assumptions import Assumption
+from nmpcrl.claims.evidence import Evidence, paths
+from nmpcrl.claims.rule import Verdict
+from nmpcrl.study import Experiment
 from nmpcrl.study.figures import claims as figures
 from nmpcrl.study.records import Records
-from nmpcrl.study.verdicts import Verdict
 
 LAYOUTS, DECAYS, SEEDS = 2, 2, 4
 CELLS = LAYOUTS * DECAYS * SEEDS
@@ -48,7 +49,7 @@ def as_the_paper_says(experiment: Experiment) -> dict:
 
 
 def verdict(found: Evidence, claim: str) -> Verdict:
-    (one,) = (v for v in claims.judge_runs(found.runs, paths(found)) if v.claim == claim)
+    (one,) = (v for v in paper_claims.judge_runs(found.runs, paths(found)) if v.claim == claim)
     return one
 
 
@@ -147,7 +148,7 @@ def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
         for axis in drawing.axes[:-1]:
             places = points(axis)
             assert len(places) == LAYOUTS * SEEDS
-            alike = (places <= [claims.SAME_PATH, claims.SAME_COST]).all(axis=1)
+            alike = (places <= [paper_claims.SAME_PATH, paper_claims.SAME_COST]).all(axis=1)
             assert (alike == inside).all()
     np.testing.assert_allclose(points(drawn("C5", found).axes[0]), [[1.0, 0.1]] * 8)
 
@@ -156,7 +157,7 @@ def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
 def test_a_pair_of_which_a_run_was_stopped_is_not_in_the_box(stopped, made_up):
     found = made_up(lambda e: {"reached": 40} if e.learner in stopped else {})
     for axis in drawn("C5", found).axes[:-1]:
-        assert (points(axis)[:, 1] > claims.SAME_COST).all()
+        assert (points(axis)[:, 1] > paper_claims.SAME_COST).all()
     assert verdict(found, "C5").counts["all"] == (0, CELLS)
 
 
@@ -224,8 +225,12 @@ def test_the_profile_falls_from_all_runs_to_none_and_counts_those_that_were_stop
 @pytest.mark.parametrize(
     ("learner", "judge", "words"),
     [
-        ("RDES", claims.rdes_takes_half_the_time, "C3 reproduced: with Ipopt, a step of RDES"),
-        ("GES", claims.ges_takes_the_same_time, "C4 reproduced: with Ipopt, a step of GES"),
+        (
+            "RDES",
+            paper_claims.rdes_takes_half_the_time,
+            "C3 reproduced: with Ipopt, a step of RDES",
+        ),
+        ("GES", paper_claims.ges_takes_the_same_time, "C4 reproduced: with Ipopt, a step of GES"),
     ],
 )
 def test_a_bar_is_as_long_as_the_ratio_that_the_verdict_rests_on(learner, judge, words):
@@ -241,7 +246,7 @@ def test_a_bar_is_as_long_as_the_ratio_that_the_verdict_rests_on(learner, judge,
 
 def test_without_the_paper_s_solver_nothing_is_said_of_its_time():
     fast = TIMES[TIMES.solver == "riccati"]
-    figure = figures.times(fast, claims.rdes_takes_half_the_time(fast), "RDES")
+    figure = figures.times(fast, paper_claims.rdes_takes_half_the_time(fast), "RDES")
     assert title(figure) == "C3 not decidable here: no time was taken with Ipopt"
 
 
@@ -252,7 +257,7 @@ def test_the_correlation_of_td_errors_is_drawn_lag_by_lag():
     records = Records(experiment, {"delta": np.append(delta, np.nan)}, {}, {})
     curvature = Curvature(np.arange(3), np.ones(3), np.full(3, 0.01))
     assumptions = (Assumption("one", "", holds=False), Assumption("other", "", holds=True))
-    one = claims.convergence_is_guaranteed(assumptions)
+    one = paper_claims.convergence_is_guaranteed(assumptions)
     figure = figures.theorem(assumptions, one, records, curvature)
     bars = [patch.get_height() for patch in figure.axes[0].patches][: figures.LAGS]
     np.testing.assert_allclose(bars[:5], [0.8, 0.6, 0.4, 0.2, 0.0], atol=0.1)

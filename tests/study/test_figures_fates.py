@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from nmpcrl.claims.failure_modes import OVER_PREDICTED, OVERSHOOT, rise
 from nmpcrl.study import Experiment
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.figures import fates
-from nmpcrl.study.mechanisms import OVER_PREDICTED, OVERSHOOT, rise
 
 
 def unlike(experiment: Experiment) -> dict:

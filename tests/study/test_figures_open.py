@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from nmpcrl.analysis.summary import Digest, table
+from nmpcrl.claims.evidence import Evidence, paths
+from nmpcrl.claims.measures import MEASURES
+from nmpcrl.claims.robustness import atlas, telling
 from nmpcrl.study import Experiment, paper, plan
-from nmpcrl.study.atlas import atlas, telling
-from nmpcrl.study.evidence import Evidence, paths
 from nmpcrl.study.figures import atlas as maps
 from nmpcrl.study.figures import open as figures
-from nmpcrl.study.measures import MEASURES
 from nmpcrl.study.store import Study
 
 VARIANT = "Q(s, a)"

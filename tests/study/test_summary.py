@@ -5,12 +5,12 @@ import re
 import pandas as pd
 import pytest
 
+from nmpcrl.claims.flips import COLUMNS
+from nmpcrl.claims.published import Published
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study import Experiment, summary
 from nmpcrl.study.departures import DEPARTURES
-from nmpcrl.study.flips import COLUMNS
 from nmpcrl.study.plan import VARIANTS
-from nmpcrl.study.published import Published
-from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 
 ABOUT = {
     "runs": {"main": 1200, "controls": 60, "soft box": 40, "tanh": 20},

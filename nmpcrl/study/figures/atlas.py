@@ -13,16 +13,16 @@ from matplotlib.ticker import FuncFormatter
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.summary import Digest
-from nmpcrl.study.atlas import WHOLE, groups
+from nmpcrl.claims.evidence import Evidence, paths
+from nmpcrl.claims.measures import MEASURES, Values
+from nmpcrl.claims.paper_claims import experiment_of
+from nmpcrl.claims.robustness import WHOLE, groups
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.study.cards import WORDS
-from nmpcrl.study.claims import experiment_of
-from nmpcrl.study.evidence import Evidence, paths
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.figures.open import plain
 from nmpcrl.study.figures.rdes import headed
 from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
-from nmpcrl.study.measures import MEASURES, Values
-from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 
 ASKED = {  # at the head of a column
     "C1": "DES diverges,\nRDES does not",
@@ -51,7 +51,7 @@ def verdict_map(atlas: pd.DataFrame, mark: str) -> Figure:
     """What becomes of each claim in each row; a frame where it is not what it is held against.
 
     Args:
-        atlas: of `atlas.atlas`.
+        atlas: of `robustness.atlas`.
         mark: where the runs come from.
     """
     claims, rows = list(atlas.claim.unique()), list(atlas.variant.unique())
@@ -77,7 +77,7 @@ def telling(cells: pd.DataFrame, found: Evidence) -> Figure:
     """What lies behind some cells: a row each, the claim's measure and the costs of its runs.
 
     Args:
-        cells: of `atlas.telling`.
+        cells: of `robustness.telling`.
         found: runs and digests of the main table and of the variants.
     """
     if cells.empty:

@@ -16,11 +16,11 @@ from nmpcrl.analysis.policy_search import Found
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.summary import Digest
 from nmpcrl.analysis.trajectory import described
+from nmpcrl.claims.failure_modes import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.figures.controller import draw_task
 from nmpcrl.study.figures.rdes import headed
 from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
-from nmpcrl.study.mechanisms import OVERSHOOT
 
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
 PARTS: dict[

@@ -20,9 +20,11 @@ from nmpcrl import Vector
 from nmpcrl.analysis.curvature import Curvature
 from nmpcrl.analysis.statistics import interquartile_mean, performance_profile
 from nmpcrl.bench.timing import ratio
-from nmpcrl.study import claims, verdicts
-from nmpcrl.study.audit import Assumption
-from nmpcrl.study.evidence import Evidence, paths
+from nmpcrl.claims import paper_claims, rule
+from nmpcrl.claims.assumptions import Assumption
+from nmpcrl.claims.evidence import Evidence, paths
+from nmpcrl.claims.measures import MEASURES
+from nmpcrl.claims.rule import Verdict
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.figures.panels import (
     INK,
@@ -37,9 +39,7 @@ from nmpcrl.study.figures.panels import (
 from nmpcrl.study.figures.performance import PARTS
 from nmpcrl.study.figures.rdes import headed, label_panel
 from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
-from nmpcrl.study.measures import MEASURES
 from nmpcrl.study.records import Column, Records
-from nmpcrl.study.verdicts import Verdict
 
 LINE = 84  # characters of a title
 SOLVERS = {"riccati": "riccati", "fatrop": "fatrop", "ipopt": "Ipopt"}
@@ -72,7 +72,7 @@ def instability(found: Evidence, verdict: Verdict) -> Figure:
 @page
 def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     """C3 and C4: a step of a learner in steps of ES, by solver and by what takes the time."""
-    band = {"RDES": claims.HALF, "GES": claims.SAME_TIME}[learner]
+    band = {"RDES": paper_claims.HALF, "GES": paper_claims.SAME_TIME}[learner]
     solvers = list(timings.solver.unique())
     figure, axis = subplots(height=1.1 + 0.55 * len(solvers))
     axis.axvspan(*band, color="0.9", zorder=0, label="as claimed")
@@ -90,10 +90,12 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     handles.append(Rectangle((0, 0), 1, 1, color="0.9"))
     names = [*PARTS, "as claimed"]
     figure.legend(handles, names, loc="outside lower left", ncols=len(names), fontsize="small")
-    if claims.SOLVER not in solvers:
-        return _titled(figure, verdict, f"no time was taken with {SOLVERS[claims.SOLVER]}")
-    value = ratio(timings, claims.SOLVER, learner)
-    finding = f"with {SOLVERS[claims.SOLVER]}, a step of {learner} takes {value:.2f} of one of ES"
+    if paper_claims.SOLVER not in solvers:
+        return _titled(figure, verdict, f"no time was taken with {SOLVERS[paper_claims.SOLVER]}")
+    value = ratio(timings, paper_claims.SOLVER, learner)
+    finding = (
+        f"with {SOLVERS[paper_claims.SOLVER]}, a step of {learner} takes {value:.2f} of one of ES"
+    )
     return marked(_titled(figure, verdict, finding), "measured while this page was made")
 
 
@@ -117,7 +119,7 @@ def same_policy(found: Evidence, verdict: Verdict) -> Figure:
 def held_out(found: Evidence, verdict: Verdict) -> Figure:
     """C6: the network's error on held-out pairs when it is told theta, over that when it is not."""
     figure, panel, drawn = _measured(found, verdict)
-    finding = f"told θ, the network errs at most {claims.MORE_ACCURATE} times as much"
+    finding = f"told θ, the network errs at most {paper_claims.MORE_ACCURATE} times as much"
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
@@ -172,7 +174,7 @@ def theorem(
 def gains(found: Evidence, verdict: Verdict) -> Figure:
     """C9: noise-free cost at the end over that at the start, of RDES and GES."""
     figure, panel, drawn = _measured(found, verdict)
-    finding = f"learning saves {claims.BETTER:.0%} of the cost or more"
+    finding = f"learning saves {paper_claims.BETTER:.0%} of the cost or more"
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
@@ -221,23 +223,26 @@ def _measured(found: Evidence, verdict: Verdict) -> tuple[Figure, Axes, Evidence
 
 def _pairs(drawn: Evidence) -> pd.DataFrame:
     """How far RDES and GES are apart on the road and in cost, a row a layout, decay and seed."""
-    rdes, ges = verdicts.arms(drawn.runs, "RDES", "GES")
+    rdes, ges = rule.arms(drawn.runs, "RDES", "GES")
     driven = {
         (e.learner, e.layout, e.decay, e.seed): digest.states for e, digest in drawn.digests.items()
     }
     path = [
-        claims.apart(driven.get(("RDES", *cell)), driven.get(("GES", *cell))) for cell in rdes.index
+        paper_claims.apart(driven.get(("RDES", *cell)), driven.get(("GES", *cell)))
+        for cell in rdes.index
     ]
-    cost = claims.costlier(rdes, ges).abs().mask(np.isinf(rdes.final_cost), np.inf)
+    cost = paper_claims.costlier(rdes, ges).abs().mask(np.isinf(rdes.final_cost), np.inf)
     return pd.DataFrame({"path": path, "cost": cost}, rdes.index).reset_index()
 
 
 def _scatter(axis: Axes, pairs: pd.DataFrame, decay: str) -> None:
     """A letter a pair of one reading, in a panel that has room for both."""
-    box = Rectangle((0, 0), claims.SAME_PATH, claims.SAME_COST, facecolor="0.88", edgecolor=INK)
+    box = Rectangle(
+        (0, 0), paper_claims.SAME_PATH, paper_claims.SAME_COST, facecolor="0.88", edgecolor=INK
+    )
     axis.add_patch(box)
-    across = logarithmic(axis, "x", pairs.path.to_numpy(float), claims.SAME_PATH)
-    up = logarithmic(axis, "y", pairs.cost.to_numpy(float), claims.SAME_COST)
+    across = logarithmic(axis, "x", pairs.path.to_numpy(float), paper_claims.SAME_PATH)
+    up = logarithmic(axis, "y", pairs.cost.to_numpy(float), paper_claims.SAME_COST)
     for one in pairs[pairs.decay == decay].dropna(subset="cost").itertuples():
         letter = dots("GES", marker=f"${one.layout}$", markersize=5.5, alpha=0.8)
         axis.plot(across(one.path), up(one.cost), **letter)

@@ -7,9 +7,9 @@ from nmpcrl.analysis import metrics
 from nmpcrl.analysis.curvature import Curvature
 from nmpcrl.analysis.gradient_td import directions
 from nmpcrl.analysis.two_state import Chain, follow, growth
+from nmpcrl.claims.paper_claims import unstable
 from nmpcrl.learning.learners import gradient_td, semi_gradient
 from nmpcrl.study import paper
-from nmpcrl.study.claims import unstable
 from nmpcrl.study.figures.rdes import (
     DECAYS,
     headed,

@@ -17,15 +17,15 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.summary import Digest
 from nmpcrl.analysis.trajectory import closes_at
+from nmpcrl.claims.evidence import Evidence
+from nmpcrl.claims.measures import MEASURES, Values, at_borders, steady
+from nmpcrl.claims.rule import NEARLY_ALL, NEARLY_NONE
 from nmpcrl.control import Task
 from nmpcrl.study import paper
-from nmpcrl.study.evidence import Evidence
 from nmpcrl.study.figures.controller import draw_task
 from nmpcrl.study.figures.rdes import headed
 from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study.layouts import gaps
-from nmpcrl.study.measures import MEASURES, Values, at_borders, steady
-from nmpcrl.study.verdicts import NEARLY_ALL, NEARLY_NONE
 
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
 OPEN, CLOSED = "#1B7F79", "#882255"  # a gap; neither is a learner's colour

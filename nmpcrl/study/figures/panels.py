@@ -11,14 +11,14 @@ from matplotlib.ticker import NullFormatter
 
 from nmpcrl import Vector
 from nmpcrl.analysis.statistics import rate
-from nmpcrl.study import verdicts
-from nmpcrl.study.evidence import Evidence
+from nmpcrl.claims import rule
+from nmpcrl.claims.evidence import Evidence
+from nmpcrl.claims.measures import Values
+from nmpcrl.claims.rule import Verdict
 from nmpcrl.study.figures.open import plain
 from nmpcrl.study.figures.rdes import headed
 from nmpcrl.study.figures.style import LOOKS, marked
-from nmpcrl.study.measures import Values
 from nmpcrl.study.records import Column
-from nmpcrl.study.verdicts import Verdict
 
 LIMIT: dict[str, Any] = {"color": "0.4", "linewidth": 0.8, "linestyle": (0, (2, 2))}
 SUBTITLE: dict[str, Any] = {"loc": "left", "fontsize": "medium", "fontweight": "normal"}
@@ -81,7 +81,7 @@ def shares(axis: Axes, verdict: Verdict) -> None:
     """The share of yes with Wilson's interval: overall, in each layout, in each reading."""
     names = {"all": "all"} | {name: name for name in verdict.by_layout}
     names |= {name: f"per {name}" for name in verdict.by_decay}
-    for limit in (verdicts.NEARLY_NONE, verdicts.MAJORITY, verdicts.NEARLY_ALL):
+    for limit in (rule.NEARLY_NONE, rule.MAJORITY, rule.NEARLY_ALL):
         axis.axvline(limit, **LIMIT)
     labels = []
     for row, name in enumerate(names):

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.imitation import Imitation
-from nmpcrl.study.claims import diverged
+from nmpcrl.claims.paper_claims import diverged
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.figures.style import LOOKS, page, subplots
 from nmpcrl.study.records import Records

@@ -17,16 +17,16 @@ from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
 
 from nmpcrl import Vector
 from nmpcrl.analysis.summary import Digest
+from nmpcrl.claims.evidence import Evidence
+from nmpcrl.claims.paper_claims import divergence, instability
+from nmpcrl.claims.rule import UNDECIDABLE, Verdict
 from nmpcrl.study.cards import WORDS
-from nmpcrl.study.claims import divergence, instability
-from nmpcrl.study.evidence import Evidence
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.figures.panels import LIMIT, SUBTITLE, bundle, legend, line, part, sourced
 from nmpcrl.study.figures.rdes import headed, label_panel
 from nmpcrl.study.figures.style import page, subplots
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import Study
-from nmpcrl.study.verdicts import UNDECIDABLE, Verdict
 
 CEILING = 4.0  # times theta_init's cost without noise, where the panels end
 Curve = Callable[[Digest], tuple[Vector, Vector]]  # episodes and costs

@@ -11,10 +11,11 @@ import pytest
 
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summary import digest, row, table
-from nmpcrl.study import Experiment, paper, plan, published, run, sweep
+from nmpcrl.claims import published
+from nmpcrl.claims.published import FILES, Damaged, Published, compare, load, publish
+from nmpcrl.claims.rule import PARTLY, REPRODUCED, Verdict
+from nmpcrl.study import Experiment, paper, plan, run, sweep
 from nmpcrl.study.experiment import frozen_arm
-from nmpcrl.study.published import FILES, Damaged, Published, compare, load, publish
-from nmpcrl.study.verdicts import PARTLY, REPRODUCED, Verdict
 
 RUNS = (
     *sweep(learner=("ES", "frozen"), seed=(0, 1, 2, 3), episodes=4, steps=6, evaluate_every=2),

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nmpcrl.analysis.statistics import rate
-from nmpcrl.study.verdicts import (
+from nmpcrl.claims.rule import (
     CELL,
     MAJORITY,
     NEARLY_ALL,

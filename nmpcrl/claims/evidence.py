@@ -13,10 +13,10 @@ import pandas as pd
 
 from nmpcrl.analysis.summaries import fetch_digests
 from nmpcrl.analysis.summary import Digest, table
+from nmpcrl.claims.published import fates_of, load
 from nmpcrl.study import paper, plan
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
 from nmpcrl.study.parameters import ParameterError
-from nmpcrl.study.published import fates_of, load
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import Study
 
@@ -120,7 +120,7 @@ def gather(
 
 
 def paths(evidence: Evidence) -> Mapping[Experiment, Column]:
-    """States of each run's last drive without noise, as `claims.judge` takes them."""
+    """States of each run's last drive without noise, as `paper_claims.judge` takes them."""
     return {experiment: digest.states for experiment, digest in evidence.digests.items()}
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nmpcrl.study.claims import CLAIMS, Paths, judge_runs
+from nmpcrl.claims.paper_claims import CLAIMS, Paths, judge_runs
+from nmpcrl.claims.rule import CELL, UNDECIDABLE, Verdict
 from nmpcrl.study.experiment import PAPER
 from nmpcrl.study.plan import MAIN_TABLE
-from nmpcrl.study.verdicts import CELL, UNDECIDABLE, Verdict
 
 COLUMNS = ("variant", "claim", "outcome", "base", "flips", "share", "base_share", "pairs", "p")
 

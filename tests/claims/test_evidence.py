@@ -5,8 +5,9 @@ import pytest
 
 from nmpcrl.analysis.summaries import fetch_digests
 from nmpcrl.analysis.summary import table
-from nmpcrl.study import ParameterError, evidence, published
-from nmpcrl.study.evidence import gather, needed
+from nmpcrl.claims import evidence, published
+from nmpcrl.claims.evidence import gather, needed
+from nmpcrl.study import ParameterError
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.plan import fresh, main_table
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nmpcrl.claims.flips import flips, spread
+from nmpcrl.claims.paper_claims import Paths, judge_runs
+from nmpcrl.claims.rule import CELL, Verdict
 from nmpcrl.study import plan
-from nmpcrl.study.claims import Paths, judge_runs
-from nmpcrl.study.flips import flips, spread
-from nmpcrl.study.verdicts import CELL, Verdict
 
 WHOLE = "main table"
 PARTS = {"layout": "B", "decay": "C"}  # of the main table, with the departures they read

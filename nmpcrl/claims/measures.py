@@ -12,10 +12,10 @@ import pandas as pd
 
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.statistics import rate
-from nmpcrl.study import claims
-from nmpcrl.study.claims import Paths, experiment_of
+from nmpcrl.claims import paper_claims
+from nmpcrl.claims.paper_claims import Paths, experiment_of
+from nmpcrl.claims.rule import CELL, arms, read
 from nmpcrl.study.experiment import PAPER
-from nmpcrl.study.verdicts import CELL, arms, read
 
 # One row a cell of layout, decay and seed, one column an arm; nan is unknown.
 Values: TypeAlias = pd.DataFrame
@@ -79,7 +79,7 @@ def saved(runs: pd.DataFrame) -> pd.Series:
 
     Minus infinity where a drive failed, and where training had to be stopped.
     """
-    return claims.gain(runs).where(runs.stopped == "finished", -np.inf)
+    return paper_claims.gain(runs).where(runs.stopped == "finished", -np.inf)
 
 
 def achieved(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
@@ -108,7 +108,7 @@ def _wander(runs: pd.DataFrame, _: Paths) -> Values:
     """Range of the noise-free cost over theta_init's; infinite where the run diverged."""
 
     def wander(arm: pd.DataFrame) -> pd.Series:
-        diverged = claims.divergence(arm)
+        diverged = paper_claims.divergence(arm)
         return arm.wander.mask(diverged.fillna(False).astype(bool), np.inf).where(diverged.notna())
 
     return _beside(runs, ("ES", "GES"), wander)
@@ -126,9 +126,9 @@ def _apart(runs: pd.DataFrame, paths: Paths) -> Values:
     }
     pairs = [(drives.get(("RDES", *c)), drives.get(("GES", *c))) for c in rdes.index]
     known = np.array([one is not None and other is not None for one, other in pairs], bool)
-    path = pd.Series([claims.apart(*pair) for pair in pairs], rdes.index, dtype=float)
-    cost = claims.costlier(rdes, ges).abs()
-    worse = np.maximum(path / claims.SAME_PATH, cost / claims.SAME_COST).fillna(np.inf)
+    path = pd.Series([paper_claims.apart(*pair) for pair in pairs], rdes.index, dtype=float)
+    cost = paper_claims.costlier(rdes, ges).abs()
+    worse = np.maximum(path / paper_claims.SAME_PATH, cost / paper_claims.SAME_COST).fillna(np.inf)
     worse = worse.mask(np.isinf(rdes.final_cost), np.inf)  # two that failed are not the same
     whole = rdes.stopped.notna() & ges.stopped.notna()
     return pd.DataFrame({"RDES and GES": worse.where(whole & known)})
@@ -150,7 +150,7 @@ def _inside(runs: pd.DataFrame, _: Paths) -> Values:
 
 def _gain(runs: pd.DataFrame, _: Paths) -> Values:
     """Share of theta_init's noise-free cost that is saved in the end."""
-    return _beside(runs, ("RDES", "GES"), claims.gain)
+    return _beside(runs, ("RDES", "GES"), paper_claims.gain)
 
 
 def _beside(
@@ -169,11 +169,11 @@ def _beside(
 
 MEASURES = {  # of C7, its weaker question: the stronger one has no border to speak of
     "C1": Measure(
-        "training cost / frozen arm's", claims.DIVERGED, _excess, contrast=True, nothing=1.0
+        "training cost / frozen arm's", paper_claims.DIVERGED, _excess, contrast=True, nothing=1.0
     ),
-    "C2": Measure("range of noise-free cost", claims.UNSTABLE, _wander, contrast=True),
+    "C2": Measure("range of noise-free cost", paper_claims.UNSTABLE, _wander, contrast=True),
     "C5": Measure("apart / what counts as the same", 1.0, _apart),
-    "C6": Measure("error with θ / without", claims.MORE_ACCURATE, _told, nothing=1.0),
+    "C6": Measure("error with θ / without", paper_claims.MORE_ACCURATE, _told, nothing=1.0),
     "C7": Measure("largest Ξ without noise", TOUCH, _inside),
-    "C9": Measure("fall of noise-free cost", claims.BETTER, _gain, at_least=True),
+    "C9": Measure("fall of noise-free cost", paper_claims.BETTER, _gain, at_least=True),
 }

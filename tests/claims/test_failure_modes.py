@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.summary import Digest
-from nmpcrl.study import Experiment, paper
-from nmpcrl.study.experiment import frozen_arm
-from nmpcrl.study.mechanisms import (
+from nmpcrl.claims.failure_modes import (
     CUT_SHORT,
     ENDINGS,
     MECHANISMS,
@@ -21,6 +19,8 @@ from nmpcrl.study.mechanisms import (
     mechanism,
     rise,
 )
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.experiment import frozen_arm
 
 EPISODES, EVERY, START_COST = 40, 10, 1000.0
 RISING = (1000.0, 990.0, 1200.0, 1200.0, 1200.0)  # at episodes 0, 10, 20, 30, 40

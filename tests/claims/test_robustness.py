@@ -6,11 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.study import Experiment, claims, plan
-from nmpcrl.study.atlas import WHOLE, atlas, departure, groups, left_out, telling
+from nmpcrl.claims import paper_claims
+from nmpcrl.claims.robustness import WHOLE, atlas, departure, groups, left_out, telling
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED
+from nmpcrl.study import Experiment, plan
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import PAPER, frozen_arm
-from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED
 
 LITERAL, CLIPPED = "literal", "no clipping"
 PLACE = np.zeros((3, 3))
@@ -18,7 +19,9 @@ PLACE = np.zeros((3, 3))
 
 def summary(experiment: Experiment, variant: str, **unlike) -> dict:
     """The row of a run that saved a tenth and in which nothing went wrong."""
-    counts = {f"{name}_{size}": 0 for name in ("inside", "eval_inside") for size in claims.SIZES}
+    counts = {
+        f"{name}_{size}": 0 for name in ("inside", "eval_inside") for size in paper_claims.SIZES
+    }
     return (
         asdict(experiment)
         | {"theta": " ".join(map(repr, experiment.theta)), "variant": variant}
@@ -46,7 +49,7 @@ def study(**unlike) -> pd.DataFrame:
 
 
 def paths(runs: pd.DataFrame) -> dict[Experiment, np.ndarray]:
-    return {claims.experiment_of(row): PLACE for row in runs.to_dict("records")}
+    return {paper_claims.experiment_of(row): PLACE for row in runs.to_dict("records")}
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +83,7 @@ def test_the_row_of_the_whole_repeats_the_verdicts(costly):
     runs, found = costly
     main = runs[runs.variant == plan.MAIN_TABLE]
     whole = found[found.variant == WHOLE].set_index("claim")
-    for verdict in claims.judge_runs(main, paths(runs)):
+    for verdict in paper_claims.judge_runs(main, paths(runs)):
         assert whole.outcome[verdict.claim] == verdict.outcome
         assert whole.share[verdict.claim] == verdict.share
 

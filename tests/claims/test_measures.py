@@ -7,10 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.study import Experiment, claims
+from nmpcrl.claims import paper_claims
+from nmpcrl.claims.measures import MEASURES, Measure, achieved, at_borders, holds, steady
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED
+from nmpcrl.study import Experiment
 from nmpcrl.study.experiment import PAPER
-from nmpcrl.study.measures import MEASURES, Measure, achieved, at_borders, holds, steady
-from nmpcrl.study.verdicts import NOT, PARTLY, REPRODUCED
 
 SEEDS = range(5)
 
@@ -39,8 +40,11 @@ def drawn(seed: int) -> pd.DataFrame:
                 "eval_worst_overlap": 0.05 if inside else -0.1,
                 "imitation_with": rng.uniform(0.5, 1.1) if learner == "RDES" else np.nan,
                 "imitation_without": 1.0,
-                **{f"inside_{size}": 0 for size in claims.SIZES},
-                **{f"eval_inside_{size}": inside * (size == "medium") for size in claims.SIZES},
+                **{f"inside_{size}": 0 for size in paper_claims.SIZES},
+                **{
+                    f"eval_inside_{size}": inside * (size == "medium")
+                    for size in paper_claims.SIZES
+                },
                 **{f"theta_{i}": value for i, value in enumerate(experiment.theta)},
             }
         )
@@ -51,13 +55,13 @@ def drives(runs: pd.DataFrame, seed: int) -> dict[Experiment, np.ndarray]:
     """Drives that stand a drawn distance away from the start; some fail."""
     rng = np.random.default_rng(seed)
     away = rng.choice([0.0, 0.1, 0.3, np.nan], len(runs))
-    named = map(claims.experiment_of, runs.to_dict("records"))
+    named = map(paper_claims.experiment_of, runs.to_dict("records"))
     return {e: np.full((3, 3), x) for e, x in zip(named, away, strict=True)}
 
 
-def asked(runs: pd.DataFrame, paths: dict) -> dict[str, tuple[pd.Series, claims.Verdict]]:
+def asked(runs: pd.DataFrame, paths: dict) -> dict[str, tuple[pd.Series, paper_claims.Verdict]]:
     """What the measure answers, and the verdict, by claim."""
-    verdicts = claims.judge_runs(runs, paths)
+    verdicts = paper_claims.judge_runs(runs, paths)
     return {
         v.claim: (holds(MEASURES[v.claim], MEASURES[v.claim].of(runs, paths)), v) for v in verdicts
     }

@@ -7,14 +7,14 @@ from nmpcrl.analysis import summary
 from nmpcrl.analysis.curvature import dropped_curvature
 from nmpcrl.analysis.summary import Digest
 from nmpcrl.bench.timing import time_learners
-from nmpcrl.study import published
-from nmpcrl.study.additions import judge_additions
-from nmpcrl.study.audit import audit
-from nmpcrl.study.claims import judge
+from nmpcrl.claims import published
+from nmpcrl.claims.assumptions import audit
+from nmpcrl.claims.own_claims import judge_additions
+from nmpcrl.claims.paper_claims import judge
+from nmpcrl.claims.rule import Verdict
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.plan import MAIN_TABLE
 from nmpcrl.study.store import fetch_all
-from nmpcrl.study.verdicts import Verdict
 
 AUDITED = Experiment("GES")  # whose whole run C8 is measured in
 TIMED = 200  # steps of each learner, for C3 and C4

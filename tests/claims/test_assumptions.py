@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.curvature import Curvature
+from nmpcrl.claims.assumptions import audit
 from nmpcrl.study import Experiment, Records, Study, paper
-from nmpcrl.study.audit import audit
 
 KINK = (0.5, 2.2 - 1.25 * np.sqrt(1 + paper.THETA_INIT[-1]), 0.0)  # Xi + theta_c = 0 in layout A
 

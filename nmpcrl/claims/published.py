@@ -3,7 +3,7 @@
 - `processes.csv`: one row a run, `summary.row`, with the part of the study it belongs to and its key;
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
-- `verdicts.json`: what became of each claim;
+- `rule.json`: what became of each claim;
 - `about.json`: code, libraries and machine.
 """
 
@@ -27,17 +27,17 @@ import nmpcrl
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summary import Digest, row
 from nmpcrl.bench.suite import machine
+from nmpcrl.claims.failure_modes import fates
+from nmpcrl.claims.paper_claims import experiment_of
+from nmpcrl.claims.rule import Verdict
 from nmpcrl.study import store
-from nmpcrl.study.claims import experiment_of
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.mechanisms import fates
 from nmpcrl.study.records import Column
-from nmpcrl.study.verdicts import Verdict
 
 FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
-WORDS = ["ending", "wrong", "mechanism"]  # of `mechanisms.fates`, as the next
+WORDS = ["ending", "wrong", "mechanism"]  # of `failure_modes.fates`, as the next
 FATE = [*WORDS, "episode"]
 MEASURES = ("final_cost", "training_cost")  # by which runs of another machine are judged
 SLACK = 0.01  # of theta_init's cost, that they may be out of the published spread

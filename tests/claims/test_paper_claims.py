@@ -11,11 +11,12 @@ import pytest
 
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.analysis.summary import digest, row, table
-from nmpcrl.study import Experiment, Study, additions, claims, paper, run
-from nmpcrl.study.audit import Assumption
-from nmpcrl.study.claims import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims import own_claims, paper_claims
+from nmpcrl.claims.assumptions import Assumption
+from nmpcrl.claims.flips import flips, spread
+from nmpcrl.claims.paper_claims import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.study import Experiment, Study, paper, run
 from nmpcrl.study.experiment import LEARNERS, PAPER
-from nmpcrl.study.flips import flips, spread
 
 START_COST = 1000.0  # noise-free cost of theta_init
 SEEDS = range(5)
@@ -58,7 +59,7 @@ def both(*changes: Changes) -> Changes:
 
 def paths(runs: pd.DataFrame, apart: float = 0.0, seeds=SEEDS) -> dict[Experiment, np.ndarray]:
     """Drives that stand still, those of RDES with some seeds a step away [m]."""
-    named = [claims.experiment_of(one) for one in runs.to_dict("records")]
+    named = [paper_claims.experiment_of(one) for one in runs.to_dict("records")]
     away = {e: apart if e.learner == "RDES" and e.seed in seeds else 0.0 for e in named}
     return {e: PLACE + [away[e], 0, 0] for e in named}
 
@@ -75,9 +76,9 @@ def timings(rdes=0.5, ges=1.0) -> pd.DataFrame:
     )
 
 
-def judge(runs: pd.DataFrame) -> tuple[claims.Verdict, ...]:
+def judge(runs: pd.DataFrame) -> tuple[paper_claims.Verdict, ...]:
     broken = [Assumption("a finite MDP", "it is not", holds=False)]
-    return claims.judge(runs, paths=paths(runs), timings=timings(), assumptions=broken)
+    return paper_claims.judge(runs, paths=paths(runs), timings=timings(), assumptions=broken)
 
 
 SOME = range(2)  # of five seeds
@@ -100,7 +101,7 @@ CONTRASTS = [
 @pytest.mark.parametrize(("des", "rdes", "outcome"), CONTRASTS)
 def test_c1_asks_in_how_many_pairs_des_diverged_and_rdes_did_not(des, rdes, outcome):
     runs = study(both(of("DES", des, **BAD), of("RDES", rdes, **BAD)))
-    verdict = claims.des_diverges_and_rdes_does_not(runs)
+    verdict = paper_claims.des_diverges_and_rdes_does_not(runs)
     assert (verdict.claim, verdict.outcome) == ("C1", outcome)
     spared = [seed for seed in des if seed not in rdes]
     assert verdict.counts["all"] == (2 * len(spared), 10)
@@ -109,7 +110,7 @@ def test_c1_asks_in_how_many_pairs_des_diverged_and_rdes_did_not(des, rdes, outc
 @pytest.mark.parametrize(("es", "ges", "outcome"), CONTRASTS)
 @pytest.mark.parametrize("why", [SWAYING, BAD])  # what diverged is unstable, too
 def test_c2_asks_in_how_many_pairs_es_was_unstable_and_ges_was_not(es, ges, outcome, why):
-    verdict = claims.es_is_unstable_and_ges_is_stable(
+    verdict = paper_claims.es_is_unstable_and_ges_is_stable(
         study(both(of("ES", es, **why), of("GES", ges, **why)))
     )
     assert (verdict.claim, verdict.outcome) == ("C2", outcome)
@@ -118,8 +119,8 @@ def test_c2_asks_in_how_many_pairs_es_was_unstable_and_ges_was_not(es, ges, outc
 @pytest.mark.parametrize(
     ("columns", "diverged"),
     [
-        ({"excess": claims.DIVERGED}, False),
-        ({"excess": np.nextafter(claims.DIVERGED, 2)}, True),
+        ({"excess": paper_claims.DIVERGED}, False),
+        ({"excess": np.nextafter(paper_claims.DIVERGED, 2)}, True),
         ({"excess": np.inf}, True),
         ({"excess": 0.1, "stopped": "diverged: theta"}, True),
         ({"excess": np.nan, "stopped": "diverged: theta"}, True),
@@ -127,23 +128,27 @@ def test_c2_asks_in_how_many_pairs_es_was_unstable_and_ges_was_not(es, ges, outc
     ],
 )
 def test_a_run_diverged_if_it_was_stopped_or_cost_more_than_the_threshold(columns, diverged):
-    judged = claims.divergence(study(of("DES", **columns), learners=("DES",)))
+    judged = paper_claims.divergence(study(of("DES", **columns), learners=("DES",)))
     expected = pd.Series([diverged] * len(judged), dtype="boolean")
     pd.testing.assert_series_equal(judged, expected, check_names=False)
 
 
 @pytest.mark.parametrize(
     ("wander", "unstable"),
-    [(claims.UNSTABLE, False), (np.nextafter(claims.UNSTABLE, 1), True), (np.inf, True)],
+    [
+        (paper_claims.UNSTABLE, False),
+        (np.nextafter(paper_claims.UNSTABLE, 1), True),
+        (np.inf, True),
+    ],
 )
 def test_a_swing_of_exactly_the_threshold_is_stable(wander, unstable):
-    judged = claims.instability(study(of("ES", wander=wander), learners=("ES",)))
+    judged = paper_claims.instability(study(of("ES", wander=wander), learners=("ES",)))
     assert judged.unique().tolist() == [unstable]
 
 
 def test_without_a_frozen_arm_nothing_is_said_of_divergence():
     runs = study(lambda _: {"excess": np.nan})
-    outcomes = {v.claim: v.outcome for v in claims.judge_runs(runs, paths(runs))}
+    outcomes = {v.claim: v.outcome for v in paper_claims.judge_runs(runs, paths(runs))}
     assert {c for c, outcome in outcomes.items() if outcome == UNDECIDABLE} == {"C1", "C2"}
 
 
@@ -155,7 +160,7 @@ def test_without_a_frozen_arm_nothing_is_said_of_divergence():
     [(0.39, PARTLY), (0.4, REPRODUCED), (0.6, REPRODUCED), (0.61, PARTLY), (1.0, NOT), (1.3, NOT)],
 )
 def test_c3_wants_half_of_the_time_with_the_paper_s_solver(measured, outcome):
-    verdict = claims.rdes_takes_half_the_time(timings(rdes=measured))
+    verdict = paper_claims.rdes_takes_half_the_time(timings(rdes=measured))
     assert (verdict.claim, verdict.outcome) == ("C3", outcome)
     assert f"{measured:.2f} with ipopt, {measured:.2f} with fatrop" in verdict.evidence
 
@@ -165,7 +170,7 @@ def test_c3_wants_half_of_the_time_with_the_paper_s_solver(measured, outcome):
     [(0.7, NOT), (0.85, PARTLY), (0.9, REPRODUCED), (1.1, REPRODUCED), (1.2, PARTLY), (1.25, NOT)],
 )
 def test_c4_wants_the_same_time(measured, outcome):
-    verdict = claims.ges_takes_the_same_time(timings(ges=measured))
+    verdict = paper_claims.ges_takes_the_same_time(timings(ges=measured))
     assert (verdict.claim, verdict.outcome) == ("C4", outcome)
 
 
@@ -178,8 +183,8 @@ def test_c4_wants_the_same_time(measured, outcome):
     ],
 )
 def test_what_was_not_timed_with_the_paper_s_solver_is_not_decided(missing):
-    assert claims.rdes_takes_half_the_time(missing).outcome == UNDECIDABLE
-    assert claims.ges_takes_the_same_time(missing).outcome == UNDECIDABLE
+    assert paper_claims.rdes_takes_half_the_time(missing).outcome == UNDECIDABLE
+    assert paper_claims.ges_takes_the_same_time(missing).outcome == UNDECIDABLE
 
 
 # C5: the same policy
@@ -189,22 +194,22 @@ def test_what_was_not_timed_with_the_paper_s_solver_is_not_decided(missing):
     ("apart", "final", "seeds", "outcome"),
     [
         (0.0, START_COST, SEEDS, REPRODUCED),
-        (claims.SAME_PATH, START_COST * (1 - claims.SAME_COST), SEEDS, REPRODUCED),
-        (claims.SAME_PATH + 1e-9, START_COST, SEEDS, NOT),
-        (0.0, START_COST * (1 - claims.SAME_COST) - 1e-9, SEEDS, NOT),
+        (paper_claims.SAME_PATH, START_COST * (1 - paper_claims.SAME_COST), SEEDS, REPRODUCED),
+        (paper_claims.SAME_PATH + 1e-9, START_COST, SEEDS, NOT),
+        (0.0, START_COST * (1 - paper_claims.SAME_COST) - 1e-9, SEEDS, NOT),
         (1.0, START_COST, SOME, PARTLY),
         (np.nan, np.inf, SEEDS, NOT),  # rollouts that failed
     ],
 )
 def test_c5_wants_the_same_path_and_the_same_cost(apart, final, seeds, outcome):
     runs = study(of("RDES", seeds, final_cost=final))
-    verdict = claims.rdes_and_ges_reach_the_same_policy(runs, paths(runs, apart, seeds))
+    verdict = paper_claims.rdes_and_ges_reach_the_same_policy(runs, paths(runs, apart, seeds))
     assert (verdict.claim, verdict.outcome) == ("C5", outcome)
 
 
 def test_c5_compares_theta_and_does_not_judge_it():
     runs = study(of("RDES", theta_0=2.0))
-    verdict = claims.rdes_and_ges_reach_the_same_policy(runs, paths(runs))
+    verdict = paper_claims.rdes_and_ges_reach_the_same_policy(runs, paths(runs))
     assert verdict.outcome == REPRODUCED
     assert "theta by up to 50% (medians)" in verdict.evidence
 
@@ -212,26 +217,26 @@ def test_c5_compares_theta_and_does_not_judge_it():
 def test_two_policies_that_both_fail_are_not_the_same():
     runs = study(lambda _: {"final_cost": np.inf})
     failed = {e: np.full_like(PLACE, np.nan) for e in paths(runs)}
-    assert claims.rdes_and_ges_reach_the_same_policy(runs, failed).outcome == NOT
+    assert paper_claims.rdes_and_ges_reach_the_same_policy(runs, failed).outcome == NOT
 
 
 def test_a_run_that_had_to_be_stopped_left_no_policy_however_low_its_last_cost():
     runs = study(lambda _: {"final_cost": 500.0, "stopped": "diverged: theta"})
-    outcomes = {v.claim: v.outcome for v in claims.judge_runs(runs, paths(runs))}
+    outcomes = {v.claim: v.outcome for v in paper_claims.judge_runs(runs, paths(runs))}
     assert outcomes["C5"] == outcomes["C9"] == NOT
     runs = study(of("TDC", final_cost=500.0, stopped="diverged: theta"))
-    assert additions.tdc_is_at_least_as_good_as_ges(runs).outcome == NOT
+    assert own_claims.tdc_is_at_least_as_good_as_ges(runs).outcome == NOT
 
 
 def test_a_path_that_is_not_there_is_no_answer():
     runs = study()
-    assert claims.rdes_and_ges_reach_the_same_policy(runs, {}).outcome == UNDECIDABLE
+    assert paper_claims.rdes_and_ges_reach_the_same_policy(runs, {}).outcome == UNDECIDABLE
 
 
 def test_robots_are_as_far_apart_as_they_ever_come_whatever_their_headings():
     one, other = np.zeros((2, 4, 3))
     other[2], other[3] = (3.0, 4.0, 0.0), (0.0, 0.0, 9.0)
-    assert claims.apart(one, other) == 5
+    assert paper_claims.apart(one, other) == 5
 
 
 # C6: the network
@@ -240,14 +245,14 @@ def test_robots_are_as_far_apart_as_they_ever_come_whatever_their_headings():
 @pytest.mark.parametrize(
     ("told", "seeds", "outcome"),
     [
-        (claims.MORE_ACCURATE, SEEDS, REPRODUCED),
-        (np.nextafter(claims.MORE_ACCURATE, 1), SOME, PARTLY),
-        (np.nextafter(claims.MORE_ACCURATE, 1), SEEDS, NOT),
+        (paper_claims.MORE_ACCURATE, SEEDS, REPRODUCED),
+        (np.nextafter(paper_claims.MORE_ACCURATE, 1), SOME, PARTLY),
+        (np.nextafter(paper_claims.MORE_ACCURATE, 1), SEEDS, NOT),
         (np.nan, SEEDS, UNDECIDABLE),
     ],
 )
 def test_c6_wants_a_clearly_smaller_error(told, seeds, outcome):
-    verdict = claims.theta_makes_the_network_more_accurate(
+    verdict = paper_claims.theta_makes_the_network_more_accurate(
         study(of("RDES", seeds, imitation_with=told))
     )
     assert (verdict.claim, verdict.outcome) == ("C6", outcome)
@@ -270,13 +275,13 @@ def test_c6_wants_a_clearly_smaller_error(told, seeds, outcome):
 )
 def test_c7_forgives_overlaps_in_training_in_part_and_no_others(columns, seeds, outcome):
     runs = study(lambda e: columns if e.seed in seeds else {})
-    verdict = claims.constraints_hold(runs)
+    verdict = paper_claims.constraints_hold(runs)
     assert (verdict.claim, verdict.outcome) == ("C7", outcome)
 
 
 def test_c7_counts_every_violation_by_size():
     sizes = {"inside_small": 7, "inside_medium": 2, "inside_large": 1, "eval_inside_large": 3}
-    evidence = claims.constraints_hold(study(of("ES", **sizes, inputs=4, outside=6))).evidence
+    evidence = paper_claims.constraints_hold(study(of("ES", **sizes, inputs=4, outside=6))).evidence
     assert "40 actions left" in evidence
     assert "70, 20 and 10 lay in an obstacle" in evidence
     assert "without noise 0, 0 and 30" in evidence
@@ -286,7 +291,7 @@ def test_c7_counts_every_violation_by_size():
 @pytest.mark.parametrize("learner", sorted(set(LEARNERS) - set(PAPER)))
 def test_what_the_paper_does_not_have_is_not_asked_to_keep_its_promises(learner):
     worst = of(learner, eval_inside_large=9, inputs=9)
-    assert claims.constraints_hold(study(worst)).outcome == REPRODUCED
+    assert paper_claims.constraints_hold(study(worst)).outcome == REPRODUCED
 
 
 # C8: the theorem
@@ -297,7 +302,7 @@ def test_what_the_paper_does_not_have_is_not_asked_to_keep_its_promises(learner)
 )
 def test_c8_wants_every_assumption(holds, outcome):
     assumptions = tuple(Assumption("a finite MDP", "it is not", holds=one) for one in holds)
-    verdict = claims.convergence_is_guaranteed(assumptions)
+    verdict = paper_claims.convergence_is_guaranteed(assumptions)
     assert (verdict.claim, verdict.outcome) == ("C8", outcome)
     assert ("a finite MDP" in verdict.evidence) == (outcome == NOT)
 
@@ -308,22 +313,22 @@ def test_c8_wants_every_assumption(holds, outcome):
 @pytest.mark.parametrize(
     ("rdes", "ges", "outcome"),
     [
-        (900.0, START_COST * (1 - claims.BETTER), REPRODUCED),
-        (900.0, START_COST * (1 - claims.BETTER) + 1e-9, PARTLY),
+        (900.0, START_COST * (1 - paper_claims.BETTER), REPRODUCED),
+        (900.0, START_COST * (1 - paper_claims.BETTER) + 1e-9, PARTLY),
         (1000.0, 1100.0, NOT),
         (np.inf, np.inf, NOT),
     ],
 )
 def test_c9_wants_both_methods_to_beat_the_frozen_theta(rdes, ges, outcome):
     runs = study(both(of("RDES", final_cost=rdes), of("GES", final_cost=ges)))
-    verdict = claims.learning_beats_the_frozen_theta(runs)
+    verdict = paper_claims.learning_beats_the_frozen_theta(runs)
     assert (verdict.claim, verdict.outcome) == ("C9", outcome)
     assert verdict.counts["all"][1] == 20
 
 
 def test_a_run_that_got_stuck_or_failed_is_said_to_be_so_and_counts():
     runs = study(both(of("RDES", (0,), final_cost=np.inf), of("GES", (1,), distance=5.0)))
-    evidence = claims.learning_beats_the_frozen_theta(runs).evidence
+    evidence = paper_claims.learning_beats_the_frozen_theta(runs).evidence
     assert "2 end more than 0.5 away" in evidence
     assert "in 2 runs one of the last three failed or training was stopped" in evidence
 
@@ -333,13 +338,15 @@ def test_a_run_that_got_stuck_or_failed_is_said_to_be_so_and_counts():
 
 def test_nine_claims_are_judged_in_order_and_each_says_what_it_rests_on():
     verdicts = judge(study())
-    assert [v.claim for v in verdicts] == [f"C{i}" for i in range(1, 10)] == list(claims.CLAIMS)
+    assert (
+        [v.claim for v in verdicts] == [f"C{i}" for i in range(1, 10)] == list(paper_claims.CLAIMS)
+    )
     assert all(v.statement and v.evidence and v.would_change for v in verdicts)
     assert {v.outcome for v in verdicts} <= {REPRODUCED, PARTLY, NOT, UNDECIDABLE}
 
 
 def test_every_claim_says_beforehand_what_is_asked_and_where_the_border_is():
-    for claim in (*claims.CLAIMS.values(), *additions.ADDITIONS.values()):
+    for claim in (*paper_claims.CLAIMS.values(), *own_claims.ADDITIONS.values()):
         said = asdict(claim)
         assert bool(said.pop("learners")) == (claim.name not in ("C3", "C4", "C8")), claim
         assert all(said.values()), claim
@@ -356,7 +363,7 @@ def test_runs_shorter_than_the_paper_s_decide_nothing_about_learning():
 
 def test_without_runs_nothing_is_decided():
     runs = study()
-    verdicts = claims.judge_runs(runs[runs.learner == "frozen"], {})
+    verdicts = paper_claims.judge_runs(runs[runs.learner == "frozen"], {})
     assert {v.claim for v in verdicts} == RUNS_DECIDE
     assert {v.outcome for v in verdicts} == {UNDECIDABLE}
 
@@ -373,7 +380,7 @@ def test_without_runs_nothing_is_decided():
 )
 def test_a_claim_about_a_learner_that_was_not_run_is_not_decided(absent, open_):
     runs = study()
-    verdicts = claims.judge_runs(runs[runs.learner != absent], paths(runs))
+    verdicts = paper_claims.judge_runs(runs[runs.learner != absent], paths(runs))
     assert {v.claim for v in verdicts if v.outcome == UNDECIDABLE} == open_
 
 
@@ -381,7 +388,7 @@ def test_layouts_may_differ_and_are_judged_one_by_one():
     def worse(e):
         return BAD if e.learner == "DES" and e.layout == "B" else {}
 
-    verdict = claims.des_diverges_and_rdes_does_not(study(worse, layouts=("A", "B")))
+    verdict = paper_claims.des_diverges_and_rdes_does_not(study(worse, layouts=("A", "B")))
     assert verdict.by_layout == {"A": NOT, "B": REPRODUCED}
     assert verdict.outcome == PARTLY
     assert verdict.interval == (rate(10, 20).low, rate(10, 20).high)
@@ -390,7 +397,7 @@ def test_layouts_may_differ_and_are_judged_one_by_one():
 def test_what_could_not_be_finished_is_shown_as_infinite_and_never_as_inf():
     lost = {"final_cost": np.inf, "excess": np.inf, "wander": np.inf}
     runs = study(lambda _: lost)
-    evidence = [v.evidence for v in (*judge(runs), *additions.judge_additions(runs))]
+    evidence = [v.evidence for v in (*judge(runs), *own_claims.judge_additions(runs))]
     assert not any("inf" in sentence for sentence in evidence)
     assert "ended at ∞ and ∞ times" in evidence[0]
 
@@ -409,8 +416,8 @@ def short():
 def test_a_run_is_judged_from_its_records_as_from_the_table(short):
     runs = table([digest(records) for records in short.values()])
     for rule, measured in (
-        (claims.diverged, claims.divergence(runs)),
-        (claims.unstable, claims.instability(runs)),
+        (paper_claims.diverged, paper_claims.divergence(runs)),
+        (paper_claims.unstable, paper_claims.instability(runs)),
     ):
         judged = [rule(short, *pair) for pair in short.items()]
         assert judged == measured.tolist()
@@ -421,7 +428,7 @@ def test_a_row_of_the_table_names_its_experiment(short):
     for experiment, records in short.items():
         runs = pd.DataFrame([row(digest(records))])
         (one,) = runs.to_dict("records")
-        assert claims.experiment_of(one) == experiment
+        assert paper_claims.experiment_of(one) == experiment
 
 
 # What we add
@@ -430,10 +437,15 @@ def test_a_row_of_the_table_names_its_experiment(short):
 @pytest.mark.parametrize(
     ("claim", "learner", "against", "border"),
     [
-        (additions.tdc_is_at_least_as_good_as_ges, "TDC", "GES", 1 + claims.SAME_COST),
-        (additions.direction_matters, "ES", "random", 1 - claims.BETTER),
-        (additions.only_the_step_length_sets_ges_apart, "matched", "GES", 1 + claims.SAME_COST),
-        (additions.q_learning_is_at_least_as_good_as_es, "QL", "ES", 1 + claims.SAME_COST),
+        (own_claims.tdc_is_at_least_as_good_as_ges, "TDC", "GES", 1 + paper_claims.SAME_COST),
+        (own_claims.direction_matters, "ES", "random", 1 - paper_claims.BETTER),
+        (
+            own_claims.only_the_step_length_sets_ges_apart,
+            "matched",
+            "GES",
+            1 + paper_claims.SAME_COST,
+        ),
+        (own_claims.q_learning_is_at_least_as_good_as_es, "QL", "ES", 1 + paper_claims.SAME_COST),
     ],
 )
 def test_an_addition_holds_up_to_its_border_and_not_beyond(claim, learner, against, border):
@@ -447,25 +459,25 @@ def test_an_addition_holds_up_to_its_border_and_not_beyond(claim, learner, again
 
 
 def test_a_learner_that_ends_alike_may_not_end_cheaper_either():
-    runs = study(of("matched", final_cost=(1 - claims.SAME_COST) * START_COST - 1e-9))
-    assert additions.only_the_step_length_sets_ges_apart(runs).outcome == NOT
+    runs = study(of("matched", final_cost=(1 - paper_claims.SAME_COST) * START_COST - 1e-9))
+    assert own_claims.only_the_step_length_sets_ges_apart(runs).outcome == NOT
 
 
 def test_of_two_failures_none_is_better_and_none_is_worse():
     runs = study(lambda _: {"final_cost": np.inf})
-    outcomes = {v.claim: v.outcome for v in additions.judge_additions(runs)}
+    outcomes = {v.claim: v.outcome for v in own_claims.judge_additions(runs)}
     assert outcomes == {"B1": REPRODUCED, "B2": NOT, "B3": REPRODUCED, "B4": REPRODUCED}
 
 
 def test_an_addition_is_judged_where_its_learner_was_run():
     runs = study(layouts=("A", "B"))
-    verdict = additions.direction_matters(runs[(runs.learner != "random") | (runs.layout == "B")])
+    verdict = own_claims.direction_matters(runs[(runs.learner != "random") | (runs.layout == "B")])
     assert verdict.by_layout == {"B": NOT}
 
 
 def test_the_evidence_of_an_addition_has_the_probability_of_improvement():
     runs = study(of("TDC", final_cost=900.0))
-    evidence = additions.tdc_is_at_least_as_good_as_ges(runs).evidence
+    evidence = own_claims.tdc_is_at_least_as_good_as_ges(runs).evidence
     assert "TDC costs less than one of GES with probability 1.00 [1.00, 1.00]" in evidence
     assert "fell by +10.0% and +0.0%" in evidence
 
@@ -522,15 +534,15 @@ def test_a_claim_about_learners_that_a_variant_does_not_change_cannot_flip():
     assert set(flips(runs, paths(runs)).claim) == {"C2", "C5", "C7", "C9"}
 
 
-@pytest.mark.parametrize("name", sorted(RUNS_DECIDE | set(additions.ADDITIONS)))
+@pytest.mark.parametrize("name", sorted(RUNS_DECIDE | set(own_claims.ADDITIONS)))
 def test_those_whom_a_claim_asks_decide_it(name):
     runs = study(lambda e: BAD if e.learner in ("DES", "ES", "matched", "QL") else {})
 
     def outcome(some: pd.DataFrame) -> str:
-        decided = (*judge(some), *additions.judge_additions(some))
+        decided = (*judge(some), *own_claims.judge_additions(some))
         return next(v.outcome for v in decided if v.claim == name)
 
-    asked = (claims.CLAIMS | additions.ADDITIONS)[name].learners
+    asked = (paper_claims.CLAIMS | own_claims.ADDITIONS)[name].learners
     alone = runs[runs.learner.isin(asked)]
     assert outcome(alone) == outcome(runs) != UNDECIDABLE
     for learner in asked:
@@ -572,10 +584,10 @@ def test_a_setting_is_judged_at_a_time():
     runs = study()
     two = pd.concat([runs, study(alpha=3e-7)])
     with pytest.raises(ValueError, match="DES has several runs in layout A"):
-        claims.judge_runs(two, paths(two))
+        paper_claims.judge_runs(two, paths(two))
 
 
 def test_nudged_runs_keep_every_digit_of_their_theta():
     theta = tuple(np.nextafter(paper.THETA_INIT, 9))
     nudged = replace(Experiment(), theta=tuple(map(float, theta)))
-    assert claims.experiment_of(summary(nudged)) == nudged
+    assert paper_claims.experiment_of(summary(nudged)) == nudged

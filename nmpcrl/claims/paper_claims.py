@@ -19,13 +19,8 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.bench.timing import ratio
-from nmpcrl.study import paper
-from nmpcrl.study.audit import Assumption
-from nmpcrl.study.experiment import PAPER, Experiment
-from nmpcrl.study.layouts import ARRIVED
-from nmpcrl.study.records import Column, Records
-from nmpcrl.study.store import Study
-from nmpcrl.study.verdicts import (
+from nmpcrl.claims.assumptions import Assumption
+from nmpcrl.claims.rule import (
     CELL,
     NOT,
     PARTLY,
@@ -39,6 +34,11 @@ from nmpcrl.study.verdicts import (
     settle,
     shown,
 )
+from nmpcrl.study import paper
+from nmpcrl.study.experiment import PAPER, Experiment
+from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.records import Column, Records
+from nmpcrl.study.store import Study
 
 # A run diverged if it had to be stopped, or if its training cost over the last 20 episodes has a
 # median above this multiple of the frozen arm's under the same noise.

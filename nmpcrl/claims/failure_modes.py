@@ -1,6 +1,6 @@
 """Why a run went wrong, and where its robot ended, read off its digest.
 
-A run went wrong if it was stopped or diverged in training (`claims.divergence`), or if its final
+A run went wrong if it was stopped or diverged in training (`paper_claims.divergence`), or if its final
 noise-free cost is above theta_init's by more than `BETTER`. Its cost rose between the last rollout
 without noise that was not above theta_init's by so much and the first that was; where none was, in
 its last episodes. In these some ten episodes the mechanisms are looked for in the order of
@@ -18,9 +18,9 @@ import pandas as pd
 
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.summary import Digest, table
+from nmpcrl.claims.paper_claims import BETTER, divergence
 from nmpcrl.control import Task
 from nmpcrl.study import paper
-from nmpcrl.study.claims import BETTER, divergence
 from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.layouts import ARRIVED, gaps
 from nmpcrl.study.records import Column

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import probability_of_improvement
-from nmpcrl.study.claims import BETTER, SAME_COST, costlier, gain
+from nmpcrl.claims.paper_claims import BETTER, SAME_COST, costlier, gain
+from nmpcrl.claims.rule import Claim, Verdict, answered, arms, median, settle, shown
 from nmpcrl.study.experiment import PAPER
-from nmpcrl.study.verdicts import Claim, Verdict, answered, arms, median, settle, shown
 
 MEASURE = "final noise-free costs, in shares of theta_init's"
 
@@ -58,7 +58,7 @@ ADDITIONS = {
 
 
 def judge_additions(runs: pd.DataFrame) -> tuple[Verdict, ...]:
-    """The verdicts on all of them, in order; `runs` as `claims.judge` takes them."""
+    """The verdicts on all of them, in order; `runs` as `paper_claims.judge` takes them."""
     return (
         tdc_is_at_least_as_good_as_ges(runs),
         direction_matters(runs),
