@@ -28,7 +28,7 @@ class Evidence:
     """Runs, their summaries, and where each comes from."""
 
     digests: Study[Digest]  # a published one has fewer columns: see `Published`
-    runs: pd.DataFrame  # `summary.table` with `variant` and `source`, one row a run, in that order
+    runs: pd.DataFrame  # `text.table` with `variant` and `source`, one row a run, in that order
 
     @cached_property
     def main(self) -> "Evidence":

@@ -85,7 +85,7 @@ def counted(fates: pd.DataFrame, what: str = "mechanism") -> pd.DataFrame:
 
 
 def went_wrong(runs: pd.DataFrame) -> list[str]:
-    """What is wrong with each run of `summary.table`: "stopped", "training", "without noise", ""."""
+    """What is wrong with each run of `text.table`: "stopped", "training", "without noise", ""."""
     signs = {
         "stopped": runs.stopped != "finished",
         "training": divergence(runs).fillna(False),

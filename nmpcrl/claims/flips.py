@@ -23,7 +23,7 @@ def flips(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFr
     left out, for there is nothing to flip, and so are the controls, which change none of them.
 
     Args:
-        runs: of `summary.table`, with a column `variant`.
+        runs: of `text.table`, with a column `variant`.
         paths: as `judge` takes them, of the variants and of the main table.
         base: the `variant` of the main table's rows.
 

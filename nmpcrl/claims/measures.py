@@ -75,7 +75,7 @@ def steady(measure: Measure, values: Values) -> bool:
 
 
 def saved(runs: pd.DataFrame) -> pd.Series:
-    """Share of theta_init's noise-free cost that each run of `summary.table` saves in the end.
+    """Share of theta_init's noise-free cost that each run of `text.table` saves in the end.
 
     Minus infinity where a drive failed, and where training had to be stopped.
     """
@@ -88,7 +88,7 @@ def achieved(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
     1 is as good as what is possible and 0 as theta_init; nan where nothing is known to be possible.
 
     Args:
-        runs: of `summary.table`.
+        runs: of `text.table`.
         possible: share of theta_init's noise-free cost that can be saved, by layout.
     """
     known = {layout: share for layout, share in possible.items() if share > 0}

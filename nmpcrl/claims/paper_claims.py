@@ -180,7 +180,7 @@ def judge(
     """Every claim of the paper, in order.
 
     Args:
-        runs: of `summary.table`, all of one setting; a missing learner leaves its claims undecided.
+        runs: of `text.table`, all of one setting; a missing learner leaves its claims undecided.
         paths: states of the last rollout without noise; only those of RDES and GES are read.
         timings: of `time_learners`; what is not in it is not decided.
         assumptions: of `audit`.
@@ -385,7 +385,7 @@ def unstable(study: Study, experiment: Experiment, records: Records) -> bool:
 
 
 def experiment_of(row: Mapping[str, Any]) -> Experiment:
-    """The experiment that a row of `summary.table` summarises."""
+    """The experiment that a row of `text.table` summarises."""
     named = {field.name: row[field.name] for field in fields(Experiment)}
     theta = tuple(float(value) for value in named["theta"].split())
     return Experiment(**named | {"theta": theta})

@@ -1,6 +1,6 @@
 """The whole study as it was trained once, in `book/published`, small enough to go with the book.
 
-- `processes.csv`: one row a run, `summary.row`, with the part of the study it belongs to and its key;
+- `processes.csv`: one row a run, `text.row`, with the part of the study it belongs to and its key;
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
 - `rule.json`: what became of each claim;

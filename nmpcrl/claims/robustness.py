@@ -24,7 +24,7 @@ def atlas(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     """The map: the main table as a whole, the rows of `spread` over it, and those of `flips`.
 
     Args:
-        runs: of `summary.table`, with a column `variant`.
+        runs: of `text.table`, with a column `variant`.
         paths: as `judge` takes them.
 
     Returns:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from nmpcrl.bench import summary, targets
-from nmpcrl.study import cards, paper
+from nmpcrl.report import tables
+from nmpcrl.study import paper
 
 
 def outcomes(measured) -> dict[str, bool | None]:
@@ -139,7 +140,7 @@ def test_a_run_that_had_to_share_the_processor_says_so(measured):
 
 def test_the_card_has_a_row_and_a_badge_for_every_figure(measured):
     measured["loop"]["seconds"] = [1e-3] * 10
-    html = cards.target_table(targets.targets(measured), "some machine")
+    html = tables.target_table(targets.targets(measured), "some machine")
     assert html.count("<tr>") == 1 + 16
     assert html.count(">missed<") == 2
     assert html.count(">reached<") == 14

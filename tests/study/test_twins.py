@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.summary import Digest, digest
+from nmpcrl.report.figures import results
 from nmpcrl.study import twins
 from nmpcrl.study.experiment import Experiment, run
-from nmpcrl.study.figures import results
 
 SHORT = {"episodes": 2, "seeds": [3], "layout": "A"}
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from nmpcrl.claims.failure_modes import OVER_PREDICTED, OVERSHOOT, rise
+from nmpcrl.report.figures import failure_modes
 from nmpcrl.study import Experiment
 from nmpcrl.study.experiment import frozen_arm
-from nmpcrl.study.figures import fates
 
 
 def unlike(experiment: Experiment) -> dict:
@@ -27,7 +27,7 @@ def widths(axis) -> dict[tuple[int, int], float]:
 
 def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up):
     found = made_up(unlike)
-    figure = fates.reasons(found)
+    figure = failure_modes.reasons(found)
     assert figure.get_suptitle() == "32 of 80 runs went wrong: 16 overshoot, 16 none of these"
     signs, ends = (widths(axis) for axis in figure.axes)
     learners = [tick.get_text() for tick in figure.axes[0].get_yticklabels()]
@@ -41,8 +41,8 @@ def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up)
 
 
 def test_a_study_in_which_all_went_well_says_so(made_up):
-    assert fates.reasons(made_up()).get_suptitle() == "0 of 80 runs went wrong"
-    assert fates.traced({}, {}).get_suptitle() == "No run went wrong"
+    assert failure_modes.reasons(made_up()).get_suptitle() == "0 of 80 runs went wrong"
+    assert failure_modes.traced({}, {}).get_suptitle() == "No run went wrong"
 
 
 def test_every_example_has_a_column_with_its_thresholds_and_the_rise_in_grey(made_up):
@@ -50,7 +50,7 @@ def test_every_example_has_a_column_with_its_thresholds_and_the_rise_in_grey(mad
     names = {"overshoot": Experiment("DES"), "none of these": Experiment("RDES", seed=1)}
     examples = {name: found.digests[e] for name, e in names.items()}
     drives = {name: found.digests[frozen_arm(e)].states for name, e in names.items()}
-    figure = fates.traced(examples, drives)
+    figure = failure_modes.traced(examples, drives)
     columns = np.array(figure.axes).reshape(4, 2)
     assert figure.get_suptitle() == "One run of each kind: overshoot, none of these"
     assert [axis.get_title(loc="left").split("\n")[0] for axis in columns[0]] == list(names)

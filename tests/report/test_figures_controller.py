@@ -5,8 +5,8 @@ import pytest
 from matplotlib import pyplot
 
 from nmpcrl.learning.training import Persistent, Rollout, evaluate
+from nmpcrl.report.figures import controller, sensitivity
 from nmpcrl.study import Records, Study, paper, sweep
-from nmpcrl.study.figures import controller, sensitivity
 
 LEARNERS, DECAYS, EPISODES, STEPS = ("ES", "frozen"), ("step", "episode"), 4, 5
 

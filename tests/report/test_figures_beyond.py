@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from nmpcrl.analysis.policy_search import Found
 from nmpcrl.analysis.summary import Digest
+from nmpcrl.report.figures import beyond
+from nmpcrl.report.figures.style import LOOKS
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.figures import beyond
-from nmpcrl.study.figures.style import LOOKS
 
 EPISODES = 40
 THERE = np.linspace(paper.START, paper.TARGET, 30)  # a drive that arrives ...

@@ -20,11 +20,11 @@ from nmpcrl.analysis.summary import Digest
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.paper_claims import divergence, instability
 from nmpcrl.claims.rule import UNDECIDABLE, Verdict
-from nmpcrl.study.cards import WORDS
+from nmpcrl.report.figures.panels import LIMIT, SUBTITLE, bundle, legend, line, part, sourced
+from nmpcrl.report.figures.rdes import headed, label_panel
+from nmpcrl.report.figures.style import page, subplots
+from nmpcrl.report.tables import WORDS
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.figures.panels import LIMIT, SUBTITLE, bundle, legend, line, part, sourced
-from nmpcrl.study.figures.rdes import headed, label_panel
-from nmpcrl.study.figures.style import page, subplots
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import Study
 

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from nmpcrl.study.summary import listed
+from nmpcrl.report.text import listed
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,11 @@ from nmpcrl.claims.measures import MEASURES, Values
 from nmpcrl.claims.paper_claims import experiment_of
 from nmpcrl.claims.robustness import WHOLE, groups
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.study.cards import WORDS
+from nmpcrl.report.figures.layouts import plain
+from nmpcrl.report.figures.rdes import headed
+from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.report.tables import WORDS
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.figures.open import plain
-from nmpcrl.study.figures.rdes import headed
-from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
 
 ASKED = {  # at the head of a column
     "C1": "DES diverges,\nRDES does not",

@@ -9,8 +9,8 @@ from nmpcrl.analysis.curvature import dropped_curvature
 from nmpcrl.analysis.gradient_td import directions
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.two_state import Chain
+from nmpcrl.report.figures import ges, rdes
 from nmpcrl.study import Experiment, Study, paper, run, sweep
-from nmpcrl.study.figures import ges, rdes
 
 SMALL = {"episodes": 4, "steps": 45, "evaluate_every": 2}
 

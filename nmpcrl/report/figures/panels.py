@@ -15,9 +15,9 @@ from nmpcrl.claims import rule
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.measures import Values
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.study.figures.open import plain
-from nmpcrl.study.figures.rdes import headed
-from nmpcrl.study.figures.style import LOOKS, marked
+from nmpcrl.report.figures.layouts import plain
+from nmpcrl.report.figures.rdes import headed
+from nmpcrl.report.figures.style import LOOKS, marked
 from nmpcrl.study.records import Column
 
 LIMIT: dict[str, Any] = {"color": "0.4", "linewidth": 0.8, "linestyle": (0, (2, 2))}

@@ -12,8 +12,8 @@ from matplotlib.ticker import MaxNLocator
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.imitation import Imitation
 from nmpcrl.claims.paper_claims import diverged
+from nmpcrl.report.figures.style import LOOKS, page, subplots
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.figures.style import LOOKS, page, subplots
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Study
 

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.evidence import paths
+from nmpcrl.report.figures import panels, results, rollouts
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.figures import drives, panels, results
 
 SEEDS = 4
 FAST = np.ones((5, 2))  # 1 m/s, and the robot's bound is 0.6
@@ -124,7 +124,7 @@ def test_learners_that_were_not_run_leave_their_panels_empty(made_up):
 # Drives
 
 
-@pytest.mark.parametrize("draw", [drives.controls, drives.states])
+@pytest.mark.parametrize("draw", [rollouts.controls, rollouts.states])
 def test_every_drive_has_its_line_against_time(draw, made_up):
     figure = draw(made_up(), "A")
     assert {axis.get_xlabel() for axis in figure.axes} == {"", "time [s]"}
@@ -135,20 +135,20 @@ def test_every_drive_has_its_line_against_time(draw, made_up):
 
 
 def test_inputs_that_leave_their_bounds_are_counted(made_up):
-    assert title(drives.controls(made_up(), "A")) == (
+    assert title(rollouts.controls(made_up(), "A")) == (
         "In 16 drives of RDES and GES, all inputs keep within their bounds"
     )
     found = made_up(lambda e: {"actions": FAST} if (e.learner, e.seed) == ("GES", 0) else {})
-    assert "10 inputs leave their bounds" in title(drives.controls(found, "A"))
+    assert "10 inputs leave their bounds" in title(rollouts.controls(found, "A"))
 
 
 def test_drives_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
     published = {"actions": np.empty((0, 0))}
     found = made_up(lambda e: published if e.seed else {})
-    figure = drives.controls(found, "A")
+    figure = rollouts.controls(found, "A")
     assert title(figure).startswith("In 4 drives")
     assert all(len(thin(axis)) == 3 for axis in figure.axes)
-    nowhere = drives.controls(made_up(lambda e: published), "A")
+    nowhere = rollouts.controls(made_up(lambda e: published), "A")
     assert title(nowhere) == "Of no drive are the inputs kept"
 
 
@@ -161,28 +161,30 @@ def test_those_that_arrive_are_counted_and_those_that_were_stopped_are_not_drawn
         return {"reached": 50} if (experiment.learner, experiment.seed) == ("RDES", 1) else {}
 
     found = made_up(unlike)
-    assert title(drives.states(found, "A")) == (
+    assert title(rollouts.states(found, "A")) == (
         "In layout A, 12 of 14 drives of RDES and GES end at the target"
     )
-    figure = drives.paths(found, "A")
+    figure = rollouts.paths(found, "A")
     assert title(figure) == "In layout A: 12 arrived, 2 stuck, 2 stopped in training"
     ends = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 5]
     assert len(ends) == 3 * SEEDS - 1
-    assert title(drives.maps(found)) == "In all layouts: 24 arrived, 4 stuck, 4 stopped in training"
+    assert (
+        title(rollouts.maps(found)) == "In all layouts: 24 arrived, 4 stuck, 4 stopped in training"
+    )
 
 
 def test_a_drive_that_failed_is_drawn_as_far_as_it_got(made_up):
     broken = made_up().digests[Experiment("GES")].states.copy()
     broken[3:] = np.nan
     found = made_up(lambda e: {"states": broken} if e.learner == "GES" else {})
-    assert "8 failed" in title(drives.paths(found, "A"))
-    figure = drives.paths(found, "A")
+    assert "8 failed" in title(rollouts.paths(found, "A"))
+    figure = rollouts.paths(found, "A")
     assert sum(len(line.get_xdata()) == 3 for line in figure.axes[0].get_lines()) == SEEDS
-    assert "8 of 16 drives" in title(drives.states(found, "A"))
+    assert "8 of 16 drives" in title(rollouts.states(found, "A"))
 
 
 def test_every_layout_has_its_map(made_up):
-    figure = drives.maps(made_up(layouts=("A", "B", "D", "E"), seeds=(0,)))
+    figure = rollouts.maps(made_up(layouts=("A", "B", "D", "E"), seeds=(0,)))
     assert heads(figure) == ["A", "B", "D", "E"]
 
 
@@ -194,10 +196,10 @@ def test_every_layout_has_its_map(made_up):
     [
         results.figure_1,
         results.figure_2,
-        drives.controls,
-        drives.states,
-        drives.paths,
-        lambda found, _: drives.maps(found),
+        rollouts.controls,
+        rollouts.states,
+        rollouts.paths,
+        lambda found, _: rollouts.maps(found),
     ],
 )
 def test_a_figure_says_where_its_runs_come_from_and_is_closed(draw, made_up):

@@ -12,9 +12,9 @@ from matplotlib.ticker import MaxNLocator
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.bench.horizons import growth
-from nmpcrl.study.figures.controller import INK, LESS, MORE
-from nmpcrl.study.figures.rdes import headed
-from nmpcrl.study.figures.style import page, subplots
+from nmpcrl.report.figures.controller import INK, LESS, MORE
+from nmpcrl.report.figures.rdes import headed
+from nmpcrl.report.figures.style import page, subplots
 
 STARTS = {"cold": (INK, "o-"), "shifted": (LESS, "s--"), "same state": (MORE, "D-.")}
 SOLVERS = {"riccati": (MORE, "o-"), "fatrop": (LESS, "s--"), "ipopt": (INK, "^:")}

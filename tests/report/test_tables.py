@@ -10,7 +10,8 @@ from bs4 import BeautifulSoup
 from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.own_claims import ADDITIONS
 from nmpcrl.claims.paper_claims import CLAIMS, NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
-from nmpcrl.study import cards, main_study
+from nmpcrl.report import tables
+from nmpcrl.study import main_study
 from nmpcrl.study.paper import DEPARTURES
 
 OUTCOMES = (REPRODUCED, PARTLY, NOT, UNDECIDABLE)
@@ -30,20 +31,20 @@ def cells(table: str) -> list[list[str]]:
 
 @pytest.mark.parametrize("outcome", OUTCOMES)
 def test_a_verdict_has_a_badge_of_its_own_and_says_it_in_words(outcome):
-    table = cards.verdict_table([verdict(outcome)], "All of it.")
-    assert f'<span class="{cards.BADGES[outcome]}">{outcome}</span>' in table
-    assert len(set(cards.BADGES.values())) == len(OUTCOMES)
+    table = tables.verdict_table([verdict(outcome)], "All of it.")
+    assert f'<span class="{tables.BADGES[outcome]}">{outcome}</span>' in table
+    assert len(set(tables.BADGES.values())) == len(OUTCOMES)
 
 
 def test_a_verdict_shows_its_share_and_interval_where_it_has_one():
     shares = {"share": 0.75, "interval": (0.5, 0.875)}
-    judged = cells(cards.verdict_table([verdict(PARTLY, **shares), verdict(NOT)], "All of it."))
+    judged = cells(tables.verdict_table([verdict(PARTLY, **shares), verdict(NOT)], "All of it."))
     assert [row[1] for row in judged[1:]] == [f"{PARTLY}|75% [50%, 88%]", NOT]
 
 
 def test_a_claim_is_shown_with_all_that_was_fixed_beforehand():
     claims = [*CLAIMS.values(), *ADDITIONS.values()]
-    shown = cells(cards.claim_table(claims, "Fixed beforehand."))[1:]
+    shown = cells(tables.claim_table(claims, "Fixed beforehand."))[1:]
     for claim, row in zip(claims, shown, strict=True):
         text = " ".join(row).lower()
         fixed = asdict(claim) | {"would_change": ""}  # that is said of the verdict
@@ -53,19 +54,19 @@ def test_a_claim_is_shown_with_all_that_was_fixed_beforehand():
 
 def test_a_claim_is_shown_in_each_layout_and_reading_in_colour_and_in_words():
     parts = {"by_layout": {"A": REPRODUCED, "B": NOT}, "by_decay": {"step": UNDECIDABLE}}
-    table = cards.spread_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
+    table = tables.spread_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
     assert cells(table) == [
         ["Claim", "All", "A", "B", "per step"],
         ["C1", "partly", "yes", "no", "open"],  # and no row of what has no layouts
     ]
     for outcome in (PARTLY, *parts["by_layout"].values(), UNDECIDABLE):
-        assert f'<span class="{cards.BADGES[outcome]}">{cards.WORDS[outcome]}</span>' in table
+        assert f'<span class="{tables.BADGES[outcome]}">{tables.WORDS[outcome]}</span>' in table
     assert '<th scope="row"' in table
 
 
 def test_a_layout_in_which_a_claim_was_not_asked_is_left_empty():
     first, second = (verdict(NOT, by_layout={name: NOT}) for name in "AB")
-    table = cells(cards.spread_table([first, second], "All of it."))
+    table = cells(tables.spread_table([first, second], "All of it."))
     assert [row[2:] for row in table[1:]] == [["no", ""], ["", "no"]]
 
 
@@ -74,27 +75,27 @@ def test_what_flips_a_verdict_is_told_by_departure_and_bold_where_it_is_sure():
         [("B", "layout E", "C1", 1e-9), ("B", "layout F", "C1", 0.5), ("", "N = 5", "C1", 0.01)],
         columns=["departure", "variant", "claim", "p"],
     )
-    table = cards.dependence([verdict(PARTLY), replace(verdict(NOT), claim="C2")], flipped)
+    table = tables.dependence([verdict(PARTLY), replace(verdict(NOT), claim="C2")], flipped)
     first, second = table.splitlines()[2:]
     flips = "{ref}`B <departure-B>`: **layout E** and layout F<br>beside the departures: N = 5"
-    assert first.endswith(f" | [partly]{{.{cards.BADGES[PARTLY]}}} | {flips} |")
-    assert second.endswith(f" | [no]{{.{cards.BADGES[NOT]}}} | nothing |")
+    assert first.endswith(f" | [partly]{{.{tables.BADGES[PARTLY]}}} | {flips} |")
+    assert second.endswith(f" | [no]{{.{tables.BADGES[NOT]}}} | nothing |")
 
 
 def test_what_a_claim_says_cannot_break_the_page():
-    assert "a &lt; b &amp; c." in cards.verdict_table([verdict(NOT)], "<caption>")
-    assert "&lt;caption&gt;" in cards.verdict_table([], "<caption>")
+    assert "a &lt; b &amp; c." in tables.verdict_table([verdict(NOT)], "<caption>")
+    assert "&lt;caption&gt;" in tables.verdict_table([], "<caption>")
 
 
 def test_an_assumption_says_in_words_whether_it_holds():
-    table = cards.assumption_table(
+    table = tables.assumption_table(
         [Assumption("x", "y", holds=True), Assumption("x", "y", holds=False)], "Audit."
     )
     assert re.findall(r">(holds|does not hold)<", table) == ["holds", "does not hold"]
 
 
 def test_the_evidence_links_to_departures():
-    assert "departure {ref}`G <departure-G>`" in cards.evidence([verdict(NOT)])
+    assert "departure {ref}`G <departure-G>`" in tables.evidence([verdict(NOT)])
 
 
 def runs(seeds) -> pd.DataFrame:
@@ -102,7 +103,7 @@ def runs(seeds) -> pd.DataFrame:
 
 
 def test_the_scope_names_layout_seeds_readings_and_length():
-    assert cards.scope(runs((3, 5))) == (
+    assert tables.scope(runs((3, 5))) == (
         "Judged from 20 runs of 7 episodes: layout A; seeds 3 and 5; exploration that decays per"
         " step and per episode."
     )
@@ -113,17 +114,17 @@ def test_the_scope_names_layout_seeds_readings_and_length():
     [((3,), "seed 3"), (tuple(range(10)), "seeds 0 to 9"), ((1, 2, 3), "seeds 1, 2 and 3")],
 )
 def test_the_scope_of_one_seed_is_in_the_singular_and_of_many_a_range(seeds, said):
-    assert f"layout A; {said}; exploration" in cards.scope(runs(seeds))
+    assert f"layout A; {said}; exploration" in tables.scope(runs(seeds))
 
 
 @pytest.mark.parametrize("letter", DEPARTURES)
 def test_a_departure_shows_all_of_its_entry(letter):
-    shown, entry = cards.departure(letter), DEPARTURES[letter]
+    shown, entry = tables.departure(letter), DEPARTURES[letter]
     assert all(part in shown for part in (entry.gap, entry.reading, entry.why))
     assert ("To run another reading" in shown) == bool(entry.variant)
 
 
 def test_a_variant_that_is_one_value_of_a_field_is_shown_as_it_is_set():
-    shown = cards.departure("M")
+    shown = tables.departure("M")
     assert "Set `box = 'soft'` (here `'hard'`), as in `sweep(box='soft')`." in shown
-    assert "as in `sweep(decay=...)`." in cards.departure("C")
+    assert "as in `sweep(decay=...)`." in tables.departure("C")

@@ -8,7 +8,8 @@ import pytest
 from nmpcrl.claims.flips import COLUMNS
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
-from nmpcrl.study import Experiment, summary
+from nmpcrl.report import text
+from nmpcrl.study import Experiment
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.plan import VARIANTS
 
@@ -49,7 +50,7 @@ def table(*rows: tuple[str, str, bool]) -> pd.DataFrame:
 
 def test_the_effort_names_runs_hours_machine_and_versions():
     found = Published(rows={Experiment(seed=s): {} for s in range(1320)}, about=ABOUT)
-    said = summary.effort(found)
+    said = text.effort(found)
     for part in ("1,320 runs of 300 episodes", "1,200 in", "60 with", "60 in 2 variants"):
         assert part in said
     for part in (
@@ -62,17 +63,17 @@ def test_the_effort_names_runs_hours_machine_and_versions():
 
 
 def test_where_nothing_is_published_the_page_says_so_and_what_to_do():
-    for said in (summary.effort(Published()), summary.outcomes(())):
+    for said in (text.effort(Published()), text.outcomes(())):
         assert "Nothing is published" in said
         assert "`nmpcrl study --publish`" in said
-    assert summary.spread(()) == summary.changes(table()) == ""
-    assert summary.hinges((), table()) == {}
-    assert summary.questions({}).startswith("Nothing was found")
+    assert text.spread(()) == text.changes(table()) == ""
+    assert text.hinges((), table()) == {}
+    assert text.questions({}).startswith("Nothing was found")
 
 
 def test_the_outcomes_are_counted_and_each_claim_is_named_once():
     judged = [verdict("C1", REPRODUCED), verdict("C2", NOT), verdict("C3", REPRODUCED)]
-    said = summary.outcomes(judged)
+    said = text.outcomes(judged)
     assert said == "Of 3 claims: 2 reproduced (C1 and C3) and 1 not reproduced (C2)."
     assert UNDECIDABLE not in said
 
@@ -91,27 +92,27 @@ def test_layouts_and_readings_disagree_where_two_decided_verdicts_differ(
     layouts, decays, disagreeing
 ):
     judged = [verdict("C5", PARTLY, layouts, decays), verdict("C8", NOT)]
-    by_layout, by_decay = re.findall(r": (\S+?)[;.]", summary.spread(judged))
+    by_layout, by_decay = re.findall(r": (\S+?)[;.]", text.spread(judged))
     assert (by_layout == "C5", by_decay == "C5") == disagreeing
-    hinges = summary.hinges(judged, table())
+    hinges = text.hinges(judged, table())
     assert ("B" in hinges, "C" in hinges) == disagreeing
 
 
 def test_variants_that_change_a_verdict_are_counted_once():
     rows = [("soft box", "C1", True), ("soft box", "C2", True), ("tanh", "C1", False)]
-    said = summary.changes(table(*rows).assign(p=[0.3, 0.009, 0.001]))
+    said = text.changes(table(*rows).assign(p=[0.3, 0.009, 0.001]))
     assert said.startswith("Of 2 variants, each with one thing changed, 1 change at least one")
     assert said.endswith("1 of them by more than chance explains (p < 0.01).")
-    assert ", 0 of them" in summary.changes(table(*rows).assign(p=[0.3, 0.01, 0.001]))
+    assert ", 0 of them" in text.changes(table(*rows).assign(p=[0.3, 0.01, 0.001]))
 
 
 def test_claims_of_our_own_hold_or_do_not_and_are_not_called_reproduced():
-    said = summary.ours([verdict("B1", NOT), verdict("B2", PARTLY)])
+    said = text.ours([verdict("B1", NOT), verdict("B2", PARTLY)])
     assert said.splitlines() == [
         "- B1. It is so. *It does not hold.*",
         "- B2. It is so. *It holds in part.*",
     ]
-    assert set(summary.HOLDS) == {REPRODUCED, PARTLY, NOT, UNDECIDABLE}
+    assert set(text.HOLDS) == {REPRODUCED, PARTLY, NOT, UNDECIDABLE}
 
 
 def test_a_departure_hinges_on_every_variant_that_reads_it_otherwise():
@@ -124,14 +125,14 @@ def test_a_departure_hinges_on_every_variant_that_reads_it_otherwise():
         ("soft box", "C5", False),
         ("alpha x 3", "C9", True),  # the paper is clear about alpha
     )
-    assert summary.hinges([verdict("C2", PARTLY, "yn", "yy")], flips) == {
+    assert text.hinges([verdict("C2", PARTLY, "yn", "yy")], flips) == {
         "B": ("C2",),
         "H": ("C1", "C6"),
     }
 
 
 def test_a_question_quotes_the_gap_and_leads_to_its_entry():
-    said = summary.questions({"B": ("C2",), "H": ("C1", "C6")})
+    said = text.questions({"B": ("C2",), "H": ("C1", "C6")})
     first, second = said.splitlines()
     assert first.startswith(f"- {DEPARTURES['B'].gap} ")
     assert first.endswith("matters to C2 ({ref}`departure-B`).")
@@ -143,4 +144,4 @@ def test_a_question_quotes_the_gap_and_leads_to_its_entry():
     [((), "none"), (("a",), "a"), (("a", "b"), "a and b"), ((1, 2, 3), "1, 2 and 3")],
 )
 def test_names_are_listed_as_a_sentence_has_them(names, text):
-    assert summary.listed(names) == text
+    assert text.listed(names) == text

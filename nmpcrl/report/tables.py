@@ -10,9 +10,9 @@ import pandas as pd
 from nmpcrl.bench.targets import Target
 from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Verdict
+from nmpcrl.report.text import SURE, listed
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.summary import SURE, listed
 
 BADGES = {
     REPRODUCED: "verdict-reproduced",
@@ -124,7 +124,7 @@ def dependence(verdicts: Iterable[Verdict], flipped: pd.DataFrame) -> str:
 
 
 def scope(runs: pd.DataFrame) -> str:
-    """What the runs of `summary.table` cover, in a sentence."""
+    """What the runs of `text.table` cover, in a sentence."""
     names = ("layout", "seed", "decay", "episodes")
     layouts, seeds, readings, episodes = (tuple(runs[name].unique().tolist()) for name in names)
     return (

@@ -13,11 +13,11 @@ from matplotlib.ticker import MaxNLocator
 from nmpcrl.analysis.summary import Digest
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ENDINGS, MECHANISMS, OVER_PREDICTED, OVERSHOOT, WELL, rise
+from nmpcrl.report.figures.layouts import closes_at, plain
+from nmpcrl.report.figures.panels import FEW, LIMIT, SUBTITLE
+from nmpcrl.report.figures.rdes import headed
+from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study import paper
-from nmpcrl.study.figures.open import closes_at, plain
-from nmpcrl.study.figures.panels import FEW, LIMIT, SUBTITLE
-from nmpcrl.study.figures.rdes import headed
-from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study.records import Column
 
 GOOD = "0.92"  # the grey of what went well

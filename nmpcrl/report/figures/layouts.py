@@ -21,10 +21,10 @@ from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.measures import MEASURES, Values, at_borders, steady
 from nmpcrl.claims.rule import NEARLY_ALL, NEARLY_NONE
 from nmpcrl.control import Task
+from nmpcrl.report.figures.controller import draw_task
+from nmpcrl.report.figures.rdes import headed
+from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study import paper
-from nmpcrl.study.figures.controller import draw_task
-from nmpcrl.study.figures.rdes import headed
-from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study.layouts import gaps
 
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}

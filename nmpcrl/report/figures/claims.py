@@ -25,8 +25,7 @@ from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.measures import MEASURES
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.study.experiment import PAPER, Experiment
-from nmpcrl.study.figures.panels import (
+from nmpcrl.report.figures.panels import (
     INK,
     SUBTITLE,
     dots,
@@ -36,9 +35,10 @@ from nmpcrl.study.figures.panels import (
     shares,
     strips,
 )
-from nmpcrl.study.figures.performance import PARTS
-from nmpcrl.study.figures.rdes import headed, label_panel
-from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.report.figures.performance import PARTS
+from nmpcrl.report.figures.rdes import headed, label_panel
+from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.records import Column, Records
 
 LINE = 84  # characters of a title

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
 from nmpcrl.learning.training import Rollout
-from nmpcrl.study.figures.style import page, subplots
+from nmpcrl.report.figures.style import page, subplots
 
 INK, LESS, MORE = "#222222", "#1B7F79", "#882255"  # none of them is a learner's
 SYMBOLS = {

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.study.figures import solver as draw
+from nmpcrl.report.figures import solver as draw
 
 
 def texts(figure) -> str:

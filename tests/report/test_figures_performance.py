@@ -3,7 +3,7 @@
 import matplotlib.pyplot as plt
 import pytest
 
-from nmpcrl.study.figures import performance
+from nmpcrl.report.figures import performance
 
 DRAWN = (
     performance.solve_times,

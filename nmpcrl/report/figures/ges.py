@@ -9,8 +9,7 @@ from nmpcrl.analysis.gradient_td import directions
 from nmpcrl.analysis.two_state import Chain, follow, growth
 from nmpcrl.claims.paper_claims import unstable
 from nmpcrl.learning.learners import gradient_td, semi_gradient
-from nmpcrl.study import paper
-from nmpcrl.study.figures.rdes import (
+from nmpcrl.report.figures.rdes import (
     DECAYS,
     headed,
     label_panel,
@@ -19,7 +18,8 @@ from nmpcrl.study.figures.rdes import (
     runs_where,
     thin,
 )
-from nmpcrl.study.figures.style import LOOKS, page, subplots
+from nmpcrl.report.figures.style import LOOKS, page, subplots
+from nmpcrl.study import paper
 from nmpcrl.study.store import Study
 
 OVERSHOOT = 2.0  # alpha ||phi||^2 beyond which a semi-gradient step overshoots its target

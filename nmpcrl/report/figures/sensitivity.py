@@ -7,9 +7,9 @@ from matplotlib.figure import Figure
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.metrics import noise_free_cost, training_cost
+from nmpcrl.report.figures.controller import INK, LESS, MORE, SYMBOLS
+from nmpcrl.report.figures.style import LOOKS, page, subplots
 from nmpcrl.study import Study
-from nmpcrl.study.figures.controller import INK, LESS, MORE, SYMBOLS
-from nmpcrl.study.figures.style import LOOKS, page, subplots
 from nmpcrl.study.paper import THETA_NAMES
 from nmpcrl.study.records import Records
 

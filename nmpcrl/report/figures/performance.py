@@ -10,9 +10,9 @@ from matplotlib.ticker import FuncFormatter
 
 from nmpcrl.bench import summary
 from nmpcrl.bench.summary import Bench
+from nmpcrl.report.figures.rdes import headed
+from nmpcrl.report.figures.style import LOOKS, page, subplots
 from nmpcrl.study import paper
-from nmpcrl.study.figures.rdes import headed
-from nmpcrl.study.figures.style import LOOKS, page, subplots
 
 NAMES = {
     "riccati": "riccati",

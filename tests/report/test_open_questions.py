@@ -4,8 +4,8 @@ import re
 
 import pytest
 
+from nmpcrl.report.open_questions import QUESTIONS, to_ask
 from nmpcrl.study.departures import DEPARTURES
-from nmpcrl.study.questions import QUESTIONS, to_ask
 
 
 def item(letter: str, text: str) -> str:

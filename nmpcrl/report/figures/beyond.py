@@ -17,10 +17,10 @@ from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.summary import Digest
 from nmpcrl.analysis.trajectory import described
 from nmpcrl.claims.failure_modes import OVERSHOOT
+from nmpcrl.report.figures.controller import draw_task
+from nmpcrl.report.figures.rdes import headed
+from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study import paper
-from nmpcrl.study.figures.controller import draw_task
-from nmpcrl.study.figures.rdes import headed
-from nmpcrl.study.figures.style import LOOKS, marked, page, subplots
 
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
 PARTS: dict[
@@ -112,7 +112,7 @@ def strips(
     """A share of every run, layout by layout and learner by learner, with interquartile means.
 
     Args:
-        runs: of `summary.table`.
+        runs: of `text.table`.
         values: one a run; infinite ones, and what is not `seen`, are drawn at the edge.
         learners: in the order in which they are drawn.
         label: what the share is of.

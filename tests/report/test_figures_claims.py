@@ -12,8 +12,8 @@ from nmpcrl.claims import paper_claims
 from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.rule import Verdict
+from nmpcrl.report.figures import claims as figures
 from nmpcrl.study import Experiment
-from nmpcrl.study.figures import claims as figures
 from nmpcrl.study.records import Records
 
 LAYOUTS, DECAYS, SEEDS = 2, 2, 4

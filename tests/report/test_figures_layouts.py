@@ -13,9 +13,9 @@ from nmpcrl.analysis.summary import Digest, table
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.measures import MEASURES
 from nmpcrl.claims.robustness import atlas, telling
+from nmpcrl.report.figures import layouts as figures
+from nmpcrl.report.figures import robustness as maps
 from nmpcrl.study import Experiment, paper, plan
-from nmpcrl.study.figures import atlas as maps
-from nmpcrl.study.figures import open as figures
 from nmpcrl.study.store import Study
 
 VARIANT = "Q(s, a)"

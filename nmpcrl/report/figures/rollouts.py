@@ -14,11 +14,11 @@ from nmpcrl.analysis.summary import Digest
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ending
 from nmpcrl.control import Task
+from nmpcrl.report.figures.controller import draw_task
+from nmpcrl.report.figures.panels import LIMIT, SUBTITLE, bundle, legend, part, sourced
+from nmpcrl.report.figures.rdes import DECAYS
+from nmpcrl.report.figures.style import LOOKS, page, subplots
 from nmpcrl.study import paper
-from nmpcrl.study.figures.controller import draw_task
-from nmpcrl.study.figures.panels import LIMIT, SUBTITLE, bundle, legend, part, sourced
-from nmpcrl.study.figures.rdes import DECAYS
-from nmpcrl.study.figures.style import LOOKS, page, subplots
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import Study

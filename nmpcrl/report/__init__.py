@@ -1,0 +1,1 @@
+"""What pages show: tables, sentences and figures, made from runs and verdicts."""
