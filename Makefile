@@ -34,7 +34,7 @@ check: .venv/ready  ## Lint, format, types, and the structure of the notebooks
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
-	@$(BIN)/python -m pytest tests/test_notebooks.py tests/test_layers.py
+	@$(BIN)/python -m pytest tests/book/test_notebooks.py tests/test_architecture.py
 
 clean:  ## Remove the built book; stored runs stay
 	rm -rf _build

@@ -8,7 +8,7 @@ Each build has its own place, in the last column, and five steps, each a functio
 
 1. `ask`      run the two first cells of each chapter, its parameters and their check: a bad value
               ends here, in one sentence; a good one says which `experiments` the chapter needs
-              whole, of which runs it needs `digests`, and what is to be done `beforehand`, with
+              whole, of which runs it needs `summaries`, and what is to be done `beforehand`, with
               the machine to itself
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
@@ -122,7 +122,7 @@ def refuse_unknown(notebook: Path, given: dict) -> None:
             )
 
 
-NEEDS = ("experiments", "digests", "beforehand")
+NEEDS = ("experiments", "summaries", "beforehand")
 
 
 def ask(notebook: Path, given: dict) -> dict[str, tuple]:
@@ -172,17 +172,19 @@ def mirror(place: Path, announcement: str) -> Path:
     return source
 
 
-def train(experiments: tuple, digests: tuple) -> None:
+def train(experiments: tuple, summaries: tuple) -> None:
     """Run what is not stored yet; the bars are the store's."""
-    from nmpcrl.analysis.summaries import fetch_digests
+    from nmpcrl.analysis.summaries import fetch_summaries
     from nmpcrl.claims import published  # only here: a refusal should not wait for it
     from nmpcrl.study import Experiment
     from nmpcrl.study.experiment import compile_ahead
     from nmpcrl.study.store import fetch_all
 
-    compile_ahead((*experiments, *digests) or (Experiment(),))  # no page is a place for its notice
+    compile_ahead(
+        (*experiments, *summaries) or (Experiment(),)
+    )  # no page is a place for its notice
     fetch_all(experiments, progress=True)
-    contradictions = published.compare(fetch_digests(digests), published.load())
+    contradictions = published.compare(fetch_summaries(summaries), published.load())
     if len(contradictions):
         raise Failure(
             "Runs that were trained here contradict the published ones:\n"
@@ -303,7 +305,7 @@ def build(place: Path, jobs: dict[Path, dict], announcement: str, strict: bool) 
         shutil.rmtree(place / "html", ignore_errors=True)
         mirror(place, announcement)
         wanted = {n: tuple(dict.fromkeys(one for need in needs for one in need[n])) for n in NEEDS}
-        train(wanted["experiments"], wanted["digests"])
+        train(wanted["experiments"], wanted["summaries"])
         for call in wanted["beforehand"]:
             call()
         execute_all(place, jobs)

@@ -135,10 +135,10 @@ def study(
 ) -> None:
     """Train whatever is missing of the study; interrupt it and start it again as you like."""
     from nmpcrl.analysis import summaries, summary
-    from nmpcrl.claims import publish
-    from nmpcrl.study import cluster, plan
+    from nmpcrl.claims.publish import publish_study
+    from nmpcrl.study import cluster, design
 
-    chosen = plan.study()
+    chosen = design.study()
     unknown = set(parts) - set(chosen.values())
     if unknown:
         known = ", ".join(dict.fromkeys(chosen.values()))
@@ -154,7 +154,7 @@ def study(
         return
     try:
         with cluster.executor(scheduler) if scheduler else nullcontext() as executor:
-            found = summaries.fetch_digests(
+            found = summaries.fetch_summaries(
                 chosen, executor=executor, workers=workers, strict=publish
             )
     except (cluster.NoCluster, summaries.Failed) as error:
@@ -164,7 +164,7 @@ def study(
         pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
         click.echo(f"{table}: {table.stat().st_size / 1e6:.0f} MB")
     if publish:
-        click.echo(f"{publish.publish(found, chosen)}: published")
+        click.echo(f"{publish_study(found, chosen)}: published")
     if len(found) < len(chosen):
         raise SystemExit(1)  # what failed has been said
 
@@ -190,7 +190,7 @@ def verify(sample: int) -> None:
         raise click.ClickException(
             "no run of the study was trained here; --sample 5 trains five for this"
         )
-    found = summaries.fetch_digests(own)
+    found = summaries.fetch_summaries(own)
     wrong = published.compare(found, known)
     exact = published.comparable(found, known)
     click.echo(

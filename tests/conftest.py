@@ -1,10 +1,21 @@
-"""Where things are, and a browser for the tests of the built site."""
+"""Where things are, a browser for the tests of the built site, and results with round numbers:
+a benchmark that nobody measured, and evidence that nobody trained."""
 
+import copy
 import os
 import shutil
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+
+from nmpcrl.analysis.summary import RunSummary, table
+from nmpcrl.claims.evidence import Evidence
+from nmpcrl.claims.published import failure_modes_of
+from nmpcrl.study import Experiment, Study, design, paper
 
 ROOT = Path(__file__).resolve().parent.parent
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -48,3 +59,173 @@ def browser():
         chromium = playwright.chromium.launch(executable_path=path, args=FLAGS.split())
         yield chromium
         chromium.close()
+
+
+LOOPS = ("without noise", "with noise")
+SOLVERS = {"riccati": 40e-6, "fatrop": 0.8e-3, "ipopt": 2e-3, "ipopt MX": 4e-3, "rebuilt": 40e-3}
+SOLVES = {"ES": 2.0, "GES": 2.0, "RDES": 1.0, "DES": 1.0}
+FIT = 0.2  # [ms]
+REST = 0.02  # [ms]
+HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}
+
+
+def transposed(names: tuple[str, ...], rows: list[tuple]) -> dict[str, list]:
+    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
+
+
+def learner(solver: str, name: str) -> tuple:
+    solve, fit = 1e3 * SOLVERS[solver], FIT if name in ("RDES", "DES") else None
+    step = SOLVES[name] * solve + (fit or 0.0) + REST
+    hours = step * 39 / 3600
+    return solver, name, SOLVES[name], step, solve, fit, REST, hours, HOURS.get(name)
+
+
+def growing(varied: str, sizes: tuple[int, ...], each: float) -> list[tuple]:
+    return [(varied, size, 4 * (4e-6 + each * size), 4) for size in sizes for _ in range(3)]
+
+
+@pytest.fixture
+def measured() -> dict[str, dict]:
+    """Every figure is reached, and everything is exactly linear; a test may change its copy."""
+    return copy.deepcopy(MEASURED)
+
+
+MEASURED = {
+    "about": {"length": "full", "key": "0", "date": "2026-01-01", "seconds": 60.0, "others": 0.1},
+    "solves": transposed(
+        ("loop", "solver", "warm", "seconds", "iterations", "suboptimality"),
+        [
+            (loop, solver, t > 0, seconds if t else 10 * seconds, 5, 0.0)
+            for loop in LOOPS
+            for solver, seconds in SOLVERS.items()
+            for t in range(5)
+        ],
+    ),
+    "loop": transposed(("loop", "seconds"), [(loop, 40e-6) for loop in LOOPS for _ in range(5)]),
+    "parts": {"part": ["solve, compiled part", "step of the plant"], "seconds": [30e-6, 2e-6]},
+    "scaling": transposed(
+        ("varied", "size", "seconds", "iterations"),
+        growing("horizon", (5, 10, 20, 40, 80), 0.5e-6)
+        + growing("obstacles", (1, 4, 8, 16, 32), 0.25e-6),
+    ),
+    "learners": transposed(
+        (
+            "solver",
+            "learner",
+            "solves",
+            "ms_per_step",
+            "ms_per_solve",
+            "ms_per_fit",
+            "ms_per_rest",
+            "hours",
+            "hours_paper",
+        ),
+        [learner(solver, name) for solver in ("riccati", "fatrop", "ipopt") for name in SOLVES],
+    ),
+    "rival": {"learner": ["mpcrl", "mpcrl", "ES", "ES"], "seconds": [0.01, 0.01, 1e-4, 1e-4]},
+    "runs": {
+        "learner": list(SOLVES),
+        "episodes": [300] * 4,
+        "seconds": [4.0, 4.0, 16.0, 16.0],
+        "processor": [4.0, 4.0, 16.0, 16.0],
+    },
+    "episodes": transposed(
+        ("learner", "episode", "seconds", "memory"),
+        [(name, k, 0.01 * k, 400_000_000) for name in SOLVES for k in range(1, 301)],
+    ),
+    "parallel": {"workers": [1, 2], "seconds": [20.0, 10.5], "runs": [4, 4], "episodes": [9, 9]},
+    "first": {
+        "cached": [False, True, True],
+        "solve": [30.0, 0.6, 0.8],
+        "step": [1.0, 0.1, 0.1],
+        "process": [33.0, 2.0, 2.0],
+        "notice": [True, False, False],
+    },
+}
+
+
+START_COST = 1000.0
+AROUND = np.array([[-2.5, 1.5], [-2.5, 8.0], [3.0, 8.0], [8.5, 8.0], [8.5, 2.0]])  # no obstacle
+DRIVE = np.column_stack([AROUND, [0.0, 0.0, 0.0, 0.0, np.pi / 2]])
+
+
+@pytest.fixture(scope="session")
+def made_up() -> Callable[..., Evidence]:
+    """Makes evidence, as `evidence_of` says."""
+    return evidence_of
+
+
+def evidence_of(
+    unlike: Callable[[Experiment], dict[str, Any]] = lambda experiment: {},
+    *,
+    layouts: tuple[str, ...] = ("A", "D"),
+    seeds: tuple[int, ...] = (0, 1, 2, 3),
+    episodes: int = paper.EPISODES,
+    source: Callable[[Experiment], str] = lambda experiment: "fresh",
+) -> Evidence:
+    """A main table in which every learner saves a tenth at once; `unlike` says what is not so."""
+    wanted = design.main_table(layouts=layouts, seeds=seeds, episodes=episodes)
+    summaries = {one: summary_of(one, **unlike(one)) for one in wanted}
+    runs = table(summaries).join(failure_modes_of(summaries))
+    runs["variant"] = design.MAIN_TABLE
+    runs["source"] = [source(one) for one in wanted]
+    return Evidence(Study(summaries), runs)
+
+
+def summary_of(
+    experiment: Experiment,
+    *,
+    end: float = 0.9,
+    swing: float = 0.0,
+    training: float = 1.0,
+    reached: int | None = None,
+    states: np.ndarray = DRIVE,
+    actions: np.ndarray | None = None,
+    inside: tuple[int, int, int] = (0, 0, 0),
+    imitation: tuple[float, float] = (0.5, 1.0),
+    **columns: Any,
+) -> RunSummary:
+    """A run in which little happens.
+
+    Args:
+        experiment: names it.
+        end: its noise-free cost after the start, over the start's.
+        swing: how much of the start's cost every other late rollout costs more.
+        training: cost of its training episodes, over the start's.
+        reached: after how many episodes it was stopped.
+        states: of its last drive without noise.
+        actions: likewise.
+        inside: states in an obstacle by size, in its first episode.
+        imitation: held-out errors with and without theta.
+        columns: further columns of `RunSummary.episodes`, or the value of all their rows.
+    """
+    count, every = experiment.episodes, experiment.evaluate_every
+    due = np.unique([*range(0, count + 1, every), count])
+    end = 1.0 if experiment.learner == "frozen" else end
+    cost = START_COST * np.where(due == 0, 1.0, end)
+    cost[(due >= count / 2) & (due // every % 2 == 0)] += swing * START_COST
+    quiet = dict.fromkeys(("failed", "restarts", "outside", "inputs", "over"), 0)
+    quiet |= {"steps": 130, "overlap": -0.1, "alpha_phi2": 0.4, "delta": 30.0, "loss": 1.0}
+    quiet |= {"bias": 0.0, "error": 10.0, "iterations": 5.0, "seconds": 0.01}
+    episodes = {name: np.full(count, value) for name, value in (quiet | columns).items()}
+    episodes["cost"] = np.full(count, START_COST * training)
+    episodes["theta"] = np.tile(experiment.theta, (count, 1))
+    episodes["w"] = np.full((count, len(experiment.theta)), paper.W_INIT)
+    episodes["inside"] = np.zeros((count, 3), int)
+    episodes["inside"][0] = inside
+    if reached is not None:
+        due, cost = due[due <= reached], cost[due <= reached]
+        episodes["cost"][reached:], episodes["theta"][reached:] = np.nan, np.nan
+    evaluations = {
+        "episode": due,
+        "theta": np.tile(experiment.theta, (due.size, 1)),
+        "cost": cost,
+        "inside": np.zeros((due.size, 3), int),
+        "overlap": np.full(due.size, -0.1),
+        "distance": np.zeros(due.size),
+    }
+    errors = dict(zip(("with_theta", "without_theta"), imitation, strict=True))
+    facts: dict[str, Any] = {"seconds": 1.0, "imitation": errors}
+    facts["stopped"] = "finished" if reached is None else "diverged: theta"
+    inputs = np.zeros((len(states), 2)) if actions is None else actions
+    return RunSummary(asdict(experiment), episodes, evaluations, states, inputs, facts)

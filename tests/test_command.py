@@ -11,10 +11,10 @@ from click.testing import CliRunner
 from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published
-from nmpcrl.study import Experiment, paper, plan, sweep
+from nmpcrl.study import Experiment, design, paper, sweep
 from nmpcrl.study.experiment import LEARNERS
 
-WHOLE = len(plan.study())
+WHOLE = len(design.study())
 SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
 STUDY = {
     **dict.fromkeys(sweep(learner=("ES", "frozen"), seed=(0, 1), **SHORT), "main"),
@@ -32,7 +32,7 @@ def command(tmp_path, monkeypatch):
 @pytest.fixture
 def small(monkeypatch):
     """A study of six short runs, judged by nobody."""
-    monkeypatch.setattr(plan, "study", lambda: dict(STUDY))
+    monkeypatch.setattr(design, "study", lambda: dict(STUDY))
     monkeypatch.setattr(publish, "verdicts", lambda runs, variants: ())
 
 
@@ -40,7 +40,7 @@ def small(monkeypatch):
 def trained(command, small):
     """The small study, trained in this process."""
     with ThreadPoolExecutor(1) as executor:
-        return summaries.fetch_digests(STUDY, executor=executor, progress=False)
+        return summaries.fetch_summaries(STUDY, executor=executor, progress=False)
 
 
 def name_of_the_stored_run(tmp_path):
@@ -196,9 +196,9 @@ def test_the_table_of_the_whole_study_takes_100_megabytes_at_most(command, train
         fields = one.experiment | {"seed": seed, "episodes": paper.EPISODES}
         noisy[experiment] = replace(one, experiment=fields, episodes=episodes)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "study", lambda: dict.fromkeys(noisy, "main"))
+        patch.setattr(design, "study", lambda: dict.fromkeys(noisy, "main"))
         patch.setattr(summaries, "is_stored", lambda _: True)
-        patch.setattr(summaries, "fetch_digests", lambda *_, **__: noisy)
+        patch.setattr(summaries, "fetch_summaries", lambda *_, **__: noisy)
         asked = command("study", "--table", str(tmp_path / "episodes.csv.gz"))
     assert asked.exit_code == 0, asked.output
     size = (tmp_path / "episodes.csv.gz").stat().st_size

@@ -9,7 +9,7 @@ from nmpcrl.control import Task
 from nmpcrl.study import paper
 from nmpcrl.study.records import Column, Records
 
-TOUCH = 1e-6  # an overlap or an excess this small is the solver's tolerance, not a violation
+TOUCH = 1e-6  # a violation this small is the solver's tolerance, not a violation
 TIGHT = 0.999  # cosine from which two features are called parallel
 LAST = 3  # rollouts that the final noise-free cost averages
 
@@ -56,23 +56,23 @@ def gain(records: Records) -> float:
     return 1 - final_cost(records) / initial_cost(records)
 
 
-def wander(records: Records) -> float:
+def late_cost_range(records: Records) -> float:
     """Range of the noise-free cost over the second half of training, as a share of the first's.
 
     Infinite where a rollout failed, or training did not get that far.
     """
-    return wander_of(*noise_free_cost(records), records.experiment["episodes"])
+    return late_cost_range_of(*noise_free_cost(records), records.experiment["episodes"])
 
 
-def wander_of(episode: Column, cost: Vector, episodes: int) -> float:
-    """`wander` from the rollouts' episodes and costs; the first one judged theta_init."""
+def late_cost_range_of(episode: Column, cost: Vector, episodes: int) -> float:
+    """`late_cost_range` from the rollouts' episodes and costs; the first one judged theta_init."""
     late = cost[episode >= episodes / 2]
     if not late.size or not np.isfinite(late).all():
         return np.inf
     return float((late.max() - late.min()) / cost[0])
 
 
-def excess(records: Records, frozen: Records, last: int = 20) -> float:
+def cost_ratio(records: Records, frozen: Records, last: int = 20) -> float:
     """Median training cost of the last episodes over that of the frozen arm under the same noise.
 
     An episode that was cut short, or never reached, costs infinitely much.

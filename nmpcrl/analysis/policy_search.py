@@ -20,7 +20,7 @@ import numpy as np
 from tqdm import tqdm
 
 from nmpcrl import Vector
-from nmpcrl.learning.training import Persistent, evaluate
+from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper, store
 from nmpcrl.study.parameters import one_of, whole
 
@@ -30,7 +30,7 @@ SPREAD = 0.3  # of the first drives, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
 FAILED = 1e6  # stands for the cost of a drive on which a solve failed
-SOURCES = ("control", "study/paper.py", "learning/training.py", "analysis/policy_search.py")
+SOURCES = ("control", "learning", "study/paper.py", "analysis/policy_search.py")
 
 
 @dataclass(frozen=True)
@@ -137,12 +137,12 @@ def _found(tried: Vector, costs: Vector) -> Found:
 
 
 def _place() -> Path:
-    return store.folder() / "search.json"
+    return store.folder() / "policy_search.json"
 
 
 def _key() -> dict[str, Any]:
     """All that the numbers depend on."""
-    return {"code": store.digest(SOURCES), **store.versions(), "cma": version("cma")}
+    return {"code": store.source_hash(SOURCES), **store.versions(), "cma": version("cma")}
 
 
 def _kept() -> dict[Search, Found]:

@@ -1,7 +1,7 @@
-"""Digests of many runs: a study is trained once, run by run, wherever there is room.
+"""Summaries of many runs: a study is trained once, run by run, wherever there is room.
 
-A worker trains, digests, and hands the digest back; who asked for it stores it. So an interruption
-loses the runs in flight and no other, and workers need not share a disk with anybody.
+A worker trains, summarises, and hands the summary back; who asked for it stores it. So an
+interruption loses the runs in flight and no other, and workers need not share a disk.
 """
 
 import json
@@ -29,7 +29,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from nmpcrl.analysis.summary import Digest, digest
+from nmpcrl.analysis.summary import RunSummary, summarise
 from nmpcrl.study import paper, store
 from nmpcrl.study.experiment import NETWORK_LEARNERS, Experiment, compile_ahead, run
 from nmpcrl.study.records import DamagedRecords, Records
@@ -55,18 +55,18 @@ class OtherCode(RuntimeError):
     """A worker would make other numbers than who asked for them."""
 
 
-def fetch_digests(
+def fetch_summaries(
     experiments: Iterable[Experiment],
     *,
     executor: Executor | None = None,
     workers: int | None = None,
     progress: bool = True,
     strict: bool = True,
-) -> store.Study[Digest]:
-    """The digests of many runs: read if they are stored, otherwise trained, digested and stored.
+) -> store.Study[RunSummary]:
+    """The summaries of many runs: read if they are stored, otherwise made and stored.
 
     A run that fails, or whose worker is killed again and again, is recorded with its reason beside
-    the digests and does not stop the others; the next call tries it again.
+    the summaries and does not stop the others; the next call tries it again.
 
     Args:
         experiments: the runs wanted.
@@ -98,23 +98,23 @@ def fetch_digests(
 
 
 def folder() -> Path:
-    """Where digests are kept, among the runs."""
-    return store.folder() / "digests"
+    """Where summaries are kept, among the runs."""
+    return store.folder() / "summaries"
 
 
 def path_of(experiment: Experiment) -> Path:
-    """The file of one digest."""
+    """The file of one summary."""
     return folder() / f"{store.name_of(experiment)}-{key(experiment)[:10]}.npz"
 
 
 def key(experiment: Experiment) -> str:
-    """A digest of all that a digest's numbers depend on."""
+    """A hash of all that a summary's numbers depend on."""
     depends = [store.key(experiment), _summary()]
     return sha256(json.dumps(depends).encode()).hexdigest()
 
 
 def is_stored(experiment: Experiment) -> bool:
-    """Whether the digest of a run is there; a damaged one is put aside."""
+    """Whether the summary of a run is there; a damaged one is put aside."""
     path = path_of(experiment)
     if not path.exists():
         return False
@@ -135,8 +135,8 @@ def seconds_of(experiment: Experiment) -> float:
     return each * experiment.episodes * experiment.steps * experiment.horizon / whole
 
 
-def make(experiment: Experiment, expected: str) -> Digest:
-    """What a worker does: train a run, unless it is stored whole, and digest it.
+def make(experiment: Experiment, expected: str) -> RunSummary:
+    """What a worker does: train a run, unless it is stored whole, and summary it.
 
     Raises:
         OtherCode: this worker would make other numbers than who asked.
@@ -149,16 +149,16 @@ def make(experiment: Experiment, expected: str) -> Digest:
         except (FileNotFoundError, DamagedRecords):
             records = run(experiment)
         records.facts.update(store.provenance(experiment))
-        return digest(records)
+        return summarise(records)
 
 
 @cache
 def _summary() -> str:
-    return store.digest(SUMMARISES)
+    return store.source_hash(SUMMARISES)
 
 
-def _read(experiment: Experiment) -> Digest:
-    return Digest.load(path_of(experiment))
+def _read(experiment: Experiment) -> RunSummary:
+    return RunSummary.load(path_of(experiment))
 
 
 @contextmanager
@@ -228,7 +228,7 @@ def kill(pool: ProcessPoolExecutor) -> None:
 def _harvest(
     missing: list[Experiment], executor: Executor, *, progress: bool
 ) -> dict[Experiment, str]:
-    """Store every digest as it comes; return what failed, with the reasons."""
+    """Store every summary as it comes; return what failed, with the reasons."""
     failures: dict[Experiment, str] = {}
     with store.without_main():
         # the long ones first, so that no worker is alone with one at the end
@@ -250,7 +250,7 @@ def _harvest(
 
 
 def _keep(
-    future: Future[Digest], pending: dict[Future[Digest], Experiment]
+    future: Future[RunSummary], pending: dict[Future[RunSummary], Experiment]
 ) -> dict[Experiment, str]:
     """Store what a worker made, or why it made nothing, which is returned.
 

@@ -1,6 +1,6 @@
 """What a study keeps of a run: tables by episode and by rollout instead of by step.
 
-A run's records take megabytes, most of them noise, and are trained again in seconds; a digest
+A run's records take megabytes, most of them noise, and are trained again in seconds; a summary
 takes a hundredth of that and is enough for every figure, verdict and mechanism of the study.
 """
 
@@ -28,7 +28,7 @@ IMITATED = "RDES"  # whose runs a network with theta and one without are fitted 
 
 
 @dataclass(frozen=True, eq=False)
-class Digest:
+class RunSummary:
     """One run, in short.
 
     Columns of `episodes`, each of shape (episodes,) unless said: cost (summed RL cost; nan where
@@ -58,7 +58,7 @@ class Digest:
         save_arrays(path, {"experiment": self.experiment, "facts": self.facts}, tables)
 
     @classmethod
-    def load(cls, path: Path) -> "Digest":
+    def load(cls, path: Path) -> "RunSummary":
         """Read a file that `save` wrote.
 
         Raises:
@@ -81,8 +81,8 @@ class Digest:
         return Experiment(**self.experiment)
 
 
-def digest(records: Records) -> Digest:
-    """The digest of a run; for a whole run of RDES also how well networks imitate it."""
+def summarise(records: Records) -> RunSummary:
+    """The summary of a run; for a whole run of RDES also how well networks imitate it."""
     experiment = Experiment(**records.experiment)
     nmpc = controller_of(experiment).nmpc
     facts = dict(records.facts)
@@ -99,21 +99,23 @@ def digest(records: Records) -> Digest:
     evaluations["overlap"] = np.fmax.reduce(overlap, axis=1)
     evaluations["distance"] = _distance(evaluated["states"], nmpc.task)
     episodes = _episodes(records, nmpc.task, nmpc.plant.lower, nmpc.plant.upper)
-    return Digest(records.experiment, episodes, evaluations, states, actions, facts)
+    return RunSummary(records.experiment, episodes, evaluations, states, actions, facts)
 
 
-def row(digest: Digest) -> dict[str, Any]:
-    """One flat row of summary: the experiment's fields, then what became of it."""
-    experiment, episodes, evaluations = digest.experiment, digest.episodes, digest.evaluations
+def row(summary: RunSummary) -> dict[str, Any]:
+    """One flat row: the experiment's fields, then what became of it."""
+    experiment, episodes, evaluations = summary.experiment, summary.episodes, summary.evaluations
     fields = experiment | {"theta": " ".join(f"{value!r}" for value in experiment["theta"])}
     late = slice(-min(LATE, max(1, experiment["episodes"] // 2)), None)
     cost = evaluations["cost"]
-    summary = {
-        "stopped": digest.facts["stopped"],
+    columns = {
+        "stopped": summary.facts["stopped"],
         "initial_cost": float(cost[0]),
         "final_cost": float(cost[-LAST:].mean()),
         "best_cost": float(cost.min()),
-        "wander": metrics.wander_of(evaluations["episode"], cost, experiment["episodes"]),
+        "late_cost_range": metrics.late_cost_range_of(
+            evaluations["episode"], cost, experiment["episodes"]
+        ),
         "training_cost": float(np.median(np.nan_to_num(episodes["cost"][late], nan=np.inf))),
         "cut_short": int(np.isnan(episodes["cost"]).sum()),
         "failed": int(episodes["failed"].sum()),
@@ -126,46 +128,46 @@ def row(digest: Digest) -> dict[str, Any]:
         "error": _median(episodes["error"][late]),
         "distance": float(evaluations["distance"][-1]),
         "iterations": float(np.nanmean(episodes["iterations"])),
-        "seconds": float(digest.facts["seconds"]),
+        "seconds": float(summary.facts["seconds"]),
     }
     for name, table in (("inside", episodes), ("eval_inside", evaluations)):
         counts = table["inside"].sum(axis=0)
-        summary |= {
+        columns |= {
             f"{name}_{size}": int(count)
             for size, count in zip(("small", "medium", "large"), counts, strict=True)
         }
-    summary |= {
+    columns |= {
         "worst_overlap": float(np.nanmax(episodes["overlap"])),
         "eval_worst_overlap": float(np.nanmax(evaluations["overlap"])),
     }
     theta = _last_known(episodes["theta"], experiment["theta"])
-    summary |= {f"theta_{i}": float(value) for i, value in enumerate(theta)}
-    imitation = digest.facts.get("imitation", {})
-    summary |= {
+    columns |= {f"theta_{i}": float(value) for i, value in enumerate(theta)}
+    imitation = summary.facts.get("imitation", {})
+    columns |= {
         "imitation_with": imitation.get("with_theta", np.nan),
         "imitation_without": imitation.get("without_theta", np.nan),
     }
-    return fields | summary
+    return fields | columns
 
 
-def table(digests: Mapping[Experiment, Digest] | Iterable[Digest]) -> pd.DataFrame:
-    """One `row` a run, with `excess`: its training cost over that of its frozen arm.
+def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> pd.DataFrame:
+    """One `row` a run, with `cost_ratio`: its training cost over that of its frozen arm.
 
-    `excess` is nan where that arm is not among the runs.
+    `cost_ratio` is nan where that arm is not among the runs.
     """
-    listed = list(digests.values() if isinstance(digests, Mapping) else digests)
+    listed = list(summaries.values() if isinstance(summaries, Mapping) else summaries)
     rows = {one.name: row(one) for one in listed}
     for experiment, values in rows.items():
         arm = rows.get(frozen_arm(experiment))
-        values["excess"] = values["training_cost"] / arm["training_cost"] if arm else np.nan
+        values["cost_ratio"] = values["training_cost"] / arm["training_cost"] if arm else np.nan
     return pd.DataFrame(list(rows.values()))
 
 
-def tidy(digests: Iterable[Digest]) -> pd.DataFrame:
+def tidy(summaries: Iterable[RunSummary]) -> pd.DataFrame:
     """One row an episode of each run: what names the run, and the columns that are numbers."""
     named = ("learner", "layout", "decay", "seed")
     frames = []
-    for one in digests:
+    for one in summaries:
         columns = {name: one.experiment[name] for name in named}
         columns |= {"episode": np.arange(one.experiment["episodes"])}
         columns |= {name: c for name, c in one.episodes.items() if c.ndim == 1}
@@ -176,8 +178,14 @@ def tidy(digests: Iterable[Digest]) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
 
 
+def separation(one: RunSummary, other: RunSummary) -> Vector:
+    """The largest difference of any component of theta, after each episode that both reached."""
+    apart = np.abs(one.episodes["theta"] - other.episodes["theta"]).max(axis=1)
+    return apart[np.isfinite(apart)]
+
+
 def _episodes(records: Records, task: Task, lower: Vector, upper: Vector) -> dict[str, Column]:
-    """The columns of `Digest.episodes`."""
+    """The columns of `RunSummary.episodes`."""
     steps = records.steps
     by = _ByEpisode(steps["episode"], records.experiment["episodes"])
     overlap = task.overlap(steps["state"]).max(axis=-1)

@@ -101,7 +101,7 @@ def expected_matrix(chain: Chain, rule: UpdateRule) -> Matrix:
     return np.array([[step.theta[0], step.w[0]] for step in moved]).T
 
 
-def growth(chain: Chain, rule: UpdateRule) -> float:
+def spectral_radius(chain: Chain, rule: UpdateRule) -> float:
     """Largest modulus of an eigenvalue of `expected_matrix`: below 1 the updates converge to 0."""
     return float(np.abs(np.linalg.eigvals(expected_matrix(chain, rule))).max())
 

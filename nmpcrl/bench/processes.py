@@ -12,7 +12,7 @@ from typing import Any
 
 from nmpcrl.bench.solves import Columns
 from nmpcrl.study.store import THREADS, fetch_all
-from nmpcrl.study.sweep import sweep
+from nmpcrl.study.sweeps import sweep
 
 
 def whole_runs(learners: tuple[str, ...], episodes: int) -> tuple[Columns, Columns]:
@@ -61,8 +61,8 @@ def first_calls(times: int, *, compile_too: bool) -> Columns:
     """The first call in a fresh process, whose machine code is kept from before or has to be made.
 
     Returns:
-        A row a process: cached, solve, step (seconds, as `fresh_process.first_call`), process (seconds from
-        its start to its end), notice (whether it said that it compiles).
+        A row a process: cached, solve, step (seconds, as `fresh_process.first_call`), process
+        (seconds from its start to its end), notice (whether it said that it compiles).
     """
     columns: Columns = {"cached": [], "solve": [], "step": [], "process": [], "notice": []}
     with tempfile.TemporaryDirectory() as folder:

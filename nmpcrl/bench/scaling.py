@@ -1,12 +1,15 @@
 """How the time of a solve grows with the horizon and with the number of obstacles."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 
+from nmpcrl import Vector
 from nmpcrl.bench.solves import THETA, Columns
-from nmpcrl.control import Nmpc, Obstacle, Solution
+from nmpcrl.control import Nmpc, Obstacle, Solution, SolverError
 from nmpcrl.study import paper
 
 HORIZONS = (5, 10, 20, 40, 80)
@@ -14,7 +17,7 @@ OBSTACLES = (1, 4, 8, 16, 32)
 BESIDE = [(x, y) for y in (8.5, 7.5, 6.5, 5.5) for x in np.linspace(-2.5, 8.5, 8)]  # the road [m]
 
 
-def growth(episodes: int, steps: int) -> Columns:
+def solve_times(episodes: int, steps: int) -> Columns:
     """The default solver in the closed loop without noise, one solve of every size in turn.
 
     Every size drives on its own. Obstacles are added beside the road, so that the plans, and with
@@ -54,3 +57,68 @@ def _crowded(count: int) -> Nmpc:
         gamma=paper.GAMMA,
         slack_weight=paper.SLACK_WEIGHT,
     )
+
+
+def time_horizons(
+    states: Sequence[Vector],
+    theta: Vector,
+    horizons: Sequence[int] = (5, 10, 20, 40, 80),
+    *,
+    layout: str = "A",
+    solvers: Sequence[str] = ("riccati", "fatrop"),
+    repetitions: int = 3,
+) -> pd.DataFrame:
+    """Time of a solve from a standing start, one row a state, horizon and solver.
+
+    The solvers take turns, in this process and with one thread, so that a change of the machine's
+    speed meets all alike. Each solve is made twice and the second one counts: the first finds the
+    processor's caches full of the other solver.
+
+    Returns:
+        Columns state (its number), horizon, solver, ms (the median of the repetitions), iterations,
+        us_per_iteration (nan where the solver began more than once), value; nan where it failed.
+    """
+    controllers = {
+        (horizon, solver): paper.nmpc(layout, horizon=horizon, solver=solver)
+        for horizon in horizons
+        for solver in solvers
+    }
+    for controller in controllers.values():
+        controller.solve(paper.task(layout).start, theta)  # transcribes
+    rows = []
+    for _ in range(repetitions):
+        for state in range(len(states)):
+            for (horizon, solver), controller in controllers.items():
+                place = {"state": state, "horizon": horizon, "solver": solver}
+                try:
+                    controller.solve(states[state], theta)
+                    solution = controller.solve(states[state], theta)
+                except SolverError:
+                    rows.append(place)
+                    continue
+                each = 1e6 * solution.seconds / solution.iterations
+                rows.append(
+                    place
+                    | {
+                        "ms": 1e3 * solution.seconds,
+                        "iterations": solution.iterations,
+                        "us_per_iteration": np.nan if solution.restarts else each,
+                        "value": solution.value,
+                    }
+                )
+    return pd.DataFrame(rows).groupby(["state", "horizon", "solver"]).median().reset_index()
+
+
+def exponents(timings: pd.DataFrame, column: str) -> dict[str, float]:
+    """For each solver the exponent k of column ~ N^k, by least squares on the medians' logarithms.
+
+    Args:
+        timings: of `time_horizons`.
+        column: "ms" or another.
+    """
+    medians = timings.groupby(["solver", "horizon"])[column].median().unstack("solver").dropna()
+    across = np.log(medians.index.to_numpy(float))
+    return {
+        str(solver): float(np.polyfit(across, np.log(medians[solver].to_numpy()), 1)[0])
+        for solver in medians
+    }

@@ -39,8 +39,8 @@ def interleaved(episodes: int, steps: int) -> Columns:
 
     Returns:
         A row a solve: loop, solver, warm (false for the first of an episode), seconds, iterations
-        (None where it failed), excess (of the value over the best of all solvers, relative to the
-        best or to 1, whichever is larger).
+        (None where it failed), suboptimality (of the value over the best of all solvers, relative
+        to the best or to 1, whichever is larger).
     """
     rng, named = np.random.default_rng(0), solvers()
     for solve in named.values():
@@ -50,7 +50,7 @@ def interleaved(episodes: int, steps: int) -> Columns:
         for _ in range(episodes):
             states = [state for state, _, _ in drive(paper.nmpc(), noise, rng, steps)]
             rows += [(loop, *row) for row in _episode(states, named, rng)]
-    names = ("loop", "solver", "warm", "seconds", "iterations", "excess")
+    names = ("loop", "solver", "warm", "seconds", "iterations", "suboptimality")
     return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
 
 
@@ -74,8 +74,8 @@ def _episode(
         found = {name: plans[name][t] for name in named}
         best = min(plan.value for plan in found.values() if plan)
         for name, plan in found.items():
-            excess = (plan.value - best) / max(1.0, best) if plan else None
-            yield name, t > 0, times[name][t], plan and plan.iterations, excess
+            suboptimality = (plan.value - best) / max(1.0, best) if plan else None
+            yield name, t > 0, times[name][t], plan and plan.iterations, suboptimality
 
 
 def own_loop(episodes: int, steps: int) -> Columns:

@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from nmpcrl.bench.learners import against_mpcrl, learners
 from nmpcrl.bench.processes import at_once, first_calls, whole_runs
-from nmpcrl.bench.scaling import growth
+from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import interleaved, own_loop, parts
 from nmpcrl.study import paper, store
 from nmpcrl.study.parameters import ParameterError
@@ -27,8 +27,7 @@ from nmpcrl.study.parameters import ParameterError
 Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
 
 ALL = ("ES", "GES", "RDES", "DES")
-MODULES = ("fresh", "growth", "learning", "measure", "rival", "runs", "solves")
-SOURCES = (*store.MATHEMATICS, "bench/timing.py", *(f"study/bench/{name}.py" for name in MODULES))
+SOURCES = (*store.MATHEMATICS, "bench")
 
 
 @dataclass(frozen=True)
@@ -171,7 +170,7 @@ def _stages(size: Length) -> list[tuple[str, Callable[[], Bench]]]:
         ("every solver", lambda: {"solves": interleaved(size.episodes, size.problems)}),
         ("its own loop", lambda: {"loop": own_loop(size.loops, paper.STEPS)}),
         ("parts of a step", lambda: {"parts": parts(size.loops)}),
-        ("growth", lambda: {"growth": growth(max(3, size.loops // 2), paper.STEPS)}),
+        ("scaling", lambda: {"scaling": solve_times(max(3, size.loops // 2), paper.STEPS)}),
         ("learning steps", steps),
         ("whole runs", runs),
         ("runs at once", lambda: {"parallel": at_once(size.seeds, size.seed_run)}),
@@ -185,8 +184,8 @@ def path() -> Path:
 
 
 def key() -> str:
-    """A digest of all that the times depend on, but for what else the machine does."""
-    depends = [store.digest(SOURCES), versions(), machine()]
+    """A hash of all that the times depend on, but for what else the machine does."""
+    depends = [store.source_hash(SOURCES), versions(), machine()]
     return hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
 
 

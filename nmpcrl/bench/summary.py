@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nmpcrl.bench.learners import PAPER_HOURS, ratio
 from nmpcrl.bench.solves import LOOPS
-from nmpcrl.bench.timing import PAPER_HOURS, ratio
 from nmpcrl.study import paper
 
 Bench = dict[str, dict[str, Any]]
@@ -39,8 +39,8 @@ def solvers(bench: Bench) -> pd.DataFrame:
                     **_microseconds(one.seconds),
                     "times": one.seconds.median() / fastest,
                     "iterations": one.iterations.mean(),
-                    "worse": (one.excess > WORSE).mean(),
-                    "failed": one.excess.isna().mean(),
+                    "worse": (one.suboptimality > WORSE).mean(),
+                    "failed": one.suboptimality.isna().mean(),
                 }
             )
     return pd.DataFrame(rows).set_index(["loop", "solver"])
@@ -78,8 +78,8 @@ def runs(bench: Bench) -> pd.DataFrame:
 
     processor is the share of the time that the processor worked on the run; hours_paper is Table
     II. Shorter runs are extended by the time of an episode after the second. Memory is the largest
-    resident size at the end of an episode [MB]; growth is that over the size after a tenth of the
-    episodes, less one.
+    resident size at the end of an episode [MB]; memory_growth is that over the size after a tenth
+    of the episodes, less one.
     """
     episodes, rows = pd.DataFrame(bench["episodes"]), {}
     totals = pd.DataFrame(bench["runs"]).set_index("learner")
@@ -93,18 +93,18 @@ def runs(bench: Bench) -> pd.DataFrame:
             "processor": processor / seconds,
             "hours_paper": PAPER_HOURS.get(str(name), np.nan),
             "memory": one.memory.max() / 1e6,
-            "growth": one.memory.max() / early - 1,
+            "memory_growth": one.memory.max() / early - 1,
         }
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def growth(bench: Bench, varied: str) -> pd.DataFrame:
+def scaling(bench: Bench, varied: str) -> pd.DataFrame:
     """How a solve grows with the "horizon" or the "obstacles", a row a size; medians [us].
 
     solve, iteration (the solve over its iterations), and per_part: the solve over the number of
     stages, or over the number of all stages' inequality constraints.
     """
-    table = pd.DataFrame(bench["growth"])
+    table = pd.DataFrame(bench["scaling"])
     mine = table[table.varied == varied]
     mine = mine.assign(iteration=mine.seconds / mine.iterations)
     rows = 1e6 * mine.groupby("size")[["seconds", "iteration"]].median()
@@ -113,9 +113,9 @@ def growth(bench: Bench, varied: str) -> pd.DataFrame:
     return rows.assign(per_part=rows.solve / parts)
 
 
-def most_growth(bench: Bench, varied: str) -> float:
+def most_per_part(bench: Bench, varied: str) -> float:
     """The largest factor by which the time per part is longer at a size than at a smaller one."""
-    per_part = growth(bench, varied).per_part.to_numpy()
+    per_part = scaling(bench, varied).per_part.to_numpy()
     return float(max(per_part[i:].max() / per_part[i] for i in range(len(per_part))))
 
 
@@ -124,7 +124,7 @@ def marginal(bench: Bench, varied: str) -> tuple[float, float]:
 
     Between neighbouring sizes; equal where the time is linear, whatever a call costs besides.
     """
-    times = growth(bench, varied).iteration
+    times = scaling(bench, varied).iteration
     slopes = [
         (times[large] - times[small]) / (large - small) for small, large in pairwise(times.index)
     ]

@@ -43,7 +43,7 @@ def targets(bench: Bench) -> list[Target]:
         *_own_loop(bench),
         *_against_others(bench),
         *_runs(bench),
-        *_growth(bench),
+        *_scaling(bench),
         *_processes(bench),
         _memory(bench),
     ]
@@ -101,13 +101,13 @@ def _runs(bench: Bench) -> Iterator[Target]:
         )
 
 
-def _growth(bench: Bench) -> Iterator[Target]:
+def _scaling(bench: Bench) -> Iterator[Target]:
     for varied, part, of in (
         ("horizon", "stage", "stages"),
         ("obstacles", "constraint", "obstacles"),
     ):
-        sizes = summary.growth(bench, varied).index
-        most, (low, high) = summary.most_growth(bench, varied), summary.marginal(bench, varied)
+        sizes = summary.scaling(bench, varied).index
+        most, (low, high) = summary.most_per_part(bench, varied), summary.marginal(bench, varied)
         yield Target(
             f"growth from {sizes[0]} to {sizes[-1]} {of}",
             f"linear: time per {part} within {LINEAR}x",
@@ -141,6 +141,6 @@ def _memory(bench: Bench) -> Target:
     return Target(
         "memory of a run",
         f"at most {MEMORY:.0f} MB, flat over episodes",
-        f"{runs.memory.max():.0f} MB, {runs.growth.max():+.1%} after the first tenth",
-        bool(runs.memory.max() <= MEMORY and runs.growth.max() <= FLAT),
+        f"{runs.memory.max():.0f} MB, {runs.memory_growth.max():+.1%} after the first tenth",
+        bool(runs.memory.max() <= MEMORY and runs.memory_growth.max() <= FLAT),
     )

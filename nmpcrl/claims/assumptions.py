@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nmpcrl.analysis import metrics
-from nmpcrl.analysis.curvature import Curvature
+from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.study import paper
 from nmpcrl.study.store import Study
 

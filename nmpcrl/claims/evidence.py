@@ -11,10 +11,10 @@ from functools import cached_property
 
 import pandas as pd
 
-from nmpcrl.analysis.summaries import fetch_digests
-from nmpcrl.analysis.summary import Digest, table
-from nmpcrl.claims.published import fates_of, load
-from nmpcrl.study import paper, plan
+from nmpcrl.analysis.summaries import fetch_summaries
+from nmpcrl.analysis.summary import RunSummary, table
+from nmpcrl.claims.published import failure_modes_of, load
+from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
 from nmpcrl.study.parameters import ParameterError
 from nmpcrl.study.records import Column
@@ -27,20 +27,20 @@ SOURCES = ("fresh", "published")
 class Evidence:
     """Runs, their summaries, and where each comes from."""
 
-    digests: Study[Digest]  # a published one has fewer columns: see `Published`
-    runs: pd.DataFrame  # `text.table` with `variant` and `source`, one row a run, in that order
+    summaries: Study[RunSummary]  # a published one has fewer columns: see `Published`
+    runs: pd.DataFrame  # `summary.table` with `variant` and `source`, one row a run, in that order
 
     @cached_property
     def main(self) -> "Evidence":
         """The runs of the main table alone."""
-        return self.where(self.runs.variant == plan.MAIN_TABLE)
+        return self.where(self.runs.variant == design.MAIN_TABLE)
 
     def where(self, holds: Iterable[bool]) -> "Evidence":
         """The runs for which it holds."""
         kept = list(holds)
         chosen = {
-            one: digest
-            for (one, digest), keep in zip(self.digests.items(), kept, strict=True)
+            one: summary
+            for (one, summary), keep in zip(self.summaries.items(), kept, strict=True)
             if keep
         }
         return Evidence(Study(chosen), self.runs[kept].reset_index(drop=True))
@@ -58,14 +58,14 @@ def needed(
     source: str,
     *,
     learners: Sequence[str] = MAIN,
-    layouts: Sequence[str] = plan.LAYOUTS,
-    seeds: Sequence[int] = plan.SEEDS,
+    layouts: Sequence[str] = design.LAYOUTS,
+    seeds: Sequence[int] = design.SEEDS,
     episodes: int = paper.EPISODES,
 ) -> tuple[Experiment, ...]:
     """The runs of the main table that have to be trained here.
 
     All that is asked for and not published, if `source` is "fresh", and of what is published
-    `plan.fresh`; none if it is "published".
+    `design.fresh`; none if it is "published".
 
     Raises:
         ParameterError: a value is not what it may be, or something asked for is not published.
@@ -73,7 +73,7 @@ def needed(
     if source not in SOURCES:
         raise ParameterError(f"study = {source!r} must be one of {', '.join(SOURCES)}")
     asked = _asked(learners, layouts, seeds, episodes)
-    known = load().digests
+    known = load().summaries
     if source == "published":
         for experiment in asked:
             if experiment not in known:
@@ -82,7 +82,7 @@ def needed(
                     " episodes; study = 'fresh' trains it"
                 )
         return ()
-    afresh = set(plan.fresh())
+    afresh = set(design.fresh())
     return tuple(e for e in asked if e in afresh or e not in known)
 
 
@@ -99,36 +99,36 @@ def gather(
     Raises:
         ParameterError: as `needed`.
     """
-    here = fetch_digests(needed(source, **asked))  # type: ignore[arg-type]
+    here = fetch_summaries(needed(source, **asked))  # type: ignore[arg-type]
     published = load()
-    wanted: dict[Experiment, str] = dict.fromkeys(_asked(**asked), plan.MAIN_TABLE)  # type: ignore[arg-type]
+    wanted: dict[Experiment, str] = dict.fromkeys(_asked(**asked), design.MAIN_TABLE)  # type: ignore[arg-type]
     if variants:
         wanted = {
-            e: name for e, name in published.variants.items() if name != plan.MAIN_TABLE
+            e: name for e, name in published.variants.items() if name != design.MAIN_TABLE
         } | wanted
-    digests: dict[Experiment, Digest] = {
-        e: here[e] if e in here else published.digests[e] for e in wanted
+    summaries: dict[Experiment, RunSummary] = {
+        e: here[e] if e in here else published.summaries[e] for e in wanted
     }
-    made = table(here).join(fates_of(here)) if here else table(here)
+    made = table(here).join(failure_modes_of(here)) if here else table(here)
     rows = {**published.rows, **dict(zip(here, made.to_dict("records"), strict=True))}
     runs = pd.DataFrame([rows[e] for e in wanted])
     runs["variant"] = list(wanted.values())
     runs["source"] = ["fresh" if e in here else "published" for e in wanted]
     arms = [rows.get(frozen_arm(e), {}).get("training_cost") for e in wanted]
-    runs["excess"] = runs.training_cost / pd.Series(arms, dtype=float)
-    return Evidence(Study(digests), runs)
+    runs["cost_ratio"] = runs.training_cost / pd.Series(arms, dtype=float)
+    return Evidence(Study(summaries), runs)
 
 
 def paths(evidence: Evidence) -> Mapping[Experiment, Column]:
     """States of each run's last drive without noise, as `paper_claims.judge` takes them."""
-    return {experiment: digest.states for experiment, digest in evidence.digests.items()}
+    return {experiment: summary.states for experiment, summary in evidence.summaries.items()}
 
 
 def _asked(
     learners: Sequence[str] = MAIN,
-    layouts: Sequence[str] = plan.LAYOUTS,
-    seeds: Sequence[int] = plan.SEEDS,
+    layouts: Sequence[str] = design.LAYOUTS,
+    seeds: Sequence[int] = design.SEEDS,
     episodes: int = paper.EPISODES,
 ) -> tuple[Experiment, ...]:
-    runs = plan.main_table(learners, layouts, seeds, episodes)
+    runs = design.main_table(learners, layouts, seeds, episodes)
     return tuple(dict.fromkeys((*runs, *map(frozen_arm, runs))))

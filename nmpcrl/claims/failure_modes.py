@@ -1,11 +1,11 @@
-"""Why a run went wrong, and where its robot ended, read off its digest.
+"""Why a run went wrong, and where its robot ended, read off its summary.
 
-A run went wrong if it was stopped or diverged in training (`paper_claims.divergence`), or if its final
-noise-free cost is above theta_init's by more than `BETTER`. Its cost rose between the last rollout
-without noise that was not above theta_init's by so much and the first that was; where none was, in
-its last episodes. In these some ten episodes the mechanisms are looked for in the order of
+A run went wrong if it was stopped or diverged in training (`paper_claims.divergence`), or if its
+final noise-free cost is above theta_init's by more than `BETTER`. Its cost rose between the last
+rollout without noise that was not above theta_init's by so much and the first that was; where none
+was, in its last episodes. In these some ten episodes the mechanisms are looked for in the order of
 `MECHANISMS`, and the first one found is the one, because each can bring about those after it. What
-came first within these episodes, a digest cannot tell.
+came first within these episodes, a summary cannot tell.
 
 The thresholds were fixed before they were put to the study, but after a look at the ranges of
 these columns in five short runs. They sort runs, and decide no claim.
@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.metrics import TOUCH
-from nmpcrl.analysis.summary import Digest, table
+from nmpcrl.analysis.summary import RunSummary, table
 from nmpcrl.claims.paper_claims import BETTER, divergence
 from nmpcrl.control import Task
 from nmpcrl.study import paper
@@ -39,11 +39,11 @@ WELL = "went well"  # in the place of a mechanism
 NAMED = ("learner", "layout", "decay", "seed")
 
 
-def fates(digests: Mapping[Experiment, Digest] | Iterable[Digest]) -> pd.DataFrame:
+def fates(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> pd.DataFrame:
     """What became of each run that learned, one row a run.
 
     Args:
-        digests: runs and their frozen arms.
+        summaries: runs and their frozen arms.
 
     Returns:
         Columns learner, layout, decay, seed, ending (of the last drive: one of `ENDINGS`), cost
@@ -54,7 +54,7 @@ def fates(digests: Mapping[Experiment, Digest] | Iterable[Digest]) -> pd.DataFra
     Raises:
         KeyError: the frozen arm of a run is not among them.
     """
-    listed = list(digests.values() if isinstance(digests, Mapping) else digests)
+    listed = list(summaries.values() if isinstance(summaries, Mapping) else summaries)
     named = {run.name: run for run in listed}
     runs = table(listed)
     shares = runs.final_cost / runs.initial_cost
@@ -85,7 +85,7 @@ def counted(fates: pd.DataFrame, what: str = "mechanism") -> pd.DataFrame:
 
 
 def went_wrong(runs: pd.DataFrame) -> list[str]:
-    """What is wrong with each run of `text.table`: "stopped", "training", "without noise", ""."""
+    """What went wrong in each run: "stopped", "training", "without noise", or "" for nothing."""
     signs = {
         "stopped": runs.stopped != "finished",
         "training": divergence(runs).fillna(False),
@@ -95,7 +95,7 @@ def went_wrong(runs: pd.DataFrame) -> list[str]:
     return np.select(conditions, list(signs), "").tolist()
 
 
-def rise(run: Digest) -> slice:
+def rise(run: RunSummary) -> slice:
     """The episodes in which a run's cost rose."""
     episode, cost = run.evaluations["episode"], run.evaluations["cost"]
     above = np.flatnonzero(cost > (1 + BETTER) * cost[0])
@@ -105,7 +105,7 @@ def rise(run: Digest) -> slice:
     return slice(max(0, reached - run.experiment["evaluate_every"]), reached)
 
 
-def mechanism(run: Digest, task: Task, first_drive: Column) -> str:
+def mechanism(run: RunSummary, task: Task, first_drive: Column) -> str:
     """Which of `MECHANISMS` was at work when the cost of a run rose.
 
     Args:
@@ -124,12 +124,12 @@ def mechanism(run: Digest, task: Task, first_drive: Column) -> str:
     return MECHANISMS[signs.index(True)]
 
 
-def overshot(run: Digest, window: slice) -> bool:
+def overshot(run: RunSummary, window: slice) -> bool:
     """Whether a step moved theta so far that the TD error grew: see `OVERSHOOT`."""
     return bool((run.episodes["alpha_phi2"][window] > OVERSHOOT).any())
 
 
-def over_predicted(run: Digest, window: slice) -> bool:
+def over_predicted(run: RunSummary, window: slice) -> bool:
     """Whether the network said too much: see `OVER_PREDICTED`; False for who has none."""
     bias, delta = run.episodes["bias"][window], run.episodes["delta"][window]
     known = np.isfinite(bias) & np.isfinite(delta)
@@ -137,7 +137,7 @@ def over_predicted(run: Digest, window: slice) -> bool:
     return bool(share >= OVER_PREDICTED)
 
 
-def gap_closed(run: Digest, window: slice, task: Task, first_drive: Column) -> bool:
+def gap_closed(run: RunSummary, window: slice, task: Task, first_drive: Column) -> bool:
     """Whether theta_c grew until no plan fits through a gap that the first drive went through."""
     start = run.experiment["theta"][-1]
     reached = np.fmax.reduce(run.episodes["theta"][window, -1], initial=start)
@@ -145,7 +145,7 @@ def gap_closed(run: Digest, window: slice, task: Task, first_drive: Column) -> b
     return any(width > 0 >= after[sides] for sides, width in before.items())
 
 
-def cut_short(run: Digest, window: slice) -> bool:
+def cut_short(run: RunSummary, window: slice) -> bool:
     """Whether solves failed: see `CUT_SHORT`."""
     judged = run.evaluations["episode"] == window.stop
     failed = np.isinf(run.evaluations["cost"][judged]).any()

@@ -38,7 +38,7 @@ def holds(measure: Measure, values: Values, border: float | None = None) -> pd.S
 
     Args:
         measure: of a claim.
-        values: of `suite.of`.
+        values: of `measure.of`.
         border: another one than the claim's.
     """
     limit = measure.border if border is None else border
@@ -75,7 +75,7 @@ def steady(measure: Measure, values: Values) -> bool:
 
 
 def saved(runs: pd.DataFrame) -> pd.Series:
-    """Share of theta_init's noise-free cost that each run of `text.table` saves in the end.
+    """Share of theta_init's noise-free cost that each run of `summary.table` saves in the end.
 
     Minus infinity where a drive failed, and where training had to be stopped.
     """
@@ -88,30 +88,32 @@ def achieved(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
     1 is as good as what is possible and 0 as theta_init; nan where nothing is known to be possible.
 
     Args:
-        runs: of `text.table`.
+        runs: of `summary.table`.
         possible: share of theta_init's noise-free cost that can be saved, by layout.
     """
     known = {layout: share for layout, share in possible.items() if share > 0}
     return saved(runs) / runs.layout.map(known).astype(float)
 
 
-def _excess(runs: pd.DataFrame, _: Paths) -> Values:
+def _cost_ratio(runs: pd.DataFrame, _: Paths) -> Values:
     """Training cost over the frozen arm's; infinite where the run was stopped."""
 
-    def excess(arm: pd.DataFrame) -> pd.Series:
-        return arm.excess.mask(arm.stopped.notna() & (arm.stopped != "finished"), np.inf)
+    def cost_ratio(arm: pd.DataFrame) -> pd.Series:
+        return arm.cost_ratio.mask(arm.stopped.notna() & (arm.stopped != "finished"), np.inf)
 
-    return _beside(runs, ("DES", "RDES"), excess)
+    return _beside(runs, ("DES", "RDES"), cost_ratio)
 
 
-def _wander(runs: pd.DataFrame, _: Paths) -> Values:
+def _late_cost_range(runs: pd.DataFrame, _: Paths) -> Values:
     """Range of the noise-free cost over theta_init's; infinite where the run diverged."""
 
-    def wander(arm: pd.DataFrame) -> pd.Series:
+    def late_cost_range(arm: pd.DataFrame) -> pd.Series:
         diverged = paper_claims.divergence(arm)
-        return arm.wander.mask(diverged.fillna(False).astype(bool), np.inf).where(diverged.notna())
+        return arm.late_cost_range.mask(diverged.fillna(False).astype(bool), np.inf).where(
+            diverged.notna()
+        )
 
-    return _beside(runs, ("ES", "GES"), wander)
+    return _beside(runs, ("ES", "GES"), late_cost_range)
 
 
 def _apart(runs: pd.DataFrame, paths: Paths) -> Values:
@@ -169,9 +171,15 @@ def _beside(
 
 MEASURES = {  # of C7, its weaker question: the stronger one has no border to speak of
     "C1": Measure(
-        "training cost / frozen arm's", paper_claims.DIVERGED, _excess, contrast=True, nothing=1.0
+        "training cost / frozen arm's",
+        paper_claims.DIVERGED,
+        _cost_ratio,
+        contrast=True,
+        nothing=1.0,
     ),
-    "C2": Measure("range of noise-free cost", paper_claims.UNSTABLE, _wander, contrast=True),
+    "C2": Measure(
+        "range of noise-free cost", paper_claims.UNSTABLE, _late_cost_range, contrast=True
+    ),
     "C5": Measure("apart / what counts as the same", 1.0, _apart),
     "C6": Measure("error with θ / without", paper_claims.MORE_ACCURATE, _told, nothing=1.0),
     "C7": Measure("largest Ξ without noise", TOUCH, _inside),

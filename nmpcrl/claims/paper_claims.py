@@ -18,7 +18,7 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
-from nmpcrl.bench.timing import ratio
+from nmpcrl.bench.learners import ratio
 from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.rule import (
     CELL,
@@ -180,7 +180,7 @@ def judge(
     """Every claim of the paper, in order.
 
     Args:
-        runs: of `text.table`, all of one setting; a missing learner leaves its claims undecided.
+        runs: of `summary.table`, all of one setting; a missing learner leaves its claims undecided.
         paths: states of the last rollout without noise; only those of RDES and GES are read.
         timings: of `time_learners`; what is not in it is not decided.
         assumptions: of `audit`.
@@ -214,13 +214,13 @@ def des_diverges_and_rdes_does_not(runs: pd.DataFrame) -> Verdict:
     """C1, from Fig. 1."""
     des, rdes = arms(runs, *CLAIMS["C1"].learners)
     gone, stayed = divergence(des), ~divergence(rdes)
-    excess = [shown(median(arm.excess), ".2f") for arm in (des, rdes)]
+    cost_ratio = [shown(median(arm.cost_ratio), ".2f") for arm in (des, rdes)]
     return settle(
         CLAIMS["C1"],
         answered(gone & stayed, des, rdes),
         f"{_of(gone)} runs of DES and {_of(~stayed)} of RDES diverged; their training cost ended at"
-        f" {excess[0]} and {excess[1]} times the frozen arm's (medians; an episode that a failed"
-        " solve cut short counts as ∞).",
+        f" {cost_ratio[0]} and {cost_ratio[1]} times the frozen arm's (medians; an episode that a"
+        " failed solve cut short counts as ∞).",
     )
 
 
@@ -228,12 +228,12 @@ def es_is_unstable_and_ges_is_stable(runs: pd.DataFrame) -> Verdict:
     """C2, from Fig. 2."""
     es, ges = arms(runs, *CLAIMS["C2"].learners)
     swung, stayed = instability(es), ~instability(ges)
-    wander = [shown(median(arm.wander), ".1%") for arm in (es, ges)]
+    late_cost_range = [shown(median(arm.late_cost_range), ".1%") for arm in (es, ges)]
     return settle(
         CLAIMS["C2"],
         answered(swung & stayed, es, ges),
         f"{_of(swung)} runs of ES and {_of(~stayed)} of GES were unstable; in the second half the"
-        f" noise-free cost ranged over {wander[0]} and {wander[1]} (medians).",
+        f" noise-free cost ranged over {late_cost_range[0]} and {late_cost_range[1]} (medians).",
     )
 
 
@@ -343,12 +343,16 @@ def learning_beats_the_frozen_theta(runs: pd.DataFrame) -> Verdict:
 def divergence(runs: pd.DataFrame) -> pd.Series:
     """Which runs diverged (see `DIVERGED`); missing where there is nothing to hold them against."""
     stopped = (runs.stopped != "finished") & runs.stopped.notna()
-    return _gone(runs.stopped, runs.excess).astype("boolean").where(runs.excess.notna() | stopped)
+    return (
+        _gone(runs.stopped, runs.cost_ratio)
+        .astype("boolean")
+        .where(runs.cost_ratio.notna() | stopped)
+    )
 
 
 def instability(runs: pd.DataFrame) -> pd.Series:
     """Which runs are unstable (see `UNSTABLE`); missing where that is not known."""
-    return answered(divergence(runs) | (runs.wander > UNSTABLE), runs)
+    return answered(divergence(runs) | (runs.late_cost_range > UNSTABLE), runs)
 
 
 def gain(runs: pd.DataFrame) -> pd.Series:
@@ -376,24 +380,24 @@ def diverged(study: Study, experiment: Experiment, records: Records) -> bool:
     """Whether a run diverged: see `DIVERGED`."""
     frozen = {name: getattr(experiment, name) for name in CELL}
     (arm,) = study.select(learner="frozen", **frozen).values()
-    return bool(_gone(records.facts["stopped"], metrics.excess(records, arm)))
+    return bool(_gone(records.facts["stopped"], metrics.cost_ratio(records, arm)))
 
 
 def unstable(study: Study, experiment: Experiment, records: Records) -> bool:
     """Whether a run is unstable: see `UNSTABLE`."""
-    return diverged(study, experiment, records) or metrics.wander(records) > UNSTABLE
+    return diverged(study, experiment, records) or metrics.late_cost_range(records) > UNSTABLE
 
 
 def experiment_of(row: Mapping[str, Any]) -> Experiment:
-    """The experiment that a row of `text.table` summarises."""
+    """The experiment that a row of `summary.table` summarises."""
     named = {field.name: row[field.name] for field in fields(Experiment)}
     theta = tuple(float(value) for value in named["theta"].split())
     return Experiment(**named | {"theta": theta})
 
 
-def _gone(stopped: Any, excess: Any) -> Any:
+def _gone(stopped: Any, cost_ratio: Any) -> Any:
     """The rule of `DIVERGED`, for one run or a column of them."""
-    return (stopped != "finished") | (excess > DIVERGED)
+    return (stopped != "finished") | (cost_ratio > DIVERGED)
 
 
 def _driven(runs: pd.DataFrame, paths: Paths) -> dict[tuple[Any, ...], Column]:

@@ -1,6 +1,6 @@
 """The whole study as it was trained once, in `book/published`, small enough to go with the book.
 
-- `processes.csv`: one row a run, `text.row`, with the part of the study it belongs to and its key;
+- `runs.csv`: one row a run, `summary.row`, with the part of the study it belongs to and its key;
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
 - `rule.json`: what became of each claim;
@@ -24,8 +24,8 @@ import numpy as np
 import pandas as pd
 
 import nmpcrl
-from nmpcrl.analysis import summaries
-from nmpcrl.analysis.summary import Digest, row
+from nmpcrl.analysis.summaries import key as run_key
+from nmpcrl.analysis.summary import RunSummary, row
 from nmpcrl.bench.suite import machine
 from nmpcrl.claims.failure_modes import fates
 from nmpcrl.claims.paper_claims import experiment_of
@@ -38,7 +38,7 @@ FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
 WORDS = ["ending", "wrong", "mechanism"]  # of `failure_modes.fates`, as the next
-FATE = [*WORDS, "episode"]
+FAILURE_MODE = [*WORDS, "episode"]
 MEASURES = ("final_cost", "training_cost")  # by which runs of another machine are judged
 SLACK = 0.01  # of theta_init's cost, that they may be out of the published spread
 EXACT = 1e-6  # relative: the cost of theta_init, which no noise and no learning moves
@@ -52,13 +52,13 @@ class Damaged(ValueError):
 class Published:
     """The published study; empty where nothing is published.
 
-    Of a digest it holds episodes["cost"], evaluations["episode"], ["theta"] and ["cost"], states
+    Of a summary it holds episodes["cost"], evaluations["episode"], ["theta"] and ["cost"], states
     and the facts "stopped" and "seconds"; single precision but for the summaries in `rows`.
     """
 
-    digests: Mapping[Experiment, Digest] = field(default_factory=dict)
+    summaries: Mapping[Experiment, RunSummary] = field(default_factory=dict)
     variants: Mapping[Experiment, str] = field(default_factory=dict)  # the part each belongs to
-    rows: Mapping[Experiment, dict[str, Any]] = field(default_factory=dict)  # of `processes.csv`
+    rows: Mapping[Experiment, dict[str, Any]] = field(default_factory=dict)  # of `runs.csv`
     verdicts: tuple[Verdict, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
 
@@ -70,14 +70,14 @@ def place() -> Path:
 
 
 def publish(
-    digests: Mapping[Experiment, Digest],
+    summaries: Mapping[Experiment, RunSummary],
     variants: Mapping[Experiment, str],
     verdicts: Sequence[Verdict],
 ) -> Path:
     """Write all files anew; the same content gives the same bytes, but for the date.
 
     Args:
-        digests: the runs.
+        summaries: the runs.
         variants: the part of the study that each belongs to.
         verdicts: on the claims.
 
@@ -86,16 +86,16 @@ def publish(
     """
     folder = place()
     folder.mkdir(parents=True, exist_ok=True)
-    labels = {e: {"variant": variants[e], "key": summaries.key(e)} for e in digests}
-    runs = pd.DataFrame([row(one) | labels[e] for e, one in digests.items()])
-    runs = runs.join(fates_of(digests))
+    labels = {e: {"variant": variants[e], "key": run_key(e)} for e in summaries}
+    runs = pd.DataFrame([row(one) | labels[e] for e, one in summaries.items()])
+    runs = runs.join(failure_modes_of(summaries))
     runs.to_csv(folder / "runs.csv", index=False)
-    curves: dict[str, Any] = _curves(list(digests.values()))
+    curves: dict[str, Any] = _curves(list(summaries.values()))
     np.savez_compressed(folder / "curves.npz", **curves)
     _write(folder / "verdicts.json", [asdict(verdict) for verdict in verdicts])
     about = {
         "date": datetime.now(UTC).date().isoformat(),
-        "code": summaries.key(Experiment()),
+        "code": run_key(Experiment()),
         "versions": store.versions(),
         "machine": here(),
         "runs": runs.variant.value_counts(sort=False).to_dict(),
@@ -123,13 +123,13 @@ def here() -> dict[str, Any]:
     return {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities}
 
 
-def fates_of(digests: Mapping[Experiment, Digest]) -> pd.DataFrame:
-    """`FATE` of each run, in order; nothing is said of the frozen arms."""
-    moved = [e for e in digests if e.learner != "frozen"]
-    told = fates(digests)[FATE].to_dict("records")
+def failure_modes_of(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
+    """`FAILURE_MODE` of each run, in order; nothing is said of the frozen arms."""
+    moved = [e for e in summaries if e.learner != "frozen"]
+    told = fates(summaries)[FAILURE_MODE].to_dict("records")
     known = dict(zip(moved, told, strict=True))
     silent = {"ending": "", "wrong": "", "episode": pd.NA, "mechanism": ""}
-    return pd.DataFrame([known.get(e, silent) for e in digests], columns=FATE)
+    return pd.DataFrame([known.get(e, silent) for e in summaries], columns=FAILURE_MODE)
 
 
 def load() -> Published:
@@ -158,7 +158,7 @@ def _load(folder: Path) -> Published:
             raise ValueError("runs.csv and curves.npz are not of the same runs")
         verdicts = json.loads((folder / "verdicts.json").read_text())
         return Published(
-            {e: _digest(one, curves, i) for i, (e, one) in enumerate(rows.items())},
+            {e: _summary_of(one, curves, i) for i, (e, one) in enumerate(rows.items())},
             {e: one["variant"] for e, one in rows.items()},
             rows,
             tuple(_verdict(one) for one in verdicts),
@@ -170,7 +170,7 @@ def _load(folder: Path) -> Published:
         ) from error
 
 
-def compare(fresh: Mapping[Experiment, Digest], published: Published) -> pd.DataFrame:
+def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.DataFrame:
     """Where runs that were trained here contradict the published ones: one row each, none if none.
 
     Where code, versions and machine are the same, every run must be the same to the last bit.
@@ -192,7 +192,7 @@ def comparable(runs: Iterable[Experiment], published: Published) -> set[Experime
     if published.about.get("machine") != here():
         return set()
     known = published.rows
-    return {e for e in runs if e in known and known[e]["key"] == summaries.key(e)}
+    return {e for e in runs if e in known and known[e]["key"] == run_key(e)}
 
 
 def _unequal(e: Experiment, here: dict[str, Any], there: dict[str, Any]) -> tuple[Any, ...] | None:
@@ -243,14 +243,14 @@ def _sums(folder: Path) -> dict[str, str]:
     return {name: sha256(content).hexdigest() for name, content in contents.items()}
 
 
-def _curves(digests: list[Digest]) -> dict[str, Column]:
+def _curves(summaries: list[RunSummary]) -> dict[str, Column]:
     """Columns of all runs, padded with nan to one length; shape (runs, ...)."""
     return {
-        "cost": _padded([one.episodes["cost"] for one in digests]),
-        "judged_after": _padded([one.evaluations["episode"] for one in digests]),
-        "judged_cost": _padded([one.evaluations["cost"] for one in digests]),
-        "judged_theta": _padded([one.evaluations["theta"] for one in digests]),
-        "states": _padded([one.states for one in digests]),
+        "cost": _padded([one.episodes["cost"] for one in summaries]),
+        "judged_after": _padded([one.evaluations["episode"] for one in summaries]),
+        "judged_cost": _padded([one.evaluations["cost"] for one in summaries]),
+        "judged_theta": _padded([one.evaluations["theta"] for one in summaries]),
+        "states": _padded([one.states for one in summaries]),
     }
 
 
@@ -262,10 +262,10 @@ def _padded(columns: list[Column]) -> Column:
     return result
 
 
-def _digest(summary: dict[str, Any], curves: Mapping[str, Column], i: int) -> Digest:
+def _summary_of(summary: dict[str, Any], curves: Mapping[str, Column], i: int) -> RunSummary:
     judged = np.isfinite(curves["judged_after"][i])
     experiment = asdict(experiment_of(summary))
-    return Digest(
+    return RunSummary(
         experiment,
         {"cost": curves["cost"][i][: experiment["episodes"]]},
         {

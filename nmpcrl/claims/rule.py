@@ -166,7 +166,7 @@ def arms(
     left no policy to drive with, so its final cost is infinite, whatever the last rollout cost.
 
     Args:
-        runs: of `text.table`, all of one setting.
+        runs: of `summary.table`, all of one setting.
         learners: whose runs are wanted.
         among: the learners in whose cells they are wanted; by default themselves.
 

@@ -124,7 +124,7 @@ def dependence(verdicts: Iterable[Verdict], flipped: pd.DataFrame) -> str:
 
 
 def scope(runs: pd.DataFrame) -> str:
-    """What the runs of `text.table` cover, in a sentence."""
+    """What the runs of `summary.table` cover, in a sentence."""
     names = ("layout", "seed", "decay", "episodes")
     layouts, seeds, readings, episodes = (tuple(runs[name].unique().tolist()) for name in names)
     return (

@@ -6,7 +6,7 @@ import pandas as pd
 
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
-from nmpcrl.study import plan
+from nmpcrl.study import design
 from nmpcrl.study.departures import DEPARTURES
 
 NOTHING = (
@@ -29,7 +29,7 @@ def effort(found: Published) -> str:
         return NOTHING
     about, episodes = found.about, {e.episodes for e in found.rows}
     parts = dict(about["runs"])
-    main, controls = parts.pop(plan.MAIN_TABLE, 0), parts.pop("controls", 0)
+    main, controls = parts.pop(design.MAIN_TABLE, 0), parts.pop("controls", 0)
     libraries = listed([f"{name} {version}" for name, version in about["versions"].items()])
     machine = about["machine"]
     return (
@@ -67,7 +67,7 @@ def spread(verdicts: Iterable[Verdict]) -> str:
 
 
 def changes(flips: pd.DataFrame) -> str:
-    """How many variants change a verdict; `flips` as `flips.flips` returns it."""
+    """How many variants change a verdict; `flips` as `robustness.flips` returns it."""
     variants = flips.variant.unique()
     if not len(variants):
         return ""
@@ -88,7 +88,7 @@ def hinges(verdicts: Iterable[Verdict], flips: pd.DataFrame) -> dict[str, tuple[
         if disagree(verdict.by_decay.values()):
             found[DECAY].add(verdict.claim)
     for variant, claim in _flipped(flips)[["variant", "claim"]].itertuples(index=False):
-        letter = plan.VARIANTS[variant].departure
+        letter = design.VARIANTS[variant].departure
         if letter:
             found[letter].add(claim)
     return {letter: tuple(sorted(claims)) for letter, claims in found.items() if claims}

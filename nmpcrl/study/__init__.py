@@ -5,7 +5,7 @@ from nmpcrl.study.experiment import Experiment, run
 from nmpcrl.study.parameters import ParameterError
 from nmpcrl.study.records import DamagedRecords, Records
 from nmpcrl.study.store import Study, fetch, fetch_all, stored
-from nmpcrl.study.sweep import main_study, sweep
+from nmpcrl.study.sweeps import main_study, sweep
 
 __all__ = [
     "DamagedRecords",

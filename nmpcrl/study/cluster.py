@@ -1,6 +1,6 @@
 """Runs on a Dask cluster; needs the optional extra `nmpcrl[cluster]`.
 
-The cluster's workers train and hand digests back, so they need this package and nothing else: no
+The cluster's workers train and hand summaries back, so they need this package and nothing else: no
 shared disk, no way to the reader's files. Dask starts again what a lost worker was at.
 """
 
@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import Any
 
-from nmpcrl.analysis import summaries
+from nmpcrl.study import store
 from nmpcrl.study.experiment import Experiment
 
 
@@ -63,4 +63,4 @@ def _refuse_others(client: Any) -> None:
 
 
 def _signature() -> str:
-    return summaries.key(Experiment())
+    return store.key(Experiment())

@@ -127,8 +127,8 @@ DEPARTURES = {
     ),
     "P": Departure(
         gap="'Diverges', 'unstable' and 'the same policy' are not defined.",
-        reading="The thresholds at the top of `paper_claims.py` and the rule in `rule.py`, which were"
-        " fixed before any claim was put to the study.",
+        reading="The thresholds at the top of `paper_claims.py` and the rule in `rule.py`, which"
+        " were fixed before any claim was put to the study.",
         why="A verdict needs them.",
     ),
 }

@@ -26,15 +26,14 @@ from nmpcrl.learning import (
     regularized_deep_expected_sarsa,
     step_matched,
 )
+from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import (
     Diverged,
     Exploration,
-    Persistent,
     Step,
     absurd,
     count_episodes,
     count_steps,
-    evaluate,
     train,
 )
 from nmpcrl.study import paper

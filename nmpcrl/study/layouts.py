@@ -22,7 +22,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Task
-from nmpcrl.learning.training import Persistent, evaluate
+from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
 
 ARRIVED = 0.5  # distance to the target, over all states, at which a drive has arrived

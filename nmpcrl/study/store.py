@@ -31,19 +31,13 @@ from nmpcrl.study.experiment import Experiment, compile_ahead, run
 from nmpcrl.study.records import DamagedRecords, Records
 
 LIBRARIES = ("casadi", "numba", "numpy", "torch")
-MATHEMATICS = (
-    "control",
-    "learning",
-    "study/paper.py",
-    "learning/training.py",
-    "study/experiment.py",
-)
+MATHEMATICS = ("control", "learning", "study/paper.py", "study/experiment.py")
 SPAWN = get_context("spawn")  # a fork would copy the threads' locks but not the threads
 ATTEMPTS = 3  # how often a run is started whose worker was killed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
-Run = TypeVar("Run")  # Records, or the Digest of them
+Run = TypeVar("Run")  # Records, or the RunSummary of them
 
 
 class Study(Mapping[Experiment, Run]):
@@ -171,7 +165,7 @@ def provenance(experiment: Experiment) -> dict[str, Any]:
 
 
 def key(experiment: Experiment) -> str:
-    """A digest of all that the run's numbers depend on."""
+    """A hash of all that the run's numbers depend on."""
     depends = [asdict(experiment), versions(), _mathematics()]
     return hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
 
@@ -190,11 +184,11 @@ def _version(library: str) -> str:
 
 @cache
 def _mathematics() -> str:
-    return digest(MATHEMATICS)
+    return source_hash(MATHEMATICS)
 
 
-def digest(places: Iterable[str]) -> str:
-    """A digest of the source in some places, without comments, docstrings and layout."""
+def source_hash(places: Iterable[str]) -> str:
+    """A hash of the source in some places, without comments, docstrings and layout."""
     root = Path(nmpcrl.__file__).parent
     found = hashlib.sha256()
     for place in places:

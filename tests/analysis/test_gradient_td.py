@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.curvature import Curvature, dropped_curvature
+from nmpcrl.analysis.gradient_td import Curvature, dropped_curvature
 from nmpcrl.study import Experiment, paper, run
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from nmpcrl.analysis import policy_search
 from nmpcrl.analysis.policy_search import LEAST, SCALE, Found, Search, fetch
-from nmpcrl.learning.training import Persistent, evaluate
+from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import ParameterError, paper
 
 BEST = np.array([0.5, 1.5, 0.1, 0.02, 0.08, 2.0, 0.3, 0.15, 0.3])  # of the bowl below

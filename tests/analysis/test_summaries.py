@@ -19,8 +19,8 @@ import pytest
 
 import nmpcrl
 from nmpcrl.analysis import summaries
-from nmpcrl.analysis.summaries import Failed, Killed, fetch_digests
-from nmpcrl.analysis.summary import Digest, digest
+from nmpcrl.analysis.summaries import Failed, Killed, fetch_summaries
+from nmpcrl.analysis.summary import RunSummary, summarise
 from nmpcrl.study import Experiment, fetch, run, store, sweep
 from nmpcrl.study.store import THREADS
 
@@ -56,12 +56,12 @@ def note(what, experiment):
 
 
 @pytest.fixture(autouse=True)
-def digests(tmp_path, monkeypatch) -> Path:
+def folder(tmp_path, monkeypatch) -> Path:
     """A folder of this test's own; and what is set for workers is unset after it."""
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
     for name in THREADS:
         monkeypatch.setenv(name, os.environ.get(name, "1"))
-    return tmp_path / "runs" / "digests"
+    return tmp_path / "runs" / "summaries"
 
 
 @pytest.fixture
@@ -92,9 +92,9 @@ def workers(tmp_path, monkeypatch):
 
 
 def here(experiments, **options):
-    """The digests, made in this process one after the other."""
+    """The summaries, made in this process one after the other."""
     with ThreadPoolExecutor(1) as executor:
-        return fetch_digests(experiments, executor=executor, progress=False, **options)
+        return fetch_summaries(experiments, executor=executor, progress=False, **options)
 
 
 def times(log: Path, what: str) -> list[int]:
@@ -103,7 +103,7 @@ def times(log: Path, what: str) -> list[int]:
     return sorted(int(seed) for said, seed, _ in lines if said == what)
 
 
-def assert_same_digest(one: Digest, other: Digest):
+def assert_same_summary(one: RunSummary, other: RunSummary):
     for columns, others in (
         (one.episodes, other.episodes),
         (one.evaluations, other.evaluations),
@@ -114,64 +114,64 @@ def assert_same_digest(one: Digest, other: Digest):
             np.testing.assert_array_equal(columns[name], others[name])
 
 
-def test_what_is_fetched_is_the_digest_of_the_run():
+def test_what_is_fetched_is_the_summary_of_the_run():
     experiments = sweep(learner=("RDES", "GES"), episodes=2, steps=65)
-    study = fetch_digests(experiments, workers=2, progress=False)
+    study = fetch_summaries(experiments, workers=2, progress=False)
     assert list(study) == list(experiments)
     for experiment in experiments:
-        assert_same_digest(study[experiment], digest(run(experiment)))
+        assert_same_summary(study[experiment], summarise(run(experiment)))
 
 
-def test_a_digest_is_stored_among_the_runs_and_says_what_it_depends_on(digests):
+def test_a_summary_is_stored_among_the_runs_and_says_what_it_depends_on(folder):
     found = here([QUICK])[QUICK]
-    (path,) = digests.iterdir()
+    (path,) = folder.iterdir()
     assert path == summaries.path_of(QUICK)
     assert path.name.startswith("frozen-A-step-seed0-2ep-")
-    assert_same_digest(Digest.load(path), found)
+    assert_same_summary(RunSummary.load(path), found)
     assert found.facts["key"] == store.key(QUICK)
     assert found.facts["versions"] == store.versions()
     assert store.stored() == {}  # the run itself is not kept
 
 
-def test_a_stored_digest_is_read_and_not_made_again(trained):
+def test_a_stored_summary_is_read_and_not_made_again(trained):
     first = here([QUICK])
     again = here([QUICK, QUICK])
     assert trained == [QUICK]
-    assert_same_digest(again[QUICK], first[QUICK])
+    assert_same_summary(again[QUICK], first[QUICK])
 
 
-def test_a_run_that_is_stored_whole_is_digested_and_not_trained_again(trained):
+def test_a_run_that_is_stored_whole_is_summarised_and_not_trained_again(trained):
     records = fetch(QUICK)
     found = here([QUICK])
     assert trained == []
-    assert_same_digest(found[QUICK], digest(records))
+    assert_same_summary(found[QUICK], summarise(records))
     assert found[QUICK].facts["seconds"] == records.facts["seconds"]
 
 
 def test_a_stored_run_that_is_damaged_is_trained_again(trained):
     fetch(QUICK)
     store.path_of(QUICK).write_bytes(b"")
-    assert_same_digest(here([QUICK])[QUICK], digest(run(QUICK)))
+    assert_same_summary(here([QUICK])[QUICK], summarise(run(QUICK)))
     assert trained == [QUICK]
 
 
-def test_a_damaged_digest_is_put_aside_and_made_again(digests, trained, capsys):
+def test_a_damaged_summary_is_put_aside_and_made_again(folder, trained, capsys):
     first = here([QUICK])
     path = summaries.path_of(QUICK)
     path.write_bytes(path.read_bytes()[:-200])
-    assert_same_digest(here([QUICK])[QUICK], first[QUICK])
+    assert_same_summary(here([QUICK])[QUICK], first[QUICK])
     assert trained == [QUICK, QUICK]
-    assert sorted(p.suffix for p in digests.iterdir()) == [".damaged", ".npz"]
+    assert sorted(p.suffix for p in folder.iterdir()) == [".damaged", ".npz"]
     assert "is kept as" in capsys.readouterr().err
 
 
 @pytest.fixture
 def keys(tmp_path, monkeypatch):
-    """The keys of a run and of its digest, after a change of a copy of the package."""
+    """The keys of a run and of its summary, after a change of a copy of the package."""
     copy = tmp_path / "nmpcrl"
     shutil.copytree(Path(nmpcrl.__file__).parent, copy, ignore=shutil.ignore_patterns("*.pyc"))
     monkeypatch.setattr(nmpcrl, "__file__", str(copy / "__init__.py"))
-    for module, name in ((store, "_mathematics"), (summaries, "_summary")):
+    for module, name in ((store, "_mathematics"), (folder, "_summary")):
         monkeypatch.setattr(module, name, getattr(module, name).__wrapped__)
 
     def after(place=None, before="", changed=""):
@@ -192,15 +192,15 @@ def keys(tmp_path, monkeypatch):
         ("analysis/imitation.py", "FITS = 4000", "FITS = 4001"),
     ],
 )
-def test_a_change_of_what_is_kept_makes_other_digests_of_the_same_runs(
+def test_a_change_of_what_is_kept_makes_other_summaries_of_the_same_runs(
     keys, place, before, changed
 ):
-    (run_before, digest_before), (run_after, digest_after) = keys(), keys(place, before, changed)
+    (run_before, summary_before), (run_after, summary_after) = keys(), keys(place, before, changed)
     assert run_before == run_after
-    assert digest_before != digest_after
+    assert summary_before != summary_after
 
 
-def test_a_change_of_the_mathematics_makes_other_runs_and_other_digests(keys):
+def test_a_change_of_the_mathematics_makes_other_runs_and_other_summaries(keys):
     before, after = keys(), keys("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6")
     assert before[0] != after[0]
     assert before[1] != after[1]
@@ -241,9 +241,9 @@ def test_what_did_not_fail_can_be_had_without_the_rest(mistaken):
     assert list(here(THREE, strict=False)) == [THREE[0], THREE[2]]
 
 
-def test_why_a_run_failed_is_written_down_beside_the_digests(mistaken, digests):
+def test_why_a_run_failed_is_written_down_beside_the_summaries(mistaken, folder):
     here(THREE, strict=False)
-    (note,) = digests.glob("*.failed.json")
+    (note,) = folder.glob("*.failed.json")
     said = json.loads(note.read_text())
     assert said["reason"] == "ArithmeticError: a mistake"
     assert "run_but_one" in said["traceback"]
@@ -251,11 +251,11 @@ def test_why_a_run_failed_is_written_down_beside_the_digests(mistaken, digests):
     assert Experiment(**said["experiment"] | {"theta": theta}) == THREE[1]
 
 
-def test_what_failed_is_tried_again_and_the_note_goes(mistaken, digests, trained):
+def test_what_failed_is_tried_again_and_the_note_goes(mistaken, folder, trained):
     here(THREE, strict=False)
     mistaken()
     assert list(here(THREE)) == list(THREE)
-    assert list(digests.glob("*.failed.json")) == []
+    assert list(folder.glob("*.failed.json")) == []
 
 
 def test_long_runs_begin_first(trained):
@@ -273,7 +273,7 @@ def test_long_runs_begin_first(trained):
 
 def test_a_bar_counts_the_runs(mistaken, capsys):
     with ThreadPoolExecutor(1) as executor:
-        fetch_digests(THREE, executor=executor, strict=False)
+        fetch_summaries(THREE, executor=executor, strict=False)
     shown = capsys.readouterr().err
     assert "3/3" in shown
     assert "1 failed" in shown
@@ -282,26 +282,26 @@ def test_a_bar_counts_the_runs(mistaken, capsys):
 def test_nothing_to_do_needs_nobody(capsys):
     here([QUICK])
     capsys.readouterr()
-    assert list(fetch_digests([QUICK])) == [QUICK]
-    assert list(fetch_digests([])) == []
+    assert list(fetch_summaries([QUICK])) == [QUICK]
+    assert list(fetch_summaries([])) == []
     assert capsys.readouterr().err == ""
 
 
 def test_a_killed_worker_is_replaced_and_what_had_ended_is_not_done_again(workers):
     log = workers(killed=(3,))
-    study = fetch_digests(SIX, workers=1, progress=False)
+    study = fetch_summaries(SIX, workers=1, progress=False)
     assert list(study) == list(SIX)
     assert times(log, "began") == [0, 1, 2, 3, 3, 4, 5]
     assert times(log, "ended") == [0, 1, 2, 3, 4, 5]
 
 
-def test_a_run_that_always_kills_its_worker_is_a_failure_like_any_other(workers, digests):
+def test_a_run_that_always_kills_its_worker_is_a_failure_like_any_other(workers, folder):
     log = workers(killed=(1,), always=True)
     with pytest.raises(Failed, match="1 of 3 runs failed"):
-        fetch_digests(THREE, workers=1, progress=False)
+        fetch_summaries(THREE, workers=1, progress=False)
     assert [summaries.is_stored(e) for e in THREE] == [True, False, True]
     assert times(log, "ended") == [0, 2]
-    (note,) = digests.glob("*.failed.json")
+    (note,) = folder.glob("*.failed.json")
     assert "killed" in json.loads(note.read_text())["reason"]
 
 
@@ -323,7 +323,7 @@ class Breaking(Executor):
 
 def test_what_an_executor_of_the_callers_loses_is_a_failure_and_the_rest_is_kept():
     with pytest.raises(Failed, match=r"1 of 3 runs failed.*BrokenProcessPool"):
-        fetch_digests(THREE, executor=Breaking(), progress=False)
+        fetch_summaries(THREE, executor=Breaking(), progress=False)
     assert [summaries.is_stored(e) for e in THREE] == [True, False, True]
 
 
@@ -355,7 +355,7 @@ from nmpcrl.analysis import summaries
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 summaries.make = made_elsewhere.make
 runs = sweep(learner="frozen", seed=tuple(range(6)), episodes=1, steps=2)
-summaries.fetch_digests(runs, workers=2)
+summaries.fetch_summaries(runs, workers=2)
 """
 
 
@@ -375,21 +375,21 @@ def interrupted(tmp_path):
     program.communicate()
 
 
-def test_an_interrupted_study_goes_on_where_it_was(workers, digests, request):
+def test_an_interrupted_study_goes_on_where_it_was(workers, folder, request):
     log = workers(pause=2)
     program = request.getfixturevalue("interrupted")
-    wait_until(lambda: any(digests.glob("*.npz")))
+    wait_until(lambda: any(folder.glob("*.npz")))
     began = len(times(log, "began"))
     os.killpg(program.pid, signal.SIGINT)  # as a terminal does: the whole group is told
     said = program.communicate(timeout=240)[1]
     assert program.returncode != 0
     assert said.count("Traceback") <= 1  # of the program, and of none of its workers
-    stored = {path: path.stat().st_mtime_ns for path in digests.glob("*.npz")}
+    stored = {path: path.stat().st_mtime_ns for path in folder.glob("*.npz")}
     assert 1 <= len(stored) < 6
     assert began - len(stored) <= 2  # as many as there were workers
     assert len(times(log, "began")) == began  # none is begun after the interruption
     log.write_text("")
-    fetch_digests(SIX, workers=2, progress=False)
+    fetch_summaries(SIX, workers=2, progress=False)
     assert len(times(log, "began")) == 6 - len(stored)
     assert {path: path.stat().st_mtime_ns for path in stored} == stored
 
@@ -418,7 +418,7 @@ def wait_until(holds, seconds: float = 240.0):
         time.sleep(0.02)
 
 
-def test_one_who_asks_while_another_trains_finds_whole_files_only(digests):
+def test_one_who_asks_while_another_trains_finds_whole_files_only(folder):
     """Two calls at once may train a run twice, and both end well."""
     studies = []
     threads = [threading.Thread(target=lambda: studies.append(here(THREE))) for _ in range(2)]
@@ -427,4 +427,4 @@ def test_one_who_asks_while_another_trains_finds_whole_files_only(digests):
     for thread in threads:
         thread.join()
     assert [list(study) for study in studies] == [list(THREE)] * 2
-    assert {path.suffix for path in digests.iterdir()} == {".npz"}
+    assert {path.suffix for path in folder.iterdir()} == {".npz"}

@@ -1,4 +1,4 @@
-"""A digest says of a run what its records say, and a table puts runs side by side."""
+"""A summary says of a run what its records say, and a table puts runs side by side."""
 
 from dataclasses import asdict, replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis import metrics
-from nmpcrl.analysis.summary import Digest, digest, row, table, tidy
+from nmpcrl.analysis.summary import RunSummary, row, summarise, table, tidy
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.records import DamagedRecords, Records
@@ -21,7 +21,7 @@ def records():
 
 @pytest.fixture(scope="module")
 def short(records):
-    return digest(records)
+    return summarise(records)
 
 
 def test_episodes_say_what_the_steps_say(records, short):
@@ -60,7 +60,7 @@ def test_every_state_in_an_obstacle_is_counted_by_how_far_it_is_in():
     }
     experiment = asdict(replace(SHORT, learner="frozen", episodes=2, steps=3))
     facts = {"stopped": "finished", "seconds": 1.0}
-    found = digest(Records(experiment, steps, evaluations, facts))
+    found = summarise(Records(experiment, steps, evaluations, facts))
     np.testing.assert_array_equal(found.episodes["inside"], [[1, 1, 0], [0, 1, 1]])
     np.testing.assert_allclose(found.episodes["overlap"], [0.05, 0.5])
     np.testing.assert_array_equal(found.episodes["inputs"], [3, 3])
@@ -74,7 +74,7 @@ def test_every_state_in_an_obstacle_is_counted_by_how_far_it_is_in():
 
 def test_what_was_never_reached_is_not_known():
     exploding = run(Experiment("ES", episodes=3, steps=6, alpha=1e5))
-    found = digest(exploding)
+    found = summarise(exploding)
     assert found.facts["stopped"].startswith("diverged")
     assert np.isnan(found.episodes["cost"]).all()
     assert np.isnan(found.episodes["overlap"][1:]).all()
@@ -83,10 +83,10 @@ def test_what_was_never_reached_is_not_known():
     np.testing.assert_array_equal(found.episodes["theta"][0], exploding.steps["theta"][-1])
 
 
-def test_a_digest_is_stored_and_read_again(short, tmp_path):
+def test_a_summary_is_stored_and_read_again(short, tmp_path):
     path = tmp_path / "one.npz"
     short.save(path)
-    read = Digest.load(path)
+    read = RunSummary.load(path)
     assert read.name == SHORT
     for name, column in short.episodes.items():
         np.testing.assert_array_equal(read.episodes[name], column)
@@ -94,20 +94,20 @@ def test_a_digest_is_stored_and_read_again(short, tmp_path):
     assert read.facts == short.facts
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(DamagedRecords, match="damaged, or not a run"):
-        Digest.load(path)
+        RunSummary.load(path)
 
 
-def test_records_are_not_taken_for_a_digest(records, tmp_path):
+def test_records_are_not_taken_for_a_summary(records, tmp_path):
     records.save(tmp_path / "run.npz")
     with pytest.raises(DamagedRecords):
-        Digest.load(tmp_path / "run.npz")
+        RunSummary.load(tmp_path / "run.npz")
 
 
 def test_a_row_measures_as_the_metrics_do(records, short):
     summary = row(short)
     assert summary["final_cost"] == metrics.final_cost(records)
     assert summary["initial_cost"] == metrics.initial_cost(records)
-    assert summary["wander"] == metrics.wander(records)
+    assert summary["late_cost_range"] == metrics.late_cost_range(records)
     theta = [summary[f"theta_{i}"] for i in range(9)]
     np.testing.assert_array_equal(theta, metrics.final_theta(records))
     assert summary["learner"] == "RDES"
@@ -116,10 +116,10 @@ def test_a_row_measures_as_the_metrics_do(records, short):
 
 def test_the_table_holds_each_run_against_its_frozen_arm(records, short):
     arm = run(frozen_arm(SHORT))
-    frame = table([short, digest(arm)]).set_index("learner")
-    assert frame.excess["frozen"] == 1
-    assert frame.excess["RDES"] == metrics.excess(records, arm)
-    assert np.isnan(table([short]).excess[0])
+    frame = table([short, summarise(arm)]).set_index("learner")
+    assert frame.cost_ratio["frozen"] == 1
+    assert frame.cost_ratio["RDES"] == metrics.cost_ratio(records, arm)
+    assert np.isnan(table([short]).cost_ratio[0])
 
 
 def test_the_tidy_table_has_a_row_an_episode(short):

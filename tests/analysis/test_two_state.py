@@ -14,10 +14,10 @@ from nmpcrl.analysis.two_state import (
     expected_matrix,
     expected_step,
     follow,
-    growth,
     mspbe,
     projected_bellman_error,
     sampled_step,
+    spectral_radius,
 )
 from nmpcrl.learning import Weights
 from nmpcrl.learning.learners import gradient_td, semi_gradient
@@ -60,7 +60,7 @@ def test_gradient_td_converges_just_when_w_is_fast_enough(gamma, alpha, ratio):
     bound = slope / (1 - alpha * slope**2)
     if np.isclose(ratio, bound, rtol=1e-3):
         return
-    radius = growth(Chain(gamma), gradient_td(alpha, ratio * alpha, gamma))
+    radius = spectral_radius(Chain(gamma), gradient_td(alpha, ratio * alpha, gamma))
     assert (radius < 1) == (ratio > bound)
 
 

@@ -4,13 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.bench import timing
+from nmpcrl.bench import learners
 from nmpcrl.study import paper
 
 
 @pytest.fixture(scope="module")
 def timings() -> pd.DataFrame:
-    return timing.time_learners(("ES", "GES", "RDES"), ("fatrop",), steps=5)
+    return learners.time_learners(("ES", "GES", "RDES"), ("fatrop",), steps=5)
 
 
 def test_there_is_a_row_for_every_learner_and_solver(timings):
@@ -36,7 +36,7 @@ def test_the_hours_are_the_step_s_time_over_the_paper_s_training(timings):
 
 def test_the_paper_s_hours_stand_beside_ours_and_are_missing_where_it_gives_none(timings):
     assert list(timings.hours_paper) == [18, 18, 9]
-    assert "DES" not in timing.PAPER_HOURS
+    assert "DES" not in learners.PAPER_HOURS
 
 
 def test_a_ratio_is_taken_within_one_solver():
@@ -47,6 +47,6 @@ def test_a_ratio_is_taken_within_one_solver():
             "ms_per_step": [2.0, 3.0, 10.0, 6.0],
         }
     )
-    assert timing.ratio(times, "fatrop", "RDES") == pytest.approx(1.5)
-    assert timing.ratio(times, "ipopt", "RDES") == pytest.approx(0.6)
-    assert timing.ratio(times, "ipopt", "ES", reference="RDES") == pytest.approx(10 / 6)
+    assert learners.ratio(times, "fatrop", "RDES") == pytest.approx(1.5)
+    assert learners.ratio(times, "ipopt", "RDES") == pytest.approx(0.6)
+    assert learners.ratio(times, "ipopt", "ES", reference="RDES") == pytest.approx(10 / 6)

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.bench.horizons import growth, time_horizons
+from nmpcrl.bench.scaling import exponents, time_horizons
 from nmpcrl.control import Nmpc, SolverError
 from nmpcrl.study import paper
 
@@ -54,4 +54,4 @@ def test_growth_is_the_exponent_of_a_power_law_and_skips_what_is_missing():
         pd.DataFrame({"solver": name, "horizon": horizons, "ms": ms}) for name, ms in law.items()
     )
     timings.iloc[0, timings.columns.get_loc("ms")] = np.nan
-    assert growth(timings, "ms") == pytest.approx({"riccati": 1.0, "fatrop": 1.5})
+    assert exponents(timings, "ms") == pytest.approx({"riccati": 1.0, "fatrop": 1.5})

@@ -67,9 +67,9 @@ def test_the_first_solve_of_an_episode_is_not_warm(interleaved):
 
 
 def test_every_problem_has_a_best_solver_and_all_agree_near_the_start(interleaved):
-    excess = interleaved.excess.to_numpy().reshape(-1, 5)
-    assert (excess.min(axis=1) == 0).all()
-    assert excess.max() < 1e-6
+    suboptimality = interleaved.suboptimality.to_numpy().reshape(-1, 5)
+    assert (suboptimality.min(axis=1) == 0).all()
+    assert suboptimality.max() < 1e-6
 
 
 def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
@@ -129,7 +129,7 @@ def test_added_obstacles_do_not_change_the_plan():
 
 
 def test_every_size_has_as_many_warm_solves():
-    table = pd.DataFrame(scaling.growth(episodes=1, steps=3))
+    table = pd.DataFrame(scaling.solve_times(episodes=1, steps=3))
     counts = table.groupby(["varied", "size"]).size()
     assert list(counts.index) == [
         *(("horizon", size) for size in scaling.HORIZONS),

@@ -48,14 +48,14 @@ def test_a_longer_benchmark_serves_for_a_shorter_one(counted, kept, asked, again
 @pytest.mark.parametrize("changed", ["versions", "machine"])
 def test_other_versions_or_another_machine_measure_again(counted, monkeypatch, changed):
     fetch("short")
-    monkeypatch.setattr(measure, changed, lambda: {"other": "one"})
+    monkeypatch.setattr(suite, changed, lambda: {"other": "one"})
     fetch("short")
     assert counted == ["short", "short"]
 
 
 def test_another_source_measures_again(counted, monkeypatch):
     fetch("short")
-    monkeypatch.setattr(suite.store, "digest", lambda _: "other")
+    monkeypatch.setattr(suite.store, "summary", lambda _: "other")
     fetch("short")
     assert counted == ["short", "short"]
 
@@ -89,7 +89,7 @@ def test_a_length_that_there_is_not_is_refused(counted, length):
 
 
 def test_the_sources_of_a_benchmark_exist():
-    assert suite.store.digest(suite.SOURCES)
+    assert suite.store.source_hash(suite.SOURCES)
 
 
 @pytest.fixture

@@ -33,9 +33,9 @@ def test_a_value_above_the_best_is_a_worse_minimum_and_no_value_a_failure(measur
         for i, (loop, solver) in enumerate(zip(solves["loop"], solves["solver"], strict=True))
         if (loop, solver) == ("with noise", "ipopt") and solves["warm"][i]
     ]
-    solves["excess"][warm[0]] = 2e-6
-    solves["excess"][warm[1]] = 0.5e-6
-    solves["excess"][warm[2]] = solves["iterations"][warm[2]] = None
+    solves["suboptimality"][warm[0]] = 2e-6
+    solves["suboptimality"][warm[1]] = 0.5e-6
+    solves["suboptimality"][warm[2]] = solves["iterations"][warm[2]] = None
     row = summary.solvers(measured).loc[("with noise", "ipopt")]
     assert row.worse == pytest.approx(1 / 4)
     assert row.failed == pytest.approx(1 / 4)
@@ -61,20 +61,20 @@ def test_memory_grows_from_a_tenth_of_the_episodes_on(measured):
     memory = measured["episodes"]["memory"]
     memory[:5] = [300_000_000] * 5  # while things are loaded
     memory[299] = 480_000_000
-    assert summary.runs(measured).growth["ES"] == pytest.approx(0.2)
+    assert summary.runs(measured).memory_growth["ES"] == pytest.approx(0.2)
     assert missed(measured) == ["memory of a run"]
 
 
 @pytest.mark.parametrize(("varied", "each"), [("horizon", 0.5), ("obstacles", 0.25)])
 def test_what_one_more_adds_is_constant_where_time_is_linear(measured, varied, each):
     assert summary.marginal(measured, varied) == pytest.approx((each, each))
-    assert summary.most_growth(measured, varied) == pytest.approx(1.0)
+    assert summary.most_per_part(measured, varied) == pytest.approx(1.0)
 
 
 def test_quadratic_growth_is_seen(measured):
-    grown = measured["growth"]
+    grown = measured["scaling"]
     grown["seconds"] = [1e-8 * size**2 for size in grown["size"]]
-    assert summary.most_growth(measured, "horizon") == pytest.approx(80 / 5)
+    assert summary.most_per_part(measured, "horizon") == pytest.approx(80 / 5)
     assert len(missed(measured)) == 2
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.curvature import Curvature
+from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.claims.assumptions import audit
 from nmpcrl.study import Experiment, Records, Study, paper
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.summaries import fetch_digests
+from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import table
 from nmpcrl.claims import evidence, published
 from nmpcrl.claims.evidence import gather, needed
 from nmpcrl.study import ParameterError
+from nmpcrl.study.design import fresh, main_table
 from nmpcrl.study.experiment import frozen_arm
-from nmpcrl.study.plan import fresh, main_table
 
 ASKED = {"learners": ["ES"], "layouts": ["A"], "seeds": [0], "episodes": 2}
 
@@ -25,9 +25,9 @@ def places(tmp_path, monkeypatch):
 def known():
     """ES and its frozen arm, both readings of the decay, published."""
     runs = main_table(["ES", "frozen"], ["A"], [0], 2)
-    digests = fetch_digests(runs, progress=False)
-    published.publish(digests, dict.fromkeys(runs, "main"), ())
-    return digests
+    summaries = fetch_summaries(runs, progress=False)
+    published.publish(summaries, dict.fromkeys(runs, "main"), ())
+    return summaries
 
 
 def test_what_is_not_published_is_trained_with_its_frozen_arms():
@@ -73,13 +73,13 @@ def test_published_runs_say_what_they_said_when_they_were_trained(known):
     told = table(known)
     assert set(found.runs.source) == {"published"}
     assert found.mark == "4 runs published"
-    for name in ("final_cost", "training_cost", "excess", "theta_8", "inside_large"):
+    for name in ("final_cost", "training_cost", "cost_ratio", "theta_8", "inside_large"):
         np.testing.assert_array_equal(found.runs[name], told[name])
-    for experiment, digest in known.items():
-        there = found.digests[experiment]
-        np.testing.assert_allclose(there.episodes["cost"], digest.episodes["cost"], rtol=1e-6)
-        np.testing.assert_allclose(there.states, digest.states, atol=1e-5)
-        assert there.evaluations["episode"].tolist() == digest.evaluations["episode"].tolist()
+    for experiment, summary in known.items():
+        there = found.summaries[experiment]
+        np.testing.assert_allclose(there.episodes["cost"], summary.episodes["cost"], rtol=1e-6)
+        np.testing.assert_allclose(there.states, summary.states, atol=1e-5)
+        assert there.evaluations["episode"].tolist() == summary.evaluations["episode"].tolist()
 
 
 def test_runs_trained_here_stand_beside_published_ones(known):
@@ -88,8 +88,8 @@ def test_runs_trained_here_stand_beside_published_ones(known):
     assert sources[0].tolist() == ["published"]
     assert sources[1].tolist() == ["fresh"]
     assert found.mark == "4 runs trained for this page, 4 runs published"
-    assert (found.runs[found.runs.learner == "frozen"].excess == 1).all()
-    assert set(found.main.digests) == set(found.digests)
+    assert (found.runs[found.runs.learner == "frozen"].cost_ratio == 1).all()
+    assert set(found.main.summaries) == set(found.summaries)
     only = found.where(found.runs.seed == 1)
-    assert {e.seed for e in only.digests} == {1}
+    assert {e.seed for e in only.summaries} == {1}
     assert len(only.runs) == 4

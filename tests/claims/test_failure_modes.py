@@ -5,7 +5,7 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.failure_modes import (
     CUT_SHORT,
     ENDINGS,
@@ -72,14 +72,14 @@ def made(learner="RDES", cost=RISING, states=THROUGH, stopped="finished", seed=0
         "distance": np.zeros(count),
     }
     facts = {"stopped": stopped, "seconds": 1.0}
-    return Digest(asdict(experiment), episodes, evaluations, states, np.zeros((5, 2)), facts)
+    return RunSummary(asdict(experiment), episodes, evaluations, states, np.zeros((5, 2)), facts)
 
 
-def found(run: Digest) -> str:
+def found(run: RunSummary) -> str:
     return mechanism(run, TASK, THROUGH)
 
 
-def frozen(seed=0) -> Digest:
+def frozen(seed=0) -> RunSummary:
     return made("frozen", (START_COST,) * 5, seed=seed)
 
 

@@ -10,11 +10,11 @@ import pandas as pd
 import pytest
 
 from nmpcrl.analysis.statistics import rate
-from nmpcrl.analysis.summary import digest, row, table
+from nmpcrl.analysis.summary import row, summarise, table
 from nmpcrl.claims import own_claims, paper_claims
 from nmpcrl.claims.assumptions import Assumption
-from nmpcrl.claims.flips import flips, spread
 from nmpcrl.claims.paper_claims import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.robustness import flips, spread
 from nmpcrl.study import Experiment, Study, paper, run
 from nmpcrl.study.experiment import LEARNERS, PAPER
 
@@ -29,7 +29,7 @@ def summary(experiment: Experiment) -> dict[str, Any]:
     """The row of a run in which nothing happened."""
     fields = asdict(experiment) | {"theta": " ".join(map(repr, experiment.theta))}
     still = {"stopped": "finished", "initial_cost": START_COST, "final_cost": START_COST}
-    still |= {"wander": 0.0, "excess": 1.0, "inputs": 0, "outside": 0, "distance": 0.1}
+    still |= {"late_cost_range": 0.0, "cost_ratio": 1.0, "inputs": 0, "outside": 0, "distance": 0.1}
     still |= {"steps_done": 39_000, "worst_overlap": 0.0, "eval_worst_overlap": 0.0}
     for name, size in product(("inside", "eval_inside"), ("small", "medium", "large")):
         still[f"{name}_{size}"] = 0
@@ -82,8 +82,8 @@ def judge(runs: pd.DataFrame) -> tuple[paper_claims.Verdict, ...]:
 
 
 SOME = range(2)  # of five seeds
-BAD = {"excess": 1.6}
-SWAYING = {"wander": 0.06}
+BAD = {"cost_ratio": 1.6}
+SWAYING = {"late_cost_range": 0.06}
 
 
 # C1 and C2: a contrast between two learners
@@ -119,12 +119,12 @@ def test_c2_asks_in_how_many_pairs_es_was_unstable_and_ges_was_not(es, ges, outc
 @pytest.mark.parametrize(
     ("columns", "diverged"),
     [
-        ({"excess": paper_claims.DIVERGED}, False),
-        ({"excess": np.nextafter(paper_claims.DIVERGED, 2)}, True),
-        ({"excess": np.inf}, True),
-        ({"excess": 0.1, "stopped": "diverged: theta"}, True),
-        ({"excess": np.nan, "stopped": "diverged: theta"}, True),
-        ({"excess": np.nan}, pd.NA),
+        ({"cost_ratio": paper_claims.DIVERGED}, False),
+        ({"cost_ratio": np.nextafter(paper_claims.DIVERGED, 2)}, True),
+        ({"cost_ratio": np.inf}, True),
+        ({"cost_ratio": 0.1, "stopped": "diverged: theta"}, True),
+        ({"cost_ratio": np.nan, "stopped": "diverged: theta"}, True),
+        ({"cost_ratio": np.nan}, pd.NA),
     ],
 )
 def test_a_run_diverged_if_it_was_stopped_or_cost_more_than_the_threshold(columns, diverged):
@@ -134,20 +134,22 @@ def test_a_run_diverged_if_it_was_stopped_or_cost_more_than_the_threshold(column
 
 
 @pytest.mark.parametrize(
-    ("wander", "unstable"),
+    ("late_cost_range", "unstable"),
     [
         (paper_claims.UNSTABLE, False),
         (np.nextafter(paper_claims.UNSTABLE, 1), True),
         (np.inf, True),
     ],
 )
-def test_a_swing_of_exactly_the_threshold_is_stable(wander, unstable):
-    judged = paper_claims.instability(study(of("ES", wander=wander), learners=("ES",)))
+def test_a_swing_of_exactly_the_threshold_is_stable(late_cost_range, unstable):
+    judged = paper_claims.instability(
+        study(of("ES", late_cost_range=late_cost_range), learners=("ES",))
+    )
     assert judged.unique().tolist() == [unstable]
 
 
 def test_without_a_frozen_arm_nothing_is_said_of_divergence():
-    runs = study(lambda _: {"excess": np.nan})
+    runs = study(lambda _: {"cost_ratio": np.nan})
     outcomes = {v.claim: v.outcome for v in paper_claims.judge_runs(runs, paths(runs))}
     assert {c for c, outcome in outcomes.items() if outcome == UNDECIDABLE} == {"C1", "C2"}
 
@@ -395,7 +397,7 @@ def test_layouts_may_differ_and_are_judged_one_by_one():
 
 
 def test_what_could_not_be_finished_is_shown_as_infinite_and_never_as_inf():
-    lost = {"final_cost": np.inf, "excess": np.inf, "wander": np.inf}
+    lost = {"final_cost": np.inf, "cost_ratio": np.inf, "late_cost_range": np.inf}
     runs = study(lambda _: lost)
     evidence = [v.evidence for v in (*judge(runs), *own_claims.judge_additions(runs))]
     assert not any("inf" in sentence for sentence in evidence)
@@ -414,7 +416,7 @@ def short():
 
 
 def test_a_run_is_judged_from_its_records_as_from_the_table(short):
-    runs = table([digest(records) for records in short.values()])
+    runs = table([summarise(records) for records in short.values()])
     for rule, measured in (
         (paper_claims.diverged, paper_claims.divergence(runs)),
         (paper_claims.unstable, paper_claims.instability(runs)),
@@ -426,7 +428,7 @@ def test_a_run_is_judged_from_its_records_as_from_the_table(short):
 
 def test_a_row_of_the_table_names_its_experiment(short):
     for experiment, records in short.items():
-        runs = pd.DataFrame([row(digest(records))])
+        runs = pd.DataFrame([row(summarise(records))])
         (one,) = runs.to_dict("records")
         assert paper_claims.experiment_of(one) == experiment
 
@@ -589,5 +591,5 @@ def test_a_setting_is_judged_at_a_time():
 
 def test_nudged_runs_keep_every_digit_of_their_theta():
     theta = tuple(np.nextafter(paper.THETA_INIT, 9))
-    nudged = replace(Experiment(), theta=tuple(map(float, theta)))
-    assert paper_claims.experiment_of(summary(nudged)) == nudged
+    perturbed = replace(Experiment(), theta=tuple(map(float, theta)))
+    assert paper_claims.experiment_of(summary(perturbed)) == perturbed

@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis import summaries
-from nmpcrl.analysis.summary import digest, row, table
+from nmpcrl.analysis.summaries import key as run_key
+from nmpcrl.analysis.summary import row, summarise, table
 from nmpcrl.claims import published
 from nmpcrl.claims.published import FILES, Damaged, Published, compare, load, publish
 from nmpcrl.claims.rule import PARTLY, REPRODUCED, Verdict
-from nmpcrl.study import Experiment, paper, plan, run, sweep
+from nmpcrl.study import Experiment, design, paper, run, sweep
 from nmpcrl.study.experiment import frozen_arm
 
 RUNS = (
@@ -47,14 +47,14 @@ def folder(tmp_path, monkeypatch) -> Path:
 
 
 @pytest.fixture(scope="module")
-def digests():
+def summaries():
     """A small study: four seeds of two learners, and a variant of two."""
-    return {e: digest(run(e)) for e in RUNS}
+    return {e: summarise(run(e)) for e in RUNS}
 
 
 @pytest.fixture
-def known(digests) -> Published:
-    publish(digests, LABELS, VERDICTS)
+def known(summaries) -> Published:
+    publish(summaries, LABELS, VERDICTS)
     return load()
 
 
@@ -66,13 +66,13 @@ def elsewhere(monkeypatch):
 
 
 def changed(one, **rollouts):
-    """A digest whose rollouts without noise came out otherwise."""
+    """A summary whose rollouts without noise came out otherwise."""
     return replace(one, evaluations=one.evaluations | rollouts)
 
 
 def test_where_nothing_is_published_there_is_nothing(folder):
     for found in (load(), folder.mkdir() or load()):
-        assert (found.digests, found.variants, found.rows) == ({}, {}, {})
+        assert (found.summaries, found.variants, found.rows) == ({}, {}, {})
         assert found.verdicts == ()
 
 
@@ -80,19 +80,19 @@ def test_what_is_published_is_in_four_files(known, folder):
     assert {path.name for path in folder.iterdir()} == set(FILES)
 
 
-def test_the_summaries_are_read_bit_for_bit_and_in_order(known, digests):
+def test_the_summaries_are_read_bit_for_bit_and_in_order(known, summaries):
     assert list(known.rows) == list(RUNS)
-    for experiment, one in digests.items():
+    for experiment, one in summaries.items():
         for name, value in row(one).items():
             np.testing.assert_equal(known.rows[experiment][name], value)
-        assert known.rows[experiment]["key"] == summaries.key(experiment)
+        assert known.rows[experiment]["key"] == run_key(experiment)
         assert known.variants[experiment] == LABELS[experiment]
 
 
-def test_the_digests_have_what_figures_need_in_single_precision(known, digests):
-    assert list(known.digests) == list(RUNS)
-    for experiment, one in digests.items():
-        found = known.digests[experiment]
+def test_the_summaries_have_what_figures_need_in_single_precision(known, summaries):
+    assert list(known.summaries) == list(RUNS)
+    for experiment, one in summaries.items():
+        found = known.summaries[experiment]
         assert found.name == experiment
         pairs = [(found.episodes["cost"], one.episodes["cost"]), (found.states, one.states)]
         pairs += [(found.evaluations[k], one.evaluations[k]) for k in ("episode", "theta", "cost")]
@@ -102,25 +102,25 @@ def test_the_digests_have_what_figures_need_in_single_precision(known, digests):
         assert found.facts["stopped"] == one.facts["stopped"]
 
 
-def test_runs_that_failed_are_read_as_they_were(digests):
+def test_runs_that_failed_are_read_as_they_were(summaries):
     """A drive that failed costs infinitely much and has states that are not known."""
-    first, *others = digests
-    cost, states = np.array([5.0, np.inf, np.inf]), digests[first].states.copy()
+    first, *others = summaries
+    cost, states = np.array([5.0, np.inf, np.inf]), summaries[first].states.copy()
     states[2:] = np.nan
-    facts = digests[first].facts | {"stopped": 'diverged: ", | "'}
-    diverged = replace(changed(digests[first], cost=cost), states=states, facts=facts)
-    publish({first: diverged} | {e: digests[e] for e in others}, LABELS, VERDICTS)
+    facts = summaries[first].facts | {"stopped": 'diverged: ", | "'}
+    diverged = replace(changed(summaries[first], cost=cost), states=states, facts=facts)
+    publish({first: diverged} | {e: summaries[e] for e in others}, LABELS, VERDICTS)
     found = load()
     assert found.rows[first]["final_cost"] == np.inf
     assert found.rows[first]["stopped"] == 'diverged: ", | "'
-    np.testing.assert_array_equal(found.digests[first].evaluations["cost"], cost)
-    np.testing.assert_array_equal(np.isnan(found.digests[first].states), np.isnan(states))
+    np.testing.assert_array_equal(found.summaries[first].evaluations["cost"], cost)
+    np.testing.assert_array_equal(np.isnan(found.summaries[first].states), np.isnan(states))
 
 
-def test_runs_of_other_lengths_are_not_padded(digests):
+def test_runs_of_other_lengths_are_not_padded(summaries):
     longer = Experiment("frozen", episodes=7, steps=9, evaluate_every=1)
-    publish(digests | {longer: digest(run(longer))}, LABELS | {longer: "longer"}, VERDICTS)
-    found = load().digests
+    publish(summaries | {longer: summarise(run(longer))}, LABELS | {longer: "longer"}, VERDICTS)
+    found = load().summaries
     assert found[longer].episodes["cost"].shape == (7,)
     assert found[longer].evaluations["cost"].shape == (8,)
     assert found[longer].states.shape == (9, 3)
@@ -135,35 +135,35 @@ def test_verdicts_are_read_as_they_were(known):
 
 def test_what_is_published_says_what_made_it(known):
     about = known.about
-    assert about["code"] == summaries.key(Experiment())
+    assert about["code"] == run_key(Experiment())
     assert about["machine"] == published.here()
     assert set(about["versions"]) >= {"python", "numpy", "torch", "casadi"}
     assert about["runs"] == {"main": 8, "N = 2": 4}
 
 
-def test_the_same_content_gives_the_same_bytes(known, digests, folder):
+def test_the_same_content_gives_the_same_bytes(known, summaries, folder):
     before = {name: (folder / name).read_bytes() for name in FILES}
     shutil.rmtree(folder)
-    publish(digests, LABELS, VERDICTS)
+    publish(summaries, LABELS, VERDICTS)
     again = {name: (folder / name).read_bytes() for name in FILES}
     about, about_again = (json.loads(files.pop("about.json")) for files in (before, again))
     assert again == before
     assert about_again | {"date": about["date"]} == about
 
 
-def test_what_is_published_anew_takes_the_place_of_what_was_read(known, digests):
+def test_what_is_published_anew_takes_the_place_of_what_was_read(known, summaries):
     fewer = [RUNS[0], frozen_arm(RUNS[0])]
-    publish({e: digests[e] for e in fewer}, LABELS, VERDICTS)
-    assert list(load().digests) == fewer
+    publish({e: summaries[e] for e in fewer}, LABELS, VERDICTS)
+    assert list(load().summaries) == fewer
 
 
-def test_the_whole_study_takes_20_megabytes_at_most(digests, folder):
+def test_the_whole_study_takes_20_megabytes_at_most(summaries, folder):
     """Runs of full length whose numbers no compression makes smaller."""
     rng, full, n = np.random.default_rng(0), Experiment(), 40
     rollouts = full.episodes // full.evaluate_every + 1
     noise = {}
     for experiment in sweep(learner=("ES", "frozen"), seed=tuple(range(n // 2))):
-        one = digests[RUNS[0]]
+        one = summaries[RUNS[0]]
         episodes = {k: rng.normal(size=(300, *c.shape[1:])) for k, c in one.episodes.items()}
         judged = {k: rng.normal(size=(rollouts, *c.shape[1:])) for k, c in one.evaluations.items()}
         judged |= {"episode": np.arange(rollouts) * full.evaluate_every}
@@ -173,7 +173,7 @@ def test_the_whole_study_takes_20_megabytes_at_most(digests, folder):
         )
     publish(noise, dict.fromkeys(noise, "main"), VERDICTS)
     each = sum(path.stat().st_size for path in folder.iterdir()) / n
-    assert each * len(plan.study()) < 20e6
+    assert each * len(design.study()) < 20e6
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -220,59 +220,59 @@ def assert_refused(folder):
     assert "\n" not in said
 
 
-def test_what_is_published_does_not_contradict_itself(known, digests, elsewhere):
-    assert compare(digests, known).empty
+def test_what_is_published_does_not_contradict_itself(known, summaries, elsewhere):
+    assert compare(summaries, known).empty
     elsewhere()
-    assert compare(digests, known).empty
+    assert compare(summaries, known).empty
 
 
-def test_runs_that_are_not_published_contradict_nothing(known, digests):
+def test_runs_that_are_not_published_contradict_nothing(known, summaries):
     other = Experiment("frozen", seed=9, episodes=4, steps=6, evaluate_every=2)
-    assert compare({other: digest(run(other))}, known).empty
+    assert compare({other: summarise(run(other))}, known).empty
 
 
 @pytest.mark.parametrize("where", ["cost", "theta"])
-def test_on_the_same_machine_the_last_bit_counts(known, digests, where):
+def test_on_the_same_machine_the_last_bit_counts(known, summaries, where):
     first = RUNS[0]
-    column = digests[first].evaluations[where].copy()
+    column = summaries[first].evaluations[where].copy()
     column[-1] = np.nextafter(column[-1], np.inf)
-    episodes = digests[first].episodes | {
-        "theta": np.nextafter(digests[first].episodes["theta"], 9)
+    episodes = summaries[first].episodes | {
+        "theta": np.nextafter(summaries[first].episodes["theta"], 9)
     }
     wrong = compare(
-        {first: replace(changed(digests[first], **{where: column}), episodes=episodes)}, known
+        {first: replace(changed(summaries[first], **{where: column}), episodes=episodes)}, known
     )
     assert len(wrong) == 1
     assert (wrong.learner[0], wrong.layout[0], wrong.seed[0]) == ("ES", "A", 0)
 
 
-def test_on_another_machine_the_last_bit_does_not_count(known, digests, elsewhere):
+def test_on_another_machine_the_last_bit_does_not_count(known, summaries, elsewhere):
     elsewhere()
-    moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in digests.items()}
+    moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in summaries.items()}
     assert compare(moved, known).empty
 
 
-def test_with_other_code_the_last_bit_does_not_count(known, digests, monkeypatch):
+def test_with_other_code_the_last_bit_does_not_count(known, summaries, monkeypatch):
     monkeypatch.setattr(summaries, "key", lambda _: "another")
-    moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in digests.items()}
+    moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in summaries.items()}
     assert compare(moved, known).empty
 
 
-def test_the_cost_of_theta_init_must_agree_on_every_machine(known, digests, elsewhere):
+def test_the_cost_of_theta_init_must_agree_on_every_machine(known, summaries, elsewhere):
     elsewhere()
     first = RUNS[0]
-    cost = digests[first].evaluations["cost"].copy()
+    cost = summaries[first].evaluations["cost"].copy()
     cost[0] *= 1 + 1e-4
-    wrong = compare({first: changed(digests[first], cost=cost)}, known)
+    wrong = compare({first: changed(summaries[first], cost=cost)}, known)
     assert list(wrong.what) == ["initial_cost"]
 
 
-def spread(digests, costs):
+def spread(summaries, costs):
     """The runs of ES in the main table, with these final costs."""
     runs = [e for e in RUNS if e.learner == "ES" and LABELS[e] == "main"]
     found = {}
     for experiment, cost in zip(runs, costs, strict=True):
-        one = digests[experiment]
+        one = summaries[experiment]
         start = one.evaluations["cost"][0]
         found[experiment] = changed(one, cost=np.array([start, *[cost * start] * 2]))
     return found
@@ -291,36 +291,36 @@ def spread(digests, costs):
     ],
 )
 def test_on_another_machine_most_runs_must_lie_in_the_published_spread(
-    digests, elsewhere, here, contradicts
+    summaries, elsewhere, here, contradicts
 ):
-    theirs = spread(digests, (0.6, 0.7, 0.8, 0.9))
-    publish(digests | theirs, LABELS, VERDICTS)
+    theirs = spread(summaries, (0.6, 0.7, 0.8, 0.9))
+    publish(summaries | theirs, LABELS, VERDICTS)
     elsewhere()
-    wrong = compare(spread(digests, here), load())
+    wrong = compare(spread(summaries, here), load())
     assert list(wrong.what.unique()) == (["final_cost"] if contradicts else [])
 
 
-def test_where_published_runs_failed_failures_are_no_contradiction(digests, elsewhere):
-    publish(digests | spread(digests, (0.6, 0.7, np.inf, np.inf)), LABELS, VERDICTS)
+def test_where_published_runs_failed_failures_are_no_contradiction(summaries, elsewhere):
+    publish(summaries | spread(summaries, (0.6, 0.7, np.inf, np.inf)), LABELS, VERDICTS)
     elsewhere()
-    assert compare(spread(digests, (np.inf, np.inf, np.inf, 0.7)), load()).empty
+    assert compare(spread(summaries, (np.inf, np.inf, np.inf, 0.7)), load()).empty
 
 
-def test_a_variant_is_held_against_itself_alone(known, digests, elsewhere):
+def test_a_variant_is_held_against_itself_alone(known, summaries, elsewhere):
     """Its theta_init costs otherwise than that of the main table."""
     main, variant = RUNS[0], next(e for e in RUNS if e.horizon == 2)
-    assert row(digests[main])["initial_cost"] != row(digests[variant])["initial_cost"]
+    assert row(summaries[main])["initial_cost"] != row(summaries[variant])["initial_cost"]
     elsewhere()
-    assert compare(digests, known).empty
-    as_main = replace(digests[main], experiment=digests[variant].experiment)
+    assert compare(summaries, known).empty
+    as_main = replace(summaries[main], experiment=summaries[variant].experiment)
     assert "initial_cost" in set(compare({variant: as_main}, known).what)
 
 
-def test_the_rows_make_the_same_table_as_the_digests(known, digests):
+def test_the_rows_make_the_same_table_as_the_summaries(known, summaries):
     """So a chapter may take either."""
     names = [*(one.name for one in fields(Experiment)), "final_cost", "training_cost", "seconds"]
     pd.testing.assert_frame_equal(
-        pd.DataFrame(list(known.rows.values()))[names], table(digests)[names], check_dtype=False
+        pd.DataFrame(list(known.rows.values()))[names], table(summaries)[names], check_dtype=False
     )
 
 

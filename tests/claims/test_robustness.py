@@ -9,7 +9,7 @@ import pytest
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.robustness import WHOLE, atlas, departure, groups, left_out, telling
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED
-from nmpcrl.study import Experiment, plan
+from nmpcrl.study import Experiment, design
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import PAPER, frozen_arm
 
@@ -25,8 +25,13 @@ def summary(experiment: Experiment, variant: str, **unlike) -> dict:
     return (
         asdict(experiment)
         | {"theta": " ".join(map(repr, experiment.theta)), "variant": variant}
-        | {"stopped": "finished", "initial_cost": 1000.0, "final_cost": 900.0, "wander": 0.0}
-        | {"excess": 1.0, "inputs": 0, "outside": 0, "distance": 0.1, "steps_done": 39_000}
+        | {
+            "stopped": "finished",
+            "initial_cost": 1000.0,
+            "final_cost": 900.0,
+            "late_cost_range": 0.0,
+        }
+        | {"cost_ratio": 1.0, "inputs": 0, "outside": 0, "distance": 0.1, "steps_done": 39_000}
         | {"worst_overlap": -0.1, "eval_worst_overlap": -0.1}
         | {"imitation_with": 0.5, "imitation_without": 1.0}
         | counts
@@ -37,14 +42,14 @@ def summary(experiment: Experiment, variant: str, **unlike) -> dict:
 
 def study(**unlike) -> pd.DataFrame:
     """The main table on two layouts, and two variants; `unlike` is so of the literal RDES."""
-    main = plan.main_table((*PAPER, "frozen"), ("A", "D"), tuple(range(5)))
-    rows = [summary(one, plan.MAIN_TABLE) for one in main]
+    main = design.main_table((*PAPER, "frozen"), ("A", "D"), tuple(range(5)))
+    rows = [summary(one, design.MAIN_TABLE) for one in main]
     rows += [
         summary(one, LITERAL, **(unlike if one.learner == "RDES" else {}))
-        for one in plan.variant(LITERAL)
+        for one in design.variant(LITERAL)
         if one.learner != "frozen"
     ]
-    rows += [summary(one, CLIPPED) for one in plan.variant(CLIPPED)]
+    rows += [summary(one, CLIPPED) for one in design.variant(CLIPPED)]
     return pd.DataFrame(rows)
 
 
@@ -81,7 +86,7 @@ def test_a_change_flips_the_cells_of_its_own_row_and_no_others(costly):
 
 def test_the_row_of_the_whole_repeats_the_verdicts(costly):
     runs, found = costly
-    main = runs[runs.variant == plan.MAIN_TABLE]
+    main = runs[runs.variant == design.MAIN_TABLE]
     whole = found[found.variant == WHOLE].set_index("claim")
     for verdict in paper_claims.judge_runs(main, paths(runs)):
         assert whole.outcome[verdict.claim] == verdict.outcome
@@ -91,19 +96,19 @@ def test_the_row_of_the_whole_repeats_the_verdicts(costly):
 def test_every_row_has_the_letter_of_its_departure():
     letters = [departure(name) for name in (WHOLE, "layout A", "decay per step", LITERAL)]
     assert letters == ["", "B", "C", "G"]
-    assert {departure(name) for name in plan.VARIANTS} <= {*DEPARTURES, ""}
+    assert {departure(name) for name in design.VARIANTS} <= {*DEPARTURES, ""}
 
 
 def test_what_was_not_run_is_left_out_and_named(costly):
     runs, _ = costly
-    assert set(left_out(runs)) == set(plan.VARIANTS) - {LITERAL, CLIPPED}
+    assert set(left_out(runs)) == set(design.VARIANTS) - {LITERAL, CLIPPED}
 
 
 def test_a_part_is_held_against_the_rest_of_the_main_table(costly):
     runs, _ = costly
     here, usual = groups(runs, "layout D")
     assert (set(here.layout), set(usual.layout)) == ({"D"}, {"A"})
-    assert set(here.variant) == set(usual.variant) == {plan.MAIN_TABLE}
+    assert set(here.variant) == set(usual.variant) == {design.MAIN_TABLE}
     here, usual = groups(runs, "decay per episode")
     assert (set(here.decay), set(usual.decay)) == ({"episode"}, {"step"})
 
@@ -111,11 +116,11 @@ def test_a_part_is_held_against_the_rest_of_the_main_table(costly):
 def test_a_variant_is_held_against_its_own_cells_and_borrows_who_it_does_not_change(costly):
     runs, _ = costly
     here, usual = groups(runs, LITERAL)
-    assert set(usual.variant) == {plan.MAIN_TABLE}
+    assert set(usual.variant) == {design.MAIN_TABLE}
     assert set(here.decay) == set(usual.decay) == {"step"}
     origin = here.groupby("learner").variant.unique().map(list).to_dict()
     assert origin["DES"] == origin["RDES"] == [LITERAL]
-    assert origin["ES"] == origin["GES"] == origin["frozen"] == [plan.MAIN_TABLE]
+    assert origin["ES"] == origin["GES"] == origin["frozen"] == [design.MAIN_TABLE]
 
 
 def cells(*rows: tuple[str, str, bool, float]) -> pd.DataFrame:
@@ -145,7 +150,7 @@ def test_where_nothing_flips_there_is_nothing_to_tell():
 
 
 def test_runs_that_are_too_short_decide_nothing():
-    short = [replace(one, episodes=4) for one in plan.main_table(PAPER, ("A",), (0, 1))]
+    short = [replace(one, episodes=4) for one in design.main_table(PAPER, ("A",), (0, 1))]
     short += [frozen_arm(one) for one in short]
-    runs = pd.DataFrame([summary(one, plan.MAIN_TABLE) for one in dict.fromkeys(short)])
+    runs = pd.DataFrame([summary(one, design.MAIN_TABLE) for one in dict.fromkeys(short)])
     assert not atlas(runs, paths(runs)).flips.any()

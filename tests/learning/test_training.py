@@ -9,14 +9,13 @@ import pytest
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.learning import Weights, expected_sarsa, frozen
+from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import (
     PATIENCE,
     Diverged,
     Exploration,
-    Persistent,
     count_episodes,
     count_steps,
-    evaluate,
     train,
 )
 from nmpcrl.study import Experiment, paper

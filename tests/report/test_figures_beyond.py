@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis.policy_search import Found
-from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.report.figures import beyond
 from nmpcrl.report.figures.style import LOOKS
 from nmpcrl.study import Experiment, paper
@@ -18,7 +18,9 @@ THERE = np.linspace(paper.START, paper.TARGET, 30)  # a drive that arrives ...
 HALFWAY = THERE[:15].repeat(2, axis=0)  # ... and one that does not
 
 
-def run(experiment: Experiment, *, size: float = 1.0, cost: float = 1.0, **facts: str) -> Digest:
+def run(
+    experiment: Experiment, *, size: float = 1.0, cost: float = 1.0, **facts: str
+) -> RunSummary:
     """A run with alpha ||phi||^2 up to `size`, and so much of the first cost in the end."""
     count = experiment.episodes
     episodes = {
@@ -28,7 +30,7 @@ def run(experiment: Experiment, *, size: float = 1.0, cost: float = 1.0, **facts
     evaluations = {"episode": np.linspace(0, count, 4), "cost": 100 * np.array([1, *[cost] * 3])}
     nothing = np.zeros((4, 3))
     about = {"stopped": "finished"} | facts
-    return Digest(asdict(experiment), episodes, evaluations, nothing, nothing[:, :2], about)
+    return RunSummary(asdict(experiment), episodes, evaluations, nothing, nothing[:, :2], about)
 
 
 def title(figure: Figure) -> str:

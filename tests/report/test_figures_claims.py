@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from nmpcrl.analysis.curvature import Curvature
+from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import interquartile_mean, rate
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.assumptions import Assumption
@@ -141,7 +141,7 @@ def test_a_median_between_a_half_that_failed_and_one_that_did_not_is_one_of_them
 
 
 def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
-    aside = made_up().digests[Experiment("RDES")].states.copy()
+    aside = made_up().summaries[Experiment("RDES")].states.copy()
     aside[2, 1] -= 1.0
     found = made_up(lambda e: {"states": aside, "end": 0.8} if e.learner == "RDES" else {})
     for drawing, inside in ((drawn("C5", made_up()), True), (drawn("C5", found), False)):

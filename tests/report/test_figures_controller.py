@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib import pyplot
 
-from nmpcrl.learning.training import Persistent, Rollout, evaluate
+from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
 from nmpcrl.report.figures import controller, sensitivity
 from nmpcrl.study import Records, Study, paper, sweep
 

@@ -48,8 +48,8 @@ def test_a_study_in_which_all_went_well_says_so(made_up):
 def test_every_example_has_a_column_with_its_thresholds_and_the_rise_in_grey(made_up):
     found = made_up(unlike)
     names = {"overshoot": Experiment("DES"), "none of these": Experiment("RDES", seed=1)}
-    examples = {name: found.digests[e] for name, e in names.items()}
-    drives = {name: found.digests[frozen_arm(e)].states for name, e in names.items()}
+    examples = {name: found.summaries[e] for name, e in names.items()}
+    drives = {name: found.summaries[frozen_arm(e)].states for name, e in names.items()}
     figure = failure_modes.traced(examples, drives)
     columns = np.array(figure.axes).reshape(4, 2)
     assert figure.get_suptitle() == "One run of each kind: overshoot, none of these"

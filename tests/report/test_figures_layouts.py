@@ -9,13 +9,14 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from nmpcrl.analysis.summary import Digest, table
+from nmpcrl.analysis.summary import RunSummary, table
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.measures import MEASURES
 from nmpcrl.claims.robustness import atlas, telling
 from nmpcrl.report.figures import layouts as figures
 from nmpcrl.report.figures import robustness as maps
-from nmpcrl.study import Experiment, paper, plan
+from nmpcrl.study import Experiment, design, paper
+from nmpcrl.study.experiment import MAIN as LEARNERS
 from nmpcrl.study.store import Study
 
 VARIANT = "Q(s, a)"
@@ -25,7 +26,7 @@ START_COST = 1000.0
 WAY = np.array([[-2.5, 1.5, 0.0], [5.5, 0.5, 0.0], [7.5, 2.5, 0.0], [8.5, 2.0, 0.0]])
 
 
-def run(experiment: Experiment, gain: float, theta_c: float) -> Digest:
+def run(experiment: Experiment, gain: float, theta_c: float) -> RunSummary:
     """A run that takes a share off the cost and ends with this theta_c; nothing goes wrong."""
     count = experiment.episodes
     known = dict.fromkeys(("cost", "delta", "loss", "bias", "error", "iterations", "seconds"), 1.0)
@@ -45,20 +46,22 @@ def run(experiment: Experiment, gain: float, theta_c: float) -> Digest:
         "distance": np.zeros(4),
     }
     facts = {"stopped": "finished", "seconds": 1.0}
-    return Digest(asdict(experiment), episodes, evaluations, WAY, np.zeros((4, 2)), facts)
+    return RunSummary(asdict(experiment), episodes, evaluations, WAY, np.zeros((4, 2)), facts)
 
 
 def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
     """Two layouts, in which learners save a tenth, and a variant in which they save `gained`."""
-    parts = dict.fromkeys(plan.main_table(plan.MAIN, ("A", "D"), SEEDS, episodes), plan.MAIN_TABLE)
-    parts |= {e: VARIANT for e in plan.variant(VARIANT, episodes) if e not in parts}
-    digests = {}
+    parts = dict.fromkeys(
+        design.main_table(LEARNERS, ("A", "D"), SEEDS, episodes), design.MAIN_TABLE
+    )
+    parts |= {e: VARIANT for e in design.variant(VARIANT, episodes) if e not in parts}
+    summaries = {}
     for experiment, part in parts.items():
         learned = experiment.learner != "frozen"
         gain = learned * (gained if part == VARIANT else 0.1)
-        digests[experiment] = run(experiment, gain, 0.35 if learned else paper.THETA_INIT[-1])
-    runs = table(digests).assign(variant=list(parts.values()), source="published")
-    return Evidence(Study(digests), runs)
+        summaries[experiment] = run(experiment, gain, 0.35 if learned else paper.THETA_INIT[-1])
+    runs = table(summaries).assign(variant=list(parts.values()), source="published")
+    return Evidence(Study(summaries), runs)
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +154,7 @@ def test_telling_draws_what_is_infinite_at_the_edge(flipping):
     changed = found.runs.assign(
         stopped=found.runs.stopped.where(found.runs.variant != VARIANT, "diverged")
     )
-    figure = maps.telling(telling(rows).head(1), Evidence(found.digests, changed))
+    figure = maps.telling(telling(rows).head(1), Evidence(found.summaries, changed))
     for line in figure.axes[0].get_lines():
         assert np.isfinite(line.get_ydata()).all()
 

@@ -5,8 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
-from nmpcrl.analysis.curvature import dropped_curvature
-from nmpcrl.analysis.gradient_td import directions
+from nmpcrl.analysis.gradient_td import directions, dropped_curvature
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.two_state import Chain
 from nmpcrl.report.figures import ges, rdes

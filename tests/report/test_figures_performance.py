@@ -9,7 +9,7 @@ DRAWN = (
     performance.solve_times,
     performance.learning_steps,
     performance.whole_runs,
-    performance.growth,
+    performance.scaling,
     performance.saving,
 )
 
@@ -55,7 +55,7 @@ def test_a_step_s_bar_is_the_sum_of_its_parts(measured):
 
 
 def test_what_one_more_costs_is_told(measured):
-    title = performance.growth(measured).get_suptitle()
+    title = performance.scaling(measured).get_suptitle()
     adds = "A stage adds 0.50 to 0.50 µs to an iteration, an obstacle 0.25 to 0.25 µs"
     assert title == adds
 

@@ -51,13 +51,13 @@ def standing(states: np.ndarray) -> np.ndarray:
 
 
 def test_costs_are_in_units_of_the_start_without_noise(made_up):
-    run = next(iter(made_up(lambda e: {"end": 0.8, "training": 1.5}).digests.values()))
+    run = next(iter(made_up(lambda e: {"end": 0.8, "training": 1.5}).summaries.values()))
     np.testing.assert_allclose(results.trained(run)[1], 1.5)
     np.testing.assert_allclose(results.judged(run)[1], [1.0, *[0.8] * 30])
 
 
 def test_what_was_cut_short_or_never_reached_costs_infinitely_much(made_up):
-    run = next(iter(made_up(lambda e: {"reached": 100}).digests.values()))
+    run = next(iter(made_up(lambda e: {"reached": 100}).summaries.values()))
     run.episodes["cost"][3] = np.nan
     episodes, cost = results.trained(run)
     assert episodes[np.isinf(cost)].tolist() == [4, *range(101, 301)]
@@ -153,7 +153,7 @@ def test_drives_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
 
 
 def test_those_that_arrive_are_counted_and_those_that_were_stopped_are_not_drawn(made_up):
-    drive = made_up().digests[Experiment("RDES")].states
+    drive = made_up().summaries[Experiment("RDES")].states
 
     def unlike(experiment: Experiment) -> dict:
         if (experiment.learner, experiment.seed) == ("RDES", 0):
@@ -174,7 +174,7 @@ def test_those_that_arrive_are_counted_and_those_that_were_stopped_are_not_drawn
 
 
 def test_a_drive_that_failed_is_drawn_as_far_as_it_got(made_up):
-    broken = made_up().digests[Experiment("GES")].states.copy()
+    broken = made_up().summaries[Experiment("GES")].states.copy()
     broken[3:] = np.nan
     found = made_up(lambda e: {"states": broken} if e.learner == "GES" else {})
     assert "8 failed" in title(rollouts.paths(found, "A"))
@@ -212,13 +212,13 @@ def test_a_figure_says_where_its_runs_come_from_and_is_closed(draw, made_up):
 def test_a_part_has_the_learners_asked_for_and_one_layout_or_all(made_up):
     found = made_up()
     assert set(panels.part(found, ("ES", "GES")).runs.learner) == {"ES", "GES"}
-    assert panels.part(found, ("ES",)).digests.values_of("layout") == ("A", "D")
-    assert panels.part(found, ("ES",), "D").digests.values_of("layout") == ("D",)
+    assert panels.part(found, ("ES",)).summaries.values_of("layout") == ("A", "D")
+    assert panels.part(found, ("ES",), "D").summaries.values_of("layout") == ("D",)
 
 
 def test_the_target_of_the_drawn_drive_is_the_task_s(made_up):
     """What the tests above call arriving is arriving in every layout that they draw."""
-    drive = made_up().digests[Experiment("GES")].states
+    drive = made_up().summaries[Experiment("GES")].states
     for name in ("A", "B", "D", "E"):
         assert paper.task(name).distance(drive[-1]) == 0
         assert paper.task(name).overlap(drive).max() < 0

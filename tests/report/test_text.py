@@ -5,13 +5,13 @@ import re
 import pandas as pd
 import pytest
 
-from nmpcrl.claims.flips import COLUMNS
 from nmpcrl.claims.published import Published
+from nmpcrl.claims.robustness import COLUMNS
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.report import text
 from nmpcrl.study import Experiment
 from nmpcrl.study.departures import DEPARTURES
-from nmpcrl.study.plan import VARIANTS
+from nmpcrl.study.design import VARIANTS
 
 ABOUT = {
     "runs": {"main": 1200, "controls": 60, "soft box": 40, "tanh": 20},
@@ -140,8 +140,8 @@ def test_a_question_quotes_the_gap_and_leads_to_its_entry():
 
 
 @pytest.mark.parametrize(
-    ("names", "text"),
+    ("names", "said"),
     [((), "none"), (("a",), "a"), (("a", "b"), "a and b"), ((1, 2, 3), "1, 2 and 3")],
 )
-def test_names_are_listed_as_a_sentence_has_them(names, text):
-    assert text.listed(names) == text
+def test_names_are_listed_as_a_sentence_has_them(names, said):
+    assert text.listed(names) == said

@@ -21,8 +21,8 @@ import pytest
 
 from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
-from nmpcrl.analysis.summaries import Failed, fetch_digests
-from nmpcrl.analysis.summary import digest
+from nmpcrl.analysis.summaries import Failed, fetch_summaries
+from nmpcrl.analysis.summary import summarise
 from nmpcrl.study import Experiment, cluster, run, store, sweep
 from nmpcrl.study.cluster import NoCluster
 
@@ -173,7 +173,7 @@ def wait_until(holds):
 
 def on_cluster(address, experiments, **options):
     with cluster.executor(address, patience=PATIENCE) as executor:
-        return fetch_digests(experiments, executor=executor, progress=False, **options)
+        return fetch_summaries(experiments, executor=executor, progress=False, **options)
 
 
 def test_a_cluster_trains_what_this_machine_would_train_and_needs_no_shared_disk(
@@ -183,10 +183,10 @@ def test_a_cluster_trains_what_this_machine_would_train_and_needs_no_shared_disk
     experiments = sweep(learner=("RDES", "GES"), episodes=2, steps=65)
     study = on_cluster(address, experiments)
     for experiment in experiments:
-        ours, theirs = digest(run(experiment)), study[experiment]
+        ours, theirs = summarise(run(experiment)), study[experiment]
         for name in set(ours.episodes) - {"seconds"}:
             np.testing.assert_array_equal(theirs.episodes[name], ours.episodes[name])
-    assert {path.parent.name for path in runs.rglob("*.npz")} == {"digests"}
+    assert {path.parent.name for path in runs.rglob("*.npz")} == {"summaries"}
     assert not (dask.elsewhere / "runs").exists()
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
-from nmpcrl.learning.training import Persistent
+from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, ParameterError, experiment, main_study, paper, run, sweep
 from nmpcrl.study.experiment import DECAYS, LEARNERS, PAPER, prepare
 

@@ -105,19 +105,19 @@ def test_a_run_of_other_versions_is_not_reused(monkeypatch, no_run):
 
 @pytest.fixture
 def source(tmp_path, monkeypatch):
-    """A copy of the package whose digest can be taken after a change."""
+    """A copy of the package whose summary can be taken after a change."""
     copy = tmp_path / "nmpcrl"
     shutil.copytree(Path(nmpcrl.__file__).parent, copy, ignore=shutil.ignore_patterns("*.pyc"))
     monkeypatch.setattr(nmpcrl, "__file__", str(copy / "__init__.py"))
 
-    def digest(place=None, before="", after=""):
+    def source_hash(place=None, before="", after=""):
         if place:
             text = (copy / place).read_text()
             assert before in text
             (copy / place).write_text(text.replace(before, after, 1))
         return store._mathematics.__wrapped__()
 
-    return digest
+    return source_hash
 
 
 @pytest.mark.parametrize(

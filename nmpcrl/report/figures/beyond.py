@@ -14,7 +14,7 @@ from nmpcrl import Matrix
 from nmpcrl.analysis.metrics import LAST
 from nmpcrl.analysis.policy_search import Found
 from nmpcrl.analysis.statistics import interquartile_mean
-from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.analysis.trajectory import described
 from nmpcrl.claims.failure_modes import OVERSHOOT
 from nmpcrl.report.figures.controller import draw_task
@@ -52,7 +52,7 @@ NAMES = {
 
 
 @page
-def step_of_w(runs: Mapping[float, Digest]) -> Figure:
+def step_of_w(runs: Mapping[float, RunSummary]) -> Figure:
     """beta ||phi||^2 in each episode of TDC, for some beta: what is left of an error of w.
 
     Args:
@@ -76,7 +76,7 @@ def step_of_w(runs: Mapping[float, Digest]) -> Figure:
 
 
 @page
-def parts_of_tdc(runs: Mapping[str, Digest]) -> Figure:
+def parts_of_tdc(runs: Mapping[str, RunSummary]) -> Figure:
     """TDC with each of its parts left out: the noise-free cost, and the size of w.
 
     Args:
@@ -112,7 +112,7 @@ def strips(
     """A share of every run, layout by layout and learner by learner, with interquartile means.
 
     Args:
-        runs: of `text.table`.
+        runs: of `summary.table`.
         values: one a run; infinite ones, and what is not `seen`, are drawn at the edge.
         learners: in the order in which they are drawn.
         label: what the share is of.
@@ -221,7 +221,7 @@ def _strip(axes: Axes, x: int, learner: str, runs: pd.DataFrame, values: pd.Seri
         axes.plot([x, x], [middle.low, middle.high], color="black", linewidth=1.0)
 
 
-def _end(run: Digest) -> float:
+def _end(run: RunSummary) -> float:
     """Final noise-free cost in shares of the first; infinite if a drive failed."""
     cost = run.evaluations["cost"]
     return float(cost[-LAST:].mean() / cost[0])

@@ -17,9 +17,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import PercentFormatter
 
 from nmpcrl import Vector
-from nmpcrl.analysis.curvature import Curvature
+from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import interquartile_mean, performance_profile
-from nmpcrl.bench.timing import ratio
+from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import paper_claims, rule
 from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.evidence import Evidence, paths
@@ -103,7 +103,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
 def same_policy(found: Evidence, verdict: Verdict) -> Figure:
     """C5: how far RDES and GES come apart on the road, and in cost; a letter a pair."""
     drawn = part(found, ("RDES", "GES"))
-    decays = found.digests.values_of("decay")
+    decays = found.summaries.values_of("decay")
     figure, axes = _panels(len(decays))
     pairs = _pairs(drawn)
     for axis, decay in zip(axes[:-1], decays, strict=True):
@@ -182,7 +182,7 @@ def gains(found: Evidence, verdict: Verdict) -> Figure:
 def learners(found: Evidence) -> Figure:
     """All learners: interquartile mean of the final cost, and how many runs save how much."""
     figure, (middles, profile) = subplots(1, 2, 3.6)
-    costs = {name: _final_costs(found, name) for name in found.digests.values_of("learner")}
+    costs = {name: _final_costs(found, name) for name in found.summaries.values_of("learner")}
     means = {name: interquartile_mean(*cost) for name, cost in costs.items()}
     placed = logarithmic(middles, "x", np.concatenate([cost for cost, _ in costs.values()]), 1.0)
     for row, (name, mean) in enumerate(means.items()):
@@ -225,7 +225,8 @@ def _pairs(drawn: Evidence) -> pd.DataFrame:
     """How far RDES and GES are apart on the road and in cost, a row a layout, decay and seed."""
     rdes, ges = rule.arms(drawn.runs, "RDES", "GES")
     driven = {
-        (e.learner, e.layout, e.decay, e.seed): digest.states for e, digest in drawn.digests.items()
+        (e.learner, e.layout, e.decay, e.seed): summary.states
+        for e, summary in drawn.summaries.items()
     }
     path = [
         paper_claims.apart(driven.get(("RDES", *cell)), driven.get(("GES", *cell)))

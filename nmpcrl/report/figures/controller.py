@@ -11,7 +11,7 @@ from matplotlib.patches import Circle
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
-from nmpcrl.learning.training import Rollout
+from nmpcrl.learning.rollout import Rollout
 from nmpcrl.report.figures.style import page, subplots
 
 INK, LESS, MORE = "#222222", "#1B7F79", "#882255"  # none of them is a learner's

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ENDINGS, MECHANISMS, OVER_PREDICTED, OVERSHOOT, WELL, rise
 from nmpcrl.report.figures.layouts import closes_at, plain
@@ -59,8 +59,8 @@ def reasons(found: Evidence) -> Figure:
 
 
 @page
-def traced(examples: Mapping[str, Digest], first_drives: Mapping[str, Column]) -> Figure:
-    """One run of each mechanism, a column each: what its digest says around the rise of the cost.
+def traced(examples: Mapping[str, RunSummary], first_drives: Mapping[str, Column]) -> Figure:
+    """One run of each mechanism, a column each: what its summary says around the rise of the cost.
 
     Args:
         examples: a run by mechanism.
@@ -90,7 +90,7 @@ def traced(examples: Mapping[str, Digest], first_drives: Mapping[str, Column]) -
     return marked(headed(figure, f"One run of each kind: {names}"), mark)
 
 
-def _trace(column: Column, run: Digest, first_drive: Column) -> None:
+def _trace(column: Column, run: RunSummary, first_drive: Column) -> None:
     """The four panels of one run."""
     task = paper.task(run.name.layout, box=run.name.box)
     window, color = rise(run), LOOKS[run.name.learner].color

@@ -4,9 +4,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
-from nmpcrl.analysis.curvature import Curvature
-from nmpcrl.analysis.gradient_td import directions
-from nmpcrl.analysis.two_state import Chain, follow, growth
+from nmpcrl.analysis.gradient_td import Curvature, directions
+from nmpcrl.analysis.two_state import Chain, follow, spectral_radius
 from nmpcrl.claims.paper_claims import unstable
 from nmpcrl.learning.learners import gradient_td, semi_gradient
 from nmpcrl.report.figures.rdes import (
@@ -39,7 +38,9 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
     left.set(xlabel="update", ylabel=r"$|\theta|$ [-]", ylim=(1e-3, 1e4))
     figure.legend(loc="outside lower center", ncols=4, fontsize="small")
     grid = np.geomspace(0.05, 20, 2000)
-    radius = np.array([growth(chain, gradient_td(alpha, r * alpha, chain.gamma)) for r in grid])
+    radius = np.array(
+        [spectral_radius(chain, gradient_td(alpha, r * alpha, chain.gamma)) for r in grid]
+    )
     right.semilogx(grid, radius, color=LOOKS["GES"].color)
     right.axhline(1, color="0.6", linewidth=1)
     right.axvline(paper.BETA / paper.ALPHA, color="0.35", linewidth=1, linestyle=":")

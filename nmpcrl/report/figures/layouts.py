@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.measures import MEASURES, Values, at_borders, steady
@@ -78,14 +78,14 @@ def layouts(drives: Mapping[str, Matrix]) -> Figure:
 @page
 def theta_c(found: Evidence) -> Figure:
     """theta_c over training, a column a layout and a row a reading of the decay."""
-    names, decays = (found.digests.values_of(field) for field in ("layout", "decay"))
+    names, decays = (found.summaries.values_of(field) for field in ("layout", "decay"))
     options = {"sharex": True, "sharey": True, "squeeze": False}
     figure, grid = subplots(len(decays), len(names), 1.9 * len(decays) + 0.9, **options)
     margin = paper.task().margin
     ends: list[float] = []
     for row, decay in zip(grid, decays, strict=True):
         for axes, name in zip(row, names, strict=True):
-            runs = found.digests.select(layout=name, decay=decay)
+            runs = found.summaries.select(layout=name, decay=decay)
             ends += _ways_of_theta_c(axes, runs)
             axes.axhline(margin, **LIMIT)
             for run in list(runs.select(learner="frozen").values())[:1]:
@@ -165,7 +165,7 @@ def same_verdict(curve: pd.DataFrame, border: float) -> tuple[float, float]:
     return float(curve.border.iloc[first]), float(curve.border.iloc[last])
 
 
-def _ways_of_theta_c(axes: Axes, runs: Mapping[Any, Digest]) -> list[float]:
+def _ways_of_theta_c(axes: Axes, runs: Mapping[Any, RunSummary]) -> list[float]:
     """Draw theta_c of every run that is shown; return where each ends."""
     ends = []
     for run in runs.values():

@@ -140,13 +140,13 @@ def _draw_workers(axes: Axes, bench: Bench) -> None:
 
 
 @page
-def growth(bench: Bench) -> Figure:
+def scaling(bench: Bench) -> Figure:
     """An iteration against the number of stages and of obstacles, with a straight line."""
     figure, axes = subplots(1, 2, 3.0, sharey=True)
     found = []
     kinds = (("horizon", "stages"), ("obstacles", "obstacles"))
     for panel, (varied, parts) in zip(axes, kinds, strict=True):
-        times = summary.growth(bench, varied).iteration
+        times = summary.scaling(bench, varied).iteration
         slope, fixed = np.polyfit(times.index, times, 1, w=1 / times)
         ends = np.array([0, times.index[-1]])
         panel.plot(ends, fixed + slope * ends, color="0.6", linestyle="--", label="straight line")

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
 
 from nmpcrl import Vector
-from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.paper_claims import divergence, instability
 from nmpcrl.claims.rule import UNDECIDABLE, Verdict
@@ -29,7 +29,7 @@ from nmpcrl.study.records import Column
 from nmpcrl.study.store import Study
 
 CEILING = 4.0  # times theta_init's cost without noise, where the panels end
-Curve = Callable[[Digest], tuple[Vector, Vector]]  # episodes and costs
+Curve = Callable[[RunSummary], tuple[Vector, Vector]]  # episodes and costs
 
 
 def figure_1(found: Evidence, layout: str) -> Figure:
@@ -50,12 +50,12 @@ def figure_2(found: Evidence, layout: str) -> Figure:
 def by_layout(found: Evidence, learners: tuple[str, ...], verdict: Verdict) -> Figure:
     """Cost without noise in every layout, a row a reading, and what the claim came to there."""
     drawn = part(found, learners)
-    layouts, decays = found.digests.values_of("layout"), found.digests.values_of("decay")
+    layouts, decays = found.summaries.values_of("layout"), found.summaries.values_of("decay")
     options = {"sharex": True, "sharey": True, "squeeze": False}
     figure, axes = subplots(len(decays), len(layouts), 1.6 * len(decays) + 1.1, **options)
     for column, layout in zip(axes.T, layouts, strict=True):
         for axis, decay in zip(column, decays, strict=True):
-            runs = drawn.digests.select(layout=layout, decay=decay)
+            runs = drawn.summaries.select(layout=layout, decay=decay)
             _costs(axis, runs, learners, judged)
         label_panel(column[-1])
         word = WORDS[verdict.by_layout.get(layout, UNDECIDABLE)]
@@ -69,15 +69,16 @@ def by_layout(found: Evidence, learners: tuple[str, ...], verdict: Verdict) -> F
 
 
 @page
-def twins(nudges: Mapping[Experiment, Vector], solvers: Vector, start: float) -> Figure:
-    """How far twins are apart against episodes; `nudges` by run, `solvers` for riccati and Ipopt.
+def replicas(perturbed: Mapping[Experiment, Vector], solvers: Vector, start: float) -> Figure:
+    """How far perturbed replicas are apart against episodes.
 
-    Both hold `twins.separation`, a number an episode; `start` is how far apart the nudged begin.
+    `perturbed` (by run) and `solvers` (riccati and Ipopt) hold `summary.separation`, a number an
+    episode; `start` is how far apart the perturbed begin.
     """
-    decays = tuple(dict.fromkeys(e.decay for e in nudges))
+    decays = tuple(dict.fromkeys(e.decay for e in perturbed))
     figure, axes = subplots(1, len(decays), 3.4, sharex=True, sharey=True, squeeze=False)
     for axis, decay in zip(axes[0], decays, strict=True):
-        for experiment, apart in nudges.items():
+        for experiment, apart in perturbed.items():
             if experiment.decay == decay:
                 _separation(axis, apart, **line(experiment.learner))
         axis.axhline(start, **LIMIT)
@@ -85,38 +86,38 @@ def twins(nudges: Mapping[Experiment, Vector], solvers: Vector, start: float) ->
         label_panel(axis, decay)
     _separation(axes[0, 0], solvers, color="0.45", linewidth=2.4)
     axes[0, 0].set_ylabel("largest difference in θ")
-    learners = tuple(dict.fromkeys(experiment.learner for experiment in nudges))
+    learners = tuple(dict.fromkeys(experiment.learner for experiment in perturbed))
     other = Line2D([], [], color="0.45", linewidth=2.4, label="ES, riccati and Ipopt")
     legend(figure, learners, other)
-    grown = sorted({e.learner for e, apart in nudges.items() if apart[-1] > start})
+    grown = sorted({e.learner for e, apart in perturbed.items() if apart[-1] > start})
     title = "Of all learners' twins, none end further apart than they began"
     if grown:
         title = f"A difference of {start:.0e} grows in runs of {' and '.join(grown)}"
     return headed(figure, title)
 
 
-def trained(digest: Digest) -> tuple[Vector, Vector]:
+def trained(summary: RunSummary) -> tuple[Vector, Vector]:
     """Cost of each episode of training, noise included, in units of the start's without noise."""
-    cost = np.nan_to_num(digest.episodes["cost"], nan=np.inf)
-    return np.arange(1.0, cost.size + 1), cost / digest.evaluations["cost"][0]
+    cost = np.nan_to_num(summary.episodes["cost"], nan=np.inf)
+    return np.arange(1.0, cost.size + 1), cost / summary.evaluations["cost"][0]
 
 
-def judged(digest: Digest) -> tuple[Vector, Vector]:
+def judged(summary: RunSummary) -> tuple[Vector, Vector]:
     """Cost of each rollout without noise, in units of the first; infinite where training ended."""
-    episodes, every = digest.experiment["episodes"], digest.experiment["evaluate_every"]
+    episodes, every = summary.experiment["episodes"], summary.experiment["evaluate_every"]
     due = np.unique([*range(0, episodes + 1, every), episodes]).astype(float)
-    known = dict(zip(digest.evaluations["episode"], digest.evaluations["cost"], strict=True))
+    known = dict(zip(summary.evaluations["episode"], summary.evaluations["cost"], strict=True))
     return due, np.array([known.get(k, np.inf) for k in due]) / known[0]
 
 
 @page
 def _learning_curves(drawn: Evidence, title: str) -> Figure:
     """Cost of each training episode above, without noise below; a column a reading."""
-    learners, decays = drawn.digests.values_of("learner"), drawn.digests.values_of("decay")
+    learners, decays = drawn.summaries.values_of("learner"), drawn.summaries.values_of("decay")
     options = {"sharex": True, "sharey": "row", "squeeze": False}
     figure, axes = subplots(2, len(decays), 5.4, **options)
     for (above, below), decay in zip(axes.T, decays, strict=True):
-        runs = drawn.digests.select(decay=decay)
+        runs = drawn.summaries.select(decay=decay)
         _costs(above, runs, learners, trained)
         _costs(below, runs, learners, judged)
         label_panel(above, decay, xlabel="")
@@ -128,10 +129,10 @@ def _learning_curves(drawn: Evidence, title: str) -> Figure:
     return sourced(figure, title, drawn)
 
 
-def _costs(axis: Axes, runs: Study[Digest], learners: Iterable[str], curve: Curve) -> None:
+def _costs(axis: Axes, runs: Study[RunSummary], learners: Iterable[str], curve: Curve) -> None:
     """Every learner's runs on a logarithmic axis of cost that ends at `CEILING`."""
     for learner in learners:
-        curves = [curve(digest) for digest in runs.select(learner=learner).values()]
+        curves = [curve(summary) for summary in runs.select(learner=learner).values()]
         if curves:
             costs = np.array([cost for _, cost in curves])
             bundle(axis, curves[0][0], np.minimum(costs, 2 * CEILING), learner)

@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.measures import MEASURES, Values
 from nmpcrl.claims.paper_claims import experiment_of
@@ -78,7 +78,7 @@ def telling(cells: pd.DataFrame, found: Evidence) -> Figure:
 
     Args:
         cells: of `robustness.telling`.
-        found: runs and digests of the main table and of the variants.
+        found: runs and summaries of the main table and of the variants.
     """
     if cells.empty:
         figure, axes = subplots(height=0.6)
@@ -93,7 +93,7 @@ def telling(cells: pd.DataFrame, found: Evidence) -> Figure:
         values = measure.of(here, where), measure.of(usual, where)
         _strips(left, cell["claim"], *values)
         learners = [name for name in LOOKS if any(name in arm.split() for arm in values[0])]
-        _costs(right, found.digests, here, usual, learners)
+        _costs(right, found.summaries, here, usual, learners)
         left.set_title(f"{cell['claim']}: {cell['outcome']}; was: {cell['base']}", fontsize=9)
         right.set_title(f"{named(cell['variant'])} (bands: without it)", fontsize=9)
     listed = ", ".join(f"{row.claim} by {named(row.variant)}" for row in cells.itertuples())
@@ -165,7 +165,7 @@ def _strips(axes: Axes, claim: str, here: Values, usual: Values) -> None:
 
 def _costs(
     axes: Axes,
-    digests: Mapping[Experiment, Digest],
+    summaries: Mapping[Experiment, RunSummary],
     here: pd.DataFrame,
     usual: pd.DataFrame,
     learners: Iterable[str],
@@ -173,10 +173,10 @@ def _costs(
     """Noise-free cost over training: a line a run here, and the quartiles of the usual ones."""
     for name in learners:
         look = LOOKS[name]
-        episode, costs = _curves(digests, usual[usual.learner == name])
+        episode, costs = _curves(summaries, usual[usual.learner == name])
         quartiles = np.percentile(costs, (25, 75), axis=0)
         axes.fill_between(episode, *quartiles, color=look.color, alpha=0.2, linewidth=0)
-        episode, costs = _curves(digests, here[here.learner == name])
+        episode, costs = _curves(summaries, here[here.learner == name])
         lines = axes.plot(episode, costs.T, **look.line, linewidth=1.0, alpha=0.8)
         lines[0].set_label(name)
     low, high = axes.get_ylim()
@@ -184,12 +184,14 @@ def _costs(
     axes.legend(fontsize=7.5)
 
 
-def _curves(digests: Mapping[Experiment, Digest], runs: pd.DataFrame) -> tuple[Vector, Matrix]:
+def _curves(
+    summaries: Mapping[Experiment, RunSummary], runs: pd.DataFrame
+) -> tuple[Vector, Matrix]:
     """After which episodes, and the noise-free costs over theta_init's, shape (runs, rollouts).
 
     What a run did not reach, and a failed drive, costs more than is drawn.
     """
-    judged = [digests[experiment_of(row)].evaluations for row in runs.to_dict("records")]
+    judged = [summaries[experiment_of(row)].evaluations for row in runs.to_dict("records")]
     episode = max((one["episode"] for one in judged), key=len)
     costs = np.full((len(judged), len(episode)), 2 * MOST_COST)
     for row, one in zip(costs, judged, strict=True):

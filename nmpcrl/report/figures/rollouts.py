@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
-from nmpcrl.analysis.summary import Digest
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ending
 from nmpcrl.control import Task
@@ -34,7 +34,7 @@ def controls(found: Evidence, layout: str) -> Figure:
     Drives whose inputs are not kept, as those of published runs, are left out.
     """
     drawn = _driving(part(found, SHOWN, layout))
-    drawn = drawn.where([digest.actions.size > 0 for digest in drawn.digests.values()])
+    drawn = drawn.where([summary.actions.size > 0 for summary in drawn.summaries.values()])
     plant = paper.nmpc(layout).plant
     figure, axes = _against_time(drawn, "actions", plant.action_names, 4.2)
     for i, row in enumerate(axes):
@@ -57,7 +57,7 @@ def states(found: Evidence, layout: str) -> Figure:
     for i, row in enumerate(axes):
         for axis in row:
             axis.axhline(task.target[i], **LIMIT)
-    ends = np.array([task.distance(digest.states[-1]) for digest in _learned(drawn)])
+    ends = np.array([task.distance(summary.states[-1]) for summary in _learned(drawn)])
     arrived = int((ends <= ARRIVED).sum())
     title = f"{arrived} of {ends.size} drives of RDES and GES end at the target"
     return sourced(figure, f"In layout {layout}, {title}", drawn)
@@ -70,10 +70,10 @@ def paths(found: Evidence, layout: str) -> Figure:
     One line a run and none for the median, for a median of places is no place that a robot was.
     """
     drawn = part(found, SHOWN, layout)
-    driving, decays = _driving(drawn), drawn.digests.values_of("decay")
+    driving, decays = _driving(drawn), drawn.summaries.values_of("decay")
     figure, axes = subplots(1, len(decays), 3.5, sharey=True, squeeze=False)
     for axis, decay in zip(axes[0], decays, strict=True):
-        _map(axis, paper.task(layout), driving.digests.select(decay=decay))
+        _map(axis, paper.task(layout), driving.summaries.select(decay=decay))
         axis.set_title(DECAYS[decay], **SUBTITLE)
         axis.set_xlabel("x [m]")
     axes[0, 0].set_ylabel("y [m]")
@@ -85,14 +85,14 @@ def paths(found: Evidence, layout: str) -> Figure:
 def maps(found: Evidence) -> Figure:
     """Where the learned policies drive in every layout, both readings of the decay."""
     drawn = part(found, SHOWN)
-    layouts = drawn.digests.values_of("layout")
+    layouts = drawn.summaries.values_of("layout")
     columns = min(3, len(layouts))
     rows = -(-len(layouts) // columns)
     figure, axes = subplots(
         rows, columns, 1.95 * rows + 0.8, sharex=True, sharey=True, squeeze=False
     )
     for axis, layout in zip(axes.flat, layouts, strict=False):
-        runs = _driving(drawn).digests.select(layout=layout)
+        runs = _driving(drawn).summaries.select(layout=layout)
         _map(axis, paper.task(layout), runs, names=False)
         axis.set_title(layout, **SUBTITLE)
     for axis in axes.flat[len(layouts) :]:
@@ -109,13 +109,13 @@ def _against_time(
     drawn: Evidence, name: str, components: tuple[str, ...], height: float
 ) -> tuple[Figure, Column]:
     """`states` or `actions` of the last rollouts: a row a component, a column a reading."""
-    decays, period = drawn.digests.values_of("decay"), paper.nmpc().plant.period
+    decays, period = drawn.summaries.values_of("decay"), paper.nmpc().plant.period
     options = {"sharex": True, "sharey": "row", "squeeze": False}
     figure, axes = subplots(len(components), max(1, len(decays)), height, **options)
     for column, decay in zip(axes.T, decays, strict=False):
         for learner in SHOWN:
-            runs = drawn.digests.select(learner=learner, decay=decay).values()
-            driven = np.array([getattr(digest, name) for digest in runs])
+            runs = drawn.summaries.select(learner=learner, decay=decay).values()
+            driven = np.array([getattr(summary, name) for summary in runs])
             for i, axis in enumerate(column if driven.size else ()):
                 bundle(axis, period * np.arange(driven.shape[1]), driven[:, :, i], learner)
         column[0].set_title(DECAYS[decay], **SUBTITLE)
@@ -127,21 +127,21 @@ def _against_time(
     return figure, axes
 
 
-def _map(axis: Axes, task: Task, runs: Study[Digest], *, names: bool = True) -> None:
+def _map(axis: Axes, task: Task, runs: Study[RunSummary], *, names: bool = True) -> None:
     """Obstacles, start, target and drives; a mark where each drive ended."""
     draw_task(axis, task, labels=names)
     for learner in SHOWN:
         look = LOOKS[learner]
-        for digest in runs.select(learner=learner).values():
-            known = digest.states[np.isfinite(digest.states).all(axis=1)]
+        for summary in runs.select(learner=learner).values():
+            known = summary.states[np.isfinite(summary.states).all(axis=1)]
             axis.plot(known[:, 0], known[:, 1], **look.line, linewidth=0.9, alpha=0.7)
             axis.plot(*known[-1, :2], look.marker, color=look.color, markersize=3.5)
     axis.set(xlim=(task.lower[0], task.upper[0]), ylim=(-3, 6))
 
 
-def _learned(drawn: Evidence) -> list[Digest]:
+def _learned(drawn: Evidence) -> list[RunSummary]:
     """Every run of the paper's two methods."""
-    return [digest for e, digest in drawn.digests.items() if e.learner in LEARNED]
+    return [summary for e, summary in drawn.summaries.items() if e.learner in LEARNED]
 
 
 def _driving(found: Evidence) -> Evidence:
@@ -149,12 +149,12 @@ def _driving(found: Evidence) -> Evidence:
     return found.where(found.runs.stopped == "finished")
 
 
-def _endings(digests: list[Digest]) -> str:
+def _endings(summaries: list[RunSummary]) -> str:
     """How many drives of runs end in which way, the most common first."""
     ends = Counter(
         ending(one.states, paper.task(one.name.layout))
         if one.facts["stopped"] == "finished"
         else "stopped in training"
-        for one in digests
+        for one in summaries
     )
     return ", ".join(f"{count} {name}" for name, count in ends.most_common())

@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.bench.horizons import growth
+from nmpcrl.bench.scaling import exponents
 from nmpcrl.report.figures.controller import INK, LESS, MORE
 from nmpcrl.report.figures.rdes import headed
 from nmpcrl.report.figures.style import page, subplots
@@ -146,7 +146,7 @@ def horizons(timings: pd.DataFrame) -> Figure:
     left.set(title="A solve", ylabel="time [ms]")
     right.set(title="An iteration", ylabel="time [µs]")
     first = next(name for name in SOLVERS if name in set(timings.solver))
-    solve, iteration = (growth(timings, column)[first] for column in columns)
+    solve, iteration = (exponents(timings, column)[first] for column in columns)
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     orders = f"a solve grows like $N^{{{solve:.2f}}}$, an iteration like $N^{{{iteration:.2f}}}$"
     return headed(figure, f"With {first} {orders}")

@@ -16,8 +16,16 @@ from nmpcrl.study.paper import DEPARTURES
 ROOT = Path(__file__).resolve().parents[2]
 NOTATION = (ROOT / "book/notation.md").read_text()
 REPRODUCE = (ROOT / "book/reproduce.md").read_text()
-PACKAGES = ("control", "learning", "study")
-MODULES = {path.stem: path for name in PACKAGES for path in (ROOT / "nmpcrl" / name).glob("*.py")}
+FOLDERS = (
+    "report",
+    "bench",
+    "claims",
+    "analysis",
+    "study",
+    "learning",
+    "control",
+)  # later ones win
+MODULES = {path.stem: path for name in FOLDERS for path in (ROOT / "nmpcrl" / name).rglob("*.py")}
 
 ROWS = re.findall(r"^\| \((\d+)([a-f]?)\) \| (.*) \| (.*) \|$", NOTATION, flags=re.M)
 ADDED = NOTATION.partition("## Equations that the paper does not have\n")[2]
@@ -63,7 +71,7 @@ def defined(text: str) -> set[str]:
     }
 
 
-@pytest.mark.parametrize("module", ["updates", "controls"])
+@pytest.mark.parametrize("module", ["updates", "baselines"])
 def test_every_update_and_every_control_is_beside_an_equation(module):
     assert {f"{module}.{name}" for name in defined(MODULES[module].read_text())} <= set(FUNCTIONS)
 
@@ -77,7 +85,7 @@ def test_the_functions_named_below_the_table_exist(name):
 def test_every_departure_has_a_section_that_renders_it():
     text = (ROOT / "book/departures.ipynb").read_text()
     assert re.findall(r"\(departure-([A-Z])\)=", text) == list(DEPARTURES)
-    assert re.findall(r"cards\.departure\(\\\"([A-Z])\\\"\)", text) == list(DEPARTURES)
+    assert re.findall(r"tables\.departure\(\\\"([A-Z])\\\"\)", text) == list(DEPARTURES)
 
 
 def test_the_parameters_of_the_chapters_are_those_that_they_declare():

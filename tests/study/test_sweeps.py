@@ -5,7 +5,7 @@ from dataclasses import asdict
 
 import pytest
 
-from nmpcrl.study import Experiment, paper, plan
+from nmpcrl.study import Experiment, design, paper
 from nmpcrl.study.experiment import MAIN, frozen_arm
 
 
@@ -15,7 +15,7 @@ def differing(one: Experiment, other: Experiment) -> set[str]:
 
 
 def test_the_main_table_has_every_learner_layout_reading_and_seed():
-    runs = plan.main_table()
+    runs = design.main_table()
     assert len(runs) == len(set(runs)) == len(MAIN) * 6 * 2 * 10
     assert {e.episodes for e in runs} == {paper.EPISODES}
     usual = Experiment()
@@ -23,41 +23,41 @@ def test_the_main_table_has_every_learner_layout_reading_and_seed():
 
 
 def test_the_study_begins_with_the_main_table_and_names_every_run_once():
-    study = plan.study()
+    study = design.study()
     names = list(study.values())
-    main = len(plan.main_table())
-    assert set(names[:main]) == {plan.MAIN_TABLE}
-    assert plan.MAIN_TABLE not in names[main:]
-    assert set(names) == {plan.MAIN_TABLE, "controls", *plan.VARIANTS}
+    main = len(design.main_table())
+    assert set(names[:main]) == {design.MAIN_TABLE}
+    assert design.MAIN_TABLE not in names[main:]
+    assert set(names) == {design.MAIN_TABLE, "controls", *design.VARIANTS}
 
 
 def test_what_is_trained_afresh_is_a_part_of_the_main_table_with_every_learner():
-    fresh = set(plan.fresh())
-    assert fresh < set(plan.main_table())
+    fresh = set(design.fresh())
+    assert fresh < set(design.main_table())
     assert {e.learner for e in fresh} == set(MAIN)
     assert len({e.layout for e in fresh}) >= 3
     assert len({e.seed for e in fresh}) >= 5
 
 
 def test_every_run_of_the_study_has_its_frozen_arm_in_the_study():
-    study = plan.study()
+    study = design.study()
     assert {frozen_arm(e) for e in study} <= set(study)
 
 
-@pytest.mark.parametrize("name", plan.VARIANTS)
+@pytest.mark.parametrize("name", design.VARIANTS)
 def test_a_variant_changes_one_thing(name):
-    variant = plan.VARIANTS[name]
-    for experiment in plan.variant(name):
+    variant = design.VARIANTS[name]
+    for experiment in design.variant(name):
         if experiment.learner != "frozen":
-            base = plan.base_of(experiment, name)
+            base = design.base_of(experiment, name)
             assert differing(experiment, base) == set(variant.fields) - {"decay"}
-            assert base in set(plan.main_table())
+            assert base in set(design.main_table())
 
 
 def test_variants_name_departures_that_there_are_and_no_two_are_the_same():
-    letters = {variant.departure for variant in plan.VARIANTS.values()} - {""}
+    letters = {variant.departure for variant in design.VARIANTS.values()} - {""}
     assert letters <= set(paper.DEPARTURES)
-    fields = Counter(str(sorted(dict(v.fields).items())) for v in plan.VARIANTS.values())
+    fields = Counter(str(sorted(dict(v.fields).items())) for v in design.VARIANTS.values())
     assert max(fields.values()) == 1
 
 

@@ -10,7 +10,7 @@ import nbformat
 import pytest
 from papermill.cli import papermill
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PATHS = sorted((ROOT / "book").glob("*.ipynb"))
 NOTEBOOKS = {path.stem: nbformat.read(path, as_version=4) for path in PATHS}
 CHAPTERS = [name for name in NOTEBOOKS if re.match(r"\d\d_|solver", name)]

@@ -10,13 +10,21 @@ from nmpcrl.study.paper import DEPARTURES
 
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = sorted((ROOT / "nmpcrl").rglob("*.py"))
-LAYERS = ("control", "learning", "study")  # each may import those to its left
+ROOMS = {  # each may import those that it names, and what they may
+    "control": (),
+    "learning": ("control",),
+    "study": ("learning",),
+    "analysis": ("study",),
+    "bench": ("study",),
+    "claims": ("analysis", "bench"),
+    "report": ("claims",),
+}
 DISK = {"io", "json", "os", "pathlib", "pickle", "shutil", "sqlite3", "tempfile"}
 HOMES = {  # foreign library -> where alone it may be imported
     "casadi": "control/",
     "numba": ("control/riccati.py", "control/hessian.py"),
     "torch": "learning/network.py",
-    "matplotlib": "study/figures",
+    "matplotlib": "report/figures",
 }
 
 each_module = pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
@@ -46,16 +54,22 @@ def cited(text: str) -> set[str]:
     return {letter for group in groups for letter in re.findall(r"[A-Z]", group)}
 
 
+def below(room: str) -> set[str]:
+    """The rooms that a room may import, directly or through others."""
+    return {room}.union(*map(below, ROOMS[room]))
+
+
+def test_every_module_is_in_a_room():
+    places = {place(path).split("/")[0] for path in MODULES}
+    assert places == {*ROOMS, "__init__.py", "__main__.py"}
+
+
 @each_module
-def test_imports_run_one_way_study_to_learning_to_control(path):
-    layer = place(path).split("/")[0]
-    if layer not in LAYERS:
-        return
-    above = LAYERS[LAYERS.index(layer) + 1 :]
-    wrong = {
-        name for name in imports(path) if name.startswith(tuple(f"nmpcrl.{one}" for one in above))
-    }
-    assert not wrong
+def test_imports_run_one_way_from_report_to_control(path):
+    room = place(path).split("/")[0]
+    imported = {name.split(".")[1] for name in imports(path) if name.startswith("nmpcrl.")}
+    if room in ROOMS:
+        assert imported & set(ROOMS) <= below(room)
 
 
 @each_module

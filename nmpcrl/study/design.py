@@ -1,4 +1,4 @@
-"""The study: which runs decide the claims, and what each is called.
+"""The design of the study: which runs decide the claims, and what each part is called.
 
 The main table varies what the paper leaves open and no single value can be chosen for: layout,
 reading of the exploration decay, and seed. The variants change one other thing at a time.
@@ -19,8 +19,8 @@ from nmpcrl.study.experiment import (
     Experiment,
     frozen_arm,
 )
-from nmpcrl.study.sweep import sweep
-from nmpcrl.study.twins import nudged
+from nmpcrl.study.replicas import perturbed
+from nmpcrl.study.sweeps import sweep
 
 LAYOUTS = tuple(paper.LAYOUTS)
 SEEDS = tuple(range(10))
@@ -64,8 +64,8 @@ def _variants() -> dict[str, Variant]:
     for horizon in (5, 20):
         found[f"N = {horizon}"] = Variant("", f"horizon N = {horizon}", {"horizon": horizon})
     found["tolerance 1e-5"] = Variant("", "a looser solver", {"tolerance": 1e-5})
-    theta = nudged(Experiment()).theta
-    found["nudged"] = Variant("", "theta_init moved by 1e-12", {"theta": theta})
+    theta = perturbed(Experiment()).theta
+    found["perturbed"] = Variant("", "theta_init moved by 1e-12", {"theta": theta})
     return found
 
 

@@ -10,7 +10,7 @@ import yaml
 from nmpcrl.claims import published
 from nmpcrl.claims.rule import NOT, REPRODUCED
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 METADATA = yaml.safe_load((ROOT / "metadata.yaml").read_text())
 CITATION = yaml.safe_load((ROOT / "CITATION.cff").read_text())
 (PAPER,) = CITATION["references"]

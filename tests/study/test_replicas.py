@@ -3,38 +3,38 @@
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.summary import Digest, digest
+from nmpcrl.analysis.summary import RunSummary, separation, summarise
 from nmpcrl.report.figures import results
-from nmpcrl.study import twins
+from nmpcrl.study import replicas
 from nmpcrl.study.experiment import Experiment, run
 
 SHORT = {"episodes": 2, "seeds": [3], "layout": "A"}
 
 
-def with_theta(*rows) -> Digest:
+def with_theta(*rows) -> RunSummary:
     nothing = np.empty((0, 0))
-    return Digest({}, {"theta": np.array(rows, float)}, {}, nothing, nothing, {})
+    return RunSummary({}, {"theta": np.array(rows, float)}, {}, nothing, nothing, {})
 
 
 def test_a_twin_differs_from_its_run_in_the_twelfth_digit_of_theta_x():
     experiment = Experiment()
-    twin = twins.nudged(experiment)
-    moved = np.array(twin.theta) - experiment.theta
-    assert moved[0] == pytest.approx(twins.NUDGE, rel=1e-3)
+    replica = replicas.perturbed(experiment)
+    moved = np.array(replica.theta) - experiment.theta
+    assert moved[0] == pytest.approx(replicas.PERTURBATION, rel=1e-3)
     assert not moved[1:].any()
-    assert twin.seed == experiment.seed
+    assert replica.seed == experiment.seed
 
 
 def test_every_learner_that_moves_has_a_twin_in_both_readings_of_the_decay():
-    found = [(e.learner, e.decay) for e, _ in twins.pairs(**SHORT)]
+    found = [(e.learner, e.decay) for e, _ in replicas.pairs(**SHORT)]
     moving = ("ES", "DES", "RDES", "GES")
     wanted = [(name, decay) for name in moving for decay in ("step", "episode")]
     assert sorted(found) == sorted(wanted)
 
 
 def test_the_other_solver_gets_a_run_as_long_as_it_can_afford():
-    for episodes, expected in ((300, twins.SOLVER_EPISODES), (4, 4)):
-        one, other = twins.solver_pair(Experiment(episodes=episodes))
+    for episodes, expected in ((300, replicas.SOLVER_EPISODES), (4, 4)):
+        one, other = replicas.solver_pair(Experiment(episodes=episodes))
         assert (one.solver, other.solver) == ("riccati", "ipopt")
         assert one.episodes == other.episodes == expected
 
@@ -42,18 +42,18 @@ def test_the_other_solver_gets_a_run_as_long_as_it_can_afford():
 def test_separation_is_the_largest_difference_over_the_episodes_that_both_reached():
     one = with_theta([1, 2], [3, 4], [5, 6])
     other = with_theta([1, 2], [2.5, 4.25], [np.nan, np.nan])
-    np.testing.assert_array_equal(twins.separation(one, other), [0, 0.5])
+    np.testing.assert_array_equal(separation(one, other), [0, 0.5])
 
 
 def test_a_run_learns_the_same_with_our_solver_as_with_ipopt():
     """Until rounding separates them; two episodes of a learner that settles are far from it."""
-    one, other = (digest(run(e)) for e in twins.solver_pair(Experiment(episodes=2)))
-    assert twins.separation(one, other).max() < 1e-6
+    one, other = (summarise(run(e)) for e in replicas.solver_pair(Experiment(episodes=2)))
+    assert separation(one, other).max() < 1e-6
 
 
 @pytest.mark.parametrize(("end", "title"), [(1e-13, "none end further apart"), (1e-2, "of DES")])
-def test_the_figure_of_twins_says_whose_difference_grew(end, title):
+def test_the_figure_of_replicas_says_whose_difference_grew(end, title):
     experiment = Experiment(learner="DES", steps=5, episodes=2)
     apart = np.geomspace(1e-12, end, 10)
-    figure = results.twins({experiment: apart}, np.full(10, 1e-10), twins.NUDGE)
+    figure = results.replicas({experiment: apart}, np.full(10, 1e-10), replicas.PERTURBATION)
     assert title in figure.get_suptitle()

@@ -13,7 +13,7 @@ import yaml
 from click.testing import CliRunner
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
@@ -173,7 +173,7 @@ def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(sm
 def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
     needs = build.ask(ROOT / "book/performance.ipynb", {"length": "smoke"})
     assert not needs["experiments"]
-    assert not needs["digests"]
+    assert not needs["summaries"]
     (call,) = needs["beforehand"]
     assert call.func.__name__ == "fetch"
     assert call.args == ("smoke",)

@@ -1,0 +1,81 @@
+"""The closed loop without noise, by which theta is judged, and what a failed solve means in it."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control import Nmpc, Solution, SolverError
+
+
+@dataclass(frozen=True)
+class Persistent:
+    """An NMPC that tries a failed solve once more, from a standing start.
+
+    With `train`, the one place that decides what a failed solve means.  # departure M
+    """
+
+    nmpc: Nmpc
+
+    @property
+    def gamma(self) -> float:
+        """The discount factor of the NMPC."""
+        return self.nmpc.gamma
+
+    def solve(
+        self,
+        state: Vector,
+        theta: Vector,
+        guess: Solution | None = None,
+        action: Vector | None = None,
+    ) -> Solution:
+        """As `Nmpc.solve`; the status is "restarted" where only the second attempt succeeded."""
+        try:
+            return self.nmpc.solve(state, theta, guess, action)
+        except SolverError:
+            if guess is None:
+                raise
+            solution = self.nmpc.solve(state, theta, None, action)
+            return replace(solution, restarts=solution.restarts + 1)
+
+    def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
+        """As `Nmpc.value_hessian_times`."""
+        return self.nmpc.value_hessian_times(solution, vector)
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """The closed loop from the start without noise."""
+
+    states: Matrix  # s_0, ..., s_K; fewer where a solve failed, shape (<= K + 1, n)
+    actions: Matrix  # shape (<= K + 1, m)
+    costs: Vector  # RL stage costs, shape (<= K + 1,)
+    failure: str = field(default="")  # what the solver said, if it failed
+
+    @property
+    def cost(self) -> float:
+        """Sum of the RL stage cost, t = 0, ..., K; infinite where a solve failed."""
+        return np.inf if self.failure else float(self.costs.sum())
+
+
+def evaluate(controller: Persistent, theta: Vector, steps: int) -> Rollout:
+    """Follow the policy of `theta` from the start for `steps` steps, without noise."""
+    plant, task = controller.nmpc.plant, controller.nmpc.task
+    state, guess, failure = task.start, None, ""
+    states, actions, costs = [], [], []
+    for _ in range(steps):
+        try:
+            guess = controller.solve(state, theta, guess)
+        except SolverError as error:
+            failure = str(error)
+            break
+        states.append(state)
+        actions.append(guess.action)
+        costs.append(task.stage_cost(state, guess.action))
+        state = plant.step(state, guess.action)
+    return Rollout(
+        states=np.reshape(states, (-1, plant.n)),
+        actions=np.reshape(actions, (-1, plant.m)),
+        costs=np.array(costs),
+        failure=failure,
+    )
