@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.compile import CannotCompile
-from nmpcrl.control.interior_point import InteriorPoint
+from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.ocp import transcribe
 from nmpcrl.control.plant import Plant
-from nmpcrl.control.program import SOLVERS as CASADI_SOLVERS
-from nmpcrl.control.program import TOLERANCE, Program
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, short
+from nmpcrl.control.solvers.nlpsol import SOLVERS as CASADI_SOLVERS
+from nmpcrl.control.solvers.nlpsol import TOLERANCE, Program
+from nmpcrl.control.solvers.riccati import InteriorPoint
 from nmpcrl.control.task import Task
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some

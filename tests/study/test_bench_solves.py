@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.control import SolverError, usual
+from nmpcrl.control import SolverError
+from nmpcrl.control.solvers import baselines
 from nmpcrl.study import paper
 from nmpcrl.study.bench import growth, learning, solves
 
@@ -17,11 +18,13 @@ def nmpc():
     return paper.nmpc()
 
 
-each_usual = pytest.mark.parametrize("write", [usual.mx, usual.rebuilt], ids=["mx", "rebuilt"])
+each_baseline = pytest.mark.parametrize(
+    "write", [baselines.mx, baselines.rebuilt], ids=["mx", "rebuilt"]
+)
 INSIDE = np.array([-0.5, 1.5, 0.0])  # the rim of an obstacle, where the slacks are at work
 
 
-@each_usual
+@each_baseline
 @pytest.mark.parametrize("state", [np.array(paper.START), INSIDE], ids=["start", "inside"])
 def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(nmpc, write, state):
     ours, theirs = nmpc.solve(state, THETA), write(nmpc)(state, THETA, None)
@@ -32,7 +35,7 @@ def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(
     assert inputs == pytest.approx(ours.inputs.T, abs=1e-3)
 
 
-@each_usual
+@each_baseline
 def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
     solve = write(nmpc)
     first = solve(nmpc.task.start, THETA, None)
@@ -42,9 +45,9 @@ def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
     assert again.value == pytest.approx(nmpc.solve(later, THETA).value, rel=1e-6)
 
 
-@each_usual
+@each_baseline
 def test_the_usual_ways_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
-    monkeypatch.setitem(usual.OPTIONS["ipopt"], "max_iter", 1)
+    monkeypatch.setitem(baselines.OPTIONS["ipopt"], "max_iter", 1)
     with pytest.raises(SolverError, match="Maximum_Iterations_Exceeded"):
         write(nmpc)(nmpc.task.start, THETA, None)
 

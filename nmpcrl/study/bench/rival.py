@@ -27,7 +27,7 @@ from mpcrl import (
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
 from nmpcrl.control.ocp import Theta, stage_cost, terminal_cost
-from nmpcrl.control.program import SOLVERS
+from nmpcrl.control.solvers.nlpsol import SOLVERS
 from nmpcrl.control.task import overlap
 from nmpcrl.study import paper
 

@@ -10,7 +10,8 @@ from unittest.mock import patch
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Solution, SolverError, interior_point, usual
+from nmpcrl.control import Nmpc, Solution, SolverError
+from nmpcrl.control.solvers import baselines, riccati
 from nmpcrl.learning import QNetwork
 from nmpcrl.study import paper
 
@@ -28,7 +29,10 @@ def solvers() -> dict[str, Solve]:
     named: dict[str, Solve] = {
         name: paper.nmpc(solver=name).solve for name in ("riccati", "fatrop", "ipopt")
     }
-    return named | {"ipopt MX": usual.mx(paper.nmpc()), "rebuilt": usual.rebuilt(paper.nmpc())}
+    return named | {
+        "ipopt MX": baselines.mx(paper.nmpc()),
+        "rebuilt": baselines.rebuilt(paper.nmpc()),
+    }
 
 
 def interleaved(episodes: int, steps: int) -> Columns:
@@ -146,8 +150,8 @@ def _watched() -> tuple[Nmpc, list[float]]:
 
         return SimpleNamespace(solve=timed, hessian_times=code.hessian_times)
 
-    original, nmpc = interior_point.kernel, paper.nmpc()
-    with patch.object(interior_point, "kernel", watched):
+    original, nmpc = riccati.kernel, paper.nmpc()
+    with patch.object(riccati, "kernel", watched):
         nmpc.solve(nmpc.task.start, THETA)
     return nmpc, seconds
 

@@ -9,7 +9,7 @@ import pytest
 
 from nmpcrl.control import Nmpc, Obstacle, SolverError, Task, differential_drive
 from nmpcrl.control.nmpc import ABSURD, SOLVERS
-from nmpcrl.control.program import SOLVERS as CASADI_SOLVERS
+from nmpcrl.control.solvers.nlpsol import SOLVERS as CASADI_SOLVERS
 from nmpcrl.study import paper
 
 OMEGA = 100.0

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Solution, Task, differential_drive, machine_code
+from nmpcrl.control import Nmpc, Solution, Task, differential_drive
+from nmpcrl.control.codegen import jit
 from nmpcrl.control.nmpc import SOLVERS
 from nmpcrl.study import paper
 
@@ -232,7 +233,7 @@ def test_other_solvers_refuse_a_soft_box(solver):
 
 
 def test_where_riccati_cannot_be_compiled_a_soft_box_is_refused(monkeypatch):
-    monkeypatch.setattr(machine_code, "numba_version", lambda: None)
+    monkeypatch.setattr(jit, "numba_version", lambda: None)
     nmpc = soft()
     message = "numba is not installed: no other solver than riccati has soft_box"
     with pytest.raises(ValueError, match=f"^{message}$"):

@@ -16,8 +16,8 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.ocp import Theta, stage_cost, terminal_cost
-from nmpcrl.control.program import SOLVERS
 from nmpcrl.control.solution import SolverError
+from nmpcrl.control.solvers.nlpsol import SOLVERS
 from nmpcrl.control.task import overlap
 
 OPTIONS: dict[str, Any] = {"print_time": False, "ipopt": SOLVERS["ipopt"]}

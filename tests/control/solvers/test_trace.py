@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from nmpcrl.control.interior_point import TOLERANCE, InteriorPoint, kernel
 from nmpcrl.control.ocp import transcribe
+from nmpcrl.control.solvers.riccati import TOLERANCE, InteriorPoint, kernel
+from nmpcrl.control.solvers.trace import interpreted, trace
 from nmpcrl.study import paper
-from nmpcrl.study.trace import interpreted, trace
 
 BUSY = np.array([-0.6, 1.4, -0.4])  # in front of an obstacle
 

@@ -1,27 +1,29 @@
-"""The solver of `riccati` compiled for a plant and called for one OCP: starts and second tries."""
+"""The solver of `kernel` compiled for a plant and called for one OCP: starts and second tries."""
 
 import time
 from collections.abc import Iterator
 from functools import cache
+from importlib.resources import files
 from types import ModuleType
 
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control.machine_code import load, own_source
+from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.plant import Plant
-from nmpcrl.control.program import TIE, TOLERANCE
 from nmpcrl.control.solution import Solution, SolverError, check_shape
-from nmpcrl.control.stages import write
+from nmpcrl.control.solvers.nlpsol import TIE, TOLERANCE
+from nmpcrl.control.solvers.stages import write
 from nmpcrl.control.task import Task
 
 WARM_LIMIT = 40  # iterations from a guess
 COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
-COLD, SHIFTED, NEAR, SAME = range(4)  # as in `riccati`
+COLD, SHIFTED, NEAR, SAME = range(4)  # as in `kernel`
 ENDS = ("solved", "found no descent", "ran out of iterations", "met numbers that are not finite")
+COMPILED = ("kernel", "hessian")  # modules of this package that are compiled beside `model`
 UNBOUNDED = 1e20  # stands for an input without a bound
 
 Start = tuple[int, Vector, int]  # kind, (z, lam, nu), iterations allowed
@@ -141,15 +143,14 @@ class InteriorPoint:
 
 @cache
 def kernel(plant: Plant) -> ModuleType:
-    """`riccati.solve` and `hessian.hessian_times` as machine code for a plant.
+    """`kernel.solve` and `hessian.hessian_times` as machine code for a plant.
 
     Raises:
         CannotCompile: numba is missing, or the plant holds an operation that is not known.
     """
     texts = {
-        "__init__": "from .hessian import hessian_times\nfrom .riccati import solve\n",
+        "__init__": "from .hessian import hessian_times\nfrom .kernel import solve\n",
         "model": write(plant),
-        "riccati": own_source("riccati"),
-        "hessian": own_source("hessian"),
+        **{name: files(__package__).joinpath(f"{name}.py").read_text() for name in COMPILED},
     }
     return load("riccati", texts, NOTICE)

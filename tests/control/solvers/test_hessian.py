@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Obstacle, Solution, Task, differential_drive, machine_code
-from nmpcrl.control.program import SOLVERS as CASADI_SOLVERS
+from nmpcrl.control import Nmpc, Obstacle, Solution, Task, differential_drive
+from nmpcrl.control.codegen import jit
+from nmpcrl.control.solvers.nlpsol import SOLVERS as CASADI_SOLVERS
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -108,7 +109,7 @@ def test_the_solution_may_be_another_solvers(controllers, draw, giver):
 
 
 def test_without_numba_the_product_is_that_of_the_dense_hessian(monkeypatch):
-    monkeypatch.setattr(machine_code, "numba_version", lambda: None)
+    monkeypatch.setattr(jit, "numba_version", lambda: None)
     nmpc = paper.nmpc()
     with pytest.warns(UserWarning, match="fatrop solves instead of riccati"):
         solution = nmpc.solve(START, THETA)

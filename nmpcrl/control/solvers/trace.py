@@ -1,4 +1,4 @@
-"""One solve, watched from within: the text of `riccati` run by Python instead of numba.
+"""One solve, watched from within: the text of `kernel` run by Python instead of numba.
 
 Machine code cannot be looked into. The functions that numba compiled are still there as Python,
 some hundred times slower, and with every step open to a debugger or to `trace`.
@@ -13,8 +13,8 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant, Solution
-from nmpcrl.control.interior_point import InteriorPoint, kernel
 from nmpcrl.control.ocp import transcribe
+from nmpcrl.control.solvers.riccati import InteriorPoint, kernel
 
 
 def interpreted(plant: Plant) -> ModuleType:
