@@ -2,12 +2,16 @@
 
 from nmpcrl.control.nmpc import Nmpc, Solution, SolverError
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
+from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati
 from nmpcrl.control.task import Obstacle, Task
 
 __all__ = [
+    "Fatrop",
+    "Ipopt",
     "Nmpc",
     "Obstacle",
     "Plant",
+    "Riccati",
     "Solution",
     "SolverError",
     "Task",

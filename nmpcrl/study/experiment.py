@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Plant
+from nmpcrl.control import Plant, solvers
 from nmpcrl.learning import (
     Learner,
     QNetwork,
@@ -54,7 +54,7 @@ LEARNERS = (*PAPER, "TDC", "QL", *CONTROLS)
 MAIN = (*PAPER, "TDC", "frozen")  # of the main table
 NETWORK_LEARNERS = ("DES", "RDES")
 DECAYS = {"step": count_steps, "episode": count_episodes}
-SOLVERS = ("riccati", "fatrop", "ipopt")
+SOLVERS = tuple(solvers.SOLVERS)
 NETWORKS = ("plain", "normalised", "tanh", "small buffer", "four fits")  # departure H
 SMALL_BUFFER = 10 * paper.STEPS  # examples
 THETA_SET = (0.0, 10.0)  # each component of theta is projected into it by TDC
@@ -102,7 +102,7 @@ class Experiment:
     steps: int = paper.STEPS  # of an episode
     horizon: int = paper.HORIZON
     solver: str = "riccati"
-    tolerance: float = 1e-8  # of the solver
+    tolerance: float = solvers.TOLERANCE  # of the solver
     evaluate_every: int = 10  # episodes between rollouts without noise
 
     def __post_init__(self) -> None:
@@ -118,7 +118,9 @@ class Experiment:
         for name in ("alpha", "beta", "beta_tdc", "zeta"):
             number(self, name, "a positive number", lambda value: value > 0)
         number(self, "decay_rate", "a number in (0, 1]", lambda value: 0 < value <= 1)
-        number(self, "tolerance", "a number in [1e-12, 1e-2]", lambda value: 1e-12 <= value <= 1e-2)
+        least, largest = solvers.LEAST_TOLERANCE, solvers.LARGEST_TOLERANCE
+        allowed = f"a number in [{least:g}, {largest:g}]"
+        number(self, "tolerance", allowed, lambda value: least <= value <= largest)
         for name in ("gated", "clipped", "constrained", "ties_active", "curvature", "projected"):
             true_or_false(self, name)
         parameter_vector(self, "theta", len(paper.THETA_INIT))
@@ -179,7 +181,7 @@ def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None
     table["alpha_phi2"] = experiment.alpha * (table["features"] ** 2).sum(axis=1)
     facts = {
         "stopped": stopped,
-        "solver": controller.nmpc.solver,  # fatrop where riccati was asked for and not to be had
+        "solver": controller.nmpc.solver.name,  # fatrop where riccati was not to be had
         "seconds": float(table["seconds"].sum()),
         "final_cost": float(judged["cost"][-1]),  # of the last rollout without noise
     }
@@ -191,10 +193,9 @@ def controller_of(experiment: Experiment) -> Persistent:
     nmpc = paper.nmpc(
         experiment.layout,
         horizon=experiment.horizon,
-        solver=experiment.solver,
+        solver=solvers.SOLVERS[experiment.solver](tolerance=experiment.tolerance),
         box=experiment.box,
         ties_active=experiment.ties_active,
-        tolerance=experiment.tolerance,
     )
     return Persistent(nmpc)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nmpcrl.control.nmpc import SOLVERS
+from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, prepare
 from nmpcrl.study.training import Persistent, Step, train
@@ -17,7 +17,7 @@ PAPER_HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}  # Table II: training time 
 
 def time_learners(
     learners: tuple[str, ...] = ("ES", "GES", "RDES", "DES"),
-    solvers: tuple[str, ...] = SOLVERS,
+    solvers: tuple[str, ...] = tuple(SOLVERS),
     steps: int = 400,
     turn: int = 1,
 ) -> pd.DataFrame:

@@ -17,10 +17,10 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.ocp import Theta, stage_cost, terminal_cost
 from nmpcrl.control.solution import SolverError
-from nmpcrl.control.solvers.nlpsol import SOLVERS
+from nmpcrl.control.solvers.nlpsol import Ipopt
 from nmpcrl.control.task import overlap
 
-OPTIONS: dict[str, Any] = {"print_time": False, "ipopt": SOLVERS["ipopt"]}
+OPTIONS: dict[str, Any] = {"print_time": False, "ipopt": Ipopt().options}
 
 
 class Plan(NamedTuple):

@@ -2,9 +2,11 @@
 
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from types import ModuleType
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,9 +15,8 @@ from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.solution import Solution, SolverError, check_shape
-from nmpcrl.control.solvers.nlpsol import TIE, TOLERANCE
+from nmpcrl.control.solvers.solver import TOLERANCE, Solver
 from nmpcrl.control.solvers.stages import write
-from nmpcrl.control.task import Task
 
 WARM_LIMIT = 40  # iterations from a guess
 COLD_LIMIT = 200  # iterations from standing still
@@ -29,32 +30,33 @@ UNBOUNDED = 1e20  # stands for an input without a bound
 Start = tuple[int, Vector, int]  # kind, (z, lam, nu), iterations allowed
 
 
-class InteriorPoint:
-    """An OCP and its compiled solver; solves as `Program` does."""
+@dataclass(frozen=True)
+class Riccati(Solver):
+    """The interior point of `kernel`, compiled for a plant at its first solve."""
 
-    def __init__(
-        self,
-        ocp: Ocp,
-        plant: Plant,
-        task: Task,
-        *,
-        ties_active: bool = False,
-        soft_box: bool = False,
-        tolerance: float = TOLERANCE,
-    ) -> None:
-        """Load the machine code, or compile it; the options are those of `Nmpc`.
+    name: ClassVar[str] = "riccati"
+    prices_box: ClassVar[bool] = True
+
+    def prepare(self, ocp: Ocp) -> "InteriorPoint":
+        """Load the machine code, or compile it.
 
         Raises:
             CannotCompile: numba is missing, or the plant holds an operation that is not known.
         """
-        self._ocp = ocp
+        return InteriorPoint(ocp, self.tolerance)
+
+
+class InteriorPoint:
+    """An OCP and its compiled solver."""
+
+    def __init__(self, ocp: Ocp, tolerance: float = TOLERANCE) -> None:
+        self._ocp, plant, task = ocp, ocp.plant, ocp.task
         code = kernel(plant)
         self._kernel, self._product = code.solve, code.hessian_times
         self._fixed = int(ocp.fixed_action.size > 0)
         self._standing = np.zeros(2 * ocp.lower.size + ocp.equality.size)
         self._size = self._standing.size + ocp.theta.numel()
         self._no_action = np.zeros(plant.m)
-        self._plant = plant
         sides = [
             (state, sign, limit[state])
             for sign, limit in ((-1.0, task.lower), (1.0, task.upper))
@@ -68,8 +70,8 @@ class InteriorPoint:
             np.reshape(np.array(sides, float), (-1, 3)),
             ocp.gamma ** np.arange(len(ocp.states), dtype=float),
             ocp.slack_weight,
-            int(soft_box),
-            -TIE if ties_active else TIE,
+            int(task.soft_box),
+            ocp.tie,
         )
         self._tolerance = tolerance
 
@@ -121,7 +123,8 @@ class InteriorPoint:
             else:
                 yield SHIFTED, point, WARM_LIMIT
         yield COLD, self._standing, COLD_LIMIT
-        lower, upper = np.maximum(self._plant.lower, -1.0), np.minimum(self._plant.upper, 1.0)
+        plant = self._ocp.plant
+        lower, upper = np.maximum(plant.lower, -1.0), np.minimum(plant.upper, 1.0)
         for seed in range(PERTURBED):
             point = self._standing.copy()
             point[self._ocp.inputs] = np.random.default_rng(seed).uniform(

@@ -13,7 +13,6 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant, Solution
-from nmpcrl.control.ocp import transcribe
 from nmpcrl.control.solvers.riccati import InteriorPoint, kernel
 
 
@@ -88,8 +87,7 @@ class _FirstStart(InteriorPoint):
     """The solver with `plain.solve` as its kernel; it takes what the first start gives."""
 
     def __init__(self, nmpc: Nmpc, plain: ModuleType) -> None:
-        problem = (nmpc.plant, nmpc.task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
-        super().__init__(transcribe(*problem, fix_action=False), nmpc.plant, nmpc.task)
+        super().__init__(nmpc.ocp)
         self._kernel = lambda *arguments: (*plain.solve(*arguments)[:2], 0.0, 0.0, 0.0)
 
 

@@ -118,7 +118,7 @@ def test_where_nothing_can_be_compiled_fatrop_solves_and_says_so_once(monkeypatc
     said = warned(recwarn)
     assert len(said) == 1
     assert ("numba is not installed" if reason == "no numba" else "OP_ERFINV") in said[0]
-    assert nmpc.solver == "fatrop"
+    assert nmpc.solver.name == "fatrop"
 
 
 @pytest.mark.parametrize("reason", ["no numba", "the plant"])

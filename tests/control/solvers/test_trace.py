@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from nmpcrl.control.ocp import transcribe
-from nmpcrl.control.solvers.riccati import TOLERANCE, InteriorPoint, kernel
+from nmpcrl.control.solvers import TOLERANCE
+from nmpcrl.control.solvers.riccati import InteriorPoint, kernel
 from nmpcrl.control.solvers.trace import interpreted, trace
 from nmpcrl.study import paper
 
@@ -28,8 +28,7 @@ def cold(nmpc, theta):
 
 def stopped(nmpc, state, theta, limit: int) -> tuple[float, float]:
     """Value and error of the machine code's cold start after so many iterations."""
-    problem = (nmpc.plant, nmpc.task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
-    solver, reached = InteriorPoint(transcribe(*problem, fix_action=False), *problem[:2]), []
+    solver, reached = InteriorPoint(nmpc.ocp), []
 
     def limited(*arguments):
         *most, start, _, tolerance, point, out = arguments
