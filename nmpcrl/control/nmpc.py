@@ -70,6 +70,7 @@ class Nmpc:
         self.slack_weight = float(slack_weight)
         self.solver = solver_of(solver)
         self.solver.check(task)
+        self._solves = self.solver  # or what took over
         self.ties_active = ties_active
 
     def solve(
@@ -128,7 +129,7 @@ class Nmpc:
     def _prepared(self, ocp: Ocp) -> Prepared:
         """The solver for a problem; fatrop, and a warning, where there is no machine code."""
         try:
-            return self.solver.prepare(ocp)
+            return self._solves.prepare(ocp)
         except CannotCompile as error:
             instead = Fatrop(self.solver.tolerance)
             try:
@@ -138,8 +139,8 @@ class Nmpc:
             warnings.warn(
                 f"{error}: {instead.name} solves instead of {self.solver.name}", stacklevel=2
             )
-            self.solver = instead
-        return self.solver.prepare(ocp)
+            self._solves = instead
+        return self._solves.prepare(ocp)
 
     def _variant(self, solution: Solution) -> "_Variant":
         return self._fixed if solution.ocp.fixed_action.size else self._free

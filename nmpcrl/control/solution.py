@@ -52,6 +52,7 @@ class Solution:
     seconds: float  # wall time of the solve and the gradient [s]
     point: Vector  # z, lam and nu, one after the other, each in the order of `ocp`
     ocp: Ocp  # says where each part lies
+    solver: str  # the name of what found it
     restarts: int = 0  # how often the solver had to begin again
     violation: float = 0.0  # how far the plan leaves the box, in the unit of the state
 

@@ -159,12 +159,14 @@ def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None
     steps, evaluations = _tables(experiment, controller.nmpc.plant)
     evaluations.append(_evaluation(controller, weights, 0, experiment.steps))
     stopped, cost, began = "finished", 0.0, time.perf_counter()
+    solver = controller.nmpc.solver.name
     try:
         options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
         for step in train(learner, controller, weights, explore, **options):
             seconds = time.perf_counter() - began
             steps.append(_row(step, seconds))
             cost += step.cost
+            solver = step.plan.solver if step.plan else solver
             if step.failure or step.time == experiment.steps - 1:
                 done = step.episode + 1
                 due = done % experiment.evaluate_every == 0 or done == experiment.episodes
@@ -181,7 +183,7 @@ def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None
     table["alpha_phi2"] = experiment.alpha * (table["features"] ** 2).sum(axis=1)
     facts = {
         "stopped": stopped,
-        "solver": controller.nmpc.solver.name,  # fatrop where riccati was not to be had
+        "solver": solver,  # what solved: fatrop where riccati was not to be had
         "seconds": float(table["seconds"].sum()),
         "final_cost": float(judged["cost"][-1]),  # of the last rollout without noise
     }

@@ -136,6 +136,7 @@ class Program:
             seconds=time.perf_counter() - began,
             point=np.concatenate([z, lam, nu]),
             ocp=self._ocp,
+            solver=self._name,
         )
 
     def hessian_times(self, solution: Solution, vector: Vector) -> None:

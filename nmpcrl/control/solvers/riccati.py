@@ -96,11 +96,12 @@ class InteriorPoint:
                     time.perf_counter() - began,
                     out[: self._standing.size],
                     self._ocp,
+                    Riccati.name,
                     restarts,
                     violation,
                 )
         raise SolverError(
-            f"riccati found no optimum from {restarts + 1} starts (the last {ENDS[int(end)]} after"
+            f"{Riccati.name} found no optimum from {restarts + 1} starts (the last {ENDS[int(end)]} after"
             f" {iterations:.0f} iterations with a relative error of {error:.1e})",
             state,
             theta,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.special import erfinv
 
-from nmpcrl.control import Nmpc, Plant, SolverError, Task
+from nmpcrl.control import Fatrop, Nmpc, Plant, Riccati, SolverError, Task
 from nmpcrl.control.codegen import jit
 from nmpcrl.control.solvers import riccati as front
 from nmpcrl.study import paper
@@ -118,7 +118,19 @@ def test_where_nothing_can_be_compiled_fatrop_solves_and_says_so_once(monkeypatc
     said = warned(recwarn)
     assert len(said) == 1
     assert ("numba is not installed" if reason == "no numba" else "OP_ERFINV") in said[0]
-    assert nmpc.solver.name == "fatrop"
+
+
+def test_what_was_asked_for_stays_and_a_solution_says_what_solved(monkeypatch):
+    asked = Riccati(tolerance=1e-7)
+    assert paper.nmpc(solver=asked).solve(START, THETA).solver == "riccati"
+    monkeypatch.setattr(jit, "numba_version", lambda: None)
+    nmpc = paper.nmpc(solver=asked)
+    with pytest.warns(UserWarning, match=WARNING):
+        solution = nmpc.solve(START, THETA)
+    assert solution.solver == "fatrop"
+    assert nmpc.solver is asked
+    exact = paper.nmpc(solver=Fatrop(tolerance=1e-7)).solve(START, THETA)
+    np.testing.assert_array_equal(solution.point, exact.point)
 
 
 @pytest.mark.parametrize("reason", ["no numba", "the plant"])
