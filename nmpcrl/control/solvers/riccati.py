@@ -1,12 +1,11 @@
 """The solver of `kernel` compiled for a plant and called for one OCP: starts and second tries."""
 
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
-from types import ModuleType
-from typing import ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -30,6 +29,29 @@ UNBOUNDED = 1e20  # stands for an input without a bound
 Start = tuple[int, Vector, int]  # kind, (z, lam, nu), iterations allowed
 
 
+class Code(NamedTuple):
+    """What is called of `kernel` and `hessian`, with the arguments that these say."""
+
+    solve: Any  # called, and taken apart by `trace`
+    hessian_times: Any
+
+
+@cache
+def machine_code(plant: Plant) -> Code:
+    """`kernel.solve` and `hessian.hessian_times` compiled for a plant.
+
+    Raises:
+        CannotCompile: numba is missing, or the plant holds an operation that is not known.
+    """
+    texts = {
+        "__init__": "from .hessian import hessian_times\nfrom .kernel import solve\n",
+        "model": write(plant),
+        **{name: files(__package__).joinpath(f"{name}.py").read_text() for name in COMPILED},
+    }
+    module = load("riccati", texts, NOTICE)
+    return Code(module.solve, module.hessian_times)
+
+
 @dataclass(frozen=True)
 class Riccati(Solver):
     """The interior point of `kernel`, compiled for a plant at its first solve."""
@@ -37,22 +59,23 @@ class Riccati(Solver):
     name: ClassVar[str] = "riccati"
     prices_box: ClassVar[bool] = True
 
+    code: Callable[[Plant], Code] = field(default=machine_code, repr=False)
+
     def prepare(self, ocp: Ocp) -> "InteriorPoint":
         """Load the machine code, or compile it.
 
         Raises:
             CannotCompile: numba is missing, or the plant holds an operation that is not known.
         """
-        return InteriorPoint(ocp, self.tolerance)
+        return InteriorPoint(ocp, self.code(ocp.plant), self.tolerance)
 
 
 class InteriorPoint:
-    """An OCP and its compiled solver."""
+    """An OCP and the code that solves it."""
 
-    def __init__(self, ocp: Ocp, tolerance: float = TOLERANCE) -> None:
+    def __init__(self, ocp: Ocp, code: Code, tolerance: float = TOLERANCE) -> None:
         self._ocp, plant, task = ocp, ocp.plant, ocp.task
-        code = kernel(plant)
-        self._kernel, self._product = code.solve, code.hessian_times
+        self._code = code
         self._fixed = int(ocp.fixed_action.size > 0)
         self._standing = np.zeros(2 * ocp.lower.size + ocp.equality.size)
         self._size = self._standing.size + ocp.theta.numel()
@@ -83,7 +106,7 @@ class InteriorPoint:
         arguments = (*self._problem, state, theta, given, self._fixed)
         for restarts, (start, point, limit) in enumerate(self._starts(state, guess)):
             out = np.empty(self._size)
-            value, iterations, end, violation, error = self._kernel(
+            value, iterations, end, violation, error = self._code.solve(
                 *arguments, start, limit, self._tolerance, point, out
             )
             if end == 0.0:
@@ -100,19 +123,17 @@ class InteriorPoint:
                     restarts,
                     violation,
                 )
-        raise SolverError(
-            f"{Riccati.name} found no optimum from {restarts + 1} starts (the last {ENDS[int(end)]} after"
-            f" {iterations:.0f} iterations with a relative error of {error:.1e})",
-            state,
-            theta,
-        )
+        how = f"{ENDS[int(end)]} after {iterations:.0f} iterations with a relative error of {error:.1e}"
+        status = f"{Riccati.name} found no optimum from {restarts + 1} starts (the last {how})"
+        raise SolverError(status, state, theta)
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None at no strict minimum."""
         action = solution.action if self._fixed else self._no_action
         out = np.empty(vector.size)
         arguments = (*self._problem, solution.state, solution.theta, action, self._fixed)
-        return out if self._product(*arguments, solution.point, vector, out) else None
+        formed = self._code.hessian_times(*arguments, solution.point, vector, out)
+        return out if formed else None
 
     def _starts(self, state: Vector, guess: Solution | None) -> Iterator[Start]:
         """The guess, standing still, and random inputs."""
@@ -143,18 +164,3 @@ class InteriorPoint:
         lam = np.zeros(ocp.equality.size)
         lam[ocp.obstacles] = guess.constraint_duals[old.obstacles]
         return np.concatenate([z, lam, nu])
-
-
-@cache
-def kernel(plant: Plant) -> ModuleType:
-    """`kernel.solve` and `hessian.hessian_times` as machine code for a plant.
-
-    Raises:
-        CannotCompile: numba is missing, or the plant holds an operation that is not known.
-    """
-    texts = {
-        "__init__": "from .hessian import hessian_times\nfrom .kernel import solve\n",
-        "model": write(plant),
-        **{name: files(__package__).joinpath(f"{name}.py").read_text() for name in COMPILED},
-    }
-    return load("riccati", texts, NOTICE)
