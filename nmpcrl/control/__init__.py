@@ -1,7 +1,8 @@
 """What the controller is: a plant, a task, and the NMPC that solves it. The only home of CasADi."""
 
-from nmpcrl.control.nmpc import Nmpc, Solution, SolverError
+from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
+from nmpcrl.control.solution import Solution, SolverError, Status
 from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati
 from nmpcrl.control.task import Obstacle, Task
 
@@ -14,6 +15,7 @@ __all__ = [
     "Riccati",
     "Solution",
     "SolverError",
+    "Status",
     "Task",
     "differential_drive",
     "rk4",

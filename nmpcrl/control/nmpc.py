@@ -15,7 +15,7 @@ from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.ocp import Ocp, transcribe
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.sensitivity import Sensitivity
-from nmpcrl.control.solution import Solution, SolverError, short
+from nmpcrl.control.solution import Solution, short
 from nmpcrl.control.solvers import Fatrop, Prepared, Riccati, Solver, solver_of
 from nmpcrl.control.task import Task
 
@@ -24,7 +24,7 @@ FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns eit
 
 DEFAULT = Riccati()
 
-__all__ = ["ABSURD", "Nmpc", "Solution", "SolverError"]
+__all__ = ["ABSURD", "Nmpc"]
 
 
 class Nmpc:

@@ -12,6 +12,7 @@ from nmpcrl import Vector
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, check_shape
+from nmpcrl.control.solvers.codes import Start
 from nmpcrl.control.solvers.solver import Solver
 
 MAX_ITERATIONS = 300
@@ -22,7 +23,7 @@ MAX_SECONDS = 5.0  # fatrop has no clock, but its 300 iterations take about 30 m
 class Nlpsol(Solver):
     """A solver that CasADi's `nlpsol` calls by its name."""
 
-    starts: ClassVar[dict[str, dict[str, Any]]]  # the better the start, the less it is moved
+    starts: ClassVar[dict[Start, dict[str, Any]]]  # the better the start, the less it is moved
 
     @property
     @abstractmethod
@@ -43,10 +44,10 @@ class Fatrop(Nlpsol):
     """fatrop: an interior point that follows the stages, as fast as CasADi's get here."""
 
     name: ClassVar[str] = "fatrop"
-    starts: ClassVar[dict[str, dict[str, Any]]] = {
-        "standing": {},
-        "shifted": {"bound_push": 1e-3},
-        "same": {"mu_init": 1e-4, "bound_push": 1e-6},
+    starts: ClassVar[dict[Start, dict[str, Any]]] = {
+        Start.COLD: {},
+        Start.SHIFTED: {"bound_push": 1e-3},
+        Start.SAME: {"mu_init": 1e-4, "bound_push": 1e-6},
     }
 
     @property
@@ -72,10 +73,10 @@ class Ipopt(Nlpsol):
     """Ipopt: the paper's solver, for any NLP."""
 
     name: ClassVar[str] = "ipopt"
-    starts: ClassVar[dict[str, dict[str, Any]]] = {
-        "standing": {},
-        "shifted": _WARM_IPOPT,
-        "same": _WARM_IPOPT,
+    starts: ClassVar[dict[Start, dict[str, Any]]] = {
+        Start.COLD: {},
+        Start.SHIFTED: _WARM_IPOPT,
+        Start.SAME: _WARM_IPOPT,
     }
 
     @property
@@ -114,10 +115,11 @@ class Program:
         """Solve for p = (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         p = np.concatenate([state, theta, *action])
         if guess is None:
-            start, (z, lam, nu) = "standing", self._standing(state)
+            start, (z, lam, nu) = Start.COLD, self._standing(state)
         else:
-            start = "same" if np.array_equal(guess.state, state) else "shifted"
-            z, lam, nu = self._from(guess, state, same=start == "same")
+            same = np.array_equal(guess.state, state)
+            start = Start.SAME if same else Start.SHIFTED
+            z, lam, nu = self._from(guess, state, same=same)
         solver = self._solvers[start]
         result = solver(p=p, x0=z, lam_g0=lam, lam_x0=nu, **self._bounds)
         stats = solver.stats()

@@ -14,6 +14,7 @@ from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.solution import Solution, SolverError, check_shape
+from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.solver import TOLERANCE, Solver
 from nmpcrl.control.solvers.stages import write
 
@@ -21,12 +22,15 @@ WARM_LIMIT = 40  # iterations from a guess
 COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
-COLD, SHIFTED, NEAR, SAME = range(4)  # as in `kernel`
-ENDS = ("solved", "found no descent", "ran out of iterations", "met numbers that are not finite")
-COMPILED = ("kernel", "hessian")  # modules of this package that are compiled beside `model`
+ENDS = {
+    End.STALLED: "found no descent",
+    End.LIMIT: "ran out of iterations",
+    End.BROKEN: "met numbers that are not finite",
+}
+COMPILED = ("codes", "kernel", "hessian")  # modules of this package, put beside `model`
 UNBOUNDED = 1e20  # stands for an input without a bound
 
-Start = tuple[int, Vector, int]  # kind, (z, lam, nu), iterations allowed
+Attempt = tuple[Start, Vector, int]  # how, from which (z, lam, nu), iterations allowed
 
 
 class Code(NamedTuple):
@@ -107,9 +111,9 @@ class InteriorPoint:
         for restarts, (start, point, limit) in enumerate(self._starts(state, guess)):
             out = np.empty(self._size)
             value, iterations, end, violation, error = self._code.solve(
-                *arguments, start, limit, self._tolerance, point, out
+                *arguments, int(start), limit, self._tolerance, point, out
             )
-            if end == 0.0:
+            if end == End.SOLVED:
                 return Solution(
                     state,
                     theta,
@@ -123,9 +127,13 @@ class InteriorPoint:
                     restarts,
                     violation,
                 )
-        how = f"{ENDS[int(end)]} after {iterations:.0f} iterations with a relative error of {error:.1e}"
-        status = f"{Riccati.name} found no optimum from {restarts + 1} starts (the last {how})"
-        raise SolverError(status, state, theta)
+        raise SolverError(
+            f"{Riccati.name} found no optimum from {restarts + 1} starts (the last"
+            f" {ENDS[End(int(end))]} after {iterations:.0f} iterations with a relative error of"
+            f" {error:.1e})",
+            state,
+            theta,
+        )
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None at no strict minimum."""
@@ -135,16 +143,16 @@ class InteriorPoint:
         formed = self._code.hessian_times(*arguments, solution.point, vector, out)
         return out if formed else None
 
-    def _starts(self, state: Vector, guess: Solution | None) -> Iterator[Start]:
+    def _starts(self, state: Vector, guess: Solution | None) -> Iterator[Attempt]:
         """The guess, standing still, and random inputs."""
         if guess is not None:
             point = self._from(guess)
             if guess.state.tolist() == state.tolist():  # a tenth of the time of np.array_equal
-                yield SAME, point, WARM_LIMIT
-                yield NEAR, point, WARM_LIMIT
+                yield Start.SAME, point, WARM_LIMIT
+                yield Start.NEAR, point, WARM_LIMIT
             else:
-                yield SHIFTED, point, WARM_LIMIT
-        yield COLD, self._standing, COLD_LIMIT
+                yield Start.SHIFTED, point, WARM_LIMIT
+        yield Start.COLD, self._standing, COLD_LIMIT
         plant = self._ocp.plant
         lower, upper = np.maximum(plant.lower, -1.0), np.minimum(plant.upper, 1.0)
         for seed in range(PERTURBED):
@@ -152,7 +160,7 @@ class InteriorPoint:
             point[self._ocp.inputs] = np.random.default_rng(seed).uniform(
                 lower, upper, self._ocp.inputs.shape
             )
-            yield COLD, point, COLD_LIMIT
+            yield Start.COLD, point, COLD_LIMIT
 
     def _from(self, guess: Solution) -> Vector:
         """The guess's z, lam and nu in the order of this OCP."""

@@ -15,6 +15,7 @@ from nmpcrl import Vector
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.solution import Solution
+from nmpcrl.control.solvers.codes import End
 from nmpcrl.control.solvers.riccati import Code, InteriorPoint, machine_code
 
 
@@ -78,7 +79,7 @@ def trace(
     if not curvature:
         _straighten(plain)
     code = Code(
-        lambda *arguments: (*plain.solve(*arguments)[:2], 0.0, 0.0, 0.0),
+        lambda *arguments: (*plain.solve(*arguments)[:2], End.SOLVED, 0.0, 0.0),
         machine_code(ocp.plant).hessian_times,
     )
     with np.errstate(all="ignore"):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.control.solvers import TOLERANCE
+from nmpcrl.control.solvers.codes import End
 from nmpcrl.control.solvers.riccati import InteriorPoint, machine_code
 from nmpcrl.control.solvers.trace import interpreted, trace
 from nmpcrl.study import paper
@@ -36,7 +37,7 @@ def stopped(nmpc, state, theta, limit: int) -> tuple[float, float]:
             *most, start, limit, tolerance, point, out
         )
         reached.append((value, error))
-        return value, iterations, 0.0, violation, error
+        return value, iterations, End.SOLVED, violation, error
 
     InteriorPoint(nmpc.ocp, code._replace(solve=limited)).solve(state, theta, None, began=0.0)
     return reached[0]
