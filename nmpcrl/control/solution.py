@@ -1,6 +1,7 @@
 """What a solve gives back: an optimum, or an error that says where there was none."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +21,13 @@ class SolverError(RuntimeError):
 
     def __reduce__(self) -> tuple[type, tuple[str, Vector, Vector]]:
         return type(self), (self.status, self.state, self.theta)
+
+
+class Status(StrEnum):
+    """How an optimum was found."""
+
+    SOLVED = "solved"
+    RESTARTED = "restarted"  # not from the start that was asked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +60,14 @@ class Solution:
     seconds: float  # wall time of the solve and the gradient [s]
     point: Vector  # z, lam and nu, one after the other, each in the order of `ocp`
     ocp: Ocp  # says where each part lies
+    solver: str  # the name of what found it
     restarts: int = 0  # how often the solver had to begin again
     violation: float = 0.0  # how far the plan leaves the box, in the unit of the state
 
     @property
-    def status(self) -> str:
-        """ "solved", or "restarted" if not from the start that was asked for."""
-        return "restarted" if self.restarts else "solved"
+    def status(self) -> Status:
+        """Whether the solver began as it was asked to."""
+        return Status.RESTARTED if self.restarts else Status.SOLVED
 
     @property
     def primal(self) -> Vector:

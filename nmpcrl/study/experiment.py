@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Plant
+from nmpcrl.control import Plant, solvers
 from nmpcrl.learning import (
     Learner,
     QNetwork,
@@ -53,7 +53,7 @@ LEARNERS = (*PAPER, "TDC", "QL", *CONTROLS)
 MAIN = (*PAPER, "TDC", "frozen")  # of the main table
 NETWORK_LEARNERS = ("DES", "RDES")
 DECAYS = {"step": count_steps, "episode": count_episodes}
-SOLVERS = ("riccati", "fatrop", "ipopt")
+SOLVERS = tuple(solvers.SOLVERS)
 NETWORKS = ("plain", "normalised", "tanh", "small buffer", "four fits")  # departure H
 SMALL_BUFFER = 10 * paper.STEPS  # examples
 THETA_SET = (0.0, 10.0)  # each component of theta is projected into it by TDC
@@ -101,7 +101,7 @@ class Experiment:
     steps: int = paper.STEPS  # of an episode
     horizon: int = paper.HORIZON
     solver: str = "riccati"
-    tolerance: float = 1e-8  # of the solver
+    tolerance: float = solvers.TOLERANCE  # of the solver
     evaluate_every: int = 10  # episodes between rollouts without noise
 
     def __post_init__(self) -> None:
@@ -117,7 +117,9 @@ class Experiment:
         for name in ("alpha", "beta", "beta_tdc", "zeta"):
             number(self, name, "a positive number", lambda value: value > 0)
         number(self, "decay_rate", "a number in (0, 1]", lambda value: 0 < value <= 1)
-        number(self, "tolerance", "a number in [1e-12, 1e-2]", lambda value: 1e-12 <= value <= 1e-2)
+        least, largest = solvers.LEAST_TOLERANCE, solvers.LARGEST_TOLERANCE
+        allowed = f"a number in [{least:g}, {largest:g}]"
+        number(self, "tolerance", allowed, lambda value: least <= value <= largest)
         for name in ("gated", "clipped", "constrained", "ties_active", "curvature", "projected"):
             true_or_false(self, name)
         parameter_vector(self, "theta", len(paper.THETA_INIT))
@@ -156,12 +158,14 @@ def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None
     steps, evaluations = _tables(experiment, controller.nmpc.plant)
     evaluations.append(_evaluation(controller, weights, 0, experiment.steps))
     stopped, cost, began = "finished", 0.0, time.perf_counter()
+    solver = controller.nmpc.solver.name
     try:
         options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
         for step in train(learner, controller, weights, explore, **options):
             seconds = time.perf_counter() - began
             steps.append(_row(step, seconds))
             cost += step.cost
+            solver = step.plan.solver if step.plan else solver
             if step.failure or step.time == experiment.steps - 1:
                 done = step.episode + 1
                 due = done % experiment.evaluate_every == 0 or done == experiment.episodes
@@ -178,7 +182,7 @@ def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None
     table["alpha_phi2"] = experiment.alpha * (table["features"] ** 2).sum(axis=1)
     facts = {
         "stopped": stopped,
-        "solver": controller.nmpc.solver,  # fatrop where riccati was asked for and not to be had
+        "solver": solver,  # what solved: fatrop where riccati was not to be had
         "seconds": float(table["seconds"].sum()),
         "final_cost": float(judged["cost"][-1]),  # of the last rollout without noise
     }
@@ -190,10 +194,9 @@ def controller_of(experiment: Experiment) -> Persistent:
     nmpc = paper.nmpc(
         experiment.layout,
         horizon=experiment.horizon,
-        solver=experiment.solver,
+        solver=solvers.SOLVERS[experiment.solver](tolerance=experiment.tolerance),
         box=experiment.box,
         ties_active=experiment.ties_active,
-        tolerance=experiment.tolerance,
     )
     return Persistent(nmpc)
 

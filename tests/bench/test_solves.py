@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from nmpcrl.bench import learners, scaling, solves
-from nmpcrl.control import SolverError, usual
+from nmpcrl.control import SolverError
+from nmpcrl.control.solvers import baselines
 from nmpcrl.study import paper
 
 THETA = solves.THETA
@@ -17,14 +18,16 @@ def nmpc():
     return paper.nmpc()
 
 
-each_usual = pytest.mark.parametrize("write", [usual.mx, usual.rebuilt], ids=["mx", "rebuilt"])
+each_baseline = pytest.mark.parametrize(
+    "write", [baselines.mx, baselines.rebuilt], ids=["mx", "rebuilt"]
+)
 INSIDE = np.array([-0.5, 1.5, 0.0])  # the rim of an obstacle, where the slacks are at work
 
 
-@each_usual
+@each_baseline
 @pytest.mark.parametrize("state", [np.array(paper.START), INSIDE], ids=["start", "inside"])
 def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(nmpc, write, state):
-    ours, theirs = nmpc.solve(state, THETA), write(nmpc)(state, THETA, None)
+    ours, theirs = nmpc.solve(state, THETA), write(nmpc.ocp)(state, THETA, None)
     assert theirs.value == pytest.approx(ours.value, rel=1e-6)
     assert theirs.features[:-1] == pytest.approx(ours.features[:-1], rel=1e-4, abs=1e-4)
     states, inputs, _ = theirs.variables
@@ -32,9 +35,9 @@ def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(
     assert inputs == pytest.approx(ours.inputs.T, abs=1e-3)
 
 
-@each_usual
+@each_baseline
 def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
-    solve = write(nmpc)
+    solve = write(nmpc.ocp)
     first = solve(nmpc.task.start, THETA, None)
     later = nmpc.plant.step(nmpc.task.start, first.variables[1][:, 0])
     again = solve(later, THETA, first)
@@ -42,11 +45,11 @@ def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
     assert again.value == pytest.approx(nmpc.solve(later, THETA).value, rel=1e-6)
 
 
-@each_usual
+@each_baseline
 def test_the_usual_ways_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
-    monkeypatch.setitem(usual.OPTIONS["ipopt"], "max_iter", 1)
+    monkeypatch.setitem(baselines.OPTIONS["ipopt"], "max_iter", 1)
     with pytest.raises(SolverError, match="Maximum_Iterations_Exceeded"):
-        write(nmpc)(nmpc.task.start, THETA, None)
+        write(nmpc.ocp)(nmpc.task.start, THETA, None)
 
 
 @pytest.fixture(scope="module")

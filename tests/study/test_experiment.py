@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
+from nmpcrl.control.codegen import jit
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, ParameterError, experiment, main_study, paper, run, sweep
 from nmpcrl.study.experiment import DECAYS, LEARNERS, PAPER, prepare
@@ -52,8 +53,8 @@ REFUSED = [
     ("curvature", 1.0, "must be true or false"),
     ("projected", "off", "must be true or false"),
     ("beta_tdc", 0.0, "must be a positive number"),
-    ("tolerance", 0.1, "must be a number in [1e-12, 1e-2]"),
-    ("tolerance", 1e-13, "must be a number in [1e-12, 1e-2]"),
+    ("tolerance", 0.1, "must be a number in [1e-12, 0.01]"),
+    ("tolerance", 1e-13, "must be a number in [1e-12, 0.01]"),
     ("solver", "acados", "must be one of riccati, fatrop, ipopt"),
     ("alpha", -1e-7, "must be a positive number"),
     ("alpha", 0, "must be a positive number"),
@@ -405,3 +406,14 @@ def test_a_theta_that_explodes_in_an_episodes_last_step_is_not_evaluated(steps):
     assert records.facts["stopped"].startswith("diverged: theta ")
     assert "left the numbers" in records.facts["stopped"]
     assert (np.abs(records.evaluations["theta"]) <= 1e6).all()
+
+
+def test_the_facts_say_which_solver_found_the_plans(monkeypatch):
+    short = {"learner": "frozen", "episodes": 1, "steps": 3}
+    for name in ("riccati", "fatrop"):
+        assert run(Experiment(**short, solver=name)).facts["solver"] == name
+    monkeypatch.setattr(jit, "numba_version", lambda: None)
+    with pytest.warns(UserWarning, match="fatrop solves instead of riccati"):
+        records = run(Experiment(**short))
+    assert records.experiment["solver"] == "riccati"
+    assert records.facts["solver"] == "fatrop"

@@ -124,7 +124,7 @@ def source(tmp_path, monkeypatch):
     ("place", "before", "after"),
     [
         ("learning/updates.py", "cost + gamma * q_next - q", "cost + gamma * q_next - 2 * q"),
-        ("control/program.py", "MAX_ITERATIONS = 300", "MAX_ITERATIONS = 200"),
+        ("control/solvers/nlpsol.py", "MAX_ITERATIONS = 300", "MAX_ITERATIONS = 200"),
         ("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6"),
         ("learning/training.py", "PATIENCE = 10", "PATIENCE = 11"),
         ("study/experiment.py", "spawn(3)", "spawn(4)"),

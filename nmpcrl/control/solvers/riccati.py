@@ -1,58 +1,89 @@
-"""The solver of `riccati` compiled for a plant and called for one OCP: starts and second tries."""
+"""The solver of `kernel` compiled for a plant and called for one OCP: starts and second tries."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from functools import cache
-from types import ModuleType
+from importlib.resources import files
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control.machine_code import load, own_source
+from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.plant import Plant
-from nmpcrl.control.program import TIE, TOLERANCE
 from nmpcrl.control.solution import Solution, SolverError, check_shape
-from nmpcrl.control.stages import write
-from nmpcrl.control.task import Task
+from nmpcrl.control.solvers.codes import End, Start
+from nmpcrl.control.solvers.solver import TOLERANCE, Solver
+from nmpcrl.control.solvers.stages import write
 
 WARM_LIMIT = 40  # iterations from a guess
 COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
-COLD, SHIFTED, NEAR, SAME = range(4)  # as in `riccati`
-ENDS = ("solved", "found no descent", "ran out of iterations", "met numbers that are not finite")
+ENDS = {
+    End.STALLED: "found no descent",
+    End.LIMIT: "ran out of iterations",
+    End.BROKEN: "met numbers that are not finite",
+}
+COMPILED = ("codes", "kernel", "hessian")  # modules of this package, put beside `model`
 UNBOUNDED = 1e20  # stands for an input without a bound
 
-Start = tuple[int, Vector, int]  # kind, (z, lam, nu), iterations allowed
+Attempt = tuple[Start, Vector, int]  # how, from which (z, lam, nu), iterations allowed
 
 
-class InteriorPoint:
-    """An OCP and its compiled solver; solves as `Program` does."""
+class Code(NamedTuple):
+    """What is called of `kernel` and `hessian`, with the arguments that these say."""
 
-    def __init__(
-        self,
-        ocp: Ocp,
-        plant: Plant,
-        task: Task,
-        *,
-        ties_active: bool = False,
-        soft_box: bool = False,
-        tolerance: float = TOLERANCE,
-    ) -> None:
-        """Load the machine code, or compile it; the options are those of `Nmpc`.
+    solve: Any  # called, and taken apart by `trace`
+    hessian_times: Any
+
+
+@cache
+def machine_code(plant: Plant) -> Code:
+    """`kernel.solve` and `hessian.hessian_times` compiled for a plant.
+
+    Raises:
+        CannotCompile: numba is missing, or the plant holds an operation that is not known.
+    """
+    texts = {
+        "__init__": "from .hessian import hessian_times\nfrom .kernel import solve\n",
+        "model": write(plant),
+        **{name: files(__package__).joinpath(f"{name}.py").read_text() for name in COMPILED},
+    }
+    module = load("riccati", texts, NOTICE)
+    return Code(module.solve, module.hessian_times)
+
+
+@dataclass(frozen=True)
+class Riccati(Solver):
+    """The interior point of `kernel`, compiled for a plant at its first solve."""
+
+    name: ClassVar[str] = "riccati"
+    prices_box: ClassVar[bool] = True
+
+    code: Callable[[Plant], Code] = field(default=machine_code, repr=False)
+
+    def prepare(self, ocp: Ocp) -> "InteriorPoint":
+        """Load the machine code, or compile it.
 
         Raises:
             CannotCompile: numba is missing, or the plant holds an operation that is not known.
         """
-        self._ocp = ocp
-        code = kernel(plant)
-        self._kernel, self._product = code.solve, code.hessian_times
+        return InteriorPoint(ocp, self.code(ocp.plant), self.tolerance)
+
+
+class InteriorPoint:
+    """An OCP and the code that solves it."""
+
+    def __init__(self, ocp: Ocp, code: Code, tolerance: float = TOLERANCE) -> None:
+        self._ocp, plant, task = ocp, ocp.plant, ocp.task
+        self._code = code
         self._fixed = int(ocp.fixed_action.size > 0)
         self._standing = np.zeros(2 * ocp.lower.size + ocp.equality.size)
         self._size = self._standing.size + ocp.theta.numel()
         self._no_action = np.zeros(plant.m)
-        self._plant = plant
         sides = [
             (state, sign, limit[state])
             for sign, limit in ((-1.0, task.lower), (1.0, task.upper))
@@ -66,8 +97,8 @@ class InteriorPoint:
             np.reshape(np.array(sides, float), (-1, 3)),
             ocp.gamma ** np.arange(len(ocp.states), dtype=float),
             ocp.slack_weight,
-            int(soft_box),
-            -TIE if ties_active else TIE,
+            int(task.soft_box),
+            ocp.tie,
         )
         self._tolerance = tolerance
 
@@ -79,10 +110,10 @@ class InteriorPoint:
         arguments = (*self._problem, state, theta, given, self._fixed)
         for restarts, (start, point, limit) in enumerate(self._starts(state, guess)):
             out = np.empty(self._size)
-            value, iterations, end, violation, error = self._kernel(
-                *arguments, start, limit, self._tolerance, point, out
+            value, iterations, end, violation, error = self._code.solve(
+                *arguments, int(start), limit, self._tolerance, point, out
             )
-            if end == 0.0:
+            if end == End.SOLVED:
                 return Solution(
                     state,
                     theta,
@@ -92,12 +123,14 @@ class InteriorPoint:
                     time.perf_counter() - began,
                     out[: self._standing.size],
                     self._ocp,
+                    Riccati.name,
                     restarts,
                     violation,
                 )
         raise SolverError(
-            f"riccati found no optimum from {restarts + 1} starts (the last {ENDS[int(end)]} after"
-            f" {iterations:.0f} iterations with a relative error of {error:.1e})",
+            f"{Riccati.name} found no optimum from {restarts + 1} starts (the last"
+            f" {ENDS[End(int(end))]} after {iterations:.0f} iterations with a relative error of"
+            f" {error:.1e})",
             state,
             theta,
         )
@@ -107,25 +140,27 @@ class InteriorPoint:
         action = solution.action if self._fixed else self._no_action
         out = np.empty(vector.size)
         arguments = (*self._problem, solution.state, solution.theta, action, self._fixed)
-        return out if self._product(*arguments, solution.point, vector, out) else None
+        formed = self._code.hessian_times(*arguments, solution.point, vector, out)
+        return out if formed else None
 
-    def _starts(self, state: Vector, guess: Solution | None) -> Iterator[Start]:
+    def _starts(self, state: Vector, guess: Solution | None) -> Iterator[Attempt]:
         """The guess, standing still, and random inputs."""
         if guess is not None:
             point = self._from(guess)
             if guess.state.tolist() == state.tolist():  # a tenth of the time of np.array_equal
-                yield SAME, point, WARM_LIMIT
-                yield NEAR, point, WARM_LIMIT
+                yield Start.SAME, point, WARM_LIMIT
+                yield Start.NEAR, point, WARM_LIMIT
             else:
-                yield SHIFTED, point, WARM_LIMIT
-        yield COLD, self._standing, COLD_LIMIT
-        lower, upper = np.maximum(self._plant.lower, -1.0), np.minimum(self._plant.upper, 1.0)
+                yield Start.SHIFTED, point, WARM_LIMIT
+        yield Start.COLD, self._standing, COLD_LIMIT
+        plant = self._ocp.plant
+        lower, upper = np.maximum(plant.lower, -1.0), np.minimum(plant.upper, 1.0)
         for seed in range(PERTURBED):
             point = self._standing.copy()
             point[self._ocp.inputs] = np.random.default_rng(seed).uniform(
                 lower, upper, self._ocp.inputs.shape
             )
-            yield COLD, point, COLD_LIMIT
+            yield Start.COLD, point, COLD_LIMIT
 
     def _from(self, guess: Solution) -> Vector:
         """The guess's z, lam and nu in the order of this OCP."""
@@ -137,19 +172,3 @@ class InteriorPoint:
         lam = np.zeros(ocp.equality.size)
         lam[ocp.obstacles] = guess.constraint_duals[old.obstacles]
         return np.concatenate([z, lam, nu])
-
-
-@cache
-def kernel(plant: Plant) -> ModuleType:
-    """`riccati.solve` and `hessian.hessian_times` as machine code for a plant.
-
-    Raises:
-        CannotCompile: numba is missing, or the plant holds an operation that is not known.
-    """
-    texts = {
-        "__init__": "from .hessian import hessian_times\nfrom .riccati import solve\n",
-        "model": write(plant),
-        "riccati": own_source("riccati"),
-        "hessian": own_source("hessian"),
-    }
-    return load("riccati", texts, NOTICE)

@@ -6,7 +6,7 @@ and layout of a plant.
 
 import casadi as ca
 
-from nmpcrl.control.compile import source
+from nmpcrl.control.codegen.source import source
 from nmpcrl.control.ocp import Theta, stage_cost, terminal_cost
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.task import overlap
@@ -26,7 +26,7 @@ def write(plant: Plant) -> str:
     """The text of the module `model` for `plant`.
 
     Raises:
-        CannotCompile: the plant's dynamics hold an operation that `compile` does not know.
+        CannotCompile: the plant's dynamics hold an operation that `codegen` does not know.
     """
     sizes = (plant.n, plant.m, 2 * plant.n + plant.m + 1)
     header = HEADER.format(about=", ".join(plant.state_names), sizes=sizes)

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, Obstacle, SolverError, Task, differential_drive
-from nmpcrl.control.nmpc import ABSURD, SOLVERS
-from nmpcrl.control.program import SOLVERS as CASADI_SOLVERS
+from nmpcrl.control.nmpc import ABSURD
+from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
 
 OMEGA = 100.0
+CASADI_SOLVERS = ("fatrop", "ipopt")
 
 
 def test_fatrop_and_ipopt_find_the_same_value_on_a_hundred_problems(controllers, draw):
@@ -195,7 +196,7 @@ def test_where_there_is_no_solution_the_error_says_so(robot, theta):
     error = caught.value
     np.testing.assert_array_equal(error.state, state)
     np.testing.assert_array_equal(error.theta, theta)
-    assert robot.solver in error.status
+    assert robot.solver.name in error.status
     assert error.status in str(error)
     assert "[50.  1.  0.]" in str(error)
     assert "\n" not in str(error)

@@ -29,6 +29,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import float64, int64, njit, types
 
+from .codes import End, Start
 from .model import (
     NTHETA,
     NU,
@@ -45,14 +46,11 @@ from .model import (
     step,
 )
 
-# How a solve starts: from inputs alone; from a guess, a stage later; from a guess as it is; from a
-# guess in the same state, where only theta has moved.
-COLD, SHIFTED, NEAR, SAME = 0, 1, 2, 3
+# numba takes plain numbers; a tuple below has one entry a start.
+COLD, SHIFTED, NEAR, SAME = map(int, Start)
+SOLVED, STALLED, LIMIT, BROKEN = map(int, End)
 START_MU = (10.0, 1e-3, 1e-3, 1e-9)
 PUSH = (1e-2, 1e-3, 1e-3, 1e-9)  # inside its bounds an input starts, in parts of their distance
-
-# How it ends: well; without descent; with too many iterations; with numbers that are not finite.
-SOLVED, STALLED, LIMIT, BROKEN = 0, 1, 2, 3
 
 BOX_WEIGHT = 1e4  # W of the box: an exact penalty, so that no state is infeasible
 KAPPA = 100.0  # mu falls when KKT with mu is violated by less than so many mu

@@ -1,4 +1,4 @@
-"""What the solver in `riccati` needs to know of a plant, a stage at a time.
+"""What the solver in `kernel` needs to know of a plant, a stage at a time.
 
 These are the signatures. `stages.write` generates a module of the same name from CasADi's
 expressions, and the solver is compiled beside that one, so none of the bodies below ever runs.

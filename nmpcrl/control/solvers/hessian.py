@@ -1,7 +1,7 @@
 """The second derivative of the value of Eq. (2) in theta, times a vector, at a solution.
 
 If theta moves along a direction w, the solution moves along (dx, du, dlam), which solves Newton's
-system of `riccati` with another right-hand side: instead of KKT's violation, what w adds to it.
+system of `kernel` with another right-hand side: instead of KKT's violation, what w adds to it.
 
 1. `linearise` and `condense` as there, with a barrier parameter so small that an active row or
    bound is all but rigid and any other is all but free;
@@ -15,20 +15,7 @@ Source: the implicit function theorem at a solution of KKT, Nocedal and Wright (
 import numpy as np
 from numba import njit, types
 
-from .model import (
-    NTHETA,
-    NU,
-    NX,
-    bend,
-    bend_end,
-    bend_path,
-    path,
-    path_slope,
-    turn,
-    turn_end,
-    turn_path,
-)
-from .riccati import (
+from .kernel import (
     PROBLEM,
     SAME,
     add,
@@ -46,6 +33,19 @@ from .riccati import (
     scaled,
     sweep,
     vector,
+)
+from .model import (
+    NTHETA,
+    NU,
+    NX,
+    bend,
+    bend_end,
+    bend_path,
+    path,
+    path_slope,
+    turn,
+    turn_end,
+    turn_path,
 )
 
 RIGID = 1e-12  # barrier parameter
