@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nmpcrl.study.paper import DEPARTURES
+from nmpcrl.study.departures import DEPARTURES
 
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = sorted((ROOT / "nmpcrl").rglob("*.py"))

@@ -12,9 +12,9 @@ from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published
 from nmpcrl.study import Experiment, design, paper, sweep
-from nmpcrl.study.experiment import LEARNERS
+from nmpcrl.study.setup import LEARNERS
 
-WHOLE = len(design.study())
+WHOLE = len(design.whole_study())
 SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
 STUDY = {
     **dict.fromkeys(sweep(learner=("ES", "frozen"), seed=(0, 1), **SHORT), "main"),

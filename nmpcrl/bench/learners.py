@@ -12,7 +12,8 @@ from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Step, train
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import Experiment, prepare
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.setup import prepare
 
 TURN = 20  # steps that a learner takes at a time: then the caches hold what its own loop leaves
 

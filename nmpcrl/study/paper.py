@@ -8,9 +8,8 @@ import numpy as np
 
 from nmpcrl.control import Nmpc, Obstacle, Task, differential_drive
 from nmpcrl.control.solvers import Solver
-from nmpcrl.study.departures import DEPARTURES
 
-__all__ = ["DEPARTURES", "LAYOUTS", "controller", "nmpc", "task", "task_among"]
+__all__ = ["LAYOUTS", "controller", "nmpc", "task", "task_among"]
 
 ALPHA = 1e-7  # step size of theta
 BETA = 1e-8  # step size of w  # departure J
@@ -19,6 +18,7 @@ ZETA = 1e-2  # learning rate of the network
 GAMMA = 0.97
 W_INIT = 1e-4  # every component of w
 THETA_INIT = (1.0, 1.0, 0.05, 0.05, 0.05, 1.0, 1.0, 0.1, 0.001)
+THETA_SET = (0.0, 10.0)  # ours: TDC projects each component of theta into it
 THETA_NAMES = ("x", "y", "heading", "v", "nu", "x_f", "y_f", "heading_f", "c")
 HORIZON = 10  # N
 STEPS = 130  # an episode runs over t = 0, ..., K with K = 129

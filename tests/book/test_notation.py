@@ -11,7 +11,7 @@ import click
 import pytest
 
 from nmpcrl.__main__ import main
-from nmpcrl.study.paper import DEPARTURES
+from nmpcrl.study.departures import DEPARTURES
 
 ROOT = Path(__file__).resolve().parents[2]
 NOTATION = (ROOT / "book/notation.md").read_text()

@@ -19,7 +19,7 @@ from nmpcrl.learning.training import (
     train,
 )
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.experiment import DECAYS, prepare
+from nmpcrl.study.setup import DECAYS, prepare
 
 THETA = np.array(paper.THETA_INIT)
 

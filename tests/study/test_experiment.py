@@ -1,6 +1,7 @@
 """An experiment names one run: what it refuses, that it repeats, and what its records say."""
 
 import dataclasses
+from importlib import import_module
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,9 +12,11 @@ from hypothesis import strategies as st
 from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.control.codegen import jit
 from nmpcrl.learning.rollout import Persistent
-from nmpcrl.study import Experiment, ParameterError, experiment, main_study, paper, run, sweep
-from nmpcrl.study.experiment import DECAYS, LEARNERS, PAPER, prepare
+from nmpcrl.study import Experiment, ParameterError, paper, paper_runs, run, sweep
+from nmpcrl.study.experiment import PAPER
+from nmpcrl.study.setup import DECAYS, LEARNERS, prepare
 
+RUN = import_module("nmpcrl.study.run")  # the module; its name in the package is the function
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
 SHORT = {"episodes": 2, "steps": 70, "evaluate_every": 2}  # the networks are ready after 128 steps
 
@@ -153,7 +156,7 @@ def test_theta_is_one_value_of_a_sweep_not_an_axis():
 
 
 def test_the_study_of_a_chapter_is_five_learners_two_decays_and_the_seeds():
-    experiments = main_study(episodes=7, seeds=[4, 5])
+    experiments = paper_runs(episodes=7, seeds=[4, 5])
     assert len(experiments) == len(set(experiments)) == 5 * 2 * 2
     assert {e.learner for e in experiments} == {*PAPER, "frozen"}
     assert {e.decay for e in experiments} == set(DECAYS)
@@ -312,9 +315,9 @@ def test_evaluations_do_not_count_as_training_time(monkeypatch):
         now += 1000.0
         return evaluate(*arguments)
 
-    evaluate = experiment.evaluate
-    monkeypatch.setattr(experiment, "evaluate", slowly)
-    monkeypatch.setattr(experiment, "time", SimpleNamespace(perf_counter=lambda: now))
+    evaluate = RUN.evaluate
+    monkeypatch.setattr(RUN, "evaluate", slowly)
+    monkeypatch.setattr(RUN, "time", SimpleNamespace(perf_counter=lambda: now))
     records = run(Experiment(learner="ES", episodes=3, steps=2, evaluate_every=1))
     assert now == 4000.0
     assert records.facts["seconds"] == 0

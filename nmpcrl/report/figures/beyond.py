@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import PercentFormatter
 
 from nmpcrl import Matrix
-from nmpcrl.analysis.metrics import LAST
 from nmpcrl.analysis.policy_search import Found
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.summary import RunSummary
@@ -21,6 +20,7 @@ from nmpcrl.report.figures.controller import draw_task
 from nmpcrl.report.figures.rdes import headed
 from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study import paper
+from nmpcrl.study.records import LAST
 
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
 PARTS: dict[

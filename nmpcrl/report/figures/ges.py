@@ -19,7 +19,7 @@ from nmpcrl.report.figures.rdes import (
 )
 from nmpcrl.report.figures.style import LOOKS, page, subplots
 from nmpcrl.study import paper
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 OVERSHOOT = 2.0  # alpha ||phi||^2 beyond which a semi-gradient step overshoots its target
 
@@ -56,7 +56,7 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
 
 
 @page
-def overshoots(study: Study, learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
+def overshoots(study: Runs, learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
     """Largest alpha ||phi||^2 of each episode, one panel a reading of the decay; 2 is marked."""
     decays = study.values_of("decay")
     figure, axes = subplots(1, len(decays), 3.0, sharey=True, squeeze=False)
@@ -81,7 +81,7 @@ def overshoots(study: Study, learners: tuple[str, ...] = ("ES", "GES")) -> Figur
 
 
 @page
-def corrections(study: Study) -> Figure:
+def corrections(study: Runs) -> Figure:
     """Corrections beside semi-gradients, summed over each episode of GES; a line a run."""
     runs = study.select(learner="GES")
     figure, axes = subplots(height=2.9)
@@ -118,7 +118,7 @@ def curvatures(measured: tuple[Curvature, ...]) -> Figure:
 
 
 @page
-def figure_2(study: Study) -> Figure:
+def figure_2(study: Runs) -> Figure:
     """Figure 2 of the paper, ES against GES, with the noise-free cost and the frozen arm."""
     figure = learning_curves(study, ("ES", "GES"))
     counts = [f"{name} in {runs_where(study, name, unstable)}" for name in ("ES", "GES")]

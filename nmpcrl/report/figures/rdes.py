@@ -15,7 +15,7 @@ from nmpcrl.claims.paper_claims import diverged
 from nmpcrl.report.figures.style import LOOKS, page, subplots
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Records
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 DECAYS = {"step": "noise decays per step", "episode": "noise decays per episode"}
 CEILING = 1.3  # multiple of theta_init's noise-free cost at which the panels without noise end
@@ -41,7 +41,7 @@ def literal_and_gated(literal: Records, gated: Records) -> Figure:
 
 
 @page
-def online_errors(study: Study, learners: tuple[str, ...] = ("DES", "RDES")) -> Figure:
+def online_errors(study: Runs, learners: tuple[str, ...] = ("DES", "RDES")) -> Figure:
     """Root mean square of the online error in each episode, one panel a reading of the decay."""
     decays = study.values_of("decay")
     figure, axes = subplots(1, len(decays), sharey=True, squeeze=False)
@@ -86,7 +86,7 @@ def held_out_errors(imitations: Iterable[Imitation]) -> Figure:
 
 
 @page
-def figure_1(study: Study) -> Figure:
+def figure_1(study: Runs) -> Figure:
     """Figure 1 of the paper, DES against RDES, with the noise-free cost and the frozen arm."""
     figure = learning_curves(study, ("DES", "RDES"))
     counts = [f"{name} in {runs_where(study, name, diverged)}" for name in ("DES", "RDES")]
@@ -94,7 +94,7 @@ def figure_1(study: Study) -> Figure:
 
 
 @page
-def learning_curves(study: Study, learners: tuple[str, ...]) -> Figure:
+def learning_curves(study: Runs, learners: tuple[str, ...]) -> Figure:
     """Summed RL cost of each training episode above, cost without noise below; frozen beside.
 
     One column a reading of the decay, one line a seed.
@@ -118,12 +118,12 @@ def learning_curves(study: Study, learners: tuple[str, ...]) -> Figure:
     return figure
 
 
-def _initial(study: Study) -> float:
+def _initial(study: Runs) -> float:
     return metrics.initial_cost(next(iter(study.values())))
 
 
 def runs_where(
-    study: Study, learner: str, measure: Callable[[Study, Experiment, Records], bool]
+    study: Runs, learner: str, measure: Callable[[Runs, Experiment, Records], bool]
 ) -> str:
     """In how many of the learner's runs `measure` holds, in words."""
     judged = [measure(study, *pair) for pair in study.select(learner=learner).items()]

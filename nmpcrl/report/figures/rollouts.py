@@ -21,7 +21,7 @@ from nmpcrl.report.figures.style import LOOKS, page, subplots
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 LEARNED = ("RDES", "GES")  # the paper's two methods, whose policies its Figs. 3 and 4 show
 SHOWN = ("frozen", *LEARNED)
@@ -127,7 +127,7 @@ def _against_time(
     return figure, axes
 
 
-def _map(axis: Axes, task: Task, runs: Study[RunSummary], *, names: bool = True) -> None:
+def _map(axis: Axes, task: Task, runs: Runs[RunSummary], *, names: bool = True) -> None:
     """Obstacles, start, target and drives; a mark where each drive ended."""
     draw_task(axis, task, labels=names)
     for learner in SHOWN:

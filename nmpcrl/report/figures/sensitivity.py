@@ -9,9 +9,9 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.metrics import noise_free_cost, training_cost
 from nmpcrl.report.figures.controller import INK, LESS, MORE, SYMBOLS
 from nmpcrl.report.figures.style import LOOKS, page, subplots
-from nmpcrl.study import Study
 from nmpcrl.study.paper import THETA_NAMES
 from nmpcrl.study.records import Records
+from nmpcrl.study.store import Runs
 
 LETTING = {"step": "decay per step", "episode": "decay per episode"}
 
@@ -89,7 +89,7 @@ def kink(offsets: Vector, values: Vector, edge: float, slopes: tuple[float, floa
 
 
 @page
-def theta_paths(study: Study) -> Figure:
+def theta_paths(study: Runs) -> Figure:
     """theta of the given runs over training, one panel a reading of the decay.
 
     Components that move by less than 0.02 in every run are drawn in grey.
@@ -120,7 +120,7 @@ def theta_paths(study: Study) -> Figure:
 
 
 @page
-def overshoot(study: Study) -> Figure:
+def overshoot(study: Runs) -> Figure:
     """The largest alpha ||phi||^2 of each episode of the given runs."""
     figure, axes = subplots(height=3.4)
     worst = 0.0
@@ -157,7 +157,7 @@ def overshoot(study: Study) -> Figure:
 
 
 @page
-def two_costs(study: Study) -> Figure:
+def two_costs(study: Runs) -> Figure:
     """Cost with noise and without, of a learner and of the frozen arm; a column a decay."""
     decays = study.values_of("decay")
     figure, grid = subplots(2, len(decays), height=5.2, sharex=True, sharey="row", squeeze=False)
@@ -188,7 +188,7 @@ def two_costs(study: Study) -> Figure:
     return figure
 
 
-def frozen_fall(study: Study) -> float:
+def frozen_fall(study: Runs) -> float:
     """The largest share by which the noisy cost of a frozen run fell: nothing was learned."""
     return max(_fall(records) for records in study.select(learner="frozen").values())
 
