@@ -40,14 +40,14 @@ class Persistent:
         self,
         state: Vector,
         theta: Vector,
-        guess: Solution | None = None,
+        warm_start: Solution | None = None,
         action: Vector | None = None,
     ) -> Solution:
         """As `Nmpc.solve`; the status is "restarted" where only the second attempt succeeded."""
         try:
-            return self.nmpc.solve(state, theta, guess, action)
+            return self.nmpc.solve(state, theta, warm_start, action)
         except SolverError:
-            if guess is None:
+            if warm_start is None:
                 raise
             solution = self.nmpc.solve(state, theta, None, action)
             return replace(solution, restarts=solution.restarts + 1)
@@ -152,11 +152,11 @@ class _Lesson:
         """The steps of one episode; the last one says so if a solve failed."""
         controller, constrained = self.controller, self.constrained
         plant, task = controller.nmpc.plant, controller.nmpc.task
-        state, guess = task.start, None
+        state, warm_start = task.start, None
         nothing = np.full(plant.m, np.nan)
         for t in range(self.explore.scale.shape[1]):
             try:
-                plan = controller.solve(state, weights.theta, guess)
+                plan = controller.solve(state, weights.theta, warm_start)
             except SolverError as error:
                 yield Step(episode, t, state, weights, nothing, failure=str(error))
                 return
@@ -177,7 +177,7 @@ class _Lesson:
                 return
             weights = update.weights
             yield Step(episode, t, state, weights, action, cost, plan, solution, update)
-            guess = (update.successor and update.successor.solution) or solution
+            warm_start = (update.successor and update.successor.solution) or solution
             state = next_state
 
 
@@ -208,18 +208,18 @@ class Rollout:
 def evaluate(controller: Persistent, theta: Vector, steps: int) -> Rollout:
     """Follow the policy of `theta` from the start for `steps` steps, without noise."""
     plant, task = controller.nmpc.plant, controller.nmpc.task
-    state, guess, failure = task.start, None, ""
+    state, plan, failure = task.start, None, ""
     states, actions, costs = [], [], []
     for _ in range(steps):
         try:
-            guess = controller.solve(state, theta, guess)
+            plan = controller.solve(state, theta, plan)
         except SolverError as error:
             failure = str(error)
             break
         states.append(state)
-        actions.append(guess.action)
-        costs.append(task.stage_cost(state, guess.action))
-        state = plant.step(state, guess.action)
+        actions.append(plan.action)
+        costs.append(task.stage_cost(state, plan.action))
+        state = plant.step(state, plan.action)
     return Rollout(
         states=np.reshape(states, (-1, plant.n)),
         actions=np.reshape(actions, (-1, plant.m)),

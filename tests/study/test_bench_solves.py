@@ -76,13 +76,13 @@ def test_every_problem_has_a_best_solver_and_all_agree_near_the_start(interleave
 
 
 def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
-    guesses = []
+    warm_starts = []
 
-    def fails_once(state, theta, guess):
-        guesses.append(guess)
-        if len(guesses) == 2:
+    def fails_once(state, theta, warm_start):
+        warm_starts.append(warm_start)
+        if len(warm_starts) == 2:
             raise SolverError("no", state, theta)
-        return nmpc.solve(state, theta, guess)
+        return nmpc.solve(state, theta, warm_start)
 
     states = [state for state, _, _ in solves.drive(nmpc, 0.0, np.random.default_rng(0), 3)]
     named = {"sound": nmpc.solve, "fails": fails_once}
@@ -90,8 +90,8 @@ def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
     failed = [row[3:] for row in rows if row[0] == "fails"]
     assert failed[1] == (None, None)
     assert failed[2][1] == pytest.approx(0, abs=1e-6)
-    assert guesses[0] is None
-    assert guesses[2] is None
+    assert warm_starts[0] is None
+    assert warm_starts[2] is None
 
 
 def test_the_excess_is_relative_to_the_best_value(nmpc):

@@ -3,7 +3,7 @@
 The inputs are the variables and the states follow from them (single shooting). Each constraint
 h(x) <= sigma of a stage, an obstacle or a side of the box, is a *row*: with slack s = sigma - h it
 adds W sigma - mu log sigma - mu log s to the objective, and its multiplier lam lies in (0, W). From
-a guess, one solve repeats the following while the barrier parameter mu falls:
+a warm start, one solve repeats the following while the barrier parameter mu falls:
 
 1. `evaluate`: roll the inputs out; measure h, and for it the best sigma and s in closed form;
 2. `linearise`: from the last stage to the first, the costates p = L_x + A' p+ and the Hessian of
@@ -566,8 +566,8 @@ def place(task, stage):
 
 
 @inlined
-def begin(task, point, duals, state, action, start, mu, factor, guess):
-    """The inputs of the guess, inside their bounds, and the bounds' multipliers."""
+def begin(task, point, duals, state, action, start, mu, factor, warm_start):
+    """The inputs of the warm start, inside their bounds, and the bounds' multipliers."""
     last = len(point.u)
     ahead = 1 if start == SHIFTED else 0
     gain = task.rate[0] / task.rate[ahead] / factor
@@ -580,17 +580,17 @@ def begin(task, point, duals, state, action, start, mu, factor, guess):
         for a in range(NU):
             low, high = task.lower[a], task.upper[a]
             push = PUSH[start] * min(1.0, high - low)
-            point.u[i, a] = min(max(guess[at + a], low + push), high - push)
-            duals.below[i, a] = max(-gain * guess[nu + at + a], mu / (point.u[i, a] - low))
-            duals.above[i, a] = max(gain * guess[nu + at + a], mu / (high - point.u[i, a]))
+            point.u[i, a] = min(max(warm_start[at + a], low + push), high - push)
+            duals.below[i, a] = max(-gain * warm_start[nu + at + a], mu / (point.u[i, a] - low))
+            duals.above[i, a] = max(gain * warm_start[nu + at + a], mu / (high - point.u[i, a]))
             if i < task.first:
                 point.u[i, a] = action[a]
                 duals.below[i, a] = duals.above[i, a] = 0.0
 
 
 @inlined
-def begin_rows(task, point, duals, start, mu, factor, guess):
-    """The rows' multipliers: the central one, or the guess's unless that is nearer to 0 or W."""
+def begin_rows(task, point, duals, start, mu, factor, warm_start):
+    """The rows' multipliers: central, or the warm start's unless these are nearer to 0 or W."""
     last, obstacles = len(point.u), len(task.discs)
     ahead = 1 if start == SHIFTED else 0
     gain = task.rate[0] / task.rate[ahead] / factor
@@ -604,10 +604,10 @@ def begin_rows(task, point, duals, start, mu, factor, guess):
         for j in range(duals.lam.shape[1]):
             middle, old = mu / point.slack[i, j], 0.0
             if j < obstacles:
-                old = gain * guess[lam + constraints + dynamics + j]
+                old = gain * warm_start[lam + constraints + dynamics + j]
             else:
                 side = task.sides[j - obstacles]
-                old = gain * side[1] * guess[nu + variables + int(side[0])]
+                old = gain * side[1] * warm_start[nu + variables + int(side[0])]
             if start != COLD:
                 middle = max(old, middle) if point.h[i, j] < 0.0 else min(old, middle)
             weight = task.weights[i, j]
@@ -775,19 +775,19 @@ PROBLEM = (
 SIGNATURE = types.UniTuple(float64, 5)(
     *PROBLEM,
     int64, int64, float64,  # start, limit, tolerance
-    vector, vector,  # guess and result
+    vector, vector,  # warm start and result
 )  # fmt: skip
 
 
 @njit(SIGNATURE, cache=True, **options)
 def solve(
     target, lower, upper, discs, sides, discount, slack_weight, soft_box, tie,
-    state, theta, action, fixed, start, limit, tolerance, guess, out,
+    state, theta, action, fixed, start, limit, tolerance, warm_start, out,
 ):  # fmt: skip
     """Solve Eq. (2); see `InteriorPoint` for the arguments.
 
     Returns value, iterations, the end, the violation of the box, and the relative error; `out`
-    receives z, lam and nu in the order of `Ocp`, as `guess` has them, and then the gradient.
+    receives z, lam and nu in the order of `Ocp`, as `warm_start` has them, and then the gradient.
     """
     task, factor = scaled(
         theta, target, lower, upper, discs, sides, discount, slack_weight, soft_box, fixed
@@ -795,11 +795,11 @@ def solve(
     N, M, rows = len(discount) - 1, len(discs), len(discs) + len(sides)
     point, trial, duals, stages, step = room(N, M, rows)
     mu = START_MU[start]
-    begin(task, point, duals, state, action, start, mu, factor, guess)
+    begin(task, point, duals, state, action, start, mu, factor, warm_start)
     for a in range(NX):
         trial.x[0, a] = state[a]
     objective, total = evaluate(task, point, mu)
-    begin_rows(task, point, duals, start, mu, factor, guess)
+    begin_rows(task, point, duals, start, mu, factor, warm_start)
     point, objective, iterations, ended, error = iterate(
         task, point, trial, duals, stages, step, mu, objective, total, limit, tolerance
     )

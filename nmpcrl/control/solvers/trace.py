@@ -40,7 +40,7 @@ def trace(
     ocp: Ocp,
     state: Vector,
     theta: Vector,
-    guess: Solution | None = None,
+    warm_start: Solution | None = None,
     *,
     curvature: bool = True,
 ) -> pd.DataFrame:
@@ -50,7 +50,7 @@ def trace(
         ocp: with u_0 free, as `Nmpc.ocp` is.
         state: as in `Nmpc.solve`, as the next two.
         theta: shape (2n + m + 1,).
-        guess: an earlier solution to start from.
+        warm_start: an earlier solution to start from.
         curvature: False drops from the Hessian how dynamics and obstacles bend (Gauss-Newton).
 
     Returns:
@@ -83,7 +83,7 @@ def trace(
         machine_code(ocp.plant).hessian_times,
     )
     with np.errstate(all="ignore"):
-        InteriorPoint(ocp, code).solve(state, theta, guess, began=0.0)
+        InteriorPoint(ocp, code).solve(state, theta, warm_start, began=0.0)
     at_state = np.maximum(0, ocp.task.overlap(state) + theta[-1]).sum()
     iterates = pd.DataFrame(rows).rename_axis("iteration").astype(float)
     iterates["value"] = factor[-1] * iterates["value"] + ocp.slack_weight * at_state

@@ -34,8 +34,8 @@ class Problem(NamedTuple):
     theta: np.ndarray
     action: np.ndarray | None = None
 
-    def solve(self, nmpc: Nmpc, guess: Solution | None = None) -> Solution:
-        return nmpc.solve(self.state, self.theta, guess, self.action)
+    def solve(self, nmpc: Nmpc, warm_start: Solution | None = None) -> Solution:
+        return nmpc.solve(self.state, self.theta, warm_start, self.action)
 
 
 def controller(rng: np.random.Generator, plant: Plant = ROBOT, longest: int = 40) -> Nmpc:
@@ -342,7 +342,7 @@ def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
     assert same >= 92
 
 
-def test_from_the_same_guess_no_more_than_one_in_two_hundred_is_worse_than_ipopts():
+def test_from_the_same_warm_start_no_more_than_one_in_two_hundred_is_worse_than_ipopts():
     """After a step, after a noisy one, and after a change of theta."""
     compared, worse = 0, 0
     for layout in range(24):
@@ -358,18 +358,18 @@ def test_from_the_same_guess_no_more_than_one_in_two_hundred_is_worse_than_ipopt
         )
         for _ in range(8):
             state, theta = drawn_state(rng, nmpc), drawn_theta(rng, nmpc)
-            guess = nmpc.solve(state, theta)
-            noisy = ROBOT.clip(guess.action + rng.normal(scale=0.3, size=2))
+            warm_start = nmpc.solve(state, theta)
+            noisy = ROBOT.clip(warm_start.action + rng.normal(scale=0.3, size=2))
             for after, weights in (
-                (ROBOT.step(state, guess.action), theta),
+                (ROBOT.step(state, warm_start.action), theta),
                 (ROBOT.step(state, noisy), theta),
                 (state, theta * rng.uniform(0.95, 1.05, 9)),
             ):
                 try:
-                    other = ipopt.solve(after, weights, guess)
+                    other = ipopt.solve(after, weights, warm_start)
                 except SolverError:  # the state lies outside the box
                     continue
-                value = nmpc.solve(after, weights, guess).value
+                value = nmpc.solve(after, weights, warm_start).value
                 compared += 1
                 worse += value > other.value * (1 + 1e-6) + 1e-7 * unit(weights)
     assert compared >= 250
