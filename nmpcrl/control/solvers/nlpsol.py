@@ -15,6 +15,8 @@ from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.control.solvers.solver import Solver
 
+PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
+
 MAX_ITERATIONS = 300
 MAX_SECONDS = 5.0  # fatrop has no clock, but its 300 iterations take about 30 ms
 
@@ -149,16 +151,14 @@ class Program:
     def hessian_times(self, solution: Solution, vector: Vector) -> None:
         """None: CasADi's solvers have the dense Hessian only."""
 
-    def _standing(self, state: Vector) -> tuple[Vector, Vector, Vector]:
+    def _standing(self, state: Vector) -> PrimalDual:
         """Stay at `state` for the whole horizon; slacks take up what overlaps there."""
         ocp = self._ocp
         z = np.zeros(ocp.lower.size)
         z[ocp.states] = state
         return z, np.zeros(ocp.equality.size), np.zeros(ocp.lower.size)
 
-    def _from(
-        self, warm_start: Solution, state: Vector, *, same: bool
-    ) -> tuple[Vector, Vector, Vector]:
+    def _from(self, warm_start: Solution, state: Vector, *, same: bool) -> PrimalDual:
         """The warm start itself if solved in the same state; else one stage later, its end twice.
 
         Shifting divides every stage's discount by gamma, and with it the multipliers.

@@ -63,11 +63,11 @@ def trace(
     factor = [1.0]
 
     def judged(norms: Any, task: Any, point: Any, _duals: Any, _stages: Any, mu: float) -> None:
-        slopes, products, largest = norms
+        stationarity, complementarity, largest = norms
         objective, _ = plain.evaluate(task, point, mu)
         obstacles = len(task.discs)
         slacks = task.weights[:, :obstacles] * np.maximum(0, point.h[:, :obstacles])
-        error, value = max(slopes / largest, products, mu), objective + slacks.sum()
+        error, value = max(stationarity / largest, complementarity, mu), objective + slacks.sum()
         rows.append({"error": error, "mu": mu, "value": value, "delta": np.nan})
 
     def factorised(_done: bool, _stages: Any, delta: float, *_: Any) -> None:
@@ -104,7 +104,7 @@ def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
 
 def _straighten(plain: ModuleType) -> None:
     """Differentiate as if dynamics and obstacles were straight lines."""
-    expand, expand_path = plain.expand, plain.expand_path
+    expand, expand_path = plain.expand_stage, plain.expand_constraint
 
     def without_costate(*arguments: Any) -> None:
         *point, costate = arguments[:6]
@@ -114,4 +114,4 @@ def _straighten(plain: ModuleType) -> None:
         expand_path(x, theta, disc, hx, hxx)
         hxx[:] = 0.0
 
-    vars(plain).update(expand=without_costate, expand_path=without_hessian)
+    vars(plain).update(expand_stage=without_costate, expand_constraint=without_hessian)
