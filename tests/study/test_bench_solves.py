@@ -26,7 +26,7 @@ INSIDE = np.array([-0.5, 1.5, 0.0])  # the rim of an obstacle, where the slacks 
 
 @each_baseline
 @pytest.mark.parametrize("state", [np.array(paper.START), INSIDE], ids=["start", "inside"])
-def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(nmpc, write, state):
+def test_the_baselines_have_the_value_gradient_and_plan_of_the_problem(nmpc, write, state):
     ours, theirs = nmpc.solve(state, THETA), write(nmpc.ocp)(state, THETA, None)
     assert theirs.value == pytest.approx(ours.value, rel=1e-6)
     assert theirs.features[:-1] == pytest.approx(ours.features[:-1], rel=1e-4, abs=1e-4)
@@ -36,7 +36,7 @@ def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(
 
 
 @each_baseline
-def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
+def test_the_baselines_start_from_the_last_plan(nmpc, write):
     solve = write(nmpc.ocp)
     first = solve(nmpc.task.start, THETA, None)
     later = nmpc.plant.step(nmpc.task.start, first.variables[1][:, 0])
@@ -46,7 +46,7 @@ def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
 
 
 @each_baseline
-def test_the_usual_ways_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
+def test_the_baselines_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
     monkeypatch.setitem(baselines.OPTIONS["ipopt"], "max_iter", 1)
     with pytest.raises(SolverError, match="Maximum_Iterations_Exceeded"):
         write(nmpc.ocp)(nmpc.task.start, THETA, None)

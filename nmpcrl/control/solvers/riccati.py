@@ -22,6 +22,8 @@ WARM_LIMIT = 40  # iterations from a warm start
 COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
+COLD, SHIFTED, NEAR, SAME = map(int, Start)  # plain numbers, as machine code takes them
+SOLVED = float(End.SOLVED)  # as it returns them
 ENDS = {
     End.STALLED: "found no descent",
     End.LIMIT: "ran out of iterations",
@@ -30,7 +32,7 @@ ENDS = {
 COMPILED = ("codes", "kernel", "hessian")  # modules of this package, put beside `model`
 UNBOUNDED = 1e20  # stands for an input without a bound
 
-Attempt = tuple[Start, Vector, int]  # how, from which (z, lam, nu), iterations allowed
+Attempt = tuple[int, Vector, int]  # which `Start`, with which (z, lam, nu), iterations allowed
 
 
 class Code(NamedTuple):
@@ -116,9 +118,9 @@ class InteriorPoint:
         for restarts, (start, point, limit) in enumerate(self._starts(state, warm_start)):
             out = np.empty(self._size)
             value, iterations, end, violation, error = self._code.solve(
-                *arguments, int(start), limit, self._tolerance, point, out
+                *arguments, start, limit, self._tolerance, point, out
             )
-            if end == End.SOLVED:
+            if end == SOLVED:
                 return Solution(
                     state,
                     theta,
@@ -153,11 +155,11 @@ class InteriorPoint:
         if warm_start is not None:
             point = self._from(warm_start)
             if warm_start.state.tolist() == state.tolist():  # a tenth of the time of np.array_equal
-                yield Start.SAME, point, WARM_LIMIT
-                yield Start.NEAR, point, WARM_LIMIT
+                yield SAME, point, WARM_LIMIT
+                yield NEAR, point, WARM_LIMIT
             else:
-                yield Start.SHIFTED, point, WARM_LIMIT
-        yield Start.COLD, self._standing, COLD_LIMIT
+                yield SHIFTED, point, WARM_LIMIT
+        yield COLD, self._standing, COLD_LIMIT
         plant = self._ocp.plant
         lower, upper = np.maximum(plant.lower, -1.0), np.minimum(plant.upper, 1.0)
         for seed in range(PERTURBED):
@@ -165,7 +167,7 @@ class InteriorPoint:
             point[self._ocp.inputs] = np.random.default_rng(seed).uniform(
                 lower, upper, self._ocp.inputs.shape
             )
-            yield Start.COLD, point, COLD_LIMIT
+            yield COLD, point, COLD_LIMIT
 
     def _from(self, warm_start: Solution) -> Vector:
         """The warm start's z, lam and nu in the order of this OCP."""

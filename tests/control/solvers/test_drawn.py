@@ -416,7 +416,7 @@ problems = st.builds(
     theta=st.tuples(*[weight] * 8, st.floats(-5, 5)).map(np.array),
     action=st.none() | st.tuples(st.floats(-0.6, 0.6), st.floats(-1.5, 1.5)).map(np.array),
 )
-usual = st.builds(
+typical = st.builds(
     Problem,
     state=st.tuples(st.floats(-3, 9), st.floats(-3, 9), st.floats(-4, 4)).map(np.array),
     theta=st.tuples(*[st.floats(0.1, 2)] * 8, st.floats(-0.3, 0.3)).map(np.array),
@@ -426,7 +426,7 @@ LAYOUTS = [controller(np.random.default_rng([5, layout])) for layout in range(30
 
 
 @settings(derandomize=True, deadline=None, max_examples=400)
-@given(problem=problems | usual, nmpc=st.sampled_from(LAYOUTS))
+@given(problem=problems | typical, nmpc=st.sampled_from(LAYOUTS))
 def test_whatever_is_asked_the_answer_is_a_solution_or_an_error(problem, nmpc):
     try:
         solution = problem.solve(nmpc)
@@ -459,7 +459,7 @@ PAIRS = [(one, mirrored(one)) for one in LAYOUTS if one.horizon <= 10]
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)
-@given(problem=usual, pair=st.sampled_from(PAIRS))
+@given(problem=typical, pair=st.sampled_from(PAIRS))
 def test_a_mirrored_world_has_mirrored_plans(problem, pair):
     flip = np.array([1.0, -1.0, -1.0])
     one = problem.solve(pair[0])
@@ -469,7 +469,7 @@ def test_a_mirrored_world_has_mirrored_plans(problem, pair):
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
-@given(problem=usual, nmpc=st.sampled_from(LAYOUTS))
+@given(problem=typical, nmpc=st.sampled_from(LAYOUTS))
 def test_solving_again_from_the_solution_costs_an_iteration_or_two(problem, nmpc):
     try:
         solution = problem.solve(nmpc)
