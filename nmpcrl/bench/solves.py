@@ -15,7 +15,7 @@ from nmpcrl.learning import QNetwork
 from nmpcrl.study import paper
 
 Columns = dict[str, list[Any]]  # lists of one length, by name
-Solve = Callable[..., Any]  # (state, theta, guess) -> what has value and iterations
+Solve = Callable[..., Any]  # (state, theta, warm_start) -> what has value and iterations
 
 THETA = np.array(paper.THETA_INIT)
 LOOPS = {"without noise": 0.0, "with noise": paper.NOISE}  # that of training's first episode
@@ -62,15 +62,15 @@ def _episode(
     times: dict[str, list[float]] = {name: [] for name in named}
     for first in range(0, len(states), STRETCH):
         for name in rng.permutation(list(named)):
-            guess = plans[name][-1] if first else None
+            warm_start = plans[name][-1] if first else None
             for state in states[first : first + STRETCH]:
                 began = time.perf_counter()
                 try:
-                    guess = named[name](state, THETA, guess)
+                    warm_start = named[name](state, THETA, warm_start)
                 except SolverError:
-                    guess = None
+                    warm_start = None
                 times[name].append(time.perf_counter() - began)
-                plans[name].append(guess)
+                plans[name].append(warm_start)
     for t in range(len(states)):
         found = {name: plans[name][t] for name in named}
         best = min(plan.value for plan in found.values() if plan)

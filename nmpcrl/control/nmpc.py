@@ -77,7 +77,7 @@ class Nmpc:
         self,
         state: Vector,
         theta: Vector,
-        guess: Solution | None = None,
+        warm_start: Solution | None = None,
         action: Vector | None = None,
     ) -> Solution:
         """Solve Eq. (2) from `state`: V_theta(s), or Q_theta(s, a) with u_0 = `action`.
@@ -85,7 +85,7 @@ class Nmpc:
         Args:
             state: plant state, shape (n,); (x [m], y [m], heading [rad]) for the robot.
             theta: NMPC parameters, shape (2n + m + 1,).
-            guess: an earlier solution to start from: as it is if it was solved in this state,
+            warm_start: an earlier solution to start from: as it is if it was solved in this state,
                 shifted by one stage if in another. Standing still at `state` if absent.
             action: the first input, shape (m,), within the plant's bounds; free if absent.
 
@@ -97,12 +97,12 @@ class Nmpc:
         state = _checked("state", state, self.plant.n, FAR)
         theta = _checked("theta", theta, 2 * self.plant.n + self.plant.m + 1)
         if action is None:
-            return self._free.solve(state, theta, guess, began=began)
+            return self._free.solve(state, theta, warm_start, began=began)
         action = _checked("action", action, self.plant.m)
         if (action < self.plant.lower).any() or (action > self.plant.upper).any():
             bounds = f"{short(self.plant.lower)} and {short(self.plant.upper)}"
             raise ValueError(f"action {short(action)} must lie between {bounds}")
-        return self._fixed.solve(state, theta, guess, action, began=began)
+        return self._fixed.solve(state, theta, warm_start, action, began=began)
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""

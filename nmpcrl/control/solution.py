@@ -129,15 +129,15 @@ def short(vector: Vector) -> str:
     return np.array2string(np.asarray(vector), precision=4, max_line_width=1000)
 
 
-def check_shape(guess: Solution, ocp: Ocp) -> None:
-    """Refuse a guess from a problem with another horizon, plant or number of obstacles.
+def check_shape(warm_start: Solution, ocp: Ocp) -> None:
+    """Refuse a warm start from a problem with another horizon, plant or number of obstacles.
 
     Raises:
         ValueError: it is one.
     """
-    old = guess.ocp
+    old = warm_start.ocp
     if old.states.shape != ocp.states.shape or old.slacks.shape != ocp.slacks.shape:
         raise ValueError(
-            f"the guess has states of shape {old.states.shape} and slacks of shape"
+            f"the warm start has states of shape {old.states.shape} and slacks of shape"
             f" {old.slacks.shape}; this problem's are {ocp.states.shape} and {ocp.slacks.shape}"
         )

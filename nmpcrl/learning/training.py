@@ -119,11 +119,11 @@ class _Lesson:
         """The steps of one episode; the last one says so if a solve failed."""
         controller, constrained = self.controller, self.constrained
         plant, task = controller.nmpc.plant, controller.nmpc.task
-        state, guess = task.start, None
+        state, warm_start = task.start, None
         nothing = np.full(plant.m, np.nan)
         for t in range(self.explore.scale.shape[1]):
             try:
-                plan = controller.solve(state, weights.theta, guess)
+                plan = controller.solve(state, weights.theta, warm_start)
             except SolverError as error:
                 yield Step(episode, t, state, weights, nothing, failure=str(error))
                 return
@@ -144,7 +144,7 @@ class _Lesson:
                 return
             weights = update.weights
             yield Step(episode, t, state, weights, action, cost, plan, solution, update)
-            guess = (update.successor and update.successor.solution) or solution
+            warm_start = (update.successor and update.successor.solution) or solution
             state = next_state
 
 

@@ -26,7 +26,7 @@ INSIDE = np.array([-0.5, 1.5, 0.0])  # the rim of an obstacle, where the slacks 
 
 @each_baseline
 @pytest.mark.parametrize("state", [np.array(paper.START), INSIDE], ids=["start", "inside"])
-def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(nmpc, write, state):
+def test_the_baselines_have_the_value_gradient_and_plan_of_the_problem(nmpc, write, state):
     ours, theirs = nmpc.solve(state, THETA), write(nmpc.ocp)(state, THETA, None)
     assert theirs.value == pytest.approx(ours.value, rel=1e-6)
     assert theirs.features[:-1] == pytest.approx(ours.features[:-1], rel=1e-4, abs=1e-4)
@@ -36,7 +36,7 @@ def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(
 
 
 @each_baseline
-def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
+def test_the_baselines_start_from_the_last_plan(nmpc, write):
     solve = write(nmpc.ocp)
     first = solve(nmpc.task.start, THETA, None)
     later = nmpc.plant.step(nmpc.task.start, first.variables[1][:, 0])
@@ -46,7 +46,7 @@ def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
 
 
 @each_baseline
-def test_the_usual_ways_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
+def test_the_baselines_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
     monkeypatch.setitem(baselines.OPTIONS["ipopt"], "max_iter", 1)
     with pytest.raises(SolverError, match="Maximum_Iterations_Exceeded"):
         write(nmpc.ocp)(nmpc.task.start, THETA, None)
@@ -76,13 +76,13 @@ def test_every_problem_has_a_best_solver_and_all_agree_near_the_start(interleave
 
 
 def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
-    guesses = []
+    warm_starts = []
 
-    def fails_once(state, theta, guess):
-        guesses.append(guess)
-        if len(guesses) == 2:
+    def fails_once(state, theta, warm_start):
+        warm_starts.append(warm_start)
+        if len(warm_starts) == 2:
             raise SolverError("no", state, theta)
-        return nmpc.solve(state, theta, guess)
+        return nmpc.solve(state, theta, warm_start)
 
     states = [state for state, _, _ in solves.drive(nmpc, 0.0, np.random.default_rng(0), 3)]
     named = {"sound": nmpc.solve, "fails": fails_once}
@@ -90,8 +90,8 @@ def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
     failed = [row[3:] for row in rows if row[0] == "fails"]
     assert failed[1] == (None, None)
     assert failed[2][1] == pytest.approx(0, abs=1e-6)
-    assert guesses[0] is None
-    assert guesses[2] is None
+    assert warm_starts[0] is None
+    assert warm_starts[2] is None
 
 
 def test_the_excess_is_relative_to_the_best_value(nmpc):

@@ -339,11 +339,11 @@ def faulty(fails):
     class Faulty(Nmpc):
         calls = 0
 
-        def solve(self, state, theta, guess=None, action=None):
+        def solve(self, state, theta, warm_start=None, action=None):
             self.calls += 1
             if fails(self.calls - 1):
                 raise SolverError(f"call {self.calls - 1} failed", state, theta)
-            return super().solve(state, theta, guess, action)
+            return super().solve(state, theta, warm_start, action)
 
     def nmpc(layout, *, box, **options):
         return Faulty(differential_drive(), paper.task(layout, box=box), **options)
@@ -373,8 +373,8 @@ def test_a_steps_restarts_add_up_and_its_worst_violation_counts(monkeypatch):
     violation = [0, 0, 0] + [0.3, 0.1, 0.0, 0.2, 0.0, 0.0] + [0, 0, 0]
 
     class Reporting(Nmpc):
-        def solve(self, state, theta, guess=None, action=None):
-            solution = super().solve(state, theta, guess, action)
+        def solve(self, state, theta, warm_start=None, action=None):
+            solution = super().solve(state, theta, warm_start, action)
             return dataclasses.replace(
                 solution, restarts=restarts.pop(0), violation=violation.pop(0)
             )

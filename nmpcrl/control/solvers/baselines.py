@@ -1,9 +1,9 @@
-"""Eq. (2) as it is usually written with CasADi: two formulations that exist to be measured against.
+"""Baselines: Eq. (2) as it is commonly written with CasADi, twice, to be measured against.
 
 `mx` keeps one NLP of matrix expressions, in which the dynamics are a called function; `rebuilt`
 writes the problem anew for every solve, as scripts do that put numbers into the model. Ipopt solves
 both. A solve starts from the last plan, shifted by a stage, and from nothing else: multipliers and
-Ipopt's options for them, which `Program` uses, are not usual.
+Ipopt's options for them, which `Program` uses, are uncommon.
 """
 
 from collections.abc import Callable

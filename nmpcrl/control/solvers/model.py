@@ -12,27 +12,27 @@ NU = 0  # inputs
 NTHETA = 0  # parameters
 
 
-def step(x: Any, u: Any, next_x_: Any) -> None:
+def transition(x: Any, u: Any, next_x_: Any) -> None:
     """The plant, Eq. (18)."""
     raise NotImplementedError
 
 
-def cost(x: Any, u: Any, theta: Any, target: Any) -> float:
+def stage_cost(x: Any, u: Any, theta: Any, target: Any) -> float:
     """L(x, u, theta) of Eq. (2a)."""
     raise NotImplementedError
 
 
-def end(x: Any, theta: Any, target: Any) -> float:
+def terminal_cost(x: Any, theta: Any, target: Any) -> float:
     """Gamma(x, theta) of Eq. (2a)."""
     raise NotImplementedError
 
 
-def path(x: Any, theta: Any, disc: Any) -> float:
+def constraint(x: Any, theta: Any, disc: Any) -> float:
     """Xi + theta_c of Eq. (2f) for one obstacle, (centre x, centre y, clearance)."""
     raise NotImplementedError
 
 
-def expand(
+def expand_stage(
     x: Any,
     u: Any,
     theta: Any,
@@ -47,60 +47,71 @@ def expand(
     S_: Any,
     R_: Any,
 ) -> None:
-    """Jacobians of `step`, gradient of discount `cost`, Hessian of that plus costate' `step`."""
+    """Jacobians of `transition`; gradient of discount `stage_cost`; Hessian of the Lagrangian.
+
+    That is discount `stage_cost` + costate' `transition`.
+    """
     raise NotImplementedError
 
 
-def expand_end(x: Any, theta: Any, target: Any, discount: Any, lx_: Any, Q_: Any) -> None:
-    """Gradient and Hessian of discount `end`."""
+def expand_terminal(x: Any, theta: Any, target: Any, discount: Any, lx_: Any, Q_: Any) -> None:
+    """Gradient and Hessian of discount `terminal_cost`."""
     raise NotImplementedError
 
 
-def expand_path(x: Any, theta: Any, disc: Any, hx_: Any, hxx_: Any) -> None:
-    """Gradient and Hessian of `path`."""
+def expand_constraint(x: Any, theta: Any, disc: Any, hx_: Any, hxx_: Any) -> None:
+    """Gradient and Hessian of `constraint`."""
     raise NotImplementedError
 
 
-def cost_slope(x: Any, u: Any, theta: Any, target: Any, slope_: Any) -> None:
-    """Gradient of `cost` in theta."""
+def stage_gradient(x: Any, u: Any, theta: Any, target: Any, gradient_: Any) -> None:
+    """Gradient of `stage_cost` in theta."""
     raise NotImplementedError
 
 
-def end_slope(x: Any, theta: Any, target: Any, slope_: Any) -> None:
-    """Gradient of `end` in theta."""
+def terminal_gradient(x: Any, theta: Any, target: Any, gradient_: Any) -> None:
+    """Gradient of `terminal_cost` in theta."""
     raise NotImplementedError
 
 
-def path_slope(x: Any, theta: Any, disc: Any, slope_: Any) -> None:
-    """Gradient of `path` in theta."""
+def constraint_gradient(x: Any, theta: Any, disc: Any, gradient_: Any) -> None:
+    """Gradient of `constraint` in theta."""
     raise NotImplementedError
 
 
-def turn(x: Any, u: Any, theta: Any, target: Any, w: Any, lx_: Any, lu_: Any) -> None:
-    """How the gradient of `cost` in x and u changes while theta moves along w."""
+def stage_mixed_hessian(
+    x: Any, u: Any, theta: Any, target: Any, w: Any, lx_: Any, lu_: Any
+) -> None:
+    """The mixed second derivative of `stage_cost` in (x, u) and theta, times w."""
     raise NotImplementedError
 
 
-def turn_end(x: Any, theta: Any, target: Any, w: Any, lx_: Any) -> None:
-    """How the gradient of `end` in x changes while theta moves along w."""
+def terminal_mixed_hessian(x: Any, theta: Any, target: Any, w: Any, lx_: Any) -> None:
+    """The mixed second derivative of `terminal_cost` in x and theta, times w."""
     raise NotImplementedError
 
 
-def turn_path(x: Any, theta: Any, disc: Any, w: Any, hx_: Any) -> None:
-    """How the gradient of `path` in x changes while theta moves along w."""
+def constraint_mixed_hessian(x: Any, theta: Any, disc: Any, w: Any, hx_: Any) -> None:
+    """The mixed second derivative of `constraint` in x and theta, times w."""
     raise NotImplementedError
 
 
-def bend(x: Any, u: Any, theta: Any, target: Any, dx: Any, du: Any, w: Any, slope_: Any) -> None:
-    """How `cost_slope` changes while x, u and theta move along dx, du and w."""
+def stage_gradient_along(
+    x: Any, u: Any, theta: Any, target: Any, dx: Any, du: Any, w: Any, gradient_: Any
+) -> None:
+    """How `stage_gradient` changes while x, u and theta move along dx, du and w."""
     raise NotImplementedError
 
 
-def bend_end(x: Any, theta: Any, target: Any, dx: Any, w: Any, slope_: Any) -> None:
-    """How `end_slope` changes while x and theta move along dx and w."""
+def terminal_gradient_along(
+    x: Any, theta: Any, target: Any, dx: Any, w: Any, gradient_: Any
+) -> None:
+    """How `terminal_gradient` changes while x and theta move along dx and w."""
     raise NotImplementedError
 
 
-def bend_path(x: Any, theta: Any, disc: Any, dx: Any, w: Any, slope_: Any) -> None:
-    """How `path_slope` changes while x and theta move along dx and w."""
+def constraint_gradient_along(
+    x: Any, theta: Any, disc: Any, dx: Any, w: Any, gradient_: Any
+) -> None:
+    """How `constraint_gradient` changes while x and theta move along dx and w."""
     raise NotImplementedError

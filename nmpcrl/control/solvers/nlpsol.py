@@ -1,4 +1,4 @@
-"""CasADi's solvers on one transcription of the OCP: where guesses are made and results read."""
+"""CasADi's solvers on one transcription of the OCP: where warm starts are made and results read."""
 
 import time
 from abc import abstractmethod
@@ -14,6 +14,8 @@ from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.control.solvers.solver import Solver
+
+PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
 
 MAX_ITERATIONS = 300
 MAX_SECONDS = 5.0  # fatrop has no clock, but its 300 iterations take about 30 ms
@@ -110,16 +112,21 @@ class Program:
         }
 
     def solve(
-        self, state: Vector, theta: Vector, guess: Solution | None, *action: Vector, began: float
+        self,
+        state: Vector,
+        theta: Vector,
+        warm_start: Solution | None,
+        *action: Vector,
+        began: float,
     ) -> Solution:
         """Solve for p = (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         p = np.concatenate([state, theta, *action])
-        if guess is None:
+        if warm_start is None:
             start, (z, lam, nu) = Start.COLD, self._standing(state)
         else:
-            same = np.array_equal(guess.state, state)
+            same = np.array_equal(warm_start.state, state)
             start = Start.SAME if same else Start.SHIFTED
-            z, lam, nu = self._from(guess, state, same=same)
+            z, lam, nu = self._from(warm_start, state, same=same)
         solver = self._solvers[start]
         result = solver(p=p, x0=z, lam_g0=lam, lam_x0=nu, **self._bounds)
         stats = solver.stats()
@@ -144,31 +151,31 @@ class Program:
     def hessian_times(self, solution: Solution, vector: Vector) -> None:
         """None: CasADi's solvers have the dense Hessian only."""
 
-    def _standing(self, state: Vector) -> tuple[Vector, Vector, Vector]:
+    def _standing(self, state: Vector) -> PrimalDual:
         """Stay at `state` for the whole horizon; slacks take up what overlaps there."""
         ocp = self._ocp
         z = np.zeros(ocp.lower.size)
         z[ocp.states] = state
         return z, np.zeros(ocp.equality.size), np.zeros(ocp.lower.size)
 
-    def _from(self, guess: Solution, state: Vector, *, same: bool) -> tuple[Vector, Vector, Vector]:
-        """The guess itself if it was solved in the same state; else one stage later, its end twice.
+    def _from(self, warm_start: Solution, state: Vector, *, same: bool) -> PrimalDual:
+        """The warm start itself if solved in the same state; else one stage later, its end twice.
 
         Shifting divides every stage's discount by gamma, and with it the multipliers.
         """
-        ocp, old = self._ocp, guess.ocp
-        check_shape(guess, ocp)
+        ocp, old = self._ocp, warm_start.ocp
+        check_shape(warm_start, ocp)
         z, nu = np.zeros(ocp.lower.size), np.zeros(ocp.lower.size)
         lam = np.zeros(ocp.equality.size)
         scale = 1.0 if same else 1.0 / ocp.gamma
         for part in ("states", "inputs", "slacks"):
             here, there = getattr(ocp, part), _shift(getattr(old, part), same)
-            z[here], nu[here] = guess.primal[there], scale * guess.bound_duals[there]
+            z[here], nu[here] = warm_start.primal[there], scale * warm_start.bound_duals[there]
         for part in ("dynamics", "obstacles"):
             here, there = getattr(ocp, part), _shift(getattr(old, part), same)
-            lam[here] = scale * guess.constraint_duals[there]
+            lam[here] = scale * warm_start.constraint_duals[there]
         incoming = old.initial if same else old.dynamics[0]
-        lam[ocp.initial] = scale * guess.constraint_duals[incoming]
+        lam[ocp.initial] = scale * warm_start.constraint_duals[incoming]
         z[ocp.states[0]] = state
         nu[np.isinf(ocp.lower) & np.isinf(ocp.upper)] = 0  # fatrop hands these back as they came
         return z, lam, nu

@@ -18,10 +18,12 @@ from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.solver import TOLERANCE, Solver
 from nmpcrl.control.solvers.stages import write
 
-WARM_LIMIT = 40  # iterations from a guess
+WARM_LIMIT = 40  # iterations from a warm start
 COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
+COLD, SHIFTED, NEAR, SAME = map(int, Start)  # plain numbers, as machine code takes them
+SOLVED = float(End.SOLVED)  # as it returns them
 ENDS = {
     End.STALLED: "found no descent",
     End.LIMIT: "ran out of iterations",
@@ -30,7 +32,7 @@ ENDS = {
 COMPILED = ("codes", "kernel", "hessian")  # modules of this package, put beside `model`
 UNBOUNDED = 1e20  # stands for an input without a bound
 
-Attempt = tuple[Start, Vector, int]  # how, from which (z, lam, nu), iterations allowed
+Attempt = tuple[int, Vector, int]  # which `Start`, with which (z, lam, nu), iterations allowed
 
 
 class Code(NamedTuple):
@@ -103,17 +105,22 @@ class InteriorPoint:
         self._tolerance = tolerance
 
     def solve(
-        self, state: Vector, theta: Vector, guess: Solution | None, *action: Vector, began: float
+        self,
+        state: Vector,
+        theta: Vector,
+        warm_start: Solution | None,
+        *action: Vector,
+        began: float,
     ) -> Solution:
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         given = action[0] if action else self._no_action
         arguments = (*self._problem, state, theta, given, self._fixed)
-        for restarts, (start, point, limit) in enumerate(self._starts(state, guess)):
+        for restarts, (start, point, limit) in enumerate(self._starts(state, warm_start)):
             out = np.empty(self._size)
             value, iterations, end, violation, error = self._code.solve(
-                *arguments, int(start), limit, self._tolerance, point, out
+                *arguments, start, limit, self._tolerance, point, out
             )
-            if end == End.SOLVED:
+            if end == SOLVED:
                 return Solution(
                     state,
                     theta,
@@ -143,16 +150,16 @@ class InteriorPoint:
         formed = self._code.hessian_times(*arguments, solution.point, vector, out)
         return out if formed else None
 
-    def _starts(self, state: Vector, guess: Solution | None) -> Iterator[Attempt]:
-        """The guess, standing still, and random inputs."""
-        if guess is not None:
-            point = self._from(guess)
-            if guess.state.tolist() == state.tolist():  # a tenth of the time of np.array_equal
-                yield Start.SAME, point, WARM_LIMIT
-                yield Start.NEAR, point, WARM_LIMIT
+    def _starts(self, state: Vector, warm_start: Solution | None) -> Iterator[Attempt]:
+        """The warm start, standing still, and random inputs."""
+        if warm_start is not None:
+            point = self._from(warm_start)
+            if warm_start.state.tolist() == state.tolist():  # a tenth of the time of np.array_equal
+                yield SAME, point, WARM_LIMIT
+                yield NEAR, point, WARM_LIMIT
             else:
-                yield Start.SHIFTED, point, WARM_LIMIT
-        yield Start.COLD, self._standing, COLD_LIMIT
+                yield SHIFTED, point, WARM_LIMIT
+        yield COLD, self._standing, COLD_LIMIT
         plant = self._ocp.plant
         lower, upper = np.maximum(plant.lower, -1.0), np.minimum(plant.upper, 1.0)
         for seed in range(PERTURBED):
@@ -160,15 +167,15 @@ class InteriorPoint:
             point[self._ocp.inputs] = np.random.default_rng(seed).uniform(
                 lower, upper, self._ocp.inputs.shape
             )
-            yield Start.COLD, point, COLD_LIMIT
+            yield COLD, point, COLD_LIMIT
 
-    def _from(self, guess: Solution) -> Vector:
-        """The guess's z, lam and nu in the order of this OCP."""
-        ocp, old = self._ocp, guess.ocp
+    def _from(self, warm_start: Solution) -> Vector:
+        """The warm start's z, lam and nu in the order of this OCP."""
+        ocp, old = self._ocp, warm_start.ocp
         if old is ocp:
-            return guess.point
-        check_shape(guess, ocp)
-        z, nu = guess.primal, guess.bound_duals
+            return warm_start.point
+        check_shape(warm_start, ocp)
+        z, nu = warm_start.primal, warm_start.bound_duals
         lam = np.zeros(ocp.equality.size)
-        lam[ocp.obstacles] = guess.constraint_duals[old.obstacles]
+        lam[ocp.obstacles] = warm_start.constraint_duals[old.obstacles]
         return np.concatenate([z, lam, nu])

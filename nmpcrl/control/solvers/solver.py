@@ -17,7 +17,12 @@ class Prepared(Protocol):
     """A solver that is ready for one OCP."""
 
     def solve(
-        self, state: Vector, theta: Vector, guess: Solution | None, *action: Vector, began: float
+        self,
+        state: Vector,
+        theta: Vector,
+        warm_start: Solution | None,
+        *action: Vector,
+        began: float,
     ) -> Solution:
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
 

@@ -40,7 +40,7 @@ def trace(
     ocp: Ocp,
     state: Vector,
     theta: Vector,
-    guess: Solution | None = None,
+    warm_start: Solution | None = None,
     *,
     curvature: bool = True,
 ) -> pd.DataFrame:
@@ -50,7 +50,7 @@ def trace(
         ocp: with u_0 free, as `Nmpc.ocp` is.
         state: as in `Nmpc.solve`, as the next two.
         theta: shape (2n + m + 1,).
-        guess: an earlier solution to start from.
+        warm_start: an earlier solution to start from.
         curvature: False drops from the Hessian how dynamics and obstacles bend (Gauss-Newton).
 
     Returns:
@@ -63,11 +63,11 @@ def trace(
     factor = [1.0]
 
     def judged(norms: Any, task: Any, point: Any, _duals: Any, _stages: Any, mu: float) -> None:
-        slopes, products, largest = norms
+        stationarity, complementarity, largest = norms
         objective, _ = plain.evaluate(task, point, mu)
         obstacles = len(task.discs)
         slacks = task.weights[:, :obstacles] * np.maximum(0, point.h[:, :obstacles])
-        error, value = max(slopes / largest, products, mu), objective + slacks.sum()
+        error, value = max(stationarity / largest, complementarity, mu), objective + slacks.sum()
         rows.append({"error": error, "mu": mu, "value": value, "delta": np.nan})
 
     def factorised(_done: bool, _stages: Any, delta: float, *_: Any) -> None:
@@ -83,7 +83,7 @@ def trace(
         machine_code(ocp.plant).hessian_times,
     )
     with np.errstate(all="ignore"):
-        InteriorPoint(ocp, code).solve(state, theta, guess, began=0.0)
+        InteriorPoint(ocp, code).solve(state, theta, warm_start, began=0.0)
     at_state = np.maximum(0, ocp.task.overlap(state) + theta[-1]).sum()
     iterates = pd.DataFrame(rows).rename_axis("iteration").astype(float)
     iterates["value"] = factor[-1] * iterates["value"] + ocp.slack_weight * at_state
@@ -104,7 +104,7 @@ def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
 
 def _straighten(plain: ModuleType) -> None:
     """Differentiate as if dynamics and obstacles were straight lines."""
-    expand, expand_path = plain.expand, plain.expand_path
+    expand, expand_path = plain.expand_stage, plain.expand_constraint
 
     def without_costate(*arguments: Any) -> None:
         *point, costate = arguments[:6]
@@ -114,4 +114,4 @@ def _straighten(plain: ModuleType) -> None:
         expand_path(x, theta, disc, hx, hxx)
         hxx[:] = 0.0
 
-    vars(plain).update(expand=without_costate, expand_path=without_hessian)
+    vars(plain).update(expand_stage=without_costate, expand_constraint=without_hessian)

@@ -50,23 +50,23 @@ def test_inside_nothing_is_violated_whatever_a_slack_costs(riccati):
             assert nmpc.solve(state, THETA).violation <= 1e-6
 
 
-def test_a_guess_that_is_no_use_is_followed_by_a_cold_start(riccati, monkeypatch):
+def test_a_warm_start_that_is_no_use_is_followed_by_a_cold_start(riccati, monkeypatch):
     other = THETA * np.linspace(0.5, 2, 9)
-    guess, cold = riccati.solve(START, THETA), riccati.solve(START + 0.1, other)
+    warm_start, cold = riccati.solve(START, THETA), riccati.solve(START + 0.1, other)
     assert (cold.restarts, cold.status) == (0, "solved")
     monkeypatch.setattr(front, "WARM_LIMIT", 1)
-    shifted = riccati.solve(START + 0.1, other, guess)
+    shifted = riccati.solve(START + 0.1, other, warm_start)
     assert (shifted.restarts, shifted.status) == (1, "restarted")
-    same = riccati.solve(START, other, guess)
+    same = riccati.solve(START, other, warm_start)
     assert (same.restarts, same.status) == (2, "restarted")
     assert shifted.value == cold.value
 
 
-def test_a_guess_of_nans_does_no_harm(riccati):
-    guess, exact = riccati.solve(START, THETA), riccati.solve(START, THETA)
-    guess.point[:] = np.nan
+def test_a_warm_start_of_nans_does_no_harm(riccati):
+    warm_start, exact = riccati.solve(START, THETA), riccati.solve(START, THETA)
+    warm_start.point[:] = np.nan
     for state in (START, START + 1e-3):
-        solution = riccati.solve(state, THETA, guess)
+        solution = riccati.solve(state, THETA, warm_start)
         assert np.isfinite(solution.point).all()
         assert solution.value == pytest.approx(exact.value, rel=1e-2)
 
