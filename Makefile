@@ -6,11 +6,16 @@ FITS := import ensurepip, sys, venv; sys.exit("%d.%d" % sys.version_info[:2] not
 FOUND = $(shell for each in $(PYTHON); do $$each -c '$(FITS)' 2>/dev/null && command -v $$each && break; done)
 BIN := .venv/bin
 
+# With LOCKED=1 only files with the hashes of locks/ are installed, and a .venv of other files is made anew.
+ifeq ($(LOCKED),1)
+LOCKS := $(PYTHONS:%=locks/python%.txt) $(or $(wildcard .venv/locked),anew)
+endif
+
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book smoke chapter study bench test test-fast check clean
+.PHONY: help book smoke chapter study bench test test-fast check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -42,16 +47,22 @@ check: .venv/ready  ## Lint, format, types, and the structure of the notebooks
 	@$(BIN)/mypy
 	@$(BIN)/python -m pytest tests/test_notebooks.py tests/test_layers.py
 
+locks: .venv/ready  ## Make locks/ anew from environment.txt; any target takes them with LOCKED=1
+	@$(BIN)/python locks/make.py $(PYTHONS)
+
 clean:  ## Remove the built book; stored runs stay
 	rm -rf _build
 
-.venv/ready: environment.txt pyproject.toml
+.venv/ready: environment.txt pyproject.toml $(LOCKS)
 	@test -n "$(FOUND)" || { \
 	  echo "Python $(firstword $(PYTHONS)) to $(lastword $(PYTHONS)), with venv and ensurepip, is needed, and not found" \
 	    "among $(PYTHON): install it, or say where: make PYTHON=/path/to/python3"; exit 1; }
+	@test -z "$(LOCKS)" -o "$$(uname -sm)" = "Linux x86_64" || { \
+	  echo "The locks are for Linux on x86-64, and this is $$(uname -sm): leave out LOCKED=1"; exit 1; }
 	@echo "Taking $$($(FOUND) --version), $(FOUND), and installing the pinned packages of" \
-	  "environment.txt into .venv: some minutes, once."
+	  "$(if $(LOCKS),locks,environment.txt) into .venv: some minutes, once."
 	@$(FOUND) -m venv --clear .venv
-	@$(BIN)/pip install -qq --disable-pip-version-check -r environment.txt
+	@$(BIN)/pip install -qq --disable-pip-version-check $(if $(LOCKS),--require-hashes -r locks/python$$( \
+	  $(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])').txt,-r environment.txt)
 	@$(BIN)/pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
-	@touch $@
+	@touch $(if $(LOCKS),.venv/locked) $@
