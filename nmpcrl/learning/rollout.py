@@ -58,8 +58,14 @@ class Rollout:
         return np.inf if self.failure else float(self.costs.sum())
 
 
-def evaluate(controller: Persistent, theta: Vector, steps: int) -> Rollout:
+def persistent(controller: Nmpc | Persistent) -> Persistent:
+    """The controller, made to try a failed solve once more."""
+    return Persistent(controller) if isinstance(controller, Nmpc) else controller
+
+
+def evaluate(controller: Nmpc | Persistent, theta: Vector, steps: int) -> Rollout:
     """Follow the policy of `theta` from the start for `steps` steps, without noise."""
+    controller = persistent(controller)
     plant, task = controller.nmpc.plant, controller.nmpc.task
     state, plan, failure = task.start, None, ""
     states, actions, costs = [], [], []

@@ -78,10 +78,12 @@ def prepare(
     """The learner, its first weights and its noise: all that `train` needs besides `controller`."""
     children = np.random.SeedSequence(experiment.seed).spawn(3)
     generators = Generators(*map(np.random.default_rng, children))
-    shape = (experiment.episodes, experiment.steps)
-    explore = Exploration(
-        noise=generators.noise.normal(scale=paper.NOISE, size=(*shape, controller.nmpc.plant.m)),
-        scale=experiment.decay_rate ** DECAYS[experiment.decay](*shape),
+    explore = Exploration.draw(
+        generators.noise,
+        (experiment.episodes, experiment.steps, controller.nmpc.plant.m),
+        deviation=paper.NOISE,
+        decay_rate=experiment.decay_rate,
+        count=DECAYS[experiment.decay],
     )
     theta = np.array(experiment.theta)
     weights = Weights(theta, np.full(theta.size, paper.W_INIT))
