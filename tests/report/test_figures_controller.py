@@ -5,7 +5,7 @@ import pytest
 from matplotlib import pyplot
 
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
-from nmpcrl.report.figures import controller, sensitivity
+from nmpcrl.report.figures import controller, expected_sarsa, sensitivity
 from nmpcrl.study import Records, Study, paper, sweep
 
 LEARNERS, DECAYS, EPISODES, STEPS = ("ES", "frozen"), ("step", "episode"), 4, 5
@@ -149,33 +149,33 @@ def test_the_kink_figure_names_the_jump():
 
 
 def test_theta_paths_name_the_component_that_moves_most():
-    figure = sensitivity.theta_paths(study().select(learner="ES"))
+    figure = expected_sarsa.theta_paths(study().select(learner="ES"))
     assert_readable(figure)
     assert r"$\theta_x$ moves most, by up to 0.4" in texts(figure)
 
 
 @pytest.mark.parametrize(("slope", "says"), [(0.1, "stays below 2"), (1.0, "passes 2")])
 def test_the_overshoot_figure_says_whether_2_was_passed(slope, says):
-    figure = sensitivity.overshoot(study(slope).select(learner="ES"))
+    figure = expected_sarsa.overshoot(study(slope).select(learner="ES"))
     assert_readable(figure)
     assert says in texts(figure)
 
 
 def test_the_frozen_arm_is_drawn_beside_the_learner_in_both_rows():
-    figure = sensitivity.two_costs(study())
+    figure = expected_sarsa.two_costs(study())
     assert_readable(figure)
     assert "falls by up to 60% by itself" in texts(figure)
     assert [len(axes.lines) for axes in figure.axes] == [4, 4, 4, 4]
 
 
 def test_the_fall_of_the_frozen_arm_is_a_share_of_its_first_cost():
-    assert sensitivity.frozen_fall(study()) == pytest.approx(0.6)
+    assert expected_sarsa.frozen_fall(study()) == pytest.approx(0.6)
 
 
 def test_one_seed_and_one_decay_are_enough_for_every_figure_of_a_study():
     runs = sweep(learner=LEARNERS, decay="step", seed=3, episodes=EPISODES)
     small = Study({run: records(run, 0.0) for run in runs})
-    for figure in (sensitivity.theta_paths, sensitivity.overshoot, sensitivity.two_costs):
+    for figure in (expected_sarsa.theta_paths, expected_sarsa.overshoot, expected_sarsa.two_costs):
         assert_readable(figure(small))
 
 

@@ -25,19 +25,20 @@ from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.measures import MEASURES
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.report.figures.panels import (
+from nmpcrl.report.figures.axes import jitter, label_panel, logarithmic
+from nmpcrl.report.figures.panels import part, shares, strips
+from nmpcrl.report.figures.style import (
     INK,
+    LOOKS,
+    STEP_PARTS,
     SUBTITLE,
     dots,
-    jitter,
-    logarithmic,
-    part,
-    shares,
-    strips,
+    hatched,
+    headed,
+    marked,
+    page,
+    subplots,
 )
-from nmpcrl.report.figures.performance import PARTS
-from nmpcrl.report.figures.rdes import headed, label_panel
-from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.records import Column, Records
 
@@ -86,9 +87,9 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     axis.invert_yaxis()
     axis.margins(x=0.12)
     axis.set_xlabel("time of a step / time of a step of ES")
-    handles = [Rectangle((0, 0), 1, 1, **_hatched(*look)) for look in PARTS.values()]
+    handles = [Rectangle((0, 0), 1, 1, **hatched(*look)) for look in STEP_PARTS.values()]
     handles.append(Rectangle((0, 0), 1, 1, color="0.9"))
-    names = [*PARTS, "as claimed"]
+    names = [*STEP_PARTS, "as claimed"]
     figure.legend(handles, names, loc="outside lower left", ncols=len(names), fontsize="small")
     if paper_claims.SOLVER not in solvers:
         return _titled(figure, verdict, f"no time was taken with {SOLVERS[paper_claims.SOLVER]}")
@@ -279,15 +280,11 @@ def _bar(axis: Axes, row: float, mine: pd.Series, reference: pd.Series) -> float
     """A step of a learner, part by part, in steps of the reference; where the bar ends."""
     parts = (mine.solves * mine.ms_per_solve, np.nan_to_num(mine.ms_per_fit), mine.ms_per_rest)
     left = 0.0
-    for part_of, look in zip(parts, PARTS.values(), strict=True):
+    for part_of, look in zip(parts, STEP_PARTS.values(), strict=True):
         width = float(part_of / reference.ms_per_step)
-        axis.barh(row, width, 0.36, left, **_hatched(*look))
+        axis.barh(row, width, 0.36, left, **hatched(*look))
         left += width
     return left
-
-
-def _hatched(color: str, hatch: str) -> dict[str, Any]:
-    return {"facecolor": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}
 
 
 def _final_costs(found: Evidence, learner: str) -> tuple[Vector, list[str]]:

@@ -12,36 +12,8 @@ from matplotlib.patches import Circle
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
 from nmpcrl.learning.rollout import Rollout
-from nmpcrl.report.figures.style import page, subplots
-
-INK, LESS, MORE = "#222222", "#1B7F79", "#882255"  # none of them is a learner's
-SYMBOLS = {
-    "x": r"\theta_x",
-    "y": r"\theta_y",
-    "heading": r"\theta_\varphi",
-    "v": r"\theta_v",
-    "nu": r"\theta_\nu",
-    "x_f": r"\theta_{x_f}",
-    "y_f": r"\theta_{y_f}",
-    "heading_f": r"\theta_{\varphi_f}",
-    "c": r"\theta_c",
-}  # of paper.THETA_NAMES, between dollar signs
-
-
-def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
-    """Obstacles, the circle Xi = 0 around each, start and target; equal scales."""
-    x, y, clearance = task.discs
-    for place in zip(x, y, clearance / 2, strict=True):
-        axes.add_patch(Circle(place[:2], place[2] - task.robot_diameter / 2, color="#CFCFCF"))
-        axes.add_patch(Circle(place[:2], place[2], fill=False, ec="#8A8A8A", ls="--", lw=0.8))
-    axes.plot(*task.start[:2], "o", color=INK, ms=5)
-    axes.plot(*task.target[:2], "*", color=INK, ms=9)
-    if labels:
-        for point, name in ((task.start, "start"), (task.target, "target")):
-            axes.annotate(
-                name, tuple(point[:2]), (0, 7), textcoords="offset points", ha="center", va="bottom"
-            )
-    axes.set_aspect("equal")
+from nmpcrl.report.figures.axes import draw_task
+from nmpcrl.report.figures.style import INK, SYMBOLS, TEAL, WINE, headed, page, subplots
 
 
 @page
@@ -52,7 +24,7 @@ def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figu
     axes.plot(*rollout.states[:, :2].T, color=INK, lw=1.0, label="road without noise")
     for i, plan in enumerate(plans):
         label = "plans" if i == 0 else None
-        axes.plot(*plan.states[:, :2].T, ".-", color=MORE, lw=2.2, ms=5, label=label)
+        axes.plot(*plan.states[:, :2].T, ".-", color=WINE, lw=2.2, ms=5, label=label)
     farthest = max((_length(plan.states) for plan in plans), default=0.0)
     axes.set(
         title=f"Plans of at most {farthest:.1f} m make a road of {_length(rollout.states):.1f} m",
@@ -81,8 +53,8 @@ def action_values(
     shades = plt.get_cmap("cividis")(np.linspace(0.75, 0.0, len(speeds)))
     for speed, column, shade in zip(speeds, values.T, shades, strict=True):
         axes.plot(turn_rates, column, ".-", color=shade, label=f"Q at {speed:g} m/s")
-    axes.axhline(value, color=MORE, ls="--", lw=1.2, label="V(s)")
-    axes.plot(policy[1], value, "D", color=MORE, ms=7, label="the policy's action")
+    axes.axhline(value, color=WINE, ls="--", lw=1.2, label="V(s)")
+    axes.plot(policy[1], value, "D", color=WINE, ms=7, label="the policy's action")
     above = np.nanmin(values) > value - 1e-4
     axes.set(
         title="Q meets V at the policy's action, never below"
@@ -128,13 +100,7 @@ def theta_effects(
         for name, changes in others.items()
     }
     first, second, *_ = sorted(moved, key=lambda name: -moved[name])
-    figure.suptitle(
-        f"${SYMBOLS[first]}$ and ${SYMBOLS[second]}$ bend the road most",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
-    )
-    return figure
+    return headed(figure, f"${SYMBOLS[first]}$ and ${SYMBOLS[second]}$ bend the road most")
 
 
 @page
@@ -151,13 +117,13 @@ def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) ->
         ha="center",
         va="bottom",
     )
-    axes.axvline(wall, color=MORE, lw=1)
+    axes.axvline(wall, color=WINE, lw=1)
     axes.annotate(
         f"wall at x = {wall:g} m ", (wall, 1), xycoords=("data", "axes fraction"),
-        ha="right", va="top", color=MORE,
+        ha="right", va="top", color=WINE,
     )  # fmt: skip
     axes.plot(*repaired.states[:, :2].T, color=INK, ls=":", label="box [−3, 9]² (used here)")
-    axes.plot(*printed.states[:, :2].T, color=MORE, lw=2, label="box [−9, 3]² (as printed)")
+    axes.plot(*printed.states[:, :2].T, color=WINE, lw=2, label="box [−9, 3]² (as printed)")
     nearest = np.linalg.norm(printed.states[:, :2] - task.target[:2], axis=1).min()
     axes.set(
         title=f"In the printed box the robot comes no nearer than {nearest:.1f} m",
@@ -185,14 +151,14 @@ def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Figure:
     begins = kept * np.sqrt(1 + task.margin)
     keeps = kept * np.sqrt(1 + theta_c[0])
     left.plot(distance, penalty, color=INK)
-    left.axvline(keeps, color=MORE, ls="--", label=f"the NMPC keeps {keeps:.3f} m")
-    left.axvline(begins, color=LESS, ls="-.", label=f"the penalty begins at {begins:.3f} m")
+    left.axvline(keeps, color=WINE, ls="--", label=f"the NMPC keeps {keeps:.3f} m")
+    left.axvline(begins, color=TEAL, ls="-.", label=f"the penalty begins at {begins:.3f} m")
     left.set(title="The penalty begins too early", xlabel="distance to a centre [m]")
     left.set_ylabel("penalty of a step [cost]")
     left.legend(loc="upper center", bbox_to_anchor=(0.45, -0.2))
     order = np.argsort(theta_c)
     right.plot(theta_c[order], np.where(np.isfinite(costs), costs, np.nan)[order], "o-", color=INK)
-    right.axvline(task.margin, color=LESS, ls="-.", lw=1)
+    right.axvline(task.margin, color=TEAL, ls="-.", lw=1)
     best = int(np.argmin(costs))
     right.set(
         title=f"$\\theta_c$ = {theta_c[best]:.2f} is cheapest",
@@ -203,8 +169,8 @@ def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Figure:
 
 
 _SIDES: tuple[dict[str, Any], ...] = (
-    {"color": LESS, "line": "-", "x": 0.0, "ha": "left"},
-    {"color": MORE, "line": "--", "x": 1.0, "ha": "right"},
+    {"color": TEAL, "line": "-", "x": 0.0, "ha": "left"},
+    {"color": WINE, "line": "--", "x": 1.0, "ha": "right"},
 )  # of the first and of the second change
 
 

@@ -11,12 +11,20 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ENDINGS, MECHANISMS, OVER_PREDICTED, OVERSHOOT, WELL, rise
-from nmpcrl.report.figures.layouts import closes_at, plain
-from nmpcrl.report.figures.panels import FEW, LIMIT, SUBTITLE
-from nmpcrl.report.figures.rdes import headed
-from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.report.figures.axes import FEW, plain, stacked
+from nmpcrl.report.figures.style import (
+    LIMIT,
+    LOOKS,
+    SUBTITLE,
+    hatched,
+    headed,
+    marked,
+    page,
+    subplots,
+)
 from nmpcrl.study import paper
 from nmpcrl.study.records import Column
 
@@ -45,8 +53,8 @@ def reasons(found: Evidence) -> Figure:
         counts = pd.crosstab(moved.learner, said)
         counts = counts.reindex(moved.learner.unique(), columns=list(names), fill_value=0)
         looks = dict(zip(names, (*PATTERNS[: len(names) - 1], (GOOD, "")), strict=True))
-        _stacked(axis, counts, looks)
-        handles = [Rectangle((0, 0), 1, 1, **_look(*look)) for look in looks.values()]
+        _numbered(axis, counts, looks)
+        handles = [Rectangle((0, 0), 1, 1, **hatched(*look)) for look in looks.values()]
         axis.legend(handles, names, loc="upper center", **BELOW)
         axis.set_xlabel("runs")
     axes[0].set_title("what was at work when the cost rose", **SUBTITLE)
@@ -117,17 +125,10 @@ def _trace(column: Column, run: RunSummary, first_drive: Column) -> None:
         axis.xaxis.set_major_locator(MaxNLocator(3, integer=True))
 
 
-def _stacked(axis: Axes, counts: pd.DataFrame, looks: Mapping[str, tuple[str, str]]) -> None:
+def _numbered(axis: Axes, counts: pd.DataFrame, looks: Mapping[str, tuple[str, str]]) -> None:
     """A bar a learner, with the number in each part that has room for it."""
-    left = np.zeros(len(counts))
-    for name, look in looks.items():
-        bars = axis.barh(counts.index, counts[name], 0.7, left, **_look(*look))
-        enough = 0.06 * counts.sum(axis=1).max()
+    enough = 0.06 * counts.sum(axis=1).max()
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
+    for name, bars in stacked(axis, counts, looks, 0.7).items():
         labels = [str(n) if n > enough else "" for n in counts[name]]
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
         axis.bar_label(bars, labels, label_type="center", fontsize="x-small", bbox=box)
-        left += counts[name].to_numpy()
-
-
-def _look(color: str, hatch: str) -> dict[str, Any]:
-    return {"facecolor": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}

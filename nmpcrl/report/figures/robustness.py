@@ -18,9 +18,8 @@ from nmpcrl.claims.measures import MEASURES, Values
 from nmpcrl.claims.paper_claims import experiment_of
 from nmpcrl.claims.robustness import WHOLE, groups
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.report.figures.layouts import plain
-from nmpcrl.report.figures.rdes import headed
-from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.report.figures.axes import plain
+from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, marked, page, subplots
 from nmpcrl.report.tables import WORDS
 from nmpcrl.study.experiment import Experiment
 
@@ -153,7 +152,7 @@ def _strips(axes: Axes, claim: str, here: Values, usual: Values) -> None:
                 "alpha": 0.8,
             }
             axes.plot(x, numbers, look.marker, linestyle="", **style)
-    axes.axhline(measure.border, color="0.35", linewidth=0.9, linestyle=(0, (2, 2)))
+    axes.axhline(measure.border, **LIMIT)
     axes.set_yscale(**SCALES.get(claim, {"value": "log"}))
     if claim in SCALES:
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -14,10 +14,9 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ending
 from nmpcrl.control import Task
-from nmpcrl.report.figures.controller import draw_task
-from nmpcrl.report.figures.panels import LIMIT, SUBTITLE, bundle, legend, part, sourced
-from nmpcrl.report.figures.rdes import DECAYS
-from nmpcrl.report.figures.style import LOOKS, page, subplots
+from nmpcrl.report.figures.axes import draw_task, legend, map_grid
+from nmpcrl.report.figures.panels import bundle, part, sourced
+from nmpcrl.report.figures.style import DECAYS, LIMIT, LOOKS, SUBTITLE, page, subplots
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column
@@ -86,20 +85,14 @@ def maps(found: Evidence) -> Figure:
     """Where the learned policies drive in every layout, both readings of the decay."""
     drawn = part(found, SHOWN)
     layouts = drawn.summaries.values_of("layout")
-    columns = min(3, len(layouts))
-    rows = -(-len(layouts) // columns)
-    figure, axes = subplots(
-        rows, columns, 1.95 * rows + 0.8, sharex=True, sharey=True, squeeze=False
-    )
-    for axis, layout in zip(axes.flat, layouts, strict=False):
+    figure, by_layout, grid = map_grid(layouts, 1.95, 0.8)
+    for layout, axis in by_layout.items():
         runs = _driving(drawn).summaries.select(layout=layout)
         _map(axis, paper.task(layout), runs, names=False)
         axis.set_title(layout, **SUBTITLE)
-    for axis in axes.flat[len(layouts) :]:
-        axis.set_axis_off()
-    for axis in axes[-1]:
+    for axis in grid[-1]:
         axis.set_xlabel("x [m]")
-    for axis in axes[:, 0]:
+    for axis in grid[:, 0]:
         axis.set_ylabel("y [m]")
     legend(figure, SHOWN)
     return sourced(figure, f"In all layouts: {_endings(_learned(drawn))}", drawn)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.evidence import paths
-from nmpcrl.report.figures import panels, results, rollouts
+from nmpcrl.report.figures import learning_curves, panels, rollouts
 from nmpcrl.study import Experiment, paper
 
 SEEDS = 4
@@ -52,22 +52,22 @@ def standing(states: np.ndarray) -> np.ndarray:
 
 def test_costs_are_in_units_of_the_start_without_noise(made_up):
     run = next(iter(made_up(lambda e: {"end": 0.8, "training": 1.5}).summaries.values()))
-    np.testing.assert_allclose(results.trained(run)[1], 1.5)
-    np.testing.assert_allclose(results.judged(run)[1], [1.0, *[0.8] * 30])
+    np.testing.assert_allclose(learning_curves.trained(run)[1], 1.5)
+    np.testing.assert_allclose(learning_curves.judged(run)[1], [1.0, *[0.8] * 30])
 
 
 def test_what_was_cut_short_or_never_reached_costs_infinitely_much(made_up):
     run = next(iter(made_up(lambda e: {"reached": 100}).summaries.values()))
     run.episodes["cost"][3] = np.nan
-    episodes, cost = results.trained(run)
+    episodes, cost = learning_curves.trained(run)
     assert episodes[np.isinf(cost)].tolist() == [4, *range(101, 301)]
-    due, judged = results.judged(run)
+    due, judged = learning_curves.judged(run)
     assert due.tolist() == list(range(0, 301, 10))
     assert due[np.isinf(judged)].tolist() == list(range(110, 301, 10))
 
 
 def test_every_run_of_figure_1_has_a_line_and_every_learner_a_median(made_up):
-    figure = results.figure_1(made_up(), "A")
+    figure = learning_curves.figure_1(made_up(), "A")
     for axis in figure.axes:
         assert len(thin(axis)) == 3 * SEEDS  # DES, RDES and frozen
         assert len(thick(axis)) == 3
@@ -75,28 +75,28 @@ def test_every_run_of_figure_1_has_a_line_and_every_learner_a_median(made_up):
 
 def test_figures_1_and_2_count_what_the_claims_count(made_up):
     found = made_up(des_fails)
-    assert title(results.figure_1(found, "A")) == (
+    assert title(learning_curves.figure_1(found, "A")) == (
         "Divergence in layout A: DES in 8 of 8, RDES in 0 of 8 runs"
     )
-    assert "DES in 0 of 8" in title(results.figure_1(found, "D"))
+    assert "DES in 0 of 8" in title(learning_curves.figure_1(found, "D"))
     swinging = made_up(lambda e: {"swing": 0.1 * (e.learner == "ES")})
-    assert title(results.figure_2(swinging, "A")) == (
+    assert title(learning_curves.figure_2(swinging, "A")) == (
         "Instability in layout A: ES in 8 of 8, GES in 0 of 8 runs"
     )
 
 
 def test_a_median_leaves_its_panel_when_most_runs_were_stopped(made_up):
-    figure = results.figure_1(made_up(des_fails), "A")
+    figure = learning_curves.figure_1(made_up(des_fails), "A")
     for axis in (figure.axes[1], figure.axes[3]):  # noise per episode: above and below
-        assert axis.get_ylim()[1] <= results.CEILING
+        assert axis.get_ylim()[1] <= learning_curves.CEILING
         (des, *others) = (line.get_ydata()[-1] for line in thick(axis))
-        assert des > results.CEILING
-        assert max(others) < results.CEILING
+        assert des > learning_curves.CEILING
+        assert max(others) < learning_curves.CEILING
 
 
 def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
     found = made_up(lambda e: {"end": 0.6 + 0.1 * e.seed}, seeds=(0, 1, 2, 3, 4))
-    figure = results.figure_2(found, "A")
+    figure = learning_curves.figure_2(found, "A")
     band = figure.axes[2].collections[0].get_paths()[0].vertices[:, 1]  # of ES, without noise
     assert band.min() == pytest.approx(0.7)
     assert band.max() == pytest.approx(1.0)
@@ -106,7 +106,7 @@ def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
 def test_every_layout_has_its_column_headed_by_its_verdict(made_up):
     found = made_up(des_fails)
     (c1, *_) = paper_claims.judge_runs(found.runs, paths(found))
-    figure = results.by_layout(found, ("DES", "RDES"), c1)
+    figure = learning_curves.by_layout(found, ("DES", "RDES"), c1)
     assert heads(figure) == ["A: yes", "D: no"]
     assert title(figure) == "Does C1 hold? yes in A; no in D"
     assert all(len(thin(axis)) == 2 * SEEDS for axis in figure.axes)
@@ -116,9 +116,9 @@ def test_learners_that_were_not_run_leave_their_panels_empty(made_up):
     found = made_up()
     only = found.where(found.runs.learner.isin(("GES", "frozen")))
     (c1, *_) = paper_claims.judge_runs(only.runs, paths(only))
-    figure = results.by_layout(only, ("DES", "RDES"), c1)
+    figure = learning_curves.by_layout(only, ("DES", "RDES"), c1)
     assert heads(figure) == ["A: open", "D: open"]
-    assert title(results.figure_1(only, "A")).endswith("DES in 0 of 0, RDES in 0 of 0 runs")
+    assert title(learning_curves.figure_1(only, "A")).endswith("DES in 0 of 0, RDES in 0 of 0 runs")
 
 
 # Drives
@@ -194,8 +194,8 @@ def test_every_layout_has_its_map(made_up):
 @pytest.mark.parametrize(
     "draw",
     [
-        results.figure_1,
-        results.figure_2,
+        learning_curves.figure_1,
+        learning_curves.figure_2,
         rollouts.controls,
         rollouts.states,
         rollouts.paths,
