@@ -41,7 +41,7 @@ def des_fails(experiment: Experiment) -> dict:
 
 
 def standing(states: np.ndarray) -> np.ndarray:
-    """The same drive, but the robot stays at the second place."""
+    """The same rollout, but the robot stays at the second place."""
     stuck = states.copy()
     stuck[2:] = stuck[1]
     return stuck
@@ -121,11 +121,11 @@ def test_learners_that_were_not_run_leave_their_panels_empty(made_up):
     assert title(learning_curves.figure_1(only, "A")).endswith("DES in 0 of 0, RDES in 0 of 0 runs")
 
 
-# Drives
+# Rollouts
 
 
 @pytest.mark.parametrize("draw", [rollouts.controls, rollouts.states])
-def test_every_drive_has_its_line_against_time(draw, made_up):
+def test_every_rollout_has_its_line_against_time(draw, made_up):
     figure = draw(made_up(), "A")
     assert {axis.get_xlabel() for axis in figure.axes} == {"", "time [s]"}
     for axis in figure.axes:
@@ -136,33 +136,33 @@ def test_every_drive_has_its_line_against_time(draw, made_up):
 
 def test_inputs_that_leave_their_bounds_are_counted(made_up):
     assert title(rollouts.controls(made_up(), "A")) == (
-        "In 16 drives of RDES and GES, all inputs keep within their bounds"
+        "In 16 rollouts of RDES and GES, all inputs keep within their bounds"
     )
     found = made_up(lambda e: {"actions": FAST} if (e.learner, e.seed) == ("GES", 0) else {})
     assert "10 inputs leave their bounds" in title(rollouts.controls(found, "A"))
 
 
-def test_drives_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
+def test_rollouts_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
     published = {"actions": np.empty((0, 0))}
     found = made_up(lambda e: published if e.seed else {})
     figure = rollouts.controls(found, "A")
-    assert title(figure).startswith("In 4 drives")
+    assert title(figure).startswith("In 4 rollouts")
     assert all(len(thin(axis)) == 3 for axis in figure.axes)
     nowhere = rollouts.controls(made_up(lambda e: published), "A")
-    assert title(nowhere) == "Of no drive are the inputs kept"
+    assert title(nowhere) == "The inputs of no rollout are kept"
 
 
 def test_those_that_arrive_are_counted_and_those_that_were_stopped_are_not_drawn(made_up):
-    drive = made_up().summaries[Experiment("RDES")].states
+    states = made_up().summaries[Experiment("RDES")].states
 
     def unlike(experiment: Experiment) -> dict:
         if (experiment.learner, experiment.seed) == ("RDES", 0):
-            return {"states": standing(drive)}
+            return {"states": standing(states)}
         return {"reached": 50} if (experiment.learner, experiment.seed) == ("RDES", 1) else {}
 
     found = made_up(unlike)
     assert title(rollouts.states(found, "A")) == (
-        "In layout A, 12 of 14 drives of RDES and GES end at the target"
+        "In layout A, 12 of 14 rollouts of RDES and GES end at the target"
     )
     figure = rollouts.paths(found, "A")
     assert title(figure) == "In layout A: 12 arrived, 2 stuck, 2 stopped in training"
@@ -173,14 +173,14 @@ def test_those_that_arrive_are_counted_and_those_that_were_stopped_are_not_drawn
     )
 
 
-def test_a_drive_that_failed_is_drawn_as_far_as_it_got(made_up):
+def test_a_rollout_that_failed_is_drawn_as_far_as_it_got(made_up):
     broken = made_up().summaries[Experiment("GES")].states.copy()
     broken[3:] = np.nan
     found = made_up(lambda e: {"states": broken} if e.learner == "GES" else {})
     assert "8 failed" in title(rollouts.paths(found, "A"))
     figure = rollouts.paths(found, "A")
     assert sum(len(line.get_xdata()) == 3 for line in figure.axes[0].get_lines()) == SEEDS
-    assert "8 of 16 drives" in title(rollouts.states(found, "A"))
+    assert "8 of 16 rollouts" in title(rollouts.states(found, "A"))
 
 
 def test_every_layout_has_its_map(made_up):
@@ -216,9 +216,9 @@ def test_a_part_has_the_learners_asked_for_and_one_layout_or_all(made_up):
     assert panels.part(found, ("ES",), "D").summaries.values_of("layout") == ("D",)
 
 
-def test_the_target_of_the_drawn_drive_is_the_task_s(made_up):
+def test_the_target_of_the_drawn_rollout_is_the_task_s(made_up):
     """What the tests above call arriving is arriving in every layout that they draw."""
-    drive = made_up().summaries[Experiment("GES")].states
+    states = made_up().summaries[Experiment("GES")].states
     for name in ("A", "B", "D", "E"):
-        assert paper.task(name).distance(drive[-1]) == 0
-        assert paper.task(name).overlap(drive).max() < 0
+        assert paper.task(name).distance(states[-1]) == 0
+        assert paper.task(name).overlap(states).max() < 0

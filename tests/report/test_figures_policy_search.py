@@ -6,7 +6,7 @@ from nmpcrl.analysis.policy_search import Found
 from nmpcrl.report.figures import policy_search
 from nmpcrl.study import paper
 
-THERE = np.linspace(paper.START, paper.TARGET, 30)  # a drive that arrives ...
+THERE = np.linspace(paper.START, paper.TARGET, 30)  # a rollout that arrives ...
 HALFWAY = THERE[:15].repeat(2, axis=0)  # ... and one that does not
 
 
@@ -23,11 +23,11 @@ def test_the_searches_are_named_without_overlap_and_summed_up():
     assert gaps.min() >= 0.005
 
 
-def test_the_roads_count_who_arrives_and_cross_out_who_does_not():
-    ways = dict.fromkeys(policy_search.ROADS, THERE)
+def test_the_trajectories_count_who_arrives_and_cross_out_who_does_not():
+    ways = dict.fromkeys(policy_search.WAYS, THERE)
     failed = np.where(np.arange(30)[:, None] < 10, THERE, np.nan)
-    drives = {"A": ways, "B": ways | {"learned": HALFWAY}, "C": ways | {"by hand": failed}}
-    figure = policy_search.roads(drives)
+    rollouts = {"A": ways, "B": ways | {"learned": HALFWAY}, "C": ways | {"by hand": failed}}
+    figure = policy_search.trajectories(rollouts)
     assert figure.get_suptitle().startswith("Arrived, of 3 layouts: 2 after learning, 2 with")
     assert figure.get_suptitle().endswith("3 at best")
     crosses = [sum(line.get_marker() == "X" for line in axes.get_lines()) for axes in figure.axes]

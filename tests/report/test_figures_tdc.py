@@ -1,4 +1,4 @@
-"""The figures of exact TDC: titles follow from the runs, and its parts can be told apart."""
+"""The figures of exact TDC: titles follow from the runs, and its parts are distinct."""
 
 from dataclasses import asdict, replace
 
@@ -35,7 +35,7 @@ def title(figure: Figure) -> str:
 TDC = Experiment("TDC", episodes=EPISODES)
 
 
-def test_a_w_that_is_lost_is_told_with_its_episode():
+def test_a_w_that_is_lost_is_named_with_its_episode():
     fast, slow = (replace(TDC, beta_tdc=beta) for beta in (2e-7, 1e-7))
     lost = run(fast, size=2.0, stopped="diverged: it went")  # beta ||phi||^2 is twice that
     figure = tdc.step_of_w({2e-7: lost, 1e-7: run(slow, size=1.9)})
@@ -47,7 +47,7 @@ def test_a_w_that_is_lost_is_told_with_its_episode():
     assert drawn == pytest.approx([4.0, 1.9])
 
 
-def test_a_w_that_keeps_is_told_too():
+def test_a_w_that_keeps_is_named_too():
     assert title(tdc.step_of_w({1e-7: run(TDC)})) == "It stays below 2"
 
 
@@ -60,6 +60,6 @@ def test_the_part_that_moves_the_end_of_tdc_most_is_in_the_title():
         assert len(axes.get_lines()) == len(ends)
 
 
-def test_the_lines_of_the_parts_can_be_told_apart_in_grey():
+def test_the_lines_of_the_parts_are_distinct_in_grey():
     styles = [str(look["linestyle"]) for look in tdc.PARTS.values()]
     assert len(set(styles)) == len(styles)

@@ -18,16 +18,17 @@ from nmpcrl.report.figures.style import INK, SYMBOLS, TEAL, WINE, headed, page, 
 
 @page
 def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figure:
-    """The road without noise, and some of the plans it was driven by."""
+    """The closed-loop trajectory without noise, and some of the plans behind it."""
     figure, axes = subplots(height=3.7)
     draw_task(axes, task)
-    axes.plot(*rollout.states[:, :2].T, color=INK, lw=1.0, label="road without noise")
+    axes.plot(*rollout.states[:, :2].T, color=INK, lw=1.0, label="trajectory without noise")
     for i, plan in enumerate(plans):
         label = "plans" if i == 0 else None
         axes.plot(*plan.states[:, :2].T, ".-", color=WINE, lw=2.2, ms=5, label=label)
     farthest = max((_length(plan.states) for plan in plans), default=0.0)
     axes.set(
-        title=f"Plans of at most {farthest:.1f} m make a road of {_length(rollout.states):.1f} m",
+        title=f"Plans of at most {farthest:.1f} m make a trajectory of"
+        f" {_length(rollout.states):.1f} m",
         xlabel="x [m]",
         ylabel="y [m]",
     )
@@ -72,19 +73,19 @@ def action_values(
 def theta_effects(
     task: Task, middle: Rollout, others: Mapping[str, Mapping[str, Rollout]]
 ) -> Figure:
-    """One panel a parameter: the road of theta_init, and of two other values of the parameter.
+    """One panel a parameter: the trajectory of theta_init, and of two other values.
 
     Args:
-        task: what the rollouts drove in.
+        task: of the rollouts.
         middle: the closed loop of theta_init.
         others: name of the parameter -> how it was changed -> closed loop; two changes each.
     """
     figure, grid = subplots(3, 3, height=5.0, sharex=True, sharey=True)
     for axes, (name, changes) in zip(grid.flat, others.items(), strict=False):
         draw_task(axes, task, labels=False)
-        _road(axes, middle, INK, ":")
+        _trajectory(axes, middle, INK, ":")
         for (change, rollout), side in zip(changes.items(), _SIDES, strict=False):
-            _road(axes, rollout, side["color"], side["line"])
+            _trajectory(axes, rollout, side["color"], side["line"])
             cost = f"{rollout.cost:.0f}" if np.isfinite(rollout.cost) else "fails"
             where = {"x": side["x"], "y": 0.03, "ha": side["ha"], "color": side["color"]}
             axes.text(s=f"{change}: {cost}", transform=axes.transAxes, fontsize=9.5, **where)
@@ -100,12 +101,12 @@ def theta_effects(
         for name, changes in others.items()
     }
     first, second, *_ = sorted(moved, key=lambda name: -moved[name])
-    return headed(figure, f"${SYMBOLS[first]}$ and ${SYMBOLS[second]}$ bend the road most")
+    return headed(figure, f"${SYMBOLS[first]}$ and ${SYMBOLS[second]}$ bend the trajectory most")
 
 
 @page
 def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) -> Figure:
-    """The road in the box of departure A, and in the box as the paper prints it."""
+    """The trajectory in the box of departure A, and in the box as the paper prints it."""
     figure, axes = subplots(height=3.7)
     draw_task(axes, task)
     axes.add_patch(Circle(tuple(task.target[:2]), task.near, fill=False, ec=INK, ls=":", lw=1))
@@ -161,7 +162,7 @@ def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Figure:
     right.axvline(task.margin, color=TEAL, ls="-.", lw=1)
     best = int(np.argmin(costs))
     right.set(
-        title=f"$\\theta_c$ = {theta_c[best]:.2f} is cheapest",
+        title=f"$\\theta_c$ = {theta_c[best]:.2f} has the lowest cost",
         xlabel="$\\theta_c$ (no unit)",
         ylabel="noise-free RL cost",
     )
@@ -174,7 +175,7 @@ _SIDES: tuple[dict[str, Any], ...] = (
 )  # of the first and of the second change
 
 
-def _road(axes: Axes, rollout: Rollout, color: str, line: str) -> None:
+def _trajectory(axes: Axes, rollout: Rollout, color: str, line: str) -> None:
     """The path, and an arrow for the heading at its end."""
     axes.plot(*rollout.states[:, :2].T, color=color, ls=line, lw=1.3)
     x, y, heading = rollout.states[-1]
@@ -187,7 +188,7 @@ def _length(states: Matrix) -> float:
 
 
 def _apart(a: Rollout, b: Rollout) -> float:
-    """Largest distance [m] from a point of one road to the nearest point of the other."""
+    """Largest distance [m] from a point of one trajectory to the nearest point of the other."""
     first, second = a.states[:, None, :2], b.states[None, :, :2]
     between = np.linalg.norm(first - second, axis=-1)
     return float(max(between.min(axis=0).max(), between.min(axis=1).max()))

@@ -16,7 +16,7 @@ from nmpcrl.study.store import Study
 
 @page
 def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates: int) -> Figure:
-    """theta over expected updates, and the growth per update against beta / alpha."""
+    """theta over expected updates, and the spectral radius against beta / alpha."""
     figure, (left, right) = subplots(1, 2, 3.3)
     path = follow(chain, semi_gradient(alpha), updates)[:, 0]
     left.semilogy(np.abs(path), **LOOKS["ES"].line, label="semi-gradient")
@@ -35,7 +35,7 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
     right.axhline(1, color="0.6", linewidth=1)
     right.axvline(paper.BETA / paper.ALPHA, color="0.35", linewidth=1, linestyle=":")
     right.annotate(" Table I", (paper.BETA / paper.ALPHA, radius.max()), color="0.35", va="top")
-    right.set(xlabel=r"$\beta / \alpha$ [-]", ylabel="growth per update [-]")
+    right.set(xlabel=r"$\beta / \alpha$ [-]", ylabel="spectral radius [-]")
     enough = grid[radius < 1]
     return headed(
         figure,
@@ -77,9 +77,9 @@ def corrections(runs: Study) -> Figure:
     shares = []
     for experiment, records in runs.select(learner="GES").items():
         parts = directions(records)
-        ours, theirs = (np.bincount(parts.episode, length) for length in parts.lengths)
+        gradient, correction = (np.bincount(parts.episode, one) for one in parts.lengths)
         look = {**thin("GES"), "linestyle": "-" if experiment.decay == "step" else ":"}
-        axes.plot(np.arange(1, ours.size + 1), theirs / ours, **look)
+        axes.plot(np.arange(1, gradient.size + 1), correction / gradient, **look)
         shares.append(parts.share)
     for decay in runs.values_of("decay"):
         line = "-" if decay == "step" else ":"

@@ -118,11 +118,11 @@ def _cut(axes: Column) -> None:
 
 
 def _spelled(verdict: Verdict) -> str:
-    """Which layouts say what: "no in A and D, yes in B"."""
-    said: dict[str, list[str]] = {}
+    """The layouts by outcome: "no in A and D, yes in B"."""
+    found: dict[str, list[str]] = {}
     for layout, outcome in verdict.by_layout.items():
-        said.setdefault(WORDS[outcome], []).append(layout)
-    return "; ".join(f"{word} in {', '.join(layouts)}" for word, layouts in said.items())
+        found.setdefault(WORDS[outcome], []).append(layout)
+    return "; ".join(f"{word} in {', '.join(layouts)}" for word, layouts in found.items())
 
 
 def _counted(

@@ -36,7 +36,7 @@ def replicas(perturbed: Mapping[Experiment, Vector], solvers: Vector, start: flo
     other = Line2D([], [], color="0.45", linewidth=2.4, label="ES, riccati and Ipopt")
     legend(figure, learners, other)
     grown = sorted({e.learner for e, apart in perturbed.items() if apart[-1] > start})
-    title = "Of all learners' twins, none end further apart than they began"
+    title = "Of all perturbed replicas, none end further apart than they began"
     if grown:
         title = f"A difference of {start:.0e} grows in runs of {' and '.join(grown)}"
     return headed(figure, title)

@@ -14,7 +14,7 @@ from nmpcrl.report.figures.axes import draw_task, map_grid
 from nmpcrl.report.figures.style import LOOKS, TEAL, WINE, headed, page, subplots
 from nmpcrl.study import paper
 
-ROADS: dict[str, dict[str, Any]] = {
+WAYS: dict[str, dict[str, Any]] = {
     "init": {"color": "0.45", "linestyle": ":"},
     "learned": LOOKS["GES"].line,
     "by hand": {"color": TEAL, "linestyle": (0, (3, 1, 1, 1))},
@@ -30,7 +30,7 @@ NAMES = {
 
 @page
 def searches(found: Mapping[str, Found]) -> Figure:
-    """The lowest noise-free cost so far over the drives of each search, by layout."""
+    """The lowest noise-free cost so far over the rollouts of each search, by layout."""
     figure, axes = subplots(height=3.0)
     shades = np.linspace(0.0, 0.7, len(found))
     ends = {layout: one.cost / one.initial for layout, one in found.items()}
@@ -39,46 +39,46 @@ def searches(found: Mapping[str, Found]) -> Figure:
         axes.step([*one.drives, one.made], share, where="post", color=str(shade), linewidth=1.2)
     for layout, y in _spaced(ends, 0.06 * (1 - min(ends.values()))).items():
         axes.annotate(f"  {layout}", (max(one.made for one in found.values()), y), va="center")
-    axes.set(xlabel="drives without noise", ylabel="lowest cost / first", xscale="log")
+    axes.set(xlabel="rollouts without noise", ylabel="lowest cost / first", xscale="log")
     gains = [one.gain for one in found.values()]
     return headed(figure, f"The search takes {min(gains):.0%} to {max(gains):.0%} off the cost")
 
 
 @page
-def roads(drives: Mapping[str, Mapping[str, Matrix]]) -> Figure:
-    """Drives without noise in each layout; a cross where one ends that does not arrive.
+def trajectories(rollouts: Mapping[str, Mapping[str, Matrix]]) -> Figure:
+    """Rollouts without noise in each layout; a cross where one ends that does not arrive.
 
     Args:
-        drives: states, shape (K + 1, n), by layout and by what is in `ROADS`.
+        rollouts: states, shape (K + 1, n), by layout and by what is in `WAYS`.
     """
-    figure, maps, grid = map_grid(list(drives), 2.0, 0.6)
-    for name, ways in drives.items():
+    figure, maps, grid = map_grid(list(rollouts), 2.0, 0.6)
+    for name, ways in rollouts.items():
         axes = maps[name]
         draw_task(axes, paper.task(name), labels=False)
         for way, states in ways.items():
-            axes.plot(*states[:, :2].T, linewidth=1.4, **ROADS[way])
+            axes.plot(*states[:, :2].T, linewidth=1.4, **WAYS[way])
             if not _arrives(states, name):
                 place = states[np.isfinite(states).all(axis=1)][-1, :2]
-                axes.plot(*place, "X", color=ROADS[way]["color"], markersize=6)
+                axes.plot(*place, "X", color=WAYS[way]["color"], markersize=6)
         axes.set_title(name, fontsize=9.5)
     grid[0, 0].set_ylim(-3.0, 6.0)
     figure.supylabel("y [m]", fontsize=9)
     for axes in grid[-1]:
         axes.set_xlabel("x [m]")
-    handles = [Line2D([], [], label=NAMES[way], **look) for way, look in ROADS.items()]
+    handles = [Line2D([], [], label=NAMES[way], **look) for way, look in WAYS.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     arrived = {
-        way: sum(_arrives(ways[way], name) for name, ways in drives.items()) for way in ROADS
+        way: sum(_arrives(ways[way], name) for name, ways in rollouts.items()) for way in WAYS
     }
     return headed(
         figure,
-        f"Arrived, of {len(drives)} layouts: {arrived['learned']} after learning,"
+        f"Arrived, of {len(rollouts)} layouts: {arrived['learned']} after learning,"
         rf" {arrived['by hand']} with $\theta_c = d_o$ alone, {arrived['best']} at best",
     )
 
 
 def _arrives(states: Matrix, layout: str) -> bool:
-    """Whether a drive in a layout ends at the target."""
+    """Whether a rollout in a layout ends at the target."""
     return bool(np.isfinite(described(states, paper.task(layout), 1.0).arrival))
 
 

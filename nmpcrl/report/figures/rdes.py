@@ -68,11 +68,11 @@ def held_out_errors(imitations: Iterable[Imitation]) -> Figure:
     label_panel(axes, xlabel="held-out episode")
     axes.set_ylabel("error of the network [cost]")
     one_entry_each(
-        axes, ("DES", "RDES"), {"DES": "told (s, a)", "RDES": "told (s, a, θ)"}, marker=True
+        axes, ("DES", "RDES"), {"DES": "input (s, a)", "RDES": "input (s, a, θ)"}, marker=True
     )
     ratios = np.array([run.ratio for run in imitations])
     helped, all_runs = int((ratios < 1).sum()), len(ratios)
-    title = f"Told θ, the network errs less in {helped} of {all_runs} runs"
+    title = f"With θ as an input, the network errs less in {helped} of {all_runs} runs"
     axes.set_title(f"{title} (median ratio {np.median(ratios):.2f})")
     return figure
 

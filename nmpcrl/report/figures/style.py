@@ -24,7 +24,7 @@ page: Any = plt.rc_context(PAGE)  # as a decorator; matplotlib's types do not kn
 
 @dataclass(frozen=True)
 class Look:
-    """How a learner is drawn, everywhere; told apart in grey and by the colour-blind."""
+    """How a learner is drawn, everywhere; distinct in grey, and to the colour-blind."""
 
     color: str
     linestyle: Any  # as matplotlib takes it

@@ -81,6 +81,6 @@ def _scientific(value: float) -> str:
 
 
 def _end(run: RunSummary) -> float:
-    """Final noise-free cost in shares of the first; infinite if a drive failed."""
+    """Final noise-free cost in shares of the first; infinite if a rollout failed."""
     cost = run.evaluations["cost"]
     return float(cost[-LAST:].mean() / cost[0])
