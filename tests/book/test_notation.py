@@ -16,6 +16,7 @@ from nmpcrl.study.paper import DEPARTURES
 ROOT = Path(__file__).resolve().parents[2]
 NOTATION = (ROOT / "book/notation.md").read_text()
 REPRODUCE = (ROOT / "book/reproduce.md").read_text()
+CLUSTER = (ROOT / "book/cluster.md").read_text()
 FOLDERS = (
     "report",
     "bench",
@@ -95,9 +96,9 @@ def test_the_parameters_of_the_chapters_are_those_that_they_declare():
     assert told == {name: parameters for name, parameters in declared.items() if parameters}
 
 
-def blocks(language: str) -> list[str]:
-    """The code of the page on commands in one language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", REPRODUCE, flags=re.M | re.S)
+def blocks(language: str, page: str = REPRODUCE) -> list[str]:
+    """The code of a page, by default of the one on commands, in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", page, flags=re.M | re.S)
 
 
 def commands() -> list[list[str]]:
@@ -119,10 +120,10 @@ def test_the_options_that_the_page_lists_are_those_of_the_command():
     assert set(told) == {option.opts[0] for option in options}
 
 
-@pytest.mark.parametrize("code", blocks("python"))
-def test_what_the_page_imports_is_there(code):
+@pytest.mark.parametrize("code", blocks("python") + blocks("python", CLUSTER))
+def test_what_the_pages_import_is_there(code):
     for node in ast.walk(ast.parse(code)):
-        if isinstance(node, ast.ImportFrom):
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("nmpcrl"):
             module = import_module(node.module)
             for alias in node.names:
                 assert hasattr(module, alias.name) or import_module(f"{node.module}.{alias.name}")
