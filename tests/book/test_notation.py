@@ -91,9 +91,9 @@ def test_every_departure_has_a_section_that_renders_it():
 
 def test_the_parameters_of_the_chapters_are_those_that_they_declare():
     rows = re.findall(r"^\| `(\d\d_\w+|solver|performance)` \| (.*) \|$", REPRODUCE, flags=re.M)
-    told = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}
+    listed = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}
     declared = {name: build.parameters(ROOT / path) for name, path in build.notebooks().items()}
-    assert told == {name: parameters for name, parameters in declared.items() if parameters}
+    assert listed == {name: parameters for name, parameters in declared.items() if parameters}
 
 
 def blocks(language: str, page: str = REPRODUCE) -> list[str]:
@@ -115,9 +115,9 @@ def test_the_commands_that_the_page_shows_are_accepted(words):
 
 
 def test_the_options_that_the_page_lists_are_those_of_the_command():
-    told = re.findall(r"^\| `(--[\w-]+)(?: [A-Z]+)?` \|", REPRODUCE, flags=re.M)
+    listed = re.findall(r"^\| `(--[\w-]+)(?: [A-Z]+)?` \|", REPRODUCE, flags=re.M)
     options = [one for one in main.commands["study"].params if isinstance(one, click.Option)]
-    assert set(told) == {option.opts[0] for option in options}
+    assert set(listed) == {option.opts[0] for option in options}
 
 
 @pytest.mark.parametrize("code", blocks("python") + blocks("python", CLUSTER))
@@ -132,5 +132,5 @@ def test_what_the_pages_import_is_there(code):
 def test_the_make_targets_that_the_page_lists_exist():
     makefile = (ROOT / "Makefile").read_text()
     targets = set(re.findall(r"^(\w+):", makefile, flags=re.M))
-    told = set(re.findall(r"^\| `make (\w+)", REPRODUCE, flags=re.M))
-    assert told == targets - {"help"}
+    listed = set(re.findall(r"^\| `make (\w+)", REPRODUCE, flags=re.M))
+    assert listed == targets - {"help"}

@@ -1,4 +1,4 @@
-"""Figures of chapter 5, one a claim: what was measured in each run, and what share says yes.
+"""One figure a claim: what was measured in each run, and what share says yes.
 
 Every figure takes the claim's `Verdict`, and its title is the outcome and what it rests on. No run
 is dropped: what was cut short is drawn in the grey strip marked ∞.
@@ -102,7 +102,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
 
 @page
 def same_policy(found: Evidence, verdict: Verdict) -> Figure:
-    """C5: how far RDES and GES come apart on the road, and in cost; a letter a pair."""
+    """C5: how far RDES and GES come apart in trajectory and in cost; a letter a pair."""
     drawn = part(found, ("RDES", "GES"))
     decays = found.summaries.values_of("decay")
     figure, axes = _panels(len(decays))
@@ -118,9 +118,11 @@ def same_policy(found: Evidence, verdict: Verdict) -> Figure:
 
 @page
 def held_out(found: Evidence, verdict: Verdict) -> Figure:
-    """C6: the network's error on held-out pairs when it is told theta, over that when it is not."""
+    """C6: the network's error on held-out pairs with theta as an input, over that without."""
     figure, panel, drawn = _measured(found, verdict)
-    finding = f"told θ, the network errs at most {paper_claims.MORE_ACCURATE} times as much"
+    finding = (
+        f"with θ as an input, the network errs at most {paper_claims.MORE_ACCURATE} times as much"
+    )
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
@@ -200,7 +202,7 @@ def learners(found: Evidence) -> Figure:
     profile.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
     profile.legend(fontsize="small", loc="lower left")
     best = min(means, key=lambda name: means[name].value)
-    title = f"{best} ends cheapest, at {means[best]:.3f} of the start's cost (interquartile mean)"
+    title = f"{best} ends lowest, at {means[best]:.3f} of the start's cost (interquartile mean)"
     return marked(headed(figure, title), found.mark)
 
 
@@ -223,14 +225,14 @@ def _measured(found: Evidence, verdict: Verdict) -> tuple[Figure, Axes, Evidence
 
 
 def _pairs(drawn: Evidence) -> pd.DataFrame:
-    """How far RDES and GES are apart on the road and in cost, a row a layout, decay and seed."""
+    """How far RDES and GES are apart in trajectory and in cost, a row a layout, decay and seed."""
     rdes, ges = rule.arms(drawn.runs, "RDES", "GES")
-    driven = {
+    states = {
         (e.learner, e.layout, e.decay, e.seed): summary.states
         for e, summary in drawn.summaries.items()
     }
     path = [
-        paper_claims.apart(driven.get(("RDES", *cell)), driven.get(("GES", *cell)))
+        paper_claims.apart(states.get(("RDES", *cell)), states.get(("GES", *cell)))
         for cell in rdes.index
     ]
     cost = paper_claims.costlier(rdes, ges).abs().mask(np.isinf(rdes.final_cost), np.inf)

@@ -1,6 +1,6 @@
-"""Figures of chapter 6: layouts, theta_c among them, and where the borders of the claims lie.
+"""Figures of the layouts, theta_c among them, and where the borders of the claims lie.
 
-The map of the verdicts is in `figures.atlas`.
+The map of the verdicts is in `figures.robustness`.
 """
 
 from collections.abc import Mapping
@@ -49,15 +49,15 @@ BORDERS = {  # at which each claim is decided once more
 
 
 @page
-def layouts(drives: Mapping[str, Matrix]) -> Figure:
-    """The layouts, theta_init's first drive in each, and the gaps that it goes through.
+def layouts(rollouts: Mapping[str, Matrix]) -> Figure:
+    """The layouts, theta_init's first rollout in each, and the gaps that it goes through.
 
     Args:
-        drives: states of the drive without noise, shape (K + 1, n), by layout.
+        rollouts: states of the rollout without noise, shape (K + 1, n), by layout.
     """
-    figure, maps, grid = map_grid(list(drives), 2.0, 0.4)
+    figure, maps, grid = map_grid(list(rollouts), 2.0, 0.4)
     margin, closing = paper.task().margin, 0
-    for name, states in drives.items():
+    for name, states in rollouts.items():
         axes, task = maps[name], paper.task(name)
         widths = gaps(task, states[:, :2], margin)
         narrowest = min(widths.values(), default=np.inf)
@@ -72,8 +72,8 @@ def layouts(drives: Mapping[str, Matrix]) -> Figure:
     grid[0, 0].set_ylim(-3.0, 6.0)
     figure.supxlabel("x [m]", fontsize=9)
     figure.supylabel("y [m]", fontsize=9)
-    count = f"{closing} of {len(drives)} layouts"
-    finding = rf"In {count}, a gap of the first drive is closed at $\theta_c$ = {margin:g}"
+    count = f"{closing} of {len(rollouts)} layouts"
+    finding = rf"In {count}, a gap of the first rollout is closed at $\theta_c$ = {margin:g}"
     return headed(figure, finding)
 
 
