@@ -24,7 +24,7 @@ RUN_CLAIMS = {
     "C5": (figures.same_policy, "RDES and GES end in the same policy in 16 of 16 pairs"),
     "C6": (
         figures.held_out,
-        "with θ as an input, the network errs at most 0.8 times as much in 16 of 16 runs",
+        "given θ, the network errs at most 0.8 times as much in 16 of 16 runs",
     ),
     "C7": (figures.violations, "all constraints held in 64 of 64 runs"),
     "C9": (figures.gains, "learning saves 1% of the cost or more in 32 of 32 runs"),

@@ -42,7 +42,7 @@ from nmpcrl.report.figures.style import (
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.records import Column, Records
 
-LINE = 84  # characters of a title
+LINE = 80  # characters of a title
 SOLVERS = {"riccati": "riccati", "fatrop": "fatrop", "ipopt": "Ipopt"}
 LAGS = 30  # steps
 ABOVE: dict[str, Any] = {
@@ -120,9 +120,7 @@ def same_policy(found: Evidence, verdict: Verdict) -> Figure:
 def held_out(found: Evidence, verdict: Verdict) -> Figure:
     """C6: the network's error on held-out pairs with theta as an input, over that without."""
     figure, panel, drawn = _measured(found, verdict)
-    finding = (
-        f"with θ as an input, the network errs at most {paper_claims.MORE_ACCURATE} times as much"
-    )
+    finding = f"given θ, the network errs at most {paper_claims.MORE_ACCURATE} times as much"
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 

@@ -11,6 +11,7 @@ from nmpcrl.report.figures.style import (
     DECAYS,
     INK,
     LOOKS,
+    SUBTITLE,
     SYMBOLS,
     TEAL,
     WINE,
@@ -46,7 +47,8 @@ def theta_paths(runs: Study) -> Figure:
                     ls=lines[i % len(lines)],
                     label=f"${SYMBOLS[THETA_NAMES[component]]}$" if run == 0 else None,
                 )
-        axes.set(title=DECAYS[decay], xlabel="episode")
+        axes.set_title(DECAYS[decay], **SUBTITLE)
+        axes.set_xlabel("episode")
     panels[0, 0].set_ylabel("component of θ (no unit)")
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=max(1, len(labels)))
@@ -101,7 +103,7 @@ def two_costs(runs: Study) -> Figure:
             cost = training_cost(records)
             column[0].plot(np.arange(1, len(cost) + 1), cost, label=label, lw=1.2, **look.line)
             column[1].plot(*noise_free_cost(records), label=label, **look.line)
-        column[0].set_title(DECAYS[decay])
+        column[0].set_title(DECAYS[decay], **SUBTITLE)
         column[1].set_xlabel("episodes trained")
     grid[0, 0].set_ylabel("with noise [cost]")
     grid[1, 0].set_ylabel("without noise [cost]")

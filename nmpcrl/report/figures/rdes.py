@@ -72,7 +72,7 @@ def held_out_errors(imitations: Iterable[Imitation]) -> Figure:
     )
     ratios = np.array([run.ratio for run in imitations])
     helped, all_runs = int((ratios < 1).sum()), len(ratios)
-    title = f"With θ as an input, the network errs less in {helped} of {all_runs} runs"
+    title = f"Given θ, the network errs less in {helped} of {all_runs} runs"
     axes.set_title(f"{title} (median ratio {np.median(ratios):.2f})")
     return figure
 
