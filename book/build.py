@@ -68,7 +68,7 @@ class Failure(click.ClickException):
 
 
 @contextmanager
-def told(log: Path):
+def reported(log: Path):
     """Turn an error that no step foresaw into a sentence and a log."""
     try:
         yield
@@ -300,7 +300,7 @@ def values(pairs, raw, texts) -> dict:
 
 def build(place: Path, jobs: dict[Path, dict], announcement: str, strict: bool) -> Path:
     """The five steps."""
-    with told(place / "logs/build.log"):
+    with reported(place / "logs/build.log"):
         needs = [ask(notebook, given) for notebook, given in jobs.items()]
         shutil.rmtree(place / "html", ignore_errors=True)
         mirror(place, announcement)

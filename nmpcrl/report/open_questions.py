@@ -41,15 +41,15 @@ QUESTIONS = (
 )
 
 
-def to_ask(decides: Mapping[str, Collection[str]], varied: Collection[str]) -> str:
-    """The questions as a numbered list in Markdown, each with what hangs on it here.
+def question_list(decides: Mapping[str, Collection[str]], varied: Collection[str]) -> str:
+    """The questions as a numbered list in Markdown, each with what depends on it here.
 
     Args:
         decides: claims whose verdicts depend on a departure, by its letter.
         varied: the letters of the departures that were read in several ways.
     """
     return "\n".join(
-        f"{number}. **{question.ask}** {_links(question)} {_weight(question, decides, varied)}"
+        f"{number}. **{question.ask}** {_links(question)} {_decided(question, decides, varied)}"
         for number, question in enumerate(QUESTIONS, start=1)
     )
 
@@ -59,12 +59,12 @@ def _links(question: Question) -> str:
     return f"(departure{'s' if len(question.departures) > 1 else ''} {refs})."
 
 
-def _weight(
+def _decided(
     question: Question, decides: Mapping[str, Collection[str]], varied: Collection[str]
 ) -> str:
     claims = sorted({claim for letter in question.departures for claim in decides.get(letter, ())})
     if claims:
         return f"The answer would decide {listed(claims)}."
     if set(question.departures) & set(varied):
-        return "No verdict hung on it in what was run."
+        return "No verdict depended on it in what was run."
     return "It was not varied here."

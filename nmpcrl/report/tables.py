@@ -59,7 +59,7 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str) -> str:
     return _table(scope, ("The paper claims", "Here"), rows)
 
 
-def spread_table(verdicts: Iterable[Verdict], caption: str) -> str:
+def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
     """One row a claim, in HTML: its outcome overall, in each layout, and in each reading."""
     decided = [v for v in verdicts if v.by_layout]
     layouts = dict.fromkeys(name for v in decided for name in v.by_layout)
@@ -104,16 +104,16 @@ def evidence(verdicts: Iterable[Verdict]) -> str:
     )
 
 
-def dependence(verdicts: Iterable[Verdict], flipped: pd.DataFrame) -> str:
-    """One row a claim, in Markdown: its verdict, and what flips it, by departure.
+def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
+    """One row a claim, in Markdown: its verdict, and what changes it, by departure.
 
     Args:
         verdicts: of `judge_runs`.
-        flipped: rows of `robustness.atlas`; those that chance hardly explains, by `SURE`, are bold.
+        changed: rows of `robustness.atlas`; those that chance hardly explains, by `SURE`, are bold.
     """
-    rows = ["| Claim | Over all | Flipped by |", "|---|---|---|"]
+    rows = ["| Claim | Over all | Changed by |", "|---|---|---|"]
     for v in verdicts:
-        mine = flipped[flipped.claim == v.claim]
+        mine = changed[changed.claim == v.claim]
         by = [
             f"{_letter(str(letter))}: {listed(map(_weighed, group.variant, group.p))}"
             for letter, group in mine.groupby("departure", sort=False)

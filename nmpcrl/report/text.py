@@ -1,6 +1,6 @@
 """The sentences of the one-page summary that rest on numbers: Markdown, from what is published."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import pandas as pd
 
@@ -23,7 +23,7 @@ SURE = 0.01  # of Fisher's test: what chance explains as rarely is called more t
 LAYOUT, DECAY = "B", "C"  # the departures that the main table itself reads in several ways
 
 
-def effort(found: Published) -> str:
+def compute_effort(found: Published) -> str:
     """What was trained, where, with what, and how long that took."""
     if not found.rows:
         return NOTHING
@@ -42,18 +42,18 @@ def effort(found: Published) -> str:
 
 
 def outcomes(verdicts: Sequence[Verdict]) -> str:
-    """How many claims met each fate, and which."""
+    """How many claims had each outcome, and which."""
     if not verdicts:
         return NOTHING
-    fates = []
+    counted = []
     for outcome in (REPRODUCED, PARTLY, NOT, UNDECIDABLE):
         names = [v.claim for v in verdicts if v.outcome == outcome]
         if names:
-            fates.append(f"{len(names)} {outcome} ({listed(names)})")
-    return f"Of {len(verdicts)} claims: {listed(fates)}."
+            counted.append(f"{len(names)} {outcome} ({listed(names)})")
+    return f"Of {len(verdicts)} claims: {listed(counted)}."
 
 
-def spread(verdicts: Iterable[Verdict]) -> str:
+def by_layout_and_decay(verdicts: Iterable[Verdict]) -> str:
     """On which claims the layouts, and the readings of the decay, disagree."""
     asked = [v for v in verdicts if v.by_layout]
     layouts = [v.claim for v in asked if disagree(v.by_layout.values())]
@@ -66,20 +66,20 @@ def spread(verdicts: Iterable[Verdict]) -> str:
     )
 
 
-def changes(flips: pd.DataFrame) -> str:
-    """How many variants change a verdict; `flips` as `robustness.flips` returns it."""
-    variants = flips.variant.unique()
+def verdicts_changed(judged: pd.DataFrame) -> str:
+    """How many variants change a verdict; `judged` as `robustness.flips` returns it."""
+    variants = judged.variant.unique()
     if not len(variants):
         return ""
-    flipped = _flipped(flips)
+    changed = _changed(judged)
     return (
-        f"Of {len(variants)} variants, each with one thing changed, {flipped.variant.nunique()}"
-        f" change at least one verdict, {flipped[flipped.p < SURE].variant.nunique()} of them by"
+        f"Of {len(variants)} variants, each with one thing changed, {changed.variant.nunique()}"
+        f" change at least one verdict, {changed[changed.p < SURE].variant.nunique()} of them by"
         f" more than chance explains (p < {SURE})."
     )
 
 
-def hinges(verdicts: Iterable[Verdict], flips: pd.DataFrame) -> dict[str, tuple[str, ...]]:
+def depends_on(verdicts: Iterable[Verdict], judged: pd.DataFrame) -> dict[str, tuple[str, ...]]:
     """The departures on which a verdict depends: letter -> claims, both in order."""
     found: dict[str, set[str]] = {letter: set() for letter in DEPARTURES}
     for verdict in verdicts:
@@ -87,24 +87,24 @@ def hinges(verdicts: Iterable[Verdict], flips: pd.DataFrame) -> dict[str, tuple[
             found[LAYOUT].add(verdict.claim)
         if disagree(verdict.by_decay.values()):
             found[DECAY].add(verdict.claim)
-    for variant, claim in _flipped(flips)[["variant", "claim"]].itertuples(index=False):
+    for variant, claim in _changed(judged)[["variant", "claim"]].itertuples(index=False):
         letter = design.VARIANTS[variant].departure
         if letter:
             found[letter].add(claim)
     return {letter: tuple(sorted(claims)) for letter, claims in found.items() if claims}
 
 
-def questions(hinges: dict[str, tuple[str, ...]]) -> str:
+def open_gaps(depends_on: Mapping[str, tuple[str, ...]]) -> str:
     """One item a departure on which a verdict depends: what the paper leaves open, and which."""
-    if not hinges:
+    if not depends_on:
         return "Nothing was found on which a verdict depends."
     return "\n".join(
         f"- {DEPARTURES[letter].gap} It matters to {listed(claims)} ({{ref}}`departure-{letter}`)."
-        for letter, claims in hinges.items()
+        for letter, claims in depends_on.items()
     )
 
 
-def ours(verdicts: Iterable[Verdict]) -> str:
+def own_claims(verdicts: Iterable[Verdict]) -> str:
     """One item a claim of our own: what it says, and whether that holds."""
     return "\n".join(f"- {v.claim}. {v.statement} *{HOLDS[v.outcome]}*" for v in verdicts)
 
@@ -120,5 +120,5 @@ def listed(names: Iterable[object]) -> str:
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def _flipped(flips: pd.DataFrame) -> pd.DataFrame:
-    return flips[flips.flips.astype(bool)]  # without rows the column has no type of its own
+def _changed(judged: pd.DataFrame) -> pd.DataFrame:
+    return judged[judged.flips.astype(bool)]  # without rows the column has no type of its own

@@ -16,6 +16,7 @@ from nmpcrl.study.departures import DEPARTURES
 ROOT = Path(__file__).resolve().parents[2]
 NOTATION = (ROOT / "book/notation.md").read_text()
 REPRODUCE = (ROOT / "book/reproduce.md").read_text()
+CLUSTER = (ROOT / "book/cluster.md").read_text()
 FOLDERS = (
     "report",
     "bench",
@@ -90,14 +91,14 @@ def test_every_departure_has_a_section_that_renders_it():
 
 def test_the_parameters_of_the_chapters_are_those_that_they_declare():
     rows = re.findall(r"^\| `(\d\d_\w+|solver|performance)` \| (.*) \|$", REPRODUCE, flags=re.M)
-    told = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}
+    listed = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}
     declared = {name: build.parameters(ROOT / path) for name, path in build.notebooks().items()}
-    assert told == {name: parameters for name, parameters in declared.items() if parameters}
+    assert listed == {name: parameters for name, parameters in declared.items() if parameters}
 
 
-def blocks(language: str) -> list[str]:
-    """The code of the page on commands in one language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", REPRODUCE, flags=re.M | re.S)
+def blocks(language: str, page: str = REPRODUCE) -> list[str]:
+    """The code of a page, by default of the one on commands, in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", page, flags=re.M | re.S)
 
 
 def commands() -> list[list[str]]:
@@ -114,15 +115,15 @@ def test_the_commands_that_the_page_shows_are_accepted(words):
 
 
 def test_the_options_that_the_page_lists_are_those_of_the_command():
-    told = re.findall(r"^\| `(--[\w-]+)(?: [A-Z]+)?` \|", REPRODUCE, flags=re.M)
+    listed = re.findall(r"^\| `(--[\w-]+)(?: [A-Z]+)?` \|", REPRODUCE, flags=re.M)
     options = [one for one in main.commands["study"].params if isinstance(one, click.Option)]
-    assert set(told) == {option.opts[0] for option in options}
+    assert set(listed) == {option.opts[0] for option in options}
 
 
-@pytest.mark.parametrize("code", blocks("python"))
-def test_what_the_page_imports_is_there(code):
+@pytest.mark.parametrize("code", blocks("python") + blocks("python", CLUSTER))
+def test_what_the_pages_import_is_there(code):
     for node in ast.walk(ast.parse(code)):
-        if isinstance(node, ast.ImportFrom):
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("nmpcrl"):
             module = import_module(node.module)
             for alias in node.names:
                 assert hasattr(module, alias.name) or import_module(f"{node.module}.{alias.name}")
@@ -131,5 +132,5 @@ def test_what_the_page_imports_is_there(code):
 def test_the_make_targets_that_the_page_lists_exist():
     makefile = (ROOT / "Makefile").read_text()
     targets = set(re.findall(r"^(\w+):", makefile, flags=re.M))
-    told = set(re.findall(r"^\| `make (\w+)", REPRODUCE, flags=re.M))
-    assert told == targets - {"help"}
+    listed = set(re.findall(r"^\| `make (\w+)", REPRODUCE, flags=re.M))
+    assert listed == targets - {"help"}

@@ -22,7 +22,10 @@ RUN_CLAIMS = {
     "C1": (figures.divergence, "DES diverged and RDES did not in 16 of 16 pairs"),
     "C2": (figures.instability, "ES was unstable and GES was not in 16 of 16 pairs"),
     "C5": (figures.same_policy, "RDES and GES end in the same policy in 16 of 16 pairs"),
-    "C6": (figures.held_out, "told θ, the network errs at most 0.8 times as much in 16 of 16 runs"),
+    "C6": (
+        figures.held_out,
+        "given θ, the network errs at most 0.8 times as much in 16 of 16 runs",
+    ),
     "C7": (figures.violations, "all constraints held in 64 of 64 runs"),
     "C9": (figures.gains, "learning saves 1% of the cost or more in 32 of 32 runs"),
 }
@@ -95,7 +98,7 @@ def test_every_run_has_its_point(claim, made_up):
 
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
 def test_the_shares_are_those_of_the_verdict_with_wilson_s_interval(claim, made_up):
-    """DES diverges in layout A alone; ES swings, RDES drives aside and saves nothing there too."""
+    """DES diverges in layout A alone; ES swings, RDES goes aside and saves nothing there too."""
 
     def unlike(experiment: Experiment) -> dict:
         there = experiment.layout == "A"
@@ -193,13 +196,13 @@ def test_a_figure_says_where_its_runs_come_from(made_up):
 # All learners
 
 
-def test_the_learner_that_ends_cheapest_is_named_with_its_interquartile_mean(made_up):
+def test_the_learner_that_ends_lowest_is_named_with_its_interquartile_mean(made_up):
     found = made_up(lambda e: {"end": 0.8 + 0.01 * e.seed if e.learner == "TDC" else 0.9})
     figure = figures.learners(found)
     runs = found.runs[found.runs.learner == "TDC"]
     mean = interquartile_mean((runs.final_cost / 1000).to_numpy(), runs.layout.tolist())
     assert title(figure) == (
-        f"TDC ends cheapest, at {mean:.3f} of the start's cost (interquartile mean)"
+        f"TDC ends lowest, at {mean:.3f} of the start's cost (interquartile mean)"
     )
     assert [tick.get_text() for tick in figure.axes[0].get_yticklabels()] == list(
         found.runs.learner.unique()

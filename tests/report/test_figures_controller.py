@@ -5,7 +5,7 @@ import pytest
 from matplotlib import pyplot
 
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
-from nmpcrl.report.figures import controller, sensitivity
+from nmpcrl.report.figures import controller, expected_sarsa, sensitivity
 from nmpcrl.study import Records, Runs, paper, sweep
 
 LEARNERS, DECAYS, EPISODES, STEPS = ("ES", "frozen"), ("step", "episode"), 4, 5
@@ -22,7 +22,7 @@ def theta():
 
 
 @pytest.fixture(scope="module")
-def road(nmpc, theta):
+def rollout(nmpc, theta):
     return evaluate(Persistent(nmpc), theta, steps=5)
 
 
@@ -74,15 +74,15 @@ def assert_readable(figure):
         assert "[" in label or "(no unit)" in label or label.endswith(counted), label
 
 
-def test_the_closed_loop_is_drawn_with_its_plans_and_its_length(nmpc, theta, road):
+def test_the_closed_loop_is_drawn_with_its_plans_and_its_length(nmpc, theta, rollout):
     plan = nmpc.solve(nmpc.task.start, theta)
-    figure = controller.closed_loop(nmpc.task, road, [plan])
+    figure = controller.closed_loop(nmpc.task, rollout, [plan])
     assert_readable(figure)
-    assert "at most 1.2 m make a road of 0.5 m" in texts(figure)
+    assert "at most 1.2 m make a trajectory of 0.5 m" in texts(figure)
 
 
-def test_every_obstacle_has_its_disc_and_its_circle(nmpc, road):
-    figure = controller.closed_loop(nmpc.task, road, [])
+def test_every_obstacle_has_its_disc_and_its_circle(nmpc, rollout):
+    figure = controller.closed_loop(nmpc.task, rollout, [])
     assert sorted(patch.radius for patch in figure.axes[0].patches) == [1.0] * 4 + [1.25] * 4
 
 
@@ -96,7 +96,7 @@ def test_the_title_says_whether_q_stays_above_v(lowest, says):
     assert says in texts(figure)
 
 
-def test_nine_panels_name_the_two_parameters_that_bend_the_road_most(nmpc):
+def test_nine_panels_name_the_two_parameters_that_bend_the_trajectory_most(nmpc):
     changes = {name: {"×¼": straight(1.5), "×4": straight(1.6)} for name in paper.THETA_NAMES}
     changes["c"] = {"−0.2": straight(1.5), "0.35": straight(3.0, cost=np.inf)}
     changes["nu"] = {"×¼": straight(0.5), "×4": straight(1.5)}
@@ -107,7 +107,7 @@ def test_nine_panels_name_the_two_parameters_that_bend_the_road_most(nmpc):
     assert "0.35: fails" in [text.get_text() for text in figure.axes[8].texts]
 
 
-def test_the_printed_box_tells_how_near_the_robot_comes(nmpc):
+def test_the_printed_box_says_how_near_the_robot_comes(nmpc):
     stopped = straight(2.0)
     stopped.states[:, 0] = np.minimum(stopped.states[:, 0], 3.0)
     figure = controller.printed_box(nmpc.task, straight(2.0), stopped, wall=3.0)
@@ -115,11 +115,11 @@ def test_the_printed_box_tells_how_near_the_robot_comes(nmpc):
     assert "no nearer than 5.5 m" in texts(figure)
 
 
-def test_the_penalty_figure_names_the_cheapest_theta_c_and_leaves_failures_out(nmpc):
+def test_the_penalty_figure_names_the_best_theta_c_and_leaves_failures_out(nmpc):
     theta_c, costs = np.array([0.001, 0.35, 0.5]), np.array([3.0, 1.0, np.inf])
     figure = controller.penalty_gap(nmpc.task, theta_c, costs)
     assert_readable(figure)
-    assert "= 0.35 is cheapest" in texts(figure)
+    assert "= 0.35 has the lowest cost" in texts(figure)
     assert np.isnan(figure.axes[1].lines[0].get_ydata()[-1])
     legend = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert legend == ["the NMPC keeps 1.251 m", "the penalty begins at 1.452 m"]
@@ -149,36 +149,36 @@ def test_the_kink_figure_names_the_jump():
 
 
 def test_theta_paths_name_the_component_that_moves_most():
-    figure = sensitivity.theta_paths(study().select(learner="ES"))
+    figure = expected_sarsa.theta_paths(study().select(learner="ES"))
     assert_readable(figure)
     assert r"$\theta_x$ moves most, by up to 0.4" in texts(figure)
 
 
 @pytest.mark.parametrize(("slope", "says"), [(0.1, "stays below 2"), (1.0, "passes 2")])
 def test_the_overshoot_figure_says_whether_2_was_passed(slope, says):
-    figure = sensitivity.overshoot(study(slope).select(learner="ES"))
+    figure = expected_sarsa.overshoot(study(slope).select(learner="ES"))
     assert_readable(figure)
     assert says in texts(figure)
 
 
 def test_the_frozen_arm_is_drawn_beside_the_learner_in_both_rows():
-    figure = sensitivity.two_costs(study())
+    figure = expected_sarsa.two_costs(study())
     assert_readable(figure)
     assert "falls by up to 60% by itself" in texts(figure)
     assert [len(axes.lines) for axes in figure.axes] == [4, 4, 4, 4]
 
 
 def test_the_fall_of_the_frozen_arm_is_a_share_of_its_first_cost():
-    assert sensitivity.frozen_fall(study()) == pytest.approx(0.6)
+    assert expected_sarsa.frozen_fall(study()) == pytest.approx(0.6)
 
 
 def test_one_seed_and_one_decay_are_enough_for_every_figure_of_a_study():
     runs = sweep(learner=LEARNERS, decay="step", seed=3, episodes=EPISODES)
     small = Runs({run: records(run, 0.0) for run in runs})
-    for figure in (sensitivity.theta_paths, sensitivity.overshoot, sensitivity.two_costs):
+    for figure in (expected_sarsa.theta_paths, expected_sarsa.overshoot, expected_sarsa.two_costs):
         assert_readable(figure(small))
 
 
-def test_a_figure_is_closed_so_that_a_notebook_shows_it_once(nmpc, road):
-    controller.closed_loop(nmpc.task, road, [])
+def test_a_figure_is_closed_so_that_a_notebook_shows_it_once(nmpc, rollout):
+    controller.closed_loop(nmpc.task, rollout, [])
     assert pyplot.get_fignums() == []

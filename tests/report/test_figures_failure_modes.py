@@ -10,7 +10,7 @@ from nmpcrl.study.experiment import frozen_arm
 
 
 def unlike(experiment: Experiment) -> dict:
-    """DES overshoots and ends costlier; RDES does, for no reason known, or was stopped."""
+    """DES overshoots and ends at a higher cost; RDES does, for no reason known, or was stopped."""
     changes = {
         "DES": {"end": 1.2, "alpha_phi2": 3.0},
         "RDES": {"end": 1.2} if experiment.seed else {"reached": 40},
@@ -49,8 +49,8 @@ def test_every_example_has_a_column_with_its_thresholds_and_the_rise_in_grey(mad
     found = made_up(unlike)
     names = {"overshoot": Experiment("DES"), "none of these": Experiment("RDES", seed=1)}
     examples = {name: found.summaries[e] for name, e in names.items()}
-    drives = {name: found.summaries[frozen_arm(e)].states for name, e in names.items()}
-    figure = failure_modes.traced(examples, drives)
+    rollouts = {name: found.summaries[frozen_arm(e)].states for name, e in names.items()}
+    figure = failure_modes.traced(examples, rollouts)
     columns = np.array(figure.axes).reshape(4, 2)
     assert figure.get_suptitle() == "One run of each kind: overshoot, none of these"
     assert [axis.get_title(loc="left").split("\n")[0] for axis in columns[0]] == list(names)

@@ -1,4 +1,4 @@
-"""The figures of chapter 6: titles follow from the runs, and nothing is left undrawn."""
+"""Layouts and robustness analysis: titles follow from the runs, and nothing is left undrawn."""
 
 from dataclasses import asdict
 
@@ -65,8 +65,8 @@ def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
 
 
 @pytest.fixture(scope="module")
-def flipping() -> tuple[Evidence, pd.DataFrame]:
-    """A study in which C9 flips in the row of the variant, and its map."""
+def changing() -> tuple[Evidence, pd.DataFrame]:
+    """A study in which C9 changes in the row of the variant, and its map."""
     found = study(gained=-0.2)
     return found, atlas(found.runs, paths(found))
 
@@ -86,7 +86,7 @@ def written(figure: Figure) -> list[str]:
     return [text for text in texts if text]
 
 
-def test_a_layout_is_called_by_the_narrowest_gap_of_its_drive():
+def test_a_layout_is_called_by_the_narrowest_gap_of_its_rollout():
     figure = figures.layouts({"A": WAY, "D": WAY})
     names = [axes.get_title("left") for axes in figure.axes if axes.get_visible()]
     assert names[0] == "A: open, +0.01 m"
@@ -103,20 +103,20 @@ def test_only_narrow_gaps_are_drawn_from_centre_to_centre():
     assert all(abs(line.get_ydata()[1]) < 3 for line in gap)  # no wall is near
 
 
-def test_the_map_has_a_frame_and_an_arrow_for_every_flip(flipping):
-    found, rows = flipping
+def test_the_map_has_a_frame_and_an_arrow_for_every_change(changing):
+    found, rows = changing
     figure = maps.verdict_map(rows, found.mark)
-    flips = int(rows.flips.sum())
-    assert flips > 0
-    assert len(frames(figure)) == flips
+    changes = int(rows.flips.sum())
+    assert changes > 0
+    assert len(frames(figure)) == changes
     arrows = [text for text in written(figure) if "→" in text]
-    assert len(arrows) == flips
+    assert len(arrows) == changes
     assert "yes → no" in arrows
-    assert title(figure).startswith(f"{flips} of ")
+    assert title(figure).startswith(f"{changes} of ")
 
 
-def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(flipping):
-    found, rows = flipping
+def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(changing):
+    found, rows = changing
     texts = written(maps.verdict_map(rows, found.mark))
     cells = [text for text in texts if text.startswith(("yes", "partly", "no", "open"))]
     assert len(cells) == len(rows)
@@ -124,16 +124,16 @@ def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(flipping):
     assert {"B", "C", "F"} <= set(texts)  # of the layouts, the decays and the variant
 
 
-def test_the_title_of_the_map_names_the_claims_that_never_flip(flipping):
-    found, rows = flipping
-    flipped = set(rows.claim[rows.flips.astype(bool)])
+def test_the_title_of_the_map_names_the_claims_that_never_change(changing):
+    found, rows = changing
+    changed = set(rows.claim[rows.flips.astype(bool)])
     never = title(maps.verdict_map(rows, found.mark)).partition("those on ")[2]
-    assert not any(claim in never for claim in flipped)
+    assert not any(claim in never for claim in changed)
     assert "C7" in never
 
 
-def test_telling_draws_a_row_a_cell_with_every_run_in_it(flipping):
-    found, rows = flipping
+def test_telling_draws_a_row_a_cell_with_every_run_in_it(changing):
+    found, rows = changing
     cells = telling(rows)
     figure = maps.telling(cells, found)
     assert len(figure.axes) == 2 * len(cells)
@@ -149,8 +149,8 @@ def test_telling_draws_a_row_a_cell_with_every_run_in_it(flipping):
         assert drawn == sum(int(one.notna().sum().sum()) for one in values)
 
 
-def test_telling_draws_what_is_infinite_at_the_edge(flipping):
-    found, rows = flipping
+def test_telling_draws_what_is_infinite_at_the_edge(changing):
+    found, rows = changing
     changed = found.runs.assign(
         stopped=found.runs.stopped.where(found.runs.variant != VARIANT, "diverged")
     )
@@ -159,17 +159,17 @@ def test_telling_draws_what_is_infinite_at_the_edge(flipping):
         assert np.isfinite(line.get_ydata()).all()
 
 
-def test_where_nothing_flips_the_figure_says_so():
+def test_where_nothing_changes_the_figure_says_so():
     found = study()
     cells = telling(atlas(found.runs, paths(found)))
-    assert title(maps.telling(cells, found)) == "No verdict flips in what was run here"
+    assert title(maps.telling(cells, found)) == "No verdict changes in what was run here"
 
 
 def test_a_study_that_is_too_short_has_a_map_on_which_all_is_open():
     found = study(episodes=4)
     rows = atlas(found.runs, paths(found))
     figure = maps.verdict_map(rows, found.mark)
-    assert title(figure) == "0 of 0 decided verdicts flip"
+    assert title(figure) == "0 of 0 decided verdicts change"
     assert not frames(figure)
 
 

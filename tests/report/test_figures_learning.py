@@ -8,7 +8,7 @@ from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import directions, dropped_curvature
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.two_state import Chain
-from nmpcrl.report.figures import ges, rdes
+from nmpcrl.report.figures import few_runs, ges, rdes
 from nmpcrl.study import Experiment, Runs, paper, run, sweep
 
 SMALL = {"episodes": 4, "steps": 45, "evaluate_every": 2}
@@ -91,8 +91,8 @@ def test_a_target_runs_ahead_where_the_next_features_are_longer(study):
 @pytest.mark.parametrize(
     ("draw", "words"),
     [
-        (rdes.figure_1, "Divergence: DES in 0 of 2, RDES in 0 of 2 runs"),
-        (ges.figure_2, "Instability: ES in"),
+        (few_runs.figure_1, "Divergence: DES in 0 of 2, RDES in 0 of 2 runs"),
+        (few_runs.figure_2, "Instability: ES in"),
         (rdes.online_errors, "the next value is off by"),
         (ges.overshoots, "Steps above 2: 0.0% of the steps of ES"),
         (ges.corrections, "times as long as δφ"),
@@ -107,7 +107,7 @@ def test_a_figure_of_the_study_says_what_it_found(study, draw, words):
 
 
 def test_each_run_has_its_line_in_figure_1(study):
-    figure = rdes.figure_1(study)
+    figure = few_runs.figure_1(study)
     lines = [line for line in figure.axes[0].lines if len(line.get_xdata())]
     assert len(lines) == 3  # DES, RDES and frozen, one seed
     assert all(len(line.get_xdata()) == SMALL["episodes"] for line in lines)
@@ -122,7 +122,7 @@ def test_a_run_that_was_stopped_early_can_be_drawn(study):
     evaluations = {name: column[:1] for name, column in full.evaluations.items()}
     stopped = type(full)(full.experiment, steps, evaluations, {"stopped": "diverged"})
     runs = {e: stopped if r is full else r for e, r in study.items()}
-    figure = rdes.figure_1(Runs(runs))
+    figure = few_runs.figure_1(Runs(runs))
     assert heading(figure).startswith("Divergence: DES in 1 of 2")
     rdes.online_errors(Runs(runs))
 
@@ -153,5 +153,5 @@ def test_the_curvature_s_figure_gives_the_median(study):
 def test_the_figures_are_closed(study):
     import matplotlib.pyplot as plt
 
-    rdes.figure_1(study)
+    few_runs.figure_1(study)
     assert not plt.get_fignums()

@@ -43,7 +43,7 @@ def test_the_fastest_and_the_slowest_solver_are_named(measured):
     assert performance.solve_times(measured).get_suptitle().startswith("fatrop is fastest")
 
 
-def test_the_network_s_share_is_told_for_the_fastest_and_the_slowest_solver(measured):
+def test_the_network_s_share_is_given_for_the_fastest_and_the_slowest_solver(measured):
     title = performance.learning_steps(measured).get_suptitle()
     assert title == "Of a step of RDES the network takes 77% with riccati and 9% with Ipopt, SX"
 
@@ -54,18 +54,18 @@ def test_a_step_s_bar_is_the_sum_of_its_parts(measured):
     assert ends == pytest.approx(measured["learners"]["ms_per_step"][:4])
 
 
-def test_what_one_more_costs_is_told(measured):
+def test_what_one_more_costs_is_given(measured):
     title = performance.scaling(measured).get_suptitle()
     adds = "A stage adds 0.50 to 0.50 µs to an iteration, an obstacle 0.25 to 0.25 µs"
     assert title == adds
 
 
-def test_runs_and_workers_are_told(measured):
+def test_runs_and_workers_are_given(measured):
     title = performance.whole_runs(measured).get_suptitle()
     assert title == "ES takes 4.0 s and RDES 16.0 s; 2 workers are 1.90 times as fast as one"
 
 
-def test_workers_that_were_not_measured_are_not_told(measured):
+def test_workers_that_were_not_measured_are_not_given(measured):
     measured["parallel"] = {name: [] for name in measured["parallel"]}
     figure = performance.whole_runs(measured)
     assert figure.get_suptitle() == "ES takes 4.0 s and RDES 16.0 s"

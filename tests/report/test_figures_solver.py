@@ -80,7 +80,7 @@ def test_the_curvature_title_counts_iterations_and_says_whether_they_were_enough
     assert texts(figure).strip() == f"With the curvature 2 iterations, {says}"
 
 
-def test_the_starts_are_told_apart_and_counted():
+def test_the_starts_are_distinct_and_counted():
     traces = {
         "cold": iterates(10, 1, 0.1, 1e-9),
         "shifted": iterates(1, 0.1, 1e-9),
@@ -100,7 +100,7 @@ def test_an_iterate_of_the_final_value_does_not_break_the_logarithm():
     assert (figure.axes[1].lines[0].get_ydata() > 0).all()
 
 
-def test_the_title_states_the_growth_of_the_first_solver():
+def test_the_title_states_how_the_first_solver_scales():
     figure = draw.horizons(timings())
     assert_readable(figure)
     assert "With riccati a solve grows like $N^{1.50}$, an iteration like $N^{1.00}$" in texts(

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from nmpcrl.report.open_questions import QUESTIONS, to_ask
+from nmpcrl.report.open_questions import QUESTIONS, question_list
 from nmpcrl.study.departures import DEPARTURES
 
 
@@ -22,7 +22,7 @@ def test_every_question_is_about_departures_that_exist_and_none_is_asked_twice()
 
 
 def test_they_are_numbered_and_linked():
-    lines = to_ask({}, ()).splitlines()
+    lines = question_list({}, ()).splitlines()
     assert [int(line.split(".")[0]) for line in lines] == list(range(1, len(QUESTIONS) + 1))
     for line, question in zip(lines, QUESTIONS, strict=True):
         assert re.findall(r"<departure-([A-Z])>", line) == list(question.departures)
@@ -33,9 +33,9 @@ def test_they_are_numbered_and_linked():
     [
         ({"H": ("C6", "C1")}, {"H"}, "would decide C1 and C6"),
         ({"G": ("C1",), "H": ("C1",)}, {"H", "G"}, "would decide C1."),
-        ({}, {"G"}, "No verdict hung on it"),
+        ({}, {"G"}, "No verdict depended on it"),
         ({}, set(), "It was not varied"),
     ],
 )
 def test_each_says_what_its_departures_decide_together(decides, varied, said):
-    assert said in item("H", to_ask(decides, varied))
+    assert said in item("H", question_list(decides, varied))

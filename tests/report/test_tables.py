@@ -54,7 +54,7 @@ def test_a_claim_is_shown_with_all_that_was_fixed_beforehand():
 
 def test_a_claim_is_shown_in_each_layout_and_reading_in_colour_and_in_words():
     parts = {"by_layout": {"A": REPRODUCED, "B": NOT}, "by_decay": {"step": UNDECIDABLE}}
-    table = tables.spread_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
+    table = tables.layout_table([verdict(PARTLY, **parts), verdict(NOT)], "All of it.")
     assert cells(table) == [
         ["Claim", "All", "A", "B", "per step"],
         ["C1", "partly", "yes", "no", "open"],  # and no row of what has no layouts
@@ -66,19 +66,19 @@ def test_a_claim_is_shown_in_each_layout_and_reading_in_colour_and_in_words():
 
 def test_a_layout_in_which_a_claim_was_not_asked_is_left_empty():
     first, second = (verdict(NOT, by_layout={name: NOT}) for name in "AB")
-    table = cells(tables.spread_table([first, second], "All of it."))
+    table = cells(tables.layout_table([first, second], "All of it."))
     assert [row[2:] for row in table[1:]] == [["no", ""], ["", "no"]]
 
 
-def test_what_flips_a_verdict_is_told_by_departure_and_bold_where_it_is_sure():
-    flipped = pd.DataFrame(
+def test_what_changes_a_verdict_is_named_by_departure_and_bold_where_it_is_sure():
+    changed = pd.DataFrame(
         [("B", "layout E", "C1", 1e-9), ("B", "layout F", "C1", 0.5), ("", "N = 5", "C1", 0.01)],
         columns=["departure", "variant", "claim", "p"],
     )
-    table = tables.dependence([verdict(PARTLY), replace(verdict(NOT), claim="C2")], flipped)
+    table = tables.dependence([verdict(PARTLY), replace(verdict(NOT), claim="C2")], changed)
     first, second = table.splitlines()[2:]
-    flips = "{ref}`B <departure-B>`: **layout E** and layout F<br>beside the departures: N = 5"
-    assert first.endswith(f" | [partly]{{.{tables.BADGES[PARTLY]}}} | {flips} |")
+    by = "{ref}`B <departure-B>`: **layout E** and layout F<br>beside the departures: N = 5"
+    assert first.endswith(f" | [partly]{{.{tables.BADGES[PARTLY]}}} | {by} |")
     assert second.endswith(f" | [no]{{.{tables.BADGES[NOT]}}} | nothing |")
 
 

@@ -50,7 +50,7 @@ def table(*rows: tuple[str, str, bool]) -> pd.DataFrame:
 
 def test_the_effort_names_runs_hours_machine_and_versions():
     found = Published(rows={Experiment(seed=s): {} for s in range(1320)}, about=ABOUT)
-    said = text.effort(found)
+    said = text.compute_effort(found)
     for part in ("1,320 runs of 300 episodes", "1,200 in", "60 with", "60 in 2 variants"):
         assert part in said
     for part in (
@@ -63,12 +63,12 @@ def test_the_effort_names_runs_hours_machine_and_versions():
 
 
 def test_where_nothing_is_published_the_page_says_so_and_what_to_do():
-    for said in (text.effort(Published()), text.outcomes(())):
+    for said in (text.compute_effort(Published()), text.outcomes(())):
         assert "Nothing is published" in said
         assert "`nmpcrl study --publish`" in said
-    assert text.spread(()) == text.changes(table()) == ""
-    assert text.hinges((), table()) == {}
-    assert text.questions({}).startswith("Nothing was found")
+    assert text.by_layout_and_decay(()) == text.verdicts_changed(table()) == ""
+    assert text.depends_on((), table()) == {}
+    assert text.open_gaps({}).startswith("Nothing was found")
 
 
 def test_the_outcomes_are_counted_and_each_claim_is_named_once():
@@ -92,22 +92,22 @@ def test_layouts_and_readings_disagree_where_two_decided_verdicts_differ(
     layouts, decays, disagreeing
 ):
     judged = [verdict("C5", PARTLY, layouts, decays), verdict("C8", NOT)]
-    by_layout, by_decay = re.findall(r": (\S+?)[;.]", text.spread(judged))
+    by_layout, by_decay = re.findall(r": (\S+?)[;.]", text.by_layout_and_decay(judged))
     assert (by_layout == "C5", by_decay == "C5") == disagreeing
-    hinges = text.hinges(judged, table())
-    assert ("B" in hinges, "C" in hinges) == disagreeing
+    depending = text.depends_on(judged, table())
+    assert ("B" in depending, "C" in depending) == disagreeing
 
 
 def test_variants_that_change_a_verdict_are_counted_once():
     rows = [("soft box", "C1", True), ("soft box", "C2", True), ("tanh", "C1", False)]
-    said = text.changes(table(*rows).assign(p=[0.3, 0.009, 0.001]))
+    said = text.verdicts_changed(table(*rows).assign(p=[0.3, 0.009, 0.001]))
     assert said.startswith("Of 2 variants, each with one thing changed, 1 change at least one")
     assert said.endswith("1 of them by more than chance explains (p < 0.01).")
-    assert ", 0 of them" in text.changes(table(*rows).assign(p=[0.3, 0.01, 0.001]))
+    assert ", 0 of them" in text.verdicts_changed(table(*rows).assign(p=[0.3, 0.01, 0.001]))
 
 
 def test_claims_of_our_own_hold_or_do_not_and_are_not_called_reproduced():
-    said = text.ours([verdict("B1", NOT), verdict("B2", PARTLY)])
+    said = text.own_claims([verdict("B1", NOT), verdict("B2", PARTLY)])
     assert said.splitlines() == [
         "- B1. It is so. *It does not hold.*",
         "- B2. It is so. *It holds in part.*",
@@ -115,24 +115,24 @@ def test_claims_of_our_own_hold_or_do_not_and_are_not_called_reproduced():
     assert set(text.HOLDS) == {REPRODUCED, PARTLY, NOT, UNDECIDABLE}
 
 
-def test_a_departure_hinges_on_every_variant_that_reads_it_otherwise():
+def test_a_departure_counts_every_variant_that_reads_it_otherwise():
     assert (VARIANTS["tanh"].departure, VARIANTS["four fits"].departure) == ("H", "H")
     assert VARIANTS["alpha x 3"].departure == ""
-    flips = table(
+    judged = table(
         ("tanh", "C6", True),
         ("four fits", "C1", True),
         ("four fits", "C6", True),
         ("soft box", "C5", False),
         ("alpha x 3", "C9", True),  # the paper is clear about alpha
     )
-    assert text.hinges([verdict("C2", PARTLY, "yn", "yy")], flips) == {
+    assert text.depends_on([verdict("C2", PARTLY, "yn", "yy")], judged) == {
         "B": ("C2",),
         "H": ("C1", "C6"),
     }
 
 
 def test_a_question_quotes_the_gap_and_leads_to_its_entry():
-    said = text.questions({"B": ("C2",), "H": ("C1", "C6")})
+    said = text.open_gaps({"B": ("C2",), "H": ("C1", "C6")})
     first, second = said.splitlines()
     assert first.startswith(f"- {DEPARTURES['B'].gap} ")
     assert first.endswith("matters to C2 ({ref}`departure-B`).")

@@ -1,4 +1,4 @@
-"""Figures of chapter 5, one a claim: what was measured in each run, and what share says yes.
+"""One figure a claim: what was measured in each run, and what share says yes.
 
 Every figure takes the claim's `Verdict`, and its title is the outcome and what it rests on. No run
 is dropped: what was cut short is drawn in the grey strip marked ∞.
@@ -25,23 +25,24 @@ from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.measures import MEASURES
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.report.figures.panels import (
+from nmpcrl.report.figures.axes import jitter, label_panel, logarithmic
+from nmpcrl.report.figures.panels import part, shares, strips
+from nmpcrl.report.figures.style import (
     INK,
+    LOOKS,
+    STEP_PARTS,
     SUBTITLE,
     dots,
-    jitter,
-    logarithmic,
-    part,
-    shares,
-    strips,
+    hatched,
+    headed,
+    marked,
+    page,
+    subplots,
 )
-from nmpcrl.report.figures.performance import PARTS
-from nmpcrl.report.figures.rdes import headed, label_panel
-from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.records import Column, Records
 
-LINE = 84  # characters of a title
+LINE = 80  # characters of a title
 SOLVERS = {"riccati": "riccati", "fatrop": "fatrop", "ipopt": "Ipopt"}
 LAGS = 30  # steps
 ABOVE: dict[str, Any] = {
@@ -86,9 +87,9 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     axis.invert_yaxis()
     axis.margins(x=0.12)
     axis.set_xlabel("time of a step / time of a step of ES")
-    handles = [Rectangle((0, 0), 1, 1, **_hatched(*look)) for look in PARTS.values()]
+    handles = [Rectangle((0, 0), 1, 1, **hatched(*look)) for look in STEP_PARTS.values()]
     handles.append(Rectangle((0, 0), 1, 1, color="0.9"))
-    names = [*PARTS, "as claimed"]
+    names = [*STEP_PARTS, "as claimed"]
     figure.legend(handles, names, loc="outside lower left", ncols=len(names), fontsize="small")
     if paper_claims.SOLVER not in solvers:
         return _titled(figure, verdict, f"no time was taken with {SOLVERS[paper_claims.SOLVER]}")
@@ -101,7 +102,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
 
 @page
 def same_policy(found: Evidence, verdict: Verdict) -> Figure:
-    """C5: how far RDES and GES come apart on the road, and in cost; a letter a pair."""
+    """C5: how far RDES and GES come apart in trajectory and in cost; a letter a pair."""
     drawn = part(found, ("RDES", "GES"))
     decays = found.summaries.values_of("decay")
     figure, axes = _panels(len(decays))
@@ -117,9 +118,9 @@ def same_policy(found: Evidence, verdict: Verdict) -> Figure:
 
 @page
 def held_out(found: Evidence, verdict: Verdict) -> Figure:
-    """C6: the network's error on held-out pairs when it is told theta, over that when it is not."""
+    """C6: the network's error on held-out pairs with theta as an input, over that without."""
     figure, panel, drawn = _measured(found, verdict)
-    finding = f"told θ, the network errs at most {paper_claims.MORE_ACCURATE} times as much"
+    finding = f"given θ, the network errs at most {paper_claims.MORE_ACCURATE} times as much"
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
@@ -199,7 +200,7 @@ def learners(found: Evidence) -> Figure:
     profile.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
     profile.legend(fontsize="small", loc="lower left")
     best = min(means, key=lambda name: means[name].value)
-    title = f"{best} ends cheapest, at {means[best]:.3f} of the start's cost (interquartile mean)"
+    title = f"{best} ends lowest, at {means[best]:.3f} of the start's cost (interquartile mean)"
     return marked(headed(figure, title), found.mark)
 
 
@@ -222,14 +223,14 @@ def _measured(found: Evidence, verdict: Verdict) -> tuple[Figure, Axes, Evidence
 
 
 def _pairs(drawn: Evidence) -> pd.DataFrame:
-    """How far RDES and GES are apart on the road and in cost, a row a layout, decay and seed."""
+    """How far RDES and GES are apart in trajectory and in cost, a row a layout, decay and seed."""
     rdes, ges = rule.arms(drawn.runs, "RDES", "GES")
-    driven = {
+    states = {
         (e.learner, e.layout, e.decay, e.seed): summary.states
         for e, summary in drawn.summaries.items()
     }
     path = [
-        paper_claims.apart(driven.get(("RDES", *cell)), driven.get(("GES", *cell)))
+        paper_claims.apart(states.get(("RDES", *cell)), states.get(("GES", *cell)))
         for cell in rdes.index
     ]
     cost = paper_claims.costlier(rdes, ges).abs().mask(np.isinf(rdes.final_cost), np.inf)
@@ -279,15 +280,11 @@ def _bar(axis: Axes, row: float, mine: pd.Series, reference: pd.Series) -> float
     """A step of a learner, part by part, in steps of the reference; where the bar ends."""
     parts = (mine.solves * mine.ms_per_solve, np.nan_to_num(mine.ms_per_fit), mine.ms_per_rest)
     left = 0.0
-    for part_of, look in zip(parts, PARTS.values(), strict=True):
+    for part_of, look in zip(parts, STEP_PARTS.values(), strict=True):
         width = float(part_of / reference.ms_per_step)
-        axis.barh(row, width, 0.36, left, **_hatched(*look))
+        axis.barh(row, width, 0.36, left, **hatched(*look))
         left += width
     return left
-
-
-def _hatched(color: str, hatch: str) -> dict[str, Any]:
-    return {"facecolor": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}
 
 
 def _final_costs(found: Evidence, learner: str) -> tuple[Vector, list[str]]:

@@ -12,50 +12,23 @@ from matplotlib.patches import Circle
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
 from nmpcrl.learning.rollout import Rollout
-from nmpcrl.report.figures.style import page, subplots
-
-INK, LESS, MORE = "#222222", "#1B7F79", "#882255"  # none of them is a learner's
-SYMBOLS = {
-    "x": r"\theta_x",
-    "y": r"\theta_y",
-    "heading": r"\theta_\varphi",
-    "v": r"\theta_v",
-    "nu": r"\theta_\nu",
-    "x_f": r"\theta_{x_f}",
-    "y_f": r"\theta_{y_f}",
-    "heading_f": r"\theta_{\varphi_f}",
-    "c": r"\theta_c",
-}  # of paper.THETA_NAMES, between dollar signs
-
-
-def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
-    """Obstacles, the circle Xi = 0 around each, start and target; equal scales."""
-    x, y, clearance = task.discs
-    for place in zip(x, y, clearance / 2, strict=True):
-        axes.add_patch(Circle(place[:2], place[2] - task.robot_diameter / 2, color="#CFCFCF"))
-        axes.add_patch(Circle(place[:2], place[2], fill=False, ec="#8A8A8A", ls="--", lw=0.8))
-    axes.plot(*task.start[:2], "o", color=INK, ms=5)
-    axes.plot(*task.target[:2], "*", color=INK, ms=9)
-    if labels:
-        for point, name in ((task.start, "start"), (task.target, "target")):
-            axes.annotate(
-                name, tuple(point[:2]), (0, 7), textcoords="offset points", ha="center", va="bottom"
-            )
-    axes.set_aspect("equal")
+from nmpcrl.report.figures.axes import draw_task
+from nmpcrl.report.figures.style import INK, SYMBOLS, TEAL, WINE, headed, page, subplots
 
 
 @page
 def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figure:
-    """The road without noise, and some of the plans it was driven by."""
+    """The closed-loop trajectory without noise, and some of the plans behind it."""
     figure, axes = subplots(height=3.7)
     draw_task(axes, task)
-    axes.plot(*rollout.states[:, :2].T, color=INK, lw=1.0, label="road without noise")
+    axes.plot(*rollout.states[:, :2].T, color=INK, lw=1.0, label="trajectory without noise")
     for i, plan in enumerate(plans):
         label = "plans" if i == 0 else None
-        axes.plot(*plan.states[:, :2].T, ".-", color=MORE, lw=2.2, ms=5, label=label)
+        axes.plot(*plan.states[:, :2].T, ".-", color=WINE, lw=2.2, ms=5, label=label)
     farthest = max((_length(plan.states) for plan in plans), default=0.0)
     axes.set(
-        title=f"Plans of at most {farthest:.1f} m make a road of {_length(rollout.states):.1f} m",
+        title=f"Plans of at most {farthest:.1f} m make a trajectory of"
+        f" {_length(rollout.states):.1f} m",
         xlabel="x [m]",
         ylabel="y [m]",
     )
@@ -81,8 +54,8 @@ def action_values(
     shades = plt.get_cmap("cividis")(np.linspace(0.75, 0.0, len(speeds)))
     for speed, column, shade in zip(speeds, values.T, shades, strict=True):
         axes.plot(turn_rates, column, ".-", color=shade, label=f"Q at {speed:g} m/s")
-    axes.axhline(value, color=MORE, ls="--", lw=1.2, label="V(s)")
-    axes.plot(policy[1], value, "D", color=MORE, ms=7, label="the policy's action")
+    axes.axhline(value, color=WINE, ls="--", lw=1.2, label="V(s)")
+    axes.plot(policy[1], value, "D", color=WINE, ms=7, label="the policy's action")
     above = np.nanmin(values) > value - 1e-4
     axes.set(
         title="Q meets V at the policy's action, never below"
@@ -100,19 +73,19 @@ def action_values(
 def theta_effects(
     task: Task, middle: Rollout, others: Mapping[str, Mapping[str, Rollout]]
 ) -> Figure:
-    """One panel a parameter: the road of theta_init, and of two other values of the parameter.
+    """One panel a parameter: the trajectory of theta_init, and of two other values.
 
     Args:
-        task: what the rollouts drove in.
+        task: of the rollouts.
         middle: the closed loop of theta_init.
         others: name of the parameter -> how it was changed -> closed loop; two changes each.
     """
     figure, grid = subplots(3, 3, height=5.0, sharex=True, sharey=True)
     for axes, (name, changes) in zip(grid.flat, others.items(), strict=False):
         draw_task(axes, task, labels=False)
-        _road(axes, middle, INK, ":")
+        _trajectory(axes, middle, INK, ":")
         for (change, rollout), side in zip(changes.items(), _SIDES, strict=False):
-            _road(axes, rollout, side["color"], side["line"])
+            _trajectory(axes, rollout, side["color"], side["line"])
             cost = f"{rollout.cost:.0f}" if np.isfinite(rollout.cost) else "fails"
             where = {"x": side["x"], "y": 0.03, "ha": side["ha"], "color": side["color"]}
             axes.text(s=f"{change}: {cost}", transform=axes.transAxes, fontsize=9.5, **where)
@@ -128,18 +101,12 @@ def theta_effects(
         for name, changes in others.items()
     }
     first, second, *_ = sorted(moved, key=lambda name: -moved[name])
-    figure.suptitle(
-        f"${SYMBOLS[first]}$ and ${SYMBOLS[second]}$ bend the road most",
-        x=0.01,
-        ha="left",
-        fontweight="bold",
-    )
-    return figure
+    return headed(figure, f"${SYMBOLS[first]}$ and ${SYMBOLS[second]}$ bend the trajectory most")
 
 
 @page
 def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) -> Figure:
-    """The road in the box of departure A, and in the box as the paper prints it."""
+    """The trajectory in the box of departure A, and in the box as the paper prints it."""
     figure, axes = subplots(height=3.7)
     draw_task(axes, task)
     axes.add_patch(Circle(tuple(task.target[:2]), task.near, fill=False, ec=INK, ls=":", lw=1))
@@ -151,13 +118,13 @@ def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) ->
         ha="center",
         va="bottom",
     )
-    axes.axvline(wall, color=MORE, lw=1)
+    axes.axvline(wall, color=WINE, lw=1)
     axes.annotate(
         f"wall at x = {wall:g} m ", (wall, 1), xycoords=("data", "axes fraction"),
-        ha="right", va="top", color=MORE,
+        ha="right", va="top", color=WINE,
     )  # fmt: skip
     axes.plot(*repaired.states[:, :2].T, color=INK, ls=":", label="box [−3, 9]² (used here)")
-    axes.plot(*printed.states[:, :2].T, color=MORE, lw=2, label="box [−9, 3]² (as printed)")
+    axes.plot(*printed.states[:, :2].T, color=WINE, lw=2, label="box [−9, 3]² (as printed)")
     nearest = np.linalg.norm(printed.states[:, :2] - task.target[:2], axis=1).min()
     axes.set(
         title=f"In the printed box the robot comes no nearer than {nearest:.1f} m",
@@ -185,17 +152,17 @@ def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Figure:
     begins = kept * np.sqrt(1 + task.margin)
     keeps = kept * np.sqrt(1 + theta_c[0])
     left.plot(distance, penalty, color=INK)
-    left.axvline(keeps, color=MORE, ls="--", label=f"the NMPC keeps {keeps:.3f} m")
-    left.axvline(begins, color=LESS, ls="-.", label=f"the penalty begins at {begins:.3f} m")
+    left.axvline(keeps, color=WINE, ls="--", label=f"the NMPC keeps {keeps:.3f} m")
+    left.axvline(begins, color=TEAL, ls="-.", label=f"the penalty begins at {begins:.3f} m")
     left.set(title="The penalty begins too early", xlabel="distance to a centre [m]")
     left.set_ylabel("penalty of a step [cost]")
     left.legend(loc="upper center", bbox_to_anchor=(0.45, -0.2))
     order = np.argsort(theta_c)
     right.plot(theta_c[order], np.where(np.isfinite(costs), costs, np.nan)[order], "o-", color=INK)
-    right.axvline(task.margin, color=LESS, ls="-.", lw=1)
+    right.axvline(task.margin, color=TEAL, ls="-.", lw=1)
     best = int(np.argmin(costs))
     right.set(
-        title=f"$\\theta_c$ = {theta_c[best]:.2f} is cheapest",
+        title=f"$\\theta_c$ = {theta_c[best]:.2f} has the lowest cost",
         xlabel="$\\theta_c$ (no unit)",
         ylabel="noise-free RL cost",
     )
@@ -203,12 +170,12 @@ def penalty_gap(task: Task, theta_c: Vector, costs: Vector) -> Figure:
 
 
 _SIDES: tuple[dict[str, Any], ...] = (
-    {"color": LESS, "line": "-", "x": 0.0, "ha": "left"},
-    {"color": MORE, "line": "--", "x": 1.0, "ha": "right"},
+    {"color": TEAL, "line": "-", "x": 0.0, "ha": "left"},
+    {"color": WINE, "line": "--", "x": 1.0, "ha": "right"},
 )  # of the first and of the second change
 
 
-def _road(axes: Axes, rollout: Rollout, color: str, line: str) -> None:
+def _trajectory(axes: Axes, rollout: Rollout, color: str, line: str) -> None:
     """The path, and an arrow for the heading at its end."""
     axes.plot(*rollout.states[:, :2].T, color=color, ls=line, lw=1.3)
     x, y, heading = rollout.states[-1]
@@ -221,7 +188,7 @@ def _length(states: Matrix) -> float:
 
 
 def _apart(a: Rollout, b: Rollout) -> float:
-    """Largest distance [m] from a point of one road to the nearest point of the other."""
+    """Largest distance [m] from a point of one trajectory to the nearest point of the other."""
     first, second = a.states[:, None, :2], b.states[None, :, :2]
     between = np.linalg.norm(first - second, axis=-1)
     return float(max(between.min(axis=0).max(), between.min(axis=1).max()))

@@ -11,12 +11,20 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ENDINGS, MECHANISMS, OVER_PREDICTED, OVERSHOOT, WELL, rise
-from nmpcrl.report.figures.layouts import closes_at, plain
-from nmpcrl.report.figures.panels import FEW, LIMIT, SUBTITLE
-from nmpcrl.report.figures.rdes import headed
-from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.report.figures.axes import FEW, plain, stacked
+from nmpcrl.report.figures.style import (
+    LIMIT,
+    LOOKS,
+    SUBTITLE,
+    hatched,
+    headed,
+    marked,
+    page,
+    subplots,
+)
 from nmpcrl.study import paper
 from nmpcrl.study.records import Column
 
@@ -36,7 +44,7 @@ AROUND = 60  # episodes shown before and after the rise
 
 @page
 def reasons(found: Evidence) -> Figure:
-    """How many runs of each learner met which mechanism, and how their last drives ended."""
+    """How many runs of each learner met which mechanism, and how their last rollouts ended."""
     moved = found.runs[found.runs.learner != "frozen"]
     figure, axes = subplots(1, 2, 1.5 + 0.32 * moved.learner.nunique(), sharey=True)
     ends = moved.ending.mask(moved.wrong == "stopped", STOPPED)
@@ -45,12 +53,12 @@ def reasons(found: Evidence) -> Figure:
         counts = pd.crosstab(moved.learner, said)
         counts = counts.reindex(moved.learner.unique(), columns=list(names), fill_value=0)
         looks = dict(zip(names, (*PATTERNS[: len(names) - 1], (GOOD, "")), strict=True))
-        _stacked(axis, counts, looks)
-        handles = [Rectangle((0, 0), 1, 1, **_look(*look)) for look in looks.values()]
+        _numbered(axis, counts, looks)
+        handles = [Rectangle((0, 0), 1, 1, **hatched(*look)) for look in looks.values()]
         axis.legend(handles, names, loc="upper center", **BELOW)
         axis.set_xlabel("runs")
     axes[0].set_title("what was at work when the cost rose", **SUBTITLE)
-    axes[1].set_title("how the last drive ended", **SUBTITLE)
+    axes[1].set_title("how the last rollout ended", **SUBTITLE)
     axes[0].invert_yaxis()
     wrong = moved.mechanism[moved.mechanism != WELL].value_counts()
     listed = ", ".join(f"{count} {name}" for name, count in wrong.items())
@@ -59,12 +67,12 @@ def reasons(found: Evidence) -> Figure:
 
 
 @page
-def traced(examples: Mapping[str, RunSummary], first_drives: Mapping[str, Column]) -> Figure:
+def traced(examples: Mapping[str, RunSummary], first_rollouts: Mapping[str, Column]) -> Figure:
     """One run of each mechanism, a column each: what its summary says around the rise of the cost.
 
     Args:
         examples: a run by mechanism.
-        first_drives: by mechanism, the states of theta_init's drive in the same layout.
+        first_rollouts: by mechanism, the states of theta_init's rollout in the same layout.
     """
     if not examples:
         figure, axis = subplots(height=0.6)
@@ -72,7 +80,7 @@ def traced(examples: Mapping[str, RunSummary], first_drives: Mapping[str, Column
         return headed(figure, "No run went wrong")
     figure, axes = subplots(4, len(examples), 6.2, sharex="col", squeeze=False)
     for column, (name, run) in zip(axes.T, examples.items(), strict=True):
-        _trace(column, run, first_drives[name])
+        _trace(column, run, first_rollouts[name])
         e = run.name
         column[0].set_title(f"{name}\n{e.learner}, {e.layout}, per {e.decay}", **SUBTITLE)
         column[-1].set_xlabel("episode")
@@ -90,7 +98,7 @@ def traced(examples: Mapping[str, RunSummary], first_drives: Mapping[str, Column
     return marked(headed(figure, f"One run of each kind: {names}"), mark)
 
 
-def _trace(column: Column, run: RunSummary, first_drive: Column) -> None:
+def _trace(column: Column, run: RunSummary, first_rollout: Column) -> None:
     """The four panels of one run."""
     task = paper.task(run.name.layout, box=run.name.box)
     window, color = rise(run), LOOKS[run.name.learner].color
@@ -110,24 +118,17 @@ def _trace(column: Column, run: RunSummary, first_drive: Column) -> None:
         plain(column[1].yaxis)
     low, high = column[3].get_ylim()
     column[3].set_ylim(max(low, SEEN[0]), min(high, SEEN[1]))
-    limits = (1.0, OVERSHOOT, OVER_PREDICTED, closes_at(task, first_drive[:, :2]))
+    limits = (1.0, OVERSHOOT, OVER_PREDICTED, closes_at(task, first_rollout[:, :2]))
     for axis, limit in zip(column, limits, strict=True):
         axis.axvspan(window.start, window.stop, color="0.9", zorder=0)
         axis.axhline(limit, **LIMIT)
         axis.xaxis.set_major_locator(MaxNLocator(3, integer=True))
 
 
-def _stacked(axis: Axes, counts: pd.DataFrame, looks: Mapping[str, tuple[str, str]]) -> None:
+def _numbered(axis: Axes, counts: pd.DataFrame, looks: Mapping[str, tuple[str, str]]) -> None:
     """A bar a learner, with the number in each part that has room for it."""
-    left = np.zeros(len(counts))
-    for name, look in looks.items():
-        bars = axis.barh(counts.index, counts[name], 0.7, left, **_look(*look))
-        enough = 0.06 * counts.sum(axis=1).max()
+    enough = 0.06 * counts.sum(axis=1).max()
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
+    for name, bars in stacked(axis, counts, looks, 0.7).items():
         labels = [str(n) if n > enough else "" for n in counts[name]]
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
         axis.bar_label(bars, labels, label_type="center", fontsize="x-small", bbox=box)
-        left += counts[name].to_numpy()
-
-
-def _look(color: str, hatch: str) -> dict[str, Any]:
-    return {"facecolor": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}

@@ -1,4 +1,4 @@
-"""Figures of chapter 4: gradient TD in the place of the semi-gradient."""
+"""Figures of GES: gradient TD in the place of the semi-gradient."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -6,27 +6,17 @@ from matplotlib.figure import Figure
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import Curvature, directions
 from nmpcrl.analysis.two_state import Chain, follow, spectral_radius
-from nmpcrl.claims.paper_claims import unstable
+from nmpcrl.claims.failure_modes import OVERSHOOT
 from nmpcrl.learning.learners import gradient_td, semi_gradient
-from nmpcrl.report.figures.rdes import (
-    DECAYS,
-    headed,
-    label_panel,
-    learning_curves,
-    one_entry_each,
-    runs_where,
-    thin,
-)
-from nmpcrl.report.figures.style import LOOKS, page, subplots
+from nmpcrl.report.figures.axes import label_panel, one_entry_each
+from nmpcrl.report.figures.style import DECAYS, LOOKS, headed, page, subplots, thin
 from nmpcrl.study import paper
 from nmpcrl.study.store import Runs
-
-OVERSHOOT = 2.0  # alpha ||phi||^2 beyond which a semi-gradient step overshoots its target
 
 
 @page
 def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates: int) -> Figure:
-    """theta over expected updates, and the growth per update against beta / alpha."""
+    """theta over expected updates, and the spectral radius against beta / alpha."""
     figure, (left, right) = subplots(1, 2, 3.3)
     path = follow(chain, semi_gradient(alpha), updates)[:, 0]
     left.semilogy(np.abs(path), **LOOKS["ES"].line, label="semi-gradient")
@@ -45,7 +35,7 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
     right.axhline(1, color="0.6", linewidth=1)
     right.axvline(paper.BETA / paper.ALPHA, color="0.35", linewidth=1, linestyle=":")
     right.annotate(" Table I", (paper.BETA / paper.ALPHA, radius.max()), color="0.35", va="top")
-    right.set(xlabel=r"$\beta / \alpha$ [-]", ylabel="growth per update [-]")
+    right.set(xlabel=r"$\beta / \alpha$ [-]", ylabel="spectral radius [-]")
     enough = grid[radius < 1]
     return headed(
         figure,
@@ -56,13 +46,13 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
 
 
 @page
-def overshoots(study: Runs, learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
+def overshoots(runs: Runs, learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
     """Largest alpha ||phi||^2 of each episode, one panel a reading of the decay; 2 is marked."""
-    decays = study.values_of("decay")
+    decays = runs.values_of("decay")
     figure, axes = subplots(1, len(decays), 3.0, sharey=True, squeeze=False)
     for panel, decay in zip(axes[0], decays, strict=True):
         for learner in learners:
-            for records in study.select(learner=learner, decay=decay).values():
+            for records in runs.select(learner=learner, decay=decay).values():
                 largest = metrics.by_episode(records, records.steps["alpha_phi2"], np.max)
                 panel.plot(np.arange(1, largest.size + 1), largest, **thin(learner))
         panel.axhline(OVERSHOOT, color="0.35", linewidth=1)
@@ -73,26 +63,25 @@ def overshoots(study: Runs, learners: tuple[str, ...] = ("ES", "GES")) -> Figure
     axes[0, 0].set_ylabel(r"largest $\alpha\,\Vert\phi\Vert^2$ [-]")
     one_entry_each(axes[0, -1], learners)
     shares = [
-        f"{np.median([metrics.overshooting(r) for r in runs.values()]):.1%} of the steps of {name}"
+        f"{np.median([metrics.overshooting(r) for r in mine.values()]):.1%} of the steps of {name}"
         for name in learners
-        if (runs := study.select(learner=name))
+        if (mine := runs.select(learner=name))
     ]
     return headed(figure, f"Steps above 2: {' and '.join(shares)} (medians)")
 
 
 @page
-def corrections(study: Runs) -> Figure:
+def corrections(runs: Runs) -> Figure:
     """Corrections beside semi-gradients, summed over each episode of GES; a line a run."""
-    runs = study.select(learner="GES")
     figure, axes = subplots(height=2.9)
     shares = []
-    for experiment, records in runs.items():
+    for experiment, records in runs.select(learner="GES").items():
         parts = directions(records)
-        ours, theirs = (np.bincount(parts.episode, length) for length in parts.lengths)
+        gradient, correction = (np.bincount(parts.episode, one) for one in parts.lengths)
         look = {**thin("GES"), "linestyle": "-" if experiment.decay == "step" else ":"}
-        axes.plot(np.arange(1, ours.size + 1), theirs / ours, **look)
+        axes.plot(np.arange(1, gradient.size + 1), correction / gradient, **look)
         shares.append(parts.share)
-    for decay in study.values_of("decay"):
+    for decay in runs.values_of("decay"):
         line = "-" if decay == "step" else ":"
         axes.plot([], [], color=LOOKS["GES"].color, linestyle=line, label=DECAYS[decay])
     axes.axhline(1, color="0.6", linewidth=1)
@@ -115,11 +104,3 @@ def curvatures(measured: tuple[Curvature, ...]) -> Figure:
     axes.set(ylabel="dropped / printed [-]")
     axes.set_title(f"The dropped term is {np.median(every):.1%} of the printed one (median)")
     return figure
-
-
-@page
-def figure_2(study: Runs) -> Figure:
-    """Figure 2 of the paper, ES against GES, with the noise-free cost and the frozen arm."""
-    figure = learning_curves(study, ("ES", "GES"))
-    counts = [f"{name} in {runs_where(study, name, unstable)}" for name in ("ES", "GES")]
-    return headed(figure, f"Instability: {', '.join(counts)} runs")

@@ -1,6 +1,6 @@
-"""Figures of chapter 6: layouts, theta_c among them, and where the borders of the claims lie.
+"""Figures of the layouts, theta_c among them, and where the borders of the claims lie.
 
-The map of the verdicts is in `figures.atlas`.
+The map of the verdicts is in `figures.robustness`.
 """
 
 from collections.abc import Mapping
@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.summary import RunSummary
@@ -21,14 +19,21 @@ from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.measures import MEASURES, Values, at_borders, steady
 from nmpcrl.claims.rule import NEARLY_ALL, NEARLY_NONE
 from nmpcrl.control import Task
-from nmpcrl.report.figures.controller import draw_task
-from nmpcrl.report.figures.rdes import headed
-from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.report.figures.axes import draw_task, map_grid, plain
+from nmpcrl.report.figures.style import (
+    LIMIT,
+    LOOKS,
+    TEAL,
+    WINE,
+    headed,
+    marked,
+    page,
+    subplots,
+)
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import gaps
 
-LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
-OPEN, CLOSED = "#1B7F79", "#882255"  # a gap; neither is a learner's colour
+OPEN, CLOSED = TEAL, WINE  # a gap
 LEARNING = ("ES", "RDES", "GES", "TDC")  # whose theta_c is drawn; that of DES may go anywhere
 NEAR = 0.05  # of theta_c from d_o
 NARROW = 1.0  # a gap that is drawn leaves less than this [m]
@@ -44,17 +49,16 @@ BORDERS = {  # at which each claim is decided once more
 
 
 @page
-def layouts(drives: Mapping[str, Matrix]) -> Figure:
-    """The layouts, theta_init's first drive in each, and the gaps that it goes through.
+def layouts(rollouts: Mapping[str, Matrix]) -> Figure:
+    """The layouts, theta_init's first rollout in each, and the gaps that it goes through.
 
     Args:
-        drives: states of the drive without noise, shape (K + 1, n), by layout.
+        rollouts: states of the rollout without noise, shape (K + 1, n), by layout.
     """
-    rows = -(-len(drives) // 3)
-    figure, grid = subplots(rows, 3, 2.0 * rows + 0.4, squeeze=False, sharex=True, sharey=True)
+    figure, maps, grid = map_grid(list(rollouts), 2.0, 0.4)
     margin, closing = paper.task().margin, 0
-    for axes, (name, states) in zip(grid.flat, drives.items(), strict=False):
-        task = paper.task(name)
+    for name, states in rollouts.items():
+        axes, task = maps[name], paper.task(name)
         widths = gaps(task, states[:, :2], margin)
         narrowest = min(widths.values(), default=np.inf)
         closing += narrowest <= 0
@@ -66,12 +70,10 @@ def layouts(drives: Mapping[str, Matrix]) -> Figure:
         kind = "closing" if narrowest <= 0 else "open"
         axes.set_title(f"{name}: {kind}, {narrowest:+.2f} m", fontsize=9)
     grid[0, 0].set_ylim(-3.0, 6.0)
-    for axes in grid.flat[len(drives) :]:
-        axes.set_visible(False)
     figure.supxlabel("x [m]", fontsize=9)
     figure.supylabel("y [m]", fontsize=9)
-    count = f"{closing} of {len(drives)} layouts"
-    finding = rf"In {count}, a gap of the first drive is closed at $\theta_c$ = {margin:g}"
+    count = f"{closing} of {len(rollouts)} layouts"
+    finding = rf"In {count}, a gap of the first rollout is closed at $\theta_c$ = {margin:g}"
     return headed(figure, finding)
 
 
@@ -138,13 +140,6 @@ def borders(values: Mapping[str, Values], mark: str) -> Figure:
     stay = sum(steady(MEASURES[claim], measured) for claim, measured in values.items())
     finding = f"{stay} of {len(values)} verdicts stay with a border half as far, and twice as far"
     return marked(headed(figure, finding), mark)
-
-
-def plain(axis: Axis) -> None:
-    """Write the ticks of a logarithmic axis as 0.5, 1, 2 and not as powers of ten."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_locator(NullLocator())
 
 
 def same_verdict(curve: pd.DataFrame, border: float) -> tuple[float, float]:

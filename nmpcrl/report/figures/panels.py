@@ -1,32 +1,20 @@
-"""What figures of chapter 5 are made of: bundles of runs, strips by layout, shares of yes."""
-
-from collections.abc import Callable, Iterable
-from typing import Any
+"""Parts of figures that show evidence: bundles of runs, strips by layout, shares of yes."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullFormatter
 
-from nmpcrl import Vector
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.claims import rule
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.measures import Values
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.report.figures.layouts import plain
-from nmpcrl.report.figures.rdes import headed
-from nmpcrl.report.figures.style import LOOKS, marked
+from nmpcrl.report.figures.axes import jitter, logarithmic
+from nmpcrl.report.figures.style import INK, LIMIT, LOOKS, dots, headed, line, marked
 from nmpcrl.study.records import Column
 
-LIMIT: dict[str, Any] = {"color": "0.4", "linewidth": 0.8, "linestyle": (0, (2, 2))}
-SUBTITLE: dict[str, Any] = {"loc": "left", "fontsize": "medium", "fontweight": "normal"}
-INK = "0.25"
 QUARTILES = (0.25, 0.5, 0.75)
-DEEP = 1e4  # what is less than this part of a threshold is drawn as much
-LEAST = 1.5  # high over low of an axis that has hardly anything to show
-FEW = 20  # high over low of an axis on which powers of ten are too few
 
 
 def part(found: Evidence, learners: tuple[str, ...], layout: str | None = None) -> Evidence:
@@ -95,61 +83,6 @@ def shares(axis: Axes, verdict: Verdict) -> None:
     axis.set(xlim=(-0.04, 1.04), ylim=(len(names) - 0.5, -0.5))
     axis.set_xticks((0, 0.5, 1), ("0", "0.5", "1"))
     axis.set_xlabel("share of yes")
-
-
-def logarithmic(axis: Axes, which: str, values: Vector, border: float) -> Callable[[Any], Any]:
-    """Make the "x" or "y" axis logarithmic, with a grey strip at its end for what is infinite.
-
-    Args:
-        axis: whose axis it is.
-        which: "x" or "y".
-        values: all that will be drawn.
-        border: a threshold that is to be seen as well.
-
-    Returns:
-        What puts values where they are drawn: nan counts as infinite.
-    """
-    finite = [*values[np.isfinite(values) & (values > border / DEEP)], border]
-    high = max(finite)
-    low = min(*finite, high / LEAST)
-    room = (high / low) ** 0.06
-    start, middle, stop = high * room ** np.array([1, 2, 3])
-    axis.set(**{f"{which}scale": "log", f"{which}lim": (low / room, stop)})
-    if which == "x":
-        axis.axvspan(start, stop, color="0.93", zorder=0)
-        axis.text(middle, 0.01, "∞", transform=axis.get_xaxis_transform(), ha="center")
-    else:
-        axis.axhspan(start, stop, color="0.93", zorder=0)
-        axis.text(0.01, middle, "∞", transform=axis.get_yaxis_transform(), va="center")
-    ticks = {"x": axis.xaxis, "y": axis.yaxis}[which]
-    if high / low < FEW:
-        plain(ticks)
-    ticks.set_minor_formatter(NullFormatter())
-    return lambda drawn: np.clip(np.nan_to_num(drawn, nan=np.inf), low, middle)
-
-
-def jitter(count: int, width: float) -> Vector:
-    """Places beside each other, so that no run hides another."""
-    return np.linspace(-width, width, count) if count > 1 else np.zeros(count)
-
-
-def line(learner: str) -> dict[str, Any]:
-    """How a median is drawn."""
-    return {**LOOKS[learner].line, "linewidth": 1.6}
-
-
-def dots(learner: str, **others: Any) -> dict[str, Any]:
-    """How single runs are drawn as points."""
-    look = LOOKS[learner]
-    style = {"color": look.color, "marker": look.marker, "linestyle": "", "markersize": 4}
-    return style | others
-
-
-def legend(figure: Figure, learners: Iterable[str], *others: Line2D) -> None:
-    """One entry a learner, below all panels."""
-    handles = [Line2D([], [], label=name, **line(name)) for name in learners]
-    handles += others
-    figure.legend(handles=handles, loc="outside lower left", ncols=len(handles))
 
 
 def sourced(figure: Figure, title: str, drawn: Evidence) -> Figure:

@@ -10,8 +10,8 @@ from matplotlib.ticker import FuncFormatter
 
 from nmpcrl.bench import summary
 from nmpcrl.bench.summary import Bench
-from nmpcrl.report.figures.rdes import headed
-from nmpcrl.report.figures.style import LOOKS, page, subplots
+from nmpcrl.report.figures.axes import stacked
+from nmpcrl.report.figures.style import INK, LOOKS, STEP_PARTS, SUBTITLE, headed, page, subplots
 from nmpcrl.study import paper
 
 NAMES = {
@@ -22,13 +22,6 @@ NAMES = {
     "rebuilt": "rebuilt each time",
 }
 MARKERS = {"riccati": "o", "fatrop": "s", "ipopt": "^", "ipopt MX": "v", "rebuilt": "D"}
-PARTS = {  # of a learning step: column of `time_learners`, colour and hatching
-    "solves": ("#0072B2", ""),
-    "network": ("#E69F00", "//"),
-    "the rest": ("0.8", ""),
-}
-INK = "0.25"
-SUBTITLE: dict[str, Any] = {"fontsize": "medium", "fontweight": "normal"}
 
 
 @page
@@ -65,12 +58,7 @@ def learning_steps(bench: Bench) -> Figure:
     solvers = table.solver.unique()
     figure, axes = subplots(1, len(solvers), 2.6, sharey=True, squeeze=False)
     for panel, solver in zip(axes[0], solvers, strict=True):
-        parts = _parts(table[table.solver == solver])
-        left = np.zeros(len(parts))
-        for name, (color, hatch) in PARTS.items():
-            style = {"color": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}
-            panel.barh(parts.index, parts[name], 0.65, left, label=name, **style)
-            left += parts[name]
+        stacked(panel, _parts(table[table.solver == solver]), STEP_PARTS, 0.65)
         panel.set_title(NAMES[solver], **SUBTITLE)
         panel.set_xlabel("ms a step")
     axes[0, 0].invert_yaxis()
@@ -87,7 +75,7 @@ def _parts(table: pd.DataFrame) -> pd.DataFrame:
     """Milliseconds of each part, a row a learner."""
     mine = table.set_index("learner")
     columns = (mine.solves * mine.ms_per_solve, mine.ms_per_fit.fillna(0.0), mine.ms_per_rest)
-    return pd.DataFrame(dict(zip(PARTS, columns, strict=True)))
+    return pd.DataFrame(dict(zip(STEP_PARTS, columns, strict=True)))
 
 
 @page

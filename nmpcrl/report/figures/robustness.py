@@ -1,4 +1,4 @@
-"""Figures of chapter 6: the map of the verdicts, and what lies behind some of its cells."""
+"""The robustness analysis: a map of the verdicts, and what lies behind some of its cells."""
 
 from collections.abc import Iterable, Mapping
 from itertools import pairwise
@@ -18,9 +18,8 @@ from nmpcrl.claims.measures import MEASURES, Values
 from nmpcrl.claims.paper_claims import experiment_of
 from nmpcrl.claims.robustness import WHOLE, groups
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.report.figures.layouts import plain
-from nmpcrl.report.figures.rdes import headed
-from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
+from nmpcrl.report.figures.axes import plain
+from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, marked, page, subplots
 from nmpcrl.report.tables import WORDS
 from nmpcrl.study.experiment import Experiment
 
@@ -47,18 +46,18 @@ MOST_COST = 1.5  # of theta_init's, that is drawn
 
 
 @page
-def verdict_map(atlas: pd.DataFrame, mark: str) -> Figure:
+def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
     """What becomes of each claim in each row; a frame where it is not what it is held against.
 
     Args:
-        atlas: of `robustness.atlas`.
+        judged: of `robustness.atlas`.
         mark: where the runs come from.
     """
-    claims, rows = list(atlas.claim.unique()), list(atlas.variant.unique())
-    letters = dict(zip(atlas.variant, atlas.departure, strict=True))
+    claims, rows = list(judged.claim.unique()), list(judged.variant.unique())
+    letters = dict(zip(judged.variant, judged.departure, strict=True))
     height = dict(zip(rows, _heights([letters[row] for row in rows]), strict=True))
     figure, axes = subplots(height=0.22 * max(height.values(), default=0) + 1.4)
-    for cell in atlas.to_dict("records"):
+    for cell in judged.to_dict("records"):
         _cell(axes, claims.index(cell["claim"]), height[cell["variant"]], cell)
     for row, y in height.items():
         axes.text(-0.1, y, named(row), ha="right", va="center", fontsize=8)
@@ -69,7 +68,7 @@ def verdict_map(atlas: pd.DataFrame, mark: str) -> Figure:
         axes.text(i + 0.5, -0.8, head, ha="center", va="bottom", fontsize=7.5)
     axes.set(xlim=(-2.5, len(claims)), ylim=(max(height.values(), default=0) + 0.7, -3.0))
     axes.set_axis_off()
-    return marked(headed(figure, _flipped(atlas)), mark)
+    return marked(headed(figure, _changed(judged)), mark)
 
 
 @page
@@ -83,17 +82,17 @@ def telling(cells: pd.DataFrame, found: Evidence) -> Figure:
     if cells.empty:
         figure, axes = subplots(height=0.6)
         axes.set_axis_off()
-        return headed(figure, "No verdict flips in what was run here")
+        return headed(figure, "No verdict changes in what was run here")
     figure, grid = subplots(
         len(cells), 2, 2.5 * len(cells) + 0.3, squeeze=False, width_ratios=(1, 1)
     )
     for (left, right), cell in zip(grid, cells.to_dict("records"), strict=True):
-        here, usual = groups(found.runs, cell["variant"])
+        here, base = groups(found.runs, cell["variant"])
         measure, where = MEASURES[cell["claim"]], paths(found)
-        values = measure.of(here, where), measure.of(usual, where)
+        values = measure.of(here, where), measure.of(base, where)
         _strips(left, cell["claim"], *values)
         learners = [name for name in LOOKS if any(name in arm.split() for arm in values[0])]
-        _costs(right, found.summaries, here, usual, learners)
+        _costs(right, found.summaries, here, base, learners)
         left.set_title(f"{cell['claim']}: {cell['outcome']}; was: {cell['base']}", fontsize=9)
         right.set_title(f"{named(cell['variant'])} (bands: without it)", fontsize=9)
     listed = ", ".join(f"{row.claim} by {named(row.variant)}" for row in cells.itertuples())
@@ -114,7 +113,7 @@ def _heights(letters: list[str]) -> list[float]:
 
 
 def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
-    """Colour, word and share of yes; framed, and with what it was before, if it flips."""
+    """Colour, word and share of yes; framed, and with what it was before, if it changes."""
     fill, ink = FILLS[cell["outcome"]]
     place, size = (column + 0.03, y - 0.46), (0.94, 0.92)
     axes.add_patch(Rectangle(place, *size, facecolor=fill, edgecolor="0.8", linewidth=0.5))
@@ -127,23 +126,23 @@ def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
     axes.text(column + 0.5, y, text, ha="center", va="center", color=ink, fontsize=7.5)
 
 
-def _flipped(atlas: pd.DataFrame) -> str:
-    """How many cells flip, and of which claims none does."""
-    decided = atlas[(atlas.variant != WHOLE) & (atlas.outcome != UNDECIDABLE)]
+def _changed(judged: pd.DataFrame) -> str:
+    """How many verdicts change, and of which claims none does."""
+    decided = judged[(judged.variant != WHOLE) & (judged.outcome != UNDECIDABLE)]
     decided = decided[decided.base != UNDECIDABLE]
-    flips = decided.groupby("claim", sort=False).flips.sum()
-    never = [str(claim) for claim, count in flips.items() if not count]
-    steady = f"; those on {' and '.join(never)} never" if never and flips.any() else ""
-    return f"{int(flips.sum())} of {len(decided)} decided verdicts flip{steady}"
+    changes = decided.groupby("claim", sort=False).flips.sum()
+    never = [str(claim) for claim, count in changes.items() if not count]
+    steady = f"; those on {' and '.join(never)} never" if never and changes.any() else ""
+    return f"{int(changes.sum())} of {len(decided)} decided verdicts change{steady}"
 
 
-def _strips(axes: Axes, claim: str, here: Values, usual: Values) -> None:
-    """The measure of each run, arm by arm: hollow as usual, filled where something is varied."""
+def _strips(axes: Axes, claim: str, here: Values, base: Values) -> None:
+    """The measure of each run, arm by arm: hollow for the baseline, filled for the variant."""
     measure = MEASURES[claim]
-    low, high = _finite_range(pd.concat([here, usual]), measure.border)
+    low, high = _finite_range(pd.concat([here, base]), measure.border)
     for i, arm in enumerate(here):
         look = LOOKS[arm.split()[-1]]
-        for shift, values, face in ((-0.2, usual, "none"), (0.2, here, look.color)):
+        for shift, values, face in ((-0.2, base, "none"), (0.2, here, look.color)):
             numbers = values[arm].dropna().clip(low, high)
             x = i + shift + np.linspace(-0.12, 0.12, len(numbers))
             style: dict[str, Any] = {
@@ -153,7 +152,7 @@ def _strips(axes: Axes, claim: str, here: Values, usual: Values) -> None:
                 "alpha": 0.8,
             }
             axes.plot(x, numbers, look.marker, linestyle="", **style)
-    axes.axhline(measure.border, color="0.35", linewidth=0.9, linestyle=(0, (2, 2)))
+    axes.axhline(measure.border, **LIMIT)
     axes.set_yscale(**SCALES.get(claim, {"value": "log"}))
     if claim in SCALES:
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -167,13 +166,13 @@ def _costs(
     axes: Axes,
     summaries: Mapping[Experiment, RunSummary],
     here: pd.DataFrame,
-    usual: pd.DataFrame,
+    base: pd.DataFrame,
     learners: Iterable[str],
 ) -> None:
-    """Noise-free cost over training: a line a run here, and the quartiles of the usual ones."""
+    """Noise-free cost over training: a line a run here, and the quartiles of the baseline."""
     for name in learners:
         look = LOOKS[name]
-        episode, costs = _curves(summaries, usual[usual.learner == name])
+        episode, costs = _curves(summaries, base[base.learner == name])
         quartiles = np.percentile(costs, (25, 75), axis=0)
         axes.fill_between(episode, *quartiles, color=look.color, alpha=0.2, linewidth=0)
         episode, costs = _curves(summaries, here[here.learner == name])
@@ -189,7 +188,7 @@ def _curves(
 ) -> tuple[Vector, Matrix]:
     """After which episodes, and the noise-free costs over theta_init's, shape (runs, rollouts).
 
-    What a run did not reach, and a failed drive, costs more than is drawn.
+    What a run did not reach, and a failed rollout, costs more than is drawn.
     """
     judged = [summaries[experiment_of(row)].evaluations for row in runs.to_dict("records")]
     episode = max((one["episode"] for one in judged), key=len)

@@ -1,6 +1,6 @@
-"""Figures of chapter 5: the learned policies at the wheel, Figs. 3 and 4 of the paper over seeds.
+"""Rollouts of the learned policies without noise: Figs. 3 and 4 of the paper, over seeds.
 
-A run that had to be stopped left no policy to drive with: it is counted, and not drawn.
+A run that had to be stopped left no policy: it is counted, and not drawn.
 """
 
 from collections import Counter
@@ -14,10 +14,9 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ending
 from nmpcrl.control import Task
-from nmpcrl.report.figures.controller import draw_task
-from nmpcrl.report.figures.panels import LIMIT, SUBTITLE, bundle, legend, part, sourced
-from nmpcrl.report.figures.rdes import DECAYS
-from nmpcrl.report.figures.style import LOOKS, page, subplots
+from nmpcrl.report.figures.axes import draw_task, legend, map_grid
+from nmpcrl.report.figures.panels import bundle, part, sourced
+from nmpcrl.report.figures.style import DECAYS, LIMIT, LOOKS, SUBTITLE, page, subplots
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column
@@ -31,9 +30,9 @@ SHOWN = ("frozen", *LEARNED)
 def controls(found: Evidence, layout: str) -> Figure:
     """Fig. 3 of the paper: the inputs under the learned policies, without noise.
 
-    Drives whose inputs are not kept, as those of published runs, are left out.
+    Rollouts whose inputs are not kept, as those of published runs, are left out.
     """
-    drawn = _driving(part(found, SHOWN, layout))
+    drawn = _finished(part(found, SHOWN, layout))
     drawn = drawn.where([summary.actions.size > 0 for summary in drawn.summaries.values()])
     plant = paper.nmpc(layout).plant
     figure, axes = _against_time(drawn, "actions", plant.action_names, 4.2)
@@ -44,14 +43,14 @@ def controls(found: Evidence, layout: str) -> Figure:
     learned = _learned(drawn)
     outside = sum(metrics.input_violations(d.actions, plant.lower, plant.upper) for d in learned)
     verb = f"{outside} inputs leave" if outside else "all inputs keep within"
-    title = f"In {len(learned)} drives of RDES and GES, {verb} their bounds"
-    return sourced(figure, title if learned else "Of no drive are the inputs kept", drawn)
+    title = f"In {len(learned)} rollouts of RDES and GES, {verb} their bounds"
+    return sourced(figure, title if learned else "The inputs of no rollout are kept", drawn)
 
 
 @page
 def states(found: Evidence, layout: str) -> Figure:
     """Fig. 4 of the paper against time: the states under the learned policies."""
-    drawn = _driving(part(found, SHOWN, layout))
+    drawn = _finished(part(found, SHOWN, layout))
     task, plant = paper.task(layout), paper.nmpc(layout).plant
     figure, axes = _against_time(drawn, "states", plant.state_names, 5.4)
     for i, row in enumerate(axes):
@@ -59,21 +58,21 @@ def states(found: Evidence, layout: str) -> Figure:
             axis.axhline(task.target[i], **LIMIT)
     ends = np.array([task.distance(summary.states[-1]) for summary in _learned(drawn)])
     arrived = int((ends <= ARRIVED).sum())
-    title = f"{arrived} of {ends.size} drives of RDES and GES end at the target"
+    title = f"{arrived} of {ends.size} rollouts of RDES and GES end at the target"
     return sourced(figure, f"In layout {layout}, {title}", drawn)
 
 
 @page
 def paths(found: Evidence, layout: str) -> Figure:
-    """Fig. 4 of the paper in the plane: where the learned policies drive, without noise.
+    """Fig. 4 of the paper in the plane: where the learned policies lead the robot, without noise.
 
     One line a run and none for the median, for a median of places is no place that a robot was.
     """
     drawn = part(found, SHOWN, layout)
-    driving, decays = _driving(drawn), drawn.summaries.values_of("decay")
+    finished, decays = _finished(drawn), drawn.summaries.values_of("decay")
     figure, axes = subplots(1, len(decays), 3.5, sharey=True, squeeze=False)
     for axis, decay in zip(axes[0], decays, strict=True):
-        _map(axis, paper.task(layout), driving.summaries.select(decay=decay))
+        _map(axis, paper.task(layout), finished.summaries.select(decay=decay))
         axis.set_title(DECAYS[decay], **SUBTITLE)
         axis.set_xlabel("x [m]")
     axes[0, 0].set_ylabel("y [m]")
@@ -83,23 +82,17 @@ def paths(found: Evidence, layout: str) -> Figure:
 
 @page
 def maps(found: Evidence) -> Figure:
-    """Where the learned policies drive in every layout, both readings of the decay."""
+    """Where the learned policies lead the robot in every layout, both readings of the decay."""
     drawn = part(found, SHOWN)
     layouts = drawn.summaries.values_of("layout")
-    columns = min(3, len(layouts))
-    rows = -(-len(layouts) // columns)
-    figure, axes = subplots(
-        rows, columns, 1.95 * rows + 0.8, sharex=True, sharey=True, squeeze=False
-    )
-    for axis, layout in zip(axes.flat, layouts, strict=False):
-        runs = _driving(drawn).summaries.select(layout=layout)
+    figure, by_layout, grid = map_grid(layouts, 1.95, 0.8)
+    for layout, axis in by_layout.items():
+        runs = _finished(drawn).summaries.select(layout=layout)
         _map(axis, paper.task(layout), runs, names=False)
         axis.set_title(layout, **SUBTITLE)
-    for axis in axes.flat[len(layouts) :]:
-        axis.set_axis_off()
-    for axis in axes[-1]:
+    for axis in grid[-1]:
         axis.set_xlabel("x [m]")
-    for axis in axes[:, 0]:
+    for axis in grid[:, 0]:
         axis.set_ylabel("y [m]")
     legend(figure, SHOWN)
     return sourced(figure, f"In all layouts: {_endings(_learned(drawn))}", drawn)
@@ -115,9 +108,9 @@ def _against_time(
     for column, decay in zip(axes.T, decays, strict=False):
         for learner in SHOWN:
             runs = drawn.summaries.select(learner=learner, decay=decay).values()
-            driven = np.array([getattr(summary, name) for summary in runs])
-            for i, axis in enumerate(column if driven.size else ()):
-                bundle(axis, period * np.arange(driven.shape[1]), driven[:, :, i], learner)
+            values = np.array([getattr(summary, name) for summary in runs])
+            for i, axis in enumerate(column if values.size else ()):
+                bundle(axis, period * np.arange(values.shape[1]), values[:, :, i], learner)
         column[0].set_title(DECAYS[decay], **SUBTITLE)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
@@ -128,7 +121,7 @@ def _against_time(
 
 
 def _map(axis: Axes, task: Task, runs: Runs[RunSummary], *, names: bool = True) -> None:
-    """Obstacles, start, target and drives; a mark where each drive ended."""
+    """Obstacles, start, target and trajectories; a mark where each ended."""
     draw_task(axis, task, labels=names)
     for learner in SHOWN:
         look = LOOKS[learner]
@@ -144,13 +137,13 @@ def _learned(drawn: Evidence) -> list[RunSummary]:
     return [summary for e, summary in drawn.summaries.items() if e.learner in LEARNED]
 
 
-def _driving(found: Evidence) -> Evidence:
-    """Without the runs that had to be stopped, which left no policy to drive with."""
+def _finished(found: Evidence) -> Evidence:
+    """Without the runs that had to be stopped, which left no policy."""
     return found.where(found.runs.stopped == "finished")
 
 
 def _endings(summaries: list[RunSummary]) -> str:
-    """How many drives of runs end in which way, the most common first."""
+    """How many rollouts end in which way, the most common first."""
     ends = Counter(
         ending(one.states, paper.task(one.name.layout))
         if one.facts["stopped"] == "finished"

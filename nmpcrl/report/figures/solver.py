@@ -12,12 +12,10 @@ from matplotlib.ticker import MaxNLocator
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.bench.scaling import exponents
-from nmpcrl.report.figures.controller import INK, LESS, MORE
-from nmpcrl.report.figures.rdes import headed
-from nmpcrl.report.figures.style import page, subplots
+from nmpcrl.report.figures.style import INK, TEAL, WINE, headed, page, subplots
 
-STARTS = {"cold": (INK, "o-"), "shifted": (LESS, "s--"), "same state": (MORE, "D-.")}
-SOLVERS = {"riccati": (MORE, "o-"), "fatrop": (LESS, "s--"), "ipopt": (INK, "^:")}
+STARTS = {"cold": (INK, "o-"), "shifted": (TEAL, "s--"), "same state": (WINE, "D-.")}
+SOLVERS = {"riccati": (WINE, "o-"), "fatrop": (TEAL, "s--"), "ipopt": (INK, "^:")}
 
 
 @page
@@ -32,7 +30,7 @@ def row_prices(
         prices: mu -> lam / W, shape (k,).
     """
     figure, (left, right) = subplots(1, 2, height=3.3)
-    shades = ("#C9A0B4", "#AA5D84", MORE)
+    shades = ("#C9A0B4", "#AA5D84", WINE)
     for (mu, penalty), shade, line in zip(penalties.items(), shades, (":", "--", "-"), strict=True):
         left.plot(h, penalty, color=shade, ls=line)
         right.plot(h, prices[mu], color=shade, ls=line, label=f"μ = {mu:g}")
@@ -67,7 +65,7 @@ def sparsity(by_kind: Matrix, by_stage: Matrix, folded: Matrix, step: int) -> Fi
         axes.set(xticks=[], yticks=[], xlabel=f"bandwidth {bandwidth(matrix)} [unknowns]")
         axes.spines[["top", "right"]].set_visible(True)
     corner = len(folded) - step - 0.5
-    look: dict[str, Any] = {"fill": False, "ec": MORE, "lw": 1.8, "zorder": 5, "clip_on": False}
+    look: dict[str, Any] = {"fill": False, "ec": WINE, "lw": 1.8, "zorder": 5, "clip_on": False}
     panels[2].add_patch(Rectangle((corner, corner), step, step, **look))
     far = bandwidth(by_stage)
     return headed(figure, f"Stage by stage, no entry is farther than {far} from the diagonal")
@@ -89,8 +87,8 @@ def curvature(exact: pd.DataFrame, straight: pd.DataFrame, tolerance: float) -> 
         tolerance: where the solver stops.
     """
     figure, axes = subplots(height=3.2)
-    axes.loglog(straight.index + 1, straight.error, "s--", color=LESS, ms=3, label="Gauss-Newton")
-    axes.loglog(exact.index + 1, exact.error, "o-", color=MORE, ms=4, label="exact Hessian")
+    axes.loglog(straight.index + 1, straight.error, "s--", color=TEAL, ms=3, label="Gauss-Newton")
+    axes.loglog(exact.index + 1, exact.error, "o-", color=WINE, ms=4, label="exact Hessian")
     axes.axhline(tolerance, color=INK, ls=":", lw=1)
     steps, others = len(exact) - 1, len(straight) - 1
     arrived = straight.error.iloc[-1] <= tolerance

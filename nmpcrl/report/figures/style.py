@@ -1,4 +1,4 @@
-"""What all figures share: the look of each learner, and the look of the page."""
+"""What all figures share: the look of each learner, of a line and of a page."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +24,7 @@ page: Any = plt.rc_context(PAGE)  # as a decorator; matplotlib's types do not kn
 
 @dataclass(frozen=True)
 class Look:
-    """How a learner is drawn, everywhere; told apart in grey and by the colour-blind."""
+    """How a learner is drawn, everywhere; distinct in grey, and to the colour-blind."""
 
     color: str
     linestyle: Any  # as matplotlib takes it
@@ -47,6 +47,55 @@ LOOKS = {
     "matched": Look("#E69F00", (0, (2, 1)), "<"),
     "random": Look("#8C5A2B", (0, (1, 1)), ">"),
 }
+
+INK, TEAL, WINE = "0.25", "#1B7F79", "#882255"  # none of them is a learner's
+LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
+SUBTITLE: dict[str, Any] = {"loc": "left", "fontsize": "medium", "fontweight": "normal"}
+DECAYS = {"step": "noise decays per step", "episode": "noise decays per episode"}
+SYMBOLS = {  # of paper.THETA_NAMES, between dollar signs
+    "x": r"\theta_x",
+    "y": r"\theta_y",
+    "heading": r"\theta_\varphi",
+    "v": r"\theta_v",
+    "nu": r"\theta_\nu",
+    "x_f": r"\theta_{x_f}",
+    "y_f": r"\theta_{y_f}",
+    "heading_f": r"\theta_{\varphi_f}",
+    "c": r"\theta_c",
+}
+STEP_PARTS = {  # of a learning step: colour and hatching
+    "solves": ("#0072B2", ""),
+    "network": ("#E69F00", "//"),
+    "the rest": ("0.8", ""),
+}
+
+
+def line(learner: str) -> dict[str, Any]:
+    """How a median is drawn."""
+    return {**LOOKS[learner].line, "linewidth": 1.6}
+
+
+def thin(learner: str) -> dict[str, Any]:
+    """How one of several lines of a learner is drawn."""
+    return {**LOOKS[learner].line, "linewidth": 1.2, "markersize": 3.5, "alpha": 0.85}
+
+
+def dots(learner: str, **others: Any) -> dict[str, Any]:
+    """How single runs are drawn as points."""
+    look = LOOKS[learner]
+    style = {"color": look.color, "marker": look.marker, "linestyle": "", "markersize": 4}
+    return style | others
+
+
+def hatched(color: str, hatch: str) -> dict[str, Any]:
+    """How a part of a bar is drawn."""
+    return {"facecolor": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}
+
+
+def headed(figure: Figure, finding: str) -> Figure:
+    """The figure with the finding above all panels."""
+    figure.suptitle(finding, x=0.01, ha="left", fontsize=10.5, fontweight="bold")
+    return figure
 
 
 def marked(figure: Figure, mark: str) -> Figure:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.evidence import paths
-from nmpcrl.report.figures import panels, results, rollouts
+from nmpcrl.report.figures import learning_curves, panels, rollouts
 from nmpcrl.study import Experiment, paper
 
 SEEDS = 4
@@ -41,7 +41,7 @@ def des_fails(experiment: Experiment) -> dict:
 
 
 def standing(states: np.ndarray) -> np.ndarray:
-    """The same drive, but the robot stays at the second place."""
+    """The same rollout, but the robot stays at the second place."""
     stuck = states.copy()
     stuck[2:] = stuck[1]
     return stuck
@@ -52,22 +52,22 @@ def standing(states: np.ndarray) -> np.ndarray:
 
 def test_costs_are_in_units_of_the_start_without_noise(made_up):
     run = next(iter(made_up(lambda e: {"end": 0.8, "training": 1.5}).summaries.values()))
-    np.testing.assert_allclose(results.trained(run)[1], 1.5)
-    np.testing.assert_allclose(results.judged(run)[1], [1.0, *[0.8] * 30])
+    np.testing.assert_allclose(learning_curves.trained(run)[1], 1.5)
+    np.testing.assert_allclose(learning_curves.judged(run)[1], [1.0, *[0.8] * 30])
 
 
 def test_what_was_cut_short_or_never_reached_costs_infinitely_much(made_up):
     run = next(iter(made_up(lambda e: {"reached": 100}).summaries.values()))
     run.episodes["cost"][3] = np.nan
-    episodes, cost = results.trained(run)
+    episodes, cost = learning_curves.trained(run)
     assert episodes[np.isinf(cost)].tolist() == [4, *range(101, 301)]
-    due, judged = results.judged(run)
+    due, judged = learning_curves.judged(run)
     assert due.tolist() == list(range(0, 301, 10))
     assert due[np.isinf(judged)].tolist() == list(range(110, 301, 10))
 
 
 def test_every_run_of_figure_1_has_a_line_and_every_learner_a_median(made_up):
-    figure = results.figure_1(made_up(), "A")
+    figure = learning_curves.figure_1(made_up(), "A")
     for axis in figure.axes:
         assert len(thin(axis)) == 3 * SEEDS  # DES, RDES and frozen
         assert len(thick(axis)) == 3
@@ -75,28 +75,28 @@ def test_every_run_of_figure_1_has_a_line_and_every_learner_a_median(made_up):
 
 def test_figures_1_and_2_count_what_the_claims_count(made_up):
     found = made_up(des_fails)
-    assert title(results.figure_1(found, "A")) == (
+    assert title(learning_curves.figure_1(found, "A")) == (
         "Divergence in layout A: DES in 8 of 8, RDES in 0 of 8 runs"
     )
-    assert "DES in 0 of 8" in title(results.figure_1(found, "D"))
+    assert "DES in 0 of 8" in title(learning_curves.figure_1(found, "D"))
     swinging = made_up(lambda e: {"swing": 0.1 * (e.learner == "ES")})
-    assert title(results.figure_2(swinging, "A")) == (
+    assert title(learning_curves.figure_2(swinging, "A")) == (
         "Instability in layout A: ES in 8 of 8, GES in 0 of 8 runs"
     )
 
 
 def test_a_median_leaves_its_panel_when_most_runs_were_stopped(made_up):
-    figure = results.figure_1(made_up(des_fails), "A")
+    figure = learning_curves.figure_1(made_up(des_fails), "A")
     for axis in (figure.axes[1], figure.axes[3]):  # noise per episode: above and below
-        assert axis.get_ylim()[1] <= results.CEILING
+        assert axis.get_ylim()[1] <= learning_curves.CEILING
         (des, *others) = (line.get_ydata()[-1] for line in thick(axis))
-        assert des > results.CEILING
-        assert max(others) < results.CEILING
+        assert des > learning_curves.CEILING
+        assert max(others) < learning_curves.CEILING
 
 
 def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
     found = made_up(lambda e: {"end": 0.6 + 0.1 * e.seed}, seeds=(0, 1, 2, 3, 4))
-    figure = results.figure_2(found, "A")
+    figure = learning_curves.figure_2(found, "A")
     band = figure.axes[2].collections[0].get_paths()[0].vertices[:, 1]  # of ES, without noise
     assert band.min() == pytest.approx(0.7)
     assert band.max() == pytest.approx(1.0)
@@ -106,7 +106,7 @@ def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
 def test_every_layout_has_its_column_headed_by_its_verdict(made_up):
     found = made_up(des_fails)
     (c1, *_) = paper_claims.judge_runs(found.runs, paths(found))
-    figure = results.by_layout(found, ("DES", "RDES"), c1)
+    figure = learning_curves.by_layout(found, ("DES", "RDES"), c1)
     assert heads(figure) == ["A: yes", "D: no"]
     assert title(figure) == "Does C1 hold? yes in A; no in D"
     assert all(len(thin(axis)) == 2 * SEEDS for axis in figure.axes)
@@ -116,16 +116,16 @@ def test_learners_that_were_not_run_leave_their_panels_empty(made_up):
     found = made_up()
     only = found.where(found.runs.learner.isin(("GES", "frozen")))
     (c1, *_) = paper_claims.judge_runs(only.runs, paths(only))
-    figure = results.by_layout(only, ("DES", "RDES"), c1)
+    figure = learning_curves.by_layout(only, ("DES", "RDES"), c1)
     assert heads(figure) == ["A: open", "D: open"]
-    assert title(results.figure_1(only, "A")).endswith("DES in 0 of 0, RDES in 0 of 0 runs")
+    assert title(learning_curves.figure_1(only, "A")).endswith("DES in 0 of 0, RDES in 0 of 0 runs")
 
 
-# Drives
+# Rollouts
 
 
 @pytest.mark.parametrize("draw", [rollouts.controls, rollouts.states])
-def test_every_drive_has_its_line_against_time(draw, made_up):
+def test_every_rollout_has_its_line_against_time(draw, made_up):
     figure = draw(made_up(), "A")
     assert {axis.get_xlabel() for axis in figure.axes} == {"", "time [s]"}
     for axis in figure.axes:
@@ -136,33 +136,33 @@ def test_every_drive_has_its_line_against_time(draw, made_up):
 
 def test_inputs_that_leave_their_bounds_are_counted(made_up):
     assert title(rollouts.controls(made_up(), "A")) == (
-        "In 16 drives of RDES and GES, all inputs keep within their bounds"
+        "In 16 rollouts of RDES and GES, all inputs keep within their bounds"
     )
     found = made_up(lambda e: {"actions": FAST} if (e.learner, e.seed) == ("GES", 0) else {})
     assert "10 inputs leave their bounds" in title(rollouts.controls(found, "A"))
 
 
-def test_drives_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
+def test_rollouts_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
     published = {"actions": np.empty((0, 0))}
     found = made_up(lambda e: published if e.seed else {})
     figure = rollouts.controls(found, "A")
-    assert title(figure).startswith("In 4 drives")
+    assert title(figure).startswith("In 4 rollouts")
     assert all(len(thin(axis)) == 3 for axis in figure.axes)
     nowhere = rollouts.controls(made_up(lambda e: published), "A")
-    assert title(nowhere) == "Of no drive are the inputs kept"
+    assert title(nowhere) == "The inputs of no rollout are kept"
 
 
 def test_those_that_arrive_are_counted_and_those_that_were_stopped_are_not_drawn(made_up):
-    drive = made_up().summaries[Experiment("RDES")].states
+    states = made_up().summaries[Experiment("RDES")].states
 
     def unlike(experiment: Experiment) -> dict:
         if (experiment.learner, experiment.seed) == ("RDES", 0):
-            return {"states": standing(drive)}
+            return {"states": standing(states)}
         return {"reached": 50} if (experiment.learner, experiment.seed) == ("RDES", 1) else {}
 
     found = made_up(unlike)
     assert title(rollouts.states(found, "A")) == (
-        "In layout A, 12 of 14 drives of RDES and GES end at the target"
+        "In layout A, 12 of 14 rollouts of RDES and GES end at the target"
     )
     figure = rollouts.paths(found, "A")
     assert title(figure) == "In layout A: 12 arrived, 2 stuck, 2 stopped in training"
@@ -173,14 +173,14 @@ def test_those_that_arrive_are_counted_and_those_that_were_stopped_are_not_drawn
     )
 
 
-def test_a_drive_that_failed_is_drawn_as_far_as_it_got(made_up):
+def test_a_rollout_that_failed_is_drawn_as_far_as_it_got(made_up):
     broken = made_up().summaries[Experiment("GES")].states.copy()
     broken[3:] = np.nan
     found = made_up(lambda e: {"states": broken} if e.learner == "GES" else {})
     assert "8 failed" in title(rollouts.paths(found, "A"))
     figure = rollouts.paths(found, "A")
     assert sum(len(line.get_xdata()) == 3 for line in figure.axes[0].get_lines()) == SEEDS
-    assert "8 of 16 drives" in title(rollouts.states(found, "A"))
+    assert "8 of 16 rollouts" in title(rollouts.states(found, "A"))
 
 
 def test_every_layout_has_its_map(made_up):
@@ -194,8 +194,8 @@ def test_every_layout_has_its_map(made_up):
 @pytest.mark.parametrize(
     "draw",
     [
-        results.figure_1,
-        results.figure_2,
+        learning_curves.figure_1,
+        learning_curves.figure_2,
         rollouts.controls,
         rollouts.states,
         rollouts.paths,
@@ -216,9 +216,9 @@ def test_a_part_has_the_learners_asked_for_and_one_layout_or_all(made_up):
     assert panels.part(found, ("ES",), "D").summaries.values_of("layout") == ("D",)
 
 
-def test_the_target_of_the_drawn_drive_is_the_task_s(made_up):
+def test_the_target_of_the_drawn_rollout_is_the_task_s(made_up):
     """What the tests above call arriving is arriving in every layout that they draw."""
-    drive = made_up().summaries[Experiment("GES")].states
+    states = made_up().summaries[Experiment("GES")].states
     for name in ("A", "B", "D", "E"):
-        assert paper.task(name).distance(drive[-1]) == 0
-        assert paper.task(name).overlap(drive).max() < 0
+        assert paper.task(name).distance(states[-1]) == 0
+        assert paper.task(name).overlap(states).max() < 0

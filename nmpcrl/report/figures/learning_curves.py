@@ -1,18 +1,16 @@
-"""Figures of chapter 5: Figs. 1 and 2 of the paper over seeds and layouts, and twins of runs.
+"""Figs. 1 and 2 of the paper, over seeds and layouts.
 
 Costs are drawn in units of theta_init's cost without noise, so that layouts compare. What was cut
 short, or never reached because the run was stopped, cost infinitely much: it counts in median and
 quartiles, and leaves its panel through the upper edge.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
 
 from nmpcrl import Vector
@@ -20,11 +18,10 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.paper_claims import divergence, instability
 from nmpcrl.claims.rule import UNDECIDABLE, Verdict
-from nmpcrl.report.figures.panels import LIMIT, SUBTITLE, bundle, legend, line, part, sourced
-from nmpcrl.report.figures.rdes import headed, label_panel
-from nmpcrl.report.figures.style import page, subplots
+from nmpcrl.report.figures.axes import label_panel, legend
+from nmpcrl.report.figures.panels import bundle, part, sourced
+from nmpcrl.report.figures.style import SUBTITLE, page, subplots
 from nmpcrl.report.tables import WORDS
-from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import Runs
 
@@ -66,34 +63,6 @@ def by_layout(found: Evidence, learners: tuple[str, ...], verdict: Verdict) -> F
     _cut(axes)
     legend(figure, learners)
     return sourced(figure, f"Does {verdict.claim} hold? {_spelled(verdict)}", drawn)
-
-
-@page
-def replicas(perturbed: Mapping[Experiment, Vector], solvers: Vector, start: float) -> Figure:
-    """How far perturbed replicas are apart against episodes.
-
-    `perturbed` (by run) and `solvers` (riccati and Ipopt) hold `summary.separation`, a number an
-    episode; `start` is how far apart the perturbed begin.
-    """
-    decays = tuple(dict.fromkeys(e.decay for e in perturbed))
-    figure, axes = subplots(1, len(decays), 3.4, sharex=True, sharey=True, squeeze=False)
-    for axis, decay in zip(axes[0], decays, strict=True):
-        for experiment, apart in perturbed.items():
-            if experiment.decay == decay:
-                _separation(axis, apart, **line(experiment.learner))
-        axis.axhline(start, **LIMIT)
-        axis.set(yscale="log")
-        label_panel(axis, decay)
-    _separation(axes[0, 0], solvers, color="0.45", linewidth=2.4)
-    axes[0, 0].set_ylabel("largest difference in θ")
-    learners = tuple(dict.fromkeys(experiment.learner for experiment in perturbed))
-    other = Line2D([], [], color="0.45", linewidth=2.4, label="ES, riccati and Ipopt")
-    legend(figure, learners, other)
-    grown = sorted({e.learner for e, apart in perturbed.items() if apart[-1] > start})
-    title = "Of all learners' twins, none end further apart than they began"
-    if grown:
-        title = f"A difference of {start:.0e} grows in runs of {' and '.join(grown)}"
-    return headed(figure, title)
 
 
 def trained(summary: RunSummary) -> tuple[Vector, Vector]:
@@ -148,16 +117,12 @@ def _cut(axes: Column) -> None:
         axis.set_ylim(None, min(CEILING, axis.get_ylim()[1]))
 
 
-def _separation(axis: Axes, apart: Vector, **line: Any) -> None:
-    axis.plot(np.arange(1, apart.size + 1), apart, **line)
-
-
 def _spelled(verdict: Verdict) -> str:
-    """Which layouts say what: "no in A and D, yes in B"."""
-    said: dict[str, list[str]] = {}
+    """The layouts by outcome: "no in A and D, yes in B"."""
+    found: dict[str, list[str]] = {}
     for layout, outcome in verdict.by_layout.items():
-        said.setdefault(WORDS[outcome], []).append(layout)
-    return "; ".join(f"{word} in {', '.join(layouts)}" for word, layouts in said.items())
+        found.setdefault(WORDS[outcome], []).append(layout)
+    return "; ".join(f"{word} in {', '.join(layouts)}" for word, layouts in found.items())
 
 
 def _counted(

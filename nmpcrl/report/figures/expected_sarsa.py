@@ -1,0 +1,151 @@
+"""Figures of Expected Sarsa: theta, its largest steps, and the cost with noise and without."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.analysis.metrics import by_episode, noise_free_cost, training_cost
+from nmpcrl.report.figures.style import (
+    DECAYS,
+    INK,
+    LOOKS,
+    SUBTITLE,
+    SYMBOLS,
+    TEAL,
+    WINE,
+    headed,
+    page,
+    subplots,
+)
+from nmpcrl.study import Runs
+from nmpcrl.study.paper import THETA_NAMES
+from nmpcrl.study.records import Records
+
+
+@page
+def theta_paths(runs: Runs) -> Figure:
+    """theta of the given runs over training, one panel a reading of the decay.
+
+    Components that move by less than 0.02 in every run are drawn in grey.
+    """
+    decays = runs.values_of("decay")
+    figure, panels = subplots(1, len(decays), height=3.8, sharey=True, squeeze=False)
+    change = np.max([np.ptp(_thetas(records), axis=0) for records in runs.values()], axis=0)
+    moving = np.flatnonzero(change > 0.02)
+    shades = plt.get_cmap("cividis")(np.linspace(0.0, 0.8, len(moving)))
+    lines = ["-", "--", "-.", ":"]
+    for axes, decay in zip(panels[0], decays, strict=True):
+        for run, records in enumerate(runs.select(decay=decay).values()):
+            thetas = _thetas(records)
+            axes.plot(thetas, color="#BBBBBB", lw=0.7)
+            for i, (component, shade) in enumerate(zip(moving, shades, strict=True)):
+                axes.plot(
+                    thetas[:, component],
+                    color=shade,
+                    ls=lines[i % len(lines)],
+                    label=f"${SYMBOLS[THETA_NAMES[component]]}$" if run == 0 else None,
+                )
+        axes.set_title(DECAYS[decay], **SUBTITLE)
+        axes.set_xlabel("episode")
+    panels[0, 0].set_ylabel("component of θ (no unit)")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=max(1, len(labels)))
+    return headed(figure, _most(change))
+
+
+@page
+def overshoot(runs: Runs) -> Figure:
+    """The largest alpha ||phi||^2 of each episode of the given runs."""
+    figure, axes = subplots(height=3.4)
+    worst = 0.0
+    for experiment, records in runs.items():
+        largest = by_episode(records, records.steps["alpha_phi2"], np.max)
+        first = experiment.seed == runs.values_of("seed")[0]
+        color, line = (TEAL, "--") if experiment.decay == "step" else (WINE, "-")
+        axes.plot(
+            np.arange(1, len(largest) + 1),
+            largest,
+            color=color,
+            ls=line,
+            label=DECAYS[experiment.decay] if first else None,
+        )
+        worst = max(worst, np.nanmax(largest))
+    axes.axhline(2, color=INK, ls=":", lw=1)
+    axes.annotate(
+        "above: overshoots", (0, 2), (4, 3), axes.get_yaxis_transform(), textcoords="offset points"
+    )
+    side = "passes 2: such a step overshoots" if worst > 2 else "stays below 2"
+    axes.set(
+        title=f"The largest step of an episode {side}",
+        xlabel="episode",
+        ylabel=r"largest $\alpha\,\|\phi\|^2$ (no unit)",
+    )
+    if worst > 10:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(0, 1.08 * max(2.2, worst))
+    axes.legend()
+    return figure
+
+
+@page
+def two_costs(runs: Runs) -> Figure:
+    """Cost with noise and without, of a learner and of the frozen arm; a column a decay."""
+    decays = runs.values_of("decay")
+    figure, grid = subplots(2, len(decays), height=5.2, sharex=True, sharey="row", squeeze=False)
+    for column, decay in zip(grid.T, decays, strict=True):
+        for experiment, records in runs.select(decay=decay).items():
+            look = LOOKS[experiment.learner]
+            first = experiment.seed == runs.values_of("seed")[0]
+            label = experiment.learner if first else None
+            cost = training_cost(records)
+            column[0].plot(np.arange(1, len(cost) + 1), cost, label=label, lw=1.2, **look.line)
+            column[1].plot(*noise_free_cost(records), label=label, **look.line)
+        column[0].set_title(DECAYS[decay], **SUBTITLE)
+        column[1].set_xlabel("episodes trained")
+    grid[0, 0].set_ylabel("with noise [cost]")
+    grid[1, 0].set_ylabel("without noise [cost]")
+    for row in grid:
+        _logarithmic_if_wide(row)
+    grid[0, 0].legend()
+    fall = frozen_fall(runs)
+    return headed(
+        figure,
+        f"With noise, the cost of a frozen θ falls by up to {fall:.0%} by itself"
+        if fall > 0.05
+        else "Few episodes: exploration has hardly begun to decay",
+    )
+
+
+def frozen_fall(runs: Runs) -> float:
+    """The largest share by which the noisy cost of a frozen run fell: nothing was learned."""
+    return max(_fall(records) for records in runs.select(learner="frozen").values())
+
+
+def _fall(records: Records) -> float:
+    cost = training_cost(records)
+    window = max(1, len(cost) // 15)
+    return float(1 - np.nanmedian(cost[-window:]) / np.nanmedian(cost[:window]))
+
+
+def _thetas(records: Records) -> Matrix:
+    """theta at the start and after each episode, shape (episodes + 1, d)."""
+    last = np.append(np.flatnonzero(np.diff(records.steps["episode"])), -1)
+    return np.vstack([records.experiment["theta"], records.steps["theta"][last]])
+
+
+def _most(change: Vector) -> str:
+    """The title of `theta_paths`: which component moved most, in any run."""
+    most = int(np.argmax(change))
+    return f"${SYMBOLS[THETA_NAMES[most]]}$ moves most, by up to {change[most]:.2g}"
+
+
+def _logarithmic_if_wide(row: list[Axes]) -> None:
+    """A run that blows up must not flatten the others."""
+    points = [line.get_ydata() for axes in row for line in axes.get_lines()]
+    values = np.concatenate([np.asarray(y, float) for y in points])
+    values = values[np.isfinite(values)]
+    if values.size and values.max() > 5 * values.min():
+        row[0].set_yscale("log")

@@ -1,0 +1,66 @@
+"""Figs. 1 and 2 of the paper for the few runs that a chapter trains, one line a run."""
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from nmpcrl.analysis import metrics
+from nmpcrl.claims.paper_claims import diverged, unstable
+from nmpcrl.report.figures.axes import label_panel, one_entry_each
+from nmpcrl.report.figures.style import headed, page, subplots, thin
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.records import Records
+from nmpcrl.study.store import Runs
+
+CEILING = 1.3  # multiple of theta_init's noise-free cost at which the panels without noise end
+
+
+@page
+def figure_1(runs: Runs) -> Figure:
+    """Figure 1 of the paper, DES against RDES, with the noise-free cost and the frozen arm."""
+    figure = _curves(runs, ("DES", "RDES"))
+    counts = [f"{name} in {_runs_where(runs, name, diverged)}" for name in ("DES", "RDES")]
+    return headed(figure, f"Divergence: {', '.join(counts)} runs")
+
+
+@page
+def figure_2(runs: Runs) -> Figure:
+    """Figure 2 of the paper, ES against GES, with the noise-free cost and the frozen arm."""
+    figure = _curves(runs, ("ES", "GES"))
+    counts = [f"{name} in {_runs_where(runs, name, unstable)}" for name in ("ES", "GES")]
+    return headed(figure, f"Instability: {', '.join(counts)} runs")
+
+
+@page
+def _curves(runs: Runs, learners: tuple[str, ...]) -> Figure:
+    """Summed RL cost of each training episode above, cost without noise below; frozen beside.
+
+    One column a reading of the decay, one line a seed.
+    """
+    decays, shown = runs.values_of("decay"), (*learners, "frozen")
+    options = {"sharex": True, "sharey": "row", "squeeze": False}
+    figure, axes = subplots(2, len(decays), 5.0, **options)
+    for (above, below), decay in zip(axes.T, decays, strict=True):
+        for learner in shown:
+            for records in runs.select(learner=learner, decay=decay).values():
+                cost = metrics.training_cost(records)
+                above.plot(np.arange(1, cost.size + 1), cost, **thin(learner))
+                below.plot(*metrics.noise_free_cost(records), **thin(learner))
+        label_panel(above, decay, xlabel="")
+        label_panel(below)
+    axes[0, 0].set_ylabel("cost of a training episode [-]")
+    axes[1, 0].set_ylabel("cost without noise [-]")
+    low, high = axes[1, 0].get_ylim()
+    initial = metrics.initial_cost(next(iter(runs.values())))
+    axes[1, 0].set_ylim(low, min(high, CEILING * initial))
+    one_entry_each(axes[0, -1], shown)
+    return figure
+
+
+def _runs_where(
+    runs: Runs, learner: str, measure: Callable[[Runs, Experiment, Records], bool]
+) -> str:
+    """In how many of the learner's runs `measure` holds, in words."""
+    holds = [measure(runs, *pair) for pair in runs.select(learner=learner).items()]
+    return f"{sum(holds)} of {len(holds)}"
