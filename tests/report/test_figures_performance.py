@@ -87,4 +87,4 @@ def test_with_slow_solvers_it_saves_time(measured):
 def test_every_solver_and_the_paper_have_a_point(measured):
     axes = performance.saving(measured).axes[0]
     names = {text.get_text() for text in axes.texts}
-    assert {*performance.NAMES.values(), "the paper"} <= names
+    assert {*performance.LABELS.values(), "the paper"} <= names
