@@ -99,7 +99,7 @@ def test_a_failed_rollout_in_the_second_half_is_wandering_without_bound(late):
     assert metrics.late_cost_range(run) == np.inf
 
 
-def test_the_excess_compares_the_medians_of_the_last_episodes():
+def test_the_cost_ratio_compares_the_medians_of_the_last_episodes():
     frozen = records(np.full((60, 1), 10.0))
     costs = np.full((60, 1), 10.0)
     costs[-20:] = 30
@@ -107,13 +107,13 @@ def test_the_excess_compares_the_medians_of_the_last_episodes():
     assert metrics.cost_ratio(records(costs), frozen) == pytest.approx(3)
 
 
-def test_the_excess_looks_at_no_more_than_the_second_half():
+def test_the_cost_ratio_looks_at_no_more_than_the_second_half():
     frozen = records(np.full((4, 1), 10.0))
     assert metrics.cost_ratio(records([[999], [999], [20], [20]]), frozen) == pytest.approx(2)
     assert metrics.cost_ratio(records([[30]]), records([[10]])) == pytest.approx(3)
 
 
-def test_an_episode_cut_short_at_the_end_is_an_infinite_excess():
+def test_an_episode_cut_short_at_the_end_is_an_infinite_cost_ratio():
     frozen = records(np.ones((2, 2)))
     run = records(np.ones((2, 2)), status=[0, 0, 0, 2])
     assert metrics.cost_ratio(run, frozen) == np.inf

@@ -1,4 +1,4 @@
-"""Twins: what is moved, and how their distance is counted."""
+"""Perturbed replicas: what is moved, and how their distance is counted."""
 
 import numpy as np
 import pytest
