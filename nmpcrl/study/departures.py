@@ -51,7 +51,7 @@ DEPARTURES = {
     "E": Departure(
         gap="The noise may carry an action out of the action space; nothing says what happens.",
         reading="The action is clipped to the action space.",
-        why="A robot that can drive at 0.6 m/s has no input for 1.6 m/s.",
+        why="No input of a robot that can do 0.6 m/s makes it do 1.6 m/s.",
         variant="clipped",
     ),
     "F": Departure(

@@ -84,17 +84,17 @@ def test_the_gain_is_the_share_of_the_cost_that_learning_took_away(last, gain):
     assert metrics.gain(records([[1]], judged=[100, last, last, last])) == pytest.approx(gain)
 
 
-def test_wandering_is_judged_in_the_second_half_only():
+def test_the_late_cost_range_is_judged_in_the_second_half_only():
     run = records(np.ones((4, 1)), judged=[100, 900, 70, 60, 65], at=[0, 1, 2, 3, 4])
     assert metrics.late_cost_range(run) == pytest.approx(0.1)
 
 
-def test_a_run_without_a_rollout_in_the_second_half_wanders_without_bound():
+def test_a_run_without_a_rollout_in_the_second_half_has_an_unbounded_range():
     assert metrics.late_cost_range(records(np.ones((4, 1)), judged=[100, 90], at=[0, 1])) == np.inf
 
 
 @pytest.mark.parametrize("late", [(np.inf, 60), (np.inf, np.inf)])
-def test_a_failed_rollout_in_the_second_half_is_wandering_without_bound(late):
+def test_a_failed_rollout_in_the_second_half_makes_the_range_unbounded(late):
     run = records(np.ones((4, 1)), judged=[100, 70, *late], at=[0, 1, 3, 4])
     assert metrics.late_cost_range(run) == np.inf
 

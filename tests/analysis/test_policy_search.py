@@ -97,14 +97,14 @@ def test_theta_stays_within_its_bounds(monkeypatch):
     assert (np.array(seen) <= policy_search.UPPER + 1e-12).all()
 
 
-def test_where_all_drives_fail_theta_init_is_what_was_found(monkeypatch):
+def test_where_all_rollouts_fail_theta_init_is_what_was_found(monkeypatch):
     monkeypatch.setattr(policy_search, "evaluate", lambda *_: SimpleNamespace(cost=np.inf))
     found = policy_search.search(Search(budget=LEAST))
     assert found.theta == pytest.approx(paper.THETA_INIT)
     assert (found.rollouts, found.best) == ((1,), (np.inf,))
 
 
-def test_a_search_in_processes_costs_what_a_drive_with_its_theta_costs():
+def test_a_search_in_processes_costs_what_a_rollout_with_its_theta_costs():
     wanted = Search("D", budget=LEAST)
     found = search_all([wanted], workers=1, progress=False)[wanted]
     controller = Persistent(paper.nmpc("D"))
