@@ -10,7 +10,7 @@ what it is, and infinite where a solve failed or training had to be stopped.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -19,11 +19,11 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.bench.learners import ratio
+from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.rule import (
     CELL,
     NOT,
-    PARTLY,
     REPRODUCED,
     UNDECIDABLE,
     Claim,
@@ -34,6 +34,7 @@ from nmpcrl.claims.rule import (
     settle,
     shown,
 )
+from nmpcrl.claims.timing import Range, decide
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.layouts import ARRIVED
@@ -64,7 +65,7 @@ NEAR_SAME_TIME = (0.8, 1.25)
 
 SOLVER = "ipopt"  # the paper's, with which C3 and C4 are judged
 SIZES = ("small", "medium", "large")  # of an overlap: up to 0.01, to 0.1, and above
-RATIO = "one ratio of medians, taken in turn in one process; no interval"
+RATIO = "median ratio of steps taken in turn, with its interval; see `timing`"
 
 Paths = Mapping[Experiment, Column]  # the states of each run's last rollout without noise
 
@@ -97,7 +98,8 @@ CLAIMS = {
             "C3",
             "RDES takes half of the time of ES.",
             "How long does a step of RDES take, in steps of ES?",
-            f"ratio of the median times of a step, with {SOLVER}, the paper's solver",
+            f"the processor's time for a step over that for one of ES, with {SOLVER}, the paper's"
+            " solver",
             f"{HALF[0]} to {HALF[1]}; partly below {NEAR_HALF[1]:g}",
             RATIO,
             "The time of one solve: the slower the solver, the closer to one half. And where a"
@@ -108,7 +110,8 @@ CLAIMS = {
             "C4",
             "GES takes the time of ES.",
             "How long does a step of GES take, in steps of ES?",
-            f"ratio of the median times of a step, with {SOLVER}, the paper's solver",
+            f"the processor's time for a step over that for one of ES, with {SOLVER}, the paper's"
+            " solver",
             f"{SAME_TIME[0]} to {SAME_TIME[1]}; partly from {NEAR_SAME_TIME[0]} to"
             f" {NEAR_SAME_TIME[1]}",
             RATIO,
@@ -242,14 +245,14 @@ def rdes_takes_half_the_time(timings: pd.DataFrame) -> Verdict:
     ratios = _ratios(timings, "RDES")
     fit = f", plus {median(timings.ms_per_fit):.2f} ms for the network" if ratios else ""
     evidence = f"{_listed('RDES', ratios)}: one solve instead of two{fit}."
-    return _timed(CLAIMS["C3"], _within(ratios, HALF, NEAR_HALF), evidence)
+    return _compared(CLAIMS["C3"], ratios, (HALF, NEAR_HALF), evidence)
 
 
 def ges_takes_the_same_time(timings: pd.DataFrame) -> Verdict:
     """C4, from Table II."""
     ratios = _ratios(timings, "GES")
     evidence = f"{_listed('GES', ratios)}; all solve twice."
-    return _timed(CLAIMS["C4"], _within(ratios, SAME_TIME, NEAR_SAME_TIME), evidence)
+    return _compared(CLAIMS["C4"], ratios, (SAME_TIME, NEAR_SAME_TIME), evidence)
 
 
 def rdes_and_ges_reach_the_same_policy(runs: pd.DataFrame, paths: Paths) -> Verdict:
@@ -429,7 +432,7 @@ def _timed(claim: Claim, outcome: str, evidence: str) -> Verdict:
     return Verdict(claim.name, claim.statement, outcome, evidence, claim.would_change)
 
 
-def _ratios(timings: pd.DataFrame, learner: str) -> dict[str, float]:
+def _ratios(timings: pd.DataFrame, learner: str) -> dict[str, Ratio]:
     """Time of a step over that of ES, by solver; the paper's comes first."""
     if timings.empty:
         return {}
@@ -441,19 +444,23 @@ def _ratios(timings: pd.DataFrame, learner: str) -> dict[str, float]:
     }
 
 
-def _within(
-    ratios: Mapping[str, float], claimed: tuple[float, float], near: tuple[float, float]
-) -> str:
+def _compared(
+    claim: Claim, ratios: Mapping[str, Ratio], ranges: tuple[Range, Range], evidence: str
+) -> Verdict:
+    """The verdict on a claim about time, by the ratio with the paper's solver."""
     if SOLVER not in ratios:
-        return UNDECIDABLE
-    value = ratios[SOLVER]
-    if claimed[0] <= value <= claimed[1]:
-        return REPRODUCED
-    return PARTLY if near[0] <= value < near[1] else NOT
+        return _timed(claim, UNDECIDABLE, evidence)
+    measured = ratios[SOLVER]
+    outcome, reason = decide(measured, *ranges)
+    return replace(
+        _timed(claim, outcome, f"{evidence} {reason}".strip()),
+        ratio=measured.value,
+        interval=None if np.isnan(measured.low) else (measured.low, measured.high),
+    )
 
 
-def _listed(learner: str, ratios: Mapping[str, float]) -> str:
-    parts = [f"{value:.2f} with {solver}" for solver, value in ratios.items()]
+def _listed(learner: str, ratios: Mapping[str, Ratio]) -> str:
+    parts = [f"{value} with {solver}" for solver, value in ratios.items()]
     if not parts:
         return f"{learner} and ES were not timed"
     return f"A step of {learner} takes, in steps of ES, {', '.join(parts)}"

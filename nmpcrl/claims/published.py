@@ -3,7 +3,7 @@
 - `runs.csv`: one row a run, `summary.row`, with the part of the study it belongs to and its key;
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
-- `rule.json`: what became of each claim;
+- `verdicts.json`: what became of each claim;
 - `about.json`: code, libraries and machine.
 """
 
@@ -29,7 +29,7 @@ from nmpcrl.analysis.summary import RunSummary, row
 from nmpcrl.bench.suite import machine
 from nmpcrl.claims.failure_modes import fates
 from nmpcrl.claims.paper_claims import experiment_of
-from nmpcrl.claims.rule import Verdict
+from nmpcrl.claims.rule import UNDECIDABLE, Verdict
 from nmpcrl.study import store
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column
@@ -103,6 +103,28 @@ def publish(
         "files": _sums(folder),
     }
     _write(folder / "about.json", about)
+    _load.cache_clear()
+    return folder
+
+
+def republish(verdicts: Iterable[Verdict]) -> Path:
+    """Put these in the place of the published verdicts on the same claims; the runs stay.
+
+    Returns:
+        Where they are.
+
+    Raises:
+        Damaged: what is published is not what `publish` wrote.
+        KeyError: there is no published verdict on a claim.
+    """
+    found, folder = load(), place()
+    kept = {verdict.claim: verdict for verdict in found.verdicts}
+    for verdict in verdicts:
+        if verdict.claim not in kept:
+            raise KeyError(f"no verdict on {verdict.claim} is published in {folder}")
+        kept[verdict.claim] = verdict
+    _write(folder / "verdicts.json", [asdict(verdict) for verdict in kept.values()])
+    _write(folder / "about.json", {**found.about, "files": _sums(folder)})
     _load.cache_clear()
     return folder
 
@@ -185,6 +207,20 @@ def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.
     wrong += _out_of_spread(others, published)
     names = [*CELL, "seed", "what", "here", "published"]
     return pd.DataFrame([one for one in wrong if one], columns=names)
+
+
+def contradicted(verdicts: Iterable[Verdict], published: Published) -> tuple[str, ...]:
+    """Which of these verdicts differ from the published ones, a sentence each.
+
+    What is not decidable, here or there, contradicts nothing.
+    """
+    known = {verdict.claim: verdict.outcome for verdict in published.verdicts}
+    pairs = [(one, known.get(one.claim, UNDECIDABLE)) for one in verdicts]
+    return tuple(
+        f"{one.claim} is {one.outcome} here, and {there} as published"
+        for one, there in pairs
+        if UNDECIDABLE not in (one.outcome, there) and one.outcome != there
+    )
 
 
 def comparable(runs: Iterable[Experiment], published: Published) -> set[Experiment]:

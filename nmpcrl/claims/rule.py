@@ -65,10 +65,11 @@ class Verdict:
     evidence: str  # the numbers
     would_change: str  # where another verdict is to be expected
     share: float | None = None  # of the answers, how many are yes; None where no run is asked
-    interval: tuple[float, float] | None = None  # of the share; the missing may say what they like
+    interval: tuple[float, float] | None = None  # of the share, whatever the missing say; or ratio
     by_layout: dict[str, str] = field(default_factory=dict)  # the outcome in each
     by_decay: dict[str, str] = field(default_factory=dict)  # and in each reading of the decay
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
+    ratio: float | None = None  # of times, where the claim is about time
 
 
 @dataclass(frozen=True)

@@ -182,10 +182,12 @@ def _word(outcome: str | None) -> str:
 
 
 def _share(verdict: Verdict) -> str:
-    """The share on which a verdict rests and its interval, below its badge."""
-    if verdict.share is None or verdict.interval is None:
+    """The share, or ratio, on which a verdict rests and its interval, below its badge."""
+    if verdict.interval is None:
         return ""
     low, high = verdict.interval
+    if verdict.share is None:
+        return f"<br>{verdict.ratio:.2f} [{low:.2f}, {high:.2f}]"
     return f"<br>{verdict.share:.0%} [{low:.0%}, {high:.0%}]"
 
 

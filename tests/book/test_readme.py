@@ -3,7 +3,10 @@
 import re
 from pathlib import Path
 
-from nmpcrl.claims import published
+from nmpcrl.bench.paired import Ratio
+from nmpcrl.claims import paper_claims, published
+from nmpcrl.claims.rule import UNDECIDABLE
+from nmpcrl.claims.timing import decide
 from nmpcrl.study import design
 
 README = (Path(__file__).resolve().parents[2] / "README.md").read_text()
@@ -21,3 +24,15 @@ def test_the_numbers_of_runs_are_those_of_the_published_study():
     assert set(re.findall(r"(\d+) runs", README)) == {str(parts["main"]), str(sum(varied))}
     assert f"in {len(varied)} ways" in README
     assert re.search(rf"`make book` trains\s{len(design.fresh())} afresh", README)
+
+
+def test_published_verdicts_on_time_are_what_their_intervals_say():
+    """So the README's table speaks of intervals, and not of how busy a machine was."""
+    ranges = {
+        "C3": (paper_claims.HALF, paper_claims.NEAR_HALF),
+        "C4": (paper_claims.SAME_TIME, paper_claims.NEAR_SAME_TIME),
+    }
+    timed = [v for v in published.load().verdicts if v.claim in ranges and v.ratio is not None]
+    for verdict in timed:
+        ratio = Ratio(verdict.ratio, *verdict.interval, waited=0.0)
+        assert verdict.outcome in (UNDECIDABLE, decide(ratio, *ranges[verdict.claim])[0])

@@ -9,7 +9,7 @@ import pytest
 
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.measures import MEASURES, Measure, achieved, at_borders, holds, steady
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, Verdict
 from nmpcrl.study import Experiment
 from nmpcrl.study.experiment import PAPER
 
@@ -59,7 +59,7 @@ def drives(runs: pd.DataFrame, seed: int) -> dict[Experiment, np.ndarray]:
     return {e: np.full((3, 3), x) for e, x in zip(named, away, strict=True)}
 
 
-def asked(runs: pd.DataFrame, paths: dict) -> dict[str, tuple[pd.Series, paper_claims.Verdict]]:
+def asked(runs: pd.DataFrame, paths: dict) -> dict[str, tuple[pd.Series, Verdict]]:
     """What the measure answers, and the verdict, by claim."""
     verdicts = paper_claims.judge_runs(runs, paths)
     return {

@@ -13,8 +13,8 @@ from nmpcrl.analysis.statistics import rate
 from nmpcrl.analysis.summary import row, summarise, table
 from nmpcrl.claims import own_claims, paper_claims
 from nmpcrl.claims.assumptions import Assumption
-from nmpcrl.claims.paper_claims import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.claims.robustness import flips, spread
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study import Experiment, Study, paper, run
 from nmpcrl.study.experiment import LEARNERS, PAPER
 
@@ -64,19 +64,20 @@ def paths(runs: pd.DataFrame, apart: float = 0.0, seeds=SEEDS) -> dict[Experimen
     return {e: PLACE + [away[e], 0, 0] for e in named}
 
 
-def timings(rdes=0.5, ges=1.0) -> pd.DataFrame:
-    """Times of a step, ES taking 1 ms."""
-    per_step = {"ES": 1.0, "RDES": rdes, "GES": ges}
+def timings(rdes=0.5, ges=1.0, width=0.0, waited=0.0) -> pd.DataFrame:
+    """Ratios of the times of a step, with intervals as wide on either side."""
+    ratios = {"ES": 1.0, "RDES": rdes, "GES": ges}
     return pd.DataFrame(
         [
-            {"solver": solver, "learner": learner, "ms_per_step": ms, "ms_per_fit": 0.1}
+            {"solver": solver, "learner": learner, "ms_per_fit": 0.1, "waited": waited}
+            | {"ratio": ratio, "ratio_low": ratio - width, "ratio_high": ratio + width}
             for solver in ("fatrop", "ipopt", "riccati")
-            for learner, ms in per_step.items()
+            for learner, ratio in ratios.items()
         ]
     )
 
 
-def judge(runs: pd.DataFrame) -> tuple[paper_claims.Verdict, ...]:
+def judge(runs: pd.DataFrame) -> tuple[Verdict, ...]:
     broken = [Assumption("a finite MDP", "it is not", holds=False)]
     return paper_claims.judge(runs, paths=paths(runs), timings=timings(), assumptions=broken)
 
@@ -164,7 +165,9 @@ def test_without_a_frozen_arm_nothing_is_said_of_divergence():
 def test_c3_wants_half_of_the_time_with_the_paper_s_solver(measured, outcome):
     verdict = paper_claims.rdes_takes_half_the_time(timings(rdes=measured))
     assert (verdict.claim, verdict.outcome) == ("C3", outcome)
-    assert f"{measured:.2f} with ipopt, {measured:.2f} with fatrop" in verdict.evidence
+    shown = f"{measured:.2f} [{measured:.2f}, {measured:.2f}]"
+    assert f"{shown} with ipopt, {shown} with fatrop" in verdict.evidence
+    assert (verdict.ratio, verdict.interval) == (measured, (measured, measured))
 
 
 @pytest.mark.parametrize(
@@ -174,6 +177,22 @@ def test_c3_wants_half_of_the_time_with_the_paper_s_solver(measured, outcome):
 def test_c4_wants_the_same_time(measured, outcome):
     verdict = paper_claims.ges_takes_the_same_time(timings(ges=measured))
     assert (verdict.claim, verdict.outcome) == ("C4", outcome)
+
+
+@pytest.mark.parametrize(
+    ("width", "waited", "outcome", "why"),
+    [
+        (0.01, 0.0, PARTLY, ""),
+        (0.03, 0.0, UNDECIDABLE, "the interval reaches across a border"),
+        (0.03, 0.5, UNDECIDABLE, "the machine was too busy"),
+        (0.01, 0.5, PARTLY, ""),
+        (0.01, 0.9, UNDECIDABLE, "the machine was too busy"),
+    ],
+)
+def test_a_time_that_cannot_be_told_from_a_border_decides_nothing(width, waited, outcome, why):
+    verdict = paper_claims.rdes_takes_half_the_time(timings(0.62, width=width, waited=waited))
+    assert verdict.outcome == outcome
+    assert why in verdict.evidence
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,10 @@ TIMES = pd.DataFrame(
         "ms_per_solve": [0.04, 0.04, 0.04, 1.99, 1.99, 2.0],
         "ms_per_fit": [np.nan, np.nan, 0.14] * 2,
         "ms_per_rest": [0.02, 0.02, 0.02, 0.02, 0.02, 0.06],
+        "ratio": [1.0, 1.0, 2.0, 1.0, 1.0, 0.55],
+        "ratio_low": [1.0, 0.95, 1.9, 1.0, 0.95, 0.5],
+        "ratio_high": [1.0, 1.05, 2.1, 1.0, 1.05, 0.6],
+        "waited": 0.0,
     }
 )
 
@@ -235,8 +239,8 @@ def test_the_profile_falls_from_all_runs_to_none_and_counts_those_that_were_stop
 )
 def test_a_bar_is_as_long_as_the_ratio_that_the_verdict_rests_on(learner, judge, words):
     figure = figures.times(TIMES, judge(TIMES), learner)
-    ratio = {"RDES": 0.55, "GES": 1.0}[learner]
-    assert title(figure) == f"{words} takes {ratio:.2f} of one of ES"
+    ratio, shown = {"RDES": (0.55, "0.55 [0.50, 0.60]"), "GES": (1.0, "1.00 [0.95, 1.05]")}[learner]
+    assert title(figure) == f"{words} takes {shown} of one of ES"
     bars = {round(patch.get_y(), 6) for patch in figure.axes[0].patches[1:]}
     assert len(bars) == 4  # two solvers, two learners
     ends = [patch.get_x() + patch.get_width() for patch in figure.axes[0].patches[1:]]

@@ -9,7 +9,8 @@ from bs4 import BeautifulSoup
 
 from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.own_claims import ADDITIONS
-from nmpcrl.claims.paper_claims import CLAIMS, NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
+from nmpcrl.claims.paper_claims import CLAIMS
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.report import tables
 from nmpcrl.study import main_study
 from nmpcrl.study.paper import DEPARTURES

@@ -80,7 +80,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
         per_learner = timings[timings.solver == solver].set_index("learner")
         for y, name in ((row - 0.2, "ES"), (row + 0.2, learner)):
             end = _bar(axis, y, per_learner.loc[name], per_learner.loc["ES"])
-            text = f" {name} {ratio(timings, solver, name):.2f}"
+            text = f" {name} {ratio(timings, solver, name).value:.2f}"
             axis.annotate(text, (end, y), va="center", fontsize="small")
     axis.set_yticks(range(len(solvers)), [SOLVERS[solver] for solver in solvers])
     axis.invert_yaxis()
@@ -93,9 +93,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     if paper_claims.SOLVER not in solvers:
         return _titled(figure, verdict, f"no time was taken with {SOLVERS[paper_claims.SOLVER]}")
     value = ratio(timings, paper_claims.SOLVER, learner)
-    finding = (
-        f"with {SOLVERS[paper_claims.SOLVER]}, a step of {learner} takes {value:.2f} of one of ES"
-    )
+    finding = f"with {SOLVERS[paper_claims.SOLVER]}, a step of {learner} takes {value} of one of ES"
     return marked(_titled(figure, verdict, finding), "measured while this page was made")
 
 
