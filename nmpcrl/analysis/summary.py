@@ -16,14 +16,13 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.imitation import imitate
-from nmpcrl.analysis.metrics import LAST, TOUCH
+from nmpcrl.analysis.metrics import LAST, LATE, TOUCH
 from nmpcrl.control import Task
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, controller_of, frozen_arm
 from nmpcrl.study.records import Column, Records, load_arrays, save_arrays
 
 SIZES = (TOUCH, 0.01, 0.1, np.inf)  # of an overlap Xi: small, medium and large violations
-LATE = 20  # episodes that stand for the end of training; at most the second half
 IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
 
 
@@ -116,7 +115,7 @@ def row(summary: RunSummary) -> dict[str, Any]:
         "late_cost_range": metrics.late_cost_range_of(
             evaluations["episode"], cost, experiment["episodes"]
         ),
-        "training_cost": float(np.median(np.nan_to_num(episodes["cost"][late], nan=np.inf))),
+        "training_cost": metrics.late_training_cost(episodes["cost"]),
         "cut_short": int(np.isnan(episodes["cost"]).sum()),
         "failed": int(episodes["failed"].sum()),
         "restarts": int(episodes["restarts"].sum()),
@@ -151,16 +150,20 @@ def row(summary: RunSummary) -> dict[str, Any]:
 
 
 def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> pd.DataFrame:
-    """One `row` a run, with `cost_ratio`: its training cost over that of its frozen arm.
-
-    `cost_ratio` is nan where that arm is not among the runs.
-    """
+    """One `row` a run, with `cost_ratio` as `cost_ratios` gives it."""
     listed = list(summaries.values() if isinstance(summaries, Mapping) else summaries)
     rows = {one.name: row(one) for one in listed}
-    for experiment, values in rows.items():
-        arm = rows.get(frozen_arm(experiment))
-        values["cost_ratio"] = values["training_cost"] / arm["training_cost"] if arm else np.nan
-    return pd.DataFrame(list(rows.values()))
+    ratios = cost_ratios(rows)
+    return pd.DataFrame([values | {"cost_ratio": ratios[e]} for e, values in rows.items()])
+
+
+def cost_ratios(rows: Mapping[Experiment, Mapping[str, Any]]) -> dict[Experiment, float]:
+    """`metrics.cost_ratio` of each `row`; nan where its frozen arm is not among them."""
+    arms = {e: rows.get(frozen_arm(e)) for e in rows}
+    return {
+        e: one["training_cost"] / arm["training_cost"] if (arm := arms[e]) else np.nan
+        for e, one in rows.items()
+    }
 
 
 def tidy(summaries: Iterable[RunSummary]) -> pd.DataFrame:

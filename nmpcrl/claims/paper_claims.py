@@ -380,14 +380,15 @@ def apart(first: Column | None, second: Column | None) -> float:
 
 
 def diverged(study: Study, experiment: Experiment, records: Records) -> bool:
-    """Whether a run diverged: see `DIVERGED`."""
+    """Whether a run is known to have diverged: see `DIVERGED`, and `divergence` for many."""
     frozen = {name: getattr(experiment, name) for name in CELL}
     (arm,) = study.select(learner="frozen", **frozen).values()
-    return bool(_gone(records.facts["stopped"], metrics.cost_ratio(records, arm)))
+    ratio = metrics.cost_ratio(*(metrics.training_cost(one) for one in (records, arm)))
+    return bool(_gone(records.facts["stopped"], ratio))
 
 
 def unstable(study: Study, experiment: Experiment, records: Records) -> bool:
-    """Whether a run is unstable: see `UNSTABLE`."""
+    """Whether a run is known to be unstable: see `UNSTABLE`, and `instability` for many."""
     return diverged(study, experiment, records) or metrics.late_cost_range(records) > UNSTABLE
 
 

@@ -187,7 +187,7 @@ def keys(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("place", "before", "changed"),
     [
-        ("analysis/summary.py", "LATE = 20", "LATE = 21"),
+        ("analysis/metrics.py", "LATE = 20", "LATE = 21"),
         ("analysis/metrics.py", "LAST = 3", "LAST = 4"),
         ("analysis/imitation.py", "FITS = 4000", "FITS = 4001"),
     ],

@@ -445,6 +445,32 @@ def test_a_run_is_judged_from_its_records_as_from_the_table(short):
         assert set(judged) == {True, False}
 
 
+@pytest.mark.parametrize(
+    ("dear", "lost", "expected"),
+    [
+        ((), {"frozen": 1}, False),
+        (("ES",), {"frozen": 1}, True),  # the frozen arm's other episodes say what is usual
+        (("ES",), {"frozen": 3}, False),  # the frozen arm did worse
+        ((), {"frozen": 3, "ES": 3}, pd.NA),  # nothing to hold it against
+    ],
+)
+def test_a_run_is_judged_alike_where_its_frozen_arm_lost_late_episodes(dear, lost, expected):
+    found = {}
+    for learner in ("ES", "frozen"):
+        records = run(Experiment(learner, episodes=6, steps=6))
+        failed = records.steps["episode"] >= 6 - lost.get(learner, 0)
+        steps = {
+            "status": np.where(failed, 2, records.steps["status"]),
+            "cost": records.steps["cost"] * (10 if learner in dear else 1),
+        }
+        changed = replace(records, steps=records.steps | steps)
+        found[Experiment(learner, episodes=6, steps=6)] = changed
+    runs = table([summarise(records) for records in found.values()])
+    assert paper_claims.divergence(runs)[runs.learner == "ES"].tolist() == [expected]
+    (es, records), _ = found.items()
+    assert paper_claims.diverged(Study(found), es, records) == (expected is True)
+
+
 def test_a_row_of_the_table_names_its_experiment(short):
     for experiment, records in short.items():
         runs = pd.DataFrame([row(summarise(records))])
