@@ -9,7 +9,7 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.learners import time_learners
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import audit
-from nmpcrl.claims.own_claims import judge_additions
+from nmpcrl.claims.own_claims import judge_own
 from nmpcrl.claims.paper_claims import judge
 from nmpcrl.claims.rule import Verdict
 from nmpcrl.study.design import MAIN_TABLE
@@ -46,4 +46,4 @@ def verdicts(
         timings=time_learners(),
         assumptions=audit(study, dropped_curvature(study[AUDITED])),
     )
-    return (*claimed, *judge_additions(added))
+    return (*claimed, *judge_own(added))

@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nmpcrl.claims.paper_claims import CLAIMS, Paths, judge_runs
-from nmpcrl.claims.rule import CELL, UNDECIDABLE, Verdict
+from nmpcrl.claims.paper_claims import BY_RUNS, judge_runs
+from nmpcrl.claims.rule import CELL, UNDECIDABLE, Paths, Verdict
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
 from nmpcrl.study.experiment import PAPER
@@ -122,7 +122,7 @@ def flips(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFr
         kept = before[~before.learner.isin(changed.learner)]
         after = judge_runs(pd.concat([changed, kept], ignore_index=True), paths)
         for verdict, other in zip(after, judge_runs(before, paths), strict=True):
-            if not changed.learner.isin(CLAIMS[verdict.claim].learners).any():
+            if not changed.learner.isin(BY_RUNS[verdict.claim].learners).any():
                 continue
             judged, held_against = (Cell(v.outcome, *v.counts["all"]) for v in (verdict, other))
             rows.append(_row(str(name), verdict.claim, judged, held_against))

@@ -21,18 +21,66 @@ more than `IDLE` = 5 % of the time; a machine with nothing else to do makes it w
 that, the ratio is too near to the border for so many steps.
 """
 
-import numpy as np
+from dataclasses import dataclass
+from typing import TypeAlias
 
+import numpy as np
+import pandas as pd
+
+from nmpcrl.bench.learners import REFERENCE, ratio
 from nmpcrl.bench.paired import Ratio
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.rule import (
+    NOT,
+    PARTLY,
+    REPRODUCED,
+    UNDECIDABLE,
+    Claim,
+    Observations,
+    Outcome,
+    Verdict,
+)
 
 WAITED = 0.75  # share of the time
 IDLE = 0.05
 
-Range = tuple[float, float]
+Range: TypeAlias = tuple[float, float]
 
 
-def decide(ratio: Ratio, claimed: Range, near: Range) -> tuple[str, str]:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TimeClaim(Claim):
+    """A claim about the time of a step, in steps of ES, with one solver."""
+
+    learner: str  # whose step
+    solver: str
+    claimed: Range  # where the claim holds
+    near: Range  # and where in part
+    work: str  # why so long, for the evidence
+
+    def judge(self, observed: Observations) -> Verdict:
+        """The verdict, by `decide`; not decidable where there was no time taken."""
+        ratios = self.ratios(observed.timings)
+        listed = ", ".join(f"{value} with {solver}" for solver, value in ratios.items())
+        taken = f"A step of {self.learner} takes, in steps of {REFERENCE}, {listed}: {self.work}."
+        if self.solver not in ratios:
+            missing = f"{self.learner} and {REFERENCE} were not timed with {self.solver}."
+            return self.verdict(UNDECIDABLE, missing)
+        measured = ratios[self.solver]
+        outcome, reason = decide(measured, self.claimed, self.near)
+        interval = None if np.isnan(measured.low) else (measured.low, measured.high)
+        evidence = f"{taken} {reason}".strip()
+        return self.verdict(outcome, evidence, ratio=measured.value, interval=interval)
+
+    def ratios(self, timings: pd.DataFrame) -> dict[str, Ratio]:
+        """Time of a step over that of ES, by solver; the one that decides comes first."""
+        if timings.empty:
+            return {}
+        timed = timings.groupby("solver").learner.agg(set)
+        solvers = [name for name in timed.index if {self.learner, REFERENCE} <= timed[name]]
+        ordered = sorted(solvers, key=lambda name: name != self.solver)
+        return {name: ratio(timings, name, self.learner) for name in ordered}
+
+
+def decide(ratio: Ratio, claimed: Range, near: Range) -> tuple[Outcome, str]:
     """The outcome, and, where there is none, why.
 
     Args:

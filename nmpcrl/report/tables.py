@@ -9,7 +9,7 @@ import pandas as pd
 
 from nmpcrl.bench.targets import Target
 from nmpcrl.claims.assumptions import Assumption
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Verdict
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Outcome, Verdict
 from nmpcrl.report.text import SURE, listed
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
@@ -34,8 +34,8 @@ def claim_table(claims: Iterable[Claim], caption: str) -> str:
     rows = (
         (
             f"<strong>{escape(c.name)}</strong> {escape(c.statement)}",
-            f"{escape(c.question)}<br>{escape(_sentence(c.measure))}",
-            f"{escape(_sentence(c.threshold))}<br>{escape(_sentence(c.test))}",
+            f"{escape(c.question)}<br>{escape(_sentence(c.measured))}",
+            f"{escape(_sentence(c.border))}<br>{escape(_sentence(c.test))}",
         )
         for c in claims
     )
@@ -176,7 +176,7 @@ def _badge(text: str, style: str) -> str:
     return f'<span class="{style}">{text}</span>'
 
 
-def _word(outcome: str | None) -> str:
+def _word(outcome: Outcome | None) -> str:
     """An outcome in a narrow cell: colour and word; nothing where nothing was judged."""
     return _badge(WORDS[outcome], BADGES[outcome]) if outcome else ""
 

@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 
 from nmpcrl.analysis.summary import RunSummary, table
 from nmpcrl.claims.evidence import Evidence, paths
-from nmpcrl.claims.measures import MEASURES
+from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import atlas, telling
 from nmpcrl.report.figures import layouts as figures
 from nmpcrl.report.figures import robustness as maps
@@ -145,7 +145,7 @@ def test_telling_draws_a_row_a_cell_with_every_run_in_it(flipping):
             for line in axes.get_lines()
         )
         groups = maps.groups(found.runs, variant)
-        values = [MEASURES[claim].of(runs, paths(found)) for runs in groups]
+        values = [BY_RUNS[claim].measure(runs, paths(found)) for runs in groups]
         assert drawn == sum(int(one.notna().sum().sum()) for one in values)
 
 
@@ -186,13 +186,13 @@ def test_theta_c_has_a_line_a_run_and_counts_where_they_end():
 
 
 def values(found: Evidence) -> dict[str, pd.DataFrame]:
-    return {claim: one.of(found.runs, paths(found)) for claim, one in MEASURES.items()}
+    return {claim: one.measure(found.runs, paths(found)) for claim, one in BY_RUNS.items()}
 
 
 def test_the_borders_are_drawn_where_they_were_fixed():
     figure = figures.borders(values(study().main), "")
-    for axes, measure in zip(figure.axes, MEASURES.values(), strict=True):
-        assert any(list(line.get_xdata()) == [measure.border] * 2 for line in axes.get_lines())
+    for axes, claim in zip(figure.axes, BY_RUNS.values(), strict=True):
+        assert any(list(line.get_xdata()) == [claim.threshold] * 2 for line in axes.get_lines())
     assert "verdicts stay" in title(figure)
 
 

@@ -12,8 +12,8 @@ from matplotlib.ticker import NullFormatter
 from nmpcrl import Vector
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.claims import rule
+from nmpcrl.claims.by_runs import Values
 from nmpcrl.claims.evidence import Evidence
-from nmpcrl.claims.measures import Values
 from nmpcrl.claims.rule import Verdict
 from nmpcrl.report.figures.layouts import plain
 from nmpcrl.report.figures.rdes import headed

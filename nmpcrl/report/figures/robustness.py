@@ -13,9 +13,9 @@ from matplotlib.ticker import FuncFormatter
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.claims.by_runs import RunClaim, Values
 from nmpcrl.claims.evidence import Evidence, paths
-from nmpcrl.claims.measures import MEASURES, Values
-from nmpcrl.claims.paper_claims import experiment_of
+from nmpcrl.claims.paper_claims import BY_RUNS, experiment_of
 from nmpcrl.claims.robustness import WHOLE, groups
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report.figures.layouts import plain
@@ -24,14 +24,6 @@ from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
 from nmpcrl.report.tables import WORDS
 from nmpcrl.study.experiment import Experiment
 
-ASKED = {  # at the head of a column
-    "C1": "DES diverges,\nRDES does not",
-    "C2": "ES is unstable,\nGES is not",
-    "C5": "RDES and GES:\nsame policy",
-    "C6": "θ helps the\nnetwork",
-    "C7": "constraints\nhold",
-    "C9": "RDES and GES\nbeat $\\theta_\\mathrm{init}$",
-}
 FILLS = {  # with the colour of the word; the darker, the more is left of the claim
     REPRODUCED: ("#1a6b3c", "white"),
     PARTLY: ("#e0b050", "black"),
@@ -39,10 +31,6 @@ FILLS = {  # with the colour of the word; the darker, the more is left of the cl
     UNDECIDABLE: ("white", "0.45"),
 }
 SYMBOLS = {"c_epsilon": r"$c_\epsilon$", "alpha x": "α ×", "beta x": "β ×"}
-SCALES: dict[str, dict[str, Any]] = {  # others are logarithmic
-    "C7": {"value": "symlog", "linthresh": 1e-6},
-    "C9": {"value": "symlog", "linthresh": 0.1},
-}
 MOST_COST = 1.5  # of theta_init's, that is drawn
 
 
@@ -65,7 +53,7 @@ def verdict_map(atlas: pd.DataFrame, mark: str) -> Figure:
         axes.text(-2.3, y, letters[row], ha="center", va="center", fontsize=8)
     axes.text(-2.3, -0.8, "departure", ha="center", va="bottom", fontsize=7.5)
     for i, claim in enumerate(claims):
-        head = f"{claim}\n{ASKED[claim]}"
+        head = f"{claim}\n{BY_RUNS[claim].short}"
         axes.text(i + 0.5, -0.8, head, ha="center", va="bottom", fontsize=7.5)
     axes.set(xlim=(-2.5, len(claims)), ylim=(max(height.values(), default=0) + 0.7, -3.0))
     axes.set_axis_off()
@@ -89,9 +77,9 @@ def telling(cells: pd.DataFrame, found: Evidence) -> Figure:
     )
     for (left, right), cell in zip(grid, cells.to_dict("records"), strict=True):
         here, usual = groups(found.runs, cell["variant"])
-        measure, where = MEASURES[cell["claim"]], paths(found)
-        values = measure.of(here, where), measure.of(usual, where)
-        _strips(left, cell["claim"], *values)
+        claim, where = BY_RUNS[cell["claim"]], paths(found)
+        values = claim.measure(here, where), claim.measure(usual, where)
+        _strips(left, claim, *values)
         learners = [name for name in LOOKS if any(name in arm.split() for arm in values[0])]
         _costs(right, found.summaries, here, usual, learners)
         left.set_title(f"{cell['claim']}: {cell['outcome']}; was: {cell['base']}", fontsize=9)
@@ -137,10 +125,9 @@ def _flipped(atlas: pd.DataFrame) -> str:
     return f"{int(flips.sum())} of {len(decided)} decided verdicts flip{steady}"
 
 
-def _strips(axes: Axes, claim: str, here: Values, usual: Values) -> None:
+def _strips(axes: Axes, claim: RunClaim, here: Values, usual: Values) -> None:
     """The measure of each run, arm by arm: hollow as usual, filled where something is varied."""
-    measure = MEASURES[claim]
-    low, high = _finite_range(pd.concat([here, usual]), measure.border)
+    low, high = _finite_range(pd.concat([here, usual]), claim.threshold)
     for i, arm in enumerate(here):
         look = LOOKS[arm.split()[-1]]
         for shift, values, face in ((-0.2, usual, "none"), (0.2, here, look.color)):
@@ -153,14 +140,15 @@ def _strips(axes: Axes, claim: str, here: Values, usual: Values) -> None:
                 "alpha": 0.8,
             }
             axes.plot(x, numbers, look.marker, linestyle="", **style)
-    axes.axhline(measure.border, color="0.35", linewidth=0.9, linestyle=(0, (2, 2)))
-    axes.set_yscale(**SCALES.get(claim, {"value": "log"}))
-    if claim in SCALES:
+    axes.axhline(claim.threshold, color="0.35", linewidth=0.9, linestyle=(0, (2, 2)))
+    if claim.linear_to:
+        axes.set_yscale("symlog", linthresh=claim.linear_to)
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     else:
+        axes.set_yscale("log")
         plain(axes.yaxis)
     axes.set_xticks(range(len(here.columns)), list(here))
-    axes.set_ylabel(measure.label, fontsize=8)
+    axes.set_ylabel(claim.label, fontsize=8)
 
 
 def _costs(
