@@ -6,6 +6,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Task
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.records import Column, Records
 
@@ -100,8 +101,8 @@ def cost_ratio(cost: Vector, frozen: Vector) -> float:
 
 
 def overshooting(records: Records) -> float:
-    """Share of the steps with alpha ||phi||^2 > 2, where a semi-gradient step overshoots."""
-    return float(np.mean(records.steps["alpha_phi2"] > 2))
+    """Share of the steps with alpha ||phi||^2 above `OVERSHOOT`."""
+    return float(np.mean(records.steps["alpha_phi2"] > OVERSHOOT))
 
 
 def theta_distance(a: Records, b: Records) -> float:

@@ -6,7 +6,6 @@ takes a hundredth of that and is enough for every figure, verdict and mechanism 
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +17,12 @@ from nmpcrl.analysis import metrics
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.metrics import LAST, LATE, TOUCH
 from nmpcrl.control import Task
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, controller_of, frozen_arm
 from nmpcrl.study.records import Column, Records, load_arrays, save_arrays
 
-SIZES = (TOUCH, 0.01, 0.1, np.inf)  # of an overlap Xi: small, medium and large violations
+SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
 IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
 
 
@@ -34,9 +34,9 @@ class RunSummary:
     the episode was cut short or never reached), steps, failed (0 or 1), restarts, inside (states
     in an obstacle, by `SIZES`, shape (episodes, 3)), overlap (largest Xi), outside (states out of
     the box), inputs (actions out of bounds), alpha_phi2 (largest alpha ||phi||^2), over (steps with
-    that above 2), delta (root mean square), loss (mean), bias and error (mean and root mean square
-    of the predicted minus the true next value), theta and w (at the end, shape (episodes, d)),
-    iterations (mean), seconds.
+    that above `OVERSHOOT`), delta (root mean square), loss (mean), bias and error (mean and root
+    mean square of the predicted minus the true next value), theta and w (at the end, shape
+    (episodes, d)), iterations (mean), seconds.
 
     Columns of `evaluations`, one row per rollout without noise: episode (so many were trained),
     theta (d,), cost (infinite where a solve failed), inside (3 counts), overlap (largest Xi),
@@ -131,10 +131,7 @@ def row(summary: RunSummary) -> dict[str, Any]:
     }
     for name, table in (("inside", episodes), ("eval_inside", evaluations)):
         counts = table["inside"].sum(axis=0)
-        columns |= {
-            f"{name}_{size}": int(count)
-            for size, count in zip(("small", "medium", "large"), counts, strict=True)
-        }
+        columns |= {f"{name}_{size}": int(count) for size, count in zip(SIZES, counts, strict=True)}
     columns |= {
         "worst_overlap": float(np.nanmax(episodes["overlap"])),
         "eval_worst_overlap": float(np.nanmax(evaluations["overlap"])),
@@ -205,7 +202,7 @@ def _episodes(records: Records, task: Task, lower: Vector, upper: Vector) -> dic
         "outside": by.sum(out).astype(int),
         "inputs": by.sum(beyond).astype(int),
         "alpha_phi2": by.reduce(np.fmax, steps["alpha_phi2"]),
-        "over": by.sum(steps["alpha_phi2"] > 2).astype(int),
+        "over": by.sum(steps["alpha_phi2"] > OVERSHOOT).astype(int),
         "delta": np.sqrt(by.mean(steps["delta"] ** 2)),
         "loss": by.mean(steps["loss"]),
         "bias": by.mean(wrong),
@@ -251,7 +248,8 @@ class _ByEpisode:
 
 def _sizes(overlap: Column) -> Column:
     """Whether overlaps are of each of `SIZES`, along a new last axis of length 3."""
-    return np.stack([(overlap > low) & (overlap <= high) for low, high in pairwise(SIZES)], axis=-1)
+    ranges = SIZES.values()
+    return np.stack([(overlap > low) & (overlap <= high) for low, high in ranges], axis=-1)
 
 
 def _distance(states: Column, task: Task) -> Vector:

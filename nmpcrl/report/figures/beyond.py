@@ -16,7 +16,7 @@ from nmpcrl.analysis.policy_search import Found
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.analysis.trajectory import described
-from nmpcrl.claims.failure_modes import OVERSHOOT
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.controller import draw_task
 from nmpcrl.report.figures.rdes import headed
 from nmpcrl.report.figures.style import LOOKS, marked, page, subplots
