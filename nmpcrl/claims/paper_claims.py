@@ -19,6 +19,7 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.metrics import TOUCH
+from nmpcrl.analysis.summary import SIZES
 from nmpcrl.claims.assumptions import Assumption, TheoremClaim
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values, beside
 from nmpcrl.claims.rule import CELL, Claim, Observations, Paths, Verdict, arms, median, shown
@@ -52,7 +53,6 @@ NEAR_HALF = (0.0, 1.0)
 NEAR_SAME_TIME = (0.8, 1.25)
 
 SOLVER = "ipopt"  # the paper's, with which C3 and C4 are judged
-SIZES = ("small", "medium", "large")  # of an overlap: up to 0.01, to 0.1, and above
 TIMED: dict[str, Any] = {
     "solver": SOLVER,
     "measured": f"the processor's time for a step over that for one of ES, with {SOLVER}, the"
@@ -65,9 +65,14 @@ UP_TO = 60  # borders at which a claim is decided once more
 # Numbers of runs, one a row of `summary.table`
 
 
+def was_stopped(runs: pd.DataFrame) -> pd.Series:
+    """Whether training had to be stopped; False for a run that is missing."""
+    return runs.stopped.notna() & (runs.stopped != "finished")
+
+
 def training_cost_ratio(runs: pd.DataFrame) -> pd.Series:
     """Training cost over the frozen arm's; infinite where the run was stopped."""
-    return runs.cost_ratio.mask(_was_stopped(runs), np.inf)
+    return runs.cost_ratio.mask(was_stopped(runs), np.inf)
 
 
 def divergence(runs: pd.DataFrame) -> pd.Series:
@@ -96,7 +101,7 @@ def cost_reduction(runs: pd.DataFrame) -> pd.Series:
 
     Minus infinity where a rollout failed, and where training had to be stopped.
     """
-    return (1 - runs.final_cost / runs.initial_cost).mask(_was_stopped(runs), -np.inf)
+    return (1 - runs.final_cost / runs.initial_cost).mask(was_stopped(runs), -np.inf)
 
 
 def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
@@ -312,11 +317,6 @@ def _c9_evidence(runs: pd.DataFrame, _: Paths) -> str:
         f" {stuck} end more than {ARRIVED} away from the target, and in {failed} runs one of the"
         " last three failed or training was stopped; they count."
     )
-
-
-def _was_stopped(runs: pd.DataFrame) -> pd.Series:
-    """Whether training had to be stopped; False for a run that is missing."""
-    return runs.stopped.notna() & (runs.stopped != "finished")
 
 
 def _of(holds: pd.Series) -> str:

@@ -27,9 +27,9 @@ import nmpcrl
 from nmpcrl.analysis.summaries import key as run_key
 from nmpcrl.analysis.summary import RunSummary, row
 from nmpcrl.bench.suite import machine
-from nmpcrl.claims.failure_modes import fates
+from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism, failure_modes
 from nmpcrl.claims.paper_claims import experiment_of
-from nmpcrl.claims.rule import UNDECIDABLE, Verdict
+from nmpcrl.claims.rule import UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import store
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column
@@ -37,7 +37,12 @@ from nmpcrl.study.records import Column
 FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
-WORDS = ["ending", "wrong", "mechanism"]  # of `failure_modes.fates`, as the next
+# Columns of `failure_modes`, and what may be in them; nothing is said of the frozen arms.
+WORDS = {
+    "ending": {*Ending, ""},
+    "wrong": {*Failure, ""},
+    "mechanism": {*Mechanism, WELL, ""},
+}
 FAILURE_MODE = [*WORDS, "episode"]
 MEASURES = ("final_cost", "training_cost")  # by which runs of another machine are judged
 SLACK = 0.01  # of theta_init's cost, that they may be out of the published spread
@@ -148,7 +153,7 @@ def here() -> dict[str, Any]:
 def failure_modes_of(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
     """`FAILURE_MODE` of each run, in order; nothing is said of the frozen arms."""
     moved = [e for e in summaries if e.learner != "frozen"]
-    told = fates(summaries)[FAILURE_MODE].to_dict("records")
+    told = failure_modes(summaries)[FAILURE_MODE].to_dict("records")
     known = dict(zip(moved, told, strict=True))
     silent = {"ending": "", "wrong": "", "episode": pd.NA, "mechanism": ""}
     return pd.DataFrame([known.get(e, silent) for e in summaries], columns=FAILURE_MODE)
@@ -173,6 +178,9 @@ def _load(folder: Path) -> Published:
             raise ValueError("a file is not the one that about.json speaks of")
         runs = pd.read_csv(folder / "runs.csv", dtype=dict.fromkeys(WORDS, str))
         runs = runs.fillna(dict.fromkeys(WORDS, ""))
+        for name, known in WORDS.items():
+            if unknown := set(runs[name]) - known:
+                raise ValueError(f"no {name} is called {', '.join(sorted(unknown))}")
         rows = {experiment_of(one): one for one in runs.to_dict("records")}
         with np.load(folder / "curves.npz", allow_pickle=False) as file:
             curves = {name: file[name] for name in file.files}
@@ -319,7 +327,12 @@ def _verdict(stored: dict[str, Any]) -> Verdict:
     """A verdict as JSON has it, with its tuples again."""
     interval = stored["interval"] and tuple(stored["interval"])
     counts = {name: tuple(pair) for name, pair in stored["counts"].items()}
-    return Verdict(**stored | {"interval": interval, "counts": counts})
+    parts = {
+        name: {part: Outcome(outcome) for part, outcome in stored[name].items()}
+        for name in ("by_layout", "by_decay")
+    }
+    outcome = Outcome(stored["outcome"])
+    return Verdict(**stored | parts | {"outcome": outcome, "interval": interval, "counts": counts})
 
 
 def _write(path: Path, content: Any) -> None:

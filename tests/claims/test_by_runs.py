@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.analysis.summary import SIZES
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast
 from nmpcrl.claims.paper_claims import BY_RUNS, share_of_possible
@@ -41,11 +42,8 @@ def drawn(seed: int) -> pd.DataFrame:
                 "eval_worst_overlap": 0.05 if inside else -0.1,
                 "imitation_with": rng.uniform(0.5, 1.1) if learner == "RDES" else np.nan,
                 "imitation_without": 1.0,
-                **{f"inside_{size}": 0 for size in paper_claims.SIZES},
-                **{
-                    f"eval_inside_{size}": inside * (size == "medium")
-                    for size in paper_claims.SIZES
-                },
+                **{f"inside_{size}": 0 for size in SIZES},
+                **{f"eval_inside_{size}": inside * (size == "medium") for size in SIZES},
                 **{f"theta_{i}": value for i, value in enumerate(experiment.theta)},
             }
         )

@@ -211,6 +211,17 @@ def test_a_table_without_a_column_is_said_in_a_sentence(known, folder):
     assert_refused(folder)
 
 
+@pytest.mark.parametrize(("name", "word"), [("runs.csv", "stuck"), ("verdicts.json", "partly")])
+def test_a_word_that_is_not_known_is_refused(known, folder, name, word):
+    text = (folder / name).read_text()
+    (folder / name).write_text(text.replace(word, "hardly"))
+    about = json.loads((folder / "about.json").read_text())
+    about["files"] = published._sums(folder)
+    (folder / "about.json").write_text(json.dumps(about))
+    assert word in text
+    assert_refused(folder)
+
+
 def assert_refused(folder):
     published._load.cache_clear()
     with pytest.raises(Damaged, match="is damaged") as refused:

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.analysis.summary import SIZES
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.robustness import WHOLE, atlas, departure, groups, left_out, telling
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED
@@ -19,9 +20,7 @@ PLACE = np.zeros((3, 3))
 
 def summary(experiment: Experiment, variant: str, **unlike) -> dict:
     """The row of a run that saved a tenth and in which nothing went wrong."""
-    counts = {
-        f"{name}_{size}": 0 for name in ("inside", "eval_inside") for size in paper_claims.SIZES
-    }
+    counts = {f"{name}_{size}": 0 for name in ("inside", "eval_inside") for size in SIZES}
     return (
         asdict(experiment)
         | {"theta": " ".join(map(repr, experiment.theta)), "variant": variant}

@@ -12,7 +12,15 @@ from matplotlib.ticker import MaxNLocator
 
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence
-from nmpcrl.claims.failure_modes import ENDINGS, MECHANISMS, OVER_PREDICTED, OVERSHOOT, WELL, rise
+from nmpcrl.claims.failure_modes import (
+    ENDINGS,
+    MECHANISMS,
+    OVER_PREDICTED,
+    WELL,
+    Failure,
+    rise,
+)
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.layouts import closes_at, plain
 from nmpcrl.report.figures.panels import FEW, LIMIT, SUBTITLE
 from nmpcrl.report.figures.rdes import headed
@@ -39,7 +47,7 @@ def reasons(found: Evidence) -> Figure:
     """How many runs of each learner met which mechanism, and how their last drives ended."""
     moved = found.runs[found.runs.learner != "frozen"]
     figure, axes = subplots(1, 2, 1.5 + 0.32 * moved.learner.nunique(), sharey=True)
-    ends = moved.ending.mask(moved.wrong == "stopped", STOPPED)
+    ends = moved.ending.mask(moved.wrong == Failure.STOPPED, STOPPED)
     kinds = (moved.mechanism, (*MECHANISMS, WELL)), (ends, (STOPPED, *ENDINGS[1:], ENDINGS[0]))
     for axis, (said, names) in zip(axes, kinds, strict=True):
         counts = pd.crosstab(moved.learner, said)
