@@ -71,7 +71,7 @@ def paired_ratio(
 
 
 def _interval(logs: Vector) -> tuple[float, float]:
-    """Of the median, by drawing blocks; a last block that is not whole is left out."""
+    """Of the median, by drawing blocks; a last block that is not whole does not count."""
     blocks = logs[: len(logs) // BLOCK * BLOCK].reshape(-1, BLOCK)
     if len(blocks) < LEAST:
         return np.nan, np.nan

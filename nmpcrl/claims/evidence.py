@@ -120,7 +120,7 @@ def gather(
 
 
 def paths(evidence: Evidence) -> Mapping[Experiment, Column]:
-    """States of each run's last drive without noise, as `paper_claims.judge` takes them."""
+    """States of each run's last rollout, as `paper_claims.judge` takes them."""
     return {experiment: summary.states for experiment, summary in evidence.summaries.items()}
 
 

@@ -27,8 +27,8 @@ from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.layouts import ARRIVED, gaps
 from nmpcrl.study.records import Column
 
-# The network is to blame if it says more than the true next value, so that on average this share
-# of the TD error (its root mean square) is of the network's making.
+# The network is to blame if it predicts more than the true next value, so that on average this
+# share of the TD error (its root mean square) is of the network's making.
 OVER_PREDICTED = 0.5
 # The solver is to blame if it cut short at least this share of the episodes, or the rollout itself.
 CUT_SHORT = 0.5
@@ -153,7 +153,7 @@ def overshot(run: RunSummary, window: slice) -> bool:
 
 
 def over_predicted(run: RunSummary, window: slice) -> bool:
-    """Whether the network said too much: see `OVER_PREDICTED`; False for who has none."""
+    """Whether the network predicted too much: see `OVER_PREDICTED`; False for who has none."""
     bias, delta = run.episodes["bias"][window], run.episodes["delta"][window]
     known = np.isfinite(bias) & np.isfinite(delta)
     share = paper.GAMMA * bias[known].sum() / delta[known].sum() if known.any() else 0.0

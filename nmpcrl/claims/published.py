@@ -37,7 +37,7 @@ from nmpcrl.study.records import Column
 FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
-# Columns of `failure_modes`, and what may be in them; nothing is said of the frozen arms.
+# Columns of `failure_modes`, and what may be in them; the frozen arms have none.
 WORDS = {
     "ending": {*Ending, ""},
     "wrong": {*Failure, ""},
@@ -45,7 +45,7 @@ WORDS = {
 }
 FAILURE_MODE = [*WORDS, "episode"]
 MEASURES = ("final_cost", "training_cost")  # by which runs of another machine are judged
-SLACK = 0.01  # of theta_init's cost, that they may be out of the published spread
+SLACK = 0.01  # of theta_init's cost, that they may be out of the published range
 EXACT = 1e-6  # relative: the cost of theta_init, which no noise and no learning moves
 
 
@@ -145,18 +145,18 @@ def here() -> dict[str, Any]:
     except OSError:
         lines = []
     kept = ("flags", "Features", "cpu family", "model\t")
-    told = sorted({line for line in lines if line.startswith(kept)})
-    abilities = sha256("\n".join(told).encode()).hexdigest()[:16]
+    lines = sorted({line for line in lines if line.startswith(kept)})
+    abilities = sha256("\n".join(lines).encode()).hexdigest()[:16]
     return {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities}
 
 
 def failure_modes_of(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
-    """`FAILURE_MODE` of each run, in order; nothing is said of the frozen arms."""
+    """`FAILURE_MODE` of each run, in order; the frozen arms have none."""
     moved = [e for e in summaries if e.learner != "frozen"]
-    told = failure_modes(summaries)[FAILURE_MODE].to_dict("records")
-    known = dict(zip(moved, told, strict=True))
-    silent = {"ending": "", "wrong": "", "episode": pd.NA, "mechanism": ""}
-    return pd.DataFrame([known.get(e, silent) for e in summaries], columns=FAILURE_MODE)
+    modes = failure_modes(summaries)[FAILURE_MODE].to_dict("records")
+    known = dict(zip(moved, modes, strict=True))
+    none = {"ending": "", "wrong": "", "episode": pd.NA, "mechanism": ""}
+    return pd.DataFrame([known.get(e, none) for e in summaries], columns=FAILURE_MODE)
 
 
 def load() -> Published:
@@ -206,13 +206,13 @@ def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.
     Where code, versions and machine are the same, every run must be the same to the last bit.
     Elsewhere rounding differs, and learning may make much of that. So theta_init's cost must agree
     to `EXACT`, and of the runs of a learner, layout and reading of the decay at least half must lie
-    within the spread of the published ones, widened on both sides by itself and by `SLACK`.
+    within the range of the published ones, widened on both sides by itself and by `SLACK`.
     """
     rows = {e: row(one) for e, one in fresh.items() if e in published.rows}
     exact = comparable(rows, published)
     wrong = [_unequal(e, rows[e], published.rows[e]) for e in sorted(exact, key=str)]
     others = {e: one for e, one in rows.items() if e not in exact}
-    wrong += _out_of_spread(others, published)
+    wrong += _out_of_range(others, published)
     names = [*CELL, "seed", "what", "here", "published"]
     return pd.DataFrame([one for one in wrong if one], columns=names)
 
@@ -248,7 +248,7 @@ def _unequal(e: Experiment, here: dict[str, Any], there: dict[str, Any]) -> tupl
     return None
 
 
-def _out_of_spread(
+def _out_of_range(
     rows: Mapping[Experiment, dict[str, Any]], published: Published
 ) -> list[tuple[Any, ...]]:
     """The rule for runs of another machine; see `compare`."""
@@ -276,9 +276,9 @@ def _widened(values: Column, slack: float) -> tuple[float, float]:
     finite = values[np.isfinite(values)]
     if not finite.size:
         return -np.inf, np.inf
-    spread = float(np.ptp(finite)) + slack
-    most = np.inf if finite.size < values.size else float(finite.max()) + spread
-    return float(finite.min()) - spread, most
+    width = float(np.ptp(finite)) + slack
+    most = np.inf if finite.size < values.size else float(finite.max()) + width
+    return float(finite.min()) - width, most
 
 
 def _sums(folder: Path) -> dict[str, str]:

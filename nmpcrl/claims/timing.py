@@ -96,8 +96,8 @@ def decide(ratio: Ratio, claimed: Range, near: Range) -> tuple[Outcome, str]:
     close, far = near[0] <= low and high < near[1], high < near[0] or low >= near[1]
     outcome = REPRODUCED if inside else PARTLY if beside and close else NOT if far else UNDECIDABLE
     if ratio.waited > WAITED or (outcome == UNDECIDABLE and ratio.waited > IDLE):
-        said = "Not decidable here: the machine was too busy, the process waited for"
-        return UNDECIDABLE, f"{said} {ratio.waited:.0%} of the time."
+        reason = "Not decidable here: the machine was too busy, the process waited for"
+        return UNDECIDABLE, f"{reason} {ratio.waited:.0%} of the time."
     if outcome == UNDECIDABLE:
         return outcome, "Not decidable here: the interval reaches across a border of the claim."
     return outcome, ""

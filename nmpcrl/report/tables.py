@@ -109,7 +109,7 @@ def dependence(verdicts: Iterable[Verdict], flipped: pd.DataFrame) -> str:
 
     Args:
         verdicts: of `judge_runs`.
-        flipped: rows of `robustness.atlas`; those that chance hardly explains, by `SURE`, are bold.
+        flipped: rows of `robustness_map`; those that chance hardly explains, by `SURE`, are bold.
     """
     rows = ["| Claim | Over all | Flipped by |", "|---|---|---|"]
     for v in verdicts:

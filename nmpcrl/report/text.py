@@ -67,7 +67,7 @@ def spread(verdicts: Iterable[Verdict]) -> str:
 
 
 def changes(flips: pd.DataFrame) -> str:
-    """How many variants change a verdict; `flips` as `robustness.flips` returns it."""
+    """How many variants change a verdict; `flips` as `robustness.variant_changes` returns it."""
     variants = flips.variant.unique()
     if not len(variants):
         return ""
@@ -121,4 +121,4 @@ def listed(names: Iterable[object]) -> str:
 
 
 def _flipped(flips: pd.DataFrame) -> pd.DataFrame:
-    return flips[flips.flips.astype(bool)]  # without rows the column has no type of its own
+    return flips[flips.changes.astype(bool)]  # without rows the column has no type of its own

@@ -15,7 +15,7 @@ from nmpcrl.analysis.summary import row, summarise, table
 from nmpcrl.claims import own_claims, paper_claims
 from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.by_runs import RunClaim
-from nmpcrl.claims.robustness import flips, spread
+from nmpcrl.claims.robustness import part_changes, variant_changes
 from nmpcrl.claims.rule import (
     NOT,
     PARTLY,
@@ -563,20 +563,20 @@ def one(frame: pd.DataFrame, variant: str, claim: str) -> pd.Series:
     return found
 
 
-def test_a_variant_flips_the_claims_whose_outcome_it_changes():
+def test_a_variant_changes_the_claims_whose_outcome_it_changes():
     hot = study(of("DES", **BAD), learners=PAPER, alpha=3e-7)
     runs = varied(study(), hot=hot)
-    frame = flips(runs, paths(runs))
+    frame = variant_changes(runs, paths(runs))
     assert set(frame.claim) == RUNS_DECIDE
-    assert frame[frame.flips].claim.tolist() == ["C1"]
-    flipped = one(frame, "hot", "C1")
-    assert (flipped.base, flipped.outcome, flipped.base_share, flipped.share) == (
+    assert frame[frame.changes].claim.tolist() == ["C1"]
+    changed = one(frame, "hot", "C1")
+    assert (changed.base, changed.outcome, changed.base_share, changed.share) == (
         NOT,
         REPRODUCED,
         0,
         1,
     )
-    assert flipped.p == pytest.approx(2 / 184756)  # two of the 20 over 10 ways to deal them out
+    assert changed.p == pytest.approx(2 / 184756)  # two of the 20 over 10 ways to deal them out
     assert one(frame, "hot", "C2").p == 1
 
 
@@ -585,21 +585,21 @@ def test_a_variant_is_held_against_the_main_table_in_its_own_cells():
         lambda e: BAD if e.learner == "DES" and e.layout == "B" else {}, layouts=("A", "B")
     )
     runs = varied(main, soft=study(learners=PAPER, layouts=("A",), box="soft"))
-    cell = one(flips(runs, paths(runs)), "soft", "C1")
+    cell = one(variant_changes(runs, paths(runs)), "soft", "C1")
     assert (cell.base, cell.outcome, cell.pairs) == (NOT, NOT, 10)
 
 
 def test_a_learner_that_a_variant_does_not_change_is_taken_from_the_main_table():
     main = study(of("ES", **SWAYING))
     runs = varied(main, slow=study(of("GES", **SWAYING), learners=("GES",), beta=1e-6))
-    frame = flips(runs, paths(runs))
+    frame = variant_changes(runs, paths(runs))
     assert (one(frame, "slow", "C2").base, one(frame, "slow", "C2").outcome) == (REPRODUCED, NOT)
     assert (one(frame, "slow", "C9").base, one(frame, "slow", "C9").outcome) == (NOT, NOT)
 
 
-def test_a_claim_about_learners_that_a_variant_does_not_change_cannot_flip():
+def test_a_claim_about_learners_that_a_variant_does_not_change_cannot_change():
     runs = varied(study(), slow=study(learners=("GES",), beta=1e-6))
-    assert set(flips(runs, paths(runs)).claim) == {"C2", "C5", "C7", "C9"}
+    assert set(variant_changes(runs, paths(runs)).claim) == {"C2", "C5", "C7", "C9"}
 
 
 @pytest.mark.parametrize("name", sorted(RUNS_DECIDE | set(own_claims.OWN_CLAIMS)))
@@ -617,16 +617,16 @@ def test_those_whom_a_claim_asks_decide_it(name):
         assert outcome(runs[runs.learner != learner]) == UNDECIDABLE
 
 
-def test_what_is_undecided_flips_nothing():
+def test_what_is_undecided_changes_nothing():
     runs = varied(study(), cut=study(learners=PAPER, episodes=10))
-    frame = flips(runs, paths(runs))
+    frame = variant_changes(runs, paths(runs))
     assert set(frame.outcome) == {UNDECIDABLE}
-    assert not frame.flips.any()
+    assert not frame.changes.any()
 
 
 def test_controls_are_no_variant_of_the_paper_s_claims():
     runs = varied(study(learners=PAPER), controls=study(learners=("random", "QL")))
-    assert flips(runs, paths(runs)).empty
+    assert variant_changes(runs, paths(runs)).empty
 
 
 def test_layouts_and_readings_are_shown_as_variants_are():
@@ -634,8 +634,8 @@ def test_layouts_and_readings_are_shown_as_variants_are():
         return BAD if e.learner == "DES" and e.layout == "B" else {}
 
     runs = study(worse, layouts=("A", "B"))
-    frame = spread(judge(runs))
-    assert list(frame.columns) == list(flips(varied(runs), {}).columns)
+    frame = part_changes(judge(runs))
+    assert list(frame.columns) == list(variant_changes(varied(runs), {}).columns)
     assert frame[frame.claim == "C1"].variant.tolist() == [
         "layout A",
         "layout B",
@@ -643,7 +643,7 @@ def test_layouts_and_readings_are_shown_as_variants_are():
         "decay per episode",
     ]
     cell = one(frame, "layout B", "C1")
-    assert (cell.outcome, cell.base, cell.flips) == (REPRODUCED, PARTLY, True)
+    assert (cell.outcome, cell.base, cell.changes) == (REPRODUCED, PARTLY, True)
     assert (cell.share, cell.base_share, cell.pairs) == (1, 0, 10)
     assert not set(frame.claim) & {"C3", "C4", "C8"}
 

@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from nmpcrl.analysis.summary import RunSummary, table
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.robustness import atlas, telling
+from nmpcrl.claims.robustness import clearest_changes, robustness_map
 from nmpcrl.report.figures import layouts as figures
 from nmpcrl.report.figures import robustness as maps
 from nmpcrl.study import Experiment, design, paper
@@ -65,10 +65,10 @@ def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
 
 
 @pytest.fixture(scope="module")
-def flipping() -> tuple[Evidence, pd.DataFrame]:
-    """A study in which C9 flips in the row of the variant, and its map."""
+def changing() -> tuple[Evidence, pd.DataFrame]:
+    """A study in which C9 changes in the row of the variant, and its map."""
     found = study(gained=-0.2)
-    return found, atlas(found.runs, paths(found))
+    return found, robustness_map(found.runs, paths(found))
 
 
 def title(figure: Figure) -> str:
@@ -103,20 +103,20 @@ def test_only_narrow_gaps_are_drawn_from_centre_to_centre():
     assert all(abs(line.get_ydata()[1]) < 3 for line in gap)  # no wall is near
 
 
-def test_the_map_has_a_frame_and_an_arrow_for_every_flip(flipping):
-    found, rows = flipping
+def test_the_map_has_a_frame_and_an_arrow_for_every_change(changing):
+    found, rows = changing
     figure = maps.verdict_map(rows, found.mark)
-    flips = int(rows.flips.sum())
-    assert flips > 0
-    assert len(frames(figure)) == flips
+    changes = int(rows.changes.sum())
+    assert changes > 0
+    assert len(frames(figure)) == changes
     arrows = [text for text in written(figure) if "→" in text]
-    assert len(arrows) == flips
+    assert len(arrows) == changes
     assert "yes → no" in arrows
-    assert title(figure).startswith(f"{flips} of ")
+    assert title(figure).startswith(f"{changes} of ")
 
 
-def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(flipping):
-    found, rows = flipping
+def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(changing):
+    found, rows = changing
     texts = written(maps.verdict_map(rows, found.mark))
     cells = [text for text in texts if text.startswith(("yes", "partly", "no", "open"))]
     assert len(cells) == len(rows)
@@ -124,18 +124,18 @@ def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(flipping):
     assert {"B", "C", "F"} <= set(texts)  # of the layouts, the decays and the variant
 
 
-def test_the_title_of_the_map_names_the_claims_that_never_flip(flipping):
-    found, rows = flipping
-    flipped = set(rows.claim[rows.flips.astype(bool)])
+def test_the_title_of_the_map_names_the_claims_that_never_change(changing):
+    found, rows = changing
+    changed_claims = set(rows.claim[rows.changes.astype(bool)])
     never = title(maps.verdict_map(rows, found.mark)).partition("those on ")[2]
-    assert not any(claim in never for claim in flipped)
+    assert not any(claim in never for claim in changed_claims)
     assert "C7" in never
 
 
-def test_telling_draws_a_row_a_cell_with_every_run_in_it(flipping):
-    found, rows = flipping
-    cells = telling(rows)
-    figure = maps.telling(cells, found)
+def test_the_clearest_changes_are_drawn_a_row_a_cell_with_every_run_in_it(changing):
+    found, rows = changing
+    cells = clearest_changes(rows)
+    figure = maps.clearest_changes(cells, found)
     assert len(figure.axes) == 2 * len(cells)
     assert cells.claim.iloc[0] in title(figure)
     assert maps.named(cells.variant.iloc[0]) in title(figure)
@@ -149,27 +149,29 @@ def test_telling_draws_a_row_a_cell_with_every_run_in_it(flipping):
         assert drawn == sum(int(one.notna().sum().sum()) for one in values)
 
 
-def test_telling_draws_what_is_infinite_at_the_edge(flipping):
-    found, rows = flipping
+def test_what_is_infinite_is_drawn_at_the_edge(changing):
+    found, rows = changing
     changed = found.runs.assign(
         stopped=found.runs.stopped.where(found.runs.variant != VARIANT, "diverged")
     )
-    figure = maps.telling(telling(rows).head(1), Evidence(found.summaries, changed))
+    figure = maps.clearest_changes(
+        clearest_changes(rows).head(1), Evidence(found.summaries, changed)
+    )
     for line in figure.axes[0].get_lines():
         assert np.isfinite(line.get_ydata()).all()
 
 
-def test_where_nothing_flips_the_figure_says_so():
+def test_where_nothing_changes_the_figure_says_so():
     found = study()
-    cells = telling(atlas(found.runs, paths(found)))
-    assert title(maps.telling(cells, found)) == "No verdict flips in what was run here"
+    cells = clearest_changes(robustness_map(found.runs, paths(found)))
+    assert title(maps.clearest_changes(cells, found)) == "No verdict changes in what was run here"
 
 
 def test_a_study_that_is_too_short_has_a_map_on_which_all_is_open():
     found = study(episodes=4)
-    rows = atlas(found.runs, paths(found))
+    rows = robustness_map(found.runs, paths(found))
     figure = maps.verdict_map(rows, found.mark)
-    assert title(figure) == "0 of 0 decided verdicts flip"
+    assert title(figure) == "0 of 0 decided verdicts change"
     assert not frames(figure)
 
 

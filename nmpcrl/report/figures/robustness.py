@@ -35,18 +35,18 @@ MOST_COST = 1.5  # of theta_init's, that is drawn
 
 
 @page
-def verdict_map(atlas: pd.DataFrame, mark: str) -> Figure:
+def verdict_map(found: pd.DataFrame, mark: str) -> Figure:
     """What becomes of each claim in each row; a frame where it is not what it is held against.
 
     Args:
-        atlas: of `robustness.atlas`.
+        found: of `robustness_map`.
         mark: where the runs come from.
     """
-    claims, rows = list(atlas.claim.unique()), list(atlas.variant.unique())
-    letters = dict(zip(atlas.variant, atlas.departure, strict=True))
+    claims, rows = list(found.claim.unique()), list(found.variant.unique())
+    letters = dict(zip(found.variant, found.departure, strict=True))
     height = dict(zip(rows, _heights([letters[row] for row in rows]), strict=True))
     figure, axes = subplots(height=0.22 * max(height.values(), default=0) + 1.4)
-    for cell in atlas.to_dict("records"):
+    for cell in found.to_dict("records"):
         _cell(axes, claims.index(cell["claim"]), height[cell["variant"]], cell)
     for row, y in height.items():
         axes.text(-0.1, y, named(row), ha="right", va="center", fontsize=8)
@@ -57,31 +57,31 @@ def verdict_map(atlas: pd.DataFrame, mark: str) -> Figure:
         axes.text(i + 0.5, -0.8, head, ha="center", va="bottom", fontsize=7.5)
     axes.set(xlim=(-2.5, len(claims)), ylim=(max(height.values(), default=0) + 0.7, -3.0))
     axes.set_axis_off()
-    return marked(headed(figure, _flipped(atlas)), mark)
+    return marked(headed(figure, _changed(found)), mark)
 
 
 @page
-def telling(cells: pd.DataFrame, found: Evidence) -> Figure:
+def clearest_changes(cells: pd.DataFrame, found: Evidence) -> Figure:
     """What lies behind some cells: a row each, the claim's measure and the costs of its runs.
 
     Args:
-        cells: of `robustness.telling`.
+        cells: of `robustness.clearest_changes`.
         found: runs and summaries of the main table and of the variants.
     """
     if cells.empty:
         figure, axes = subplots(height=0.6)
         axes.set_axis_off()
-        return headed(figure, "No verdict flips in what was run here")
+        return headed(figure, "No verdict changes in what was run here")
     figure, grid = subplots(
         len(cells), 2, 2.5 * len(cells) + 0.3, squeeze=False, width_ratios=(1, 1)
     )
     for (left, right), cell in zip(grid, cells.to_dict("records"), strict=True):
-        here, usual = groups(found.runs, cell["variant"])
+        here, base = groups(found.runs, cell["variant"])
         claim, where = BY_RUNS[cell["claim"]], paths(found)
-        values = claim.measure(here, where), claim.measure(usual, where)
+        values = claim.measure(here, where), claim.measure(base, where)
         _strips(left, claim, *values)
         learners = [name for name in LOOKS if any(name in arm.split() for arm in values[0])]
-        _costs(right, found.summaries, here, usual, learners)
+        _costs(right, found.summaries, here, base, learners)
         left.set_title(f"{cell['claim']}: {cell['outcome']}; was: {cell['base']}", fontsize=9)
         right.set_title(f"{named(cell['variant'])} (bands: without it)", fontsize=9)
     listed = ", ".join(f"{row.claim} by {named(row.variant)}" for row in cells.itertuples())
@@ -102,12 +102,12 @@ def _heights(letters: list[str]) -> list[float]:
 
 
 def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
-    """Colour, word and share of yes; framed, and with what it was before, if it flips."""
+    """Colour, word and share of yes; framed, and with the outcome of the base, if it changes."""
     fill, ink = FILLS[cell["outcome"]]
     place, size = (column + 0.03, y - 0.46), (0.94, 0.92)
     axes.add_patch(Rectangle(place, *size, facecolor=fill, edgecolor="0.8", linewidth=0.5))
     text = WORDS[cell["outcome"]]
-    if cell["flips"]:
+    if cell["changes"]:
         text = f"{WORDS[cell['base']]} → {text}"
         axes.add_patch(Rectangle(place, *size, fill=False, edgecolor="black", linewidth=1.8))
     elif 0 < cell["share"] < 1:
@@ -115,22 +115,22 @@ def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
     axes.text(column + 0.5, y, text, ha="center", va="center", color=ink, fontsize=7.5)
 
 
-def _flipped(atlas: pd.DataFrame) -> str:
-    """How many cells flip, and of which claims none does."""
-    decided = atlas[(atlas.variant != WHOLE) & (atlas.outcome != UNDECIDABLE)]
+def _changed(found: pd.DataFrame) -> str:
+    """How many cells change, and of which claims none does."""
+    decided = found[(found.variant != WHOLE) & (found.outcome != UNDECIDABLE)]
     decided = decided[decided.base != UNDECIDABLE]
-    flips = decided.groupby("claim", sort=False).flips.sum()
-    never = [str(claim) for claim, count in flips.items() if not count]
-    steady = f"; those on {' and '.join(never)} never" if never and flips.any() else ""
-    return f"{int(flips.sum())} of {len(decided)} decided verdicts flip{steady}"
+    changes = decided.groupby("claim", sort=False).changes.sum()
+    never = [str(claim) for claim, count in changes.items() if not count]
+    steady = f"; those on {' and '.join(never)} never" if never and changes.any() else ""
+    return f"{int(changes.sum())} of {len(decided)} decided verdicts change{steady}"
 
 
-def _strips(axes: Axes, claim: RunClaim, here: Values, usual: Values) -> None:
-    """The measure of each run, arm by arm: hollow as usual, filled where something is varied."""
-    low, high = _finite_range(pd.concat([here, usual]), claim.threshold)
+def _strips(axes: Axes, claim: RunClaim, here: Values, base: Values) -> None:
+    """The measure of each run, arm by arm: hollow of the base, filled of the variant."""
+    low, high = _finite_range(pd.concat([here, base]), claim.threshold)
     for i, arm in enumerate(here):
         look = LOOKS[arm.split()[-1]]
-        for shift, values, face in ((-0.2, usual, "none"), (0.2, here, look.color)):
+        for shift, values, face in ((-0.2, base, "none"), (0.2, here, look.color)):
             numbers = values[arm].dropna().clip(low, high)
             x = i + shift + np.linspace(-0.12, 0.12, len(numbers))
             style: dict[str, Any] = {
@@ -155,13 +155,13 @@ def _costs(
     axes: Axes,
     summaries: Mapping[Experiment, RunSummary],
     here: pd.DataFrame,
-    usual: pd.DataFrame,
+    base: pd.DataFrame,
     learners: Iterable[str],
 ) -> None:
-    """Noise-free cost over training: a line a run here, and the quartiles of the usual ones."""
+    """Noise-free cost over training: a line a run here, and the quartiles of the base."""
     for name in learners:
         look = LOOKS[name]
-        episode, costs = _curves(summaries, usual[usual.learner == name])
+        episode, costs = _curves(summaries, base[base.learner == name])
         quartiles = np.percentile(costs, (25, 75), axis=0)
         axes.fill_between(episode, *quartiles, color=look.color, alpha=0.2, linewidth=0)
         episode, costs = _curves(summaries, here[here.learner == name])
@@ -177,7 +177,7 @@ def _curves(
 ) -> tuple[Vector, Matrix]:
     """After which episodes, and the noise-free costs over theta_init's, shape (runs, rollouts).
 
-    What a run did not reach, and a failed drive, costs more than is drawn.
+    What a run did not reach, and a failed rollout, costs more than is drawn.
     """
     judged = [summaries[experiment_of(row)].evaluations for row in runs.to_dict("records")]
     episode = max((one["episode"] for one in judged), key=len)
