@@ -10,8 +10,8 @@ from nmpcrl.bench.learners import time_learners
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import audit
 from nmpcrl.claims.own_claims import judge_own
-from nmpcrl.claims.paper_claims import judge
-from nmpcrl.claims.rule import Verdict
+from nmpcrl.claims.paper_claims import BY_TIME, judge
+from nmpcrl.claims.rule import UNDECIDABLE, Observations, Verdict
 from nmpcrl.study.design import MAIN_TABLE
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.store import fetch_all
@@ -31,10 +31,25 @@ def publish_study(
     return published.publish(runs, variants, verdicts(runs, variants))
 
 
+def publish_timing() -> tuple[Verdict, ...]:
+    """Time the learners here, and publish the verdicts that rest on it anew; all else stays.
+
+    Nothing is published unless all of them are decided, since the machine may be busy.
+
+    Returns:
+        The verdicts.
+    """
+    observed = Observations(timings=time_learners())
+    judged = tuple(claim.judge(observed) for claim in BY_TIME.values())
+    if UNDECIDABLE not in {verdict.outcome for verdict in judged}:
+        published.republish(judged)
+    return judged
+
+
 def verdicts(
     runs: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
 ) -> tuple[Verdict, ...]:
-    """The verdicts on the paper's claims and on our additions."""
+    """The verdicts on the paper's claims and on our own."""
     table = summary.table(runs)
     parts = [variants[e] for e in runs]
     main = table[[part == MAIN_TABLE for part in parts]]
