@@ -76,8 +76,9 @@ def transposed(names: tuple[str, ...], rows: list[tuple]) -> dict[str, list]:
 def learner(solver: str, name: str) -> tuple:
     solve, fit = 1e3 * SOLVERS[solver], FIT if name in ("RDES", "DES") else None
     step = SOLVES[name] * solve + (fit or 0.0) + REST
-    hours = step * 39 / 3600
-    return solver, name, SOLVES[name], step, solve, fit, REST, hours, HOURS.get(name)
+    hours, ratio = step * 39 / 3600, step / (SOLVES["ES"] * solve + REST)
+    parts = (SOLVES[name], step, solve, fit, REST, hours, HOURS.get(name))
+    return solver, name, *parts, ratio, ratio - 0.01, ratio + 0.01, 0.0
 
 
 def growing(varied: str, sizes: tuple[int, ...], each: float) -> list[tuple]:
@@ -119,6 +120,10 @@ MEASURED = {
             "ms_per_rest",
             "hours",
             "hours_paper",
+            "ratio",
+            "ratio_low",
+            "ratio_high",
+            "waited",
         ),
         [learner(solver, name) for solver in ("riccati", "fatrop", "ipopt") for name in SOLVES],
     ),

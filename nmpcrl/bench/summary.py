@@ -195,6 +195,6 @@ def measured_ratios(bench: Bench) -> pd.DataFrame:
         rows[solver] = {
             "solve": mine["RDES"],
             "solve_es": mine["ES"],
-            "ratio": ratio(table, solver, "RDES"),
+            "ratio": ratio(table, solver, "RDES").value,
         }
     return pd.DataFrame.from_dict(rows, orient="index")

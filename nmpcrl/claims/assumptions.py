@@ -6,7 +6,9 @@ import numpy as np
 
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import Curvature
+from nmpcrl.claims.rule import NOT, REPRODUCED, UNDECIDABLE, Claim, Observations, Verdict
 from nmpcrl.study import paper
+from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
 
@@ -19,7 +21,22 @@ class Assumption:
     holds: bool
 
 
-def audit(study: Runs, curvature: Curvature) -> tuple[Assumption, ...]:
+class TheoremClaim(Claim):
+    """A claim that rests on a theorem: it holds if what is run meets all of the assumptions."""
+
+    def judge(self, observed: Observations) -> Verdict:
+        """The verdict; one assumption that does not hold is enough against it."""
+        assumptions = observed.assumptions
+        broken = [a.theorem for a in assumptions if not a.holds]
+        listed = f": {'; '.join(broken)}" if broken else ""
+        return self.verdict(
+            UNDECIDABLE if not assumptions else NOT if broken else REPRODUCED,
+            f"{len(broken)} of the theorem's {len(assumptions)} assumptions do not hold for what is"
+            f" run{listed}.",
+        )
+
+
+def audit(study: Runs[Records], curvature: Curvature) -> tuple[Assumption, ...]:
     """The assumptions of the convergence theorem of nonlinear TDC, beside what is run."""
     ges = study.select(learner="GES")
     experiment = next(iter(ges))

@@ -100,23 +100,32 @@ def test_a_failed_rollout_in_the_second_half_makes_the_range_unbounded(late):
 
 
 def test_the_cost_ratio_compares_the_medians_of_the_last_episodes():
-    frozen = records(np.full((60, 1), 10.0))
-    costs = np.full((60, 1), 10.0)
+    frozen, costs = np.full(60, 10.0), np.full(60, 10.0)
     costs[-20:] = 30
     costs[-9:] = 1000  # fewer than half of the last twenty
-    assert metrics.cost_ratio(records(costs), frozen) == pytest.approx(3)
+    assert metrics.cost_ratio(costs, frozen) == pytest.approx(3)
 
 
 def test_the_cost_ratio_looks_at_no_more_than_the_second_half():
-    frozen = records(np.full((4, 1), 10.0))
-    assert metrics.cost_ratio(records([[999], [999], [20], [20]]), frozen) == pytest.approx(2)
-    assert metrics.cost_ratio(records([[30]]), records([[10]])) == pytest.approx(3)
+    assert metrics.cost_ratio(np.array([999.0, 999, 20, 20]), np.full(4, 10.0)) == pytest.approx(2)
+    assert metrics.cost_ratio(np.array([30.0]), np.array([10.0])) == pytest.approx(3)
 
 
-def test_an_episode_cut_short_at_the_end_is_an_infinite_cost_ratio():
-    frozen = records(np.ones((2, 2)))
-    run = records(np.ones((2, 2)), status=[0, 0, 0, 2])
-    assert metrics.cost_ratio(run, frozen) == np.inf
+LOST, WHOLE, ONE_LOST = np.full(4, np.nan), np.full(4, 10.0), np.array([10.0] * 59 + [np.nan])
+
+
+@pytest.mark.parametrize(
+    ("cost", "frozen", "ratio"),
+    [
+        (np.array([1.0, np.nan]), np.ones(2), np.inf),
+        (LOST, WHOLE, np.inf),
+        (WHOLE, LOST, 0.0),  # whatever the run did, the frozen arm did worse
+        (LOST, LOST, np.nan),
+        (ONE_LOST, ONE_LOST, 1.0),  # one lost episode is no more than a costly one, in either arm
+    ],
+)
+def test_an_episode_that_was_lost_costs_infinitely_much_in_either_arm(cost, frozen, ratio):
+    assert metrics.cost_ratio(cost, frozen) == pytest.approx(ratio, nan_ok=True)
 
 
 def test_overshooting_counts_the_steps_strictly_above_two():

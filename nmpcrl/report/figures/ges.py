@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import Curvature, directions
 from nmpcrl.analysis.two_state import Chain, follow, spectral_radius
-from nmpcrl.claims.failure_modes import OVERSHOOT
 from nmpcrl.learning.learners import gradient_td, semi_gradient
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.axes import label_panel, one_entry_each
 from nmpcrl.report.figures.style import DECAYS, LOOKS, headed, page, subplots, thin
 from nmpcrl.study import paper
