@@ -1,16 +1,24 @@
 # `make book` trains, executes and builds everything; `make test` passes the tests.
 
-PYTHON ?= python3.11
+PYTHONS := 3.11 3.12 3.13 3.14
+PYTHON ?= $(PYTHONS:%=python%) python3
+FITS := import ensurepip, sys, venv; sys.exit("%d.%d" % sys.version_info[:2] not in "$(PYTHONS)".split())
+FOUND = $(shell for each in $(PYTHON); do $$each -c '$(FITS)' 2>/dev/null && command -v $$each && break; done)
 BIN := .venv/bin
+
+# With LOCKED=1 only files with the hashes of locks/ are installed, and a .venv of other files is made anew.
+ifeq ($(LOCKED),1)
+LOCKS := $(PYTHONS:%=locks/python%.txt) $(or $(wildcard .venv/locked),anew)
+endif
 
 export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book smoke chapter study bench test check clean
+.PHONY: help book smoke chapter study bench test test-fast check locks clean anew
 
 help:  ## Show this list
-	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 16
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
 
 book: .venv/ready  ## Train what is missing, execute every chapter, build _build/html
 	@$(BIN)/python book/build.py
@@ -30,20 +38,31 @@ bench: .venv/ready  ## Measure how long solves, steps and runs take, and print w
 test: .venv/ready  ## All tests; those of the site need a built book and a Chromium
 	@$(BIN)/python -m pytest
 
+test-fast: .venv/ready  ## The fast tests: no book, no training
+	@$(BIN)/python -m pytest -m "not slow and not book"
+
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
 	@$(BIN)/python -m pytest tests/book/test_notebooks.py tests/test_architecture.py
 
+locks: .venv/ready  ## Make locks/ anew from environment.txt; any target takes them with LOCKED=1
+	@$(BIN)/python locks/make.py $(PYTHONS)
+
 clean:  ## Remove the built book; stored runs stay
 	rm -rf _build
 
-.venv/ready: environment.txt pyproject.toml
-	@$(PYTHON) -c 'import ensurepip, sys, venv; sys.exit(sys.version_info[:2] != (3, 11))' 2>/dev/null || \
-	  { echo "Python 3.11 (with venv) is needed and $(PYTHON) is not it: install it, or say where: make PYTHON=/path/to/python3.11"; exit 1; }
-	@echo "Installing the pinned packages of environment.txt into .venv: some minutes, once."
-	@$(PYTHON) -m venv --clear .venv
-	@$(BIN)/pip install -qq --disable-pip-version-check -r environment.txt
+.venv/ready: environment.txt pyproject.toml $(LOCKS)
+	@test -n "$(FOUND)" || { \
+	  echo "Python $(firstword $(PYTHONS)) to $(lastword $(PYTHONS)), with venv and ensurepip, is needed, and not found" \
+	    "among $(PYTHON): install it, or say where: make PYTHON=/path/to/python3"; exit 1; }
+	@test -z "$(LOCKS)" -o "$$(uname -sm)" = "Linux x86_64" || { \
+	  echo "The locks are for Linux on x86-64, and this is $$(uname -sm): leave out LOCKED=1"; exit 1; }
+	@echo "Taking $$($(FOUND) --version), $(FOUND), and installing the pinned packages of" \
+	  "$(if $(LOCKS),locks,environment.txt) into .venv: some minutes, once."
+	@$(FOUND) -m venv --clear .venv
+	@$(BIN)/pip install -qq --disable-pip-version-check $(if $(LOCKS),--require-hashes -r locks/python$$( \
+	  $(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])').txt,-r environment.txt)
 	@$(BIN)/pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
-	@touch $@
+	@touch $(if $(LOCKS),.venv/locked) $@

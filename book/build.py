@@ -177,7 +177,7 @@ def train(experiments: tuple, summaries: tuple) -> None:
     from nmpcrl.analysis.summaries import fetch_summaries
     from nmpcrl.claims import published  # only here: a refusal should not wait for it
     from nmpcrl.study import Experiment
-    from nmpcrl.study.experiment import compile_ahead
+    from nmpcrl.study.setup import compile_ahead
     from nmpcrl.study.store import fetch_all
 
     compile_ahead(

@@ -13,10 +13,12 @@ from tqdm import tqdm
 from nmpcrl import __version__
 from nmpcrl.analysis import metrics
 from nmpcrl.study import DamagedRecords, Experiment, ParameterError, Records, fetch, paper
-from nmpcrl.study.experiment import DECAYS, LEARNERS, SOLVERS
+from nmpcrl.study.records import StepStatus, Stopped
+from nmpcrl.study.setup import DECAYS, LEARNERS
 from nmpcrl.study.store import folder, path_of, stored
 
 HELP = {"help_option_names": ["-h", "--help"]}
+RELOCKED = 60  # runs that are trained afresh before the code is locked anew
 
 
 @click.group(context_settings=HELP)
@@ -35,7 +37,7 @@ def main() -> None:
 )
 @click.option("--alpha", default=paper.ALPHA, show_default=True, help="Step size of theta.")
 @click.option("--beta", default=paper.BETA, show_default=True, help="Step size of w.")
-@click.option("--solver", default=SOLVERS[0], show_default=True, help="Or fatrop, or ipopt.")
+@click.option("--solver", default="riccati", show_default=True, help="Or fatrop, or ipopt.")
 @click.option("--literal", is_flag=True, help="Algorithm 1 literally: do not wait for the network.")
 def train(literal: bool, **fields: Any) -> None:
     """Train one run and store it; a stored one is read."""
@@ -50,7 +52,9 @@ def train(literal: bool, **fields: Any) -> None:
             bar.update(done - bar.n)
 
         records = fetch(experiment, on_episode=on_episode)
-        bar.update(experiment.episodes - bar.n if records.facts["stopped"] == "finished" else 0)
+        bar.update(
+            experiment.episodes - bar.n if records.facts["stopped"] == Stopped.FINISHED else 0
+        )
     click.echo(f"{path_of(experiment)}: {records.facts['stopped']}")
     click.echo(_verdict(records))
 
@@ -102,13 +106,9 @@ def evaluate(run: str) -> None:
 @click.option("--again", is_flag=True, help="Measure even if there is a benchmark of this code.")
 def bench(length: str, again: bool) -> None:
     """Measure how long solves, steps and runs take, and hold it against what is to be reached."""
-    from nmpcrl.bench import (
-        fetch,
-        suite,
-        targets,  # nothing else here needs them
-    )
+    from nmpcrl.bench import suite, targets  # nothing else here needs them
 
-    measured = suite.measure(length) if again else fetch(length)
+    measured = suite.measure(length) if again else suite.read_or_measure(length)
     rows = targets.rows(measured)
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
@@ -138,7 +138,7 @@ def study(
     from nmpcrl.claims.publish import publish_study
     from nmpcrl.study import cluster, design
 
-    chosen = design.study()
+    chosen = design.whole_study()
     unknown = set(parts) - set(chosen.values())
     if unknown:
         known = ", ".join(dict.fromkeys(chosen.values()))
@@ -171,10 +171,12 @@ def study(
 
 @main.command()
 @click.option("--sample", type=click.IntRange(0), default=0, help="Train so many runs for it.")
-def verify(sample: int) -> None:
+@click.option("--relock", is_flag=True, help="Show that an edit changed no bit, and lock the code.")
+@click.option("--workers", type=click.IntRange(1), help="Processes; as many as cores by default.")
+def verify(sample: int, relock: bool, workers: int | None) -> None:
     """Hold the runs that were trained here against the published ones."""
     from nmpcrl.analysis import summaries
-    from nmpcrl.claims import published
+    from nmpcrl.claims import published, verification
 
     try:
         known = published.load()
@@ -182,15 +184,23 @@ def verify(sample: int) -> None:
         raise click.ClickException(str(error)) from None
     if not known.rows:
         raise click.ClickException(f"nothing is published in {published.place()}")
-    everything = list(known.rows)
-    every = max(1, len(everything) // max(1, sample))
-    drawn = everything[::every][:sample]
-    own = [e for e in everything if e in set(drawn) or summaries.is_stored(e)]
+    if relock:
+        try:
+            done = verification.relock(known, sample or RELOCKED, workers=workers)
+        except verification.CannotRelock as error:
+            raise click.ClickException(str(error)) from None
+        click.echo(
+            f"{done.published + done.stored} fresh runs have the same bits, {done.published} as the"
+            f" published ones and {done.stored} as those made here before: {done.lock} is written"
+        )
+        return
+    drawn = set(verification.sample(known, sample)) if sample else set()
+    own = [e for e in known.rows if e in drawn or summaries.is_stored(e)]
     if not own:
         raise click.ClickException(
             "no run of the study was trained here; --sample 5 trains five for this"
         )
-    found = summaries.fetch_summaries(own)
+    found = summaries.fetch_summaries(own, workers=workers)
     wrong = published.compare(found, known)
     exact = published.comparable(found, known)
     click.echo(
@@ -215,6 +225,7 @@ def _figures(records: Records) -> dict[str, str]:
     states, actions = metrics.final_rollout(records)
     overlap = task.overlap(states).max(axis=-1)
     theta = ", ".join(f"{value:.4g}" for value in records.evaluations["theta"][-1])
+    failed = records.steps["status"] == StepStatus.FAILED
     return {
         "cost of the last rollout": f"{records.evaluations['cost'][-1]:.1f}",
         "steps": f"{np.isfinite(states[:, 0]).sum()} of {len(states)}",
@@ -224,7 +235,7 @@ def _figures(records: Records) -> dict[str, str]:
         "largest speed and turn rate": " and ".join(
             f"{value:.3f}" for value in np.nanmax(np.abs(actions), axis=0)
         ),
-        "steps of training with a failed solve": f"{(records.steps['status'] == 2).sum()}",
+        "steps of training with a failed solve": f"{failed.sum()}",
         "steps with alpha ||phi||^2 above 2": f"{metrics.overshooting(records):.2%}",
         "theta": theta,
     }

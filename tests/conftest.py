@@ -15,7 +15,7 @@ import pytest
 from nmpcrl.analysis.summary import RunSummary, table
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.published import failure_modes_of
-from nmpcrl.study import Experiment, Study, design, paper
+from nmpcrl.study import Experiment, Runs, design, paper
 
 ROOT = Path(__file__).resolve().parent.parent
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -169,7 +169,7 @@ def evidence_of(
     runs = table(summaries).join(failure_modes_of(summaries))
     runs["variant"] = design.MAIN_TABLE
     runs["source"] = [source(one) for one in wanted]
-    return Evidence(Study(summaries), runs)
+    return Evidence(Runs(summaries), runs)
 
 
 def summary_of(

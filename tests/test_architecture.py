@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nmpcrl.study.paper import DEPARTURES
+from nmpcrl.study.departures import DEPARTURES
 
 ROOT = Path(__file__).resolve().parent.parent
 MODULES = sorted((ROOT / "nmpcrl").rglob("*.py"))
@@ -22,7 +22,7 @@ ROOMS = {  # each may import those that it names, and what they may
 DISK = {"io", "json", "os", "pathlib", "pickle", "shutil", "sqlite3", "tempfile"}
 HOMES = {  # foreign library -> where alone it may be imported
     "casadi": "control/",
-    "numba": ("control/riccati.py", "control/hessian.py"),
+    "numba": ("control/solvers/kernel.py", "control/solvers/hessian.py"),
     "torch": "learning/network.py",
     "matplotlib": "report/figures",
 }
@@ -83,7 +83,7 @@ def test_a_foreign_library_has_one_home(path, library):
 def test_only_the_study_knows_the_disk(path):
     if place(path).split("/")[0] not in ("control", "learning"):
         return
-    if place(path) == "control/machine_code.py":  # its cache of what numba compiled
+    if place(path) == "control/codegen/jit.py":  # its cache of what numba compiled
         return
     calls = [
         node.func for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)

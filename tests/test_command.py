@@ -11,10 +11,10 @@ from click.testing import CliRunner
 from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published
-from nmpcrl.study import Experiment, design, paper, sweep
-from nmpcrl.study.experiment import LEARNERS
+from nmpcrl.study import Experiment, design, executor, paper, sweep
+from nmpcrl.study.setup import LEARNERS
 
-WHOLE = len(design.study())
+WHOLE = len(design.whole_study())
 SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
 STUDY = {
     **dict.fromkeys(sweep(learner=("ES", "frozen"), seed=(0, 1), **SHORT), "main"),
@@ -32,15 +32,15 @@ def command(tmp_path, monkeypatch):
 @pytest.fixture
 def small(monkeypatch):
     """A study of six short runs, judged by nobody."""
-    monkeypatch.setattr(design, "study", lambda: dict(STUDY))
+    monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
     monkeypatch.setattr(publish, "verdicts", lambda runs, variants: ())
 
 
 @pytest.fixture
 def trained(command, small):
     """The small study, trained in this process."""
-    with ThreadPoolExecutor(1) as executor:
-        return summaries.fetch_summaries(STUDY, executor=executor, progress=False)
+    with ThreadPoolExecutor(1) as one:
+        return summaries.fetch_summaries(STUDY, executor=one, progress=False)
 
 
 def name_of_the_stored_run(tmp_path):
@@ -157,7 +157,7 @@ def test_a_run_that_fails_is_told_and_the_others_are_kept(command, trained, monk
         raise ArithmeticError("a mistake")
 
     monkeypatch.setattr(summaries, "run", fail)
-    monkeypatch.setattr(summaries, "_processes", lambda *_: ThreadPoolExecutor(1))
+    monkeypatch.setattr(executor, "processes", lambda *_: ThreadPoolExecutor(1))
     told = command("study")
     assert told.exit_code == 1
     assert "1 of 6 runs failed" in told.output
@@ -196,7 +196,7 @@ def test_the_table_of_the_whole_study_takes_100_megabytes_at_most(command, train
         fields = one.experiment | {"seed": seed, "episodes": paper.EPISODES}
         noisy[experiment] = replace(one, experiment=fields, episodes=episodes)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(design, "study", lambda: dict.fromkeys(noisy, "main"))
+        patch.setattr(design, "whole_study", lambda: dict.fromkeys(noisy, "main"))
         patch.setattr(summaries, "is_stored", lambda _: True)
         patch.setattr(summaries, "fetch_summaries", lambda *_, **__: noisy)
         asked = command("study", "--table", str(tmp_path / "episodes.csv.gz"))

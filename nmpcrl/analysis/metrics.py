@@ -7,11 +7,11 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.control import Task
 from nmpcrl.study import paper
-from nmpcrl.study.records import Column, Records
+from nmpcrl.study.records import Column, Records, StepStatus
+from nmpcrl.study.records import final_cost as records_final_cost
 
 TOUCH = 1e-6  # a violation this small is the solver's tolerance, not a violation
 TIGHT = 0.999  # cosine from which two features are called parallel
-LAST = 3  # rollouts that the final noise-free cost averages
 
 
 def training_cost(records: Records) -> Vector:
@@ -22,7 +22,7 @@ def training_cost(records: Records) -> Vector:
     steps = records.steps
     episodes, length = records.experiment["episodes"], records.experiment["steps"]
     total = np.bincount(steps["episode"], np.nan_to_num(steps["cost"]), minlength=episodes)
-    count = np.bincount(steps["episode"], steps["status"] < 2, minlength=episodes)
+    count = np.bincount(steps["episode"], steps["status"] != StepStatus.FAILED, minlength=episodes)
     return np.where(count == length, total, np.nan)
 
 
@@ -37,8 +37,8 @@ def initial_cost(records: Records) -> float:
 
 
 def final_cost(records: Records) -> float:
-    """Noise-free cost at the end, the mean of the last `LAST` rollouts; infinite if one failed."""
-    return float(records.evaluations["cost"][-LAST:].mean())
+    """Noise-free cost at the end: see `records.final_cost`."""
+    return records_final_cost(records.evaluations["cost"])
 
 
 def final_theta(records: Records) -> Vector:

@@ -6,23 +6,24 @@ What it finds bounds the family's best from one side only; a longer search may f
 """
 
 import json
-import os
 import sys
 from collections.abc import Iterable, Mapping
-from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import cma
 import numpy as np
-from tqdm import tqdm
 
 from nmpcrl import Vector
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper, store
+from nmpcrl.study.atomic import write_json
+from nmpcrl.study.executor import execute
 from nmpcrl.study.parameters import one_of, whole
+from nmpcrl.study.provenance import epochs, versions
 
 BUDGET = 2000  # drives without noise that a search may make
 LEAST = 40  # drives: the first one and some generations
@@ -30,7 +31,6 @@ SPREAD = 0.3  # of the first drives, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
 FAILED = 1e6  # stands for the cost of a drive on which a solve failed
-SOURCES = ("control", "learning", "study/paper.py", "analysis/policy_search.py")
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def search(wanted: Search) -> Found:
     return _found(np.array(tried) * SCALE, np.array(costs))
 
 
-def fetch(
+def search_all(
     searches: Iterable[Search], *, workers: int | None = None, progress: bool = True
 ) -> dict[Search, Found]:
     """`search` for many: read what is stored, search for the rest in parallel, and store it.
@@ -109,18 +109,28 @@ def fetch(
         searches: those wanted.
         workers: how many processes; by default as many as there are cores.
         progress: whether to show a bar.
+
+    Raises:
+        Exception: what the first search raised that failed; the others are stored.
     """
     wanted = tuple(dict.fromkeys(searches))
     kept = _kept()
     missing = [one for one in wanted if one not in kept]
-    if missing:
-        processes = min(workers or os.cpu_count() or 1, len(missing))
-        with store.processes(processes) as pool, store.without_main():
-            pending = {pool.submit(search, one): one for one in missing}
-            bar = tqdm(as_completed(pending), "searches", len(pending), disable=not progress)
-            for done in bar:
-                kept[pending[done]] = done.result()
-                _keep(kept)
+
+    def keep(one: Search, found: Found) -> str:
+        kept[one] = found
+        _keep(kept)
+        return f"layout {one.layout}: cost {found.cost:.0f}"
+
+    failures = execute(
+        {one: partial(search, one) for one in missing},
+        keep,
+        workers=workers,
+        progress=progress,
+        unit="search",
+    )
+    for error in failures.values():
+        raise error
     return {one: kept[one] for one in wanted}
 
 
@@ -140,9 +150,9 @@ def _place() -> Path:
     return store.folder() / "policy_search.json"
 
 
-def _key() -> dict[str, Any]:
+def _depends_on() -> dict[str, Any]:
     """All that the numbers depend on."""
-    return {"code": store.source_hash(SOURCES), **store.versions(), "cma": version("cma")}
+    return {"epochs": epochs(), **versions(), "cma": version("cma")}
 
 
 def _kept() -> dict[Search, Found]:
@@ -150,7 +160,7 @@ def _kept() -> dict[Search, Found]:
     place = _place()
     try:
         kept = json.loads(place.read_text())
-        if kept["key"] != _key():
+        if kept["key"] != _depends_on():
             return {}
         return {Search(**one): Found(**_tuples(found)) for one, found in kept["searches"]}
     except FileNotFoundError:
@@ -161,13 +171,8 @@ def _kept() -> dict[Search, Found]:
 
 
 def _keep(found: Mapping[Search, Found]) -> None:
-    """Write the whole file beside its place, then rename it."""
-    place = _place()
-    place.parent.mkdir(parents=True, exist_ok=True)
-    half = place.with_suffix(".half")
     searches = [[asdict(one), asdict(result)] for one, result in found.items()]
-    half.write_text(json.dumps({"key": _key(), "searches": searches}))
-    half.replace(place)
+    write_json(_place(), {"key": _depends_on(), "searches": searches})
 
 
 def _tuples(fields: Mapping[str, Any]) -> dict[str, Any]:

@@ -16,11 +16,12 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.imitation import imitate
-from nmpcrl.analysis.metrics import LAST, TOUCH
+from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.control import Task
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import Experiment, controller_of, frozen_arm
-from nmpcrl.study.records import Column, Records, load_arrays, save_arrays
+from nmpcrl.study.experiment import Experiment, frozen_arm
+from nmpcrl.study.records import Column, Records, StepStatus, final_cost, load_arrays, save_arrays
+from nmpcrl.study.setup import controller_of
 
 SIZES = (TOUCH, 0.01, 0.1, np.inf)  # of an overlap Xi: small, medium and large violations
 LATE = 20  # episodes that stand for the end of training; at most the second half
@@ -111,7 +112,7 @@ def row(summary: RunSummary) -> dict[str, Any]:
     columns = {
         "stopped": summary.facts["stopped"],
         "initial_cost": float(cost[0]),
-        "final_cost": float(cost[-LAST:].mean()),
+        "final_cost": final_cost(cost),
         "best_cost": float(cost.min()),
         "late_cost_range": metrics.late_cost_range_of(
             evaluations["episode"], cost, experiment["episodes"]
@@ -195,7 +196,7 @@ def _episodes(records: Records, task: Task, lower: Vector, upper: Vector) -> dic
     return {
         "cost": metrics.training_cost(records),
         "steps": by.sum(np.ones(len(overlap))).astype(int),
-        "failed": by.sum(steps["status"] == 2).astype(int),
+        "failed": by.sum(steps["status"] == StepStatus.FAILED).astype(int),
         "restarts": by.sum(steps["restarts"]).astype(int),
         "inside": np.stack([by.sum(size) for size in _sizes(overlap).T], axis=1).astype(int),
         "overlap": by.reduce(np.fmax, overlap),

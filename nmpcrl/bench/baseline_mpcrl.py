@@ -25,9 +25,8 @@ from mpcrl import (
 )
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc
+from nmpcrl.control import Ipopt, Nmpc
 from nmpcrl.control.ocp import Theta, stage_cost, terminal_cost
-from nmpcrl.control.program import SOLVERS
 from nmpcrl.control.task import overlap
 from nmpcrl.study import paper
 
@@ -93,7 +92,7 @@ def _mpc(nmpc: Nmpc) -> Mpc:
             "print_time": False,
             "bound_consistency": True,
             "calc_lam_p": False,
-            "ipopt": SOLVERS["ipopt"],
+            "ipopt": Ipopt().options,
         },
         solver="ipopt",
     )

@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.bench.solves import Columns
-from nmpcrl.control.nmpc import SOLVERS
+from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Step, train
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import Experiment, prepare
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.setup import prepare
 
 TURN = 20  # steps that a learner takes at a time: then the caches hold what its own loop leaves
 
@@ -59,7 +60,7 @@ PAPER_HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}  # Table II: training time 
 
 def time_learners(
     learners: tuple[str, ...] = ("ES", "GES", "RDES", "DES"),
-    solvers: tuple[str, ...] = SOLVERS,
+    solvers: tuple[str, ...] = tuple(SOLVERS),
     steps: int = 400,
     turn: int = 1,
 ) -> pd.DataFrame:

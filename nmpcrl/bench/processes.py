@@ -11,7 +11,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from nmpcrl.bench.solves import Columns
-from nmpcrl.study.store import THREADS, fetch_all
+from nmpcrl.study.executor import THREADS
+from nmpcrl.study.store import fetch_all
 from nmpcrl.study.sweeps import sweep
 
 

@@ -3,19 +3,19 @@
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from types import SimpleNamespace
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Solution, SolverError, interior_point, usual
+from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
+from nmpcrl.control.solvers import baselines
+from nmpcrl.control.solvers.riccati import Code, machine_code
 from nmpcrl.learning import QNetwork
 from nmpcrl.study import paper
 
 Columns = dict[str, list[Any]]  # lists of one length, by name
-Solve = Callable[..., Any]  # (state, theta, guess) -> what has value and iterations
+Solve = Callable[..., Any]  # (state, theta, warm_start) -> what has value and iterations
 
 THETA = np.array(paper.THETA_INIT)
 LOOPS = {"without noise": 0.0, "with noise": paper.NOISE}  # that of training's first episode
@@ -28,7 +28,8 @@ def solvers() -> dict[str, Solve]:
     named: dict[str, Solve] = {
         name: paper.nmpc(solver=name).solve for name in ("riccati", "fatrop", "ipopt")
     }
-    return named | {"ipopt MX": usual.mx(paper.nmpc()), "rebuilt": usual.rebuilt(paper.nmpc())}
+    ocp = paper.nmpc().ocp
+    return named | {"ipopt MX": baselines.mx(ocp), "rebuilt": baselines.rebuilt(ocp)}
 
 
 def interleaved(episodes: int, steps: int) -> Columns:
@@ -61,15 +62,15 @@ def _episode(
     times: dict[str, list[float]] = {name: [] for name in named}
     for first in range(0, len(states), STRETCH):
         for name in rng.permutation(list(named)):
-            guess = plans[name][-1] if first else None
+            warm_start = plans[name][-1] if first else None
             for state in states[first : first + STRETCH]:
                 began = time.perf_counter()
                 try:
-                    guess = named[name](state, THETA, guess)
+                    warm_start = named[name](state, THETA, warm_start)
                 except SolverError:
-                    guess = None
+                    warm_start = None
                 times[name].append(time.perf_counter() - began)
-                plans[name].append(guess)
+                plans[name].append(warm_start)
     for t in range(len(states)):
         found = {name: plans[name][t] for name in named}
         best = min(plan.value for plan in found.values() if plan)
@@ -135,8 +136,8 @@ def _watched() -> tuple[Nmpc, list[float]]:
     """A controller that has solved once, and a list to which it adds its machine code's times."""
     seconds: list[float] = []
 
-    def watched(plant: Any) -> SimpleNamespace:
-        code = original(plant)
+    def watched(plant: Plant) -> Code:
+        code = machine_code(plant)
 
         def timed(*arguments: Any) -> Any:
             began = time.perf_counter()
@@ -144,11 +145,10 @@ def _watched() -> tuple[Nmpc, list[float]]:
             seconds.append(time.perf_counter() - began)
             return result
 
-        return SimpleNamespace(solve=timed, hessian_times=code.hessian_times)
+        return code._replace(solve=timed)
 
-    original, nmpc = interior_point.kernel, paper.nmpc()
-    with patch.object(interior_point, "kernel", watched):
-        nmpc.solve(nmpc.task.start, THETA)
+    nmpc = paper.nmpc(solver=Riccati(code=watched))
+    nmpc.solve(nmpc.task.start, THETA)
     return nmpc, seconds
 
 

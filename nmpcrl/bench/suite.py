@@ -1,11 +1,7 @@
 """The benchmark as a whole: measured into a dict of columns, kept as one JSON file."""
 
-import hashlib
 import json
-import os
-import platform
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,13 +17,14 @@ from nmpcrl.bench.learners import against_mpcrl, learners
 from nmpcrl.bench.processes import at_once, first_calls, whole_runs
 from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import interleaved, own_loop, parts
-from nmpcrl.study import paper, store
+from nmpcrl.study import paper, provenance, store
+from nmpcrl.study.atomic import write_json
+from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import ParameterError
 
 Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
 
 ALL = ("ES", "GES", "RDES", "DES")
-SOURCES = (*store.MATHEMATICS, "bench")
 
 
 @dataclass(frozen=True)
@@ -94,7 +91,7 @@ LENGTHS = {  # from the shortest
 }
 
 
-def fetch(length: str = "full", *, progress: bool = True) -> Bench:
+def read_or_measure(length: str = "full", *, progress: bool = True) -> Bench:
     """The benchmark: read if this code was measured here, and at least so long; else measured.
 
     Args:
@@ -126,7 +123,7 @@ def stored() -> Bench | None:
     """What is in the file, if it is of this code, these versions and this machine."""
     try:
         kept = json.loads(path().read_text())
-        return kept if kept["about"]["key"] == key() else None
+        return kept if kept["about"]["key"] == depends_on() else None
     except FileNotFoundError:
         return None
     except (ValueError, LookupError, TypeError) as error:
@@ -139,7 +136,7 @@ def measure(length: str, *, progress: bool = True) -> Bench:
     size, began = LENGTHS[length], time.perf_counter()
     about: dict[str, Any] = {
         "length": length,
-        "key": key(),
+        "key": depends_on(),
         "date": datetime.now(UTC).date().isoformat(),
         "others": psutil.cpu_percent(1.0) / 100,  # share of the cores that is in use already
         "machine": machine(),
@@ -151,7 +148,7 @@ def measure(length: str, *, progress: bool = True) -> Bench:
         bar.set_description(f"benchmark ({length}): {name}")
         bench |= stage()
     about["seconds"] = time.perf_counter() - began
-    _save(bench)
+    write_json(path(), bench)
     return bench
 
 
@@ -183,10 +180,11 @@ def path() -> Path:
     return store.folder() / "bench.json"
 
 
-def key() -> str:
+def depends_on() -> str:
     """A hash of all that the times depend on, but for what else the machine does."""
-    depends = [store.source_hash(SOURCES), versions(), machine()]
-    return hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
+    return provenance.hash_of(
+        [provenance.sources_hash(), provenance.room_hash("bench"), versions(), machine()]
+    )
 
 
 def versions() -> dict[str, str | None]:
@@ -195,36 +193,4 @@ def versions() -> dict[str, str | None]:
         rival = version("mpcrl")
     except PackageNotFoundError:
         rival = None
-    return {**store.versions(), "mpcrl": rival}
-
-
-def machine() -> dict[str, Any]:
-    """What is known of the machine."""
-    return {
-        "processor": _processor(),
-        "architecture": platform.machine(),
-        "cores": os.cpu_count(),
-        "system": platform.system(),
-    }
-
-
-def _processor() -> str:
-    """The processor's name, where the system tells it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor() or "unknown"
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or "unknown"
-
-
-def _save(bench: Bench) -> None:
-    """Write the whole file beside its place, then rename it."""
-    path().parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path().parent, prefix=".half-", suffix=".tmp")
-    try:
-        with os.fdopen(handle, "w") as file:
-            json.dump(bench, file)
-        Path(name).replace(path())
-    finally:
-        Path(name).unlink(missing_ok=True)
+    return {**provenance.environment(), "mpcrl": rival}

@@ -1,4 +1,4 @@
-"""From the measured columns to numbers: pure functions of what `fetch` returns."""
+"""From the measured columns to numbers: pure functions of what `read_or_measure` returns."""
 
 from dataclasses import dataclass
 from itertools import pairwise

@@ -7,7 +7,7 @@ import numpy as np
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.study import paper
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +19,7 @@ class Assumption:
     holds: bool
 
 
-def audit(study: Study, curvature: Curvature) -> tuple[Assumption, ...]:
+def audit(study: Runs, curvature: Curvature) -> tuple[Assumption, ...]:
     """The assumptions of the convergence theorem of nonlinear TDC, beside what is run."""
     ges = study.select(learner="GES")
     experiment = next(iter(ges))

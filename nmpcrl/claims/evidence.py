@@ -18,7 +18,7 @@ from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
 from nmpcrl.study.parameters import ParameterError
 from nmpcrl.study.records import Column
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 SOURCES = ("fresh", "published")
 
@@ -27,7 +27,7 @@ SOURCES = ("fresh", "published")
 class Evidence:
     """Runs, their summaries, and where each comes from."""
 
-    summaries: Study[RunSummary]  # a published one has fewer columns: see `Published`
+    summaries: Runs[RunSummary]  # a published one has fewer columns: see `Published`
     runs: pd.DataFrame  # `summary.table` with `variant` and `source`, one row a run, in that order
 
     @cached_property
@@ -43,7 +43,7 @@ class Evidence:
             for (one, summary), keep in zip(self.summaries.items(), kept, strict=True)
             if keep
         }
-        return Evidence(Study(chosen), self.runs[kept].reset_index(drop=True))
+        return Evidence(Runs(chosen), self.runs[kept].reset_index(drop=True))
 
     @property
     def mark(self) -> str:
@@ -116,7 +116,7 @@ def gather(
     runs["source"] = ["fresh" if e in here else "published" for e in wanted]
     arms = [rows.get(frozen_arm(e), {}).get("training_cost") for e in wanted]
     runs["cost_ratio"] = runs.training_cost / pd.Series(arms, dtype=float)
-    return Evidence(Study(summaries), runs)
+    return Evidence(Runs(summaries), runs)
 
 
 def paths(evidence: Evidence) -> Mapping[Experiment, Column]:

@@ -38,7 +38,7 @@ from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 # A run diverged if it had to be stopped, or if its training cost over the last 20 episodes has a
 # median above this multiple of the frozen arm's under the same noise.
@@ -65,6 +65,8 @@ NEAR_SAME_TIME = (0.8, 1.25)
 SOLVER = "ipopt"  # the paper's, with which C3 and C4 are judged
 SIZES = ("small", "medium", "large")  # of an overlap: up to 0.01, to 0.1, and above
 RATIO = "one ratio of medians, taken in turn in one process; no interval"
+
+NAMES = ("learner", *CELL, "episodes")  # of a row: without them it names no run
 
 Paths = Mapping[Experiment, Column]  # the states of each run's last rollout without noise
 
@@ -376,23 +378,33 @@ def apart(first: Column | None, second: Column | None) -> float:
     return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))
 
 
-def diverged(study: Study, experiment: Experiment, records: Records) -> bool:
+def diverged(study: Runs, experiment: Experiment, records: Records) -> bool:
     """Whether a run diverged: see `DIVERGED`."""
     frozen = {name: getattr(experiment, name) for name in CELL}
     (arm,) = study.select(learner="frozen", **frozen).values()
     return bool(_gone(records.facts["stopped"], metrics.cost_ratio(records, arm)))
 
 
-def unstable(study: Study, experiment: Experiment, records: Records) -> bool:
+def unstable(study: Runs, experiment: Experiment, records: Records) -> bool:
     """Whether a run is unstable: see `UNSTABLE`."""
     return diverged(study, experiment, records) or metrics.late_cost_range(records) > UNSTABLE
 
 
 def experiment_of(row: Mapping[str, Any]) -> Experiment:
-    """The experiment that a row of `summary.table` summarises."""
-    named = {field.name: row[field.name] for field in fields(Experiment)}
-    theta = tuple(float(value) for value in named["theta"].split())
-    return Experiment(**named | {"theta": theta})
+    """The experiment that a row of `summary.table` summarises.
+
+    A field for which an older table has no column takes its default.
+
+    Raises:
+        LookupError: one of `NAMES` is missing.
+    """
+    missing = {one.name for one in fields(Experiment)} - row.keys()
+    if missing & set(NAMES):
+        raise LookupError(f"there is no column {min(missing & set(NAMES))}")
+    named = {one.name: row[one.name] for one in fields(Experiment) if one.name not in missing}
+    if "theta" in named:
+        named["theta"] = tuple(float(value) for value in named["theta"].split())
+    return Experiment(**named)
 
 
 def _gone(stopped: Any, cost_ratio: Any) -> Any:

@@ -26,7 +26,7 @@ def publish_study(
     """Judge the study, and write `book/published` anew.
 
     Args:
-        runs: all of `design.study`.
+        runs: all of `design.whole_study`.
         variants: the part of the study that each belongs to.
     """
     return published.publish(runs, variants, verdicts(runs, variants))

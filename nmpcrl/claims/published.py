@@ -9,7 +9,6 @@
 
 import json
 import os
-import platform
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
@@ -24,14 +23,14 @@ import numpy as np
 import pandas as pd
 
 import nmpcrl
-from nmpcrl.analysis.summaries import key as run_key
 from nmpcrl.analysis.summary import RunSummary, row
-from nmpcrl.bench.suite import machine
 from nmpcrl.claims.failure_modes import fates
 from nmpcrl.claims.paper_claims import experiment_of
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.study import store
+from nmpcrl.study.atomic import write_json
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.machine import fingerprint
+from nmpcrl.study.provenance import EPOCHS, environment, summary_key
 from nmpcrl.study.records import Column
 
 FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
@@ -86,41 +85,25 @@ def publish(
     """
     folder = place()
     folder.mkdir(parents=True, exist_ok=True)
-    labels = {e: {"variant": variants[e], "key": run_key(e)} for e in summaries}
+    labels = {e: {"variant": variants[e], "key": summary_key(e)} for e in summaries}
     runs = pd.DataFrame([row(one) | labels[e] for e, one in summaries.items()])
     runs = runs.join(failure_modes_of(summaries))
     runs.to_csv(folder / "runs.csv", index=False)
     curves: dict[str, Any] = _curves(list(summaries.values()))
     np.savez_compressed(folder / "curves.npz", **curves)
-    _write(folder / "verdicts.json", [asdict(verdict) for verdict in verdicts])
+    write_json(folder / "verdicts.json", [asdict(verdict) for verdict in verdicts], indent=1)
     about = {
         "date": datetime.now(UTC).date().isoformat(),
-        "code": run_key(Experiment()),
-        "versions": store.versions(),
-        "machine": here(),
+        "epochs": EPOCHS,
+        "versions": environment(),
+        "machine": fingerprint(),
         "runs": runs.variant.value_counts(sort=False).to_dict(),
         "hours": float(runs.seconds.sum() / 3600),
         "files": _sums(folder),
     }
-    _write(folder / "about.json", about)
+    write_json(folder / "about.json", about, indent=1)
     _load.cache_clear()
     return folder
-
-
-def here() -> dict[str, Any]:
-    """What is known of this machine, the abilities of its processor and its C library included.
-
-    Machine code is made for the former, and processors of one name may differ in them; sines and
-    cosines come from the latter.
-    """
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        lines = []
-    kept = ("flags", "Features", "cpu family", "model\t")
-    told = sorted({line for line in lines if line.startswith(kept)})
-    abilities = sha256("\n".join(told).encode()).hexdigest()[:16]
-    return {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities}
 
 
 def failure_modes_of(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
@@ -180,7 +163,7 @@ def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.
     """
     rows = {e: row(one) for e, one in fresh.items() if e in published.rows}
     exact = comparable(rows, published)
-    wrong = [_unequal(e, rows[e], published.rows[e]) for e in sorted(exact, key=str)]
+    wrong = [unequal(e, rows[e], published.rows[e]) for e in sorted(exact, key=str)]
     others = {e: one for e, one in rows.items() if e not in exact}
     wrong += _out_of_spread(others, published)
     names = [*CELL, "seed", "what", "here", "published"]
@@ -189,13 +172,16 @@ def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.
 
 def comparable(runs: Iterable[Experiment], published: Published) -> set[Experiment]:
     """Those of which code, versions and machine are the ones of the published runs."""
-    if published.about.get("machine") != here():
+    made = {"machine": fingerprint(), "versions": environment()}
+    if any(published.about.get(name) != value for name, value in made.items()):
         return set()
     known = published.rows
-    return {e for e in runs if e in known and known[e]["key"] == run_key(e)}
+    return {e for e in runs if e in known and known[e]["key"] == summary_key(e)}
 
 
-def _unequal(e: Experiment, here: dict[str, Any], there: dict[str, Any]) -> tuple[Any, ...] | None:
+def unequal(
+    e: Experiment, here: Mapping[str, Any], there: Mapping[str, Any]
+) -> tuple[Any, ...] | None:
     """The first number in which two runs differ that should be the same."""
     compared = [*MEASURES, "initial_cost", *(f"theta_{i}" for i in range(len(e.theta)))]
     for name in compared:
@@ -284,9 +270,3 @@ def _verdict(stored: dict[str, Any]) -> Verdict:
     interval = stored["interval"] and tuple(stored["interval"])
     counts = {name: tuple(pair) for name, pair in stored["counts"].items()}
     return Verdict(**stored | {"interval": interval, "counts": counts})
-
-
-def _write(path: Path, content: Any) -> None:
-    half = path.with_suffix(".half")
-    half.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n")
-    half.replace(path)

@@ -1,15 +1,21 @@
 """What the controller is: a plant, a task, and the NMPC that solves it. The only home of CasADi."""
 
-from nmpcrl.control.nmpc import Nmpc, Solution, SolverError
+from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
+from nmpcrl.control.solution import Solution, SolverError, Status
+from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati
 from nmpcrl.control.task import Obstacle, Task
 
 __all__ = [
+    "Fatrop",
+    "Ipopt",
     "Nmpc",
     "Obstacle",
     "Plant",
+    "Riccati",
     "Solution",
     "SolverError",
+    "Status",
     "Task",
     "differential_drive",
     "rk4",

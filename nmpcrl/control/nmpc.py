@@ -7,30 +7,24 @@
 import time
 import warnings
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.compile import CannotCompile
-from nmpcrl.control.interior_point import InteriorPoint
-from nmpcrl.control.ocp import transcribe
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.control.ocp import Ocp, transcribe
 from nmpcrl.control.plant import Plant
-from nmpcrl.control.program import SOLVERS as CASADI_SOLVERS
-from nmpcrl.control.program import TOLERANCE, Program
 from nmpcrl.control.sensitivity import Sensitivity
-from nmpcrl.control.solution import Solution, SolverError, short
+from nmpcrl.control.solution import Solution, short
+from nmpcrl.control.solvers import Fatrop, Prepared, Riccati, Solver, solver_of
 from nmpcrl.control.task import Task
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
 
-LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
+DEFAULT = Riccati()
 
-SOLVERS = ("riccati", *CASADI_SOLVERS)
-FALLBACK = "fatrop"  # where the default cannot be compiled
-
-__all__ = ["ABSURD", "SOLVERS", "Nmpc", "Solution", "SolverError"]
+__all__ = ["ABSURD", "Nmpc"]
 
 
 class Nmpc:
@@ -43,11 +37,9 @@ class Nmpc:
         horizon: int = 10,
         gamma: float = 0.97,
         slack_weight: float = 100.0,
-        solver: str = SOLVERS[0],
+        solver: Solver | str = DEFAULT,
         *,
         ties_active: bool = False,
-        soft_box: bool = False,
-        tolerance: float = TOLERANCE,
     ) -> None:
         """Check and keep the problem; it is transcribed at the first solve.
 
@@ -57,13 +49,11 @@ class Nmpc:
             horizon: N, the number of planned inputs.
             gamma: discount factor, 0 < gamma <= 1.
             slack_weight: omega, the cost of a unit of each slack.
-            solver: "riccati", which is compiled for the plant at its first solve and gives way to
-                "fatrop" with a warning where that cannot be done; "fatrop"; or "ipopt".
+            solver: `Riccati()`, which is compiled for the plant at its first solve and gives way to
+                fatrop with a warning where that cannot be done; `Fatrop()`; `Ipopt()`; or the
+                name of one of them.
             ties_active: whether a state exactly on an obstacle's boundary counts as in it: the
                 other side of a kink in theta_c.  # departure L
-            soft_box: whether leaving the box costs `slack_weight` a metre, as entering an obstacle
-                does, instead of being forbidden; riccati only.  # departure M
-            tolerance: of the KKT conditions.
         """
         if isinstance(horizon, bool) or not isinstance(horizon, int | np.integer) or horizon < 1:
             raise ValueError(f"horizon = {horizon!r} must be a whole number, 1 or more")
@@ -71,13 +61,6 @@ class Nmpc:
             raise ValueError(f"gamma = {gamma} must lie in (0, 1]")
         if not 0 < slack_weight < np.inf:
             raise ValueError(f"slack_weight = {slack_weight} must be a positive number")
-        if solver not in SOLVERS:
-            raise ValueError(f"solver = {solver!r} must be one of {', '.join(SOLVERS)}")
-        if not LEAST_TOLERANCE <= tolerance <= LARGEST_TOLERANCE:
-            allowed = f"[{LEAST_TOLERANCE:g}, {LARGEST_TOLERANCE:g}]"
-            raise ValueError(f"tolerance = {tolerance} must lie in {allowed}")
-        if soft_box and solver != "riccati":
-            raise ValueError(f"soft_box = {soft_box} is for riccati, not for {solver}")
         if task.start.size != plant.n:
             raise ValueError(f"the task has {task.start.size} states and the plant {plant.n}")
         self.plant = plant
@@ -85,15 +68,16 @@ class Nmpc:
         self.horizon = int(horizon)
         self.gamma = float(gamma)
         self.slack_weight = float(slack_weight)
-        self.solver = solver
-        self.soft_box = soft_box
-        self.options: dict[str, Any] = {"ties_active": ties_active, "tolerance": float(tolerance)}
+        self.solver = solver_of(solver)
+        self.solver.check(task)
+        self._solves = self.solver  # or what took over
+        self.ties_active = ties_active
 
     def solve(
         self,
         state: Vector,
         theta: Vector,
-        guess: Solution | None = None,
+        warm_start: Solution | None = None,
         action: Vector | None = None,
     ) -> Solution:
         """Solve Eq. (2) from `state`: V_theta(s), or Q_theta(s, a) with u_0 = `action`.
@@ -101,7 +85,7 @@ class Nmpc:
         Args:
             state: plant state, shape (n,); (x [m], y [m], heading [rad]) for the robot.
             theta: NMPC parameters, shape (2n + m + 1,).
-            guess: an earlier solution to start from: as it is if it was solved in this state,
+            warm_start: an earlier solution to start from: as it is if it was solved in this state,
                 shifted by one stage if in another. Standing still at `state` if absent.
             action: the first input, shape (m,), within the plant's bounds; free if absent.
 
@@ -113,12 +97,12 @@ class Nmpc:
         state = _checked("state", state, self.plant.n, FAR)
         theta = _checked("theta", theta, 2 * self.plant.n + self.plant.m + 1)
         if action is None:
-            return self._free.solve(state, theta, guess, began=began)
+            return self._free.solve(state, theta, warm_start, began=began)
         action = _checked("action", action, self.plant.m)
         if (action < self.plant.lower).any() or (action > self.plant.upper).any():
             bounds = f"{short(self.plant.lower)} and {short(self.plant.upper)}"
             raise ValueError(f"action {short(action)} must lie between {bounds}")
-        return self._fixed.solve(state, theta, guess, action, began=began)
+        return self._fixed.solve(state, theta, warm_start, action, began=began)
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
@@ -137,6 +121,27 @@ class Nmpc:
         """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`."""
         return self._variant(solution).sensitivity.kkt_residual(*_point(solution))
 
+    @property
+    def ocp(self) -> Ocp:
+        """Eq. (2) with u_0 free, in symbols."""
+        return self._free.ocp
+
+    def _prepared(self, ocp: Ocp) -> Prepared:
+        """The solver for a problem; fatrop, and a warning, where there is no machine code."""
+        try:
+            return self._solves.prepare(ocp)
+        except CannotCompile as error:
+            instead = Fatrop(self.solver.tolerance)
+            try:
+                instead.check(self.task)
+            except ValueError as refusal:
+                raise ValueError(f"{error}, and {refusal}") from error
+            warnings.warn(
+                f"{error}: {instead.name} solves instead of {self.solver.name}", stacklevel=2
+            )
+            self._solves = instead
+        return self._solves.prepare(ocp)
+
     def _variant(self, solution: Solution) -> "_Variant":
         return self._fixed if solution.ocp.fixed_action.size else self._free
 
@@ -153,37 +158,21 @@ class _Variant:
     """Eq. (2) with u_0 free or fixed: transcribed, with its sensitivities and a solver."""
 
     def __init__(self, nmpc: Nmpc, *, fix_action: bool) -> None:
-        plant, task = nmpc.plant, nmpc.task
-        problem = (plant, task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
-        self._ocp = transcribe(*problem, fix_action=fix_action)
-        self._interior_point: InteriorPoint | None = None
-        if nmpc.solver == "riccati":
-            try:
-                point = InteriorPoint(
-                    self._ocp, plant, task, soft_box=nmpc.soft_box, **nmpc.options
-                )
-                self._interior_point, self.solve = point, point.solve
-                return
-            except CannotCompile as error:
-                if nmpc.soft_box:
-                    raise ValueError(
-                        f"{error}: no other solver than riccati has soft_box"
-                    ) from error
-                warnings.warn(f"{error}: {FALLBACK} solves instead of riccati", stacklevel=2)
-                nmpc.solver = FALLBACK
-        self.solve = Program(self._ocp, self.sensitivity, task, nmpc.solver, **nmpc.options).solve
+        problem = (nmpc.plant, nmpc.task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
+        self.ocp = transcribe(*problem, fix_action=fix_action, ties_active=nmpc.ties_active)
+        self._solver = nmpc._prepared(self.ocp)
+        self.solve = self._solver.solve
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector:
         """As `Nmpc.value_hessian_times`; by dense algebra where there is no machine code."""
-        fast = self._interior_point
-        product = fast.hessian_times(solution, vector) if fast else None
+        product = self._solver.hessian_times(solution, vector)
         if product is None:
             return self.sensitivity.hessian(*_point(solution)) @ vector
         return product
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
-        return Sensitivity(self._ocp)
+        return Sensitivity(self.ocp)
 
 
 def _point(solution: Solution) -> tuple[Vector, Vector, Vector, Vector]:

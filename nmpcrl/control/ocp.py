@@ -17,6 +17,8 @@ from nmpcrl.control.task import Task, overlap
 
 Indices = NDArray[np.int_]
 
+TIE = 1e-6  # a start this close to an obstacle's boundary is on it, not in it  # departure L
+
 
 class Theta(NamedTuple):
     """The blocks of theta, in the paper's order: (stage, inputs, terminal, constraint)."""
@@ -51,6 +53,11 @@ class Ocp:
     The index arrays say where in z and in g each part of the problem lies.
     """
 
+    plant: Plant
+    task: Task
+    gamma: float
+    slack_weight: float
+    ties_active: bool  # whether a start on an obstacle's boundary counts as in it  # departure L
     variables: ca.SX  # z
     parameters: ca.SX  # p
     theta: ca.SX  # the part of p that is learned
@@ -66,12 +73,22 @@ class Ocp:
     fixed_action: Indices  # u_0 = a in g, shape (m,), or (0,) when u_0 is free
     dynamics: Indices  # Eq. (2c) in g, shape (N, n)
     obstacles: Indices  # Eq. (2f) in g, shape (N + 1, M)
-    gamma: float
-    slack_weight: float
+
+    @property
+    def tie(self) -> float:
+        """A start whose Xi + theta_c exceeds this is in the obstacle, not on its boundary."""
+        return -TIE if self.ties_active else TIE
 
 
 def transcribe(
-    plant: Plant, task: Task, horizon: int, gamma: float, slack_weight: float, *, fix_action: bool
+    plant: Plant,
+    task: Task,
+    horizon: int,
+    gamma: float,
+    slack_weight: float,
+    *,
+    fix_action: bool,
+    ties_active: bool = False,
 ) -> Ocp:
     """Write Eq. (2) by multiple shooting; with `fix_action`, add u_0 = a as a constraint.
 
@@ -116,6 +133,11 @@ def transcribe(
         constraints.add("obstacles", tightened - sigma[i], -np.inf, 0)
 
     return Ocp(
+        plant=plant,
+        task=task,
+        gamma=gamma,
+        slack_weight=slack_weight,
+        ties_active=ties_active,
         variables=variables.expression,
         parameters=ca.vertcat(state, theta, action),
         theta=theta,
@@ -131,8 +153,6 @@ def transcribe(
         fixed_action=constraints.where("fixed_action")[0],
         dynamics=constraints.where("dynamics"),
         obstacles=constraints.where("obstacles"),
-        gamma=gamma,
-        slack_weight=slack_weight,
     )
 
 

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control.machine_code import callable_of
+from nmpcrl.control.codegen.jit import callable_of
 
 Dynamics = Callable[[ca.SX, ca.SX], ca.SX]
 

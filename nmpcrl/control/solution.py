@@ -1,6 +1,7 @@
 """What a solve gives back: an optimum, or an error that says where there was none."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +21,13 @@ class SolverError(RuntimeError):
 
     def __reduce__(self) -> tuple[type, tuple[str, Vector, Vector]]:
         return type(self), (self.status, self.state, self.theta)
+
+
+class Status(StrEnum):
+    """How an optimum was found."""
+
+    SOLVED = "solved"
+    RESTARTED = "restarted"  # not from the start that was asked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,13 +60,14 @@ class Solution:
     seconds: float  # wall time of the solve and the gradient [s]
     point: Vector  # z, lam and nu, one after the other, each in the order of `ocp`
     ocp: Ocp  # says where each part lies
+    solver: str  # the name of what found it
     restarts: int = 0  # how often the solver had to begin again
     violation: float = 0.0  # how far the plan leaves the box, in the unit of the state
 
     @property
-    def status(self) -> str:
-        """ "solved", or "restarted" if not from the start that was asked for."""
-        return "restarted" if self.restarts else "solved"
+    def status(self) -> Status:
+        """Whether the solver began as it was asked to."""
+        return Status.RESTARTED if self.restarts else Status.SOLVED
 
     @property
     def primal(self) -> Vector:
@@ -120,15 +129,15 @@ def short(vector: Vector) -> str:
     return np.array2string(np.asarray(vector), precision=4, max_line_width=1000)
 
 
-def check_shape(guess: Solution, ocp: Ocp) -> None:
-    """Refuse a guess from a problem with another horizon, plant or number of obstacles.
+def check_shape(warm_start: Solution, ocp: Ocp) -> None:
+    """Refuse a warm start from a problem with another horizon, plant or number of obstacles.
 
     Raises:
         ValueError: it is one.
     """
-    old = guess.ocp
+    old = warm_start.ocp
     if old.states.shape != ocp.states.shape or old.slacks.shape != ocp.slacks.shape:
         raise ValueError(
-            f"the guess has states of shape {old.states.shape} and slacks of shape"
+            f"the warm start has states of shape {old.states.shape} and slacks of shape"
             f" {old.slacks.shape}; this problem's are {ocp.states.shape} and {ocp.slacks.shape}"
         )

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control.machine_code import callable_of
+from nmpcrl.control.codegen.jit import callable_of
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,7 @@ class Task:
     near: float = 1.5  # d_t: closer than this the input is charged instead of the obstacles
     margin: float = 0.35  # d_o: the penalty begins this much before Xi = 0  # departure N
     penalty: float = 50.0  # c of Upsilon
+    soft_box: bool = False  # leaving the box is priced as obstacles are  # departure M
     target_may_lie_outside: bool = False  # only to show what the paper's printed box does
 
     def __post_init__(self) -> None:

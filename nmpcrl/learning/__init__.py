@@ -1,4 +1,7 @@
-"""How the parameters of the NMPC move: a learner is a bootstrap and an update rule."""
+"""How the parameters of the NMPC move: a learner is a bootstrap and an update rule.
+
+`train` is Algorithm 1, and `evaluate` judges its result by a rollout without noise.
+"""
 
 from nmpcrl.learning.baselines import frozen, random_direction, step_matched
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, SecondSolve, Successor, Transition
@@ -14,6 +17,15 @@ from nmpcrl.learning.learners import (
     regularized_deep_expected_sarsa,
 )
 from nmpcrl.learning.network import QNetwork
+from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
+from nmpcrl.learning.training import (
+    Diverged,
+    Exploration,
+    Step,
+    count_episodes,
+    count_steps,
+    train,
+)
 from nmpcrl.learning.updates import (
     auxiliary_step,
     curvature_correction,
@@ -25,17 +37,25 @@ from nmpcrl.learning.updates import (
 
 __all__ = [
     "Bootstrap",
+    "Diverged",
+    "Exploration",
     "Imitation",
     "Learner",
+    "Persistent",
     "QNetwork",
+    "Rollout",
     "SecondSolve",
+    "Step",
     "Successor",
     "Transition",
     "Update",
     "Weights",
     "auxiliary_step",
+    "count_episodes",
+    "count_steps",
     "curvature_correction",
     "deep_expected_sarsa",
+    "evaluate",
     "expected_sarsa",
     "frozen",
     "gradient_expected_sarsa",
@@ -48,4 +68,5 @@ __all__ = [
     "semi_gradient_step",
     "step_matched",
     "td_error",
+    "train",
 ]

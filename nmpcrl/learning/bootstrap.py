@@ -28,7 +28,7 @@ class Successor:
 
     value: float  # Q(s+, a+)
     features: Vector | None = None  # phi+, shape (d,); None from a network
-    solution: Solution | None = None  # of the second solve, a guess for the next first one
+    solution: Solution | None = None  # of the second solve, a warm start for the next first one
     loss: float = np.nan  # of the network's last fit in this step
     seconds: float = 0.0  # spent on fit and prediction [s]; a solve keeps its own time
 
@@ -44,7 +44,7 @@ class Controller(Protocol):
         self,
         state: Vector,
         theta: Vector,
-        guess: Solution | None = None,
+        warm_start: Solution | None = None,
         action: Vector | None = None,
     ) -> Solution:
         """See `nmpcrl.control.Nmpc.solve`."""

@@ -26,14 +26,14 @@ class Persistent:
         self,
         state: Vector,
         theta: Vector,
-        guess: Solution | None = None,
+        warm_start: Solution | None = None,
         action: Vector | None = None,
     ) -> Solution:
         """As `Nmpc.solve`; the status is "restarted" where only the second attempt succeeded."""
         try:
-            return self.nmpc.solve(state, theta, guess, action)
+            return self.nmpc.solve(state, theta, warm_start, action)
         except SolverError:
-            if guess is None:
+            if warm_start is None:
                 raise
             solution = self.nmpc.solve(state, theta, None, action)
             return replace(solution, restarts=solution.restarts + 1)
@@ -58,21 +58,27 @@ class Rollout:
         return np.inf if self.failure else float(self.costs.sum())
 
 
-def evaluate(controller: Persistent, theta: Vector, steps: int) -> Rollout:
+def persistent(controller: Nmpc | Persistent) -> Persistent:
+    """The controller, made to try a failed solve once more."""
+    return Persistent(controller) if isinstance(controller, Nmpc) else controller
+
+
+def evaluate(controller: Nmpc | Persistent, theta: Vector, steps: int) -> Rollout:
     """Follow the policy of `theta` from the start for `steps` steps, without noise."""
+    controller = persistent(controller)
     plant, task = controller.nmpc.plant, controller.nmpc.task
-    state, guess, failure = task.start, None, ""
+    state, plan, failure = task.start, None, ""
     states, actions, costs = [], [], []
     for _ in range(steps):
         try:
-            guess = controller.solve(state, theta, guess)
+            plan = controller.solve(state, theta, plan)
         except SolverError as error:
             failure = str(error)
             break
         states.append(state)
-        actions.append(guess.action)
-        costs.append(task.stage_cost(state, guess.action))
-        state = plant.step(state, guess.action)
+        actions.append(plan.action)
+        costs.append(task.stage_cost(state, plan.action))
+        state = plant.step(state, plan.action)
     return Rollout(
         states=np.reshape(states, (-1, plant.n)),
         actions=np.reshape(actions, (-1, plant.m)),

@@ -1,6 +1,6 @@
 """Algorithm 1 as a generator of steps."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Solution, SolverError
+from nmpcrl.control import Nmpc, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.solution import short
 from nmpcrl.learning.bootstrap import Transition
 from nmpcrl.learning.learners import Learner, Update, Weights
-from nmpcrl.learning.rollout import Persistent
+from nmpcrl.learning.rollout import Persistent, persistent
 
 Counts = NDArray[np.int_]
+Count = Callable[[int, int], Counts]  # (episodes, steps) -> k of each step
 
 PATIENCE = 10  # so many episodes in a row that a failed solve ended are a divergence
 
@@ -47,6 +48,28 @@ class Exploration:
     noise: Matrix  # epsilon, shape (episodes, steps, m)
     scale: NDArray[np.floating]  # c_epsilon^k, shape (episodes, steps)
 
+    @classmethod
+    def draw(
+        cls,
+        rng: np.random.Generator,
+        shape: tuple[int, int, int],
+        *,
+        deviation: float = 1.0,
+        decay_rate: float = 0.99,
+        count: Count | None = None,
+    ) -> "Exploration":
+        """Normal noise that decays.
+
+        Args:
+            rng: draws the noise.
+            shape: episodes, steps of an episode, inputs of the plant.
+            deviation: standard deviation before the decay.
+            decay_rate: c_epsilon.
+            count: k of Eq. (5): `count_steps`, the default, or `count_episodes`.
+        """
+        scale = decay_rate ** (count or count_steps)(*shape[:2])
+        return cls(rng.normal(scale=deviation, size=shape), scale)
+
     def __call__(self, policy: Vector, episode: int, time: int) -> Vector:
         """The action before it is clipped to the action space."""
         return policy + self._scaled[episode, time]
@@ -69,7 +92,7 @@ def count_episodes(episodes: int, steps: int) -> Counts:
 
 def train(
     learner: Learner,
-    controller: Persistent,
+    controller: Nmpc | Persistent,
     weights: Weights,
     explore: Exploration,
     *,
@@ -91,11 +114,11 @@ def train(
     Raises:
         Diverged: theta is no longer usable, or `PATIENCE` episodes in a row ended early.
     """
-    lesson = _Lesson(learner, controller, explore, clipped, constrained)
+    trainer = _Trainer(learner, persistent(controller), explore, clipped, constrained)
     failed = 0
     for episode in range(len(explore.scale)):
         failure = ""
-        for step in lesson.episode(episode, weights):
+        for step in trainer.episode(episode, weights):
             weights, failure = step.weights, step.failure
             yield step
             if absurd(weights):
@@ -106,7 +129,7 @@ def train(
 
 
 @dataclass(frozen=True, eq=False)
-class _Lesson:
+class _Trainer:
     """What an episode needs, as in `train`."""
 
     learner: Learner
@@ -119,11 +142,11 @@ class _Lesson:
         """The steps of one episode; the last one says so if a solve failed."""
         controller, constrained = self.controller, self.constrained
         plant, task = controller.nmpc.plant, controller.nmpc.task
-        state, guess = task.start, None
+        state, warm_start = task.start, None
         nothing = np.full(plant.m, np.nan)
         for t in range(self.explore.scale.shape[1]):
             try:
-                plan = controller.solve(state, weights.theta, guess)
+                plan = controller.solve(state, weights.theta, warm_start)
             except SolverError as error:
                 yield Step(episode, t, state, weights, nothing, failure=str(error))
                 return
@@ -144,7 +167,7 @@ class _Lesson:
                 return
             weights = update.weights
             yield Step(episode, t, state, weights, action, cost, plan, solution, update)
-            guess = (update.successor and update.successor.solution) or solution
+            warm_start = (update.successor and update.successor.solution) or solution
             state = next_state
 
 

@@ -1,22 +1,23 @@
 """What is measured: the paper's numbers, runs, metrics, claims and figures."""
 
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import Experiment, run
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.parameters import ParameterError
 from nmpcrl.study.records import DamagedRecords, Records
-from nmpcrl.study.store import Study, fetch, fetch_all, stored
-from nmpcrl.study.sweeps import main_study, sweep
+from nmpcrl.study.run import run
+from nmpcrl.study.store import Runs, fetch, fetch_all, stored
+from nmpcrl.study.sweeps import paper_runs, sweep
 
 __all__ = [
     "DamagedRecords",
     "Experiment",
     "ParameterError",
     "Records",
-    "Study",
+    "Runs",
     "fetch",
     "fetch_all",
-    "main_study",
     "paper",
+    "paper_runs",
     "run",
     "stored",
     "sweep",

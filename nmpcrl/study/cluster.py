@@ -9,8 +9,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import Any
 
-from nmpcrl.study import store
-from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.provenance import signature
 
 
 class NoCluster(RuntimeError):
@@ -49,9 +48,9 @@ def executor(address: str, *, patience: float = 30.0) -> Iterator[Executor]:
 
 def _refuse_others(client: Any) -> None:
     """Say at once if a worker would make other numbers; one that joins later says it itself."""
-    ours = _signature()
+    ours = signature()
     try:
-        signatures = client.run(_signature)
+        signatures = client.run(signature)
     except Exception as error:  # Dask wraps whatever went wrong over there
         raise NoCluster(f"a worker cannot say which code it has: {error}") from None
     for worker, theirs in signatures.items():
@@ -60,7 +59,3 @@ def _refuse_others(client: Any) -> None:
                 f"the worker {worker} has other code or other versions of what the numbers depend"
                 " on than this machine"
             )
-
-
-def _signature() -> str:
-    return store.key(Experiment())

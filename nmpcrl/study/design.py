@@ -10,16 +10,9 @@ from types import MappingProxyType
 from typing import Any
 
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import (
-    DECAYS,
-    MAIN,
-    NETWORK_LEARNERS,
-    NETWORKS,
-    PAPER,
-    Experiment,
-    frozen_arm,
-)
+from nmpcrl.study.experiment import MAIN, NETWORK_LEARNERS, PAPER, Experiment, frozen_arm
 from nmpcrl.study.replicas import perturbed
+from nmpcrl.study.setup import DECAYS, NETWORKS
 from nmpcrl.study.sweeps import sweep
 
 LAYOUTS = tuple(paper.LAYOUTS)
@@ -53,7 +46,7 @@ def _variants() -> dict[str, Variant]:
         "literal": Variant("G", "theta moves from step 1", {"gated": False}, NETWORK_LEARNERS),
         "other side of the kink": Variant("L", "ties count as active", {"ties_active": True}),
     }
-    for network in NETWORKS[1:]:
+    for network in list(NETWORKS)[1:]:
         found[network] = Variant("H", f"network: {network}", {"network": network}, NETWORK_LEARNERS)
     for factor in (0.1, 10, 100):
         changed = f"beta x {factor:g}"
@@ -103,7 +96,7 @@ def variant(name: str, episodes: int = paper.EPISODES) -> tuple[Experiment, ...]
     return (*runs, *dict.fromkeys(map(frozen_arm, runs)))
 
 
-def study(episodes: int = paper.EPISODES) -> dict[Experiment, str]:
+def whole_study(episodes: int = paper.EPISODES) -> dict[Experiment, str]:
     """Every run of the study with the part that it belongs to, the main table first.
 
     A run that two parts share is named after the first.

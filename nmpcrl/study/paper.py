@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.control import Nmpc, Obstacle, Task, differential_drive
-from nmpcrl.study.departures import DEPARTURES
+from nmpcrl.control.solvers import Solver
 
-__all__ = ["DEPARTURES", "LAYOUTS", "controller", "nmpc", "task", "task_among"]
+__all__ = ["LAYOUTS", "controller", "nmpc", "task", "task_among"]
 
 ALPHA = 1e-7  # step size of theta
 BETA = 1e-8  # step size of w  # departure J
@@ -18,6 +18,7 @@ ZETA = 1e-2  # learning rate of the network
 GAMMA = 0.97
 W_INIT = 1e-4  # every component of w
 THETA_INIT = (1.0, 1.0, 0.05, 0.05, 0.05, 1.0, 1.0, 0.1, 0.001)
+THETA_SET = (0.0, 10.0)  # ours: TDC projects each component of theta into it
 THETA_NAMES = ("x", "y", "heading", "v", "nu", "x_f", "y_f", "heading_f", "c")
 HORIZON = 10  # N
 STEPS = 130  # an episode runs over t = 0, ..., K with K = 129
@@ -52,10 +53,12 @@ def task(layout: str = "A", *, box: str = BOXES[0]) -> Task:
         raise ValueError(f"layout = {layout!r} must be one of {', '.join(LAYOUTS)}")
     if box not in BOXES:
         raise ValueError(f"box = {box!r} must be one of {', '.join(BOXES)}")
-    return task_among(LAYOUTS[layout], printed_box=box == "printed")
+    return task_among(LAYOUTS[layout], printed_box=box == "printed", soft_box=box == "soft")
 
 
-def task_among(centres: Iterable[tuple[float, float]], *, printed_box: bool = False) -> Task:
+def task_among(
+    centres: Iterable[tuple[float, float]], *, printed_box: bool = False, soft_box: bool = False
+) -> Task:
     """The robot's task among obstacles with these centres [m]."""
     return Task(
         start=np.array(START),
@@ -63,6 +66,7 @@ def task_among(centres: Iterable[tuple[float, float]], *, printed_box: bool = Fa
         lower=np.array(PRINTED_LOWER if printed_box else LOWER),
         upper=np.array(PRINTED_UPPER if printed_box else UPPER),
         obstacles=tuple(Obstacle(x, y) for x, y in centres),
+        soft_box=soft_box,
         target_may_lie_outside=printed_box,
     )
 
@@ -71,7 +75,7 @@ def nmpc(
     layout: str = "A",
     *,
     horizon: int = HORIZON,
-    solver: str = "riccati",
+    solver: Solver | str = "riccati",
     box: str = BOXES[0],
     **options: Any,
 ) -> Nmpc:
@@ -84,9 +88,7 @@ def nmpc(
         box: one of `BOXES`.
         options: further ones of `Nmpc`.
     """
-    return controller(
-        task(layout, box=box), horizon=horizon, solver=solver, soft_box=box == "soft", **options
-    )
+    return controller(task(layout, box=box), horizon=horizon, solver=solver, **options)
 
 
 def controller(task: Task, **options: Any) -> Nmpc:

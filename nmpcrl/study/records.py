@@ -4,18 +4,56 @@ Analyses read records and nothing else. Loading never unpickles.
 """
 
 import json
-import os
-import tempfile
 from dataclasses import dataclass
+from enum import IntEnum, StrEnum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from nmpcrl import Vector
+from nmpcrl.study.atomic import write_whole
+
 Column = NDArray[Any]
 Tables = dict[str, dict[str, Column]]  # columns by name, by the name of their table
 Field = tuple[str, type] | tuple[str, type, int | tuple[int, ...]]  # name, type[, shape]
+
+
+LAST = 3  # rollouts that the final cost averages
+
+
+class Stopped(StrEnum):
+    """How training ended; the fact `stopped` begins with it, and may go on with ": " and why."""
+
+    FINISHED = "finished"
+    DIVERGED = "diverged"
+
+
+class StepStatus(IntEnum):
+    """How the solves of a step went: the column `status`."""
+
+    SOLVED = 0
+    RESTARTED = 1
+    FAILED = 2
+
+    @classmethod
+    def of(cls, *, failed: bool, restarts: int) -> "StepStatus":
+        """The worst that can be said of a step's solves."""
+        return cls.FAILED if failed else cls.RESTARTED if restarts else cls.SOLVED
+
+
+def final_cost(cost: Vector) -> float:
+    """Noise-free cost at the end of a run: the mean of its last rollouts, `LAST` or fewer.
+
+    The first rollout judges theta_init and is never among them. Infinite where one of them failed,
+    or where training was stopped before there was any.
+
+    Args:
+        cost: of every rollout, theta_init's first, shape (rollouts,).
+    """
+    learned = cost[1:][-LAST:]
+    return float(learned.mean()) if learned.size else np.inf
 
 
 class DamagedRecords(ValueError):
@@ -46,8 +84,8 @@ class Records:
     """One run.
 
     Columns of `steps`, one row per step of training: episode, time, state (n,), action (m,), cost,
-    value, next_value, delta, features (d,), theta (d,), w (d,), loss, status (0 solved, 1 after a
-    restart, 2 failed), restarts, violation (how far a plan leaves the box [m]), iterations, solves,
+    value, next_value, delta, features (d,), theta (d,), w (d,), loss, status (a `StepStatus`),
+    restarts, violation (how far a plan leaves the box [m]), iterations, solves,
     solve_seconds, fit_seconds, seconds, alpha_phi2 (alpha ||phi||^2). theta and w are those after
     the step. What a step does not have is nan.
 
@@ -58,7 +96,7 @@ class Records:
     experiment: dict[str, Any]  # the fields of the Experiment
     steps: dict[str, Column]
     evaluations: dict[str, Column]
-    facts: dict[str, Any]  # stopped, seconds, final_cost; when stored versions, machine, key
+    facts: dict[str, Any]  # stopped, solver, seconds, final_cost; when stored those of `provenance`
 
     def save(self, path: Path) -> None:
         """Write the whole file beside `path`, then rename it into place."""
@@ -89,21 +127,13 @@ class Records:
 
 def save_arrays(path: Path, about: dict[str, Any], tables: Tables) -> None:
     """Write columns and facts beside `path`, whole, then rename the file into place."""
-    arrays = {
+    arrays: dict[str, Any] = {
         f"{table}/{name}": column
         for table, columns in tables.items()
         for name, column in columns.items()
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".half-", suffix=".tmp")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)  # type: ignore[arg-type]
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).replace(path)
-    finally:
-        Path(name).unlink(missing_ok=True)
+    arrays["about"] = np.array(json.dumps(about))
+    write_whole(path, lambda file: np.savez_compressed(file, **arrays))
 
 
 def load_arrays(path: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], Tables]:

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.sweeps import main_study
+from nmpcrl.study.sweeps import paper_runs
 
 PERTURBATION = 1e-12  # added to theta_x at the start
 OTHER_SOLVER = "ipopt"
@@ -20,8 +20,8 @@ def perturbed(experiment: Experiment) -> Experiment:
 
 
 def pairs(**fields: Any) -> tuple[Pair, ...]:
-    """Every learner's run and its perturbed replica; `fields` as `main_study` takes them."""
-    moving = [e for e in main_study(**fields) if e.learner != "frozen"]
+    """Every learner's run and its perturbed replica; `fields` as `paper_runs` takes them."""
+    moving = [e for e in paper_runs(**fields) if e.learner != "frozen"]
     return tuple((e, perturbed(e)) for e in moving)
 
 

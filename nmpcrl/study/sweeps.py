@@ -6,8 +6,9 @@ from itertools import product
 from typing import Any
 
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import DECAYS, PAPER, Experiment
+from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.setup import DECAYS
 
 
 def sweep(**axes: Any) -> tuple[Experiment, ...]:
@@ -39,7 +40,7 @@ def sweep(**axes: Any) -> tuple[Experiment, ...]:
     )
 
 
-def main_study(
+def paper_runs(
     episodes: int = paper.EPISODES,
     seeds: Sequence[int] = (0, 1),
     layout: str = "A",

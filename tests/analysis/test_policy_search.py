@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis import policy_search
-from nmpcrl.analysis.policy_search import LEAST, SCALE, Found, Search, fetch
+from nmpcrl.analysis.policy_search import LEAST, SCALE, Found, Search, search_all
 from nmpcrl.learning.rollout import Persistent, evaluate
-from nmpcrl.study import ParameterError, paper
+from nmpcrl.study import ParameterError, executor, paper
 
 BEST = np.array([0.5, 1.5, 0.1, 0.02, 0.08, 2.0, 0.3, 0.15, 0.3])  # of the bowl below
 FOUND = Found(paper.THETA_INIT, 40, (1, 7), (100.0, 80.0))
@@ -45,7 +45,7 @@ def searched(monkeypatch):
         return FOUND
 
     monkeypatch.setattr(policy_search, "search", note)
-    monkeypatch.setattr(policy_search.store, "processes", lambda _: ThreadPoolExecutor(1))
+    monkeypatch.setattr(executor, "processes", lambda *_: ThreadPoolExecutor(1))
     return made
 
 
@@ -106,7 +106,7 @@ def test_where_all_drives_fail_theta_init_is_what_was_found(monkeypatch):
 
 def test_a_search_in_processes_costs_what_a_drive_with_its_theta_costs():
     wanted = Search("D", budget=LEAST)
-    found = fetch([wanted], workers=1, progress=False)[wanted]
+    found = search_all([wanted], workers=1, progress=False)[wanted]
     controller = Persistent(paper.nmpc("D"))
     drives = [
         evaluate(controller, np.array(t), paper.STEPS) for t in (paper.THETA_INIT, found.theta)
@@ -117,21 +117,23 @@ def test_a_search_in_processes_costs_what_a_drive_with_its_theta_costs():
 
 def test_what_is_stored_is_read_and_only_the_rest_is_searched_for(searched):
     first, second = Search("A"), Search("A", budget=LEAST)
-    assert fetch([first], progress=False) == {first: FOUND}
-    assert fetch([second, first], progress=False) == {second: FOUND, first: FOUND}
+    assert search_all([first], progress=False) == {first: FOUND}
+    assert search_all([second, first], progress=False) == {second: FOUND, first: FOUND}
     assert searched == [first, second]
 
 
-def test_other_code_or_versions_make_old_searches_worthless(searched, monkeypatch):
-    fetch([Search()], progress=False)
-    monkeypatch.setattr(policy_search, "version", lambda _: "0.0")
-    fetch([Search()], progress=False)
+@pytest.mark.parametrize("what", ["version", "versions", "epochs"])
+def test_other_versions_and_epochs_make_old_searches_worthless(searched, monkeypatch, what):
+    search_all([Search()], progress=False)
+    other = {"version": "0.0", "versions": {"casadi": "0.0"}, "epochs": {"control": 99}}[what]
+    monkeypatch.setattr(policy_search, what, lambda *_: other)
+    search_all([Search()], progress=False)
     assert len(searched) == 2
 
 
 def test_a_damaged_file_is_reported_and_searched_again(searched, runs, capsys):
-    fetch([Search()], progress=False)
+    search_all([Search()], progress=False)
     (runs / "policy_search.json").write_text("{")
-    assert fetch([Search()], progress=False) == {Search(): FOUND}
+    assert search_all([Search()], progress=False) == {Search(): FOUND}
     assert "is damaged" in capsys.readouterr().err
     assert len(searched) == 2

@@ -3,7 +3,6 @@
 import contextlib
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -11,18 +10,16 @@ import threading
 import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-import nmpcrl
 from nmpcrl.analysis import summaries
-from nmpcrl.analysis.summaries import Failed, Killed, fetch_summaries
+from nmpcrl.analysis.summaries import Failed, fetch_summaries
 from nmpcrl.analysis.summary import RunSummary, summarise
-from nmpcrl.study import Experiment, fetch, run, store, sweep
-from nmpcrl.study.store import THREADS
+from nmpcrl.study import Experiment, executor, fetch, provenance, run, store, sweep
+from nmpcrl.study.executor import THREADS, Killed
 
 QUICK = Experiment("frozen", episodes=2, steps=3, evaluate_every=1)
 SIX = sweep(learner="frozen", seed=tuple(range(6)), episodes=1, steps=2)
@@ -93,8 +90,8 @@ def workers(tmp_path, monkeypatch):
 
 def here(experiments, **options):
     """The summaries, made in this process one after the other."""
-    with ThreadPoolExecutor(1) as executor:
-        return fetch_summaries(experiments, executor=executor, progress=False, **options)
+    with ThreadPoolExecutor(1) as one:
+        return fetch_summaries(experiments, executor=one, progress=False, **options)
 
 
 def times(log: Path, what: str) -> list[int]:
@@ -128,8 +125,9 @@ def test_a_summary_is_stored_among_the_runs_and_says_what_it_depends_on(folder):
     assert path == summaries.path_of(QUICK)
     assert path.name.startswith("frozen-A-step-seed0-2ep-")
     assert_same_summary(RunSummary.load(path), found)
-    assert found.facts["key"] == store.key(QUICK)
-    assert found.facts["versions"] == store.versions()
+    assert found.facts["key"] == provenance.key(QUICK)
+    assert found.facts["versions"] == provenance.environment()
+    assert found.facts["sources"] == provenance.sources_hash()
     assert store.stored() == {}  # the run itself is not kept
 
 
@@ -163,57 +161,6 @@ def test_a_damaged_summary_is_put_aside_and_made_again(folder, trained, capsys):
     assert trained == [QUICK, QUICK]
     assert sorted(p.suffix for p in folder.iterdir()) == [".damaged", ".npz"]
     assert "is kept as" in capsys.readouterr().err
-
-
-@pytest.fixture
-def keys(tmp_path, monkeypatch):
-    """The keys of a run and of its summary, after a change of a copy of the package."""
-    copy = tmp_path / "nmpcrl"
-    shutil.copytree(Path(nmpcrl.__file__).parent, copy, ignore=shutil.ignore_patterns("*.pyc"))
-    monkeypatch.setattr(nmpcrl, "__file__", str(copy / "__init__.py"))
-    for module, name in ((store, "_mathematics"), (folder, "_summary")):
-        monkeypatch.setattr(module, name, getattr(module, name).__wrapped__)
-
-    def after(place=None, before="", changed=""):
-        if place:
-            text = (copy / place).read_text()
-            assert before in text
-            (copy / place).write_text(text.replace(before, changed, 1))
-        return store.key(QUICK), summaries.key(QUICK)
-
-    return after
-
-
-@pytest.mark.parametrize(
-    ("place", "before", "changed"),
-    [
-        ("analysis/summary.py", "LATE = 20", "LATE = 21"),
-        ("analysis/metrics.py", "LAST = 3", "LAST = 4"),
-        ("analysis/imitation.py", "FITS = 4000", "FITS = 4001"),
-    ],
-)
-def test_a_change_of_what_is_kept_makes_other_summaries_of_the_same_runs(
-    keys, place, before, changed
-):
-    (run_before, summary_before), (run_after, summary_after) = keys(), keys(place, before, changed)
-    assert run_before == run_after
-    assert summary_before != summary_after
-
-
-def test_a_change_of_the_mathematics_makes_other_runs_and_other_summaries(keys):
-    before, after = keys(), keys("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6")
-    assert before[0] != after[0]
-    assert before[1] != after[1]
-
-
-def test_a_comment_changes_neither(keys):
-    assert keys() == keys("analysis/summary.py", "# episodes that stand", "# how many stand")
-
-
-def test_every_field_has_a_part_in_the_key():
-    others = [QUICK, replace(QUICK, seed=1), replace(QUICK, alpha=2e-7), replace(QUICK, horizon=9)]
-    assert len({summaries.key(e) for e in others}) == len(others)
-    assert len({summaries.path_of(e) for e in others}) == len(others)
 
 
 @pytest.fixture
@@ -272,8 +219,8 @@ def test_long_runs_begin_first(trained):
 
 
 def test_a_bar_counts_the_runs(mistaken, capsys):
-    with ThreadPoolExecutor(1) as executor:
-        fetch_summaries(THREE, executor=executor, strict=False)
+    with ThreadPoolExecutor(1) as one:
+        fetch_summaries(THREE, executor=one, strict=False)
     shown = capsys.readouterr().err
     assert "3/3" in shown
     assert "1 failed" in shown
@@ -328,21 +275,32 @@ def test_what_an_executor_of_the_callers_loses_is_a_failure_and_the_rest_is_kept
 
 
 def test_a_worker_with_other_code_trains_nothing(monkeypatch, trained):
-    """A worker of a cluster may join late; so each compares keys before each run."""
-    experiment, make = QUICK, summaries.make
-    elsewhere = store.versions() | {"numpy": "0.0.1"}
+    """A worker of a cluster may join late; so each compares signatures before each run."""
+    make = summaries.make
 
-    def with_other_versions(*arguments):
-        monkeypatch.setattr(store, "versions", lambda: elsewhere)
-        try:
-            return make(*arguments)
-        finally:
-            monkeypatch.undo()
+    def by_another(*arguments):
+        monkeypatch.setattr(summaries, "signature", lambda: "another")
+        return make(*arguments)
 
-    monkeypatch.setattr(summaries, "make", with_other_versions)
+    monkeypatch.setattr(summaries, "make", by_another)
     with pytest.raises(Failed, match="other code, or other versions"):
-        here([experiment])
+        here([QUICK])
     assert trained == []
+
+
+def test_a_run_that_is_wanted_afresh_is_trained_though_it_is_stored(trained):
+    fetch(QUICK)
+    assert_same_summary(
+        summaries.make(QUICK, provenance.signature(), afresh=True), summarise(run(QUICK))
+    )
+    assert trained == [QUICK]
+
+
+def test_a_summary_of_a_stored_run_says_which_code_made_the_run(monkeypatch):
+    fetch(QUICK)
+    then = provenance.sources_hash()
+    monkeypatch.setattr(provenance, "sources_hash", lambda: "edited since")
+    assert here([QUICK])[QUICK].facts["sources"] == then
 
 
 INTERRUPTED = """
@@ -395,15 +353,15 @@ def test_an_interrupted_study_goes_on_where_it_was(workers, folder, request):
 
 
 def test_a_process_that_starts_while_a_study_is_interrupted_is_ended_too(monkeypatch):
-    starting, processes = threading.Event(), store.processes
+    starting, process = threading.Event(), executor._process
 
-    def slowly(workers):
+    def slowly():
         starting.set()
         time.sleep(0.5)
-        return processes(workers)
+        return process()
 
-    monkeypatch.setattr(store, "processes", slowly)
-    slots = summaries.Slots(1)
+    monkeypatch.setattr(executor, "_process", slowly)
+    slots = executor.Slots(1)
     began, waits = slots.submit(time.sleep, 20), slots.submit(time.sleep, 20)
     starting.wait()
     slots.shutdown(wait=False, cancel_futures=True)

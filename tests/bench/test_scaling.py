@@ -38,7 +38,7 @@ def test_a_solve_that_fails_leaves_a_row_without_numbers(monkeypatch):
     solve = Nmpc.solve
 
     def failing(self, state, theta):
-        if self.solver == "fatrop" and state[0] > 0:
+        if self.solver.name == "fatrop" and state[0] > 0:
             raise SolverError("no", state, theta)
         return solve(self, state, theta)
 

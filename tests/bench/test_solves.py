@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from nmpcrl.bench import learners, scaling, solves
-from nmpcrl.control import SolverError, usual
+from nmpcrl.control import SolverError
+from nmpcrl.control.solvers import baselines
 from nmpcrl.study import paper
 
 THETA = solves.THETA
@@ -17,14 +18,16 @@ def nmpc():
     return paper.nmpc()
 
 
-each_usual = pytest.mark.parametrize("write", [usual.mx, usual.rebuilt], ids=["mx", "rebuilt"])
+each_baseline = pytest.mark.parametrize(
+    "write", [baselines.mx, baselines.rebuilt], ids=["mx", "rebuilt"]
+)
 INSIDE = np.array([-0.5, 1.5, 0.0])  # the rim of an obstacle, where the slacks are at work
 
 
-@each_usual
+@each_baseline
 @pytest.mark.parametrize("state", [np.array(paper.START), INSIDE], ids=["start", "inside"])
-def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(nmpc, write, state):
-    ours, theirs = nmpc.solve(state, THETA), write(nmpc)(state, THETA, None)
+def test_the_baselines_have_the_value_gradient_and_plan_of_the_problem(nmpc, write, state):
+    ours, theirs = nmpc.solve(state, THETA), write(nmpc.ocp)(state, THETA, None)
     assert theirs.value == pytest.approx(ours.value, rel=1e-6)
     assert theirs.features[:-1] == pytest.approx(ours.features[:-1], rel=1e-4, abs=1e-4)
     states, inputs, _ = theirs.variables
@@ -32,9 +35,9 @@ def test_the_usual_ways_of_writing_the_problem_have_its_value_gradient_and_plan(
     assert inputs == pytest.approx(ours.inputs.T, abs=1e-3)
 
 
-@each_usual
-def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
-    solve = write(nmpc)
+@each_baseline
+def test_the_baselines_start_from_the_last_plan(nmpc, write):
+    solve = write(nmpc.ocp)
     first = solve(nmpc.task.start, THETA, None)
     later = nmpc.plant.step(nmpc.task.start, first.variables[1][:, 0])
     again = solve(later, THETA, first)
@@ -42,11 +45,11 @@ def test_the_usual_ways_start_from_the_last_plan(nmpc, write):
     assert again.value == pytest.approx(nmpc.solve(later, THETA).value, rel=1e-6)
 
 
-@each_usual
-def test_the_usual_ways_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
-    monkeypatch.setitem(usual.OPTIONS["ipopt"], "max_iter", 1)
+@each_baseline
+def test_the_baselines_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
+    monkeypatch.setitem(baselines.OPTIONS["ipopt"], "max_iter", 1)
     with pytest.raises(SolverError, match="Maximum_Iterations_Exceeded"):
-        write(nmpc)(nmpc.task.start, THETA, None)
+        write(nmpc.ocp)(nmpc.task.start, THETA, None)
 
 
 @pytest.fixture(scope="module")
@@ -73,13 +76,13 @@ def test_every_problem_has_a_best_solver_and_all_agree_near_the_start(interleave
 
 
 def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
-    guesses = []
+    warm_starts = []
 
-    def fails_once(state, theta, guess):
-        guesses.append(guess)
-        if len(guesses) == 2:
+    def fails_once(state, theta, warm_start):
+        warm_starts.append(warm_start)
+        if len(warm_starts) == 2:
             raise SolverError("no", state, theta)
-        return nmpc.solve(state, theta, guess)
+        return nmpc.solve(state, theta, warm_start)
 
     states = [state for state, _, _ in solves.drive(nmpc, 0.0, np.random.default_rng(0), 3)]
     named = {"sound": nmpc.solve, "fails": fails_once}
@@ -87,8 +90,8 @@ def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
     failed = [row[3:] for row in rows if row[0] == "fails"]
     assert failed[1] == (None, None)
     assert failed[2][1] == pytest.approx(0, abs=1e-6)
-    assert guesses[0] is None
-    assert guesses[2] is None
+    assert warm_starts[0] is None
+    assert warm_starts[2] is None
 
 
 def test_the_excess_is_relative_to_the_best_value(nmpc):

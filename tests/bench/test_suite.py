@@ -24,13 +24,13 @@ def counted(tmp_path, monkeypatch):
     return lengths
 
 
-def fetch(length):
-    return suite.fetch(length, progress=False)
+def measured_here(length):
+    return suite.read_or_measure(length, progress=False)
 
 
 def test_what_was_measured_is_read_again(counted):
-    first = fetch("short")
-    assert fetch("short") == first
+    first = measured_here("short")
+    assert measured_here("short") == first
     assert counted == ["short"]
 
 
@@ -39,44 +39,45 @@ def test_what_was_measured_is_read_again(counted):
     [("full", "short", False), ("short", "smoke", False), ("smoke", "short", True)],
 )
 def test_a_longer_benchmark_serves_for_a_shorter_one(counted, kept, asked, again):
-    fetch(kept)
-    found = fetch(asked)
+    measured_here(kept)
+    found = measured_here(asked)
     assert counted == [kept, asked] if again else [kept]
     assert found["about"]["length"] == (asked if again else kept)
 
 
 @pytest.mark.parametrize("changed", ["versions", "machine"])
 def test_other_versions_or_another_machine_measure_again(counted, monkeypatch, changed):
-    fetch("short")
+    measured_here("short")
     monkeypatch.setattr(suite, changed, lambda: {"other": "one"})
-    fetch("short")
+    measured_here("short")
     assert counted == ["short", "short"]
 
 
-def test_another_source_measures_again(counted, monkeypatch):
-    fetch("short")
-    monkeypatch.setattr(suite.store, "summary", lambda _: "other")
-    fetch("short")
+@pytest.mark.parametrize("what", ["sources_hash", "room_hash"])
+def test_another_source_measures_again(counted, monkeypatch, what):
+    measured_here("short")
+    monkeypatch.setattr(suite.provenance, what, lambda *_: "other")
+    measured_here("short")
     assert counted == ["short", "short"]
 
 
 @pytest.mark.parametrize("content", ["{", "[]", "{}"])
 def test_a_damaged_file_is_told_and_measured_again(counted, capsys, content):
-    fetch("short")
+    measured_here("short")
     suite.path().write_text(content)
-    fetch("short")
+    measured_here("short")
     assert counted == ["short", "short"]
     assert "is damaged" in capsys.readouterr().err
 
 
 def test_the_file_is_whole_and_alone(counted):
-    bench = fetch("short")
+    bench = measured_here("short")
     assert json.loads(suite.path().read_text()) == bench
     assert list(suite.path().parent.iterdir()) == [suite.path()]
 
 
 def test_a_benchmark_says_where_and_of_what_it_is(counted):
-    about = fetch("short")["about"]
+    about = measured_here("short")["about"]
     assert about["machine"].keys() == {"processor", "architecture", "cores", "system"}
     assert {"python", "casadi", "numpy", "torch", "mpcrl"} <= about["versions"].keys()
 
@@ -84,12 +85,8 @@ def test_a_benchmark_says_where_and_of_what_it_is(counted):
 @pytest.mark.parametrize("length", ["long", "", None, True, 3, ["full"]])
 def test_a_length_that_there_is_not_is_refused(counted, length):
     with pytest.raises(ParameterError, match="must be one of smoke, short, full"):
-        fetch(length)
+        measured_here(length)
     assert not counted
-
-
-def test_the_sources_of_a_benchmark_exist():
-    assert suite.store.source_hash(suite.SOURCES)
 
 
 @pytest.fixture

@@ -7,22 +7,22 @@ import pytest
 
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.claims.assumptions import audit
-from nmpcrl.study import Experiment, Records, Study, paper
+from nmpcrl.study import Experiment, Records, Runs, paper
 
 KINK = (0.5, 2.2 - 1.25 * np.sqrt(1 + paper.THETA_INIT[-1]), 0.0)  # Xi + theta_c = 0 in layout A
 
 
-def study(experiment: Experiment, state=(-2.0, -2.0, 0.0)) -> Study:
+def study(experiment: Experiment, state=(-2.0, -2.0, 0.0)) -> Runs:
     """A run of GES that stays in one state and whose theta does not move."""
     steps = {
         "state": np.tile(state, (4, 1)),
         "theta": np.tile(paper.THETA_INIT, (4, 1)),
         "delta": np.array([1.0, 2.0, 3.0, 4.0]),
     }
-    return Study({experiment: Records({"theta": paper.THETA_INIT}, steps, {}, {})})
+    return Runs({experiment: Records({"theta": paper.THETA_INIT}, steps, {}, {})})
 
 
-def holding(runs: Study, dropped: float = 0.1) -> dict[str, bool]:
+def holding(runs: Runs, dropped: float = 0.1) -> dict[str, bool]:
     """Which assumptions hold, by their first words."""
     size = np.array([1.0])
     return {a.theorem: a.holds for a in audit(runs, Curvature(size, size, dropped * size))}

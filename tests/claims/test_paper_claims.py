@@ -15,8 +15,9 @@ from nmpcrl.claims import own_claims, paper_claims
 from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.paper_claims import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.claims.robustness import flips, spread
-from nmpcrl.study import Experiment, Study, paper, run
-from nmpcrl.study.experiment import LEARNERS, PAPER
+from nmpcrl.study import Experiment, Runs, paper, run
+from nmpcrl.study.experiment import PAPER
+from nmpcrl.study.setup import LEARNERS
 
 START_COST = 1000.0  # noise-free cost of theta_init
 SEEDS = range(5)
@@ -412,7 +413,7 @@ def short():
     experiments = [Experiment(name, episodes=4, steps=6) for name in (*PAPER, "frozen")]
     experiments.append(Experiment("ES", alpha=1e5, seed=1, episodes=4, steps=6))
     experiments.append(Experiment("frozen", seed=1, episodes=4, steps=6))
-    return Study({one: run(one) for one in experiments})
+    return Runs({one: run(one) for one in experiments})
 
 
 def test_a_run_is_judged_from_its_records_as_from_the_table(short):

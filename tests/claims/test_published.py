@@ -3,19 +3,22 @@
 import json
 import shutil
 from dataclasses import asdict, fields, replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.summaries import key as run_key
 from nmpcrl.analysis.summary import row, summarise, table
 from nmpcrl.claims import published
 from nmpcrl.claims.published import FILES, Damaged, Published, compare, load, publish
 from nmpcrl.claims.rule import PARTLY, REPRODUCED, Verdict
 from nmpcrl.study import Experiment, design, paper, run, sweep
 from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.machine import fingerprint
+from nmpcrl.study.provenance import EPOCHS, environment
+from nmpcrl.study.provenance import summary_key as run_key
 
 RUNS = (
     *sweep(learner=("ES", "frozen"), seed=(0, 1, 2, 3), episodes=4, steps=6, evaluate_every=2),
@@ -61,8 +64,8 @@ def known(summaries) -> Published:
 @pytest.fixture
 def elsewhere(monkeypatch):
     """From here on this is another machine."""
-    there = published.here() | {"processor": "another"}
-    return lambda: monkeypatch.setattr(published, "machine", lambda: there)
+    there = fingerprint() | {"processor": "another"}
+    return lambda: monkeypatch.setattr(published, "fingerprint", lambda: there)
 
 
 def changed(one, **rollouts):
@@ -135,9 +138,9 @@ def test_verdicts_are_read_as_they_were(known):
 
 def test_what_is_published_says_what_made_it(known):
     about = known.about
-    assert about["code"] == run_key(Experiment())
-    assert about["machine"] == published.here()
-    assert set(about["versions"]) >= {"python", "numpy", "torch", "casadi"}
+    assert about["epochs"] == EPOCHS
+    assert about["machine"] == fingerprint()
+    assert about["versions"] == environment()
     assert about["runs"] == {"main": 8, "N = 2": 4}
 
 
@@ -173,7 +176,7 @@ def test_the_whole_study_takes_20_megabytes_at_most(summaries, folder):
         )
     publish(noise, dict.fromkeys(noise, "main"), VERDICTS)
     each = sum(path.stat().st_size for path in folder.iterdir()) / n
-    assert each * len(design.study()) < 20e6
+    assert each * len(design.whole_study()) < 20e6
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -209,6 +212,17 @@ def test_a_table_without_a_column_is_said_in_a_sentence(known, folder):
     runs = pd.read_csv(folder / "runs.csv").drop(columns="layout")
     runs.to_csv(folder / "runs.csv", index=False)
     assert_refused(folder)
+
+
+def test_a_column_that_an_older_table_lacks_takes_the_fields_default(known, summaries, folder):
+    runs = pd.read_csv(folder / "runs.csv").drop(columns=["projected", "evaluate_every"])
+    runs.to_csv(folder / "runs.csv", index=False)
+    about = json.loads((folder / "about.json").read_text())
+    about["files"]["runs.csv"] = sha256((folder / "runs.csv").read_bytes()).hexdigest()
+    (folder / "about.json").write_text(json.dumps(about))
+    published._load.cache_clear()
+    default = Experiment().evaluate_every
+    assert list(load().rows) == [replace(e, evaluate_every=default) for e in summaries]
 
 
 def assert_refused(folder):
@@ -252,8 +266,14 @@ def test_on_another_machine_the_last_bit_does_not_count(known, summaries, elsewh
     assert compare(moved, known).empty
 
 
-def test_with_other_code_the_last_bit_does_not_count(known, summaries, monkeypatch):
-    monkeypatch.setattr(summaries, "key", lambda _: "another")
+@pytest.mark.parametrize(
+    ("what", "other"),
+    [("environment", lambda: {"python": "2.7"}), ("summary_key", lambda _: "another")],
+)
+def test_with_other_versions_or_epochs_the_last_bit_does_not_count(
+    known, summaries, monkeypatch, what, other
+):
+    monkeypatch.setattr(published, what, other)
     moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in summaries.items()}
     assert compare(moved, known).empty
 

@@ -8,7 +8,7 @@ import pytest
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Obstacle, Plant, Task
-from nmpcrl.control.nmpc import SOLVERS
+from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
 
 # Where theta is drawn from: around what learning visits, all of it positive.

@@ -4,8 +4,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.control.ocp import transcribe
-
 STEP = 1e-4
 
 
@@ -59,8 +57,7 @@ def test_features_of_a_fixed_action_are_differences_as_well(fatrop, draw):
 
 def test_features_are_minus_the_parameter_multipliers_of_casadi(fatrop, draw):
     """The solver's own sensitivity, from an Ipopt of this test's making."""
-    problem = (fatrop.plant, fatrop.task, fatrop.horizon, fatrop.gamma, fatrop.slack_weight)
-    ocp = transcribe(*problem, fix_action=False)
+    ocp = fatrop.ocp
     nlp = {"x": ocp.variables, "p": ocp.parameters, "f": ocp.objective, "g": ocp.constraints}
     exact = {"print_level": 0, "sb": "yes", "tol": 1e-10, "bound_relax_factor": 0}
     ipopt = ca.nlpsol("ipopt", "ipopt", nlp, {"print_time": False, "ipopt": exact})

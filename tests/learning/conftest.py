@@ -14,11 +14,11 @@ class LinearController:
     """V_theta(s) = phi(s)' theta, and a plan that is easy to recognise."""
 
     gamma: float = 0.9
-    calls: list = field(default_factory=list)  # (state, theta, guess, action) of every solve
+    calls: list = field(default_factory=list)  # (state, theta, warm_start, action) of every solve
     products: list = field(default_factory=list)  # (solution, vector) of every Hessian product
 
-    def solve(self, state, theta, guess=None, action=None):
-        self.calls.append((state, theta, guess, action))
+    def solve(self, state, theta, warm_start=None, action=None):
+        self.calls.append((state, theta, warm_start, action))
         state = np.asarray(state, float)
         return SimpleNamespace(
             state=state,

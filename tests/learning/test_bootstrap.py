@@ -20,10 +20,10 @@ def test_the_second_solve_values_the_next_state_under_the_given_theta(controller
 def test_the_second_solve_starts_from_the_first(controller, transition):
     step = transition(THETA)
     SecondSolve(controller)(step, THETA)
-    ((state, theta, guess, action),) = controller.calls
+    ((state, theta, warm_start, action),) = controller.calls
     assert state is step.next_state
     assert theta is THETA
-    assert guess is step.solution
+    assert warm_start is step.solution
     assert action is None
 
 

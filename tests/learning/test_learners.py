@@ -178,7 +178,7 @@ class Bandit:
 
     gamma = 0.9
 
-    def solve(self, state, theta, guess=None, action=None):
+    def solve(self, state, theta, warm_start=None, action=None):
         a = -theta[1] / (2 * theta[2]) if action is None else action
         features = np.array([1.0, a, a**2])
         return SimpleNamespace(value=features @ theta, features=features)

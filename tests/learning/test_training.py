@@ -19,7 +19,7 @@ from nmpcrl.learning.training import (
     train,
 )
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.experiment import DECAYS, prepare
+from nmpcrl.study.setup import DECAYS, prepare
 
 THETA = np.array(paper.THETA_INIT)
 
@@ -30,13 +30,13 @@ class Faulty(Nmpc):
     def __init__(self, fails):
         super().__init__(differential_drive(), paper.task())
         self.fails = fails
-        self.guesses = []  # of every call
+        self.warm_starts = []  # of every call
 
-    def solve(self, state, theta, guess=None, action=None):
-        self.guesses.append(guess)
-        if self.fails(len(self.guesses) - 1):
-            raise SolverError(f"call {len(self.guesses) - 1} failed", state, theta)
-        return super().solve(state, theta, guess, action)
+    def solve(self, state, theta, warm_start=None, action=None):
+        self.warm_starts.append(warm_start)
+        if self.fails(len(self.warm_starts) - 1):
+            raise SolverError(f"call {len(self.warm_starts) - 1} failed", state, theta)
+        return super().solve(state, theta, warm_start, action)
 
 
 @pytest.fixture(scope="module")
@@ -143,23 +143,23 @@ def test_training_can_be_stopped_at_any_step(sound):
     steps.close()
 
 
-def test_the_second_solve_is_the_next_first_ones_guess():
+def test_the_second_solve_is_the_next_first_ones_warm_start():
     """It was solved in that very state, so nothing is shifted, and little is left to do."""
     controller = Persistent(Faulty(lambda call: False))
     steps = training(controller, noisy(1, 4), es)
-    guesses = controller.nmpc.guesses
-    assert guesses[0] is None
+    warm_starts = controller.nmpc.warm_starts
+    assert warm_starts[0] is None
     for k, step in enumerate(steps):
-        assert guesses[2 * k + 1] is step.solution
+        assert warm_starts[2 * k + 1] is step.solution
         if k + 1 < len(steps):
-            assert guesses[2 * k + 2] is step.update.successor.solution
+            assert warm_starts[2 * k + 2] is step.update.successor.solution
 
 
-def test_without_a_second_solve_the_plan_itself_is_the_next_guess():
+def test_without_a_second_solve_the_plan_itself_is_the_next_warm_start():
     controller = Persistent(Faulty(lambda call: False))
     steps = training(controller, noisy(2, 3))
     plans = [step.solution for step in steps]
-    assert controller.nmpc.guesses == [None, *plans[:2], None, *plans[3:5]]
+    assert controller.nmpc.warm_starts == [None, *plans[:2], None, *plans[3:5]]
 
 
 def test_the_step_reading_counts_time_through_training():
@@ -192,8 +192,8 @@ def test_a_failed_solve_is_tried_once_more_from_a_standing_start():
     steps = training(controller, quiet(1, 4))
     assert [step.solution.status for step in steps] == ["solved", "solved", "restarted", "solved"]
     assert [step.solution.restarts for step in steps] == [0, 0, 1, 0]
-    assert controller.nmpc.guesses[2] is steps[1].solution
-    assert controller.nmpc.guesses[3] is None
+    assert controller.nmpc.warm_starts[2] is steps[1].solution
+    assert controller.nmpc.warm_starts[3] is None
     assert all(not step.failure for step in steps)
 
 
@@ -201,14 +201,14 @@ def test_a_standing_start_that_failed_is_not_repeated():
     controller = Persistent(Faulty(lambda call: True))
     with pytest.raises(SolverError):
         controller.solve(paper.task().start, THETA)
-    assert len(controller.nmpc.guesses) == 1
+    assert len(controller.nmpc.warm_starts) == 1
 
 
 def test_a_restart_keeps_the_action_that_was_fixed():
     controller = Persistent(Faulty(lambda call: call == 1))
-    guess = controller.solve(paper.task().start, THETA)
+    warm_start = controller.solve(paper.task().start, THETA)
     action = np.array([0.2, -0.3])
-    solution = controller.solve(paper.task().start, THETA, guess, action)
+    solution = controller.solve(paper.task().start, THETA, warm_start, action)
     np.testing.assert_allclose(solution.action, action, atol=1e-7)
 
 

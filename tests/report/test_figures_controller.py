@@ -6,7 +6,7 @@ from matplotlib import pyplot
 
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
 from nmpcrl.report.figures import controller, expected_sarsa, sensitivity
-from nmpcrl.study import Records, Study, paper, sweep
+from nmpcrl.study import Records, Runs, paper, sweep
 
 LEARNERS, DECAYS, EPISODES, STEPS = ("ES", "frozen"), ("step", "episode"), 4, 5
 
@@ -51,9 +51,9 @@ def records(experiment, slope: float) -> Records:
     return Records(fields, steps, evaluations, {})
 
 
-def study(slope: float = 0.1) -> Study:
+def study(slope: float = 0.1) -> Runs:
     runs = sweep(learner=LEARNERS, decay=DECAYS, seed=[0, 1], episodes=EPISODES)
-    return Study({run: records(run, slope * (run.learner == "ES")) for run in runs})
+    return Runs({run: records(run, slope * (run.learner == "ES")) for run in runs})
 
 
 def texts(figure) -> str:
@@ -174,7 +174,7 @@ def test_the_fall_of_the_frozen_arm_is_a_share_of_its_first_cost():
 
 def test_one_seed_and_one_decay_are_enough_for_every_figure_of_a_study():
     runs = sweep(learner=LEARNERS, decay="step", seed=3, episodes=EPISODES)
-    small = Study({run: records(run, 0.0) for run in runs})
+    small = Runs({run: records(run, 0.0) for run in runs})
     for figure in (expected_sarsa.theta_paths, expected_sarsa.overshoot, expected_sarsa.two_costs):
         assert_readable(figure(small))
 

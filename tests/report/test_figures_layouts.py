@@ -17,7 +17,7 @@ from nmpcrl.report.figures import layouts as figures
 from nmpcrl.report.figures import robustness as maps
 from nmpcrl.study import Experiment, design, paper
 from nmpcrl.study.experiment import MAIN as LEARNERS
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 VARIANT = "Q(s, a)"
 SEEDS = (0, 1, 2, 3, 4)
@@ -61,7 +61,7 @@ def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
         gain = learned * (gained if part == VARIANT else 0.1)
         summaries[experiment] = run(experiment, gain, 0.35 if learned else paper.THETA_INIT[-1])
     runs = table(summaries).assign(variant=list(parts.values()), source="published")
-    return Evidence(Study(summaries), runs)
+    return Evidence(Runs(summaries), runs)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from nmpcrl.analysis.gradient_td import directions, dropped_curvature
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.two_state import Chain
 from nmpcrl.report.figures import few_runs, ges, rdes
-from nmpcrl.study import Experiment, Study, paper, run, sweep
+from nmpcrl.study import Experiment, Runs, paper, run, sweep
 
 SMALL = {"episodes": 4, "steps": 45, "evaluate_every": 2}
 
@@ -19,7 +19,7 @@ def study():
     """All five learners, both readings of the decay, four short episodes."""
     learners = ("ES", "DES", "RDES", "GES", "frozen")
     experiments = sweep(learner=learners, decay=("step", "episode"), **SMALL)
-    return Study({experiment: run(experiment) for experiment in experiments})
+    return Runs({experiment: run(experiment) for experiment in experiments})
 
 
 def one(study, learner, decay="step"):
@@ -122,9 +122,9 @@ def test_a_run_that_was_stopped_early_can_be_drawn(study):
     evaluations = {name: column[:1] for name, column in full.evaluations.items()}
     stopped = type(full)(full.experiment, steps, evaluations, {"stopped": "diverged"})
     runs = {e: stopped if r is full else r for e, r in study.items()}
-    figure = few_runs.figure_1(Study(runs))
+    figure = few_runs.figure_1(Runs(runs))
     assert heading(figure).startswith("Divergence: DES in 1 of 2")
-    rdes.online_errors(Study(runs))
+    rdes.online_errors(Runs(runs))
 
 
 def test_the_chain_s_figure_names_the_ratio_from_which_gradient_td_converges():

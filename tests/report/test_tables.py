@@ -11,8 +11,8 @@ from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.own_claims import ADDITIONS
 from nmpcrl.claims.paper_claims import CLAIMS, NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.report import tables
-from nmpcrl.study import main_study
-from nmpcrl.study.paper import DEPARTURES
+from nmpcrl.study import paper_runs
+from nmpcrl.study.departures import DEPARTURES
 
 OUTCOMES = (REPRODUCED, PARTLY, NOT, UNDECIDABLE)
 
@@ -99,7 +99,7 @@ def test_the_evidence_links_to_departures():
 
 
 def runs(seeds) -> pd.DataFrame:
-    return pd.DataFrame([asdict(one) for one in main_study(episodes=7, seeds=seeds)])
+    return pd.DataFrame([asdict(one) for one in paper_runs(episodes=7, seeds=seeds)])
 
 
 def test_the_scope_names_layout_seeds_readings_and_length():

@@ -23,7 +23,7 @@ from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import Failed, fetch_summaries
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.study import Experiment, cluster, run, store, sweep
+from nmpcrl.study import cluster, provenance, run, sweep
 from nmpcrl.study.cluster import NoCluster
 
 pytest.importorskip("distributed", reason="needs the extra nmpcrl[cluster]")
@@ -35,8 +35,8 @@ NOTING = """
 import os, time
 from pathlib import Path
 
-from nmpcrl.study import experiment as plain
 from nmpcrl.analysis import summaries
+from nmpcrl.study import run as train
 
 LOG = Path({log!r})
 
@@ -46,7 +46,7 @@ def run(experiment):
     time.sleep({pause})
     if experiment.seed in {killing}:
         os.kill(os.getpid(), 9)
-    records = plain.run(experiment)
+    records = train(experiment)
     note("ended", experiment)
     return records
 
@@ -69,9 +69,9 @@ def run(experiment):
 summaries.run = run
 """
 OTHER_VERSIONS = """
-from nmpcrl.study import store
+from nmpcrl.study import provenance
 
-store.LIBRARIES = store.LIBRARIES[1:]
+provenance.LIBRARIES = provenance.LIBRARIES[1:]
 """
 WITHOUT_PACKAGE = """
 import sys
@@ -285,7 +285,7 @@ def test_a_worker_with_other_versions_that_joins_late_trains_nothing(address, wo
     study = on_cluster(address, TEN, strict=False)
     helper.join()
     for found in study.values():
-        assert found.facts["versions"] == store.versions()
+        assert found.facts["versions"] == provenance.environment()
     assert seeds(log, "ended") == sorted(e.seed for e in study)
 
 
@@ -312,10 +312,6 @@ def test_without_dask_it_is_said_what_to_install(monkeypatch):
         cluster.executor("tcp://127.0.0.1:9"),
     ):
         pass
-
-
-def test_every_worker_is_asked_for_one_key():
-    assert cluster._signature() == summaries.key(Experiment())
 
 
 PAGE = (Path(__file__).resolve().parents[2] / "book/cluster.md").read_text()

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from nmpcrl.study import DamagedRecords, Records
-from nmpcrl.study.records import Table
+from nmpcrl.study.records import LAST, StepStatus, Table, final_cost
 
 
 def example(rows=40):
@@ -221,3 +221,28 @@ def test_a_row_of_another_length_is_refused_and_so_is_one_too_many():
     table.append((0, 1.0))
     with pytest.raises(IndexError):
         table.append((1, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("cost", "expected"),
+    [
+        ([9.0, 3.0, 2.0, 1.0], 2.0),
+        ([9.0, 5.0, 3.0, 2.0, 1.0], 2.0),
+        ([9.0, 2.0, 1.0], 1.5),  # a short run: theta_init's own rollout says nothing of learning
+        ([9.0, 1.0], 1.0),
+        ([9.0], np.inf),  # stopped before any rollout of a learned theta
+        ([9.0, 3.0, np.inf, 1.0], np.inf),
+        ([np.inf, 3.0, 2.0, 1.0], 2.0),
+    ],
+)
+def test_the_final_cost_averages_the_last_rollouts_but_never_the_first(cost, expected):
+    assert LAST == 3
+    assert final_cost(np.array(cost)) == expected
+
+
+@pytest.mark.parametrize(
+    ("failed", "restarts", "status"),
+    [(False, 0, StepStatus.SOLVED), (False, 2, StepStatus.RESTARTED), (True, 2, StepStatus.FAILED)],
+)
+def test_the_status_of_a_step_is_the_worst_of_its_solves(failed, restarts, status):
+    assert StepStatus.of(failed=failed, restarts=restarts) is status

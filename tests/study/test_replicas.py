@@ -6,7 +6,8 @@ import pytest
 from nmpcrl.analysis.summary import RunSummary, separation, summarise
 from nmpcrl.report.figures import results
 from nmpcrl.study import replicas
-from nmpcrl.study.experiment import Experiment, run
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.run import run
 
 SHORT = {"episodes": 2, "seeds": [3], "layout": "A"}
 

@@ -23,7 +23,7 @@ from nmpcrl.report.figures.panels import bundle, part, sourced
 from nmpcrl.report.figures.style import SUBTITLE, page, subplots
 from nmpcrl.report.tables import WORDS
 from nmpcrl.study.records import Column
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 CEILING = 4.0  # times theta_init's cost without noise, where the panels end
 Curve = Callable[[RunSummary], tuple[Vector, Vector]]  # episodes and costs
@@ -98,7 +98,7 @@ def _learning_curves(drawn: Evidence, title: str) -> Figure:
     return sourced(figure, title, drawn)
 
 
-def _costs(axis: Axes, runs: Study[RunSummary], learners: Iterable[str], curve: Curve) -> None:
+def _costs(axis: Axes, runs: Runs[RunSummary], learners: Iterable[str], curve: Curve) -> None:
     """Every learner's runs on a logarithmic axis of cost that ends at `CEILING`."""
     for learner in learners:
         curves = [curve(summary) for summary in runs.select(learner=learner).values()]

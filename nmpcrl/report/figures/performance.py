@@ -1,4 +1,4 @@
-"""Figures of the appendix on performance: functions of what `bench.fetch` returns."""
+"""Figures of the appendix on performance: functions of what `bench.read_or_measure` returns."""
 
 from typing import Any
 

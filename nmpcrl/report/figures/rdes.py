@@ -10,7 +10,7 @@ from nmpcrl.analysis.imitation import Imitation
 from nmpcrl.report.figures.axes import label_panel, one_entry_each
 from nmpcrl.report.figures.style import LOOKS, headed, page, subplots, thin
 from nmpcrl.study.records import Records
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 
 @page
@@ -33,7 +33,7 @@ def literal_and_gated(literal: Records, gated: Records) -> Figure:
 
 
 @page
-def online_errors(runs: Study, learners: tuple[str, ...] = ("DES", "RDES")) -> Figure:
+def online_errors(runs: Runs, learners: tuple[str, ...] = ("DES", "RDES")) -> Figure:
     """Root mean square of the online error in each episode, one panel a reading of the decay."""
     decays = runs.values_of("decay")
     figure, axes = subplots(1, len(decays), sharey=True, squeeze=False)

@@ -20,7 +20,7 @@ from nmpcrl.report.figures.style import DECAYS, LIMIT, LOOKS, SUBTITLE, page, su
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column
-from nmpcrl.study.store import Study
+from nmpcrl.study.store import Runs
 
 LEARNED = ("RDES", "GES")  # the paper's two methods, whose policies its Figs. 3 and 4 show
 SHOWN = ("frozen", *LEARNED)
@@ -120,7 +120,7 @@ def _against_time(
     return figure, axes
 
 
-def _map(axis: Axes, task: Task, runs: Study[RunSummary], *, names: bool = True) -> None:
+def _map(axis: Axes, task: Task, runs: Runs[RunSummary], *, names: bool = True) -> None:
     """Obstacles, start, target and trajectories; a mark where each ended."""
     draw_task(axis, task, labels=names)
     for learner in SHOWN:

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from nmpcrl.analysis.metrics import LAST
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.failure_modes import OVERSHOOT
 from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, page, subplots
+from nmpcrl.study.records import LAST
 
 PARTS: dict[
     str, dict[str, Any]

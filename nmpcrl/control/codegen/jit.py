@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -24,7 +23,7 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control.compile import CannotCompile, returns, source
+from nmpcrl.control.codegen.source import CannotCompile, returns, source
 
 COMPLETE = "complete"  # a file of this name says that everything in its folder is compiled
 
@@ -40,7 +39,7 @@ from numba import float64, njit, void
 
 
 def compiled(function: ca.Function) -> Callable[..., Any]:
-    """`function` as machine code, called as `compile.source` says, with contiguous arrays.
+    """`function` as machine code, called as `source` says, with contiguous arrays.
 
     Raises:
         CannotCompile: numba is missing, or an operation is not known.
@@ -78,11 +77,6 @@ def callable_of(function: ca.Function) -> Callable[..., Any]:
         return out
 
     return call
-
-
-def own_source(module: str) -> str:
-    """The text of a module of this package."""
-    return files(__package__).joinpath(f"{module}.py").read_text()
 
 
 @cache

@@ -1,4 +1,4 @@
-"""CasADi writes the mathematics, numba compiles it: `source` turns a Function into Python.
+"""CasADi expressions to Python text: `source` writes a Function down for numba to compile.
 
 An SX Function is a list of scalar instructions. Each becomes one line of Python on floats, with
 common subexpressions eliminated first, so numba compiles what a careful hand would have written.

@@ -6,7 +6,7 @@ and layout of a plant.
 
 import casadi as ca
 
-from nmpcrl.control.compile import source
+from nmpcrl.control.codegen.source import source
 from nmpcrl.control.ocp import Theta, stage_cost, terminal_cost
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.task import overlap
@@ -26,7 +26,7 @@ def write(plant: Plant) -> str:
     """The text of the module `model` for `plant`.
 
     Raises:
-        CannotCompile: the plant's dynamics hold an operation that `compile` does not know.
+        CannotCompile: the plant's dynamics hold an operation that `codegen` does not know.
     """
     sizes = (plant.n, plant.m, 2 * plant.n + plant.m + 1)
     header = HEADER.format(about=", ".join(plant.state_names), sizes=sizes)
@@ -46,71 +46,77 @@ def functions(plant: Plant) -> list[ca.Function]:
     w = ca.SX.sym("w", 2 * n + m + 1)
     weights = Theta.split(theta, n, m)
 
-    step = plant.transition(x, u)
+    next_x = plant.transition(x, u)
     cost = stage_cost(x, u, weights, target)
-    end = terminal_cost(x, weights, target)
-    path = overlap(x[0], x[1], disc[0], disc[1], disc[2]) + weights.constraint
-    lagrangian = discount * cost + ca.dot(costate, step)
+    terminal = terminal_cost(x, weights, target)
+    constraint = overlap(x[0], x[1], disc[0], disc[1], disc[2]) + weights.constraint
+    lagrangian = discount * cost + ca.dot(costate, next_x)
     hessian, _ = ca.hessian(lagrangian, ca.vertcat(x, u))
     expand = {
-        "A": ca.jacobian(step, x),
-        "B": ca.jacobian(step, u),
+        "A": ca.jacobian(next_x, x),
+        "B": ca.jacobian(next_x, u),
         "lx": ca.gradient(discount * cost, x),
         "lu": ca.gradient(discount * cost, u),
         "Q": hessian[:n, :n],
         "S": hessian[n:, :n],
         "R": hessian[n:, n:],
     }
-    end_hessian, end_gradient = ca.hessian(discount * end, x)
-    path_hessian, path_gradient = ca.hessian(path, x)
+    terminal_hessian, lx = ca.hessian(discount * terminal, x)
+    constraint_hessian, hx = ca.hessian(constraint, x)
 
     def along(gradient: ca.SX, *moved: tuple[ca.SX, ca.SX]) -> ca.SX:
         """The derivative of a gradient while each variable moves along its direction."""
         variables, directions = (ca.vertcat(*part) for part in zip(*moved, strict=True))
         return ca.jtimes(gradient, variables, directions)
 
-    cost_slope, end_slope, path_slope = (ca.gradient(f, theta) for f in (cost, end, path))
+    stage_gradient, terminal_gradient, constraint_gradient = (
+        ca.gradient(f, theta) for f in (cost, terminal, constraint)
+    )
     stage = {"x": x, "u": u, "theta": theta, "target": target}
     last = {"x": x, "theta": theta, "target": target}
     obstacle = {"x": x, "theta": theta, "disc": disc}
     weighted = {**stage, "discount": discount, "costate": costate}
     return [
-        _function("step", {"x": x, "u": u}, {"next_x": step}),
-        _function("cost", stage, {"cost": cost}),
-        _function("end", last, {"end": end}),
-        _function("path", obstacle, {"path": path}),
-        _function("expand", weighted, expand),
+        _function("transition", {"x": x, "u": u}, {"next_x": next_x}),
+        _function("stage_cost", stage, {"cost": cost}),
+        _function("terminal_cost", last, {"cost": terminal}),
+        _function("constraint", obstacle, {"h": constraint}),
+        _function("expand_stage", weighted, expand),
         _function(
-            "expand_end", {**last, "discount": discount}, {"lx": end_gradient, "Q": end_hessian}
+            "expand_terminal", {**last, "discount": discount}, {"lx": lx, "Q": terminal_hessian}
         ),
-        _function("expand_path", obstacle, {"hx": path_gradient, "hxx": path_hessian}),
-        _function("cost_slope", stage, {"slope": cost_slope}),
-        _function("end_slope", last, {"slope": end_slope}),
-        _function("path_slope", obstacle, {"slope": path_slope}),
+        _function("expand_constraint", obstacle, {"hx": hx, "hxx": constraint_hessian}),
+        _function("stage_gradient", stage, {"gradient": stage_gradient}),
+        _function("terminal_gradient", last, {"gradient": terminal_gradient}),
+        _function("constraint_gradient", obstacle, {"gradient": constraint_gradient}),
         _function(
-            "turn",
+            "stage_mixed_hessian",
             {**stage, "w": w},
             {
                 "lx": along(ca.gradient(cost, x), (theta, w)),
                 "lu": along(ca.gradient(cost, u), (theta, w)),
             },
         ),
-        _function("turn_end", {**last, "w": w}, {"lx": along(ca.gradient(end, x), (theta, w))}),
-        _function("turn_path", {**obstacle, "w": w}, {"hx": along(path_gradient, (theta, w))}),
         _function(
-            "bend",
+            "terminal_mixed_hessian",
+            {**last, "w": w},
+            {"lx": along(ca.gradient(terminal, x), (theta, w))},
+        ),
+        _function("constraint_mixed_hessian", {**obstacle, "w": w}, {"hx": along(hx, (theta, w))}),
+        _function(
+            "stage_gradient_along",
             {**stage, "dx": dx, "du": du, "w": w},
-            {"slope": along(cost_slope, (x, dx), (u, du), (theta, w))},
+            {"gradient": along(stage_gradient, (x, dx), (u, du), (theta, w))},
         ),
         _function(
-            "bend_end",
+            "terminal_gradient_along",
             {**last, "dx": dx, "w": w},
-            {"slope": along(end_slope, (x, dx), (theta, w))},
+            {"gradient": along(terminal_gradient, (x, dx), (theta, w))},
         ),
         _function(
-            "bend_path",
+            "constraint_gradient_along",
             {**obstacle, "dx": dx, "w": w},
-            {"slope": along(path_slope, (x, dx), (theta, w))},
+            {"gradient": along(constraint_gradient, (x, dx), (theta, w))},
         ),
     ]
 

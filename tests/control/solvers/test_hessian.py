@@ -6,19 +6,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Obstacle, Solution, Task, differential_drive, machine_code
-from nmpcrl.control.program import SOLVERS as CASADI_SOLVERS
+from nmpcrl.control import Nmpc, Obstacle, Riccati, Solution, Task, differential_drive
+from nmpcrl.control.codegen import jit
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
 START = np.array(paper.START)
 STEP = 1e-5
+CASADI_SOLVERS = ("fatrop", "ipopt")
 
 
 @pytest.fixture(scope="module")
 def exact() -> Nmpc:
     """The paper's controller, solved so well that features can be subtracted."""
-    return paper.nmpc(tolerance=1e-11)
+    return paper.nmpc(solver=Riccati(tolerance=1e-11))
 
 
 def differences(nmpc: Nmpc, solution: Solution, vector: Vector, step: float = STEP) -> Vector:
@@ -79,7 +80,7 @@ def test_horizon_and_number_of_obstacles_do_not_matter_to_it(horizon, count):
     obstacles = tuple(Obstacle(-1.0 + x, 2.5) for x in range(count))
     box = np.array([9.0, 9.0, np.inf])
     task = Task(START, np.array(paper.TARGET), -box, box, obstacles)
-    nmpc = Nmpc(differential_drive(), task, horizon=horizon, tolerance=1e-11)
+    nmpc = Nmpc(differential_drive(), task, horizon=horizon, solver=Riccati(tolerance=1e-11))
     solution = nmpc.solve(START, THETA)
     along = THETA * np.linspace(-1, 1, 9)
     slope = smooth(nmpc, solution, along)
@@ -108,7 +109,7 @@ def test_the_solution_may_be_another_solvers(controllers, draw, giver):
 
 
 def test_without_numba_the_product_is_that_of_the_dense_hessian(monkeypatch):
-    monkeypatch.setattr(machine_code, "numba_version", lambda: None)
+    monkeypatch.setattr(jit, "numba_version", lambda: None)
     nmpc = paper.nmpc()
     with pytest.warns(UserWarning, match="fatrop solves instead of riccati"):
         solution = nmpc.solve(START, THETA)
@@ -157,7 +158,7 @@ def test_the_slack_of_stage_zero_is_straight_on_either_side_of_its_kink(radius):
     start = np.array([radius, 0.0, 0.3])
     task = Task(start, np.array([5.0, 4.0, 1.0]), -box, box, (Obstacle(0.0, 0.0),))
     sides = [
-        Nmpc(differential_drive(), task, ties_active=active, tolerance=1e-11)
+        Nmpc(differential_drive(), task, solver=Riccati(1e-11), ties_active=active)
         for active in (False, True)
     ]
     one, other = (nmpc.value_hessian_times(nmpc.solve(start, theta), theta) for nmpc in sides)

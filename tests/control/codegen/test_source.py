@@ -6,10 +6,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.control import differential_drive, model
-from nmpcrl.control.compile import BINARY, UNARY, CannotCompile, source
-from nmpcrl.control.machine_code import callable_of, compiled, load
-from nmpcrl.control.stages import functions, write
+from nmpcrl.control import differential_drive
+from nmpcrl.control.codegen.jit import callable_of, compiled, load
+from nmpcrl.control.codegen.source import BINARY, UNARY, CannotCompile, source
+from nmpcrl.control.solvers import model
+from nmpcrl.control.solvers.stages import functions, write
 
 SPECIAL = [
     0.0,

@@ -3,7 +3,7 @@
 The inputs are the variables and the states follow from them (single shooting). Each constraint
 h(x) <= sigma of a stage, an obstacle or a side of the box, is a *row*: with slack s = sigma - h it
 adds W sigma - mu log sigma - mu log s to the objective, and its multiplier lam lies in (0, W). From
-a guess, one solve repeats the following while the barrier parameter mu falls:
+a warm start, one solve repeats the following while the barrier parameter mu falls:
 
 1. `evaluate`: roll the inputs out; measure h, and for it the best sigma and s in closed form;
 2. `linearise`: from the last stage to the first, the costates p = L_x + A' p+ and the Hessian of
@@ -29,30 +29,28 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import float64, int64, njit, types
 
+from .codes import End, Start
 from .model import (
     NTHETA,
     NU,
     NX,
-    cost,
-    cost_slope,
-    end,
-    end_slope,
-    expand,
-    expand_end,
-    expand_path,
-    path,
-    path_slope,
-    step,
+    constraint,
+    constraint_gradient,
+    expand_constraint,
+    expand_stage,
+    expand_terminal,
+    stage_cost,
+    stage_gradient,
+    terminal_cost,
+    terminal_gradient,
+    transition,
 )
 
-# How a solve starts: from inputs alone; from a guess, a stage later; from a guess as it is; from a
-# guess in the same state, where only theta has moved.
-COLD, SHIFTED, NEAR, SAME = 0, 1, 2, 3
+# numba takes plain numbers; a tuple below has one entry a start.
+COLD, SHIFTED, NEAR, SAME = map(int, Start)
+SOLVED, STALLED, LIMIT, BROKEN = map(int, End)
 START_MU = (10.0, 1e-3, 1e-3, 1e-9)
 PUSH = (1e-2, 1e-3, 1e-3, 1e-9)  # inside its bounds an input starts, in parts of their distance
-
-# How it ends: well; without descent; with too many iterations; with numbers that are not finite.
-SOLVED, STALLED, LIMIT, BROKEN = 0, 1, 2, 3
 
 BOX_WEIGHT = 1e4  # W of the box: an exact penalty, so that no state is infeasible
 KAPPA = 100.0  # mu falls when KKT with mu is violated by less than so many mu
@@ -134,13 +132,13 @@ def evaluate(task, point, mu):
     """Step 1 for point.x[0] and point.u; the objective and the barrier function."""
     x, u = point.x, point.u
     for i in range(len(u)):
-        step(x[i], u[i], x[i + 1])
+        transition(x[i], u[i], x[i + 1])
     measure(task, x, point.h)
     centre(point.h.ravel(), task.weights.ravel(), mu, point.sigma.ravel(), point.slack.ravel())
     last = len(u)
-    objective = task.rate[last] * end(x[last], task.theta, task.target)
+    objective = task.rate[last] * terminal_cost(x[last], task.theta, task.target)
     for i in range(last):
-        objective += task.rate[i] * cost(x[i], u[i], task.theta, task.target)
+        objective += task.rate[i] * stage_cost(x[i], u[i], task.theta, task.target)
     return objective, objective + barrier(task, point, mu)
 
 
@@ -150,7 +148,7 @@ def measure(task, x, h):
     obstacles = len(task.discs)
     for i in range(len(h)):
         for j in range(obstacles):
-            h[i, j] = path(x[i + 1], task.theta, task.discs[j])
+            h[i, j] = constraint(x[i + 1], task.theta, task.discs[j])
         for j in range(len(task.sides)):
             state, sign, limit = int(task.sides[j, 0]), task.sides[j, 1], task.sides[j, 2]
             h[i, obstacles + j] = sign * (x[i + 1, state] - limit)
@@ -201,11 +199,11 @@ def linearise(task, point, duals, stages):
     for i in range(last, -1, -1):
         rate = task.rate[i : i + 1]
         if i == last:
-            expand_end(x[i], task.theta, task.target, rate, stages.lx[i], Q[i])
+            expand_terminal(x[i], task.theta, task.target, rate, stages.lx[i], Q[i])
             for a in range(NX):
                 p[i, a] = stages.lx[i, a]
         else:
-            expand(
+            expand_stage(
                 x[i], u[i], task.theta, task.target, rate, p[i + 1],
                 A[i], stages.B[i], stages.lx[i], stages.lu[i], Q[i], stages.S[i], stages.R[i],
             )  # fmt: skip
@@ -218,7 +216,7 @@ def linearise(task, point, duals, stages):
             return
         for j in range(obstacles):
             lam, hx = duals.lam[i - 1, j], stages.hx[i - 1, j]
-            expand_path(x[i], task.theta, task.discs[j], hx, curved)
+            expand_constraint(x[i], task.theta, task.discs[j], hx, curved)
             for a in range(NX):
                 p[i, a] += lam * hx[a]
                 for b in range(NX):
@@ -234,30 +232,30 @@ def residuals(task, point, duals, stages, mu):
     Stationarity is that of the inputs; the others' holds by construction. Complementarity is how
     far the products of multipliers and distances are from mu.
     """
-    largest, slopes, products = 1.0, 0.0, 0.0
+    largest, stationarity, complementarity = 1.0, 0.0, 0.0
     for i in range(task.first, len(point.u)):
         for b in range(NX):
             size = abs(stages.p[i + 1, b])
             largest = size if size > largest else largest
         for a in range(NU):
-            slope = input_slope(stages, i, a) - duals.below[i, a] + duals.above[i, a]
+            gradient = input_gradient(stages, i, a) - duals.below[i, a] + duals.above[i, a]
             low = duals.below[i, a] * (point.u[i, a] - task.lower[a]) - mu
             high = duals.above[i, a] * (task.upper[a] - point.u[i, a]) - mu
-            slopes += slope * slope
-            products += low * low + high * high
-    products += row_residuals(
+            stationarity += gradient * gradient
+            complementarity += low * low + high * high
+    complementarity += row_residuals(
         duals.lam.ravel(), task.weights.ravel(), point.sigma.ravel(), point.slack.ravel(), mu
     )
-    return math.sqrt(slopes), math.sqrt(products), largest
+    return math.sqrt(stationarity), math.sqrt(complementarity), largest
 
 
 @inlined
-def input_slope(stages, i, a):
+def input_gradient(stages, i, a):
     """The Lagrangian's derivative in input a of stage i, but for the bounds."""
-    slope = stages.lu[i, a]
+    gradient = stages.lu[i, a]
     for b in range(NX):
-        slope += stages.B[i, b, a] * stages.p[i + 1, b]
-    return slope
+        gradient += stages.B[i, b, a] * stages.p[i + 1, b]
+    return gradient
 
 
 @inlined
@@ -414,12 +412,12 @@ def newton_step(task, point, duals, stages, mu, step):
     """Step 6: the step; the primal and the dual length that stay inside bounds; the descent."""
     sweep(task, stages, step)
     rows_along(task, stages, step.x, step.lam)
-    slope = descent(task, point, stages, mu, step)
+    derivative = descent(task, point, stages, mu, step)
     scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
     tau = max(0.99, 1.0 - max(mu, 1e-5))
     primal, dual = bounds_along(task, point, duals, mu, step, tau)
     inside = inside_rows(duals.lam.ravel(), step.lam.ravel(), task.weights.ravel(), tau)
-    return primal, min(dual, inside), slope
+    return primal, min(dual, inside), derivative
 
 
 @inlined
@@ -444,24 +442,24 @@ def sweep(task, stages, step):
 
 
 @inlined
-def rows_along(task, stages, dx, slope):
+def rows_along(task, stages, dx, hx_dx):
     """h_x dx of every row."""
     obstacles = len(task.discs)
-    for i in range(len(slope)):
+    for i in range(len(hx_dx)):
         for j in range(obstacles):
             total = 0.0
             for a in range(NX):
                 total += stages.hx[i, j, a] * dx[i + 1, a]
-            slope[i, j] = total
+            hx_dx[i, j] = total
         for j in range(len(task.sides)):
-            slope[i, obstacles + j] = task.sides[j, 1] * dx[i + 1, int(task.sides[j, 0])]
+            hx_dx[i, obstacles + j] = task.sides[j, 1] * dx[i + 1, int(task.sides[j, 0])]
 
 
 @inlined
-def scale_rows(slope, off, stiff):
+def scale_rows(dlam, off, stiff):
     """dlam of every row, in the place of h_x dx."""
-    for t in range(slope.size):
-        slope[t] = stiff[t] * (off[t] + slope[t])
+    for t in range(dlam.size):
+        dlam[t] = stiff[t] * (off[t] + dlam[t])
 
 
 @inlined
@@ -515,14 +513,14 @@ def descent(task, point, stages, mu, step):
 
 
 @inlined
-def search(task, point, trial, mu, step, length, total, slope):
+def search(task, point, trial, mu, step, length, total, derivative):
     """Step 7: put into `trial` what lowers the barrier function; it and the objective, or nan."""
     while length > SHORTEST:
         for i in range(len(step.u)):
             for a in range(NU):
                 trial.u[i, a] = point.u[i, a] + length * step.u[i, a]
         objective, reached = evaluate(task, trial, mu)
-        if reached <= total + ARMIJO * length * slope + ROUNDING * abs(total):
+        if reached <= total + ARMIJO * length * derivative + ROUNDING * abs(total):
             return objective, reached
         length *= 0.5
     return np.nan, np.nan
@@ -560,56 +558,56 @@ def scaled(theta, target, lower, upper, discs, sides, discount, slack_weight, so
 
 
 @inlined
-def place(task, stage):
+def offsets(task, stage):
     """Where the variables and the constraints of a stage begin in the vectors of `Ocp`."""
     obstacles, later = len(task.discs), min(stage, 1)
-    constraint = stage * (NX + obstacles) + later * (NX + task.first * NU)
-    return stage * (NX + NU + obstacles), constraint
+    constraints = stage * (NX + obstacles) + later * (NX + task.first * NU)
+    return stage * (NX + NU + obstacles), constraints
 
 
 @inlined
-def begin(task, point, duals, state, action, start, mu, factor, guess):
-    """The inputs of the guess, inside their bounds, and the bounds' multipliers."""
+def initialise(task, point, duals, state, action, start, mu, factor, warm_start):
+    """The inputs of the warm start, inside their bounds, and the bounds' multipliers."""
     last = len(point.u)
     ahead = 1 if start == SHIFTED else 0
     gain = task.rate[0] / task.rate[ahead] / factor
-    variables, constraints = place(task, last)
+    variables, constraints = offsets(task, last)
     nu = variables + NX + len(task.discs) + constraints + len(task.discs)
     for a in range(NX):
         point.x[0, a] = state[a]
     for i in range(last):
-        at = place(task, min(i + ahead, last - 1))[0] + NX
+        at = offsets(task, min(i + ahead, last - 1))[0] + NX
         for a in range(NU):
             low, high = task.lower[a], task.upper[a]
             push = PUSH[start] * min(1.0, high - low)
-            point.u[i, a] = min(max(guess[at + a], low + push), high - push)
-            duals.below[i, a] = max(-gain * guess[nu + at + a], mu / (point.u[i, a] - low))
-            duals.above[i, a] = max(gain * guess[nu + at + a], mu / (high - point.u[i, a]))
+            point.u[i, a] = min(max(warm_start[at + a], low + push), high - push)
+            duals.below[i, a] = max(-gain * warm_start[nu + at + a], mu / (point.u[i, a] - low))
+            duals.above[i, a] = max(gain * warm_start[nu + at + a], mu / (high - point.u[i, a]))
             if i < task.first:
                 point.u[i, a] = action[a]
                 duals.below[i, a] = duals.above[i, a] = 0.0
 
 
 @inlined
-def begin_rows(task, point, duals, start, mu, factor, guess):
-    """The rows' multipliers: the central one, or the guess's unless that is nearer to 0 or W."""
+def initialise_rows(task, point, duals, start, mu, factor, warm_start):
+    """The rows' multipliers: central, or the warm start's unless these are nearer to 0 or W."""
     last, obstacles = len(point.u), len(task.discs)
     ahead = 1 if start == SHIFTED else 0
     gain = task.rate[0] / task.rate[ahead] / factor
-    variables, constraints = place(task, last)
+    variables, constraints = offsets(task, last)
     lam = variables + NX + obstacles
     nu = lam + constraints + obstacles
     for i in range(last):
         source = min(i + 1 + ahead, last)
-        variables, constraints = place(task, source)
+        variables, constraints = offsets(task, source)
         dynamics = NX if source < last else 0
         for j in range(duals.lam.shape[1]):
             middle, old = mu / point.slack[i, j], 0.0
             if j < obstacles:
-                old = gain * guess[lam + constraints + dynamics + j]
+                old = gain * warm_start[lam + constraints + dynamics + j]
             else:
                 side = task.sides[j - obstacles]
-                old = gain * side[1] * guess[nu + variables + int(side[0])]
+                old = gain * side[1] * warm_start[nu + variables + int(side[0])]
             if start != COLD:
                 middle = max(old, middle) if point.h[i, j] < 0.0 else min(old, middle)
             weight = task.weights[i, j]
@@ -634,9 +632,9 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
     delta, iteration, polished, centred, ended = 0.0, 0, 0, False, LIMIT
     while True:
         linearise(task, point, duals, stages)
-        slopes, products, largest = residuals(task, point, duals, stages, mu)
-        error = max(slopes / largest, products, mu)
-        if not slopes + products < np.inf:  # `max` may lose a nan
+        stationarity, complementarity, largest = residuals(task, point, duals, stages, mu)
+        error = max(stationarity / largest, complementarity, mu)
+        if not stationarity + complementarity < np.inf:  # `max` may lose a nan
             ended = BROKEN
             break
         goal = tolerance * min(1.0, max(abs(objective), 1e-4 * largest))
@@ -647,7 +645,7 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
         if iteration >= limit:
             ended = SOLVED if error <= tolerance else LIMIT
             break
-        if max(slopes, products) <= KAPPA * mu and mu > 0.1 * goal:
+        if max(stationarity, complementarity) <= KAPPA * mu and mu > 0.1 * goal:
             mu = max(0.1 * goal, min(0.2 * mu, mu**1.7))
             centre(
                 point.h.ravel(), task.weights.ravel(), mu, point.sigma.ravel(), point.slack.ravel()
@@ -662,8 +660,8 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
             else:
                 added = max(delta / 4.0, 1e-12 * largest) if delta > 0.0 else 1e-6 * largest
         delta = added if added > 0.0 else delta
-        primal, dual, slope = newton_step(task, point, duals, stages, mu, step)
-        reached, reached_total = search(task, point, trial, mu, step, primal, total, slope)
+        primal, dual, derivative = newton_step(task, point, duals, stages, mu, step)
+        reached, reached_total = search(task, point, trial, mu, step, primal, total, derivative)
         if reached == reached:
             point, trial, centred = trial, point, False
             objective, total = reached, reached_total
@@ -678,36 +676,36 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
 
 
 @inlined
-def report(task, point, duals, stages, objective, factor, slack_weight, soft_box, tie, out):
+def write_solution(task, point, duals, stages, objective, factor, slack_weight, soft_box, tie, out):
     """Write the solution in the order of `Ocp`, and the value's gradient; see `Sensitivity`."""
     last, obstacles = len(point.u), len(task.discs)
-    variables, constraints = place(task, last)
+    variables, constraints = offsets(task, last)
     lam = variables + NX + obstacles
     nu = lam + constraints + obstacles
     phi = nu + lam
     value, violation = factor * objective, 0.0
-    slope = np.empty(NTHETA)
+    gradient = np.empty(NTHETA)
     for a in range(NTHETA):
         out[phi + a] = 0.0
     for i in range(last + 1):
         rate = factor * task.rate[i]
-        at, row = place(task, i)
+        at, row = offsets(task, i)
         for a in range(NX):
             out[at + a] = point.x[i, a]
             out[nu + at + a] = 0.0
         if i < last:
-            cost_slope(point.x[i], point.u[i], task.theta, task.target, slope)
+            stage_gradient(point.x[i], point.u[i], task.theta, task.target, gradient)
             for a in range(NX):
                 out[lam + row + a] = -factor * stages.p[i + 1, a]
             row += NX
         else:
-            end_slope(point.x[i], task.theta, task.target, slope)
-        add(out, phi, rate, slope)
+            terminal_gradient(point.x[i], task.theta, task.target, gradient)
+        add(out, phi, rate, gradient)
         if i == 0:
             for a in range(NX):
                 out[lam + row + a] = -factor * stages.p[0, a]
             for a in range(task.first * NU):
-                out[lam + row + NX + a] = -factor * input_slope(stages, 0, a)
+                out[lam + row + NX + a] = -factor * input_gradient(stages, 0, a)
             row += NX + task.first * NU
         else:
             for j in range(len(task.sides)):
@@ -724,13 +722,13 @@ def report(task, point, duals, stages, objective, factor, slack_weight, soft_box
             at += NU
         for j in range(obstacles):
             weight = rate * slack_weight
-            h = path(point.x[i], task.theta, task.discs[j])
+            h = constraint(point.x[i], task.theta, task.discs[j])
             multiplier = weight if h > tie else 0.0
             if i > 0:
                 multiplier = factor * duals.lam[i - 1, j]
             value += weight * max(0.0, h)
-            path_slope(point.x[i], task.theta, task.discs[j], slope)
-            add(out, phi, multiplier, slope)
+            constraint_gradient(point.x[i], task.theta, task.discs[j], gradient)
+            add(out, phi, multiplier, gradient)
             out[at + j] = max(0.0, h)
             out[lam + row + j] = multiplier
             out[nu + at + j] = multiplier - weight
@@ -745,7 +743,7 @@ def add(out, at, times, vector):
 
 
 @inlined
-def room(N, M, rows):
+def allocate(N, M, rows):
     """Space for an iterate, a trial of the next one, multipliers, derivatives and a step."""
     point = Point(
         np.empty((N + 1, NX)), np.empty((N, NU)),
@@ -777,35 +775,35 @@ PROBLEM = (
 SIGNATURE = types.UniTuple(float64, 5)(
     *PROBLEM,
     int64, int64, float64,  # start, limit, tolerance
-    vector, vector,  # guess and result
+    vector, vector,  # warm start and result
 )  # fmt: skip
 
 
 @njit(SIGNATURE, cache=True, **options)
 def solve(
     target, lower, upper, discs, sides, discount, slack_weight, soft_box, tie,
-    state, theta, action, fixed, start, limit, tolerance, guess, out,
+    state, theta, action, fixed, start, limit, tolerance, warm_start, out,
 ):  # fmt: skip
     """Solve Eq. (2); see `InteriorPoint` for the arguments.
 
     Returns value, iterations, the end, the violation of the box, and the relative error; `out`
-    receives z, lam and nu in the order of `Ocp`, as `guess` has them, and then the gradient.
+    receives z, lam and nu in the order of `Ocp`, as `warm_start` has them, and then the gradient.
     """
     task, factor = scaled(
         theta, target, lower, upper, discs, sides, discount, slack_weight, soft_box, fixed
     )
     N, M, rows = len(discount) - 1, len(discs), len(discs) + len(sides)
-    point, trial, duals, stages, step = room(N, M, rows)
+    point, trial, duals, stages, step = allocate(N, M, rows)
     mu = START_MU[start]
-    begin(task, point, duals, state, action, start, mu, factor, guess)
+    initialise(task, point, duals, state, action, start, mu, factor, warm_start)
     for a in range(NX):
         trial.x[0, a] = state[a]
     objective, total = evaluate(task, point, mu)
-    begin_rows(task, point, duals, start, mu, factor, guess)
+    initialise_rows(task, point, duals, start, mu, factor, warm_start)
     point, objective, iterations, ended, error = iterate(
         task, point, trial, duals, stages, step, mu, objective, total, limit, tolerance
     )
-    value, violation = report(
+    value, violation = write_solution(
         task, point, duals, stages, objective, factor, slack_weight, soft_box, tie, out
     )
     return value, float(iterations), float(ended), violation, error

@@ -1,13 +1,13 @@
 """The second derivative of the value of Eq. (2) in theta, times a vector, at a solution.
 
 If theta moves along a direction w, the solution moves along (dx, du, dlam), which solves Newton's
-system of `riccati` with another right-hand side: instead of KKT's violation, what w adds to it.
+system of `kernel` with another right-hand side: instead of KKT's violation, what w adds to it.
 
 1. `linearise` and `condense` as there, with a barrier parameter so small that an active row or
    bound is all but rigid and any other is all but free;
-2. `tilt`: the mixed derivatives of the Lagrangian in (x, u) and theta, along w, as q and r;
+2. `right_hand_side`: the Lagrangian's mixed derivatives in (x, u) and theta, along w, as q and r;
 3. `factorise` and `sweep` as there;
-4. `follow`: the derivative of the gradient phi along (dx, du, dlam, w) is the product.
+4. `gradient_along`: the derivative of the gradient phi along (dx, du, dlam, w) is the product.
 
 Source: the implicit function theorem at a solution of KKT, Nocedal and Wright (2006), Section 12.
 """
@@ -15,65 +15,67 @@ Source: the implicit function theorem at a solution of KKT, Nocedal and Wright (
 import numpy as np
 from numba import njit, types
 
-from .model import (
-    NTHETA,
-    NU,
-    NX,
-    bend,
-    bend_end,
-    bend_path,
-    path,
-    path_slope,
-    turn,
-    turn_end,
-    turn_path,
-)
-from .riccati import (
+from .kernel import (
     PROBLEM,
     SAME,
     add,
-    begin,
-    begin_rows,
+    allocate,
     condense,
     evaluate,
     factorise,
+    initialise,
+    initialise_rows,
     inlined,
     linearise,
     options,
-    room,
     rows_along,
     scale_rows,
     scaled,
     sweep,
     vector,
 )
+from .model import (
+    NTHETA,
+    NU,
+    NX,
+    constraint,
+    constraint_gradient,
+    constraint_gradient_along,
+    constraint_mixed_hessian,
+    stage_gradient_along,
+    stage_mixed_hessian,
+    terminal_gradient_along,
+    terminal_mixed_hessian,
+)
 
 RIGID = 1e-12  # barrier parameter
 
 
 @inlined
-def tilt(task, point, duals, stages, w):
+def right_hand_side(task, point, duals, stages, w):
     """Newton's right-hand side where theta moves along w: q, r and `off`, after `condense`."""
     q, obstacles, last = stages.q, len(task.discs), len(point.u)
-    slope, hx = np.empty(NTHETA), np.empty(NX)
+    gradient, hx = np.empty(NTHETA), np.empty(NX)
     for i in range(last + 1):
         rate = task.rate[i]
         if i < last:
-            turn(point.x[i], point.u[i], task.theta, task.target, w, q[i], stages.r[i])
+            stage_mixed_hessian(
+                point.x[i], point.u[i], task.theta, task.target, w, q[i], stages.r[i]
+            )
             for a in range(NU):
                 stages.r[i, a] *= rate
         else:
-            turn_end(point.x[i], task.theta, task.target, w, q[i])
+            terminal_mixed_hessian(point.x[i], task.theta, task.target, w, q[i])
         for a in range(NX):
             q[i, a] *= rate
         if i == 0:
             continue
         for j in range(obstacles):
-            path_slope(point.x[i], task.theta, task.discs[j], slope)
-            turn_path(point.x[i], task.theta, task.discs[j], w, hx)
+            constraint_gradient(point.x[i], task.theta, task.discs[j], gradient)
+            constraint_mixed_hessian(point.x[i], task.theta, task.discs[j], w, hx)
             off = 0.0
             for a in range(NTHETA):
-                off += slope[a] * w[a]
+                off += gradient[a] * w[a]
             stages.off[i - 1, j] = off
             pull = stages.stiff[i - 1, j] * off
             for a in range(NX):
@@ -83,29 +85,29 @@ def tilt(task, point, duals, stages, w):
 
 
 @inlined
-def follow(task, point, duals, step, slack_weight, factor, tie, w, out):
+def gradient_along(task, point, duals, step, slack_weight, factor, tie, w, out):
     """The derivative of phi along the step and w."""
     obstacles, last = len(task.discs), len(point.u)
-    slope = np.empty(NTHETA)
+    gradient = np.empty(NTHETA)
     for a in range(NTHETA):
         out[a] = 0.0
     for i in range(last + 1):
         rate, x, dx = factor * task.rate[i], point.x[i], step.x[i]
         if i < last:
-            bend(x, point.u[i], task.theta, task.target, dx, step.u[i], w, slope)
+            stage_gradient_along(x, point.u[i], task.theta, task.target, dx, step.u[i], w, gradient)
         else:
-            bend_end(x, task.theta, task.target, dx, w, slope)
-        add(out, 0, rate, slope)
+            terminal_gradient_along(x, task.theta, task.target, dx, w, gradient)
+        add(out, 0, rate, gradient)
         for j in range(obstacles):
             if i > 0:
                 multiplier, change = factor * duals.lam[i - 1, j], factor * step.lam[i - 1, j]
             else:
-                inside = path(x, task.theta, task.discs[j]) > tie
+                inside = constraint(x, task.theta, task.discs[j]) > tie
                 multiplier, change = (rate * slack_weight if inside else 0.0), 0.0
-            path_slope(x, task.theta, task.discs[j], slope)
-            add(out, 0, change, slope)
-            bend_path(x, task.theta, task.discs[j], dx, w, slope)
-            add(out, 0, multiplier, slope)
+            constraint_gradient(x, task.theta, task.discs[j], gradient)
+            add(out, 0, change, gradient)
+            constraint_gradient_along(x, task.theta, task.discs[j], dx, w, gradient)
+            add(out, 0, multiplier, gradient)
 
 
 SIGNATURE = types.boolean(*PROBLEM, vector, vector, vector)  # point, w, result
@@ -124,18 +126,18 @@ def hessian_times(
         theta, target, lower, upper, discs, sides, discount, slack_weight, soft_box, fixed
     )
     N, M, rows = len(discount) - 1, len(discs), len(discs) + len(sides)
-    point, _, duals, stages, step = room(N, M, rows)
+    point, _, duals, stages, step = allocate(N, M, rows)
     mu = RIGID
-    begin(task, point, duals, state, action, SAME, mu, factor, solved)
+    initialise(task, point, duals, state, action, SAME, mu, factor, solved)
     evaluate(task, point, mu)
-    begin_rows(task, point, duals, SAME, mu, factor, solved)
+    initialise_rows(task, point, duals, SAME, mu, factor, solved)
     linearise(task, point, duals, stages)
     condense(task, point, duals, stages, mu)
-    tilt(task, point, duals, stages, w)
+    right_hand_side(task, point, duals, stages, w)
     if not factorise(stages, 0.0, task.first, step):
         return False
     sweep(task, stages, step)
     rows_along(task, stages, step.x, step.lam)
     scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
-    follow(task, point, duals, step, slack_weight, factor, tie, w, out)
+    gradient_along(task, point, duals, step, slack_weight, factor, tie, w, out)
     return True

@@ -6,6 +6,7 @@ from dataclasses import asdict
 import pytest
 
 from nmpcrl.study import Experiment, design, paper
+from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import MAIN, frozen_arm
 
 
@@ -23,7 +24,7 @@ def test_the_main_table_has_every_learner_layout_reading_and_seed():
 
 
 def test_the_study_begins_with_the_main_table_and_names_every_run_once():
-    study = design.study()
+    study = design.whole_study()
     names = list(study.values())
     main = len(design.main_table())
     assert set(names[:main]) == {design.MAIN_TABLE}
@@ -40,7 +41,7 @@ def test_what_is_trained_afresh_is_a_part_of_the_main_table_with_every_learner()
 
 
 def test_every_run_of_the_study_has_its_frozen_arm_in_the_study():
-    study = design.study()
+    study = design.whole_study()
     assert {frozen_arm(e) for e in study} <= set(study)
 
 
@@ -56,7 +57,7 @@ def test_a_variant_changes_one_thing(name):
 
 def test_variants_name_departures_that_there_are_and_no_two_are_the_same():
     letters = {variant.departure for variant in design.VARIANTS.values()} - {""}
-    assert letters <= set(paper.DEPARTURES)
+    assert letters <= set(DEPARTURES)
     fields = Counter(str(sorted(dict(v.fields).items())) for v in design.VARIANTS.values())
     assert max(fields.values()) == 1
 

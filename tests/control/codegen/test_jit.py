@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from nmpcrl.control import machine_code
+from nmpcrl.control.codegen import jit
 
 TEXT = """
 from numba import float64, njit
@@ -17,7 +17,7 @@ def double(x):
     return 2.0 * x
 """
 SCRIPT = f"""
-from nmpcrl.control.machine_code import load
+from nmpcrl.control.codegen.jit import load
 print(load("tiny", {{"__init__": {TEXT!r}}}, "Compiling ...").double(4.0))
 """
 SOLVE = """
@@ -81,7 +81,7 @@ def test_a_damaged_file_is_noticed_and_compiled_again(full, pattern, damage):
 
 
 def test_an_interrupted_compilation_is_repeated(full):
-    (complete,) = full.rglob(machine_code.COMPLETE)
+    (complete,) = full.rglob(jit.COMPLETE)
     complete.unlink()
     lines = said(full)
     assert len(lines) == 1
@@ -93,8 +93,8 @@ def test_an_interruption_leaves_nothing_that_counts_as_complete(tmp_path, monkey
     monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
     text = TEXT + "\nraise KeyboardInterrupt\n"
     with pytest.raises(KeyboardInterrupt):
-        machine_code.load("stopped", {"__init__": text})
-    assert not [*tmp_path.rglob(machine_code.COMPLETE)]
+        jit.load("stopped", {"__init__": text})
+    assert not [*tmp_path.rglob(jit.COMPLETE)]
     assert not [name for name in sys.modules if name.startswith("stopped_")]
 
 
@@ -119,10 +119,10 @@ def test_two_processes_at_once_do_not_disturb_each_other(tmp_path):
 
 def test_other_text_or_another_numba_is_other_code(tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
-    machine_code.load("tiny", {"__init__": "x = 1\n"})
-    machine_code.load("tiny", {"__init__": "x = 2\n"})
-    monkeypatch.setattr(machine_code, "numba_version", lambda: "0.1")
-    assert machine_code.load("tiny", {"__init__": "x = 1\n"}).x == 1
+    jit.load("tiny", {"__init__": "x = 1\n"})
+    jit.load("tiny", {"__init__": "x = 2\n"})
+    monkeypatch.setattr(jit, "numba_version", lambda: "0.1")
+    assert jit.load("tiny", {"__init__": "x = 1\n"}).x == 1
     assert len([*tmp_path.iterdir()]) == 3
 
 
@@ -136,4 +136,4 @@ def test_the_cache_is_where_the_user_wants_it(monkeypatch, chosen):
         monkeypatch.setenv(name, value)
     places = {"XDG_CACHE_HOME": Path("/somewhere/nmpcrl"), "NMPCRL_CACHE": Path("/here")}
     name = next(iter(chosen), None)
-    assert machine_code.folder() == places.get(name, Path.home() / ".cache/nmpcrl")
+    assert jit.folder() == places.get(name, Path.home() / ".cache/nmpcrl")

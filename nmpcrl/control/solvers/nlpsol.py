@@ -1,7 +1,9 @@
-"""One transcription of the OCP and a solver of CasADi: where guesses are made and results read."""
+"""CasADi's solvers on one transcription of the OCP: where warm starts are made and results read."""
 
 import time
-from typing import Any
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -10,24 +12,54 @@ from nmpcrl import Vector
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, check_shape
-from nmpcrl.control.task import Task
+from nmpcrl.control.solvers.codes import Start
+from nmpcrl.control.solvers.solver import Solver
 
-TOLERANCE = 1e-8  # of the solvers, on their own scaled KKT residual
+PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
+
 MAX_ITERATIONS = 300
 MAX_SECONDS = 5.0  # fatrop has no clock, but its 300 iterations take about 30 ms
-TIE = 1e-6  # a start this close to an obstacle's boundary is on it, not in it  # departure L
 
-SOLVERS: dict[str, dict[str, Any]] = {
-    "fatrop": {"print_level": 0, "tol": TOLERANCE, "max_iter": MAX_ITERATIONS},
-    "ipopt": {
-        "print_level": 0,
-        "sb": "yes",
-        "tol": TOLERANCE,
-        "max_iter": MAX_ITERATIONS,
-        "max_wall_time": MAX_SECONDS,
-        "bound_relax_factor": 0.0,
-    },
-}
+
+@dataclass(frozen=True)
+class Nlpsol(Solver):
+    """A solver that CasADi's `nlpsol` calls by its name."""
+
+    starts: ClassVar[dict[Start, dict[str, Any]]]  # the better the start, the less it is moved
+
+    @property
+    @abstractmethod
+    def options(self) -> dict[str, Any]:
+        """The solver's own options, whatever the start."""
+
+    def structure(self, ocp: Ocp) -> dict[str, Any]:
+        """What `nlpsol` is told of the problem's structure."""
+        return {}
+
+    def prepare(self, ocp: Ocp) -> "Program":
+        """An NLP solver for each kind of start."""
+        return Program(ocp, self)
+
+
+@dataclass(frozen=True)
+class Fatrop(Nlpsol):
+    """fatrop: an interior point that follows the stages, as fast as CasADi's get here."""
+
+    name: ClassVar[str] = "fatrop"
+    starts: ClassVar[dict[Start, dict[str, Any]]] = {
+        Start.COLD: {},
+        Start.SHIFTED: {"bound_push": 1e-3},
+        Start.SAME: {"mu_init": 1e-4, "bound_push": 1e-6},
+    }
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Silent, and bounded."""
+        return {"print_level": 0, "tol": self.tolerance, "max_iter": MAX_ITERATIONS}
+
+    def structure(self, ocp: Ocp) -> dict[str, Any]:
+        """Stages are found by fatrop itself."""
+        return {"structure_detection": "auto", "equality": ocp.equality.tolist()}
 
 
 _NEAR = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
@@ -36,42 +68,41 @@ _WARM_IPOPT = {
     "mu_init": 1e-3,
     **{f"warm_start_{name}": 1e-4 for name in _NEAR},
 }
-STARTS: dict[str, dict[str, dict[str, Any]]] = {  # the better the start, the less it is moved
-    "fatrop": {
-        "standing": {},
-        "shifted": {"bound_push": 1e-3},
-        "same": {"mu_init": 1e-4, "bound_push": 1e-6},
-    },
-    "ipopt": {
-        "standing": {},
-        "shifted": _WARM_IPOPT,
-        "same": _WARM_IPOPT,
-    },
-}
+
+
+@dataclass(frozen=True)
+class Ipopt(Nlpsol):
+    """Ipopt: the paper's solver, for any NLP."""
+
+    name: ClassVar[str] = "ipopt"
+    starts: ClassVar[dict[Start, dict[str, Any]]] = {
+        Start.COLD: {},
+        Start.SHIFTED: _WARM_IPOPT,
+        Start.SAME: _WARM_IPOPT,
+    }
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """Silent, and bounded in iterations and time."""
+        return {
+            "print_level": 0,
+            "sb": "yes",
+            "tol": self.tolerance,
+            "max_iter": MAX_ITERATIONS,
+            "max_wall_time": MAX_SECONDS,
+            "bound_relax_factor": 0.0,
+        }
 
 
 class Program:
     """An OCP and one of CasADi's solvers."""
 
-    def __init__(
-        self,
-        ocp: Ocp,
-        sensitivity: Sensitivity,
-        task: Task,
-        solver: str,
-        *,
-        ties_active: bool = False,
-        tolerance: float = TOLERANCE,
-    ) -> None:
-        """Make the solver; the options are those of `Nmpc`."""
+    def __init__(self, ocp: Ocp, solver: Nlpsol) -> None:
         self._ocp = ocp
-        self._tie = -TIE if ties_active else TIE
-        self._sensitivity = sensitivity
-        self._task = task
-        self._name = solver
+        self._name = solver.name
+        self._sensitivity = Sensitivity(ocp)
         self._solvers = {
-            start: _solver(ocp, solver, SOLVERS[solver] | options | {"tol": tolerance})
-            for start, options in STARTS[solver].items()
+            start: _function(ocp, solver, options) for start, options in solver.starts.items()
         }
         self._bounds = {
             "lbx": ca.DM(ocp.lower),
@@ -81,15 +112,21 @@ class Program:
         }
 
     def solve(
-        self, state: Vector, theta: Vector, guess: Solution | None, *action: Vector, began: float
+        self,
+        state: Vector,
+        theta: Vector,
+        warm_start: Solution | None,
+        *action: Vector,
+        began: float,
     ) -> Solution:
         """Solve for p = (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         p = np.concatenate([state, theta, *action])
-        if guess is None:
-            start, (z, lam, nu) = "standing", self._standing(state)
+        if warm_start is None:
+            start, (z, lam, nu) = Start.COLD, self._standing(state)
         else:
-            start = "same" if np.array_equal(guess.state, state) else "shifted"
-            z, lam, nu = self._from(guess, state, same=start == "same")
+            same = np.array_equal(warm_start.state, state)
+            start = Start.SAME if same else Start.SHIFTED
+            z, lam, nu = self._from(warm_start, state, same=same)
         solver = self._solvers[start]
         result = solver(p=p, x0=z, lam_g0=lam, lam_x0=nu, **self._bounds)
         stats = solver.stats()
@@ -108,33 +145,37 @@ class Program:
             seconds=time.perf_counter() - began,
             point=np.concatenate([z, lam, nu]),
             ocp=self._ocp,
+            solver=self._name,
         )
 
-    def _standing(self, state: Vector) -> tuple[Vector, Vector, Vector]:
+    def hessian_times(self, solution: Solution, vector: Vector) -> None:
+        """None: CasADi's solvers have the dense Hessian only."""
+
+    def _standing(self, state: Vector) -> PrimalDual:
         """Stay at `state` for the whole horizon; slacks take up what overlaps there."""
         ocp = self._ocp
         z = np.zeros(ocp.lower.size)
         z[ocp.states] = state
         return z, np.zeros(ocp.equality.size), np.zeros(ocp.lower.size)
 
-    def _from(self, guess: Solution, state: Vector, *, same: bool) -> tuple[Vector, Vector, Vector]:
-        """The guess itself if it was solved in the same state; else one stage later, its end twice.
+    def _from(self, warm_start: Solution, state: Vector, *, same: bool) -> PrimalDual:
+        """The warm start itself if solved in the same state; else one stage later, its end twice.
 
         Shifting divides every stage's discount by gamma, and with it the multipliers.
         """
-        ocp, old = self._ocp, guess.ocp
-        check_shape(guess, ocp)
+        ocp, old = self._ocp, warm_start.ocp
+        check_shape(warm_start, ocp)
         z, nu = np.zeros(ocp.lower.size), np.zeros(ocp.lower.size)
         lam = np.zeros(ocp.equality.size)
         scale = 1.0 if same else 1.0 / ocp.gamma
         for part in ("states", "inputs", "slacks"):
             here, there = getattr(ocp, part), _shift(getattr(old, part), same)
-            z[here], nu[here] = guess.primal[there], scale * guess.bound_duals[there]
+            z[here], nu[here] = warm_start.primal[there], scale * warm_start.bound_duals[there]
         for part in ("dynamics", "obstacles"):
             here, there = getattr(ocp, part), _shift(getattr(old, part), same)
-            lam[here] = scale * guess.constraint_duals[there]
+            lam[here] = scale * warm_start.constraint_duals[there]
         incoming = old.initial if same else old.dynamics[0]
-        lam[ocp.initial] = scale * guess.constraint_duals[incoming]
+        lam[ocp.initial] = scale * warm_start.constraint_duals[incoming]
         z[ocp.states[0]] = state
         nu[np.isinf(ocp.lower) & np.isinf(ocp.upper)] = 0  # fatrop hands these back as they came
         return z, lam, nu
@@ -146,17 +187,15 @@ class Program:
         theta_c is omega inside an obstacle and 0 outside. On the boundary any number in between
         satisfies KKT and each solver returns another; here it is 0.  # departure L
         """
-        inside = self._task.overlap(state) + theta[-1] > self._tie
+        inside = self._ocp.task.overlap(state) + theta[-1] > self._ocp.tie
         lam[self._ocp.obstacles[0]] = np.where(inside, self._ocp.slack_weight, 0.0)
         nu[self._ocp.slacks[0]] = np.where(inside, 0.0, -self._ocp.slack_weight)
 
 
-def _solver(ocp: Ocp, name: str, options: dict[str, Any]) -> ca.Function:
+def _function(ocp: Ocp, solver: Nlpsol, start: dict[str, Any]) -> ca.Function:
     nlp = {"x": ocp.variables, "p": ocp.parameters, "f": ocp.objective, "g": ocp.constraints}
-    settings: dict[str, Any] = {"print_time": False, name: options}
-    if name == "fatrop":
-        settings |= {"structure_detection": "auto", "equality": ocp.equality.tolist()}
-    return ca.nlpsol(name, name, nlp, settings)
+    settings: dict[str, Any] = {"print_time": False, solver.name: solver.options | start}
+    return ca.nlpsol(solver.name, solver.name, nlp, settings | solver.structure(ocp))
 
 
 def _status(name: str, stats: dict[str, Any]) -> str:

@@ -34,8 +34,8 @@ class Problem(NamedTuple):
     theta: np.ndarray
     action: np.ndarray | None = None
 
-    def solve(self, nmpc: Nmpc, guess: Solution | None = None) -> Solution:
-        return nmpc.solve(self.state, self.theta, guess, self.action)
+    def solve(self, nmpc: Nmpc, warm_start: Solution | None = None) -> Solution:
+        return nmpc.solve(self.state, self.theta, warm_start, self.action)
 
 
 def controller(rng: np.random.Generator, plant: Plant = ROBOT, longest: int = 40) -> Nmpc:
@@ -342,7 +342,7 @@ def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
     assert same >= 92
 
 
-def test_from_the_same_guess_no_more_than_one_in_two_hundred_is_worse_than_ipopts():
+def test_from_the_same_warm_start_no_more_than_one_in_two_hundred_is_worse_than_ipopts():
     """After a step, after a noisy one, and after a change of theta."""
     compared, worse = 0, 0
     for layout in range(24):
@@ -358,18 +358,18 @@ def test_from_the_same_guess_no_more_than_one_in_two_hundred_is_worse_than_ipopt
         )
         for _ in range(8):
             state, theta = drawn_state(rng, nmpc), drawn_theta(rng, nmpc)
-            guess = nmpc.solve(state, theta)
-            noisy = ROBOT.clip(guess.action + rng.normal(scale=0.3, size=2))
+            warm_start = nmpc.solve(state, theta)
+            noisy = ROBOT.clip(warm_start.action + rng.normal(scale=0.3, size=2))
             for after, weights in (
-                (ROBOT.step(state, guess.action), theta),
+                (ROBOT.step(state, warm_start.action), theta),
                 (ROBOT.step(state, noisy), theta),
                 (state, theta * rng.uniform(0.95, 1.05, 9)),
             ):
                 try:
-                    other = ipopt.solve(after, weights, guess)
+                    other = ipopt.solve(after, weights, warm_start)
                 except SolverError:  # the state lies outside the box
                     continue
-                value = nmpc.solve(after, weights, guess).value
+                value = nmpc.solve(after, weights, warm_start).value
                 compared += 1
                 worse += value > other.value * (1 + 1e-6) + 1e-7 * unit(weights)
     assert compared >= 250
@@ -416,7 +416,7 @@ problems = st.builds(
     theta=st.tuples(*[weight] * 8, st.floats(-5, 5)).map(np.array),
     action=st.none() | st.tuples(st.floats(-0.6, 0.6), st.floats(-1.5, 1.5)).map(np.array),
 )
-usual = st.builds(
+typical = st.builds(
     Problem,
     state=st.tuples(st.floats(-3, 9), st.floats(-3, 9), st.floats(-4, 4)).map(np.array),
     theta=st.tuples(*[st.floats(0.1, 2)] * 8, st.floats(-0.3, 0.3)).map(np.array),
@@ -426,7 +426,7 @@ LAYOUTS = [controller(np.random.default_rng([5, layout])) for layout in range(30
 
 
 @settings(derandomize=True, deadline=None, max_examples=400)
-@given(problem=problems | usual, nmpc=st.sampled_from(LAYOUTS))
+@given(problem=problems | typical, nmpc=st.sampled_from(LAYOUTS))
 def test_whatever_is_asked_the_answer_is_a_solution_or_an_error(problem, nmpc):
     try:
         solution = problem.solve(nmpc)
@@ -459,7 +459,7 @@ PAIRS = [(one, mirrored(one)) for one in LAYOUTS if one.horizon <= 10]
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)
-@given(problem=usual, pair=st.sampled_from(PAIRS))
+@given(problem=typical, pair=st.sampled_from(PAIRS))
 def test_a_mirrored_world_has_mirrored_plans(problem, pair):
     flip = np.array([1.0, -1.0, -1.0])
     one = problem.solve(pair[0])
@@ -469,7 +469,7 @@ def test_a_mirrored_world_has_mirrored_plans(problem, pair):
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
-@given(problem=usual, nmpc=st.sampled_from(LAYOUTS))
+@given(problem=typical, nmpc=st.sampled_from(LAYOUTS))
 def test_solving_again_from_the_solution_costs_an_iteration_or_two(problem, nmpc):
     try:
         solution = problem.solve(nmpc)

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from nmpcrl.control.interior_point import TOLERANCE, InteriorPoint, kernel
-from nmpcrl.control.ocp import transcribe
+from nmpcrl.control.solvers import TOLERANCE
+from nmpcrl.control.solvers.codes import End
+from nmpcrl.control.solvers.riccati import InteriorPoint, machine_code
+from nmpcrl.control.solvers.trace import interpreted, trace
 from nmpcrl.study import paper
-from nmpcrl.study.trace import interpreted, trace
 
 BUSY = np.array([-0.6, 1.4, -0.4])  # in front of an obstacle
 
@@ -23,24 +24,22 @@ def theta():
 
 @pytest.fixture(scope="module")
 def cold(nmpc, theta):
-    return trace(nmpc, BUSY, theta)
+    return trace(nmpc.ocp, BUSY, theta)
 
 
 def stopped(nmpc, state, theta, limit: int) -> tuple[float, float]:
     """Value and error of the machine code's cold start after so many iterations."""
-    problem = (nmpc.plant, nmpc.task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
-    solver, reached = InteriorPoint(transcribe(*problem, fix_action=False), *problem[:2]), []
+    reached, code = [], machine_code(nmpc.plant)
 
     def limited(*arguments):
         *most, start, _, tolerance, point, out = arguments
-        value, iterations, _, violation, error = kernel(nmpc.plant).solve(
+        value, iterations, _, violation, error = code.solve(
             *most, start, limit, tolerance, point, out
         )
         reached.append((value, error))
-        return value, iterations, 0.0, violation, error
+        return value, iterations, End.SOLVED, violation, error
 
-    solver._kernel = limited
-    solver.solve(state, theta, None, began=0.0)
+    InteriorPoint(nmpc.ocp, code._replace(solve=limited)).solve(state, theta, None, began=0.0)
     return reached[0]
 
 
@@ -58,7 +57,7 @@ def test_the_last_iterate_is_the_solution_in_a_scaled_problem_and_inside_an_obst
 ):
     weighed = np.append(factor * theta[:8], theta[8])
     solution = nmpc.solve(np.array(state), weighed)
-    iterates = trace(nmpc, np.array(state), weighed)
+    iterates = trace(nmpc.ocp, np.array(state), weighed)
     assert solution.restarts == 0
     assert len(iterates) == solution.iterations + 1
     assert iterates.value.iloc[-1] == pytest.approx(solution.value, rel=1e-9)
@@ -78,14 +77,14 @@ def test_the_last_row_takes_no_step_and_some_first_one_needs_a_delta(cold):
 
 def test_a_warm_start_begins_with_a_smaller_mu_and_takes_fewer_iterations(nmpc, theta, cold):
     first = nmpc.solve(BUSY, theta)
-    shifted = trace(nmpc, nmpc.plant.step(BUSY, first.action), theta, first)
-    same = trace(nmpc, BUSY, theta + 1e-4, first)
+    shifted = trace(nmpc.ocp, nmpc.plant.step(BUSY, first.action), theta, first)
+    same = trace(nmpc.ocp, BUSY, theta + 1e-4, first)
     assert cold.mu[0] > shifted.mu[0] > same.mu[0]
     assert len(cold) > len(shifted) > len(same)
 
 
 def test_gauss_newton_needs_no_delta_and_more_iterations(nmpc, theta, cold):
-    straight = trace(nmpc, BUSY, theta, curvature=False)
+    straight = trace(nmpc.ocp, BUSY, theta, curvature=False)
     assert straight.delta.max() == 0
     assert len(straight) > 3 * len(cold)
     if straight.error.iloc[-1] <= TOLERANCE:

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 from scipy.special import erfinv
 
-from nmpcrl.control import Nmpc, Plant, SolverError, Task, interior_point, machine_code
+from nmpcrl.control import Fatrop, Nmpc, Plant, Riccati, SolverError, Task
+from nmpcrl.control.codegen import jit
+from nmpcrl.control.solvers import riccati as front
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -48,29 +50,29 @@ def test_inside_nothing_is_violated_whatever_a_slack_costs(riccati):
             assert nmpc.solve(state, THETA).violation <= 1e-6
 
 
-def test_a_guess_that_is_no_use_is_followed_by_a_cold_start(riccati, monkeypatch):
+def test_a_warm_start_that_is_no_use_is_followed_by_a_cold_start(riccati, monkeypatch):
     other = THETA * np.linspace(0.5, 2, 9)
-    guess, cold = riccati.solve(START, THETA), riccati.solve(START + 0.1, other)
+    warm_start, cold = riccati.solve(START, THETA), riccati.solve(START + 0.1, other)
     assert (cold.restarts, cold.status) == (0, "solved")
-    monkeypatch.setattr(interior_point, "WARM_LIMIT", 1)
-    shifted = riccati.solve(START + 0.1, other, guess)
+    monkeypatch.setattr(front, "WARM_LIMIT", 1)
+    shifted = riccati.solve(START + 0.1, other, warm_start)
     assert (shifted.restarts, shifted.status) == (1, "restarted")
-    same = riccati.solve(START, other, guess)
+    same = riccati.solve(START, other, warm_start)
     assert (same.restarts, same.status) == (2, "restarted")
     assert shifted.value == cold.value
 
 
-def test_a_guess_of_nans_does_no_harm(riccati):
-    guess, exact = riccati.solve(START, THETA), riccati.solve(START, THETA)
-    guess.point[:] = np.nan
+def test_a_warm_start_of_nans_does_no_harm(riccati):
+    warm_start, exact = riccati.solve(START, THETA), riccati.solve(START, THETA)
+    warm_start.point[:] = np.nan
     for state in (START, START + 1e-3):
-        solution = riccati.solve(state, THETA, guess)
+        solution = riccati.solve(state, THETA, warm_start)
         assert np.isfinite(solution.point).all()
         assert solution.value == pytest.approx(exact.value, rel=1e-2)
 
 
 def test_when_it_gives_up_it_says_what_it_tried(riccati, monkeypatch):
-    monkeypatch.setattr(interior_point, "COLD_LIMIT", 1)
+    monkeypatch.setattr(front, "COLD_LIMIT", 1)
     with pytest.raises(SolverError) as caught:
         riccati.solve(START, THETA)
     assert caught.value.status.startswith(
@@ -82,7 +84,7 @@ def test_when_it_gives_up_it_says_what_it_tried(riccati, monkeypatch):
 
 
 def strange() -> Plant:
-    """A plant that cannot be compiled: its dynamics hold an operation that `compile` lacks."""
+    """A plant that cannot be compiled: its dynamics hold an operation that `codegen` lacks."""
     return Plant(
         dynamics=lambda state, action: ca.erfinv(action),
         state_names=("x", "y"),
@@ -105,7 +107,7 @@ def warned(caught) -> list[str]:
 @pytest.mark.parametrize("reason", ["no numba", "the plant"])
 def test_where_nothing_can_be_compiled_fatrop_solves_and_says_so_once(monkeypatch, recwarn, reason):
     if reason == "no numba":
-        monkeypatch.setattr(machine_code, "numba_version", lambda: None)
+        monkeypatch.setattr(jit, "numba_version", lambda: None)
         nmpc, state, theta, action = paper.nmpc(), START, THETA, np.array([0.3, 0.1])
     else:
         nmpc, state, action = Nmpc(strange(), field()), np.zeros(2), np.array([0.3, 0.1])
@@ -116,7 +118,19 @@ def test_where_nothing_can_be_compiled_fatrop_solves_and_says_so_once(monkeypatc
     said = warned(recwarn)
     assert len(said) == 1
     assert ("numba is not installed" if reason == "no numba" else "OP_ERFINV") in said[0]
-    assert nmpc.solver == "fatrop"
+
+
+def test_what_was_asked_for_stays_and_a_solution_says_what_solved(monkeypatch):
+    asked = Riccati(tolerance=1e-7)
+    assert paper.nmpc(solver=asked).solve(START, THETA).solver == "riccati"
+    monkeypatch.setattr(jit, "numba_version", lambda: None)
+    nmpc = paper.nmpc(solver=asked)
+    with pytest.warns(UserWarning, match=WARNING):
+        solution = nmpc.solve(START, THETA)
+    assert solution.solver == "fatrop"
+    assert nmpc.solver is asked
+    exact = paper.nmpc(solver=Fatrop(tolerance=1e-7)).solve(START, THETA)
+    np.testing.assert_array_equal(solution.point, exact.point)
 
 
 @pytest.mark.parametrize("reason", ["no numba", "the plant"])
@@ -124,7 +138,7 @@ def test_where_nothing_can_be_compiled_plant_and_task_compute_as_before(monkeypa
     if reason == "no numba":
         compiled, task = paper.nmpc().plant.step(START, np.array([0.5, 0.3])), paper.task()
         cost = task.stage_cost(START, np.array([0.5, 0.3]))
-        monkeypatch.setattr(machine_code, "numba_version", lambda: None)
+        monkeypatch.setattr(jit, "numba_version", lambda: None)
         again = paper.nmpc()
         np.testing.assert_allclose(again.plant.step(START, np.array([0.5, 0.3])), compiled)
         assert paper.task().stage_cost(START, np.array([0.5, 0.3])) == pytest.approx(cost)

@@ -1,4 +1,4 @@
-"""One solve, watched from within: the text of `riccati` run by Python instead of numba.
+"""One solve, watched from within: the text of `kernel` run by Python instead of numba.
 
 Machine code cannot be looked into. The functions that numba compiled are still there as Python,
 some hundred times slower, and with every step open to a debugger or to `trace`.
@@ -12,9 +12,11 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Plant, Solution
-from nmpcrl.control.interior_point import InteriorPoint, kernel
-from nmpcrl.control.ocp import transcribe
+from nmpcrl.control.ocp import Ocp
+from nmpcrl.control.plant import Plant
+from nmpcrl.control.solution import Solution
+from nmpcrl.control.solvers.codes import End
+from nmpcrl.control.solvers.riccati import Code, InteriorPoint, machine_code
 
 
 def interpreted(plant: Plant) -> ModuleType:
@@ -27,7 +29,7 @@ def interpreted(plant: Plant) -> ModuleType:
     """
     plain = ModuleType("riccati")
     names = vars(plain)
-    names.update(kernel(plant).solve.py_func.__globals__)
+    names.update(machine_code(plant).solve.py_func.__globals__)
     for name, found in list(names.items()):
         if hasattr(found, "py_func"):
             names[name] = FunctionType(found.py_func.__code__, names, name)
@@ -35,20 +37,20 @@ def interpreted(plant: Plant) -> ModuleType:
 
 
 def trace(
-    nmpc: Nmpc,
+    ocp: Ocp,
     state: Vector,
     theta: Vector,
-    guess: Solution | None = None,
+    warm_start: Solution | None = None,
     *,
     curvature: bool = True,
 ) -> pd.DataFrame:
     """Every iterate of V_theta(s)'s first start, from the start to the answer.
 
     Args:
-        nmpc: the controller.
+        ocp: with u_0 free, as `Nmpc.ocp` is.
         state: as in `Nmpc.solve`, as the next two.
         theta: shape (2n + m + 1,).
-        guess: an earlier solution to start from.
+        warm_start: an earlier solution to start from.
         curvature: False drops from the Hessian how dynamics and obstacles bend (Gauss-Newton).
 
     Returns:
@@ -56,16 +58,16 @@ def trace(
         (barrier parameter), value (of the plan, slacks included), delta (what every Q_uu got on top
         in the step from here; nan in the last row).
     """
-    plain = interpreted(nmpc.plant)
+    plain = interpreted(ocp.plant)
     rows: list[dict[str, float]] = []
     factor = [1.0]
 
     def judged(norms: Any, task: Any, point: Any, _duals: Any, _stages: Any, mu: float) -> None:
-        slopes, products, largest = norms
+        stationarity, complementarity, largest = norms
         objective, _ = plain.evaluate(task, point, mu)
         obstacles = len(task.discs)
         slacks = task.weights[:, :obstacles] * np.maximum(0, point.h[:, :obstacles])
-        error, value = max(slopes / largest, products, mu), objective + slacks.sum()
+        error, value = max(stationarity / largest, complementarity, mu), objective + slacks.sum()
         rows.append({"error": error, "mu": mu, "value": value, "delta": np.nan})
 
     def factorised(_done: bool, _stages: Any, delta: float, *_: Any) -> None:
@@ -76,21 +78,16 @@ def trace(
     _watch(plain, "factorise", factorised)
     if not curvature:
         _straighten(plain)
+    code = Code(
+        lambda *arguments: (*plain.solve(*arguments)[:2], End.SOLVED, 0.0, 0.0),
+        machine_code(ocp.plant).hessian_times,
+    )
     with np.errstate(all="ignore"):
-        _FirstStart(nmpc, plain).solve(state, theta, guess, began=0.0)
-    at_state = np.maximum(0, nmpc.task.overlap(state) + theta[-1]).sum()
+        InteriorPoint(ocp, code).solve(state, theta, warm_start, began=0.0)
+    at_state = np.maximum(0, ocp.task.overlap(state) + theta[-1]).sum()
     iterates = pd.DataFrame(rows).rename_axis("iteration").astype(float)
-    iterates["value"] = factor[-1] * iterates["value"] + nmpc.slack_weight * at_state
+    iterates["value"] = factor[-1] * iterates["value"] + ocp.slack_weight * at_state
     return iterates
-
-
-class _FirstStart(InteriorPoint):
-    """The solver with `plain.solve` as its kernel; it takes what the first start gives."""
-
-    def __init__(self, nmpc: Nmpc, plain: ModuleType) -> None:
-        problem = (nmpc.plant, nmpc.task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
-        super().__init__(transcribe(*problem, fix_action=False), nmpc.plant, nmpc.task)
-        self._kernel = lambda *arguments: (*plain.solve(*arguments)[:2], 0.0, 0.0, 0.0)
 
 
 def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
@@ -107,7 +104,7 @@ def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
 
 def _straighten(plain: ModuleType) -> None:
     """Differentiate as if dynamics and obstacles were straight lines."""
-    expand, expand_path = plain.expand, plain.expand_path
+    expand, expand_path = plain.expand_stage, plain.expand_constraint
 
     def without_costate(*arguments: Any) -> None:
         *point, costate = arguments[:6]
@@ -117,4 +114,4 @@ def _straighten(plain: ModuleType) -> None:
         expand_path(x, theta, disc, hx, hxx)
         hxx[:] = 0.0
 
-    vars(plain).update(expand=without_costate, expand_path=without_hessian)
+    vars(plain).update(expand_stage=without_costate, expand_constraint=without_hessian)

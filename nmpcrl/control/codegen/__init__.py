@@ -1,0 +1,1 @@
+"""CasADi writes the mathematics, numba compiles it."""

@@ -1,0 +1,63 @@
+"""What a solver of Eq. (2) is: a value with its options, which gets itself ready for a problem."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from nmpcrl import Vector
+from nmpcrl.control.ocp import Ocp
+from nmpcrl.control.solution import Solution
+from nmpcrl.control.task import Task
+
+TOLERANCE = 1e-8  # what is taken where none is said
+LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
+
+
+class Prepared(Protocol):
+    """A solver that is ready for one OCP."""
+
+    def solve(
+        self,
+        state: Vector,
+        theta: Vector,
+        warm_start: Solution | None,
+        *action: Vector,
+        began: float,
+    ) -> Solution:
+        """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
+
+    def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
+        """The Hessian of the value in theta, times a vector (d,); None if it cannot be had fast."""
+
+
+@dataclass(frozen=True)
+class Solver(ABC):
+    """A way to solve Eq. (2), told apart by `name`."""
+
+    name: ClassVar[str]
+    prices_box: ClassVar[bool] = False  # whether it can do a task's `soft_box`
+
+    tolerance: float = TOLERANCE  # of the KKT conditions, as the solver scales them
+
+    def __post_init__(self) -> None:
+        if not LEAST_TOLERANCE <= self.tolerance <= LARGEST_TOLERANCE:
+            allowed = f"[{LEAST_TOLERANCE:g}, {LARGEST_TOLERANCE:g}]"
+            raise ValueError(f"tolerance = {self.tolerance} must lie in {allowed}")
+        object.__setattr__(self, "tolerance", float(self.tolerance))
+
+    def check(self, task: Task) -> None:
+        """Refuse a task that this solver cannot do.
+
+        Raises:
+            ValueError: it is one.
+        """
+        if task.soft_box and not self.prices_box:
+            raise ValueError(f"{self.name} can only forbid to leave the box: soft_box = True")
+
+    @abstractmethod
+    def prepare(self, ocp: Ocp) -> Prepared:
+        """Get ready for a problem.
+
+        Raises:
+            CannotCompile: it takes machine code, and there is none for the plant.
+        """

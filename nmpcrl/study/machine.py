@@ -1,0 +1,46 @@
+"""What is known of this machine: enough to tell whether the same code must give the same bits."""
+
+import os
+import platform
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+CPUINFO = Path("/proc/cpuinfo")
+
+
+def machine() -> dict[str, Any]:
+    """What a reader would ask of it."""
+    return {
+        "processor": _processor(),
+        "architecture": platform.machine(),
+        "cores": os.cpu_count(),
+        "system": platform.system(),
+    }
+
+
+@cache
+def fingerprint() -> dict[str, Any]:
+    """`machine`, with the abilities of its processor and its C library.
+
+    Machine code is made for the former, and processors of one name may differ in them; sines and
+    cosines come from the latter.
+    """
+    kept = ("flags", "Features", "cpu family", "model\t")
+    told = sorted({line for line in _cpuinfo() if line.startswith(kept)})
+    abilities = sha256("\n".join(told).encode()).hexdigest()[:16]
+    return {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities}
+
+
+def _processor() -> str:
+    """The processor's name, where the system tells it."""
+    names = [line.partition(":")[2] for line in _cpuinfo() if line.startswith("model name")]
+    return names[0].strip() if names else platform.processor() or "unknown"
+
+
+def _cpuinfo() -> list[str]:
+    try:
+        return CPUINFO.read_text().splitlines()
+    except OSError:
+        return []

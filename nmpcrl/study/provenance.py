@@ -1,0 +1,279 @@
+"""What the numbers of a stored run depend on, and how a stored run of old code is noticed.
+
+A run's *key* is a hash of what names its numbers:
+
+- the fields of its experiment that its learner reads and that differ from `ORIGINAL`, in resolved
+  form: the centres of the obstacles and not the letter of the layout;
+- the versions of the libraries that touch its numbers;
+- the epoch of each room whose code does, a number in `EPOCHS` that is raised by hand.
+
+So a new field, layout or metric, a moved or a renamed file leaves every key as it is. Source code
+has no part in a key. Instead, `sources.lock.json` holds a hash of every file that bears on numbers.
+Where one is not what the lock says, a test fails and whoever reads a stored run is warned, until
+either the epoch of its room is raised, so that all runs are trained anew, or
+`nmpcrl verify --relock` has shown with fresh runs that no bit has changed.
+"""
+
+import ast
+import hashlib
+import json
+import platform
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from nmpcrl.study import paper
+from nmpcrl.study.atomic import write_json
+from nmpcrl.study.experiment import NETWORK_LEARNERS, Experiment
+from nmpcrl.study.machine import fingerprint
+
+# Raised by hand where an edit of the room changes a number; then every run is trained anew.
+EPOCHS = {"control": 1, "learning": 1, "study": 1, "analysis": 1}
+RUN_ROOMS = ("control", "learning", "study")  # whose code bears on a run
+SUMMARY_ROOMS = (*RUN_ROOMS, "analysis")  # and on its summary
+
+LIBRARIES = ("casadi", "numba", "numpy")  # of every run; torch besides, where a network learns
+
+# A field is left out of the key where it has this value, which it had when it became a field. New
+# fields are added with the value that all runs before them had; an entry never changes, even if the
+# default of the field does.
+ORIGINAL: dict[str, Any] = {
+    "learner": "ES",
+    "seed": 0,
+    "episodes": 300,
+    "obstacles": ((0.5, 2.2), (3.0, 0.5), (5.5, 2.8), (7.0, 0.3)),
+    "decay": "step",
+    "decay_rate": 0.99,
+    "alpha": 1e-7,
+    "beta": 1e-8,
+    "zeta": 1e-2,
+    "gated": True,
+    "clipped": True,
+    "constrained": False,
+    "network": "plain",
+    "box": "hard",
+    "ties_active": False,
+    "curvature": True,
+    "projected": True,
+    "beta_tdc": 1.5e-7,
+    "theta": (1.0, 1.0, 0.05, 0.05, 0.05, 1.0, 1.0, 0.1, 0.001),
+    "steps": 130,
+    "horizon": 10,
+    "solver": "riccati",
+    "tolerance": 1e-8,
+    "evaluate_every": 10,
+}
+
+ROOT = Path(__file__).parent.parent
+LOCK = Path(__file__).with_name("sources.lock.json")
+WHOLE_ROOMS = ("control", "learning")  # every file of which counts
+ENTRIES = ("study/run.py", "analysis/summary.py")  # which count with all that they import
+ALONE = ("analysis/policy_search.py",)  # which count without
+
+
+def key(experiment: Experiment) -> str:
+    """A hash of all that the run's numbers depend on."""
+    return hash_of([identity(experiment), versions(experiment), _epochs(RUN_ROOMS)])
+
+
+def summary_key(experiment: Experiment) -> str:
+    """A hash of all that the numbers of the run's summary depend on."""
+    return hash_of([identity(experiment), versions(experiment), _epochs(SUMMARY_ROOMS)])
+
+
+def identity(experiment: Experiment) -> dict[str, Any]:
+    """The fields that name a run, resolved, without those that have their `ORIGINAL` value."""
+    fields = resolved(experiment)
+    return {name: value for name, value in fields.items() if value != ORIGINAL[name]}
+
+
+def resolved(experiment: Experiment) -> dict[str, Any]:
+    """The fields as its learner reads them, with the centres of the obstacles for the layout."""
+    fields = dict(vars(experiment.canonical))
+    return {"obstacles": paper.LAYOUTS[fields.pop("layout")]} | fields
+
+
+def versions(experiment: Experiment | None = None) -> dict[str, str]:
+    """The versions of the libraries that touch the numbers of a run, or of any run.
+
+    What a build adds after "+" is left out: it is the same code.
+    """
+    learns = experiment is None or experiment.learner in NETWORK_LEARNERS
+    names = (*LIBRARIES, "torch") if learns else LIBRARIES
+    return {name: _version(name).partition("+")[0] for name in names}
+
+
+def environment() -> dict[str, str]:
+    """All that must be the same, beside key and machine, for the same bits."""
+    libraries = {name: _version(name) for name in (*LIBRARIES, "torch")}
+    return {"python": platform.python_version(), **libraries}
+
+
+def provenance(experiment: Experiment) -> dict[str, Any]:
+    """The facts that say where a run was made, and what its numbers depend on."""
+    return {
+        "versions": environment(),
+        "machine": fingerprint(),
+        "key": key(experiment),
+        "sources": sources_hash(),
+    }
+
+
+def signature() -> str:
+    """The same for all who would make the same numbers of the same experiments."""
+    return hash_of([versions(), EPOCHS, sources_hash()])
+
+
+def epochs() -> dict[str, int]:
+    """Those of the rooms that bear on summaries, and on what is searched for."""
+    return _epochs(SUMMARY_ROOMS)
+
+
+def _version(library: str) -> str:
+    try:
+        return version(library)
+    except PackageNotFoundError:  # only numba may be missing: fatrop then solves
+        return "absent"
+
+
+def _epochs(rooms: Iterable[str]) -> dict[str, int]:
+    return {room: EPOCHS[room] for room in rooms}
+
+
+def hash_of(depends: Any) -> str:
+    """A hash of anything that JSON can hold."""
+    return hashlib.sha256(json.dumps(depends, sort_keys=True).encode()).hexdigest()
+
+
+def sources(root: Path = ROOT) -> dict[str, str]:
+    """A hash of the code of each file that bears on the numbers of runs and summaries, by path."""
+    paths = {path for room in WHOLE_ROOMS for path in (root / room).rglob("*.py")}
+    paths |= _reached(root, [root / entry for entry in ENTRIES])
+    paths |= {root / entry for entry in ALONE}
+    codes = {path: code(path.read_text()) for path in sorted(paths)}
+    return {
+        path.relative_to(root).as_posix(): hashlib.sha256(text.encode()).hexdigest()
+        for path, text in codes.items()
+        if text
+    }
+
+
+@cache
+def sources_hash() -> str:
+    """One hash of all `sources`, wherever they lie."""
+    return hash_of(sorted(sources().values()))
+
+
+def room_hash(room: str) -> str:
+    """One hash of the code of a whole room."""
+    return hash_of([code(path.read_text()) for path in sorted((ROOT / room).rglob("*.py"))])
+
+
+def locked() -> dict[str, str]:
+    """`sources` as the lock has them."""
+    return dict(json.loads(LOCK.read_text())["sources"])
+
+
+def changed(now: Mapping[str, str], lock: Mapping[str, str]) -> list[str]:
+    """The files whose code is not what the lock has, moved and renamed ones left out."""
+    new, old = Counter(now.values()), Counter(lock.values())
+    other = {path for path, found in now.items() if new[found] > old[found]}
+    gone = {path for path, found in lock.items() if old[found] > new[found]}
+    return sorted(other | gone)
+
+
+def relock() -> Path:
+    """Write the lock anew."""
+    write_json(LOCK, {"epochs": EPOCHS, "sources": sources()}, indent=1)
+    return LOCK
+
+
+@cache
+def warn_of_changes() -> None:
+    """Say once, on standard error, that stored runs may be of other code than this."""
+    files = changed(sources(), locked())
+    if files:
+        print(
+            f"{', '.join(files)}: not the code that stored runs were made with;"
+            " `nmpcrl verify --relock` shows whether their numbers hold; if not, raise the epoch of"
+            " the room in nmpcrl/study/provenance.py",
+            file=sys.stderr,
+        )
+
+
+def code(text: str) -> str:
+    """A module's syntax tree as text, without comments, docstrings, imports and functions' types.
+
+    Empty if nothing else is in it. The same text on every version of Python that we know.
+    """
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            node.returns = None
+        elif isinstance(node, ast.arg):
+            node.annotation = None
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            documented = ast.get_docstring(node) is not None
+            node.body = [one for one in node.body[documented:] if not _is_bookkeeping(one)]
+    return "\n".join(map(_shape, tree.body))
+
+
+def _is_bookkeeping(node: ast.stmt) -> bool:
+    """Whether a statement is an import, or names what a package exports."""
+    exports = isinstance(node, ast.Assign) and any(
+        isinstance(target, ast.Name) and target.id == "__all__" for target in node.targets
+    )
+    return exports or isinstance(node, ast.Import | ast.ImportFrom)
+
+
+def _shape(node: Any) -> str:
+    """`ast.dump`, whose text is not the same on every version of Python."""
+    if isinstance(node, list):
+        return f"[{', '.join(map(_shape, node))}]"
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    kept = (
+        f"{name}={_shape(value)}"
+        for name, value in ast.iter_fields(node)
+        if name not in ("ctx", "kind", "type_comment", "type_params") and value not in (None, [])
+    )
+    return f"{type(node).__name__}({', '.join(kept)})"
+
+
+def _reached(root: Path, entries: Iterable[Path]) -> set[Path]:
+    """The files of the package that some files import, directly or through others."""
+    found: set[Path] = set()
+    left = list(entries)
+    while left:
+        path = left.pop()
+        if path not in found:
+            found.add(path)
+            left += _imported(root, path)
+    return found
+
+
+def _imported(root: Path, path: Path) -> Iterator[Path]:
+    """The files that a file imports; what a package passes on is followed to where it is made."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "nmpcrl":
+            for alias in node.names:
+                yield from _defined(root, str(node.module), alias.name)
+
+
+def _defined(root: Path, module: str, name: str) -> Iterator[Path]:
+    """Where `from module import name` is defined."""
+    place = root.joinpath(*module.split(".")[1:])
+    if place.with_suffix(".py").is_file():
+        yield place.with_suffix(".py")
+    elif (place / f"{name}.py").is_file():
+        yield place / f"{name}.py"
+    elif (place / "__init__.py").is_file():
+        for node in ast.parse((place / "__init__.py").read_text()).body:
+            if isinstance(node, ast.ImportFrom):
+                for alias in node.names:
+                    if (alias.asname or alias.name) == name and node.module != module:
+                        yield from _defined(root, str(node.module), alias.name)

@@ -1,0 +1,159 @@
+"""`run` carries out an experiment: it trains, judges theta without noise, and keeps records."""
+
+import gc
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from nmpcrl.control import Plant
+from nmpcrl.learning import Successor, Weights
+from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.training import Diverged, Step, absurd, train
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.records import Field, Records, StepStatus, Stopped, Table, final_cost
+from nmpcrl.study.setup import controller_of, prepare
+
+UNKNOWN = Successor(np.nan)  # of a step that was not bootstrapped
+UNSOLVED: Any = SimpleNamespace(  # stands in for a solve that failed or was not asked for
+    value=np.nan,
+    features=np.nan,
+    restarts=0,
+    violation=np.nan,  # max(a, nan) is a
+    iterations=0,
+    seconds=0.0,
+)
+
+
+def run(experiment: Experiment, on_episode: Callable[[int, float], None] | None = None) -> Records:
+    """Train and evaluate as `experiment` says; the same experiment gives the same numbers.
+
+    Args:
+        experiment: names the run; what its learner does not read is set to its default.
+        on_episode: called after each episode with how many are done and the episode's summed cost.
+    """
+    gc.freeze()  # the collector need not look through all that was imported, again and again
+    try:
+        return _run(experiment.canonical, on_episode)
+    finally:
+        gc.unfreeze()
+
+
+def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None) -> Records:
+    controller = controller_of(experiment)
+    learner, weights, explore = prepare(experiment, controller)
+    steps, evaluations = _tables(experiment, controller.nmpc.plant)
+    evaluations.append(_evaluation(controller, weights, 0, experiment.steps))
+    stopped, cost, began = str(Stopped.FINISHED), 0.0, time.perf_counter()
+    solver = controller.nmpc.solver.name
+    try:
+        options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
+        for step in train(learner, controller, weights, explore, **options):
+            seconds = time.perf_counter() - began
+            steps.append(_row(step, seconds))
+            cost += step.cost
+            solver = step.plan.solver if step.plan else solver
+            if step.failure or step.time == experiment.steps - 1:
+                done = step.episode + 1
+                due = done % experiment.evaluate_every == 0 or done == experiment.episodes
+                if due and not absurd(step.weights):
+                    row = _evaluation(controller, step.weights, done, experiment.steps)
+                    evaluations.append(row)
+                if on_episode:
+                    on_episode(done, cost)
+                cost = 0.0
+            began = time.perf_counter()
+    except Diverged as error:
+        stopped = f"{Stopped.DIVERGED}: {error}"
+    table, judged = steps.columns(), evaluations.columns()
+    table["alpha_phi2"] = experiment.alpha * (table["features"] ** 2).sum(axis=1)
+    facts = {
+        "stopped": stopped,
+        "solver": solver,  # what solved: fatrop where riccati was not to be had
+        "seconds": float(table["seconds"].sum()),
+        "final_cost": final_cost(judged["cost"]),
+    }
+    return Records(asdict(experiment), table, judged, facts)
+
+
+def _tables(experiment: Experiment, plant: Plant) -> tuple[Table, Table]:
+    """Room for `Records.steps` and `Records.evaluations`."""
+    n, m, d, steps = plant.n, plant.m, len(experiment.theta), experiment.steps
+    step: list[Field] = [
+        ("episode", int),
+        ("time", int),
+        ("state", float, n),
+        ("action", float, m),
+        ("cost", float),
+        ("value", float),
+        ("next_value", float),
+        ("delta", float),
+        ("features", float, d),
+        ("theta", float, d),
+        ("w", float, d),
+        ("loss", float),
+        ("status", int),
+        ("restarts", int),
+        ("violation", float),
+        ("iterations", int),
+        ("solves", int),
+        ("solve_seconds", float),
+        ("fit_seconds", float),
+        ("seconds", float),
+    ]
+    evaluation: list[Field] = [
+        ("episode", int),
+        ("theta", float, d),
+        ("cost", float),
+        ("states", float, (steps, n)),
+        ("actions", float, (steps, m)),
+    ]
+    rollouts = experiment.episodes // experiment.evaluate_every + 2  # the first and the last
+    return Table(step, experiment.episodes * steps), Table(evaluation, rollouts)
+
+
+def _row(step: Step, seconds: float) -> tuple[Any, ...]:
+    """The row of `Records.steps` for one step of training, in the order of `_tables`."""
+    update = step.update
+    successor = (update and update.successor) or UNKNOWN
+    first = step.solution or UNSOLVED
+    solves = list(dict.fromkeys(filter(None, (step.plan, step.solution, successor.solution))))
+    restarts = sum(solve.restarts for solve in solves)
+    return (
+        step.episode,
+        step.time,
+        step.state,
+        step.action,
+        step.cost,
+        first.value,
+        successor.value,
+        np.nan if update is None or update.delta is None else update.delta,
+        first.features,
+        step.weights.theta,
+        step.weights.w,
+        successor.loss,
+        StepStatus.of(failed=bool(step.failure), restarts=restarts),
+        restarts,
+        max((solve.violation for solve in solves), default=np.nan),
+        sum(solve.iterations for solve in solves),
+        len(solves),
+        sum(solve.seconds for solve in solves),
+        successor.seconds,
+        seconds,
+    )
+
+
+def _evaluation(
+    controller: Persistent, weights: Weights, episode: int, steps: int
+) -> tuple[Any, ...]:
+    """The row of `Records.evaluations` for the policy of `weights`."""
+    rollout = evaluate(controller, weights.theta, steps)
+    missing = ((0, steps - len(rollout.states)), (0, 0))
+    states, actions = (
+        np.pad(driven, missing, constant_values=np.nan)
+        for driven in (rollout.states, rollout.actions)
+    )
+    return episode, weights.theta, rollout.cost, states, actions

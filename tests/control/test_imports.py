@@ -1,0 +1,31 @@
+"""Within control imports run one way: nmpc -> solvers -> the problem -> codegen."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import nmpcrl.control
+
+ROOT = Path(nmpcrl.control.__file__).parent
+FLOORS = (  # each may import from those before it, and from its own
+    ("codegen",),
+    ("plant", "task", "ocp", "sensitivity", "solution"),
+    ("solvers",),
+    ("nmpc",),
+)
+MODULES = [path for path in sorted(ROOT.rglob("*.py")) if path != ROOT / "__init__.py"]
+
+
+def floor(name: str) -> int:
+    """How high a module or a room of control stands."""
+    return next(i for i, names in enumerate(FLOORS) if name in names)
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_nothing_is_imported_from_above(path):
+    own = path.relative_to(ROOT).with_suffix("").parts[0]
+    text = path.read_text()
+    assert not re.search(r"^from nmpcrl\.control import", text, flags=re.M), "name the module"
+    rooms = re.findall(r"^from nmpcrl\.control\.(\w+)[\w.]* import", text, flags=re.M)
+    assert all(floor(room) <= floor(own) for room in rooms)

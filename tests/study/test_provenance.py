@@ -1,0 +1,197 @@
+"""Keys that survive a move, a lock that tells when code has changed, and what a key depends on."""
+
+import json
+import shutil
+from dataclasses import fields, replace
+
+import pytest
+
+from nmpcrl.study import Experiment, paper, provenance
+from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.provenance import ORIGINAL, changed, identity, key, sources, summary_key
+from nmpcrl.study.setup import LEARNERS
+
+
+@pytest.fixture
+def edited(tmp_path):
+    """The sources of a copy of the package after an edit, as `sources` has them."""
+    copy = tmp_path / "nmpcrl"
+    ignored = shutil.ignore_patterns("*.pyc", "__pycache__")
+    shutil.copytree(provenance.ROOT, copy, ignore=ignored)
+
+    def edit(place="", before="", after="", *, moved_to=""):
+        if moved_to:
+            (copy / moved_to).parent.mkdir(parents=True, exist_ok=True)
+            (copy / place).rename(copy / moved_to)
+            place = moved_to
+        if before:
+            text = (copy / place).read_text()
+            assert before in text
+            (copy / place).write_text(text.replace(before, after, 1))
+        return sources(copy)
+
+    return edit
+
+
+NUMBERS = [
+    ("learning/updates.py", "cost + gamma * q_next - q", "cost + gamma * q_next - 2 * q"),
+    ("learning/training.py", "PATIENCE = 10", "PATIENCE = 11"),
+    ("control/solvers/kernel.py", "ARMIJO = 1e-4", "ARMIJO = 1e-1"),
+    ("control/solvers/nlpsol.py", "MAX_ITERATIONS = 300", "MAX_ITERATIONS = 200"),
+    ("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6"),
+    ("study/setup.py", "spawn(3)", "spawn(4)"),
+    ("study/run.py", "evaluate_every == 0", "evaluate_every == 1"),
+    ("analysis/summary.py", "LATE = 20", "LATE = 21"),
+    ("analysis/metrics.py", "TOUCH = 1e-6", "TOUCH = 1e-5"),
+    ("analysis/imitation.py", "FITS = 4000", "FITS = 4001"),
+    ("analysis/policy_search.py", "SPREAD = 0.3", "SPREAD = 0.4"),
+]
+NO_NUMBERS = [
+    ("learning/updates.py", '"""The update rules', '"""All update rules'),
+    ("learning/updates.py", '"""TD error', '"""The TD error'),
+    ("learning/updates.py", "\n\n\ndef td_error", "\n\n\n# A comment.\n\n\ndef td_error"),
+    ("learning/updates.py", "import numpy as np", "import math\n\nimport numpy as np"),
+    ("learning/updates.py", "q_next: float) -> float", "q_next: object) -> object"),
+    ("learning/__init__.py", '"td_error",', '"td_error", "another",'),
+    ("control/ocp.py", "# z\n", "# the variables\n"),
+    ("study/executor.py", "ATTEMPTS = 3", "ATTEMPTS = 4"),
+    ("study/departures.py", "A slip of the index.", "A slip of an index."),
+    ("claims/rule.py", "MAJORITY = 0.5", "MAJORITY = 0.6"),
+]
+
+
+@pytest.mark.parametrize(("place", "before", "after"), NUMBERS)
+def test_an_edit_of_what_bears_on_numbers_is_noticed(edited, place, before, after):
+    assert changed(edited(place, before, after), sources()) == [place]
+
+
+@pytest.mark.parametrize(
+    ("place", "before", "after"),
+    [row for row in NUMBERS if row[0].startswith(provenance.WHOLE_ROOMS)],
+)
+def test_such_an_edit_is_noticed_in_a_file_that_was_moved_into_a_subfolder(
+    edited, place, before, after
+):
+    room, _, name = place.partition("/")
+    moved_to = f"{room}/below/{name.rpartition('/')[2]}"
+    assert changed(edited(place, before, after, moved_to=moved_to), sources()) == sorted(
+        [place, moved_to]
+    )
+
+
+@pytest.mark.parametrize(("place", "before", "after"), NO_NUMBERS)
+def test_an_edit_of_what_bears_on_no_number_is_not(edited, place, before, after):
+    assert changed(edited(place, before, after), sources()) == []
+
+
+def test_a_moved_and_a_renamed_file_change_nothing(edited):
+    now = edited("learning/updates.py", moved_to="learning/below/rules.py")
+    assert "learning/below/rules.py" in now
+    assert changed(now, sources()) == []
+
+
+def test_the_code_is_what_the_lock_has():
+    """If this fails: `nmpcrl verify --relock`, or raise the epoch of the room and relock."""
+    assert changed(sources(), provenance.locked()) == []
+    assert json.loads(provenance.LOCK.read_text())["epochs"] == provenance.EPOCHS
+
+
+def test_who_reads_stored_runs_is_warned_of_other_code(monkeypatch, capsys):
+    lock = {**sources(), "learning/updates.py": "another"}
+    monkeypatch.setattr(provenance, "locked", lambda: lock)
+    provenance.warn_of_changes.__wrapped__()
+    said = capsys.readouterr().err
+    assert said.startswith("learning/updates.py: not the code that stored runs were made with")
+    assert said.count("\n") == 1
+
+
+def test_every_field_and_nothing_else_has_an_original_value():
+    names = {field.name for field in fields(Experiment)}
+    assert set(ORIGINAL) == names - {"layout"} | {"obstacles"}
+
+
+def test_the_papers_run_of_es_is_named_by_versions_and_epochs_alone():
+    assert identity(Experiment()) == {}
+
+
+@pytest.mark.parametrize(
+    ("other", "names"),
+    [
+        ({"seed": 1}, {"seed": 1}),
+        ({"alpha": 2e-7}, {"alpha": 2e-7}),
+        ({"steps": 4}, {"steps": 4}),
+        ({"theta": (0.9,) * 9}, {"theta": (0.9,) * 9}),
+        ({"layout": "B"}, {"obstacles": paper.LAYOUTS["B"]}),
+        ({"learner": "DES", "gated": False}, {"learner": "DES", "gated": False}),
+        ({"solver": "ipopt"}, {"solver": "ipopt"}),
+    ],
+)
+def test_a_key_depends_on_what_differs_from_the_original(other, names):
+    assert identity(Experiment(**other)) == names
+    assert key(Experiment(**other)) != key(Experiment())
+
+
+def test_a_run_and_its_summary_have_keys_of_their_own():
+    assert key(Experiment()) != summary_key(Experiment())
+
+
+def test_the_key_does_not_depend_on_how_a_value_was_written():
+    assert key(Experiment(alpha=1)) == key(Experiment(alpha=1.0))
+    assert key(Experiment(theta=[1] * 9)) == key(Experiment(theta=(1.0,) * 9))
+
+
+def test_the_centres_of_a_layout_count_and_not_its_letter(monkeypatch):
+    before = key(Experiment(layout="A")), key(Experiment(layout="B"))
+    monkeypatch.setitem(paper.LAYOUTS, "Z", paper.LAYOUTS["B"])
+    assert key(Experiment(layout="Z")) == before[1]
+    monkeypatch.setitem(paper.LAYOUTS, "A", ((0.0, 0.0), *paper.LAYOUTS["A"][1:]))
+    assert key(Experiment(layout="A")) not in before
+
+
+@pytest.mark.parametrize(
+    ("learner", "unread"),
+    [
+        ("ES", {"zeta": 0.5, "beta": 1e-3, "network": "tanh", "gated": False, "curvature": False}),
+        ("GES", {"zeta": 0.5, "beta_tdc": 1.0, "projected": False}),
+        ("DES", {"beta": 1e-3, "beta_tdc": 1.0}),
+        ("QL", {"constrained": True}),
+        ("frozen", {"alpha": 1.0, "beta": 1.0, "ties_active": True, "constrained": True}),
+    ],
+)
+def test_what_a_learner_does_not_read_has_no_part_in_the_key(learner, unread):
+    one = Experiment(learner=learner)
+    for name, value in unread.items():
+        other = replace(one, **{name: value})
+        assert key(other) == key(one), name
+        assert other.canonical == one
+
+
+@pytest.mark.parametrize("learner", LEARNERS)
+def test_the_frozen_arm_keeps_all_that_is_not_learned(learner):
+    one = Experiment(learner=learner, layout="C", seed=3, horizon=5, box="soft", alpha=3e-7)
+    assert frozen_arm(one) == Experiment("frozen", layout="C", seed=3, horizon=5, box="soft")
+
+
+@pytest.mark.parametrize("room", provenance.EPOCHS)
+def test_an_epoch_that_is_raised_makes_other_runs(monkeypatch, room):
+    before = key(Experiment()), summary_key(Experiment())
+    monkeypatch.setitem(provenance.EPOCHS, room, provenance.EPOCHS[room] + 1)
+    after = key(Experiment()), summary_key(Experiment())
+    assert (before[0] != after[0]) == (room in provenance.RUN_ROOMS)
+    assert before[1] != after[1]
+
+
+@pytest.mark.parametrize("library", ["casadi", "numba", "numpy", "torch"])
+@pytest.mark.parametrize("learner", ["ES", "RDES"])
+def test_a_version_counts_where_the_library_touches_the_numbers(monkeypatch, library, learner):
+    before, version = key(Experiment(learner)), provenance._version
+    other = {library: "0.0.1"}
+    monkeypatch.setattr(provenance, "_version", lambda name: other.get(name) or version(name))
+    assert (key(Experiment(learner)) != before) == (library != "torch" or learner == "RDES")
+
+
+def test_what_a_build_adds_to_a_version_does_not_count(monkeypatch):
+    monkeypatch.setattr(provenance, "_version", lambda name: "1.2")
+    before = key(Experiment("RDES"))
+    monkeypatch.setattr(provenance, "_version", lambda name: "1.2+cpu")
+    assert key(Experiment("RDES")) == before
