@@ -35,6 +35,7 @@ OLD = {  # the word that replaces it: the pattern of the old one, and where it m
     "baseline": (r"rivals?", ""),
     "depends on": (r"hinges?", ""),
     "scaling, spectral radius": (r"growth", ""),
+    "predicts": (r"networks? (says?|said)", ""),
 }
 
 
