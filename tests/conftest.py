@@ -122,7 +122,7 @@ MEASURED = {
         ),
         [learner(solver, name) for solver in ("riccati", "fatrop", "ipopt") for name in SOLVES],
     ),
-    "rival": {"learner": ["mpcrl", "mpcrl", "ES", "ES"], "seconds": [0.01, 0.01, 1e-4, 1e-4]},
+    "mpcrl": {"learner": ["mpcrl", "mpcrl", "ES", "ES"], "seconds": [0.01, 0.01, 1e-4, 1e-4]},
     "runs": {
         "learner": list(SOLVES),
         "episodes": [300] * 4,
@@ -146,7 +146,7 @@ MEASURED = {
 
 START_COST = 1000.0
 AROUND = np.array([[-2.5, 1.5], [-2.5, 8.0], [3.0, 8.0], [8.5, 8.0], [8.5, 2.0]])  # no obstacle
-DRIVE = np.column_stack([AROUND, [0.0, 0.0, 0.0, 0.0, np.pi / 2]])
+TRAJECTORY = np.column_stack([AROUND, [0.0, 0.0, 0.0, 0.0, np.pi / 2]])
 
 
 @pytest.fixture(scope="session")
@@ -179,7 +179,7 @@ def summary_of(
     swing: float = 0.0,
     training: float = 1.0,
     reached: int | None = None,
-    states: np.ndarray = DRIVE,
+    states: np.ndarray = TRAJECTORY,
     actions: np.ndarray | None = None,
     inside: tuple[int, int, int] = (0, 0, 0),
     imitation: tuple[float, float] = (0.5, 1.0),
@@ -193,7 +193,7 @@ def summary_of(
         swing: how much of the start's cost every other late rollout costs more.
         training: cost of its training episodes, over the start's.
         reached: after how many episodes it was stopped.
-        states: of its last drive without noise.
+        states: of its last rollout without noise.
         actions: likewise.
         inside: states in an obstacle by size, in its first episode.
         imitation: held-out errors with and without theta.

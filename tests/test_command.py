@@ -1,4 +1,4 @@
-"""The command `nmpcrl`, driven as a user drives it, on runs of a few short episodes."""
+"""The command `nmpcrl`, used as a user would, on runs of a few short episodes."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace

@@ -112,6 +112,6 @@ def whole_study(episodes: int = paper.EPISODES) -> dict[Experiment, str]:
 
 def base_of(experiment: Experiment, name: str) -> Experiment:
     """The run of the main table that a run of variant `name` is held against."""
-    usual = Experiment()
-    changed = {key: getattr(usual, key) for key in VARIANTS[name].fields if key != "decay"}
+    default = Experiment()
+    changed = {key: getattr(default, key) for key in VARIANTS[name].fields if key != "decay"}
     return replace(experiment, **changed)

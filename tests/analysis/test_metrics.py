@@ -84,22 +84,22 @@ def test_the_gain_is_the_share_of_the_cost_that_learning_took_away(last, gain):
     assert metrics.gain(records([[1]], judged=[100, last, last, last])) == pytest.approx(gain)
 
 
-def test_wandering_is_judged_in_the_second_half_only():
+def test_the_late_cost_range_is_judged_in_the_second_half_only():
     run = records(np.ones((4, 1)), judged=[100, 900, 70, 60, 65], at=[0, 1, 2, 3, 4])
     assert metrics.late_cost_range(run) == pytest.approx(0.1)
 
 
-def test_a_run_without_a_rollout_in_the_second_half_wanders_without_bound():
+def test_a_run_without_a_rollout_in_the_second_half_has_an_unbounded_range():
     assert metrics.late_cost_range(records(np.ones((4, 1)), judged=[100, 90], at=[0, 1])) == np.inf
 
 
 @pytest.mark.parametrize("late", [(np.inf, 60), (np.inf, np.inf)])
-def test_a_failed_rollout_in_the_second_half_is_wandering_without_bound(late):
+def test_a_failed_rollout_in_the_second_half_makes_the_range_unbounded(late):
     run = records(np.ones((4, 1)), judged=[100, 70, *late], at=[0, 1, 3, 4])
     assert metrics.late_cost_range(run) == np.inf
 
 
-def test_the_excess_compares_the_medians_of_the_last_episodes():
+def test_the_cost_ratio_compares_the_medians_of_the_last_episodes():
     frozen = records(np.full((60, 1), 10.0))
     costs = np.full((60, 1), 10.0)
     costs[-20:] = 30
@@ -107,13 +107,13 @@ def test_the_excess_compares_the_medians_of_the_last_episodes():
     assert metrics.cost_ratio(records(costs), frozen) == pytest.approx(3)
 
 
-def test_the_excess_looks_at_no_more_than_the_second_half():
+def test_the_cost_ratio_looks_at_no_more_than_the_second_half():
     frozen = records(np.full((4, 1), 10.0))
     assert metrics.cost_ratio(records([[999], [999], [20], [20]]), frozen) == pytest.approx(2)
     assert metrics.cost_ratio(records([[30]]), records([[10]])) == pytest.approx(3)
 
 
-def test_an_episode_cut_short_at_the_end_is_an_infinite_excess():
+def test_an_episode_cut_short_at_the_end_is_an_infinite_cost_ratio():
     frozen = records(np.ones((2, 2)))
     run = records(np.ones((2, 2)), status=[0, 0, 0, 2])
     assert metrics.cost_ratio(run, frozen) == np.inf

@@ -175,5 +175,5 @@ def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
     assert not needs["experiments"]
     assert not needs["summaries"]
     (call,) = needs["beforehand"]
-    assert call.func.__name__ == "fetch"
+    assert call.func.__name__ == "read_or_measure"
     assert call.args == ("smoke",)

@@ -19,7 +19,7 @@ OLD = {  # the word that replaces it: the pattern of the old one, and where it m
     "perturbed replica": (r"twins?", ""),
     "run summary": (r"digests?", r"hexdigest"),
     "train": (r"harvest(s|ed|ing)?", ""),
-    "baseline, default, common": (r"usual(ly)?", ""),
+    "baseline, default, common": (r"usual", ""),
     "trajectory": (r"roads?", ""),
     "rollout": (
         r"dr(ive|ives|iven|iving|ove)",
@@ -31,10 +31,9 @@ OLD = {  # the word that replaces it: the pattern of the old one, and where it m
     "table": (r"cards?", ""),
     "higher cost": (r"dearer|costlier|dearest|costliest", ""),
     "lower cost": (r"cheap(er|est|ly)?", ""),
-    "has as an input, names, says": (r"told", ""),
+    "has theta as an input": (r"told (of )?theta", ""),
     "baseline": (r"rivals?", ""),
     "depends on": (r"hinges?", ""),
-    "scaling, spectral radius": (r"growth", ""),
     "predicts": (r"networks? (says?|said)", ""),
 }
 

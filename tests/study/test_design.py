@@ -19,8 +19,8 @@ def test_the_main_table_has_every_learner_layout_reading_and_seed():
     runs = design.main_table()
     assert len(runs) == len(set(runs)) == len(MAIN) * 6 * 2 * 10
     assert {e.episodes for e in runs} == {paper.EPISODES}
-    usual = Experiment()
-    assert all(differing(e, usual) <= {"learner", "layout", "decay", "seed"} for e in runs)
+    default = Experiment()
+    assert all(differing(e, default) <= {"learner", "layout", "decay", "seed"} for e in runs)
 
 
 def test_the_study_begins_with_the_main_table_and_names_every_run_once():

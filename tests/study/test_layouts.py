@@ -70,7 +70,7 @@ def test_a_path_that_stands_still_goes_through_no_gap(task):
     assert gaps(task, np.full((5, 2), [1.7, 1.4]), 0.0) == {}
 
 
-def test_a_layout_closes_where_the_gap_of_the_first_drive_does_at_theta_c_of_the_margin():
+def test_a_layout_closes_where_the_gap_of_the_first_rollout_does_at_theta_c_of_the_margin():
     assert screen(paper.LAYOUTS["A"]).kind == "open"
     (x, y), second, *others = paper.LAYOUTS["A"]
     towards = np.array(second) - [x, y]

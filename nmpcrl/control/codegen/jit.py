@@ -1,6 +1,6 @@
 """Python text to machine code by numba, kept on disk: compiled once on a machine, then loaded.
 
-A package of modules lives in a folder named by a digest of its text and of all versions concerned,
+A package of modules lives in a folder named by a hash of its text and of all versions concerned,
 so what is there is right by construction. numba keeps the machine code in the same folder.
 """
 
@@ -100,7 +100,7 @@ def load(name: str, texts: Mapping[str, str], notice: str = "") -> ModuleType:
     """Import a package of modules; what numba compiles there is found again the next time.
 
     Args:
-        name: what the package is called; a digest is added.
+        name: what the package is called; a hash is added.
         texts: the text of each module by its name; that of `__init__` is returned.
         notice: said on standard error while something is compiled.
 

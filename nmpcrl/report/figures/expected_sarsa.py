@@ -19,9 +19,9 @@ from nmpcrl.report.figures.style import (
     page,
     subplots,
 )
+from nmpcrl.study import Runs
 from nmpcrl.study.paper import THETA_NAMES
 from nmpcrl.study.records import Records
-from nmpcrl.study.store import Runs
 
 
 @page
