@@ -34,6 +34,7 @@ OLD = {  # the word that replaces it: the pattern of the old one, and where it m
     "has theta as an input": (r"told (of )?theta", ""),
     "baseline": (r"rivals?", ""),
     "depends on": (r"hinges?", ""),
+    "predicts": (r"networks? (says?|said)", ""),
 }
 
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.metrics import by_episode, noise_free_cost, training_cost
 from nmpcrl.report.figures.style import (
-    DECAYS,
+    DECAY_TITLES,
     INK,
     LOOKS,
     SUBTITLE,
@@ -47,7 +47,7 @@ def theta_paths(runs: Runs[Records]) -> Figure:
                     ls=lines[i % len(lines)],
                     label=f"${SYMBOLS[THETA_NAMES[component]]}$" if run == 0 else None,
                 )
-        axes.set_title(DECAYS[decay], **SUBTITLE)
+        axes.set_title(DECAY_TITLES[decay], **SUBTITLE)
         axes.set_xlabel("episode")
     panels[0, 0].set_ylabel("component of θ (no unit)")
     handles, labels = panels[0, 0].get_legend_handles_labels()
@@ -69,7 +69,7 @@ def overshoot(runs: Runs[Records]) -> Figure:
             largest,
             color=color,
             ls=line,
-            label=DECAYS[experiment.decay] if first else None,
+            label=DECAY_TITLES[experiment.decay] if first else None,
         )
         worst = max(worst, np.nanmax(largest))
     axes.axhline(2, color=INK, ls=":", lw=1)
@@ -103,7 +103,7 @@ def two_costs(runs: Runs[Records]) -> Figure:
             cost = training_cost(records)
             column[0].plot(np.arange(1, len(cost) + 1), cost, label=label, lw=1.2, **look.line)
             column[1].plot(*noise_free_cost(records), label=label, **look.line)
-        column[0].set_title(DECAYS[decay], **SUBTITLE)
+        column[0].set_title(DECAY_TITLES[decay], **SUBTITLE)
         column[1].set_xlabel("episodes trained")
     grid[0, 0].set_ylabel("with noise [cost]")
     grid[1, 0].set_ylabel("without noise [cost]")

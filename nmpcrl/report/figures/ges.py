@@ -9,7 +9,7 @@ from nmpcrl.analysis.two_state import Chain, follow, spectral_radius
 from nmpcrl.learning.learners import gradient_td, semi_gradient
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.axes import label_panel, one_entry_each
-from nmpcrl.report.figures.style import DECAYS, LOOKS, headed, page, subplots, thin
+from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS, headed, page, subplots, thin
 from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
@@ -84,7 +84,7 @@ def corrections(runs: Runs[Records]) -> Figure:
         shares.append(parts.share)
     for decay in runs.values_of("decay"):
         line = "-" if decay == "step" else ":"
-        axes.plot([], [], color=LOOKS["GES"].color, linestyle=line, label=DECAYS[decay])
+        axes.plot([], [], color=LOOKS["GES"].color, linestyle=line, label=DECAY_TITLES[decay])
     axes.axhline(1, color="0.6", linewidth=1)
     label_panel(axes)
     axes.set(ylabel="correction / semi-gradient [-]", ylim=(0, None))

@@ -64,7 +64,7 @@ LOOKS = {
 INK, TEAL, WINE = "0.25", "#1B7F79", "#882255"  # none of them is a learner's
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
 SUBTITLE: dict[str, Any] = {"loc": "left", "fontsize": "medium", "fontweight": "normal"}
-DECAYS = {"step": "noise decays per step", "episode": "noise decays per episode"}
+DECAY_TITLES = {"step": "noise decays per step", "episode": "noise decays per episode"}
 SYMBOLS = {  # of paper.THETA_NAMES, between dollar signs
     "x": r"\theta_x",
     "y": r"\theta_y",
