@@ -405,8 +405,8 @@ CLAIMS: dict[str, Claim] = {
             name="C6",
             statement="theta as an input makes the network more accurate.",
             short="θ helps the\nnetwork",
-            question="Fitted to the same run of RDES, does the network that is told theta err"
-            " less?",
+            question="Fitted to the same run of RDES, does the network that has theta as an input"
+            " err less?",
             measured="root mean square errors on held-out pairs of state and theta, with over"
             " without",
             border=f"at most {MORE_ACCURATE}",

@@ -29,7 +29,7 @@ from nmpcrl.study.experiment import LEARNERS, PAPER
 
 START_COST = 1000.0  # noise-free cost of theta_init
 SEEDS = range(5)
-PLACE = np.zeros((3, 3))  # a drive that stands still
+PLACE = np.zeros((3, 3))  # a rollout that stands still
 
 Changes = Callable[[Experiment], dict[str, Any]]
 
@@ -67,7 +67,7 @@ def both(*changes: Changes) -> Changes:
 
 
 def paths(runs: pd.DataFrame, apart: float = 0.0, seeds=SEEDS) -> dict[Experiment, np.ndarray]:
-    """Drives that stand still, those of RDES with some seeds a step away [m]."""
+    """Rollouts that stand still, those of RDES with some seeds a step away [m]."""
     named = [experiment_of(one) for one in runs.to_dict("records")]
     away = {e: apart if e.learner == "RDES" and e.seed in seeds else 0.0 for e in named}
     return {e: PLACE + [away[e], 0, 0] for e in named}
@@ -470,7 +470,7 @@ def test_a_run_is_judged_from_its_records_as_from_the_table(short):
     ("dear", "lost", "expected"),
     [
         ((), {"frozen": 1}, False),
-        (("ES",), {"frozen": 1}, True),  # the frozen arm's other episodes say what is usual
+        (("ES",), {"frozen": 1}, True),  # the frozen arm's other episodes are the reference
         (("ES",), {"frozen": 3}, False),  # the frozen arm did worse
         ((), {"frozen": 3, "ES": 3}, pd.NA),  # nothing to hold it against
     ],
@@ -526,7 +526,7 @@ def test_an_addition_holds_up_to_its_border_and_not_beyond(claim, learner, again
     assert verdict_on(claim, runs[runs.learner != against]).outcome == UNDECIDABLE
 
 
-def test_a_learner_that_ends_alike_may_not_end_cheaper_either():
+def test_a_learner_that_ends_alike_may_not_end_at_a_lower_cost_either():
     runs = study(of("matched", final_cost=(1 - paper_claims.SAME_COST) * START_COST - 1e-9))
     assert verdict_on("B3", runs).outcome == NOT
 

@@ -106,7 +106,7 @@ def test_the_summaries_have_what_figures_need_in_single_precision(known, summari
 
 
 def test_runs_that_failed_are_read_as_they_were(summaries):
-    """A drive that failed costs infinitely much and has states that are not known."""
+    """A rollout that failed costs infinitely much and has states that are not known."""
     first, *others = summaries
     cost, states = np.array([5.0, np.inf, np.inf]), summaries[first].states.copy()
     states[2:] = np.nan

@@ -65,7 +65,7 @@ def paths(runs: pd.DataFrame) -> dict[Experiment, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def costly():
-    """The literal runs of RDES end costlier than they began."""
+    """The literal runs of RDES end at a higher cost than they began."""
     runs = study(final_cost=1200.0)
     return runs, robustness_map(runs, paths(runs))
 
