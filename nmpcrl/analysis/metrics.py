@@ -43,7 +43,8 @@ def final_cost(records: Records) -> float:
 
 def final_theta(records: Records) -> Vector:
     """theta when training stopped, shape (d,)."""
-    return records.steps["theta"][-1]
+    result: Vector = records.steps["theta"][-1]
+    return result
 
 
 def final_rollout(records: Records) -> tuple[Column, Column]:
@@ -107,7 +108,8 @@ def path_distance(a: Records, b: Records) -> float:
 def obstacle_violations(states: Column, task: Task) -> Vector:
     """Xi of the worst obstacle, where it is above 0 by more than `TOUCH`: one value a violation."""
     worst = task.overlap(states).max(axis=-1)
-    return worst[worst > TOUCH]
+    result: Vector = worst[worst > TOUCH]
+    return result
 
 
 def input_violations(actions: Column, lower: Vector, upper: Vector) -> int:
@@ -169,7 +171,8 @@ def next_over_this(records: Records) -> Vector:
     this, after = steps["features"][:-1], steps["features"][1:]
     ratio = paper.GAMMA * np.sum(this * after, axis=1) / np.sum(this**2, axis=1)
     same_episode = steps["episode"][1:] == steps["episode"][:-1]
-    return ratio[same_episode & np.isfinite(ratio)]
+    result: Vector = ratio[same_episode & np.isfinite(ratio)]
+    return result
 
 
 def parallel_share(records: Records) -> float:

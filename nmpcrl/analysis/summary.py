@@ -182,7 +182,8 @@ def tidy(summaries: Iterable[RunSummary]) -> pd.DataFrame:
 def separation(one: RunSummary, other: RunSummary) -> Vector:
     """The largest difference of any component of theta, after each episode that both reached."""
     apart = np.abs(one.episodes["theta"] - other.episodes["theta"]).max(axis=1)
-    return apart[np.isfinite(apart)]
+    result: Vector = apart[np.isfinite(apart)]
+    return result
 
 
 def _episodes(records: Records, task: Task, lower: Vector, upper: Vector) -> dict[str, Column]:
@@ -228,12 +229,13 @@ class _ByEpisode:
     def mean(self, column: Column) -> Vector:
         known = np.isfinite(column)
         count = self.sum(known)
-        return np.divide(
+        result: Vector = np.divide(
             self.sum(np.where(known, column, 0.0)),
             count,
             np.full(count.shape, np.nan),
             where=count > 0,
         )
+        return result
 
     def reduce(self, function: np.ufunc, column: Column) -> Vector:
         return self._spread(function.reduceat(column, self._first))
@@ -254,7 +256,8 @@ def _sizes(overlap: Column) -> Column:
 
 def _distance(states: Column, task: Task) -> Vector:
     """Distance to the target at the end of each rollout, shape (rollouts,)."""
-    return np.linalg.norm(states[:, -1] - task.target, axis=-1)
+    result: Vector = np.linalg.norm(states[:, -1] - task.target, axis=-1)
+    return result
 
 
 def _median(values: Vector) -> float:

@@ -21,7 +21,8 @@ TURN = 20  # steps that a learner takes at a time: then the caches hold what its
 def learners(steps: int) -> Columns:
     """Table II with every solver: the columns of `time_learners`; None where there is no number."""
     table = time_learners(steps=steps, turn=TURN).astype(object)
-    return table.where(table.notna(), None).to_dict("list")
+    result: Columns = table.where(table.notna(), None).to_dict("list")
+    return result
 
 
 def against_mpcrl(rounds: int, steps: int) -> Columns:

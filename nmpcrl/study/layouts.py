@@ -141,7 +141,8 @@ def _distances(start: Vector, end: Vector, points: Sequence[Sequence[float]]) ->
     along = end - start
     away = np.asarray(points) - start
     share = np.clip(away @ along / (along @ along), 0, 1)
-    return np.linalg.norm(away - share[:, None] * along, axis=1)
+    result: Vector = np.linalg.norm(away - share[:, None] * along, axis=1)
+    return result
 
 
 def _crosses(path: Matrix, one: Vector, other: Vector) -> bool:

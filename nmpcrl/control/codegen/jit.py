@@ -52,7 +52,8 @@ def compiled(function: ca.Function) -> Callable[..., Any]:
         arguments=", ".join("float64[::1]" if k == 1 else "float64[:, ::1]" for _, k in sizes),
     )
     name = function.name()
-    return getattr(load(name, {"__init__": header + source(function)}), name)
+    result: Callable[..., Any] = getattr(load(name, {"__init__": header + source(function)}), name)
+    return result
 
 
 def callable_of(function: ca.Function) -> Callable[..., Any]:
@@ -71,7 +72,8 @@ def callable_of(function: ca.Function) -> Callable[..., Any]:
     def call(*vectors: Vector) -> Vector | float:
         arrays = [np.ascontiguousarray(vector, dtype=float) for vector in vectors]
         if scalar:
-            return code(*arrays)
+            result: Vector | float = code(*arrays)
+            return result
         out = np.empty(shape)
         code(*arrays, out)
         return out

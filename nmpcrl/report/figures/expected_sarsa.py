@@ -25,7 +25,7 @@ from nmpcrl.study.records import Records
 
 
 @page
-def theta_paths(runs: Runs) -> Figure:
+def theta_paths(runs: Runs[Records]) -> Figure:
     """theta of the given runs over training, one panel a reading of the decay.
 
     Components that move by less than 0.02 in every run are drawn in grey.
@@ -56,7 +56,7 @@ def theta_paths(runs: Runs) -> Figure:
 
 
 @page
-def overshoot(runs: Runs) -> Figure:
+def overshoot(runs: Runs[Records]) -> Figure:
     """The largest alpha ||phi||^2 of each episode of the given runs."""
     figure, axes = subplots(height=3.4)
     worst = 0.0
@@ -91,7 +91,7 @@ def overshoot(runs: Runs) -> Figure:
 
 
 @page
-def two_costs(runs: Runs) -> Figure:
+def two_costs(runs: Runs[Records]) -> Figure:
     """Cost with noise and without, of a learner and of the frozen arm; a column a decay."""
     decays = runs.values_of("decay")
     figure, grid = subplots(2, len(decays), height=5.2, sharex=True, sharey="row", squeeze=False)
@@ -119,7 +119,7 @@ def two_costs(runs: Runs) -> Figure:
     )
 
 
-def frozen_fall(runs: Runs) -> float:
+def frozen_fall(runs: Runs[Records]) -> float:
     """The largest share by which the noisy cost of a frozen run fell: nothing was learned."""
     return max(_fall(records) for records in runs.select(learner="frozen").values())
 

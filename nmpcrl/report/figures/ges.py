@@ -11,6 +11,7 @@ from nmpcrl.learning.learners import gradient_td, semi_gradient
 from nmpcrl.report.figures.axes import label_panel, one_entry_each
 from nmpcrl.report.figures.style import DECAYS, LOOKS, headed, page, subplots, thin
 from nmpcrl.study import paper
+from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
 
@@ -46,7 +47,7 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
 
 
 @page
-def overshoots(runs: Runs, learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
+def overshoots(runs: Runs[Records], learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
     """Largest alpha ||phi||^2 of each episode, one panel a reading of the decay; 2 is marked."""
     decays = runs.values_of("decay")
     figure, axes = subplots(1, len(decays), 3.0, sharey=True, squeeze=False)
@@ -71,7 +72,7 @@ def overshoots(runs: Runs, learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
 
 
 @page
-def corrections(runs: Runs) -> Figure:
+def corrections(runs: Runs[Records]) -> Figure:
     """Corrections beside semi-gradients, summed over each episode of GES; a line a run."""
     figure, axes = subplots(height=2.9)
     shares = []

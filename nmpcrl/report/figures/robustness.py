@@ -109,7 +109,8 @@ def named(row: str) -> str:
 def _heights(letters: list[str]) -> list[float]:
     """Where each row of the map lies, with some room between departures."""
     steps = [1.0 + 0.4 * (one != other) for one, other in pairwise(letters)]
-    return np.cumsum([0.0, *steps]).tolist()
+    result: list[float] = np.cumsum([0.0, *steps]).tolist()
+    return result
 
 
 def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
