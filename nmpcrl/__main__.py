@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from nmpcrl import __version__
 from nmpcrl.analysis import metrics
+from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import DamagedRecords, Experiment, ParameterError, Records, fetch, paper
 from nmpcrl.study.records import StepStatus, Stopped
 from nmpcrl.study.setup import DECAYS, LEARNERS
@@ -37,7 +38,9 @@ def main() -> None:
 )
 @click.option("--alpha", default=paper.ALPHA, show_default=True, help="Step size of theta.")
 @click.option("--beta", default=paper.BETA, show_default=True, help="Step size of w.")
-@click.option("--solver", default="riccati", show_default=True, help="Or fatrop, or ipopt.")
+@click.option(
+    "--solver", default="riccati", show_default=True, help=f"One of {', '.join(SOLVERS)}."
+)
 @click.option("--literal", is_flag=True, help="Algorithm 1 literally: do not wait for the network.")
 def train(literal: bool, **fields: Any) -> None:
     """Train one run and store it; a stored one is read."""

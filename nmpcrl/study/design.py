@@ -15,7 +15,7 @@ from nmpcrl.study.replicas import perturbed
 from nmpcrl.study.setup import DECAYS, NETWORKS
 from nmpcrl.study.sweeps import sweep
 
-LAYOUTS = tuple(paper.LAYOUTS)
+LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too
 SEEDS = tuple(range(10))
 VARIED: dict[str, Any] = {"layout": ("A", "D"), "seed": tuple(range(5))}  # one open, one closing
 FRESH: dict[str, Any] = {"layouts": ("A", "B", "D"), "seeds": tuple(range(5))}

@@ -115,7 +115,7 @@ def sampler(seed: int = SEED) -> Iterator[Centres]:
 def drawn() -> dict[str, Centres]:
     """The named layouts after A: the first that `sampler` draws, until there are `NAMED` of a kind.
 
-    `paper.LAYOUTS` holds them; a test draws them again.
+    `paper.LAYOUTS` begins with them; a test draws them again.
     """
     wanted = dict(NAMED)
     wanted[screen(paper.LAYOUTS["A"]).kind] -= 1

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-FILES = ("README.md", "CITATION.cff", "metadata.yaml", "Makefile")
+FILES = ("README.md", "CONTRIBUTING.md", "CITATION.cff", "metadata.yaml", "Makefile")
 FOLDERS = ("nmpcrl", "book", "tests")
 KINDS = (".py", ".md", ".ipynb", ".css", ".js", ".html", ".svg")
 

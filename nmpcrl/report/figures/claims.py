@@ -83,7 +83,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
             end = _bar(axis, y, per_learner.loc[name], per_learner.loc["ES"])
             text = f" {name} {ratio(timings, solver, name).value:.2f}"
             axis.annotate(text, (end, y), va="center", fontsize="small")
-    axis.set_yticks(range(len(solvers)), [SOLVERS[solver] for solver in solvers])
+    axis.set_yticks(range(len(solvers)), [SOLVERS.get(solver, solver) for solver in solvers])
     axis.invert_yaxis()
     axis.margins(x=0.12)
     axis.set_xlabel("time of a step / time of a step of ES")
