@@ -99,6 +99,8 @@ def test_the_code_is_what_the_lock_has():
 def test_who_reads_stored_runs_is_warned_of_other_code(monkeypatch, capsys):
     lock = {**sources(), "learning/updates.py": "another"}
     monkeypatch.setattr(provenance, "locked", lambda: lock)
+    monkeypatch.setenv(provenance.WARNED, "")
+    provenance.warn_of_changes.__wrapped__()
     provenance.warn_of_changes.__wrapped__()
     said = capsys.readouterr().err
     assert said.startswith("learning/updates.py: not the code that stored runs were made with")
