@@ -314,10 +314,6 @@ for name, probe in json.load(sys.stdin).items():
 print(json.dumps(failures))
 """
 
-if not (ROOT / "nmpcrl/claims/by_runs.py").exists():  # where a claim is not one object yet
-    for rows in (FILES, LOCK, EDITS, PROBES):
-        del rows["claim"]
-
 each_row = pytest.mark.parametrize("name", EDITS)
 
 
