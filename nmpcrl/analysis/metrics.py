@@ -112,12 +112,6 @@ def theta_distance(a: Records, b: Records) -> float:
     return float(np.max(np.abs(first - second) / np.maximum(np.abs(first), np.abs(second))))
 
 
-def path_distance(a: Records, b: Records) -> float:
-    """Largest distance [m] between two robots that drive without noise side by side."""
-    (first, _), (second, _) = final_rollout(a), final_rollout(b)
-    return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))
-
-
 def obstacle_violations(states: Column, task: Task) -> Vector:
     """Xi of the worst obstacle, where it is above 0 by more than `TOUCH`: one value a violation."""
     worst = task.overlap(states).max(axis=-1)

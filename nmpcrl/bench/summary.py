@@ -63,7 +63,9 @@ def _microseconds(seconds: pd.Series) -> dict[str, float]:
 
 def learners(bench: Bench) -> pd.DataFrame:
     """What `time_learners` measured, times in milliseconds."""
-    return pd.DataFrame(bench["learners"])
+    table = pd.DataFrame(bench["learners"])
+    numbers = table.columns.difference(["solver", "learner"])
+    return table.astype(dict.fromkeys(numbers, float))  # JSON has None for what is not known
 
 
 def against_mpcrl(bench: Bench) -> tuple[float, float]:

@@ -1,24 +1,21 @@
 """What the convergence theorem of nonlinear TDC assumes, beside what is run: claim C8."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import Curvature
-from nmpcrl.claims.rule import NOT, REPRODUCED, UNDECIDABLE, Claim, Observations, Verdict
+from nmpcrl.claims.rule import (
+    NOT,
+    REPRODUCED,
+    UNDECIDABLE,
+    Assumption,
+    Claim,
+    Observations,
+    Verdict,
+)
 from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
-
-
-@dataclass(frozen=True, eq=False)
-class Assumption:
-    """One assumption of the theorem behind C8, beside what is run."""
-
-    theorem: str  # what Maei et al. (2009) assume
-    here: str  # what the paper does, with a measurement where one is possible
-    holds: bool
 
 
 class TheoremClaim(Claim):

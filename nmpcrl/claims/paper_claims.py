@@ -19,9 +19,19 @@ from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.summary import SIZES, experiment_of
-from nmpcrl.claims.assumptions import Assumption, TheoremClaim
+from nmpcrl.claims.assumptions import TheoremClaim
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values, beside
-from nmpcrl.claims.rule import CELL, Claim, Observations, Paths, Verdict, arms, median, shown
+from nmpcrl.claims.rule import (
+    CELL,
+    Assumption,
+    Claim,
+    Observations,
+    Paths,
+    Verdict,
+    arms,
+    median,
+    shown,
+)
 from nmpcrl.claims.timing import TimeClaim
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment

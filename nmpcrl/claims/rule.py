@@ -24,7 +24,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -33,9 +33,6 @@ from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column
-
-if TYPE_CHECKING:
-    from nmpcrl.claims.assumptions import Assumption
 
 MAJORITY = 0.5
 NEARLY_ALL = 0.9
@@ -76,13 +73,22 @@ class Verdict:
 
 
 @dataclass(frozen=True, eq=False)
+class Assumption:
+    """One assumption of the theorem behind C8, beside what is run."""
+
+    theorem: str  # what Maei et al. (2009) assume
+    here: str  # what the paper does, with a measurement where one is possible
+    holds: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Observations:
     """All that a claim may be judged by; each takes what it asks for."""
 
     runs: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `summary.table`
     paths: Paths = field(default_factory=dict)
     timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
-    assumptions: "tuple[Assumption, ...]" = ()  # of `audit`
+    assumptions: tuple[Assumption, ...] = ()  # of `audit`
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

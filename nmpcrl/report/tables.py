@@ -8,8 +8,16 @@ from html import escape
 import pandas as pd
 
 from nmpcrl.bench.targets import Target
-from nmpcrl.claims.assumptions import Assumption
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Outcome, Verdict
+from nmpcrl.claims.rule import (
+    NOT,
+    PARTLY,
+    REPRODUCED,
+    UNDECIDABLE,
+    Assumption,
+    Claim,
+    Outcome,
+    Verdict,
+)
 from nmpcrl.report.text import SURE, listed
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment

@@ -5,7 +5,7 @@ reading of the exploration decay, and seed. The variants change one other thing 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
@@ -108,10 +108,3 @@ def whole_study(episodes: int = paper.EPISODES) -> dict[Experiment, str]:
         for experiment in runs:
             named.setdefault(experiment, name)
     return named
-
-
-def base_of(experiment: Experiment, name: str) -> Experiment:
-    """The run of the main table that a run of variant `name` is held against."""
-    default = Experiment()
-    changed = {key: getattr(default, key) for key in VARIANTS[name].fields if key != "decay"}
-    return replace(experiment, **changed)

@@ -139,12 +139,6 @@ def test_the_distance_between_thetas_is_relative_and_symmetric():
     assert metrics.theta_distance(a, a) == 0
 
 
-def test_the_distance_between_paths_is_the_largest_at_one_time_and_ignores_the_heading():
-    a, b = records([[1]]), records([[1]])
-    b.evaluations["states"][-1, 2] = [3, 4, 100]
-    assert metrics.path_distance(a, b) == pytest.approx(5)
-
-
 def test_a_state_on_the_boundary_of_an_obstacle_is_no_violation():
     task = scene()
     clearance = 1.25

@@ -150,3 +150,10 @@ def test_the_printed_table_has_the_same_rows(measured):
     header, *rows = targets.rows(measured)
     assert header == ("what", "to reach", "measured", "outcome")
     assert [row[0] for row in rows] == list(outcomes(measured))
+
+
+def test_a_ratio_that_json_could_not_hold_is_not_known(measured):
+    measured["learners"]["ratio_low"] = [None] * len(measured["learners"]["ratio_low"])
+    ratios = summary.measured_ratios(measured)
+    assert np.isfinite(ratios.ratio).all()
+    assert summary.learners(measured).ratio_low.isna().all()

@@ -13,7 +13,6 @@ from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.analysis.summary import experiment_of, row, summarise, table
 from nmpcrl.claims import own_claims, paper_claims
-from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.by_runs import RunClaim
 from nmpcrl.claims.robustness import part_changes, variant_changes
 from nmpcrl.claims.rule import (
@@ -21,6 +20,7 @@ from nmpcrl.claims.rule import (
     PARTLY,
     REPRODUCED,
     UNDECIDABLE,
+    Assumption,
     Observations,
     Verdict,
 )

@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import interquartile_mean, rate
 from nmpcrl.claims import paper_claims
-from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import CLAIMS
-from nmpcrl.claims.rule import Observations, Verdict
+from nmpcrl.claims.rule import Assumption, Observations, Verdict
 from nmpcrl.report.figures import claims as figures
 from nmpcrl.study import Experiment
 from nmpcrl.study.records import Records

@@ -7,10 +7,9 @@ import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
 
-from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import CLAIMS
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Assumption, Verdict
 from nmpcrl.report import tables
 from nmpcrl.study import paper_runs
 from nmpcrl.study.departures import DEPARTURES

@@ -1,7 +1,7 @@
 """The study as a list of runs: what varies, and what each run is held against."""
 
 from collections import Counter
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -45,12 +45,19 @@ def test_every_run_of_the_study_has_its_frozen_arm_in_the_study():
     assert {frozen_arm(e) for e in study} <= set(study)
 
 
+def base_of(experiment: Experiment, name: str) -> Experiment:
+    """The run of the main table that a run of variant `name` is held against."""
+    default = Experiment()
+    changed = {key: getattr(default, key) for key in design.VARIANTS[name].fields if key != "decay"}
+    return replace(experiment, **changed)
+
+
 @pytest.mark.parametrize("name", design.VARIANTS)
 def test_a_variant_changes_one_thing(name):
     variant = design.VARIANTS[name]
     for experiment in design.variant(name):
         if experiment.learner != "frozen":
-            base = design.base_of(experiment, name)
+            base = base_of(experiment, name)
             assert differing(experiment, base) == set(variant.fields) - {"decay"}
             assert base in set(design.main_table())
 

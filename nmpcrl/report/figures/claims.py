@@ -21,10 +21,9 @@ from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import interquartile_mean, performance_profile
 from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import paper_claims
-from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.rule import Verdict
+from nmpcrl.claims.rule import Assumption, Verdict
 from nmpcrl.report.figures.axes import jitter, label_panel, logarithmic
 from nmpcrl.report.figures.panels import part, shares, strips
 from nmpcrl.report.figures.style import (
