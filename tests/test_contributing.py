@@ -190,11 +190,12 @@ from matplotlib.figure import Figure
 
 from nmpcrl.analysis.metrics import final_theta
 from nmpcrl.report.figures.style import dots, headed, page, subplots
+from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
 
 @page
-def ends(runs: Runs) -> Figure:
+def ends(runs: Runs[Records]) -> Figure:
     """The last theta of each run, a marker a learner."""
     figure, axes = subplots()
     for experiment, records in runs.items():
@@ -282,12 +283,16 @@ assert verdict.counts["all"][1] == 120
 assert "GES is at least as good as ES." in claim_table(own_claims.OWN_CLAIMS.values(), "")
 """,
     "figure": """
-from nmpcrl.report.figures.ends import ends
+import nbformat
+
 from nmpcrl.study import Experiment, Runs, run
 
 one = Experiment(episodes=1, steps=5)
-ends(Runs({one: run(one)})).savefig("ends.svg")
-assert "theta ends in 1 places" in ends(Runs({one: run(one)})).get_suptitle()
+cell = nbformat.read("book/02_expected_sarsa.ipynb", as_version=4).cells[-1]
+names = {"runs": Runs({one: run(one)})}
+exec(cell.source.replace("\\nends(", "\\nfigure = ends("), names)
+names["figure"].savefig("ends.svg")
+assert "theta ends in 1 places" in names["figure"].get_suptitle()
 """,
     "chapter": """
 import build
@@ -313,10 +318,6 @@ for name, probe in json.load(sys.stdin).items():
         failures[name] = traceback.format_exc()
 print(json.dumps(failures))
 """
-
-if not (ROOT / "nmpcrl/claims/by_runs.py").exists():  # where a claim is not one object yet
-    for rows in (FILES, LOCK, EDITS, PROBES):
-        del rows["claim"]
 
 each_row = pytest.mark.parametrize("name", EDITS)
 

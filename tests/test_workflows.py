@@ -1,0 +1,50 @@
+"""The workflows call what is there, and keep what the build writes."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+import yaml
+
+from nmpcrl.__main__ import main
+from nmpcrl.analysis import summaries
+
+ROOT = Path(__file__).resolve().parents[1]
+PATHS = sorted((ROOT / ".github/workflows").glob("*.yml"))
+TARGETS = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), flags=re.M)
+DRIVER = (ROOT / "book/build.py").read_text()
+
+each_workflow = pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+
+
+def steps(path: Path) -> list[dict]:
+    jobs = yaml.safe_load(path.read_text())["jobs"].values()
+    return [step for job in jobs for step in job["steps"]]
+
+
+@each_workflow
+def test_every_command_is_a_target_of_make_or_a_command_of_the_package(path):
+    lines = [step["run"] for step in steps(path) if "run" in step]
+    assert lines
+    for line in lines:
+        program, name, *arguments = shlex.split(line)
+        if program == "make":
+            assert name in TARGETS
+        else:
+            assert program == ".venv/bin/nmpcrl"
+            main.commands[name].make_context(name, arguments)
+
+
+@each_workflow
+def test_artifacts_are_kept_from_where_they_are_written(path, monkeypatch):
+    monkeypatch.delenv("NMPCRL_RUNS", raising=False)
+    kept = [step["with"] for step in steps(path) if "upload" in step.get("uses", "")]
+    assert kept
+    for place in " ".join(one["path"] for one in kept).split():
+        first, _, name = place.partition("/")
+        assert first == "_build" or place == str(summaries.folder())
+        if first == "_build":
+            assert f'place / "{name}' in DRIVER
+    names = [one["name"] for one in kept if "name" in one]
+    assert len(names) == len(set(names))
