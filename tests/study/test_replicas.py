@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.summary import RunSummary, separation, summarise
-from nmpcrl.report.figures import results
+from nmpcrl.report.figures import perturbed
 from nmpcrl.study import replicas
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.run import run
@@ -56,5 +56,5 @@ def test_a_run_learns_the_same_with_our_solver_as_with_ipopt():
 def test_the_figure_of_replicas_says_whose_difference_grew(end, title):
     experiment = Experiment(learner="DES", steps=5, episodes=2)
     apart = np.geomspace(1e-12, end, 10)
-    figure = results.replicas({experiment: apart}, np.full(10, 1e-10), replicas.PERTURBATION)
+    figure = perturbed.replicas({experiment: apart}, np.full(10, 1e-10), replicas.PERTURBATION)
     assert title in figure.get_suptitle()
