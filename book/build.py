@@ -33,11 +33,13 @@ import subprocess
 import sys
 import time
 import traceback
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from importlib.resources import as_file, files
 from multiprocessing import get_context
 from pathlib import Path
+from typing import IO, Any
 
 import click
 import nbformat
@@ -48,6 +50,8 @@ from papermill.exceptions import PapermillExecutionError
 from tqdm import tqdm
 
 logging.getLogger("papermill").setLevel(logging.ERROR)  # a page without parameters is no news
+
+Given = dict[str, Any]  # parameters of a chapter by name
 
 ROOT = Path(__file__).resolve().parent.parent
 SMOKE = {"episodes": 4, "length": "smoke", "layouts": ["A", "D"], "seeds": [0, 1], "budget": 40}
@@ -63,12 +67,12 @@ INDEX = """<!DOCTYPE html>
 class Failure(click.ClickException):
     """A sentence for the reader; the details are in a log."""
 
-    def show(self, file=None):
+    def show(self, file: IO[Any] | None = None) -> None:
         click.echo(self.message, file=sys.stderr)
 
 
 @contextmanager
-def reported(log: Path):
+def reported(log: Path) -> Iterator[None]:
     """Turn an error that no step foresaw into a sentence and a log."""
     try:
         yield
@@ -111,7 +115,7 @@ def known(chapter: str) -> Path:
     return paths[name]
 
 
-def refuse_unknown(notebook: Path, given: dict) -> None:
+def refuse_unknown(notebook: Path, given: Given) -> None:
     """Papermill only logs a misspelt name; here it ends the build."""
     names = parameters(notebook)
     for name in given:
@@ -125,7 +129,7 @@ def refuse_unknown(notebook: Path, given: dict) -> None:
 NEEDS = ("experiments", "summaries", "beforehand")
 
 
-def ask(notebook: Path, given: dict) -> dict[str, tuple]:
+def ask(notebook: Path, given: Given) -> dict[str, tuple[Any, ...]]:
     """What a chapter needs: run its parameters cell, set `given`, run its check cell.
 
     Returns what that cell gives each of `NEEDS`.
@@ -143,12 +147,12 @@ def ask(notebook: Path, given: dict) -> dict[str, tuple]:
     return {need: tuple(names.get(need, ())) for need in NEEDS}
 
 
-def nearest(name: str, names) -> str:
+def nearest(name: str, names: Iterable[str]) -> str:
     close = difflib.get_close_matches(name, names, n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 
-def listed(names) -> str:
+def listed(names: Iterable[str]) -> str:
     *most, last = names
     return f"{', '.join(most)} and {last}" if most else last
 
@@ -172,7 +176,7 @@ def mirror(place: Path, announcement: str) -> Path:
     return source
 
 
-def train(experiments: tuple, summaries: tuple) -> None:
+def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     """Run what is not stored yet; the bars are the store's."""
     from nmpcrl.analysis.summaries import fetch_summaries
     from nmpcrl.claims import published  # only here: a refusal should not wait for it
@@ -192,7 +196,7 @@ def train(experiments: tuple, summaries: tuple) -> None:
         )
 
 
-def execute(notebook: Path, target: Path, log: Path, given: dict) -> tuple[float, str]:
+def execute(notebook: Path, target: Path, log: Path, given: Given) -> tuple[float, str]:
     """Papermill one notebook; return the seconds it took and, if it failed, why in a sentence."""
     started = time.perf_counter()
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -218,11 +222,11 @@ def sentence(error: Exception) -> str:
     if not isinstance(error, PapermillExecutionError):
         return f"{type(error).__name__}: {error}"
     if error.ename == "ParameterError":
-        return error.evalue
+        return str(error.evalue)
     return f"cell {error.cell_index} failed with {error.ename}: {error.evalue}"
 
 
-def execute_all(place: Path, jobs: dict[Path, dict]) -> None:
+def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
     """Execute notebooks (path -> given parameters), and put them into the mirror."""
     executed, logs = place / "executed", place / "logs"
     shutil.rmtree(executed, ignore_errors=True)
@@ -277,7 +281,7 @@ def warnings(log: Path, most: int = 20) -> str:
     return "\n".join(f"  {line}" for line in (wrong[:most] or lines[-most:]))
 
 
-def in_cell(place: re.Match) -> str:
+def in_cell(place: re.Match[str]) -> str:
     """MyST-NB counts 10000 lines a cell, from cell 1: name the cell, from 0, and the line."""
     return f".ipynb, cell {int(place[1]) - 1}, line {int(place[2])}:"
 
@@ -286,9 +290,11 @@ def shown(path: Path) -> str:
     return os.path.relpath(path, ROOT)
 
 
-def values(pairs, raw, texts) -> dict:
+def values(
+    pairs: Iterable[tuple[str, str]], raw: Iterable[tuple[str, str]], texts: Iterable[str]
+) -> Given:
     """Parameters as papermill's own -p, -r and -y read them."""
-    given = {}
+    given: Given = {}
     for text in texts:
         try:
             given |= yaml.safe_load(text)
@@ -298,7 +304,7 @@ def values(pairs, raw, texts) -> dict:
     return given | dict(raw)
 
 
-def build(place: Path, jobs: dict[Path, dict], announcement: str, strict: bool) -> Path:
+def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool) -> Path:
     """The five steps."""
     with reported(place / "logs/build.log"):
         needs = [ask(notebook, given) for notebook, given in jobs.items()]
@@ -313,7 +319,7 @@ def build(place: Path, jobs: dict[Path, dict], announcement: str, strict: bool) 
     return place / "html"
 
 
-def build_chapter(name: str, given: dict) -> Path:
+def build_chapter(name: str, given: Given) -> Path:
     """Execute one chapter; the other pages are there to be referred to. Returns its page."""
     notebook = known(name)
     refuse_unknown(notebook, given)
@@ -325,7 +331,7 @@ def build_chapter(name: str, given: dict) -> Path:
 
 def build_book(smoke: bool) -> Path:
     """Execute every chapter. Returns the page to open."""
-    jobs = {notebook: {} for notebook in notebooks().values()}
+    jobs: dict[Path, Given] = {notebook: {} for notebook in notebooks().values()}
     if not smoke:
         return build(Path("_build"), jobs, "", strict=True) / "index.html"
     for notebook in jobs:
@@ -342,7 +348,13 @@ def build_book(smoke: bool) -> Path:
 )
 @click.option("-r", "raw", nargs=2, multiple=True, metavar="NAME TEXT", help="Kept as a text.")
 @click.option("-y", "texts", multiple=True, help="Parameters as YAML: '{seeds: [3]}'.")
-def main(smoke, chapter, pairs, raw, texts):
+def main(
+    smoke: bool,
+    chapter: str | None,
+    pairs: tuple[tuple[str, str], ...],
+    raw: tuple[tuple[str, str], ...],
+    texts: tuple[str, ...],
+) -> None:
     """Train what is missing, execute the chapters, build the book."""
     os.chdir(ROOT)
     given = values(pairs, raw, texts)

@@ -1,7 +1,8 @@
 """Reinforcement learning on top of nonlinear model predictive control: one paper, reproduced.
 
-Three layers, imported one way: `study` (what is measured) -> `learning` (how the parameters move)
--> `control` (what the controller is).
+Seven rooms, imported one way: `report` (what pages show) -> `claims` (verdicts) -> `analysis`
+(numbers) and `bench` (times) -> `study` (what is run, and where it is kept) -> `learning` (how the
+parameters move) -> `control` (what the controller is).
 """
 
 import numpy as np

@@ -93,8 +93,9 @@ def transposed(names: tuple[str, ...], rows: list[tuple]) -> dict[str, list]:
 def learner(solver: str, name: str) -> tuple:
     solve, fit = 1e3 * SOLVERS[solver], FIT if name in ("RDES", "DES") else None
     step = SOLVES[name] * solve + (fit or 0.0) + REST
-    hours = step * 39 / 3600
-    return solver, name, SOLVES[name], step, solve, fit, REST, hours, HOURS.get(name)
+    hours, ratio = step * 39 / 3600, step / (SOLVES["ES"] * solve + REST)
+    parts = (SOLVES[name], step, solve, fit, REST, hours, HOURS.get(name))
+    return solver, name, *parts, ratio, ratio - 0.01, ratio + 0.01, 0.0
 
 
 def growing(varied: str, sizes: tuple[int, ...], each: float) -> list[tuple]:
@@ -136,10 +137,14 @@ MEASURED = {
             "ms_per_rest",
             "hours",
             "hours_paper",
+            "ratio",
+            "ratio_low",
+            "ratio_high",
+            "waited",
         ),
         [learner(solver, name) for solver in ("riccati", "fatrop", "ipopt") for name in SOLVES],
     ),
-    "rival": {"learner": ["mpcrl", "mpcrl", "ES", "ES"], "seconds": [0.01, 0.01, 1e-4, 1e-4]},
+    "mpcrl": {"learner": ["mpcrl", "mpcrl", "ES", "ES"], "seconds": [0.01, 0.01, 1e-4, 1e-4]},
     "runs": {
         "learner": list(SOLVES),
         "episodes": [300] * 4,
@@ -163,7 +168,7 @@ MEASURED = {
 
 START_COST = 1000.0
 AROUND = np.array([[-2.5, 1.5], [-2.5, 8.0], [3.0, 8.0], [8.5, 8.0], [8.5, 2.0]])  # no obstacle
-DRIVE = np.column_stack([AROUND, [0.0, 0.0, 0.0, 0.0, np.pi / 2]])
+TRAJECTORY = np.column_stack([AROUND, [0.0, 0.0, 0.0, 0.0, np.pi / 2]])
 
 
 @pytest.fixture(scope="session")
@@ -196,7 +201,7 @@ def summary_of(
     swing: float = 0.0,
     training: float = 1.0,
     reached: int | None = None,
-    states: np.ndarray = DRIVE,
+    states: np.ndarray = TRAJECTORY,
     actions: np.ndarray | None = None,
     inside: tuple[int, int, int] = (0, 0, 0),
     imitation: tuple[float, float] = (0.5, 1.0),
@@ -210,7 +215,7 @@ def summary_of(
         swing: how much of the start's cost every other late rollout costs more.
         training: cost of its training episodes, over the start's.
         reached: after how many episodes it was stopped.
-        states: of its last drive without noise.
+        states: of its last rollout without noise.
         actions: likewise.
         inside: states in an obstacle by size, in its first episode.
         imitation: held-out errors with and without theta.

@@ -1,4 +1,4 @@
-"""The command `nmpcrl`, driven as a user drives it, on runs of a few short episodes."""
+"""The command `nmpcrl`, used as a user would, on runs of a few short episodes."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -10,7 +10,8 @@ from click.testing import CliRunner
 
 from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
-from nmpcrl.claims import publish, published
+from nmpcrl.claims import publish, published, rule
+from nmpcrl.claims.rule import Verdict
 from nmpcrl.study import Experiment, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 
@@ -259,3 +260,15 @@ def test_verify_says_that_what_is_published_is_damaged(command, trained, tmp_pat
     assert refused.exit_code == 1
     assert "is damaged" in refused.output
     assert len(refused.output.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("outcome", "code"), [(rule.PARTLY, 0), (rule.UNDECIDABLE, 1)])
+def test_bench_publishes_the_verdicts_on_time_only_where_they_are_decided(
+    command, monkeypatch, outcome, code
+):
+    judged = Verdict("C3", "half the time", outcome, "0.65 [0.62, 0.68]", "")
+    monkeypatch.setattr(publish, "publish_timing", lambda: (judged,))
+    done = command("bench", "--publish")
+    assert done.exit_code == code
+    assert f"C3: {outcome}. 0.65" in done.output
+    assert ("nothing is published" in done.output) == bool(code)

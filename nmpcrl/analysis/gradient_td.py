@@ -55,7 +55,8 @@ def directions(records: Records) -> Directions:
 
 
 def _norm(vectors: Matrix) -> Vector:
-    return np.linalg.norm(vectors, axis=1)
+    result: Vector = np.linalg.norm(vectors, axis=1)
+    return result
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,14 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Task
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.records import Column, Records, StepStatus
 from nmpcrl.study.records import final_cost as records_final_cost
 
 TOUCH = 1e-6  # a violation this small is the solver's tolerance, not a violation
 TIGHT = 0.999  # cosine from which two features are called parallel
+LATE = 20  # episodes that stand for the end of training; at most the second half
 
 
 def training_cost(records: Records) -> Vector:
@@ -43,7 +45,8 @@ def final_cost(records: Records) -> float:
 
 def final_theta(records: Records) -> Vector:
     """theta when training stopped, shape (d,)."""
-    return records.steps["theta"][-1]
+    result: Vector = records.steps["theta"][-1]
+    return result
 
 
 def final_rollout(records: Records) -> tuple[Column, Column]:
@@ -72,24 +75,35 @@ def late_cost_range_of(episode: Column, cost: Vector, episodes: int) -> float:
     return float((late.max() - late.min()) / cost[0])
 
 
-def cost_ratio(records: Records, frozen: Records, last: int = 20) -> float:
-    """Median training cost of the last episodes over that of the frozen arm under the same noise.
+def late_training_cost(cost: Vector) -> float:
+    """Median training cost of the last `LATE` episodes, or of the second half if that is fewer.
 
     An episode that was cut short, or never reached, costs infinitely much.
 
     Args:
-        records: a run.
-        frozen: the run of the frozen learner with the same seed, layout and decay.
-        last: how many episodes count; at most the second half of training.
+        cost: of each episode, as `training_cost` gives it, shape (episodes,).
     """
-    window = -min(last, max(1, records.experiment["episodes"] // 2))
-    late = np.nan_to_num(training_cost(records)[window:], nan=np.inf)
-    return float(np.median(late) / np.median(training_cost(frozen)[window:]))
+    window = min(LATE, max(1, len(cost) // 2))
+    return float(np.median(np.nan_to_num(cost[-window:], nan=np.inf)))
+
+
+def cost_ratio(cost: Vector, frozen: Vector) -> float:
+    """`late_training_cost` of a run over that of its frozen arm, which meets the same noise.
+
+    Infinite where the run lost half of its late episodes, so that it diverged; 0 where the frozen
+    arm did and the run did not; nan where both did. Then the frozen theta fares no better than the
+    one that was learned, and whether learning diverged cannot be said: the answer is missing.
+
+    Args:
+        cost: of each episode of the run, as `training_cost` gives it, shape (episodes,).
+        frozen: that of the run of the frozen learner with the same seed, layout and decay.
+    """
+    return late_training_cost(cost) / late_training_cost(frozen)
 
 
 def overshooting(records: Records) -> float:
-    """Share of the steps with alpha ||phi||^2 > 2, where a semi-gradient step overshoots."""
-    return float(np.mean(records.steps["alpha_phi2"] > 2))
+    """Share of the steps with alpha ||phi||^2 above `OVERSHOOT`."""
+    return float(np.mean(records.steps["alpha_phi2"] > OVERSHOOT))
 
 
 def theta_distance(a: Records, b: Records) -> float:
@@ -98,16 +112,11 @@ def theta_distance(a: Records, b: Records) -> float:
     return float(np.max(np.abs(first - second) / np.maximum(np.abs(first), np.abs(second))))
 
 
-def path_distance(a: Records, b: Records) -> float:
-    """Largest distance [m] between two robots that drive without noise side by side."""
-    (first, _), (second, _) = final_rollout(a), final_rollout(b)
-    return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))
-
-
 def obstacle_violations(states: Column, task: Task) -> Vector:
     """Xi of the worst obstacle, where it is above 0 by more than `TOUCH`: one value a violation."""
     worst = task.overlap(states).max(axis=-1)
-    return worst[worst > TOUCH]
+    result: Vector = worst[worst > TOUCH]
+    return result
 
 
 def input_violations(actions: Column, lower: Vector, upper: Vector) -> int:
@@ -169,7 +178,8 @@ def next_over_this(records: Records) -> Vector:
     this, after = steps["features"][:-1], steps["features"][1:]
     ratio = paper.GAMMA * np.sum(this * after, axis=1) / np.sum(this**2, axis=1)
     same_episode = steps["episode"][1:] == steps["episode"][:-1]
-    return ratio[same_episode & np.isfinite(ratio)]
+    result: Vector = ratio[same_episode & np.isfinite(ratio)]
+    return result
 
 
 def parallel_share(records: Records) -> float:

@@ -1,8 +1,8 @@
 """The best theta that a derivative-free search finds: how far from it does learning end?
 
 CMA-ES (Hansen 2016) minimises the noise-free cost that learning is judged by, which no learner
-ever sees, within a stated budget of drives. It is no learner: it needs whole drives without noise.
-What it finds bounds the family's best from one side only; a longer search may find better.
+ever sees, within a stated budget of rollouts. It is no learner: it needs whole rollouts without
+noise. What it finds bounds the family's best from one side only; a longer search may find better.
 """
 
 import json
@@ -25,12 +25,12 @@ from nmpcrl.study.executor import execute
 from nmpcrl.study.parameters import one_of, whole
 from nmpcrl.study.provenance import epochs, versions
 
-BUDGET = 2000  # drives without noise that a search may make
-LEAST = 40  # drives: the first one and some generations
-SPREAD = 0.3  # of the first drives, in units of `SCALE`
+BUDGET = 2000  # rollouts without noise that a search may make
+LEAST = 40  # rollouts: the first one and some generations
+SPREAD = 0.3  # of the first rollouts, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
-FAILED = 1e6  # stands for the cost of a drive on which a solve failed
+FAILED = 1e6  # stands for the cost of a rollout on which a solve failed
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,11 @@ class Search:
 
 @dataclass(frozen=True)
 class Found:
-    """Where a search ended, and each improvement on the way; the first drive is theta_init's."""
+    """Where a search ended, and each improvement on the way; the first rollout is theta_init's."""
 
     theta: tuple[float, ...]
-    made: int  # drives in all
-    drives: tuple[int, ...]  # at this one, from 1 on, ...
+    made: int  # rollouts in all
+    rollouts: tuple[int, ...]  # at this one, from 1 on, ...
     best: tuple[float, ...]  # ... the lowest cost so far fell to this
 
     @property
@@ -135,13 +135,13 @@ def search_all(
 
 
 def _found(tried: Vector, costs: Vector) -> Found:
-    """The result of drives with these thetas, shape (drives, d), and costs, shape (drives,)."""
+    """The result of rollouts with these thetas, shape (rollouts, d), and their costs."""
     lowest = np.minimum.accumulate(costs)
     fell = np.flatnonzero(np.r_[True, lowest[1:] < lowest[:-1]])
     return Found(
         theta=tuple(tried[fell[-1]].tolist()),
         made=len(costs),
-        drives=tuple((fell + 1).tolist()),
+        rollouts=tuple((fell + 1).tolist()),
         best=tuple(lowest[fell].tolist()),
     )
 

@@ -67,7 +67,8 @@ def interquartile_mean(scores: Vector, strata: Sequence[Hashable]) -> Estimate:
     known = _known(scores)
 
     def middle(*drawn: Vector) -> Vector:
-        return stats.trim_mean(known[np.concatenate(drawn, axis=-1)], 0.25, axis=-1)
+        result: Vector = stats.trim_mean(known[np.concatenate(drawn, axis=-1)], 0.25, axis=-1)
+        return result
 
     return _bootstrapped(middle, strata)
 
@@ -98,7 +99,8 @@ def probability_of_improvement(
         for pairs in drawn:
             one, other = ours[pairs][..., :, None], theirs[pairs][..., None, :]
             wins.append(((one < other) + 0.5 * (one == other)).mean(axis=(-2, -1)))
-        return np.mean(wins, axis=0)
+        result: Vector = np.mean(wins, axis=0)
+        return result
 
     return _bootstrapped(better, strata)
 

@@ -5,8 +5,7 @@ takes a hundredth of that and is enough for every figure, verdict and mechanism 
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +15,16 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.imitation import imitate
-from nmpcrl.analysis.metrics import TOUCH
+from nmpcrl.analysis.metrics import LATE, TOUCH
 from nmpcrl.control import Task
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.records import Column, Records, StepStatus, final_cost, load_arrays, save_arrays
 from nmpcrl.study.setup import controller_of
 
-SIZES = (TOUCH, 0.01, 0.1, np.inf)  # of an overlap Xi: small, medium and large violations
-LATE = 20  # episodes that stand for the end of training; at most the second half
+SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
+NAMES = ("learner", "layout", "decay", "seed", "episodes")  # of a row: without them it names no run
 IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
 
 
@@ -36,9 +36,9 @@ class RunSummary:
     the episode was cut short or never reached), steps, failed (0 or 1), restarts, inside (states
     in an obstacle, by `SIZES`, shape (episodes, 3)), overlap (largest Xi), outside (states out of
     the box), inputs (actions out of bounds), alpha_phi2 (largest alpha ||phi||^2), over (steps with
-    that above 2), delta (root mean square), loss (mean), bias and error (mean and root mean square
-    of the predicted minus the true next value), theta and w (at the end, shape (episodes, d)),
-    iterations (mean), seconds.
+    that above `OVERSHOOT`), delta (root mean square), loss (mean), bias and error (mean and root
+    mean square of the predicted minus the true next value), theta and w (at the end, shape
+    (episodes, d)), iterations (mean), seconds.
 
     Columns of `evaluations`, one row per rollout without noise: episode (so many were trained),
     theta (d,), cost (infinite where a solve failed), inside (3 counts), overlap (largest Xi),
@@ -106,7 +106,7 @@ def summarise(records: Records) -> RunSummary:
 def row(summary: RunSummary) -> dict[str, Any]:
     """One flat row: the experiment's fields, then what became of it."""
     experiment, episodes, evaluations = summary.experiment, summary.episodes, summary.evaluations
-    fields = experiment | {"theta": " ".join(f"{value!r}" for value in experiment["theta"])}
+    named = experiment | {"theta": " ".join(f"{value!r}" for value in experiment["theta"])}
     late = slice(-min(LATE, max(1, experiment["episodes"] // 2)), None)
     cost = evaluations["cost"]
     columns = {
@@ -117,7 +117,7 @@ def row(summary: RunSummary) -> dict[str, Any]:
         "late_cost_range": metrics.late_cost_range_of(
             evaluations["episode"], cost, experiment["episodes"]
         ),
-        "training_cost": float(np.median(np.nan_to_num(episodes["cost"][late], nan=np.inf))),
+        "training_cost": metrics.late_training_cost(episodes["cost"]),
         "cut_short": int(np.isnan(episodes["cost"]).sum()),
         "failed": int(episodes["failed"].sum()),
         "restarts": int(episodes["restarts"].sum()),
@@ -133,10 +133,7 @@ def row(summary: RunSummary) -> dict[str, Any]:
     }
     for name, table in (("inside", episodes), ("eval_inside", evaluations)):
         counts = table["inside"].sum(axis=0)
-        columns |= {
-            f"{name}_{size}": int(count)
-            for size, count in zip(("small", "medium", "large"), counts, strict=True)
-        }
+        columns |= {f"{name}_{size}": int(count) for size, count in zip(SIZES, counts, strict=True)}
     columns |= {
         "worst_overlap": float(np.nanmax(episodes["overlap"])),
         "eval_worst_overlap": float(np.nanmax(evaluations["overlap"])),
@@ -148,20 +145,41 @@ def row(summary: RunSummary) -> dict[str, Any]:
         "imitation_with": imitation.get("with_theta", np.nan),
         "imitation_without": imitation.get("without_theta", np.nan),
     }
-    return fields | columns
+    return named | columns
+
+
+def experiment_of(row: Mapping[str, Any]) -> Experiment:
+    """The experiment that a `row` summarises.
+
+    A field for which an older table has no column takes its default.
+
+    Raises:
+        LookupError: one of `NAMES` is missing.
+    """
+    missing = {one.name for one in fields(Experiment)} - row.keys()
+    if nameless := missing & set(NAMES):
+        raise LookupError(f"there is no column {min(nameless)}")
+    named = {one.name: row[one.name] for one in fields(Experiment) if one.name not in missing}
+    if "theta" in named:
+        named["theta"] = tuple(float(value) for value in named["theta"].split())
+    return Experiment(**named)
 
 
 def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> pd.DataFrame:
-    """One `row` a run, with `cost_ratio`: its training cost over that of its frozen arm.
-
-    `cost_ratio` is nan where that arm is not among the runs.
-    """
+    """One `row` a run, with `cost_ratio` as `cost_ratios` gives it."""
     listed = list(summaries.values() if isinstance(summaries, Mapping) else summaries)
     rows = {one.name: row(one) for one in listed}
-    for experiment, values in rows.items():
-        arm = rows.get(frozen_arm(experiment))
-        values["cost_ratio"] = values["training_cost"] / arm["training_cost"] if arm else np.nan
-    return pd.DataFrame(list(rows.values()))
+    ratios = cost_ratios(rows)
+    return pd.DataFrame([values | {"cost_ratio": ratios[e]} for e, values in rows.items()])
+
+
+def cost_ratios(rows: Mapping[Experiment, Mapping[str, Any]]) -> dict[Experiment, float]:
+    """`metrics.cost_ratio` of each `row`; nan where its frozen arm is not among them."""
+    arms = {e: rows.get(frozen_arm(e)) for e in rows}
+    return {
+        e: one["training_cost"] / arm["training_cost"] if (arm := arms[e]) else np.nan
+        for e, one in rows.items()
+    }
 
 
 def tidy(summaries: Iterable[RunSummary]) -> pd.DataFrame:
@@ -182,7 +200,8 @@ def tidy(summaries: Iterable[RunSummary]) -> pd.DataFrame:
 def separation(one: RunSummary, other: RunSummary) -> Vector:
     """The largest difference of any component of theta, after each episode that both reached."""
     apart = np.abs(one.episodes["theta"] - other.episodes["theta"]).max(axis=1)
-    return apart[np.isfinite(apart)]
+    result: Vector = apart[np.isfinite(apart)]
+    return result
 
 
 def _episodes(records: Records, task: Task, lower: Vector, upper: Vector) -> dict[str, Column]:
@@ -203,7 +222,7 @@ def _episodes(records: Records, task: Task, lower: Vector, upper: Vector) -> dic
         "outside": by.sum(out).astype(int),
         "inputs": by.sum(beyond).astype(int),
         "alpha_phi2": by.reduce(np.fmax, steps["alpha_phi2"]),
-        "over": by.sum(steps["alpha_phi2"] > 2).astype(int),
+        "over": by.sum(steps["alpha_phi2"] > OVERSHOOT).astype(int),
         "delta": np.sqrt(by.mean(steps["delta"] ** 2)),
         "loss": by.mean(steps["loss"]),
         "bias": by.mean(wrong),
@@ -228,12 +247,13 @@ class _ByEpisode:
     def mean(self, column: Column) -> Vector:
         known = np.isfinite(column)
         count = self.sum(known)
-        return np.divide(
+        result: Vector = np.divide(
             self.sum(np.where(known, column, 0.0)),
             count,
             np.full(count.shape, np.nan),
             where=count > 0,
         )
+        return result
 
     def reduce(self, function: np.ufunc, column: Column) -> Vector:
         return self._spread(function.reduceat(column, self._first))
@@ -249,12 +269,14 @@ class _ByEpisode:
 
 def _sizes(overlap: Column) -> Column:
     """Whether overlaps are of each of `SIZES`, along a new last axis of length 3."""
-    return np.stack([(overlap > low) & (overlap <= high) for low, high in pairwise(SIZES)], axis=-1)
+    ranges = SIZES.values()
+    return np.stack([(overlap > low) & (overlap <= high) for low, high in ranges], axis=-1)
 
 
 def _distance(states: Column, task: Task) -> Vector:
     """Distance to the target at the end of each rollout, shape (rollouts,)."""
-    return np.linalg.norm(states[:, -1] - task.target, axis=-1)
+    result: Vector = np.linalg.norm(states[:, -1] - task.target, axis=-1)
+    return result
 
 
 def _median(values: Vector) -> float:

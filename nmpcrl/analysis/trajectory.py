@@ -1,4 +1,4 @@
-"""A drive in plain words: how long, how far, how close to the obstacles, and through which gaps."""
+"""What a closed-loop trajectory is like: its length, its clearance, and the gaps on its way."""
 
 from dataclasses import dataclass
 
@@ -11,28 +11,28 @@ from nmpcrl.study.records import Column
 
 
 @dataclass(frozen=True)
-class Drive:
-    """What somebody would say who had watched it."""
+class Trajectory:
+    """What is seen of a rollout without noise."""
 
     arrival: float  # [s] until it stays within `ARRIVED` of the target's place; infinite if never
-    length: float  # of the road [m]
-    room: float  # least distance of the robot's side from an obstacle's [m]; negative inside
-    penalty: float  # sum of Upsilon over the drive, what it is charged for coming close
+    length: float  # of the path [m]
+    clearance: float  # least distance of the robot's side from an obstacle's [m]; negative inside
+    penalty: float  # sum of Upsilon over the rollout, what it is charged for coming close
 
 
-def described(states: Column, task: Task, period: float) -> Drive:
-    """Look at the states of a drive, shape (K + 1, n), one a `period` [s]; nan after a failure."""
-    driven = states[np.isfinite(states).all(axis=1)]
-    away = np.linalg.norm(driven - task.target, axis=1)
-    late = np.flatnonzero(np.linalg.norm((driven - task.target)[:, :2], axis=1) > ARRIVED)
-    missed = len(driven) < len(states) or len(driven) - 1 in late
+def describe(states: Column, task: Task, period: float) -> Trajectory:
+    """The states of a rollout, shape (K + 1, n), one a `period` [s]; nan after a failed solve."""
+    reached = states[np.isfinite(states).all(axis=1)]
+    away = np.linalg.norm(reached - task.target, axis=1)
+    late = np.flatnonzero(np.linalg.norm((reached - task.target)[:, :2], axis=1) > ARRIVED)
+    missed = len(reached) < len(states) or len(reached) - 1 in late
     x, y, clearance = task.discs
-    apart = np.hypot(driven[:, :1] - x, driven[:, 1:2] - y) - clearance / 2
-    charged = driven[away >= task.near]  # nearer to the target, the input is charged instead
-    return Drive(
+    distances = np.hypot(reached[:, :1] - x, reached[:, 1:2] - y) - clearance / 2
+    charged = reached[away >= task.near]  # nearer to the target, the input is charged instead
+    return Trajectory(
         arrival=np.inf if missed else period * int(max(late, default=-1) + 1),
-        length=float(np.linalg.norm(np.diff(driven[:, :2], axis=0), axis=1).sum()),
-        room=float(apart.min()),
+        length=float(np.linalg.norm(np.diff(reached[:, :2], axis=0), axis=1).sum()),
+        clearance=float(distances.min()),
         penalty=float(sum(map(task.collision_penalty, charged))),
     )
 

@@ -1,4 +1,4 @@
-"""The rival: Q-learning by mpcrl, the library of this field, on the paper's problem.
+"""The baseline: Q-learning by mpcrl, the library of this field, on the paper's problem.
 
 `LstdQLearningAgent` of mpcrl (F. Airaldi) learns as `semi_gradient` does, from two solves and a
 gradient a step. It is set up as its examples are: csnlp writes the problem in SX, each solve starts

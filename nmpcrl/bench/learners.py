@@ -2,11 +2,14 @@
 
 import time
 from collections.abc import Iterator
+from dataclasses import astuple
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from nmpcrl import Matrix
+from nmpcrl.bench.paired import Ratio, paired_ratio
 from nmpcrl.bench.solves import Columns
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning.rollout import Persistent
@@ -15,13 +18,17 @@ from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.setup import prepare
 
+SETTLED = max(paper.BATCH, paper.STEPS)  # steps before counting: the networks are fitted then
+REFERENCE = "ES"  # whose step the others' are compared with
+COMPARED = ["ratio", "ratio_low", "ratio_high", "waited"]  # columns: the fields of `Ratio`
 TURN = 20  # steps that a learner takes at a time: then the caches hold what its own loop leaves
 
 
 def learners(steps: int) -> Columns:
     """Table II with every solver: the columns of `time_learners`; None where there is no number."""
     table = time_learners(steps=steps, turn=TURN).astype(object)
-    return table.where(table.notna(), None).to_dict("list")
+    result: Columns = table.where(table.notna(), None).to_dict("list")
+    return result
 
 
 def against_mpcrl(rounds: int, steps: int) -> Columns:
@@ -61,14 +68,18 @@ PAPER_HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}  # Table II: training time 
 def time_learners(
     learners: tuple[str, ...] = ("ES", "GES", "RDES", "DES"),
     solvers: tuple[str, ...] = tuple(SOLVERS),
-    steps: int = 400,
+    steps: int = 3 * paper.STEPS,
     turn: int = 1,
 ) -> pd.DataFrame:
     """Time of one learning step, one row a learner and solver.
 
     All take some steps each in turn, in this process and with one thread, so that a change of the
     machine's speed meets all alike; in a new order each time, because whoever follows a network's
-    fit finds the processor's cache full of it. Counting starts when the networks are fitted.
+    fit finds the processor's cache full of it. Counting starts with the second episode, when the
+    networks are fitted; by default it covers whole episodes.
+
+    All times are the processor's, and the parts of a step get their share of it. `paired` says why,
+    and how the steps of two learners are compared.
 
     Args:
         learners: names, as `Experiment` knows them.
@@ -80,8 +91,9 @@ def time_learners(
     Returns:
         Columns solver, learner, solves (per step), ms_per_step, ms_per_solve, ms_per_fit (nan where
         there is no fit), ms_per_rest (plant, cost, update and the loop around them), which are
-        medians, hours (the median step times the paper's 300 x 130 steps), and hours_paper (Table
-        II; nan for DES, which is not in it).
+        medians, hours (the median step times the paper's 300 x 130 steps), hours_paper (Table II;
+        nan for DES, which is not in it), and of `Ratio` to ES: ratio, ratio_low, ratio_high and
+        waited (nan where ES is not among the learners).
     """
     runs = {
         (solver, learner): learn(learner, solver=solver)
@@ -90,34 +102,54 @@ def time_learners(
     }
     times: dict[tuple[str, str], list[tuple[float, ...]]] = {name: [] for name in runs}
     names, rng = list(runs), np.random.default_rng(0)
-    for first in range(0, paper.BATCH + steps, turn):
+    for first in range(0, SETTLED + steps, turn):
         for i in rng.permutation(len(names)):
-            for _ in range(min(turn, paper.BATCH + steps - first)):
+            for _ in range(min(turn, SETTLED + steps - first)):
                 times[names[i]].append(_timed(runs[names[i]]))
-    rows = []
-    for (solver, learner), parts in times.items():
-        solves, solving, fitting, whole = np.array(parts[paper.BATCH :]).T
-        step = float(np.median(whole))
-        rows.append(
-            {
-                "solver": solver,
-                "learner": learner,
-                "solves": float(solves.mean()),
-                "ms_per_step": 1e3 * step,
-                "ms_per_solve": 1e3 * float(np.median(solving / solves)),
-                "ms_per_fit": 1e3 * float(np.median(fitting)) if fitting.any() else np.nan,
-                "ms_per_rest": 1e3 * float(np.median(whole - solving - fitting)),
-                "hours": step * paper.EPISODES * paper.STEPS / 3600,
-                "hours_paper": PAPER_HOURS.get(learner, np.nan),
-            }
-        )
-    return pd.DataFrame(rows)
+    counted = {name: np.array(rows[SETTLED:]).T for name, rows in times.items()}
+    rows = [
+        _medians(parts)
+        | {"hours_paper": PAPER_HOURS.get(learner, np.nan)}
+        | _against(parts, counted.get((solver, REFERENCE)))
+        for (solver, learner), parts in counted.items()
+    ]
+    named = pd.DataFrame(list(counted), columns=["solver", "learner"])
+    return named.join(pd.DataFrame(rows))
 
 
-def ratio(timings: pd.DataFrame, solver: str, learner: str, reference: str = "ES") -> float:
-    """Time of a learner's step over that of the reference's, with one solver."""
-    per_step = timings[timings.solver == solver].set_index("learner").ms_per_step
-    return float(per_step[learner] / per_step[reference])
+def _medians(parts: Matrix) -> dict[str, float]:
+    """What a step of one learner is made of; `parts` are the rows of `_timed`, one a column."""
+    solves, solving, fitting, passed, work = parts
+    share = work / passed  # what the processor did of each part, which has only the other clock
+    step = float(np.median(work))
+    return {
+        "solves": float(solves.mean()),
+        "ms_per_step": 1e3 * step,
+        "ms_per_solve": 1e3 * float(np.median(share * solving / solves)),
+        "ms_per_fit": 1e3 * float(np.median(share * fitting)) if fitting.any() else np.nan,
+        "ms_per_rest": 1e3 * float(np.median(work - share * (solving + fitting))),
+        "hours": step * paper.EPISODES * paper.STEPS / 3600,
+    }
+
+
+def _against(mine: Matrix, reference: Matrix | None) -> dict[str, float]:
+    """The columns of a row that compare it with the reference."""
+    if reference is None:
+        return dict.fromkeys(COMPARED, np.nan)
+    (*_, passed, work), (*_, their_passed, theirs) = mine, reference
+    return dict(
+        zip(COMPARED, astuple(paired_ratio(work, theirs, passed, their_passed)), strict=True)
+    )
+
+
+def ratio(timings: pd.DataFrame, solver: str, learner: str) -> Ratio:
+    """Time of a learner's step over that of one of ES with the same solver.
+
+    Raises:
+        KeyError: the learner was not timed with this solver.
+    """
+    row = timings.set_index(["solver", "learner"]).loc[(solver, learner)]
+    return Ratio(*(float(row[name]) for name in COMPARED))
 
 
 def learn(learner: str, **fields: Any) -> Iterator[Step]:
@@ -128,15 +160,18 @@ def learn(learner: str, **fields: Any) -> Iterator[Step]:
     return train(learning, controller, weights, explore)
 
 
-def _timed(steps: Iterator[Step]) -> tuple[float, float, float, float]:
-    """The next step's number of solves, their time, the network's and all [s]; none fails here."""
-    began = time.perf_counter()
+def _timed(steps: Iterator[Step]) -> tuple[float, ...]:
+    """The next step: its number of solves; the time [s] of these, of the network and of all.
+
+    The last number is the processor's time of all, of every thread. No solve fails here.
+    """
+    began, worked = time.perf_counter(), time.process_time()
     step = next(steps)
-    whole = time.perf_counter() - began
+    work, passed = time.process_time() - worked, time.perf_counter() - began
     if step.solution is None or step.update is None:
         raise RuntimeError(f"a solve failed while timing: {step.failure}")
     successor = step.update.successor
     second = successor.solution if successor else None
     solving = step.solution.seconds + (second.seconds if second else 0.0)
     fitting = successor.seconds if successor else 0.0
-    return (2.0 if second else 1.0), solving, fitting, whole
+    return (2.0 if second else 1.0), solving, fitting, passed, work

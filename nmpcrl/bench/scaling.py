@@ -14,14 +14,15 @@ from nmpcrl.study import paper
 
 HORIZONS = (5, 10, 20, 40, 80)
 OBSTACLES = (1, 4, 8, 16, 32)
-BESIDE = [(x, y) for y in (8.5, 7.5, 6.5, 5.5) for x in np.linspace(-2.5, 8.5, 8)]  # the road [m]
+ROWS = (8.5, 7.5, 6.5, 5.5)  # y of the obstacles beside the trajectory [m]
+BESIDE = [(x, y) for y in ROWS for x in np.linspace(-2.5, 8.5, 8)]
 
 
 def solve_times(episodes: int, steps: int) -> Columns:
     """The default solver in the closed loop without noise, one solve of every size in turn.
 
-    Every size drives on its own. Obstacles are added beside the road, so that the plans, and with
-    them the number of iterations, stay what they are.
+    Every size has a closed loop of its own. Obstacles are added beside the trajectory, so that the
+    plans, and with them the number of iterations, stay what they are.
 
     Returns:
         A row a warm solve: varied ("horizon" or "obstacles"), size, seconds, iterations.
@@ -49,7 +50,7 @@ def solve_times(episodes: int, steps: int) -> Columns:
 
 
 def _crowded(count: int) -> Nmpc:
-    """The paper's controller with the first of its obstacles, and all others beside the road."""
+    """The paper's controller with one of its obstacles, and all others beside the trajectory."""
     task, beside = paper.task(), [Obstacle(*centre) for centre in BESIDE]
     return Nmpc(
         plant=paper.nmpc().plant,

@@ -49,7 +49,7 @@ def interleaved(episodes: int, steps: int) -> Columns:
     rows = []
     for loop, noise in LOOPS.items():
         for _ in range(episodes):
-            states = [state for state, _, _ in drive(paper.nmpc(), noise, rng, steps)]
+            states = [state for state, _, _ in closed_loop(paper.nmpc(), noise, rng, steps)]
             rows += [(loop, *row) for row in _episode(states, named, rng)]
     names = ("loop", "solver", "warm", "seconds", "iterations", "suboptimality")
     return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
@@ -85,13 +85,13 @@ def own_loop(episodes: int, steps: int) -> Columns:
     columns: Columns = {"loop": [], "seconds": []}
     for _ in range(episodes):
         for loop, noise in LOOPS.items():
-            times = [seconds for _, _, seconds in drive(nmpc, noise, rng, steps)][1:]
+            times = [seconds for _, _, seconds in closed_loop(nmpc, noise, rng, steps)][1:]
             columns["loop"] += [loop] * len(times)
             columns["seconds"] += times
     return columns
 
 
-def drive(
+def closed_loop(
     nmpc: Nmpc, noise: float, rng: np.random.Generator, steps: int
 ) -> Iterator[tuple[Vector, Solution, float]]:
     """The closed loop from the start: each state, its solution, and how long the solve took [s]."""
@@ -107,12 +107,14 @@ def drive(
 def parts(episodes: int) -> Columns:
     """What a solve and the rest of a learning step are made of: part, seconds (medians).
 
-    Measured in the closed loop without noise, of which so many episodes are driven.
+    Measured in the closed loop without noise, for so many episodes.
     """
     (nmpc, compiled), network = _watched(), _network()
     spent: dict[str, list[float]] = {}
     for _ in range(episodes):
-        for state, solution, seconds in drive(nmpc, 0.0, np.random.default_rng(0), paper.STEPS):
+        for state, solution, seconds in closed_loop(
+            nmpc, 0.0, np.random.default_rng(0), paper.STEPS
+        ):
             inner, action = compiled[-1], solution.action
             spent.setdefault("solve, compiled part", []).append(inner)
             spent.setdefault("solve, Python around it", []).append(seconds - inner)

@@ -36,7 +36,7 @@ class Length:
     loops: int  # episodes of the default solver's own loop, and of every other small measure
     turns: int  # learning steps of every learner with every solver
     rounds: int  # of mpcrl
-    rival_steps: int  # of each round
+    mpcrl_steps: int  # of each round
     run: int  # episodes of a whole run
     learners: tuple[str, ...]  # whose whole runs are measured
     seeds: int  # runs at once
@@ -52,7 +52,7 @@ LENGTHS = {  # from the shortest
         loops=1,
         turns=20,
         rounds=1,
-        rival_steps=8,
+        mpcrl_steps=8,
         run=4,
         learners=("ES", "RDES"),
         seeds=0,
@@ -66,7 +66,7 @@ LENGTHS = {  # from the shortest
         loops=10,
         turns=120,
         rounds=2,
-        rival_steps=40,
+        mpcrl_steps=40,
         run=30,
         learners=ALL,
         seeds=6,
@@ -80,7 +80,7 @@ LENGTHS = {  # from the shortest
         loops=40,
         turns=400,
         rounds=5,
-        rival_steps=60,
+        mpcrl_steps=60,
         run=paper.EPISODES,
         learners=ALL,
         seeds=12,
@@ -160,8 +160,8 @@ def _stages(size: Length) -> list[tuple[str, Callable[[], Bench]]]:
         return {"runs": totals, "episodes": progress}
 
     def steps() -> Bench:
-        rival = against_mpcrl(size.rounds, size.rival_steps)
-        return {"learners": learners(size.turns), "rival": rival}
+        steps = against_mpcrl(size.rounds, size.mpcrl_steps)
+        return {"learners": learners(size.turns), "mpcrl": steps}
 
     return [
         ("every solver", lambda: {"solves": interleaved(size.episodes, size.problems)}),
@@ -190,7 +190,7 @@ def depends_on() -> str:
 def versions() -> dict[str, str | None]:
     """The versions that the times depend on."""
     try:
-        rival = version("mpcrl")
+        found: str | None = version("mpcrl")
     except PackageNotFoundError:
-        rival = None
-    return {**provenance.environment(), "mpcrl": rival}
+        found = None
+    return {**provenance.environment(), "mpcrl": found}

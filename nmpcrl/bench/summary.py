@@ -66,9 +66,9 @@ def learners(bench: Bench) -> pd.DataFrame:
     return pd.DataFrame(bench["learners"])
 
 
-def rival(bench: Bench) -> tuple[float, float]:
+def against_mpcrl(bench: Bench) -> tuple[float, float]:
     """A learning step of mpcrl and one of ES, medians [ms]; nan where mpcrl is not installed."""
-    steps = pd.DataFrame(bench["rival"], dtype=object).astype({"seconds": float})
+    steps = pd.DataFrame(bench["mpcrl"], dtype=object).astype({"seconds": float})
     theirs, ours = (steps.seconds[steps.learner == name].median() for name in ("mpcrl", "ES"))
     return 1e3 * float(theirs), 1e3 * float(ours)
 
@@ -195,6 +195,6 @@ def measured_ratios(bench: Bench) -> pd.DataFrame:
         rows[solver] = {
             "solve": mine["RDES"],
             "solve_es": mine["ES"],
-            "ratio": ratio(table, solver, "RDES"),
+            "ratio": ratio(table, solver, "RDES").value,
         }
     return pd.DataFrame.from_dict(rows, orient="index")

@@ -12,7 +12,7 @@ from nmpcrl.study import paper
 
 SOLVE = (45.0, 120.0)  # [us] median and 95th percentile of a solve in its own loop
 TIMES = {"fatrop": 15.0, "ipopt": 40.0, "ipopt MX": 90.0}  # as long as with riccati
-RIVAL = 60.0  # times as long as a step of ES
+MPCRL = 60.0  # times as long as a step of ES
 RUN = {"ES": 5.0, "GES": 5.0, "RDES": 22.0, "DES": 22.0}  # [s] of a whole run
 LINEAR = 1.5
 SPEED_UP = 1.8  # of two workers
@@ -76,16 +76,16 @@ def _against_others(bench: Bench) -> Iterator[Target]:
             shown,
             bool((times.loc[solver] >= least).all()),
         )
-    theirs, ours = summary.rival(bench)
+    theirs, ours = summary.against_mpcrl(bench)
     yield Target(
         "a learning step of mpcrl, beside one of ES",
-        f"at least {RIVAL:.0f}x as long",
+        f"at least {MPCRL:.0f}x as long",
         f"{theirs / ours:.0f}x ({theirs:.1f} ms, {1e3 * ours:.0f} µs)" if theirs > 0 else "–",
-        bool(theirs / ours >= RIVAL) if theirs > 0 else None,
+        bool(theirs / ours >= MPCRL) if theirs > 0 else None,
     )
 
 
-NAMES = {"fatrop": "fatrop", "ipopt": "Ipopt (SX)", "ipopt MX": "Ipopt as usually written (MX)"}
+NAMES = {"fatrop": "fatrop", "ipopt": "Ipopt (SX)", "ipopt MX": "Ipopt as commonly written (MX)"}
 
 
 def _runs(bench: Bench) -> Iterator[Target]:

@@ -1,25 +1,39 @@
 """What the convergence theorem of nonlinear TDC assumes, beside what is run: claim C8."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import Curvature
+from nmpcrl.claims.rule import (
+    NOT,
+    REPRODUCED,
+    UNDECIDABLE,
+    Assumption,
+    Claim,
+    Observations,
+    Verdict,
+)
 from nmpcrl.study import paper
+from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
 
-@dataclass(frozen=True, eq=False)
-class Assumption:
-    """One assumption of the theorem behind C8, beside what is run."""
+class TheoremClaim(Claim):
+    """A claim that rests on a theorem: it holds if what is run meets all of the assumptions."""
 
-    theorem: str  # what Maei et al. (2009) assume
-    here: str  # what the paper does, with a measurement where one is possible
-    holds: bool
+    def judge(self, observed: Observations) -> Verdict:
+        """The verdict; one assumption that does not hold is enough against it."""
+        assumptions = observed.assumptions
+        broken = [a.theorem for a in assumptions if not a.holds]
+        listed = f": {'; '.join(broken)}" if broken else ""
+        return self.verdict(
+            UNDECIDABLE if not assumptions else NOT if broken else REPRODUCED,
+            f"{len(broken)} of the theorem's {len(assumptions)} assumptions do not hold for what is"
+            f" run{listed}.",
+        )
 
 
-def audit(study: Runs, curvature: Curvature) -> tuple[Assumption, ...]:
+def audit(study: Runs[Records], curvature: Curvature) -> tuple[Assumption, ...]:
     """The assumptions of the convergence theorem of nonlinear TDC, beside what is run."""
     ges = study.select(learner="GES")
     experiment = next(iter(ges))

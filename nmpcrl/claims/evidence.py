@@ -12,7 +12,7 @@ from functools import cached_property
 import pandas as pd
 
 from nmpcrl.analysis.summaries import fetch_summaries
-from nmpcrl.analysis.summary import RunSummary, table
+from nmpcrl.analysis.summary import RunSummary, cost_ratios, table
 from nmpcrl.claims.published import failure_modes_of, load
 from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
@@ -114,13 +114,13 @@ def gather(
     runs = pd.DataFrame([rows[e] for e in wanted])
     runs["variant"] = list(wanted.values())
     runs["source"] = ["fresh" if e in here else "published" for e in wanted]
-    arms = [rows.get(frozen_arm(e), {}).get("training_cost") for e in wanted]
-    runs["cost_ratio"] = runs.training_cost / pd.Series(arms, dtype=float)
+    ratios = cost_ratios(rows)
+    runs["cost_ratio"] = [ratios[e] for e in wanted]
     return Evidence(Runs(summaries), runs)
 
 
 def paths(evidence: Evidence) -> Mapping[Experiment, Column]:
-    """States of each run's last drive without noise, as `paper_claims.judge` takes them."""
+    """States of each run's last rollout, as `paper_claims.judge` takes them."""
     return {experiment: summary.states for experiment, summary in evidence.summaries.items()}
 
 

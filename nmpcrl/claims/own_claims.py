@@ -1,103 +1,56 @@
 """What we add to the paper: learners that it does not have, held against those that it has.
 
-Decided as the paper's claims are, by the thresholds of `claims` and the rule of `verdicts`, and
+Decided as the paper's claims are, by the thresholds of `paper_claims` and the rule of `rule`, and
 fixed with them before they were put to the study. A claim is judged wherever its learner was run.
 """
 
-import numpy as np
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import pandas as pd
 
 from nmpcrl.analysis.statistics import probability_of_improvement
-from nmpcrl.claims.paper_claims import BETTER, SAME_COST, costlier, gain
-from nmpcrl.claims.rule import Claim, Verdict, answered, arms, median, settle, shown
+from nmpcrl.claims.by_runs import AtMost, RunClaim, Values
+from nmpcrl.claims.paper_claims import BETTER, SAME_COST, cost_difference, cost_reduction
+from nmpcrl.claims.rule import Observations, Paths, Verdict, arms, median, shown
 from nmpcrl.study.experiment import PAPER
 
-MEASURE = "final noise-free costs, in shares of theta_init's"
 
-ADDITIONS = {
-    claim.name: claim
-    for claim in (
-        Claim(
-            "B1",
-            "Exact TDC is at least as good as GES.",
-            "Does TDC end no costlier than GES with the same layout, decay and seed?",
-            MEASURE,
-            f"costlier by at most {SAME_COST:.0%}",
-            would_change="The step size of w, which is ours.",
-            learners=("TDC", "GES"),
-        ),
-        Claim(
-            "B2",
-            "The direction of a step matters: ES beats steps of its length in random directions.",
-            "Does ES end cheaper than the random walk with the same layout, decay and seed?",
-            MEASURE,
-            f"cheaper by at least {BETTER:.0%}",
-            would_change="Layouts in which theta_init can hardly be improved.",
-            learners=("ES", "random"),
-        ),
-        Claim(
-            "B3",
-            "Only the length of its steps sets GES apart: ES with steps as long ends alike.",
-            "Does ES with GES's step length end as GES does with the same layout, decay and seed?",
-            MEASURE,
-            f"apart by at most {SAME_COST:.0%}",
-            would_change="A larger beta (departure J): w starts near 0, and with w = 0 GES is ES.",
-            learners=("matched", "GES"),
-        ),
-        Claim(
-            "B4",
-            "Q-learning with Q(s, a) is at least as good as ES.",
-            "Does Q-learning end no costlier than ES with the same layout, decay and seed?",
-            MEASURE,
-            f"costlier by at most {SAME_COST:.0%}",
-            would_change="Exploration late in training: without it, a is what the policy says.",
-            learners=("QL", "ES"),
-        ),
-    )
-}
+def compared(
+    learners: tuple[str, str],
+    size: Callable[[pd.Series], pd.Series] = lambda difference: difference,
+) -> dict[str, Any]:
+    """The fields of a claim that compares the final noise-free costs of two learners.
+
+    Args:
+        learners: the cost of the first minus that of the second is judged, in shares of
+            theta_init's.
+        size: what is judged of the difference.
+    """
+    first, second = learners
+    return {
+        "learners": learners,
+        "measured": "final noise-free costs, in shares of theta_init's",
+        "measure": partial(_difference, learners, size),
+        "evidence": partial(_evidence, learners),
+        "label": f"noise-free cost, {first} - {second}",
+    }
 
 
-def judge_additions(runs: pd.DataFrame) -> tuple[Verdict, ...]:
-    """The verdicts on all of them, in order; `runs` as `paper_claims.judge` takes them."""
-    return (
-        tdc_is_at_least_as_good_as_ges(runs),
-        direction_matters(runs),
-        only_the_step_length_sets_ges_apart(runs),
-        q_learning_is_at_least_as_good_as_es(runs),
-    )
+def _difference(
+    learners: tuple[str, str],
+    size: Callable[[pd.Series], pd.Series],
+    runs: pd.DataFrame,
+    _: Paths,
+) -> Values:
+    difference = size(cost_difference(*_pairs(learners, runs)))
+    return difference.astype(float).to_frame(f"{learners[0]} and {learners[1]}")
 
 
-def tdc_is_at_least_as_good_as_ges(runs: pd.DataFrame) -> Verdict:
-    """B1: GES is TDC without the curvature term, and with w slower than theta."""
-    return _against(ADDITIONS["B1"], runs, (-np.inf, SAME_COST))
-
-
-def direction_matters(runs: pd.DataFrame) -> Verdict:
-    """B2: the control of ES takes steps of its length in uniformly random directions."""
-    return _against(ADDITIONS["B2"], runs, (-np.inf, -BETTER))
-
-
-def only_the_step_length_sets_ges_apart(runs: pd.DataFrame) -> Verdict:
-    """B3: the control of GES takes steps of its length in the direction of ES."""
-    return _against(ADDITIONS["B3"], runs, (-SAME_COST, SAME_COST))
-
-
-def q_learning_is_at_least_as_good_as_es(runs: pd.DataFrame) -> Verdict:
-    """B4: the Q-learning of Gros and Zanon (2020), which the paper builds on."""
-    return _against(ADDITIONS["B4"], runs, (-np.inf, SAME_COST))
-
-
-def _against(claim: Claim, runs: pd.DataFrame, bounds: tuple[float, float]) -> Verdict:
-    """Whether the first learner ends costlier than the second by a share within these bounds."""
-    added = tuple(name for name in claim.learners if name not in PAPER)
-    first, second = arms(runs, *claim.learners, among=added)
-    more = costlier(first, second)
-    answers = answered((bounds[0] <= more) & (more <= bounds[1]), first, second)
-    return settle(claim, answers, _compared(claim.learners, first, second))
-
-
-def _compared(learners: tuple[str, ...], first: pd.DataFrame, second: pd.DataFrame) -> str:
-    """Probability of improvement and median gains, of the pairs that are whole."""
+def _evidence(learners: tuple[str, str], runs: pd.DataFrame, _: Paths) -> str:
+    """Probability of improvement and median reductions, of the pairs that are whole."""
+    first, second = _pairs(learners, runs)
     whole = (first.stopped.notna() & second.stopped.notna()).to_numpy(bool)
     if not whole.any():
         return f"{learners[0]} and {learners[1]} were not run together."
@@ -107,8 +60,68 @@ def _compared(learners: tuple[str, ...], first: pd.DataFrame, second: pd.DataFra
         other.final_cost.to_numpy(float),
         list(one.index.get_level_values("layout")),
     )
-    falls = [shown(median(gain(arm)), "+.1%") for arm in (one, other)]
+    medians = [shown(median(cost_reduction(arm)), "+.1%") for arm in (one, other)]
     return (
         f"A run of {learners[0]} costs less than one of {learners[1]} with probability"
-        f" {better:.2f}; the noise-free cost fell by {falls[0]} and {falls[1]} (medians)."
+        f" {better:.2f}; the noise-free cost was reduced by {medians[0]} and {medians[1]}"
+        " (medians)."
     )
+
+
+def _pairs(learners: tuple[str, str], runs: pd.DataFrame) -> tuple[pd.DataFrame, ...]:
+    """The runs of both, where the one that the paper does not have was run."""
+    return arms(runs, *learners, among=tuple(name for name in learners if name not in PAPER))
+
+
+OWN_CLAIMS: dict[str, RunClaim] = {
+    claim.name: claim
+    for claim in (
+        AtMost(
+            name="B1",
+            statement="Exact TDC is at least as good as GES.",
+            question="Does TDC end at no higher cost than GES with the same layout, decay and"
+            " seed?",
+            border=f"higher by at most {SAME_COST:.0%}",
+            would_change="The step size of w, which is ours.",
+            threshold=SAME_COST,
+            **compared(("TDC", "GES")),
+        ),
+        AtMost(
+            name="B2",
+            statement="The direction of a step matters: ES beats steps of its length in random"
+            " directions.",
+            question="Does ES end at a lower cost than the random walk with the same layout,"
+            " decay and seed?",
+            border=f"lower by at least {BETTER:.0%}",
+            would_change="Layouts in which theta_init can hardly be improved.",
+            threshold=-BETTER,
+            **compared(("ES", "random")),
+        ),
+        AtMost(
+            name="B3",
+            statement="Only the length of its steps sets GES apart: ES with steps as long ends"
+            " alike.",
+            question="Does ES with GES's step length end as GES does with the same layout, decay"
+            " and seed?",
+            border=f"apart by at most {SAME_COST:.0%}",
+            would_change="A larger beta (departure J): w starts near 0, and with w = 0 GES is ES.",
+            threshold=SAME_COST,
+            **compared(("matched", "GES"), pd.Series.abs),
+        ),
+        AtMost(
+            name="B4",
+            statement="Q-learning with Q(s, a) is at least as good as ES.",
+            question="Does Q-learning end at no higher cost than ES with the same layout, decay"
+            " and seed?",
+            border=f"higher by at most {SAME_COST:.0%}",
+            would_change="Exploration late in training: without it, a is what the policy says.",
+            threshold=SAME_COST,
+            **compared(("QL", "ES")),
+        ),
+    )
+}
+
+
+def judge_own(runs: pd.DataFrame) -> tuple[Verdict, ...]:
+    """The verdicts on all of them, in order; `runs` as `paper_claims.judge` takes them."""
+    return tuple(claim.judge(Observations(runs)) for claim in OWN_CLAIMS.values())

@@ -1,6 +1,6 @@
-"""The paper's claims, one function each: a question, a measure, a threshold and a verdict.
+"""The paper's claims, one object each: a question, numbers, a border and the sentences about them.
 
-The thresholds below, and the rule in `verdicts` by which the answers of many runs become a verdict,
+The thresholds below, and the rule in `rule` by which the answers of many runs become a verdict,
 were fixed while the study was being trained and before any claim was put to it, and are
 not to be moved after. A first study, of two seeds in layout A, had been seen by then.
 # departure P
@@ -10,7 +10,6 @@ what it is, and infinite where a solve failed or training had to be stopped.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -18,22 +17,22 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
-from nmpcrl.bench.learners import ratio
-from nmpcrl.claims.assumptions import Assumption
+from nmpcrl.analysis.metrics import TOUCH
+from nmpcrl.analysis.summary import SIZES, experiment_of
+from nmpcrl.claims.assumptions import TheoremClaim
+from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values, beside
 from nmpcrl.claims.rule import (
     CELL,
-    NOT,
-    PARTLY,
-    REPRODUCED,
-    UNDECIDABLE,
+    Assumption,
     Claim,
+    Observations,
+    Paths,
     Verdict,
-    answered,
     arms,
     median,
-    settle,
     shown,
 )
+from nmpcrl.claims.timing import TimeClaim
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.layouts import ARRIVED
@@ -49,8 +48,8 @@ UNSTABLE = 0.05
 # "Half the time" and "the same time": the ratio of the time of a step to that of ES.
 HALF = (0.4, 0.6)
 SAME_TIME = (0.9, 1.1)
-# Two policies are the same if two robots driven side by side stay this close [m] and the
-# noise-free costs differ by at most this share.
+# Two policies are the same if their trajectories without noise stay this close [m] and their costs
+# differ by at most this share.
 SAME_PATH = 0.25
 SAME_COST = 0.01
 # theta makes the network more accurate if the held-out error falls to this multiple or below.
@@ -63,113 +62,428 @@ NEAR_HALF = (0.0, 1.0)
 NEAR_SAME_TIME = (0.8, 1.25)
 
 SOLVER = "ipopt"  # the paper's, with which C3 and C4 are judged
-SIZES = ("small", "medium", "large")  # of an overlap: up to 0.01, to 0.1, and above
-RATIO = "one ratio of medians, taken in turn in one process; no interval"
+TIMED: dict[str, Any] = {
+    "solver": SOLVER,
+    "measured": f"the processor's time for a step over that for one of ES, with {SOLVER}, the"
+    " paper's solver",
+    "test": "median ratio of steps taken in turn, with its interval; see `timing`",
+}
+UP_TO = 60  # borders at which a claim is decided once more
 
-NAMES = ("learner", *CELL, "episodes")  # of a row: without them it names no run
 
-Paths = Mapping[Experiment, Column]  # the states of each run's last rollout without noise
+# Numbers of runs, one a row of `summary.table`
 
-CLAIMS = {
+
+def was_stopped(runs: pd.DataFrame) -> pd.Series:
+    """Whether training had to be stopped; False for a run that is missing."""
+    return runs.stopped.notna() & (runs.stopped != "finished")
+
+
+def training_cost_ratio(runs: pd.DataFrame) -> pd.Series:
+    """Training cost over the frozen arm's; infinite where the run was stopped."""
+    return runs.cost_ratio.mask(was_stopped(runs), np.inf)
+
+
+def divergence(runs: pd.DataFrame) -> pd.Series:
+    """Which runs diverged (see `DIVERGED`); missing where there is nothing to hold them against."""
+    ratio = training_cost_ratio(runs)
+    return (ratio > DIVERGED).astype("boolean").where(ratio.notna())
+
+
+def late_cost_range(runs: pd.DataFrame) -> pd.Series:
+    """Range of the noise-free cost over theta_init's; infinite where the run diverged.
+
+    nan where it is not known whether it diverged.
+    """
+    gone = divergence(runs)
+    return runs.late_cost_range.mask(gone.fillna(False).astype(bool), np.inf).where(gone.notna())
+
+
+def instability(runs: pd.DataFrame) -> pd.Series:
+    """Which runs are unstable (see `UNSTABLE`); missing where that is not known."""
+    numbers = late_cost_range(runs)
+    return (numbers > UNSTABLE).astype("boolean").where(numbers.notna())
+
+
+def cost_reduction(runs: pd.DataFrame) -> pd.Series:
+    """Share of theta_init's noise-free cost by which each run's is lower in the end.
+
+    Minus infinity where a rollout failed, and where training had to be stopped.
+    """
+    return (1 - runs.final_cost / runs.initial_cost).mask(was_stopped(runs), -np.inf)
+
+
+def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
+    """Share of the reduction that is possible in its layout that each run achieves in the end.
+
+    1 is as good as what is possible and 0 as theta_init; nan where nothing is known to be possible.
+
+    Args:
+        runs: of `summary.table`.
+        possible: by which share of theta_init's noise-free cost it can be lowered, by layout.
+    """
+    known = {layout: share for layout, share in possible.items() if share > 0}
+    return cost_reduction(runs) / runs.layout.map(known).astype(float)
+
+
+def cost_difference(first: pd.DataFrame, second: pd.DataFrame) -> pd.Series:
+    """Final noise-free cost of the first arm minus the second's, in shares of theta_init's.
+
+    Two that failed cost the same.
+    """
+    more = (first.final_cost - second.final_cost) / first.initial_cost
+    return more.where(first.final_cost != second.final_cost, 0.0)
+
+
+def path_distance(first: Column | None, second: Column | None) -> float:
+    """Largest distance [m] of two trajectories at the same time; nan where one is missing."""
+    if first is None or second is None:
+        return np.nan
+    return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))
+
+
+def diverged(study: Runs[Records], experiment: Experiment, records: Records) -> bool:
+    """Whether a run is known to have diverged: see `DIVERGED`, and `divergence` for many."""
+    frozen = {name: getattr(experiment, name) for name in CELL}
+    (arm,) = study.select(learner="frozen", **frozen).values()
+    ratio = metrics.cost_ratio(*(metrics.training_cost(one) for one in (records, arm)))
+    runs = pd.DataFrame({"stopped": [records.facts["stopped"]], "cost_ratio": [ratio]})
+    return bool(divergence(runs).fillna(False).iloc[0])
+
+
+def unstable(study: Runs[Records], experiment: Experiment, records: Records) -> bool:
+    """Whether a run is known to be unstable: see `UNSTABLE`, and `instability` for many."""
+    return diverged(study, experiment, records) or metrics.late_cost_range(records) > UNSTABLE
+
+
+# C1, from Fig. 1
+
+
+def _cost_ratios(runs: pd.DataFrame, _: Paths) -> Values:
+    return beside(runs, ("DES", "RDES"), training_cost_ratio)
+
+
+def _c1_evidence(runs: pd.DataFrame, _: Paths) -> str:
+    des, rdes = arms(runs, "DES", "RDES")
+    ratio = [shown(median(arm.cost_ratio), ".2f") for arm in (des, rdes)]
+    return (
+        f"{_of(divergence(des))} runs of DES and {_of(divergence(rdes))} of RDES diverged; their"
+        f" training cost ended at {ratio[0]} and {ratio[1]} times the frozen arm's (medians; an"
+        " episode that a failed solve cut short counts as ∞)."
+    )
+
+
+# C2, from Fig. 2
+
+
+def _late_cost_ranges(runs: pd.DataFrame, _: Paths) -> Values:
+    return beside(runs, ("ES", "GES"), late_cost_range)
+
+
+def _c2_evidence(runs: pd.DataFrame, _: Paths) -> str:
+    es, ges = arms(runs, "ES", "GES")
+    ranges = [shown(median(arm.late_cost_range), ".1%") for arm in (es, ges)]
+    return (
+        f"{_of(instability(es))} runs of ES and {_of(instability(ges))} of GES were unstable; in"
+        f" the second half the noise-free cost ranged over {ranges[0]} and {ranges[1]} (medians)."
+    )
+
+
+# C5, from Figs. 3 and 4 and the conclusion
+
+
+def policy_distances(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
+    """How far the policies of RDES and GES are apart, a row a cell.
+
+    Returns:
+        Columns path [m] (nan where a rollout failed) and cost (in shares of theta_init's), failed
+        (whether RDES's did: two that failed have the same cost and are not the same), and known
+        (whether both runs and both paths are there).
+    """
+    rdes, ges = arms(runs, "RDES", "GES")
+    wanted = runs[runs.learner.isin(("RDES", "GES"))].to_dict("records")
+    found = {
+        (row["learner"], *(row[name] for name in CELL)): paths.get(experiment_of(row))
+        for row in wanted
+    }
+    pairs = [(found.get(("RDES", *cell)), found.get(("GES", *cell))) for cell in rdes.index]
+    there = np.array([one is not None and other is not None for one, other in pairs], bool)
+    return pd.DataFrame(
+        {
+            "path": pd.Series([path_distance(*pair) for pair in pairs], rdes.index, dtype=float),
+            "cost": cost_difference(rdes, ges).abs(),
+            "failed": np.isinf(rdes.final_cost),
+            "known": there & rdes.stopped.notna() & ges.stopped.notna(),
+        }
+    )
+
+
+def _policy_distance(runs: pd.DataFrame, paths: Paths) -> Values:
+    """The distance in path or in cost, whichever is more, in units of what counts as the same."""
+    apart = policy_distances(runs, paths)
+    worse = np.maximum(apart.path / SAME_PATH, apart.cost / SAME_COST).fillna(np.inf)
+    return worse.mask(apart.failed, np.inf).where(apart.known).to_frame("RDES and GES")
+
+
+def _c5_evidence(runs: pd.DataFrame, paths: Paths) -> str:
+    apart, thetas = policy_distances(runs, paths), arms(runs, "RDES", "GES")
+    return (
+        f"The trajectories come to be {shown(median(apart.path), '.2f')} m apart, the noise-free"
+        f" costs differ by {shown(median(apart.cost), '.1%')} and the components of theta by up to"
+        f" {shown(median(_theta_distances(*thetas)), '.0%')} (medians)."
+    )
+
+
+def _theta_distances(first: pd.DataFrame, second: pd.DataFrame) -> Vector:
+    """Largest relative difference between the components of two final thetas, one a pair."""
+    names = [f"theta_{i}" for i in range(len(paper.THETA_INIT))]
+    one, other = (arm[names].to_numpy(float) for arm in (first, second))
+    relative = np.abs(one - other) / np.maximum(np.abs(one), np.abs(other))
+    result: Vector = np.max(relative, axis=1, initial=0)
+    return result
+
+
+# C6, from Section III-A
+
+
+def _relative_error(runs: pd.DataFrame, _: Paths) -> Values:
+    """Held-out error of the network that has theta as an input over that of the one without."""
+    return beside(
+        runs, ("RDES",), lambda arm: arm.imitation_with / arm.imitation_without, among=PAPER
+    )
+
+
+def _c6_evidence(runs: pd.DataFrame, _: Paths) -> str:
+    (rdes,) = arms(runs, "RDES", among=PAPER)
+    return (
+        f"On held-out pairs the error is {shown(median(rdes.imitation_with), '.1f')} with theta and"
+        f" {shown(median(rdes.imitation_without), '.1f')} without (medians of the root mean square,"
+        " in units of cost)."
+    )
+
+
+# C7, from Section III-A and the conclusion
+
+
+def _largest_overlap(runs: pd.DataFrame, _: Paths) -> Values:
+    """Largest Xi without noise, 0 if none was above; infinite for an input out of bounds."""
+    return beside(
+        runs, PAPER, lambda arm: arm.eval_worst_overlap.clip(lower=0).mask(arm.inputs > 0, np.inf)
+    )
+
+
+def _states_inside(runs: pd.DataFrame, _: Paths) -> Values:
+    """How many states in training lay in an obstacle."""
+    return beside(runs, PAPER, lambda arm: _inside(arm, "inside").sum(axis=1, skipna=False))
+
+
+def _c7_evidence(runs: pd.DataFrame, paths: Paths) -> str:
+    every = pd.concat(arms(runs, *PAPER), keys=PAPER, names=["learner"])
+    training, judged = (_inside(every, name) for name in ("inside", "eval_inside"))
+    worst = [shown(every[c].max(), ".3f") for c in ("worst_overlap", "eval_worst_overlap")]
+    kept = BY_RUNS["C7"].answers(_largest_overlap(runs, paths))
+    return (
+        f"{every.inputs.sum():.0f} actions left their bounds. Of {every.steps_done.sum():.0f}"
+        f" states in training, {_sized(training)} lay in an obstacle by a small, a medium and a"
+        f" large Xi (up to 0.01, up to 0.1, and above; the largest is {worst[0]}), and of those"
+        f" without noise {_sized(judged)} (the largest is {worst[1]})."
+        f" {every.outside.sum():.0f} states in training lay outside the box. Without noise,"
+        f" {_of(kept)} runs kept the constraints."
+    )
+
+
+def _inside(runs: pd.DataFrame, name: str) -> pd.DataFrame:
+    """How many states lay in an obstacle, one column a size."""
+    return runs[[f"{name}_{size}" for size in SIZES]]
+
+
+def _sized(inside: pd.DataFrame) -> str:
+    first, second, third = (f"{count:.0f}" for count in inside.sum())
+    return f"{first}, {second} and {third}"
+
+
+# C9, what the paper takes for granted
+
+
+def _cost_reductions(runs: pd.DataFrame, _: Paths) -> Values:
+    return beside(runs, ("RDES", "GES"), cost_reduction)
+
+
+def _c9_evidence(runs: pd.DataFrame, _: Paths) -> str:
+    every = dict(zip(PAPER, arms(runs, *PAPER), strict=True))
+    medians = {name: shown(median(cost_reduction(arm)), "+.1%") for name, arm in every.items()}
+    claimed = pd.concat(arms(runs, "RDES", "GES"))
+    failed = int(np.isinf(claimed.final_cost).sum())
+    stuck = int((claimed.distance > ARRIVED).sum())
+    listed = ", ".join(f"{name} {value}" for name, value in medians.items())
+    return (
+        f"Median reduction of the noise-free cost: {listed}. Of the last rollouts of RDES and GES,"
+        f" {stuck} end more than {ARRIVED} away from the target, and in {failed} runs one of the"
+        " last three failed or training was stopped; they count."
+    )
+
+
+def _of(holds: pd.Series) -> str:
+    known = holds.dropna()
+    return f"{int(known.sum())} of {len(known)}"
+
+
+CLAIMS: dict[str, Claim] = {
     claim.name: claim
     for claim in (
-        Claim(
-            "C1",
-            "DES diverges within 300 episodes; RDES does not.",
-            "Did DES diverge, and RDES with the same layout, decay and seed not?",
-            "whether the run was stopped; median training cost of the last 20 episodes over that of"
-            " the frozen arm under the same noise",
-            f"diverged: stopped, or above {DIVERGED}",
+        Contrast(
+            name="C1",
+            statement="DES diverges within 300 episodes; RDES does not.",
+            short="DES diverges,\nRDES does not",
+            question="Did DES diverge, and RDES with the same layout, decay and seed not?",
+            measured="whether the run was stopped; median training cost of the last 20 episodes"
+            " over that of the frozen arm under the same noise",
+            border=f"diverged: stopped, or above {DIVERGED}",
             would_change="Other layouts and the untold details of the network; Algorithm 1 read"
             " literally (departure G).",
             learners=("DES", "RDES"),
+            measure=_cost_ratios,
+            threshold=DIVERGED,
+            evidence=_c1_evidence,
+            nothing=1.0,
+            label="training cost / frozen arm's",
+            borders=np.geomspace(1.02, 15, UP_TO),
         ),
-        Claim(
-            "C2",
-            "ES is unstable; GES is stable.",
-            "Was ES unstable, and GES with the same layout, decay and seed not?",
-            "as C1; range of the noise-free cost in the second half of training, as a share of"
-            " theta_init's",
-            f"unstable: diverged, or above {UNSTABLE:.0%}",
+        Contrast(
+            name="C2",
+            statement="ES is unstable; GES is stable.",
+            short="ES is unstable,\nGES is not",
+            question="Was ES unstable, and GES with the same layout, decay and seed not?",
+            measured="as C1; range of the noise-free cost in the second half of training, as a"
+            " share of theta_init's",
+            border=f"unstable: diverged, or above {UNSTABLE:.0%}",
             would_change="A larger step size: alpha ||phi||^2 decides where a semi-gradient step"
             " overshoots.",
             learners=("ES", "GES"),
+            measure=_late_cost_ranges,
+            threshold=UNSTABLE,
+            evidence=_c2_evidence,
+            label="range of noise-free cost",
+            borders=np.geomspace(0.005, 1.5, UP_TO),
         ),
-        Claim(
-            "C3",
-            "RDES takes half of the time of ES.",
-            "How long does a step of RDES take, in steps of ES?",
-            f"ratio of the median times of a step, with {SOLVER}, the paper's solver",
-            f"{HALF[0]} to {HALF[1]}; partly below {NEAR_HALF[1]:g}",
-            RATIO,
-            "The time of one solve: the slower the solver, the closer to one half. And where a"
-            " solve starts: ES has already solved in the next state and starts its next step from"
-            " there.",
+        TimeClaim(
+            name="C3",
+            statement="RDES takes half of the time of ES.",
+            question="How long does a step of RDES take, in steps of ES?",
+            border=f"{HALF[0]} to {HALF[1]}; partly below {NEAR_HALF[1]:g}",
+            would_change="The time of one solve: the slower the solver, the closer to one half. And"
+            " where a solve starts: ES has already solved in the next state and starts its next"
+            " step from there.",
+            learner="RDES",
+            claimed=HALF,
+            near=NEAR_HALF,
+            work="one solve instead of two, and a fit of the network",
+            **TIMED,
         ),
-        Claim(
-            "C4",
-            "GES takes the time of ES.",
-            "How long does a step of GES take, in steps of ES?",
-            f"ratio of the median times of a step, with {SOLVER}, the paper's solver",
-            f"{SAME_TIME[0]} to {SAME_TIME[1]}; partly from {NEAR_SAME_TIME[0]} to"
+        TimeClaim(
+            name="C4",
+            statement="GES takes the time of ES.",
+            question="How long does a step of GES take, in steps of ES?",
+            border=f"{SAME_TIME[0]} to {SAME_TIME[1]}; partly from {NEAR_SAME_TIME[0]} to"
             f" {NEAR_SAME_TIME[1]}",
-            RATIO,
-            "Nothing that we know of: the work is the same.",
+            would_change="Nothing that we know of: the work is the same.",
+            learner="GES",
+            claimed=SAME_TIME,
+            near=NEAR_SAME_TIME,
+            work="both solve twice",
+            **TIMED,
         ),
-        Claim(
-            "C5",
-            "RDES and GES reach the same policy.",
-            "Did RDES and GES with the same layout, decay and seed end in the same policy?",
-            "largest distance of two robots that drive side by side without noise; difference of"
-            " the final noise-free costs, as a share of theta_init's (theta itself is compared, but"
-            " not judged: two of them may drive alike)",
-            f"at most {SAME_PATH} m and at most {SAME_COST:.0%}",
+        AtMost(
+            name="C5",
+            statement="RDES and GES reach the same policy.",
+            short="RDES and GES:\nsame policy",
+            question="Did RDES and GES with the same layout, decay and seed end in the same"
+            " policy?",
+            measured="largest distance of their trajectories without noise; difference of the final"
+            " noise-free costs, as a share of theta_init's (theta itself is compared, but not"
+            " judged: two of them may act alike)",
+            border=f"at most {SAME_PATH} m and at most {SAME_COST:.0%}",
             would_change="A looser meaning of 'same', and longer training.",
             learners=("RDES", "GES"),
+            measure=_policy_distance,
+            threshold=1.0,
+            evidence=_c5_evidence,
+            label="apart / what counts as the same",
+            borders=np.geomspace(0.1, 30, UP_TO),
         ),
-        Claim(
-            "C6",
-            "theta as an input makes the network more accurate.",
-            "Fitted to the same run of RDES, does the network that is told theta err less?",
-            "root mean square errors on held-out pairs of state and theta, with over without",
-            f"at most {MORE_ACCURATE}",
+        AtMost(
+            name="C6",
+            statement="theta as an input makes the network more accurate.",
+            short="θ helps the\nnetwork",
+            question="Fitted to the same run of RDES, does the network that has theta as an input"
+            " err less?",
+            measured="root mean square errors on held-out pairs of state and theta, with over"
+            " without",
+            border=f"at most {MORE_ACCURATE}",
             would_change="How far theta moves: where it hardly does, there is nothing to tell the"
             " network.",
             learners=("RDES",),
+            measure=_relative_error,
+            threshold=MORE_ACCURATE,
+            evidence=_c6_evidence,
+            unit="runs",
+            nothing=1.0,
+            label="error with θ / without",
+            borders=np.geomspace(0.3, 1.3, UP_TO),
         ),
-        Claim(
-            "C7",
-            "Input and obstacle constraints hold throughout.",
-            "Did every action stay in its bounds and every state out of the obstacles, in training"
-            " and without noise? The weaker question: without noise?",
-            "actions out of bounds; states in an obstacle, by the size of Xi",
-            f"none beyond {metrics.TOUCH:g}; partly if only the weaker question is not refuted",
+        AtMost(
+            name="C7",
+            statement="Input and obstacle constraints hold throughout.",
+            short="constraints\nhold",
+            question="Did every action stay in its bounds and every state out of the obstacles, in"
+            " training and without noise? The weaker question: without noise?",
+            measured="actions out of bounds; states in an obstacle, by the size of Xi",
+            border=f"none beyond {TOUCH:g}; partly if only the weaker question is not refuted",
             would_change="The obstacle constraint is soft, and noise is added after it was"
             " enforced.",
             learners=PAPER,
+            measure=_largest_overlap,
+            threshold=TOUCH,
+            besides=_states_inside,
+            evidence=_c7_evidence,
+            unit="runs",
+            label="largest Ξ without noise",
+            linear_to=TOUCH,
+            borders=np.geomspace(1e-8, 1.0, UP_TO),
         ),
-        Claim(
-            "C8",
-            "Convergence of GES is guaranteed.",
-            "Does what is run meet the assumptions of the theorem?",
-            "each assumption beside the code, with a measurement where one is possible",
-            "all of them",
-            "one assumption that does not hold is enough",
-            "Decaying step sizes, w faster than theta, the curvature term and a projection would"
-            " bring it closer.",
+        TheoremClaim(
+            name="C8",
+            statement="Convergence of GES is guaranteed.",
+            question="Does what is run meet the assumptions of the theorem?",
+            measured="each assumption beside the code, with a measurement where one is possible",
+            border="all of them",
+            test="one assumption that does not hold is enough",
+            would_change="Decaying step sizes, w faster than theta, the curvature term and a"
+            " projection would bring it closer.",
         ),
-        Claim(
-            "C9",
-            "Learning with RDES and GES beats theta_init without noise.",
-            "Does the run of RDES, or of GES, end with a lower noise-free cost than theta_init's?",
-            "share of theta_init's noise-free cost that the last three rollouts save",
-            f"at least {BETTER:.0%}",
+        AtLeast(
+            name="C9",
+            statement="Learning with RDES and GES beats theta_init without noise.",
+            short="RDES and GES\nbeat $\\theta_\\mathrm{init}$",
+            question="Does the run of RDES, or of GES, end with a lower noise-free cost than"
+            " theta_init's?",
+            measured="share of theta_init's noise-free cost that the last three rollouts save",
+            border=f"at least {BETTER:.0%}",
             would_change="The layout, and theta_c: near d_o it removes the penalty altogether"
             " (departure N).",
             learners=("RDES", "GES"),
+            measure=_cost_reductions,
+            threshold=BETTER,
+            evidence=_c9_evidence,
+            unit="runs",
+            label="fall of noise-free cost",
+            linear_to=0.1,
+            borders=np.linspace(-0.05, 0.15, UP_TO),
         ),
     )
 }
+BY_RUNS = {name: claim for name, claim in CLAIMS.items() if isinstance(claim, RunClaim)}
+BY_TIME = {name: claim for name, claim in CLAIMS.items() if isinstance(claim, TimeClaim)}
 
 
 def judge(
@@ -190,287 +504,11 @@ def judge(
     Raises:
         ValueError: the runs are of several settings.
     """
-    return (
-        des_diverges_and_rdes_does_not(runs),
-        es_is_unstable_and_ges_is_stable(runs),
-        rdes_takes_half_the_time(timings),
-        ges_takes_the_same_time(timings),
-        rdes_and_ges_reach_the_same_policy(runs, paths),
-        theta_makes_the_network_more_accurate(runs),
-        constraints_hold(runs),
-        convergence_is_guaranteed(tuple(assumptions)),
-        learning_beats_the_frozen_theta(runs),
-    )
+    observed = Observations(runs, paths, timings, tuple(assumptions))
+    return tuple(claim.judge(observed) for claim in CLAIMS.values())
 
 
 def judge_runs(runs: pd.DataFrame, paths: Paths) -> tuple[Verdict, ...]:
     """The claims that the runs alone decide, as `judge` has them."""
-    return tuple(
-        verdict
-        for verdict in judge(runs, paths=paths, timings=pd.DataFrame(), assumptions=())
-        if verdict.claim not in ("C3", "C4", "C8")
-    )
-
-
-def des_diverges_and_rdes_does_not(runs: pd.DataFrame) -> Verdict:
-    """C1, from Fig. 1."""
-    des, rdes = arms(runs, *CLAIMS["C1"].learners)
-    gone, stayed = divergence(des), ~divergence(rdes)
-    cost_ratio = [shown(median(arm.cost_ratio), ".2f") for arm in (des, rdes)]
-    return settle(
-        CLAIMS["C1"],
-        answered(gone & stayed, des, rdes),
-        f"{_of(gone)} runs of DES and {_of(~stayed)} of RDES diverged; their training cost ended at"
-        f" {cost_ratio[0]} and {cost_ratio[1]} times the frozen arm's (medians; an episode that a"
-        " failed solve cut short counts as ∞).",
-    )
-
-
-def es_is_unstable_and_ges_is_stable(runs: pd.DataFrame) -> Verdict:
-    """C2, from Fig. 2."""
-    es, ges = arms(runs, *CLAIMS["C2"].learners)
-    swung, stayed = instability(es), ~instability(ges)
-    late_cost_range = [shown(median(arm.late_cost_range), ".1%") for arm in (es, ges)]
-    return settle(
-        CLAIMS["C2"],
-        answered(swung & stayed, es, ges),
-        f"{_of(swung)} runs of ES and {_of(~stayed)} of GES were unstable; in the second half the"
-        f" noise-free cost ranged over {late_cost_range[0]} and {late_cost_range[1]} (medians).",
-    )
-
-
-def rdes_takes_half_the_time(timings: pd.DataFrame) -> Verdict:
-    """C3, from Table II, with the paper's solver."""
-    ratios = _ratios(timings, "RDES")
-    fit = f", plus {median(timings.ms_per_fit):.2f} ms for the network" if ratios else ""
-    evidence = f"{_listed('RDES', ratios)}: one solve instead of two{fit}."
-    return _timed(CLAIMS["C3"], _within(ratios, HALF, NEAR_HALF), evidence)
-
-
-def ges_takes_the_same_time(timings: pd.DataFrame) -> Verdict:
-    """C4, from Table II."""
-    ratios = _ratios(timings, "GES")
-    evidence = f"{_listed('GES', ratios)}; all solve twice."
-    return _timed(CLAIMS["C4"], _within(ratios, SAME_TIME, NEAR_SAME_TIME), evidence)
-
-
-def rdes_and_ges_reach_the_same_policy(runs: pd.DataFrame, paths: Paths) -> Verdict:
-    """C5, from Figs. 3 and 4 and the conclusion."""
-    rdes, ges = arms(runs, *CLAIMS["C5"].learners)
-    driven = _driven(runs, paths)
-    path = pd.Series(
-        [apart(driven.get(("RDES", *cell)), driven.get(("GES", *cell))) for cell in rdes.index],
-        rdes.index,
-        dtype=float,
-    )
-    cost = costlier(rdes, ges).abs()
-    known = pd.Series([("RDES", *c) in driven and ("GES", *c) in driven for c in rdes.index])
-    same = (path <= SAME_PATH) & (cost <= SAME_COST) & np.isfinite(rdes.final_cost)
-    return settle(
-        CLAIMS["C5"],
-        answered(same, rdes, ges).where(known.to_numpy(bool)),
-        f"The robots come to be {shown(median(path), '.2f')} m apart, their noise-free costs differ"
-        f" by {shown(median(cost), '.1%')} and the components of theta by up to"
-        f" {shown(median(_theta_apart(rdes, ges)), '.0%')} (medians).",
-    )
-
-
-def theta_makes_the_network_more_accurate(runs: pd.DataFrame) -> Verdict:
-    """C6, from Section III-A."""
-    (rdes,) = arms(runs, *CLAIMS["C6"].learners, among=PAPER)
-    told = rdes.imitation_with / rdes.imitation_without
-    return settle(
-        CLAIMS["C6"],
-        (told <= MORE_ACCURATE).astype("boolean").where(told.notna()),
-        f"On held-out pairs the error is {shown(median(rdes.imitation_with), '.1f')} with theta and"
-        f" {shown(median(rdes.imitation_without), '.1f')} without (medians of the root mean square,"
-        " in units of cost).",
-        unit="runs",
-    )
-
-
-def constraints_hold(runs: pd.DataFrame) -> Verdict:
-    """C7, from Section III-A and the conclusion."""
-    asked = CLAIMS["C7"].learners
-    every = pd.concat(arms(runs, *asked), keys=asked, names=["learner"])
-    training, judged = (_inside(every, name) for name in ("inside", "eval_inside"))
-    kept = (judged.sum(axis=1) == 0) & (every.inputs == 0)
-    whole = kept & (training.sum(axis=1) == 0)
-    worst = [shown(every[c].max(), ".3f") for c in ("worst_overlap", "eval_worst_overlap")]
-    return settle(
-        CLAIMS["C7"],
-        answered(whole, every),
-        f"{every.inputs.sum():.0f} actions left their bounds. Of {every.steps_done.sum():.0f}"
-        f" states in training, {_sized(training)} lay in an obstacle by a small, a medium and a"
-        f" large Xi (up to 0.01, up to 0.1, and above; the largest is {worst[0]}), and of those"
-        f" driven without noise {_sized(judged)} (the largest is {worst[1]})."
-        f" {every.outside.sum():.0f} states in training lay outside the box. Without noise,"
-        f" {_of(answered(kept, every))} runs kept the constraints.",
-        weaker=answered(kept, every),
-        unit="runs",
-    )
-
-
-def convergence_is_guaranteed(assumptions: tuple[Assumption, ...]) -> Verdict:
-    """C8, from the title, the abstract and Section III-B."""
-    broken = [a.theorem for a in assumptions if not a.holds]
-    decided = NOT if broken else REPRODUCED
-    listed = f": {'; '.join(broken)}" if broken else ""
-    return _timed(
-        CLAIMS["C8"],
-        decided if assumptions else UNDECIDABLE,
-        f"{len(broken)} of the theorem's {len(assumptions)} assumptions do not hold for what is"
-        f" run{listed}.",
-    )
-
-
-def learning_beats_the_frozen_theta(runs: pd.DataFrame) -> Verdict:
-    """C9, what the paper takes for granted."""
-    asked = CLAIMS["C9"].learners
-    claimed = pd.concat(arms(runs, *asked), keys=asked, names=["learner"])
-    gains = {name: median(gain(arm)) for name, arm in zip(PAPER, arms(runs, *PAPER), strict=True)}
-    listed = ", ".join(f"{name} {shown(value, '+.1%')}" for name, value in gains.items())
-    failed = int(np.isinf(claimed.final_cost).sum())
-    stuck = int((claimed.distance > ARRIVED).sum())
-    return settle(
-        CLAIMS["C9"],
-        answered(gain(claimed) >= BETTER, claimed),
-        f"Median fall of the noise-free cost: {listed}. Of the last drives of RDES and GES, {stuck}"
-        f" end more than {ARRIVED} away from the target, and in {failed} runs one of the last three"
-        " failed or training was stopped; they count.",
-        unit="runs",
-    )
-
-
-def divergence(runs: pd.DataFrame) -> pd.Series:
-    """Which runs diverged (see `DIVERGED`); missing where there is nothing to hold them against."""
-    stopped = (runs.stopped != "finished") & runs.stopped.notna()
-    return (
-        _gone(runs.stopped, runs.cost_ratio)
-        .astype("boolean")
-        .where(runs.cost_ratio.notna() | stopped)
-    )
-
-
-def instability(runs: pd.DataFrame) -> pd.Series:
-    """Which runs are unstable (see `UNSTABLE`); missing where that is not known."""
-    return answered(divergence(runs) | (runs.late_cost_range > UNSTABLE), runs)
-
-
-def gain(runs: pd.DataFrame) -> pd.Series:
-    """Share of the noise-free cost that learning took away; minus infinity where a drive failed."""
-    return 1 - runs.final_cost / runs.initial_cost
-
-
-def costlier(first: pd.DataFrame, second: pd.DataFrame) -> pd.Series:
-    """Final noise-free cost of the first arm over the second's, in shares of theta_init's.
-
-    Two that failed cost the same.
-    """
-    more = (first.final_cost - second.final_cost) / first.initial_cost
-    return more.where(first.final_cost != second.final_cost, 0.0)
-
-
-def apart(first: Column | None, second: Column | None) -> float:
-    """Largest distance [m] of two robots that drive side by side; nan where one is missing."""
-    if first is None or second is None:
-        return np.nan
-    return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))
-
-
-def diverged(study: Runs, experiment: Experiment, records: Records) -> bool:
-    """Whether a run diverged: see `DIVERGED`."""
-    frozen = {name: getattr(experiment, name) for name in CELL}
-    (arm,) = study.select(learner="frozen", **frozen).values()
-    return bool(_gone(records.facts["stopped"], metrics.cost_ratio(records, arm)))
-
-
-def unstable(study: Runs, experiment: Experiment, records: Records) -> bool:
-    """Whether a run is unstable: see `UNSTABLE`."""
-    return diverged(study, experiment, records) or metrics.late_cost_range(records) > UNSTABLE
-
-
-def experiment_of(row: Mapping[str, Any]) -> Experiment:
-    """The experiment that a row of `summary.table` summarises.
-
-    A field for which an older table has no column takes its default.
-
-    Raises:
-        LookupError: one of `NAMES` is missing.
-    """
-    missing = {one.name for one in fields(Experiment)} - row.keys()
-    if missing & set(NAMES):
-        raise LookupError(f"there is no column {min(missing & set(NAMES))}")
-    named = {one.name: row[one.name] for one in fields(Experiment) if one.name not in missing}
-    if "theta" in named:
-        named["theta"] = tuple(float(value) for value in named["theta"].split())
-    return Experiment(**named)
-
-
-def _gone(stopped: Any, cost_ratio: Any) -> Any:
-    """The rule of `DIVERGED`, for one run or a column of them."""
-    return (stopped != "finished") | (cost_ratio > DIVERGED)
-
-
-def _driven(runs: pd.DataFrame, paths: Paths) -> dict[tuple[Any, ...], Column]:
-    """The paths of RDES and GES, by learner and cell."""
-    wanted = runs[runs.learner.isin(("RDES", "GES"))].to_dict("records")
-    found = {(row["learner"], *(row[n] for n in CELL)): experiment_of(row) for row in wanted}
-    return {name: paths[one] for name, one in found.items() if one in paths}
-
-
-def _theta_apart(first: pd.DataFrame, second: pd.DataFrame) -> Vector:
-    """Largest relative difference between the components of two final thetas, one a pair."""
-    names = [f"theta_{i}" for i in range(len(paper.THETA_INIT))]
-    one, other = (arm[names].to_numpy(float) for arm in (first, second))
-    return np.max(np.abs(one - other) / np.maximum(np.abs(one), np.abs(other)), axis=1, initial=0)
-
-
-def _inside(runs: pd.DataFrame, name: str) -> pd.DataFrame:
-    """How many states lay in an obstacle, one column a size."""
-    return runs[[f"{name}_{size}" for size in SIZES]]
-
-
-def _sized(inside: pd.DataFrame) -> str:
-    first, second, third = (f"{count:.0f}" for count in inside.sum())
-    return f"{first}, {second} and {third}"
-
-
-def _timed(claim: Claim, outcome: str, evidence: str) -> Verdict:
-    """A verdict for which no run is asked."""
-    return Verdict(claim.name, claim.statement, outcome, evidence, claim.would_change)
-
-
-def _ratios(timings: pd.DataFrame, learner: str) -> dict[str, float]:
-    """Time of a step over that of ES, by solver; the paper's comes first."""
-    if timings.empty:
-        return {}
-    timed = timings.groupby("solver").learner.agg(set)
-    solvers = [name for name in timed.index if {learner, "ES"} <= timed[name]]
-    return {
-        solver: ratio(timings, solver, learner)
-        for solver in sorted(solvers, key=lambda name: name != SOLVER)
-    }
-
-
-def _within(
-    ratios: Mapping[str, float], claimed: tuple[float, float], near: tuple[float, float]
-) -> str:
-    if SOLVER not in ratios:
-        return UNDECIDABLE
-    value = ratios[SOLVER]
-    if claimed[0] <= value <= claimed[1]:
-        return REPRODUCED
-    return PARTLY if near[0] <= value < near[1] else NOT
-
-
-def _listed(learner: str, ratios: Mapping[str, float]) -> str:
-    parts = [f"{value:.2f} with {solver}" for solver, value in ratios.items()]
-    if not parts:
-        return f"{learner} and ES were not timed"
-    return f"A step of {learner} takes, in steps of ES, {', '.join(parts)}"
-
-
-def _of(holds: pd.Series) -> str:
-    known = holds.dropna()
-    return f"{int(known.sum())} of {len(known)}"
+    observed = Observations(runs, paths)
+    return tuple(claim.judge(observed) for claim in BY_RUNS.values())

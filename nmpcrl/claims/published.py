@@ -3,7 +3,7 @@
 - `runs.csv`: one row a run, `summary.row`, with the part of the study it belongs to and its key;
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
-- `rule.json`: what became of each claim;
+- `verdicts.json`: what became of each claim;
 - `about.json`: code, libraries and machine.
 """
 
@@ -23,10 +23,9 @@ import numpy as np
 import pandas as pd
 
 import nmpcrl
-from nmpcrl.analysis.summary import RunSummary, row
-from nmpcrl.claims.failure_modes import fates
-from nmpcrl.claims.paper_claims import experiment_of
-from nmpcrl.claims.rule import Verdict
+from nmpcrl.analysis.summary import RunSummary, experiment_of, row
+from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism, failure_modes
+from nmpcrl.claims.rule import UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.machine import fingerprint
@@ -36,10 +35,15 @@ from nmpcrl.study.records import Column
 FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
-WORDS = ["ending", "wrong", "mechanism"]  # of `failure_modes.fates`, as the next
+# Columns of `failure_modes`, and what may be in them; the frozen arms have none.
+WORDS = {
+    "ending": {*Ending, ""},
+    "wrong": {*Failure, ""},
+    "mechanism": {*Mechanism, WELL, ""},
+}
 FAILURE_MODE = [*WORDS, "episode"]
 MEASURES = ("final_cost", "training_cost")  # by which runs of another machine are judged
-SLACK = 0.01  # of theta_init's cost, that they may be out of the published spread
+SLACK = 0.01  # of theta_init's cost, that they may be out of the published range
 EXACT = 1e-6  # relative: the cost of theta_init, which no noise and no learning moves
 
 
@@ -106,13 +110,35 @@ def publish(
     return folder
 
 
+def republish(verdicts: Iterable[Verdict]) -> Path:
+    """Put these in the place of the published verdicts on the same claims; the runs stay.
+
+    Returns:
+        Where they are.
+
+    Raises:
+        Damaged: what is published is not what `publish` wrote.
+        KeyError: there is no published verdict on a claim.
+    """
+    found, folder = load(), place()
+    kept = {verdict.claim: verdict for verdict in found.verdicts}
+    for verdict in verdicts:
+        if verdict.claim not in kept:
+            raise KeyError(f"no verdict on {verdict.claim} is published in {folder}")
+        kept[verdict.claim] = verdict
+    write_json(folder / "verdicts.json", [asdict(verdict) for verdict in kept.values()], indent=1)
+    write_json(folder / "about.json", {**found.about, "files": _sums(folder)}, indent=1)
+    _load.cache_clear()
+    return folder
+
+
 def failure_modes_of(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
-    """`FAILURE_MODE` of each run, in order; nothing is said of the frozen arms."""
+    """`FAILURE_MODE` of each run, in order; the frozen arms have none."""
     moved = [e for e in summaries if e.learner != "frozen"]
-    told = fates(summaries)[FAILURE_MODE].to_dict("records")
-    known = dict(zip(moved, told, strict=True))
-    silent = {"ending": "", "wrong": "", "episode": pd.NA, "mechanism": ""}
-    return pd.DataFrame([known.get(e, silent) for e in summaries], columns=FAILURE_MODE)
+    modes = failure_modes(summaries)[FAILURE_MODE].to_dict("records")
+    known = dict(zip(moved, modes, strict=True))
+    none = {"ending": "", "wrong": "", "episode": pd.NA, "mechanism": ""}
+    return pd.DataFrame([known.get(e, none) for e in summaries], columns=FAILURE_MODE)
 
 
 def load() -> Published:
@@ -134,6 +160,9 @@ def _load(folder: Path) -> Published:
             raise ValueError("a file is not the one that about.json speaks of")
         runs = pd.read_csv(folder / "runs.csv", dtype=dict.fromkeys(WORDS, str))
         runs = runs.fillna(dict.fromkeys(WORDS, ""))
+        for name, known in WORDS.items():
+            if unknown := set(runs[name]) - known:
+                raise ValueError(f"no {name} is called {', '.join(sorted(unknown))}")
         rows = {experiment_of(one): one for one in runs.to_dict("records")}
         with np.load(folder / "curves.npz", allow_pickle=False) as file:
             curves = {name: file[name] for name in file.files}
@@ -159,15 +188,29 @@ def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.
     Where code, versions and machine are the same, every run must be the same to the last bit.
     Elsewhere rounding differs, and learning may make much of that. So theta_init's cost must agree
     to `EXACT`, and of the runs of a learner, layout and reading of the decay at least half must lie
-    within the spread of the published ones, widened on both sides by itself and by `SLACK`.
+    within the range of the published ones, widened on both sides by itself and by `SLACK`.
     """
     rows = {e: row(one) for e, one in fresh.items() if e in published.rows}
     exact = comparable(rows, published)
     wrong = [unequal(e, rows[e], published.rows[e]) for e in sorted(exact, key=str)]
     others = {e: one for e, one in rows.items() if e not in exact}
-    wrong += _out_of_spread(others, published)
+    wrong += _out_of_range(others, published)
     names = [*CELL, "seed", "what", "here", "published"]
     return pd.DataFrame([one for one in wrong if one], columns=names)
+
+
+def contradicted(verdicts: Iterable[Verdict], published: Published) -> tuple[str, ...]:
+    """Which of these verdicts differ from the published ones, a sentence each.
+
+    What is not decidable, here or there, contradicts nothing.
+    """
+    known = {verdict.claim: verdict.outcome for verdict in published.verdicts}
+    pairs = [(one, known.get(one.claim, UNDECIDABLE)) for one in verdicts]
+    return tuple(
+        f"{one.claim} is {one.outcome} here, and {there} as published"
+        for one, there in pairs
+        if UNDECIDABLE not in (one.outcome, there) and one.outcome != there
+    )
 
 
 def comparable(runs: Iterable[Experiment], published: Published) -> set[Experiment]:
@@ -190,7 +233,7 @@ def unequal(
     return None
 
 
-def _out_of_spread(
+def _out_of_range(
     rows: Mapping[Experiment, dict[str, Any]], published: Published
 ) -> list[tuple[Any, ...]]:
     """The rule for runs of another machine; see `compare`."""
@@ -218,9 +261,9 @@ def _widened(values: Column, slack: float) -> tuple[float, float]:
     finite = values[np.isfinite(values)]
     if not finite.size:
         return -np.inf, np.inf
-    spread = float(np.ptp(finite)) + slack
-    most = np.inf if finite.size < values.size else float(finite.max()) + spread
-    return float(finite.min()) - spread, most
+    width = float(np.ptp(finite)) + slack
+    most = np.inf if finite.size < values.size else float(finite.max()) + width
+    return float(finite.min()) - width, most
 
 
 def _sums(folder: Path) -> dict[str, str]:
@@ -269,4 +312,9 @@ def _verdict(stored: dict[str, Any]) -> Verdict:
     """A verdict as JSON has it, with its tuples again."""
     interval = stored["interval"] and tuple(stored["interval"])
     counts = {name: tuple(pair) for name, pair in stored["counts"].items()}
-    return Verdict(**stored | {"interval": interval, "counts": counts})
+    parts = {
+        name: {part: Outcome(outcome) for part, outcome in stored[name].items()}
+        for name in ("by_layout", "by_decay")
+    }
+    outcome = Outcome(stored["outcome"])
+    return Verdict(**stored | parts | {"outcome": outcome, "interval": interval, "counts": counts})

@@ -1,9 +1,10 @@
-"""On what the verdicts depend: one map of all that was varied, and its most telling cells.
+"""Robustness analysis: what becomes of each verdict when one choice of the study is another.
 
-A row of the map is a layout, a reading of the decay, or a variant of the plan; a column is a claim
-that runs decide. A cell says what becomes of the claim there, and whether that differs from what it
-is held against: for a layout or a reading the others, for a variant the same cells of the main
-table. See `flips` for both.
+The choices are those that the paper leaves open (a multiverse analysis, Steegen et al. 2016). A row
+of the map is a layout, a reading of the decay, or a variant of the plan; a column is a claim that
+runs decide. A cell has the outcome there and says whether it differs from the outcome that it is
+compared with: a layout or a reading is compared with the whole main table, a variant with the main
+table in the same cells of layout, decay and seed.
 """
 
 from collections.abc import Iterable
@@ -13,8 +14,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nmpcrl.claims.paper_claims import CLAIMS, Paths, judge_runs
-from nmpcrl.claims.rule import CELL, UNDECIDABLE, Verdict
+from nmpcrl.claims.paper_claims import BY_RUNS, judge_runs
+from nmpcrl.claims.rule import CELL, UNDECIDABLE, Outcome, Paths, Verdict
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
 from nmpcrl.study.experiment import PAPER
@@ -23,43 +24,49 @@ WHOLE = "main table"
 PARTS = {"layout": "B", "decay": "C"}  # of the main table, with the departures they read
 
 
-def atlas(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
-    """The map: the main table as a whole, the rows of `spread` over it, and those of `flips`.
+def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
+    """The map: the main table as a whole, its parts (`part_changes`), and `variant_changes`.
 
     Args:
         runs: of `summary.table`, with a column `variant`.
         paths: as `judge` takes them.
 
     Returns:
-        The columns of `flips` after `departure`, a letter of `DEPARTURES` or "".
+        `COLUMNS` after `departure`, a letter of `DEPARTURES` or "".
     """
     verdicts = judge_runs(runs[runs.variant == design.MAIN_TABLE], paths)
     whole = pd.DataFrame([_whole(verdict) for verdict in verdicts])
-    found = pd.concat([whole, spread(verdicts), flips(runs, paths)], ignore_index=True)
+    rows = [whole, part_changes(verdicts), variant_changes(runs, paths)]
+    found = pd.concat(rows, ignore_index=True)
     found.insert(0, "departure", found.variant.map(departure))
     return found
 
 
-def left_out(runs: pd.DataFrame) -> tuple[str, ...]:
+def not_run(runs: pd.DataFrame) -> tuple[str, ...]:
     """The variants of the plan that there is no run of."""
     return tuple(name for name in design.VARIANTS if name not in set(runs.variant))
 
 
-def telling(atlas: pd.DataFrame, count: int = 3) -> pd.DataFrame:
-    """The cells that flip and that chance explains least, of as many different claims and rows."""
-    left = atlas[atlas.flips.astype(bool)].sort_values("p", kind="stable")
+def clearest_changes(found: pd.DataFrame, count: int = 3) -> pd.DataFrame:
+    """The changed cells with the smallest p, of as many different claims and rows.
+
+    Args:
+        found: of `robustness_map`.
+        count: how many, at most.
+    """
+    rest = found[found.changes.astype(bool)].sort_values("p", kind="stable")
     chosen: list[int] = []
-    while len(left) and len(chosen) < count:
-        chosen.append(left.index[0])
-        left = left[(left.claim != left.claim.iloc[0]) & (left.variant != left.variant.iloc[0])]
-    return atlas.loc[chosen]
+    while len(rest) and len(chosen) < count:
+        chosen.append(rest.index[0])
+        rest = rest[(rest.claim != rest.claim.iloc[0]) & (rest.variant != rest.variant.iloc[0])]
+    return found.loc[chosen]
 
 
 def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The runs behind a row of the map, and those that it is held against.
+    """The runs behind a row of the map, and those that it is compared with.
 
     Args:
-        runs: as `atlas` takes them.
+        runs: as `robustness_map` takes them.
         variant: of the row.
     """
     main = runs[runs.variant == design.MAIN_TABLE]
@@ -73,35 +80,38 @@ def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame
 
 
 def departure(variant: str) -> str:
-    """The letter of what a row of the map reads otherwise, or "" where the paper is clear."""
+    """The letter of the departure that a row of the map reads otherwise, or ""."""
     if variant in design.VARIANTS:
         return design.VARIANTS[variant].departure
     return "" if variant == WHOLE else PARTS[_part(variant)[0]]
 
 
 def _whole(verdict: Verdict) -> dict[str, Any]:
-    """The row of the whole main table, which flips nothing."""
+    """The row of the whole main table, which changes nothing."""
     named = {"variant": WHOLE, "claim": verdict.claim, "outcome": verdict.outcome}
     share = np.nan if verdict.share is None else verdict.share
     pairs = verdict.counts["all"][1]
-    return named | {"base": verdict.outcome, "flips": False, "share": share, "pairs": pairs}
+    return named | {"base": verdict.outcome, "changes": False, "share": share, "pairs": pairs}
 
 
 def _part(variant: str) -> tuple[str, str]:
-    """Field and value of a row of `spread`: "layout A", "decay per step"."""
+    """Field and value of a row of `part_changes`: "layout A", "decay per step"."""
     words = variant.split()
     return words[0], words[-1]
 
 
-COLUMNS = ("variant", "claim", "outcome", "base", "flips", "share", "base_share", "pairs", "p")
+# `base` is the outcome that `outcome` is compared with; `changes` says that both are decided and
+# differ; `share` and `base_share` are of yes; `pairs` answered; `p` is the chance of shares so
+# different if the choice changed nothing (Fisher's exact test, as if runs were independent).
+COLUMNS = ("variant", "claim", "outcome", "base", "changes", "share", "base_share", "pairs", "p")
 
 
-def flips(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFrame:
-    """Every variant against the claims that runs decide, beside the same cells of the main table.
+def variant_changes(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFrame:
+    """The outcome of every claim in every variant, beside that of the main table's same cells.
 
     A learner of the paper that a variant does not run is one that it does not change, so its runs
-    of the main table stand in for it. A claim that none of the changed learners is asked about is
-    left out, for there is nothing to flip, and so are the controls, which change none of them.
+    of the main table stand in for it. A claim that asks none of the changed learners has no row,
+    for it cannot change, and neither have the controls, which change no learner of the paper.
 
     Args:
         runs: of `summary.table`, with a column `variant`.
@@ -109,30 +119,28 @@ def flips(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFr
         base: the `variant` of the main table's rows.
 
     Returns:
-        One row a variant and claim, in order, with the columns variant, claim, outcome, base (the
-        outcome of the main table in the cells of the variant), flips (both are decided, and
-        differ), share, base_share, pairs (how many answered) and p (the chance of shares so
-        different if the variant changed nothing: Fisher's exact test, as if runs were independent).
+        `COLUMNS`, one row a variant and claim, in order.
     """
     paper = runs[runs.learner.isin(PAPER)]
-    usual = paper[paper.variant == base]
+    main = paper[paper.variant == base]
     rows = []
     for name, changed in paper[paper.variant != base].groupby("variant", sort=False):
-        before = usual.merge(changed[CELL].drop_duplicates(), on=CELL)
+        before = main.merge(changed[CELL].drop_duplicates(), on=CELL)
         kept = before[~before.learner.isin(changed.learner)]
         after = judge_runs(pd.concat([changed, kept], ignore_index=True), paths)
         for verdict, other in zip(after, judge_runs(before, paths), strict=True):
-            if not changed.learner.isin(CLAIMS[verdict.claim].learners).any():
+            if not changed.learner.isin(BY_RUNS[verdict.claim].learners).any():
                 continue
-            judged, held_against = (Cell(v.outcome, *v.counts["all"]) for v in (verdict, other))
-            rows.append(_row(str(name), verdict.claim, judged, held_against))
+            judged, compared = (Cell(v.outcome, *v.counts["all"]) for v in (verdict, other))
+            rows.append(_row(str(name), verdict.claim, judged, compared))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def spread(verdicts: Iterable[Verdict]) -> pd.DataFrame:
-    """Every layout and reading of the decay against the claims, with the columns of `flips`.
+def part_changes(verdicts: Iterable[Verdict]) -> pd.DataFrame:
+    """The outcome of every claim in each layout and reading of the decay, beside that of all.
 
-    `base` is the outcome over all of them, and `base_share` the share in the others.
+    Returns:
+        `COLUMNS`; `base` is the outcome over the whole table, `base_share` the share in its rest.
     """
     rows = []
     for verdict in verdicts:
@@ -150,7 +158,7 @@ def spread(verdicts: Iterable[Verdict]) -> pd.DataFrame:
 class Cell(NamedTuple):
     """An outcome and the answers that it rests on."""
 
-    outcome: str
+    outcome: Outcome
     yes: int
     of: int
 
@@ -168,7 +176,7 @@ def _row(variant: str, claim: str, judged: Cell, base: Cell) -> dict[str, Any]:
         "claim": claim,
         "outcome": judged.outcome,
         "base": base.outcome,
-        "flips": decided and judged.outcome != base.outcome,
+        "changes": decided and judged.outcome != base.outcome,
         "share": judged.share,
         "base_share": base.share,
         "pairs": judged.of,

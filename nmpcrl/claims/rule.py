@@ -20,39 +20,39 @@ What is missing (a run that was not made, or is shorter than the paper's, or has
 held against) is no answer: a verdict stands if it is the same whatever the missing ones would say.
 """
 
-from collections.abc import Iterable
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.study import paper
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.records import Column
 
 MAJORITY = 0.5
 NEARLY_ALL = 0.9
 NEARLY_NONE = 0.1
 
-REPRODUCED = "reproduced"
-PARTLY = "partly reproduced"
-NOT = "not reproduced"
-UNDECIDABLE = "not decidable here"
-
 CELL = ["layout", "decay", "seed"]  # what two runs share that are held against each other
 
+Paths: TypeAlias = Mapping[Experiment, Column]  # the states of each run's last rollout
 
-@dataclass(frozen=True)
-class Claim:
-    """What the paper says, or we do, and how it is decided: fixed before it was put to a run."""
 
-    name: str  # "C1"
-    statement: str
-    question: str  # what each run, or pair of runs, is asked
-    measure: str  # the numbers that answer it
-    threshold: str  # and the border between yes and no
-    test: str = "share of yes, with its interval"
-    would_change: str = ""  # where another verdict is to be expected
-    learners: tuple[str, ...] = ()  # whose runs answer, in the order of the question
+class Outcome(StrEnum):
+    """What becomes of a claim."""
+
+    REPRODUCED = "reproduced"
+    PARTLY = "partly reproduced"
+    NOT = "not reproduced"
+    UNDECIDABLE = "not decidable here"
+
+
+REPRODUCED, PARTLY, NOT, UNDECIDABLE = Outcome
 
 
 @dataclass(frozen=True)
@@ -61,14 +61,57 @@ class Verdict:
 
     claim: str  # "C1"
     statement: str  # what the paper says
-    outcome: str  # one of the four above
+    outcome: Outcome
     evidence: str  # the numbers
     would_change: str  # where another verdict is to be expected
     share: float | None = None  # of the answers, how many are yes; None where no run is asked
-    interval: tuple[float, float] | None = None  # of the share; the missing may say what they like
-    by_layout: dict[str, str] = field(default_factory=dict)  # the outcome in each
-    by_decay: dict[str, str] = field(default_factory=dict)  # and in each reading of the decay
+    interval: tuple[float, float] | None = None  # of the share, whatever the missing say; or ratio
+    by_layout: dict[str, Outcome] = field(default_factory=dict)  # the outcome in each
+    by_decay: dict[str, Outcome] = field(default_factory=dict)  # and in each reading of the decay
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
+    ratio: float | None = None  # of times, where the claim is about time
+
+
+@dataclass(frozen=True, eq=False)
+class Assumption:
+    """One assumption of the theorem behind C8, beside what is run."""
+
+    theorem: str  # what Maei et al. (2009) assume
+    here: str  # what the paper does, with a measurement where one is possible
+    holds: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """All that a claim may be judged by; each takes what it asks for."""
+
+    runs: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `summary.table`
+    paths: Paths = field(default_factory=dict)
+    timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
+    assumptions: tuple[Assumption, ...] = ()  # of `audit`
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Claim(ABC):
+    """What the paper says, or we do, and how it is decided: fixed before it was put to a run."""
+
+    name: str  # "C1"
+    statement: str
+    question: str  # what is asked
+    measured: str  # the numbers that answer it, in words
+    border: str  # and where yes ends, in words
+    test: str = "share of yes, with its interval"
+    would_change: str  # where another verdict is to be expected
+    learners: tuple[str, ...] = ()  # whose runs answer, in the order of the question
+
+    @abstractmethod
+    def judge(self, observed: Observations) -> Verdict:
+        """The verdict on what was observed."""
+
+    def verdict(self, outcome: Outcome, evidence: str, **numbers: Any) -> Verdict:
+        """A verdict on this claim; `numbers` are further fields of `Verdict`."""
+        texts = (self.name, self.statement, outcome, evidence, self.would_change)
+        return Verdict(*texts, **numbers)
 
 
 @dataclass(frozen=True)
@@ -80,7 +123,7 @@ class Answers:
     missing: int = 0
 
     @property
-    def outcome(self) -> str:
+    def outcome(self) -> Outcome:
         """The rule at the top, whatever the missing ones would say."""
         asked = self.yes + self.no + self.missing
         least, most = read(self.yes, asked), read(self.yes + self.missing, asked)
@@ -96,7 +139,7 @@ class Answers:
         return Estimate(self.yes / answered, low, high)
 
 
-def read(yes: int, of: int) -> str:
+def read(yes: int, of: int) -> Outcome:
     """The rule at the top, for `yes` of `of` answers of which none is missing."""
     if not of or rate(of, of).low <= MAJORITY:
         return UNDECIDABLE
@@ -133,7 +176,7 @@ def settle(
         unit: what was asked, in the plural.
     """
 
-    def outcome(group: pd.Series) -> str:
+    def outcome(group: pd.Series) -> Outcome:
         strict = count(group).outcome
         if weaker is None or strict != NOT:
             return strict
@@ -143,17 +186,14 @@ def settle(
     whole = count(answers)
     layouts, decays = _groups(answers, "layout"), _groups(answers, "decay")
     parts = {"all": answers} | layouts | decays
-    return Verdict(
-        claim.name,
-        claim.statement,
+    return claim.verdict(
         outcome(answers),
         f"{evidence} {_held(whole, unit)} {scope(answers)}",
-        claim.would_change,
-        whole.share.value if whole.share else None,
-        (whole.share.low, whole.share.high) if whole.share else None,
-        {name: outcome(group) for name, group in layouts.items()},
-        {name: outcome(group) for name, group in decays.items()},
-        {name: (count(part).yes, int(part.notna().sum())) for name, part in parts.items()},
+        share=whole.share.value if whole.share else None,
+        interval=(whole.share.low, whole.share.high) if whole.share else None,
+        by_layout={name: outcome(group) for name, group in layouts.items()},
+        by_decay={name: outcome(group) for name, group in decays.items()},
+        counts={name: (count(part).yes, int(part.notna().sum())) for name, part in parts.items()},
     )
 
 
@@ -163,7 +203,7 @@ def arms(
     """The runs of each learner, in the same order of layout, decay and seed.
 
     A run that is missing, or shorter than the paper's, is a row of nan. One that had to be stopped
-    left no policy to drive with, so its final cost is infinite, whatever the last rollout cost.
+    left no policy, so its final cost is infinite, whatever the last rollout cost.
 
     Args:
         runs: of `summary.table`, all of one setting.
@@ -187,12 +227,6 @@ def _arm(runs: pd.DataFrame, learner: str) -> pd.DataFrame:
             f"{learner} has several runs in {cell}: judge the runs of one setting at a time"
         )
     return whole.assign(final_cost=whole.final_cost.where(whole.stopped == "finished", np.inf))
-
-
-def answered(holds: pd.Series, *frames: pd.DataFrame) -> pd.Series:
-    """Answers that are missing where a run of one of the arms is."""
-    known = np.logical_and.reduce([frame.stopped.notna() for frame in frames])
-    return holds.astype("boolean").where(known)
 
 
 def scope(answers: pd.Series) -> str:

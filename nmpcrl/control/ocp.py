@@ -36,12 +36,14 @@ class Theta(NamedTuple):
 
 def stage_cost(state: ca.SX, action: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
     """L(s, u, theta) of the paper: ||s - s_ref||^2 and ||u||^2, weighted by theta squared."""
-    return ca.sumsqr(theta.stage * (state - target)) + ca.sumsqr(theta.inputs * action)
+    result: ca.SX = ca.sumsqr(theta.stage * (state - target)) + ca.sumsqr(theta.inputs * action)
+    return result
 
 
 def terminal_cost(state: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
     """Gamma(s, theta) of the paper: ||s - s_ref||^2, weighted by theta squared."""
-    return ca.sumsqr(theta.terminal * (state - target))
+    result: ca.SX = ca.sumsqr(theta.terminal * (state - target))
+    return result
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,7 +59,8 @@ class Sensitivity:
         active_t = np.vstack([g_t[row], np.zeros((bound.sum(), len(l_tt)))])
         kkt = np.block([[l_zz, active.T], [active, np.zeros((len(active), len(active)))]])
         right = np.vstack([l_zt, active_t])
-        return l_tt - right.T @ np.linalg.solve(kkt, right)
+        result: Matrix = l_tt - right.T @ np.linalg.solve(kkt, right)
+        return result
 
     def kkt_residual(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> float:
         """The largest violation of the KKT conditions, 0 at an optimum.

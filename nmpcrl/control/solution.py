@@ -102,12 +102,14 @@ class Solution:
     @property
     def action(self) -> Vector:
         """u_0, shape (m,): the policy of Eq. (4), or the action that was fixed."""
-        return self.point.take(self.ocp.inputs[0])
+        result: Vector = self.point.take(self.ocp.inputs[0])
+        return result
 
     @property
     def next_action(self) -> Vector:
         """u_1, shape (m,): what the plan does next; u_0 when the horizon is 1."""
-        return self.point.take(self.ocp.inputs[min(1, len(self.ocp.inputs) - 1)])
+        result: Vector = self.point.take(self.ocp.inputs[min(1, len(self.ocp.inputs) - 1)])
+        return result
 
     @cached_property
     def multipliers(self) -> Multipliers:

@@ -29,7 +29,7 @@ class Obstacle:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Drive from `start` to `target` within a box and around the obstacles."""
+    """Go from `start` to `target` within a box and around the obstacles."""
 
     start: Vector  # s_0, shape (n,)
     target: Vector  # s_ref, shape (n,); the reference input is 0

@@ -78,7 +78,7 @@ class SecondSolve:
 
 @dataclass(frozen=True)
 class Imitation:
-    """Let a network learn the NMPC's value and ask it: DES, and RDES if it is told theta."""
+    """Let a network learn the NMPC's value and ask it: DES, and RDES if theta is an input."""
 
     network: QNetwork
     with_theta: bool

@@ -9,7 +9,7 @@
 | TDC     | a second solve    | gradient TD with its curvature, projected  |
 | QL      | a second solve    | a semi-gradient of Q(s, a), u_0 = a fixed  |
 
-The control arms that they are held against are in `controls`.
+The control arms that they are held against are in `baselines`.
 """
 
 from collections.abc import Callable
@@ -158,7 +158,7 @@ def deep_expected_sarsa(
 def regularized_deep_expected_sarsa(
     nmpc: Controller, network: QNetwork, alpha: float, *, gated: bool = True, fits: int = 1
 ) -> Learner:
-    """RDES, the paper's first method: the network of DES is told theta as well, 14 inputs."""
+    """RDES, the paper's first method: the network of DES with theta as an input, too."""
     bootstrap = Imitation(network, with_theta=True, gated=gated, fits=fits)
     return Learner("RDES", bootstrap, semi_gradient(alpha), nmpc.gamma)
 

@@ -72,7 +72,8 @@ class Exploration:
 
     def __call__(self, policy: Vector, episode: int, time: int) -> Vector:
         """The action before it is clipped to the action space."""
-        return policy + self._scaled[episode, time]
+        result: Vector = policy + self._scaled[episode, time]
+        return result
 
     @cached_property
     def _scaled(self) -> Matrix:

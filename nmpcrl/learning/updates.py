@@ -4,6 +4,10 @@ import numpy as np
 
 from nmpcrl import Vector
 
+# A semi-gradient step multiplies the TD error of its own transition by 1 - alpha ||phi||^2, to
+# first order and with the target held. Where alpha ||phi||^2 is above 2, it changes sign and grows.
+OVERSHOOT = 2.0
+
 
 def td_error(cost: float, gamma: float, q: float, q_next: float) -> float:
     """TD error: Eq. (7), or Eq. (11) when a network supplies `q_next`."""

@@ -8,8 +8,16 @@ from html import escape
 import pandas as pd
 
 from nmpcrl.bench.targets import Target
-from nmpcrl.claims.assumptions import Assumption
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Claim, Verdict
+from nmpcrl.claims.rule import (
+    NOT,
+    PARTLY,
+    REPRODUCED,
+    UNDECIDABLE,
+    Assumption,
+    Claim,
+    Outcome,
+    Verdict,
+)
 from nmpcrl.report.text import SURE, listed
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
@@ -34,8 +42,8 @@ def claim_table(claims: Iterable[Claim], caption: str) -> str:
     rows = (
         (
             f"<strong>{escape(c.name)}</strong> {escape(c.statement)}",
-            f"{escape(c.question)}<br>{escape(_sentence(c.measure))}",
-            f"{escape(_sentence(c.threshold))}<br>{escape(_sentence(c.test))}",
+            f"{escape(c.question)}<br>{escape(_sentence(c.measured))}",
+            f"{escape(_sentence(c.border))}<br>{escape(_sentence(c.test))}",
         )
         for c in claims
     )
@@ -109,7 +117,7 @@ def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
 
     Args:
         verdicts: of `judge_runs`.
-        changed: rows of `robustness.atlas`; those that chance hardly explains, by `SURE`, are bold.
+        changed: rows of `robustness_map`; those that chance hardly explains, by `SURE`, are bold.
     """
     rows = ["| Claim | Over all | Changed by |", "|---|---|---|"]
     for v in verdicts:
@@ -176,16 +184,18 @@ def _badge(text: str, style: str) -> str:
     return f'<span class="{style}">{text}</span>'
 
 
-def _word(outcome: str | None) -> str:
+def _word(outcome: Outcome | None) -> str:
     """An outcome in a narrow cell: colour and word; nothing where nothing was judged."""
     return _badge(WORDS[outcome], BADGES[outcome]) if outcome else ""
 
 
 def _share(verdict: Verdict) -> str:
-    """The share on which a verdict rests and its interval, below its badge."""
-    if verdict.share is None or verdict.interval is None:
+    """The share, or ratio, on which a verdict rests and its interval, below its badge."""
+    if verdict.interval is None:
         return ""
     low, high = verdict.interval
+    if verdict.share is None:
+        return f"<br>{verdict.ratio:.2f} [{low:.2f}, {high:.2f}]"
     return f"<br>{verdict.share:.0%} [{low:.0%}, {high:.0%}]"
 
 

@@ -67,7 +67,7 @@ def by_layout_and_decay(verdicts: Iterable[Verdict]) -> str:
 
 
 def verdicts_changed(judged: pd.DataFrame) -> str:
-    """How many variants change a verdict; `judged` as `robustness.flips` returns it."""
+    """How many variants change a verdict; `judged` as `robustness.variant_changes` returns it."""
     variants = judged.variant.unique()
     if not len(variants):
         return ""
@@ -121,4 +121,4 @@ def listed(names: Iterable[object]) -> str:
 
 
 def _changed(judged: pd.DataFrame) -> pd.DataFrame:
-    return judged[judged.flips.astype(bool)]  # without rows the column has no type of its own
+    return judged[judged.changes.astype(bool)]  # without rows the column has no type of its own

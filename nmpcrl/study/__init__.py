@@ -1,4 +1,4 @@
-"""What is measured: the paper's numbers, runs, metrics, claims and figures."""
+"""What is run, and where it is kept: the paper's numbers, layouts, experiments and records."""
 
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment

@@ -21,7 +21,7 @@ DEPARTURES = {
     "A": Departure(
         gap="The target, x = 8.5 m, lies outside the printed state space, [-9, 3]^2.",
         reading="State space [-3, 9]^2.",
-        why="One flipped sign repairs everything: start and target then each lie 0.5 m inside a"
+        why="One changed sign repairs everything: start and target then each lie 0.5 m inside a"
         " wall, and 11 m at 0.6 m/s take 92 of the 129 steps. With the printed box the robot parks"
         " at x = 3 m and never comes within d_t of the target.",
         variant="box = 'printed'",
@@ -51,7 +51,7 @@ DEPARTURES = {
     "E": Departure(
         gap="The noise may carry an action out of the action space; nothing says what happens.",
         reading="The action is clipped to the action space.",
-        why="A robot that can drive at 0.6 m/s cannot be told to drive at 1.6 m/s.",
+        why="No input of a robot that can do 0.6 m/s makes it do 1.6 m/s.",
         variant="clipped",
     ),
     "F": Departure(

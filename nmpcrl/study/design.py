@@ -5,7 +5,7 @@ reading of the exploration decay, and seed. The variants change one other thing 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
@@ -15,7 +15,7 @@ from nmpcrl.study.replicas import perturbed
 from nmpcrl.study.setup import DECAYS, NETWORKS
 from nmpcrl.study.sweeps import sweep
 
-LAYOUTS = tuple(paper.LAYOUTS)
+LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too
 SEEDS = tuple(range(10))
 VARIED: dict[str, Any] = {"layout": ("A", "D"), "seed": tuple(range(5))}  # one open, one closing
 FRESH: dict[str, Any] = {"layouts": ("A", "B", "D"), "seeds": tuple(range(5))}
@@ -108,10 +108,3 @@ def whole_study(episodes: int = paper.EPISODES) -> dict[Experiment, str]:
         for experiment in runs:
             named.setdefault(experiment, name)
     return named
-
-
-def base_of(experiment: Experiment, name: str) -> Experiment:
-    """The run of the main table that a run of variant `name` is held against."""
-    usual = Experiment()
-    changed = {key: getattr(usual, key) for key in VARIANTS[name].fields if key != "decay"}
-    return replace(experiment, **changed)

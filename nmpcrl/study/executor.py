@@ -156,7 +156,8 @@ class Slots(Executor):
             if not hasattr(self._own, "process"):
                 self._own.process = _process()
                 self._all.append(self._own.process)
-            return self._own.process.submit(call)
+            result: Future[Any] = self._own.process.submit(call)
+            return result
 
 
 def _process() -> ProcessPoolExecutor:

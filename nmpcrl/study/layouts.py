@@ -10,7 +10,7 @@ A layout may be used if
 2. start and target lie outside every penalty zone, Upsilon = 0;
 3. without noise, the controller with theta_init is at the target after K = 129 steps.
 
-It is called *closing* if a gap that this first drive goes through is closed at theta_c = 0.35,
+It is called *closing* if a gap that this first rollout goes through is closed at theta_c = 0.35,
 where learning may be heading (departure N), and *open* otherwise.
 """
 
@@ -25,7 +25,7 @@ from nmpcrl.control import Task
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
 
-ARRIVED = 0.5  # distance to the target, over all states, at which a drive has arrived
+ARRIVED = 0.5  # distance to the target, over all states, at which a rollout has arrived
 SEED = 0  # of the sampler that drew the named layouts
 AREA = ((-1.5, 7.5), (-1.5, 5.0))  # of the drawn centres, x and y [m]
 APART = 2.2  # least distance of two drawn centres [m]: no disc touches another
@@ -41,8 +41,8 @@ class Screening:
 
     blocked: bool  # 1: the straight way
     clear: bool  # 2: start and target
-    arrives: bool  # 3: the drive of theta_init
-    closing: bool  # a gap of this drive is closed at theta_c = d_o
+    arrives: bool  # 3: the rollout of theta_init
+    closing: bool  # a gap of this rollout is closed at theta_c = d_o
 
     @property
     def passed(self) -> bool:
@@ -63,9 +63,9 @@ def screen(centres: Centres) -> Screening:
     if not (blocked and clear):
         return Screening(blocked, clear, arrives=False, closing=False)
     theta = np.array(paper.THETA_INIT)
-    drive = evaluate(Persistent(paper.controller(task)), theta, paper.STEPS)
-    arrives = not drive.failure and task.distance(drive.states[-1]) <= ARRIVED
-    narrow = [width <= 0 for width in gaps(task, drive.states[:, :2], task.margin).values()]
+    rollout = evaluate(Persistent(paper.controller(task)), theta, paper.STEPS)
+    arrives = not rollout.failure and task.distance(rollout.states[-1]) <= ARRIVED
+    narrow = [width <= 0 for width in gaps(task, rollout.states[:, :2], task.margin).values()]
     return Screening(blocked, clear, arrives=bool(arrives), closing=any(narrow))
 
 
@@ -115,7 +115,7 @@ def sampler(seed: int = SEED) -> Iterator[Centres]:
 def drawn() -> dict[str, Centres]:
     """The named layouts after A: the first that `sampler` draws, until there are `NAMED` of a kind.
 
-    `paper.LAYOUTS` holds them; a test draws them again.
+    `paper.LAYOUTS` begins with them; a test draws them again.
     """
     wanted = dict(NAMED)
     wanted[screen(paper.LAYOUTS["A"]).kind] -= 1
@@ -141,7 +141,8 @@ def _distances(start: Vector, end: Vector, points: Sequence[Sequence[float]]) ->
     along = end - start
     away = np.asarray(points) - start
     share = np.clip(away @ along / (along @ along), 0, 1)
-    return np.linalg.norm(away - share[:, None] * along, axis=1)
+    result: Vector = np.linalg.norm(away - share[:, None] * along, axis=1)
+    return result
 
 
 def _crosses(path: Matrix, one: Vector, other: Vector) -> bool:

@@ -153,7 +153,7 @@ def _evaluation(
     rollout = evaluate(controller, weights.theta, steps)
     missing = ((0, steps - len(rollout.states)), (0, 0))
     states, actions = (
-        np.pad(driven, missing, constant_values=np.nan)
-        for driven in (rollout.states, rollout.actions)
+        np.pad(reached, missing, constant_values=np.nan)
+        for reached in (rollout.states, rollout.actions)
     )
     return episode, weights.theta, rollout.cost, states, actions

@@ -84,39 +84,48 @@ def test_the_gain_is_the_share_of_the_cost_that_learning_took_away(last, gain):
     assert metrics.gain(records([[1]], judged=[100, last, last, last])) == pytest.approx(gain)
 
 
-def test_wandering_is_judged_in_the_second_half_only():
+def test_the_late_cost_range_is_judged_in_the_second_half_only():
     run = records(np.ones((4, 1)), judged=[100, 900, 70, 60, 65], at=[0, 1, 2, 3, 4])
     assert metrics.late_cost_range(run) == pytest.approx(0.1)
 
 
-def test_a_run_without_a_rollout_in_the_second_half_wanders_without_bound():
+def test_a_run_without_a_rollout_in_the_second_half_has_an_unbounded_range():
     assert metrics.late_cost_range(records(np.ones((4, 1)), judged=[100, 90], at=[0, 1])) == np.inf
 
 
 @pytest.mark.parametrize("late", [(np.inf, 60), (np.inf, np.inf)])
-def test_a_failed_rollout_in_the_second_half_is_wandering_without_bound(late):
+def test_a_failed_rollout_in_the_second_half_makes_the_range_unbounded(late):
     run = records(np.ones((4, 1)), judged=[100, 70, *late], at=[0, 1, 3, 4])
     assert metrics.late_cost_range(run) == np.inf
 
 
-def test_the_excess_compares_the_medians_of_the_last_episodes():
-    frozen = records(np.full((60, 1), 10.0))
-    costs = np.full((60, 1), 10.0)
+def test_the_cost_ratio_compares_the_medians_of_the_last_episodes():
+    frozen, costs = np.full(60, 10.0), np.full(60, 10.0)
     costs[-20:] = 30
     costs[-9:] = 1000  # fewer than half of the last twenty
-    assert metrics.cost_ratio(records(costs), frozen) == pytest.approx(3)
+    assert metrics.cost_ratio(costs, frozen) == pytest.approx(3)
 
 
-def test_the_excess_looks_at_no_more_than_the_second_half():
-    frozen = records(np.full((4, 1), 10.0))
-    assert metrics.cost_ratio(records([[999], [999], [20], [20]]), frozen) == pytest.approx(2)
-    assert metrics.cost_ratio(records([[30]]), records([[10]])) == pytest.approx(3)
+def test_the_cost_ratio_looks_at_no_more_than_the_second_half():
+    assert metrics.cost_ratio(np.array([999.0, 999, 20, 20]), np.full(4, 10.0)) == pytest.approx(2)
+    assert metrics.cost_ratio(np.array([30.0]), np.array([10.0])) == pytest.approx(3)
 
 
-def test_an_episode_cut_short_at_the_end_is_an_infinite_excess():
-    frozen = records(np.ones((2, 2)))
-    run = records(np.ones((2, 2)), status=[0, 0, 0, 2])
-    assert metrics.cost_ratio(run, frozen) == np.inf
+LOST, WHOLE, ONE_LOST = np.full(4, np.nan), np.full(4, 10.0), np.array([10.0] * 59 + [np.nan])
+
+
+@pytest.mark.parametrize(
+    ("cost", "frozen", "ratio"),
+    [
+        (np.array([1.0, np.nan]), np.ones(2), np.inf),
+        (LOST, WHOLE, np.inf),
+        (WHOLE, LOST, 0.0),  # whatever the run did, the frozen arm did worse
+        (LOST, LOST, np.nan),
+        (ONE_LOST, ONE_LOST, 1.0),  # one lost episode is no more than a costly one, in either arm
+    ],
+)
+def test_an_episode_that_was_lost_costs_infinitely_much_in_either_arm(cost, frozen, ratio):
+    assert metrics.cost_ratio(cost, frozen) == pytest.approx(ratio, nan_ok=True)
 
 
 def test_overshooting_counts_the_steps_strictly_above_two():
@@ -128,12 +137,6 @@ def test_the_distance_between_thetas_is_relative_and_symmetric():
     b = records([[1]], theta=[[1.0] * (D - 1) + [2.0]])
     assert metrics.theta_distance(a, b) == metrics.theta_distance(b, a) == pytest.approx(0.5)
     assert metrics.theta_distance(a, a) == 0
-
-
-def test_the_distance_between_paths_is_the_largest_at_one_time_and_ignores_the_heading():
-    a, b = records([[1]]), records([[1]])
-    b.evaluations["states"][-1, 2] = [3, 4, 100]
-    assert metrics.path_distance(a, b) == pytest.approx(5)
 
 
 def test_a_state_on_the_boundary_of_an_obstacle_is_no_violation():

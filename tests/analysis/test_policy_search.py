@@ -24,14 +24,14 @@ def runs(tmp_path, monkeypatch):
 
 @pytest.fixture
 def bowl(monkeypatch):
-    """Drives whose cost is 7 at `BEST`, grows with the distance, and is infinite far away."""
+    """Rollouts whose cost is 7 at `BEST`, grows with the distance, and is infinite far away."""
 
-    def drive(_, theta, steps):
+    def rollout(_, theta, steps):
         away = np.linalg.norm((theta - BEST) / SCALE)
         assert steps == paper.STEPS
         return SimpleNamespace(cost=7 + away**2 if away < 3 else np.inf)
 
-    monkeypatch.setattr(policy_search, "evaluate", drive)
+    monkeypatch.setattr(policy_search, "evaluate", rollout)
 
 
 @pytest.fixture
@@ -67,9 +67,9 @@ def test_the_least_cost_is_found_within_the_budget():
 def test_it_starts_at_theta_init_and_notes_every_improvement():
     found = policy_search.search(Search(budget=200))
     start = np.linalg.norm((paper.THETA_INIT - BEST) / SCALE)
-    assert found.drives[0] == 1
+    assert found.rollouts[0] == 1
     assert found.initial == pytest.approx(7 + start**2)
-    assert (np.diff(found.drives) > 0).all()
+    assert (np.diff(found.rollouts) > 0).all()
     assert (np.diff(found.best) < 0).all()
     assert found.gain == pytest.approx(1 - found.best[-1] / found.best[0])
 
@@ -83,11 +83,11 @@ def test_the_same_search_finds_the_same_theta_and_another_seed_another():
 
 @pytest.mark.usefixtures("bowl")
 def test_theta_stays_within_its_bounds(monkeypatch):
-    seen, drive = [], policy_search.evaluate
+    seen, rollout = [], policy_search.evaluate
 
     def note(controller, theta, steps):
         seen.append(theta)
-        return drive(controller, theta, steps)
+        return rollout(controller, theta, steps)
 
     monkeypatch.setattr(policy_search, "evaluate", note)
     policy_search.search(Search(budget=300))
@@ -95,22 +95,24 @@ def test_theta_stays_within_its_bounds(monkeypatch):
     assert (np.array(seen) <= policy_search.UPPER + 1e-12).all()
 
 
-def test_where_all_drives_fail_theta_init_is_what_was_found(monkeypatch):
+def test_where_all_rollouts_fail_theta_init_is_what_was_found(monkeypatch):
     monkeypatch.setattr(policy_search, "evaluate", lambda *_: SimpleNamespace(cost=np.inf))
     found = policy_search.search(Search(budget=LEAST))
     assert found.theta == pytest.approx(paper.THETA_INIT)
-    assert (found.drives, found.best) == ((1,), (np.inf,))
+    assert (found.rollouts, found.best) == ((1,), (np.inf,))
 
 
 @pytest.mark.slow
-def test_a_search_in_processes_costs_what_a_drive_with_its_theta_costs():
+def test_a_search_in_processes_costs_what_a_rollout_with_its_theta_costs():
     wanted = Search("D", budget=LEAST)
     found = search_all([wanted], workers=1, progress=False)[wanted]
     controller = Persistent(paper.nmpc("D"))
-    drives = [
+    rollouts = [
         evaluate(controller, np.array(t), paper.STEPS) for t in (paper.THETA_INIT, found.theta)
     ]
-    assert (found.initial, found.cost) == pytest.approx([drive.cost for drive in drives], rel=1e-9)
+    assert (found.initial, found.cost) == pytest.approx(
+        [rollout.cost for rollout in rollouts], rel=1e-9
+    )
     assert found.cost < found.initial
 
 

@@ -118,8 +118,19 @@ def test_the_table_holds_each_run_against_its_frozen_arm(records, short):
     arm = run(frozen_arm(SHORT))
     frame = table([short, summarise(arm)]).set_index("learner")
     assert frame.cost_ratio["frozen"] == 1
-    assert frame.cost_ratio["RDES"] == metrics.cost_ratio(records, arm)
+    costs = [metrics.training_cost(one) for one in (records, arm)]
+    assert frame.cost_ratio["RDES"] == metrics.cost_ratio(*costs)
     assert np.isnan(table([short]).cost_ratio[0])
+
+
+@pytest.mark.parametrize("lost", [slice(3, None), slice(2, None)])
+def test_the_table_and_the_metric_agree_where_the_frozen_arm_lost_episodes(short, lost):
+    arm = replace(short, experiment=asdict(frozen_arm(SHORT)))
+    lame = replace(arm, episodes=arm.episodes | {"cost": arm.episodes["cost"].copy()})
+    lame.episodes["cost"][lost] = np.nan
+    frame = table([short, lame]).set_index("learner")
+    expected = metrics.cost_ratio(short.episodes["cost"], lame.episodes["cost"])
+    assert frame.cost_ratio["RDES"] == expected == 0
 
 
 def test_the_tidy_table_has_a_row_an_episode(short):

@@ -1,9 +1,9 @@
-"""A drive in plain words: each number against a drive whose numbers can be read off."""
+"""A trajectory's summary: each number against one whose numbers can be read off."""
 
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.trajectory import closes_at, described
+from nmpcrl.analysis.trajectory import closes_at, describe
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import gaps
 
@@ -21,45 +21,45 @@ def along(points: np.ndarray) -> np.ndarray:
     return np.column_stack([points, np.full(len(points), np.pi / 2)])
 
 
-def test_a_straight_drive_is_as_long_as_its_ends_are_apart(task):
+def test_a_straight_trajectory_is_as_long_as_its_ends_are_apart(task):
     states = along(np.linspace([-2.5, 2.0], [8.5, 2.0], 12))
-    found = described(states, task, 0.5)
+    found = describe(states, task, 0.5)
     assert found.length == pytest.approx(11.0)
-    assert found.room == pytest.approx(np.hypot(0.5, 2.0) - 1.25)
+    assert found.clearance == pytest.approx(np.hypot(0.5, 2.0) - 1.25)
 
 
 def test_the_robot_has_arrived_when_it_is_at_the_target_to_stay(task):
     away = np.array([3.0, 0.1, 2.0, 0.6, 0.4, 0.0])
     states = along(np.column_stack([8.5 - away, np.full(6, 2.0)]))
-    assert described(states, task, 0.5).arrival == pytest.approx(4 * 0.5)
-    assert described(states[:-2], task, 0.5).arrival == np.inf
+    assert describe(states, task, 0.5).arrival == pytest.approx(4 * 0.5)
+    assert describe(states[:-2], task, 0.5).arrival == np.inf
 
 
 def test_where_it_looks_does_not_matter_to_arriving(task):
     states = along(np.tile([8.5, 2.0], (3, 1)))
     states[:, 2] = -np.pi / 2
-    assert described(states, task, 0.5).arrival == 0
+    assert describe(states, task, 0.5).arrival == 0
 
 
-def test_a_drive_that_failed_never_arrives(task):
+def test_a_rollout_that_failed_never_arrives(task):
     states = along(np.tile([8.5, 2.0], (4, 1)))
-    assert described(states, task, 0.5).arrival == 0
+    assert describe(states, task, 0.5).arrival == 0
     states[2:] = np.nan
-    assert described(states, task, 0.5).arrival == np.inf
+    assert describe(states, task, 0.5).arrival == np.inf
 
 
 def test_coming_close_is_charged_only_within_the_margin_and_far_from_the_target(task):
     beside, within = [3.0, FAR + 0.01], [3.0, 1.25]
-    assert described(along(np.array([beside])), task, 0.5).penalty == 0
-    assert described(along(np.array([beside, within])), task, 0.5).penalty == pytest.approx(
+    assert describe(along(np.array([beside])), task, 0.5).penalty == 0
+    assert describe(along(np.array([beside, within])), task, 0.5).penalty == pytest.approx(
         50 * 0.35
     )
     near = paper.task_among(((8.5, 3.2), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
-    assert described(along(np.array([[8.5, 2.1]])), near, 0.5).penalty == 0
+    assert describe(along(np.array([[8.5, 2.1]])), near, 0.5).penalty == 0
 
 
 def test_inside_an_obstacle_the_room_is_negative(task):
-    assert described(along(np.array([[3.0, 1.0]])), task, 0.5).room == pytest.approx(-0.25)
+    assert describe(along(np.array([[3.0, 1.0]])), task, 0.5).clearance == pytest.approx(-0.25)
 
 
 def test_a_gap_closes_where_its_width_is_nothing():

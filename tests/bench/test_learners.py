@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from nmpcrl.bench import learners
+from nmpcrl.bench.paired import Ratio
 from nmpcrl.study import paper
 
 
@@ -40,13 +41,32 @@ def test_the_paper_s_hours_stand_beside_ours_and_are_missing_where_it_gives_none
 
 
 def test_a_ratio_is_taken_within_one_solver():
-    times = pd.DataFrame(
-        {
-            "solver": ["fatrop", "fatrop", "ipopt", "ipopt"],
-            "learner": ["ES", "RDES", "ES", "RDES"],
-            "ms_per_step": [2.0, 3.0, 10.0, 6.0],
-        }
-    )
-    assert learners.ratio(times, "fatrop", "RDES") == pytest.approx(1.5)
-    assert learners.ratio(times, "ipopt", "RDES") == pytest.approx(0.6)
-    assert learners.ratio(times, "ipopt", "ES", reference="RDES") == pytest.approx(10 / 6)
+    names = ["ratio", "ratio_low", "ratio_high", "waited"]
+    rows = [(1.0, 1.0, 1.0, 0.0), (1.5, 1.4, 1.6, 0.1), (1.0, 1.0, 1.0, 0.0), (0.6, 0.5, 0.7, 0.2)]
+    times = pd.DataFrame(rows, columns=names)
+    times["solver"] = ["fatrop", "fatrop", "ipopt", "ipopt"]
+    times["learner"] = ["ES", "RDES", "ES", "RDES"]
+    assert learners.ratio(times, "fatrop", "RDES") == Ratio(1.5, 1.4, 1.6, 0.1)
+    assert learners.ratio(times, "ipopt", "RDES") == Ratio(0.6, 0.5, 0.7, 0.2)
+    with pytest.raises(KeyError):
+        learners.ratio(times, "ipopt", "GES")
+
+
+def test_es_is_as_fast_as_itself_and_few_steps_have_no_interval(timings):
+    table = timings.set_index("learner")
+    assert table.ratio["ES"] == 1
+    assert table[["ratio_low", "ratio_high"]].isna().all(axis=None)
+    assert table.waited.between(0, 1).all()
+
+
+def test_without_es_there_is_nothing_to_compare_with():
+    table = learners.time_learners(("GES",), ("riccati",), steps=2)
+    assert table[learners.COMPARED].isna().all(axis=None)
+
+
+def test_the_parts_of_a_step_add_up_to_the_processor_s_time_however_long_it_waited():
+    parts = np.array([[2.0, 0.4, 0.2, 2.0, 1.0]] * 3).T  # half of the time was somebody else's
+    made = learners._medians(parts)
+    assert made["ms_per_step"] == pytest.approx(1e3)
+    told = made["solves"] * made["ms_per_solve"] + made["ms_per_fit"] + made["ms_per_rest"]
+    assert told == pytest.approx(made["ms_per_step"])

@@ -84,7 +84,7 @@ def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
             raise SolverError("no", state, theta)
         return nmpc.solve(state, theta, warm_start)
 
-    states = [state for state, _, _ in solves.drive(nmpc, 0.0, np.random.default_rng(0), 3)]
+    states = [state for state, _, _ in solves.closed_loop(nmpc, 0.0, np.random.default_rng(0), 3)]
     named = {"sound": nmpc.solve, "fails": fails_once}
     rows = list(solves._episode(states, named, np.random.default_rng(0)))
     failed = [row[3:] for row in rows if row[0] == "fails"]
@@ -94,7 +94,7 @@ def test_a_solver_that_fails_is_kept_without_a_value_and_starts_again(nmpc):
     assert warm_starts[2] is None
 
 
-def test_the_excess_is_relative_to_the_best_value(nmpc):
+def test_the_suboptimality_is_relative_to_the_best_value(nmpc):
     class Dear:
         def __init__(self, solution):
             self.value, self.iterations = 1.5 * solution.value, 1
@@ -111,9 +111,9 @@ def test_the_own_loop_has_both_loops_and_no_cold_solve():
 
 def test_without_noise_the_loop_is_the_policy_s_own(nmpc):
     rng = np.random.default_rng(0)
-    (_, first, _), (state, _, _) = solves.drive(nmpc, 0.0, rng, 2)
+    (_, first, _), (state, _, _) = solves.closed_loop(nmpc, 0.0, rng, 2)
     assert state == pytest.approx(nmpc.plant.step(nmpc.task.start, first.action))
-    *_, (noisy, _, _) = solves.drive(nmpc, 1.0, rng, 2)
+    *_, (noisy, _, _) = solves.closed_loop(nmpc, 1.0, rng, 2)
     assert np.abs(noisy - state).max() > 1e-3
 
 
@@ -127,7 +127,7 @@ def test_added_obstacles_do_not_change_the_plan():
     few, many = scaling._crowded(1), scaling._crowded(max(scaling.OBSTACLES))
     assert len(many.task.obstacles) == max(scaling.OBSTACLES)
     rng = np.random.default_rng(0)
-    for state, solution, _ in solves.drive(few, 0.0, rng, 40):
+    for state, solution, _ in solves.closed_loop(few, 0.0, rng, 40):
         assert many.solve(state, THETA).value == pytest.approx(solution.value, rel=1e-6)
 
 

@@ -99,10 +99,10 @@ def test_learners_whose_steps_are_the_sum_of_these_parts_lie_on_the_curve(measur
 
 def test_what_was_not_measured_is_unknown(measured):
     measured["parallel"] = {"workers": [], "seconds": [], "runs": [], "episodes": []}
-    measured["rival"] = {"learner": [], "seconds": []}
+    measured["mpcrl"] = {"learner": [], "seconds": []}
     measured["first"] = {name: column[1:] for name, column in measured["first"].items()}
     assert np.isnan(summary.speed_up(measured)[1])
-    assert np.isnan(summary.rival(measured)).all()
+    assert np.isnan(summary.against_mpcrl(measured)).all()
     assert np.isnan(summary.first_call(measured, cached=False)[0])
     unknown = [what for what, reached in outcomes(measured).items() if reached is None]
     assert len(unknown) == 3
@@ -120,7 +120,7 @@ def test_every_figure_can_be_reached(measured):
         ("loop", "seconds", 46e-6, 2),
         ("runs", "seconds", 23.0, 4),
         ("parallel", "seconds", 10.0, 1),
-        ("rival", "seconds", 1e-3, 1),
+        ("mpcrl", "seconds", 1e-3, 1),
         ("first", "notice", False, 1),
         ("first", "solve", 41.0, 2),
         ("episodes", "memory", 700_000_000, 1),
@@ -138,7 +138,7 @@ def test_a_run_that_had_to_share_the_processor_says_so(measured):
     assert told == "4.0 s, the processor 75% of it"
 
 
-def test_the_card_has_a_row_and_a_badge_for_every_figure(measured):
+def test_the_table_has_a_row_and_a_badge_for_every_figure(measured):
     measured["loop"]["seconds"] = [1e-3] * 10
     html = tables.target_table(targets.targets(measured), "some machine")
     assert html.count("<tr>") == 1 + 16

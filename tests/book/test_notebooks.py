@@ -38,8 +38,10 @@ def figures(name: str) -> list:
 
 
 def test_the_chapters_are_there_and_in_the_table_of_contents():
-    assert [name[:2] for name in CHAPTERS[:7]] == ["01", "02", "03", "04", "05", "06", "07"]
-    assert CHAPTERS[7:] == ["solver"]
+    *numbered, last = CHAPTERS
+    assert [name[:2] for name in numbered] == [f"{i:02}" for i in range(1, len(numbered) + 1)]
+    assert len(numbered) >= 7
+    assert last == "solver"
     assert set(NOTEBOOKS) == set(build.notebooks())
 
 

@@ -1,18 +1,45 @@
-"""The README says what was measured."""
+"""The README says what was measured, and its commands and examples work."""
 
 import re
+from collections import Counter
 from pathlib import Path
 
+import numpy as np
+
+from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import published
+from nmpcrl.claims.paper_claims import BY_TIME
+from nmpcrl.claims.rule import UNDECIDABLE
+from nmpcrl.claims.timing import decide
 from nmpcrl.study import design
 
-README = (Path(__file__).resolve().parents[2] / "README.md").read_text()
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text()
+COUNTED = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+
+
+def claims() -> dict[str, str]:
+    """The published outcome of each of the paper's claims."""
+    verdicts = published.load().verdicts
+    return {v.claim: v.outcome for v in verdicts if v.claim.startswith("C")}
 
 
 def test_the_table_of_claims_holds_the_published_verdicts():
     rows = dict(re.findall(r"^\| (C\d) \| .* \| (.+) \|$", README, flags=re.M))
-    verdicts = {v.claim: v.outcome for v in published.load().verdicts if v.claim.startswith("C")}
-    assert rows == verdicts
+    assert rows == claims()
+
+
+def test_the_first_paragraph_counts_the_published_verdicts():
+    count = Counter(claims().values())
+    found = re.search(
+        r"Of the paper's (\w+) claims, (\w+)\s(?:is|are) reproduced, (\w+) (?:is|are) partly"
+        r" and (\w+) (?:is|are) not",
+        README,
+    )
+    outcomes = ("reproduced", "partly reproduced", "not reproduced")
+    expected = [len(claims()), *(count[outcome] for outcome in outcomes)]
+    assert found
+    assert [COUNTED.index(word) for word in found.groups()] == expected
 
 
 def test_the_numbers_of_runs_are_those_of_the_published_study():
@@ -21,3 +48,33 @@ def test_the_numbers_of_runs_are_those_of_the_published_study():
     assert set(re.findall(r"(\d+) runs", README)) == {str(parts["main"]), str(sum(varied))}
     assert f"in {len(varied)} ways" in README
     assert re.search(rf"`make book` trains\s{len(design.fresh())} afresh", README)
+
+
+def test_published_verdicts_on_time_are_what_their_intervals_say():
+    """So the README's table speaks of intervals, and not of how busy a machine was."""
+    known = [v for v in published.load().verdicts if v.claim in BY_TIME and v.ratio is not None]
+    for verdict in known:
+        claim, ratio = BY_TIME[verdict.claim], Ratio(verdict.ratio, *verdict.interval, waited=0.0)
+        assert verdict.outcome in (UNDECIDABLE, decide(ratio, claim.claimed, claim.near)[0])
+
+
+def test_the_example_trains_a_plant_of_the_readers_own_as_the_text_says(capsys):
+    (example,) = re.findall(r"^```python\n(.*?)^```$", README, flags=re.M | re.S)
+    names: dict = {}
+    exec(example, names)
+    before, after = map(float, re.findall(r"cost without noise: (\d+)", capsys.readouterr().out))
+    said = re.search(r"the cost without noise from (\d+) to (\d+)\.", README)
+    np.testing.assert_allclose([before, after], [float(cost) for cost in said.groups()], atol=1)
+    assert names["explore"].scale.shape == (40, 60)  # "Forty episodes of 60 steps"
+
+
+def test_the_layout_names_every_room_and_the_way_of_imports():
+    rooms = {path.name for path in (ROOT / "nmpcrl").iterdir() if (path / "__init__.py").is_file()}
+    assert set(re.findall(r"^nmpcrl/(\w+)/ ", README, flags=re.M)) == rooms
+    (way,) = re.findall(r"`(\w+ -> [^`]+)`", README)
+    assert set(re.findall(r"\w+", way)) == rooms
+
+
+def test_links_lead_to_files():
+    for target in re.findall(r"\]\(([^):]+)\)", README):
+        assert (ROOT / target).is_file(), target

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-FILES = ("README.md", "CITATION.cff", "metadata.yaml", "Makefile")
+FILES = ("README.md", "CONTRIBUTING.md", "CITATION.cff", "metadata.yaml", "Makefile")
 FOLDERS = ("nmpcrl", "book", "tests")
 KINDS = (".py", ".md", ".ipynb", ".css", ".js", ".html", ".svg")
 
@@ -19,7 +19,7 @@ OLD = {  # the word that replaces it: the pattern of the old one, and where it m
     "perturbed replica": (r"twins?", ""),
     "run summary": (r"digests?", r"hexdigest"),
     "train": (r"harvest(s|ed|ing)?", ""),
-    "baseline, default, common": (r"usual(ly)?", ""),
+    "baseline, default, common": (r"usual", ""),
     "trajectory": (r"roads?", ""),
     "rollout": (
         r"dr(ive|ives|iven|iving|ove)",
@@ -31,10 +31,10 @@ OLD = {  # the word that replaces it: the pattern of the old one, and where it m
     "table": (r"cards?", ""),
     "higher cost": (r"dearer|costlier|dearest|costliest", ""),
     "lower cost": (r"cheap(er|est|ly)?", ""),
-    "has as an input, names, says": (r"told", ""),
+    "has theta as an input": (r"told (of )?theta", ""),
     "baseline": (r"rivals?", ""),
     "depends on": (r"hinges?", ""),
-    "scaling, spectral radius": (r"growth", ""),
+    "predicts": (r"networks? (says?|said)", ""),
 }
 
 

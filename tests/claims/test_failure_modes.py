@@ -8,17 +8,15 @@ import pytest
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.failure_modes import (
     CUT_SHORT,
-    ENDINGS,
     MECHANISMS,
     OVER_PREDICTED,
-    OVERSHOOT,
     WELL,
-    counted,
     ending,
-    fates,
+    failure_modes,
     mechanism,
     rise,
 )
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.experiment import frozen_arm
 
@@ -136,7 +134,7 @@ def test_episodes_without_a_prediction_do_not_count():
     assert found(run) == "network"
 
 
-def test_a_gap_that_the_first_drive_did_not_use_may_close():
+def test_a_gap_that_the_first_rollout_did_not_use_may_close():
     around = THROUGH.copy()
     around[1:4, 1] = 8.0
     assert mechanism(made(theta_c=(AMONG, CLOSING + 0.1)), TASK, around) == "none of these"
@@ -195,7 +193,7 @@ def test_the_first_mechanism_in_order_is_the_one():
         ({(-1, 0): np.nan}, "failed"),
     ],
 )
-def test_a_drive_ended_as_the_worst_that_can_be_said_of_it(change, name):
+def test_a_rollout_ended_as_the_worst_that_can_be_said_of_it(change, name):
     states = THROUGH.copy()
     states[1:3] = [[0.0, 0.0, 0.0], [2.0, -1.5, 0.0]]  # clear of all obstacles
     for place, value in change.items():
@@ -206,7 +204,7 @@ def test_a_drive_ended_as_the_worst_that_can_be_said_of_it(change, name):
 # All runs
 
 
-def test_every_run_that_learned_has_a_fate_and_those_that_went_wrong_a_mechanism():
+def test_every_run_that_learned_has_a_row_and_those_that_went_wrong_a_mechanism():
     runs = [
         made(seed=0, alpha_phi2=(WINDOW, 3.0)),
         made(seed=1, cost=(START_COST,) * 5),
@@ -218,7 +216,7 @@ def test_every_run_that_learned_has_a_fate_and_those_that_went_wrong_a_mechanism
         made("DES", seed=2, cost=(START_COST, *[1010.1] * 4)),
     ]
     runs[1].episodes["cost"][20:] = 150.1
-    frame = fates([*runs, *(frozen(seed) for seed in range(3))])
+    frame = failure_modes([*runs, *(frozen(seed) for seed in range(3))])
     assert frame.learner.tolist() == ["RDES", "RDES", "RDES", "GES", "DES", "DES"]
     assert frame.wrong.tolist() == [
         "without noise",
@@ -241,22 +239,8 @@ def test_every_run_that_learned_has_a_fate_and_those_that_went_wrong_a_mechanism
     assert frame.episode[0] == 10
 
 
-def test_counts_cover_every_run_and_name_every_fate():
-    runs = [made(seed=seed, alpha_phi2=(WINDOW, 3.0)) for seed in range(3)]
-    runs[2] = made(seed=2, cost=(START_COST,) * 5, states=np.full(THROUGH.shape, np.nan))
-    frame = fates([*runs, *(frozen(seed) for seed in range(3))])
-    mechanisms, endings = counted(frame), counted(frame, "ending")
-    assert mechanisms.loc["RDES"].to_dict() == dict.fromkeys(MECHANISMS, 0) | {
-        "overshoot": 2,
-        WELL: 1,
-    }
-    assert tuple(endings.columns) == ENDINGS
-    assert endings.loc["RDES", "failed"] == 1
-    assert endings.to_numpy().sum() == mechanisms.to_numpy().sum() == len(frame)
-
-
 def test_a_run_without_its_frozen_arm_is_refused():
     run = made()
     with pytest.raises(KeyError) as error:
-        fates([run])
+        failure_modes([run])
     assert error.value.args == (frozen_arm(run.name),)

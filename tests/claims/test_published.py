@@ -13,7 +13,7 @@ import pytest
 from nmpcrl.analysis.summary import row, summarise, table
 from nmpcrl.claims import published
 from nmpcrl.claims.published import FILES, Damaged, Published, compare, load, publish
-from nmpcrl.claims.rule import PARTLY, REPRODUCED, Verdict
+from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study import Experiment, design, paper, run, sweep
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.machine import fingerprint
@@ -106,7 +106,7 @@ def test_the_summaries_have_what_figures_need_in_single_precision(known, summari
 
 
 def test_runs_that_failed_are_read_as_they_were(summaries):
-    """A drive that failed costs infinitely much and has states that are not known."""
+    """A rollout that failed costs infinitely much and has states that are not known."""
     first, *others = summaries
     cost, states = np.array([5.0, np.inf, np.inf]), summaries[first].states.copy()
     states[2:] = np.nan
@@ -225,6 +225,17 @@ def test_a_column_that_an_older_table_lacks_takes_the_fields_default(known, summ
     assert list(load().rows) == [replace(e, evaluate_every=default) for e in summaries]
 
 
+@pytest.mark.parametrize(("name", "word"), [("runs.csv", "stuck"), ("verdicts.json", "partly")])
+def test_a_word_that_is_not_known_is_refused(known, folder, name, word):
+    text = (folder / name).read_text()
+    (folder / name).write_text(text.replace(word, "hardly"))
+    about = json.loads((folder / "about.json").read_text())
+    about["files"] = published._sums(folder)
+    (folder / "about.json").write_text(json.dumps(about))
+    assert word in text
+    assert_refused(folder)
+
+
 def assert_refused(folder):
     published._load.cache_clear()
     with pytest.raises(Damaged, match="is damaged") as refused:
@@ -232,6 +243,37 @@ def assert_refused(folder):
     said = str(refused.value)
     assert str(folder) in said
     assert "\n" not in said
+
+
+def test_single_verdicts_are_published_anew_and_all_else_stays(known, folder):
+    before = [(folder / name).read_bytes() for name in ("runs.csv", "curves.npz")]
+    measured = replace(VERDICTS[1], outcome=PARTLY, share=None, interval=(1.1, 1.2), ratio=1.15)
+    published.republish([measured])
+    found = load()
+    assert found.verdicts == (VERDICTS[0], measured)
+    assert before == [(folder / name).read_bytes() for name in ("runs.csv", "curves.npz")]
+    kept = {name: value for name, value in known.about.items() if name != "files"}
+    assert {name: value for name, value in found.about.items() if name != "files"} == kept
+    with pytest.raises(KeyError, match="no verdict on C9"):
+        published.republish([replace(measured, claim="C9")])
+
+
+@pytest.mark.parametrize(
+    ("here", "contradicts"),
+    [(PARTLY, False), (UNDECIDABLE, False), (REPRODUCED, True), (NOT, True)],
+)
+def test_a_verdict_contradicts_a_published_one_if_both_are_decided_and_differ(here, contradicts):
+    found = Published(verdicts=VERDICTS)
+    told = published.contradicted([replace(VERDICTS[0], outcome=here)], found)
+    sentence = f"C1 is {here} here, and partly reproduced as published"
+    assert told == ((sentence,) if contradicts else ())
+
+
+def test_what_is_not_published_or_not_decided_there_contradicts_nothing():
+    other = replace(VERDICTS[0], claim="C9")
+    assert published.contradicted([other], Published(verdicts=VERDICTS)) == ()
+    open_there = Published(verdicts=(replace(VERDICTS[0], outcome=UNDECIDABLE),))
+    assert published.contradicted([VERDICTS[0]], open_there) == ()
 
 
 def test_what_is_published_does_not_contradict_itself(known, summaries, elsewhere):

@@ -1,4 +1,4 @@
-"""The map: which rows it has, what each is held against, and which cells are shown."""
+"""The map: which rows it has, what each is compared with, and which cells are shown."""
 
 from dataclasses import asdict, replace
 
@@ -6,8 +6,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.analysis.summary import SIZES, experiment_of
 from nmpcrl.claims import paper_claims
-from nmpcrl.claims.robustness import WHOLE, atlas, departure, groups, left_out, telling
+from nmpcrl.claims.robustness import (
+    WHOLE,
+    clearest_changes,
+    departure,
+    groups,
+    not_run,
+    robustness_map,
+)
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED
 from nmpcrl.study import Experiment, design
 from nmpcrl.study.departures import DEPARTURES
@@ -19,9 +27,7 @@ PLACE = np.zeros((3, 3))
 
 def summary(experiment: Experiment, variant: str, **unlike) -> dict:
     """The row of a run that saved a tenth and in which nothing went wrong."""
-    counts = {
-        f"{name}_{size}": 0 for name in ("inside", "eval_inside") for size in paper_claims.SIZES
-    }
+    counts = {f"{name}_{size}": 0 for name in ("inside", "eval_inside") for size in SIZES}
     return (
         asdict(experiment)
         | {"theta": " ".join(map(repr, experiment.theta)), "variant": variant}
@@ -54,14 +60,14 @@ def study(**unlike) -> pd.DataFrame:
 
 
 def paths(runs: pd.DataFrame) -> dict[Experiment, np.ndarray]:
-    return {paper_claims.experiment_of(row): PLACE for row in runs.to_dict("records")}
+    return {experiment_of(row): PLACE for row in runs.to_dict("records")}
 
 
 @pytest.fixture(scope="module")
 def costly():
-    """The literal runs of RDES end costlier than they began."""
+    """The literal runs of RDES end at a higher cost than they began."""
     runs = study(final_cost=1200.0)
-    return runs, atlas(runs, paths(runs))
+    return runs, robustness_map(runs, paths(runs))
 
 
 def test_the_rows_are_the_whole_its_parts_and_the_variants_in_order(costly):
@@ -72,14 +78,14 @@ def test_the_rows_are_the_whole_its_parts_and_the_variants_in_order(costly):
     assert not found.duplicated(["variant", "claim"]).any()
 
 
-def test_a_change_flips_the_cells_of_its_own_row_and_no_others(costly):
+def test_a_variant_changes_the_cells_of_its_own_row_and_no_others(costly):
     _, found = costly
-    flipped = found[found.flips.astype(bool)]
-    assert set(zip(flipped.variant, flipped.claim, strict=True)) == {
+    changed = found[found.changes.astype(bool)]
+    assert set(zip(changed.variant, changed.claim, strict=True)) == {
         (LITERAL, "C5"),
         (LITERAL, "C9"),
     }
-    ends = flipped.set_index("claim")
+    ends = changed.set_index("claim")
     assert (ends.base["C5"], ends.outcome["C5"]) == (REPRODUCED, NOT)
     assert (ends.base["C9"], ends.outcome["C9"]) == (REPRODUCED, PARTLY)  # GES still saves
 
@@ -99,36 +105,36 @@ def test_every_row_has_the_letter_of_its_departure():
     assert {departure(name) for name in design.VARIANTS} <= {*DEPARTURES, ""}
 
 
-def test_what_was_not_run_is_left_out_and_named(costly):
+def test_what_was_not_run_is_named(costly):
     runs, _ = costly
-    assert set(left_out(runs)) == set(design.VARIANTS) - {LITERAL, CLIPPED}
+    assert set(not_run(runs)) == set(design.VARIANTS) - {LITERAL, CLIPPED}
 
 
-def test_a_part_is_held_against_the_rest_of_the_main_table(costly):
+def test_a_part_is_compared_with_the_rest_of_the_main_table(costly):
     runs, _ = costly
-    here, usual = groups(runs, "layout D")
-    assert (set(here.layout), set(usual.layout)) == ({"D"}, {"A"})
-    assert set(here.variant) == set(usual.variant) == {design.MAIN_TABLE}
-    here, usual = groups(runs, "decay per episode")
-    assert (set(here.decay), set(usual.decay)) == ({"episode"}, {"step"})
+    here, base = groups(runs, "layout D")
+    assert (set(here.layout), set(base.layout)) == ({"D"}, {"A"})
+    assert set(here.variant) == set(base.variant) == {design.MAIN_TABLE}
+    here, base = groups(runs, "decay per episode")
+    assert (set(here.decay), set(base.decay)) == ({"episode"}, {"step"})
 
 
-def test_a_variant_is_held_against_its_own_cells_and_borrows_who_it_does_not_change(costly):
+def test_a_variant_is_compared_with_its_own_cells_and_borrows_who_it_does_not_change(costly):
     runs, _ = costly
-    here, usual = groups(runs, LITERAL)
-    assert set(usual.variant) == {design.MAIN_TABLE}
-    assert set(here.decay) == set(usual.decay) == {"step"}
+    here, base = groups(runs, LITERAL)
+    assert set(base.variant) == {design.MAIN_TABLE}
+    assert set(here.decay) == set(base.decay) == {"step"}
     origin = here.groupby("learner").variant.unique().map(list).to_dict()
     assert origin["DES"] == origin["RDES"] == [LITERAL]
     assert origin["ES"] == origin["GES"] == origin["frozen"] == [design.MAIN_TABLE]
 
 
 def cells(*rows: tuple[str, str, bool, float]) -> pd.DataFrame:
-    return pd.DataFrame(rows, columns=["variant", "claim", "flips", "p"])
+    return pd.DataFrame(rows, columns=["variant", "claim", "changes", "p"])
 
 
-def test_the_most_telling_cells_are_the_surest_of_different_claims_and_rows():
-    found = telling(
+def test_the_clearest_changes_are_the_surest_of_different_claims_and_rows():
+    found = clearest_changes(
         cells(
             ("one", "C1", True, 0.02),
             ("one", "C2", True, 0.001),
@@ -145,12 +151,12 @@ def test_the_most_telling_cells_are_the_surest_of_different_claims_and_rows():
     ]
 
 
-def test_where_nothing_flips_there_is_nothing_to_tell():
-    assert telling(cells(("one", "C1", False, 0.001))).empty
+def test_where_nothing_changes_there_is_no_clearest_change():
+    assert clearest_changes(cells(("one", "C1", False, 0.001))).empty
 
 
 def test_runs_that_are_too_short_decide_nothing():
     short = [replace(one, episodes=4) for one in design.main_table(PAPER, ("A",), (0, 1))]
     short += [frozen_arm(one) for one in short]
     runs = pd.DataFrame([summary(one, design.MAIN_TABLE) for one in dict.fromkeys(short)])
-    assert not atlas(runs, paths(runs)).flips.any()
+    assert not robustness_map(runs, paths(runs)).changes.any()

@@ -25,7 +25,22 @@ from nmpcrl.claims.rule import (
     shown,
 )
 
-CLAIM = Claim("X1", "It is so.", "Is it?", "a measure", "a threshold", would_change="Elsewhere.")
+
+class Open(Claim):
+    """A claim that nothing decides."""
+
+    def judge(self, observed):
+        return self.verdict(UNDECIDABLE, "Nothing is known.")
+
+
+CLAIM = Open(
+    name="X1",
+    statement="It is so.",
+    question="Is it?",
+    measured="a measure",
+    border="a threshold",
+    would_change="Elsewhere.",
+)
 
 counts = st.integers(0, 40)
 

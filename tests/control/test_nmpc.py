@@ -95,11 +95,11 @@ def test_the_value_at_the_start_is_about_a_thousand(robot):
 
 
 def test_the_sign_of_a_weight_means_nothing(robot):
-    flipped = THETA * [-1, 1, -1, 1, -1, 1, -1, 1, 1]
-    one, other = robot.solve(START, THETA), robot.solve(START, flipped)
+    negated = THETA * [-1, 1, -1, 1, -1, 1, -1, 1, 1]
+    one, other = robot.solve(START, THETA), robot.solve(START, negated)
     assert other.value == pytest.approx(one.value, rel=1e-9)
     np.testing.assert_allclose(
-        other.features, one.features * np.sign(flipped), rtol=1e-5, atol=1e-5
+        other.features, one.features * np.sign(negated), rtol=1e-5, atol=1e-5
     )
 
 

@@ -72,9 +72,9 @@ def test_slacks_are_what_the_plan_overlaps(robot, draw):
     overlapped = 0
     for state, theta in draw(60, seed=4):
         solution = robot.solve(state, theta)
-        excess = robot.task.overlap(solution.states) + theta[-1]
-        np.testing.assert_allclose(solution.slacks, np.maximum(0, excess), atol=2e-6)
-        overlapped += (excess > 0.01).any()
+        beyond = robot.task.overlap(solution.states) + theta[-1]
+        np.testing.assert_allclose(solution.slacks, np.maximum(0, beyond), atol=2e-6)
+        overlapped += (beyond > 0.01).any()
     assert overlapped > 5
 
 
@@ -87,10 +87,10 @@ def test_any_number_of_obstacles_is_counted_at_stage_zero(point_mass, open_field
     free = Nmpc(point_mass(), open_field(), solver=solver).solve(state, theta)
     nmpc = Nmpc(point_mass(), open_field(obstacles), solver=solver)
     solution = nmpc.solve(state, theta)
-    excess = nmpc.task.overlap(state) + theta[-1]
-    assert (excess > 0).all()
+    beyond = nmpc.task.overlap(state) + theta[-1]
+    assert (beyond > 0).all()
     assert solution.slacks.shape == (11, count)
-    assert solution.value == pytest.approx(free.value + OMEGA * excess.sum(), rel=1e-7)
+    assert solution.value == pytest.approx(free.value + OMEGA * beyond.sum(), rel=1e-7)
     assert solution.features[-1] == pytest.approx(OMEGA * count, abs=1e-4)
 
 

@@ -1,4 +1,4 @@
-"""The plant against the arc that it drives exactly."""
+"""The plant against the arc that it follows exactly."""
 
 import casadi as ca
 import numpy as np
@@ -10,7 +10,7 @@ BOUND = np.ones(1)
 
 
 def arc(state, speed, turn_rate, time):
-    """Where a unicycle is after driving a circle for `time` seconds: the integral of Eq. (17)."""
+    """Where a unicycle is after following a circle for `time` seconds: the integral of Eq. (17)."""
     x, y, heading = state
     later = heading + turn_rate * time
     radius = speed / turn_rate
@@ -23,7 +23,7 @@ def arc(state, speed, turn_rate, time):
     )
 
 
-def drive(period, state, action, time):
+def simulated(period, state, action, time):
     plant = differential_drive(period)
     for _ in range(round(time / period)):
         state = plant.step(state, action)
@@ -33,7 +33,7 @@ def drive(period, state, action, time):
 def test_runge_kutta_converges_to_the_arc_with_order_four():
     state, action, time = np.array([-2.5, 1.5, 0.4]), np.array([0.6, 1.5]), 1.6
     exact = arc(state, *action, time)
-    errors = [np.abs(drive(h, state, action, time) - exact).max() for h in (0.4, 0.2, 0.1)]
+    errors = [np.abs(simulated(h, state, action, time) - exact).max() for h in (0.4, 0.2, 0.1)]
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     np.testing.assert_allclose(orders, 4, atol=0.15)
 
@@ -55,7 +55,7 @@ def test_a_step_is_a_fifth_of_a_second_long():
     assert stepped.shape == (3,)
 
 
-def test_a_robot_that_does_not_turn_drives_straight():
+def test_a_robot_that_does_not_turn_moves_straight():
     stepped = differential_drive().step(np.array([1.0, 2.0, np.pi / 2]), np.array([0.5, 0.0]))
     np.testing.assert_allclose(stepped, [1.0, 2.1, np.pi / 2], atol=1e-15)
 

@@ -302,7 +302,7 @@ def test_with_theta_c_at_the_penaltys_margin_the_cost_is_the_other_reference(sou
     )
 
 
-def test_ipopt_drives_to_the_same_cost(rollout):
+def test_ipopt_reaches_the_same_cost(rollout):
     controller = Persistent(paper.nmpc(solver="ipopt"))
     assert evaluate(controller, THETA, paper.STEPS).cost == pytest.approx(rollout.cost, rel=1e-4)
 
@@ -329,7 +329,7 @@ def test_the_rollout_of_theta_init_reaches_the_target_and_hits_nothing(sound, ro
     assert (rollout.states <= task.upper).all()
 
 
-def test_a_rollout_that_fails_costs_infinity_and_keeps_what_it_drove():
+def test_a_rollout_that_fails_costs_infinity_and_keeps_what_it_had():
     controller = Persistent(Faulty(lambda call: call >= 3))
     failed = evaluate(controller, THETA, 10)
     assert failed.cost == np.inf

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import interquartile_mean, rate
 from nmpcrl.claims import paper_claims
-from nmpcrl.claims.assumptions import Assumption
 from nmpcrl.claims.evidence import Evidence, paths
-from nmpcrl.claims.rule import Verdict
+from nmpcrl.claims.paper_claims import CLAIMS
+from nmpcrl.claims.rule import Assumption, Observations, Verdict
 from nmpcrl.report.figures import claims as figures
 from nmpcrl.study import Experiment
 from nmpcrl.study.records import Records
@@ -38,6 +38,10 @@ TIMES = pd.DataFrame(
         "ms_per_solve": [0.04, 0.04, 0.04, 1.99, 1.99, 2.0],
         "ms_per_fit": [np.nan, np.nan, 0.14] * 2,
         "ms_per_rest": [0.02, 0.02, 0.02, 0.02, 0.02, 0.06],
+        "ratio": [1.0, 1.0, 2.0, 1.0, 1.0, 0.55],
+        "ratio_low": [1.0, 0.95, 1.9, 1.0, 0.95, 0.5],
+        "ratio_high": [1.0, 1.05, 2.1, 1.0, 1.05, 0.6],
+        "waited": 0.0,
     }
 )
 
@@ -226,20 +230,20 @@ def test_the_profile_falls_from_all_runs_to_none_and_counts_those_that_were_stop
 
 
 @pytest.mark.parametrize(
-    ("learner", "judge", "words"),
+    ("learner", "claim", "words"),
     [
         (
             "RDES",
-            paper_claims.rdes_takes_half_the_time,
+            "C3",
             "C3 reproduced: with Ipopt, a step of RDES",
         ),
-        ("GES", paper_claims.ges_takes_the_same_time, "C4 reproduced: with Ipopt, a step of GES"),
+        ("GES", "C4", "C4 reproduced: with Ipopt, a step of GES"),
     ],
 )
-def test_a_bar_is_as_long_as_the_ratio_that_the_verdict_rests_on(learner, judge, words):
-    figure = figures.times(TIMES, judge(TIMES), learner)
-    ratio = {"RDES": 0.55, "GES": 1.0}[learner]
-    assert title(figure) == f"{words} takes {ratio:.2f} of one of ES"
+def test_a_bar_is_as_long_as_the_ratio_that_the_verdict_rests_on(learner, claim, words):
+    figure = figures.times(TIMES, CLAIMS[claim].judge(Observations(timings=TIMES)), learner)
+    ratio, shown = {"RDES": (0.55, "0.55 [0.50, 0.60]"), "GES": (1.0, "1.00 [0.95, 1.05]")}[learner]
+    assert title(figure) == f"{words} takes {shown} of one of ES"
     bars = {round(patch.get_y(), 6) for patch in figure.axes[0].patches[1:]}
     assert len(bars) == 4  # two solvers, two learners
     ends = [patch.get_x() + patch.get_width() for patch in figure.axes[0].patches[1:]]
@@ -249,7 +253,7 @@ def test_a_bar_is_as_long_as_the_ratio_that_the_verdict_rests_on(learner, judge,
 
 def test_without_the_paper_s_solver_nothing_is_said_of_its_time():
     fast = TIMES[TIMES.solver == "riccati"]
-    figure = figures.times(fast, paper_claims.rdes_takes_half_the_time(fast), "RDES")
+    figure = figures.times(fast, CLAIMS["C3"].judge(Observations(timings=fast)), "RDES")
     assert title(figure) == "C3 not decidable here: no time was taken with Ipopt"
 
 
@@ -260,7 +264,7 @@ def test_the_correlation_of_td_errors_is_drawn_lag_by_lag():
     records = Records(experiment, {"delta": np.append(delta, np.nan)}, {}, {})
     curvature = Curvature(np.arange(3), np.ones(3), np.full(3, 0.01))
     assumptions = (Assumption("one", "", holds=False), Assumption("other", "", holds=True))
-    one = paper_claims.convergence_is_guaranteed(assumptions)
+    one = CLAIMS["C8"].judge(Observations(assumptions=assumptions))
     figure = figures.theorem(assumptions, one, records, curvature)
     bars = [patch.get_height() for patch in figure.axes[0].patches][: figures.LAGS]
     np.testing.assert_allclose(bars[:5], [0.8, 0.6, 0.4, 0.2, 0.0], atol=0.1)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nmpcrl.claims.failure_modes import OVER_PREDICTED, OVERSHOOT, rise
+from nmpcrl.claims.failure_modes import OVER_PREDICTED, rise
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures import failure_modes
 from nmpcrl.study import Experiment
 from nmpcrl.study.experiment import frozen_arm

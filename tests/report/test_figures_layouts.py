@@ -11,8 +11,8 @@ from matplotlib.patches import Rectangle
 
 from nmpcrl.analysis.summary import RunSummary, table
 from nmpcrl.claims.evidence import Evidence, paths
-from nmpcrl.claims.measures import MEASURES
-from nmpcrl.claims.robustness import atlas, telling
+from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.robustness import clearest_changes, robustness_map
 from nmpcrl.report.figures import layouts as figures
 from nmpcrl.report.figures import robustness as maps
 from nmpcrl.study import Experiment, design, paper
@@ -68,7 +68,7 @@ def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
 def changing() -> tuple[Evidence, pd.DataFrame]:
     """A study in which C9 changes in the row of the variant, and its map."""
     found = study(gained=-0.2)
-    return found, atlas(found.runs, paths(found))
+    return found, robustness_map(found.runs, paths(found))
 
 
 def title(figure: Figure) -> str:
@@ -106,7 +106,7 @@ def test_only_narrow_gaps_are_drawn_from_centre_to_centre():
 def test_the_map_has_a_frame_and_an_arrow_for_every_change(changing):
     found, rows = changing
     figure = maps.verdict_map(rows, found.mark)
-    changes = int(rows.flips.sum())
+    changes = int(rows.changes.sum())
     assert changes > 0
     assert len(frames(figure)) == changes
     arrows = [text for text in written(figure) if "→" in text]
@@ -126,16 +126,16 @@ def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(changing):
 
 def test_the_title_of_the_map_names_the_claims_that_never_change(changing):
     found, rows = changing
-    changed = set(rows.claim[rows.flips.astype(bool)])
+    changed_claims = set(rows.claim[rows.changes.astype(bool)])
     never = title(maps.verdict_map(rows, found.mark)).partition("those on ")[2]
-    assert not any(claim in never for claim in changed)
+    assert not any(claim in never for claim in changed_claims)
     assert "C7" in never
 
 
-def test_telling_draws_a_row_a_cell_with_every_run_in_it(changing):
+def test_the_clearest_changes_are_drawn_a_row_a_cell_with_every_run_in_it(changing):
     found, rows = changing
-    cells = telling(rows)
-    figure = maps.telling(cells, found)
+    cells = clearest_changes(rows)
+    figure = maps.clearest_changes(cells, found)
     assert len(figure.axes) == 2 * len(cells)
     assert cells.claim.iloc[0] in title(figure)
     assert maps.named(cells.variant.iloc[0]) in title(figure)
@@ -145,29 +145,31 @@ def test_telling_draws_a_row_a_cell_with_every_run_in_it(changing):
             for line in axes.get_lines()
         )
         groups = maps.groups(found.runs, variant)
-        values = [MEASURES[claim].of(runs, paths(found)) for runs in groups]
+        values = [BY_RUNS[claim].measure(runs, paths(found)) for runs in groups]
         assert drawn == sum(int(one.notna().sum().sum()) for one in values)
 
 
-def test_telling_draws_what_is_infinite_at_the_edge(changing):
+def test_what_is_infinite_is_drawn_at_the_edge(changing):
     found, rows = changing
     changed = found.runs.assign(
         stopped=found.runs.stopped.where(found.runs.variant != VARIANT, "diverged")
     )
-    figure = maps.telling(telling(rows).head(1), Evidence(found.summaries, changed))
+    figure = maps.clearest_changes(
+        clearest_changes(rows).head(1), Evidence(found.summaries, changed)
+    )
     for line in figure.axes[0].get_lines():
         assert np.isfinite(line.get_ydata()).all()
 
 
 def test_where_nothing_changes_the_figure_says_so():
     found = study()
-    cells = telling(atlas(found.runs, paths(found)))
-    assert title(maps.telling(cells, found)) == "No verdict changes in what was run here"
+    cells = clearest_changes(robustness_map(found.runs, paths(found)))
+    assert title(maps.clearest_changes(cells, found)) == "No verdict changes in what was run here"
 
 
 def test_a_study_that_is_too_short_has_a_map_on_which_all_is_open():
     found = study(episodes=4)
-    rows = atlas(found.runs, paths(found))
+    rows = robustness_map(found.runs, paths(found))
     figure = maps.verdict_map(rows, found.mark)
     assert title(figure) == "0 of 0 decided verdicts change"
     assert not frames(figure)
@@ -186,13 +188,13 @@ def test_theta_c_has_a_line_a_run_and_counts_where_they_end():
 
 
 def values(found: Evidence) -> dict[str, pd.DataFrame]:
-    return {claim: one.of(found.runs, paths(found)) for claim, one in MEASURES.items()}
+    return {claim: one.measure(found.runs, paths(found)) for claim, one in BY_RUNS.items()}
 
 
 def test_the_borders_are_drawn_where_they_were_fixed():
     figure = figures.borders(values(study().main), "")
-    for axes, measure in zip(figure.axes, MEASURES.values(), strict=True):
-        assert any(list(line.get_xdata()) == [measure.border] * 2 for line in axes.get_lines())
+    for axes, claim in zip(figure.axes, BY_RUNS.values(), strict=True):
+        assert any(list(line.get_xdata()) == [claim.threshold] * 2 for line in axes.get_lines())
     assert "verdicts stay" in title(figure)
 
 

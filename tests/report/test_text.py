@@ -43,8 +43,8 @@ def verdict(claim: str, outcome: str, layouts: str = "", decays: str = "") -> Ve
 
 
 def table(*rows: tuple[str, str, bool]) -> pd.DataFrame:
-    """What `flips` returns, as far as it matters here."""
-    frame = pd.DataFrame(rows, columns=["variant", "claim", "flips"])
+    """What `variant_changes` returns, as far as it matters here."""
+    frame = pd.DataFrame(rows, columns=["variant", "claim", "changes"])
     return frame.reindex(columns=list(COLUMNS))
 
 

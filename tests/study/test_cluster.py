@@ -157,8 +157,8 @@ def worker(dask, address, tmp_path):
         name = f"worker{len(started)}"
         preload = tmp_path / f"{name}.py"
         preload.write_text(text)
-        usual = ("--nthreads", "1", "--no-nanny", "--name", f"{tmp_path.name}-{name}")
-        started.append(dask("worker", address, *usual, "--preload", str(preload), *options))
+        common = ("--nthreads", "1", "--no-nanny", "--name", f"{tmp_path.name}-{name}")
+        started.append(dask("worker", address, *common, "--preload", str(preload), *options))
         return started[-1]
 
     yield start

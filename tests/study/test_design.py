@@ -1,7 +1,7 @@
 """The study as a list of runs: what varies, and what each run is held against."""
 
 from collections import Counter
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -24,8 +24,8 @@ def test_the_main_table_has_every_learner_layout_reading_and_seed():
     runs = design.main_table()
     assert len(runs) == len(set(runs)) == len(MAIN) * 6 * 2 * 10
     assert {e.episodes for e in runs} == {paper.EPISODES}
-    usual = Experiment()
-    assert all(differing(e, usual) <= {"learner", "layout", "decay", "seed"} for e in runs)
+    default = Experiment()
+    assert all(differing(e, default) <= {"learner", "layout", "decay", "seed"} for e in runs)
 
 
 def test_the_study_begins_with_the_main_table_and_names_every_run_once():
@@ -50,12 +50,19 @@ def test_every_run_of_the_study_has_its_frozen_arm_in_the_study():
     assert {frozen_arm(e) for e in study} <= set(study)
 
 
+def base_of(experiment: Experiment, name: str) -> Experiment:
+    """The run of the main table that a run of variant `name` is held against."""
+    default = Experiment()
+    changed = {key: getattr(default, key) for key in design.VARIANTS[name].fields if key != "decay"}
+    return replace(experiment, **changed)
+
+
 @pytest.mark.parametrize("name", design.VARIANTS)
 def test_a_variant_changes_one_thing(name, main_table):
     variant = design.VARIANTS[name]
     for experiment in design.variant(name):
         if experiment.learner != "frozen":
-            base = design.base_of(experiment, name)
+            base = base_of(experiment, name)
             assert differing(experiment, base) == set(variant.fields) - {"decay"}
             assert base in main_table
 

@@ -5,7 +5,7 @@ from itertools import combinations, islice
 import numpy as np
 import pytest
 
-from nmpcrl.study import layouts, paper
+from nmpcrl.study import design, layouts, paper
 from nmpcrl.study.layouts import gaps, sampler, screen
 
 AWAY = ((0.0, 7.5), (3.0, 7.5), (5.5, 7.5), (8.0, 7.5))  # all at the upper wall
@@ -70,7 +70,7 @@ def test_a_path_that_stands_still_goes_through_no_gap(task):
     assert gaps(task, np.full((5, 2), [1.7, 1.4]), 0.0) == {}
 
 
-def test_a_layout_closes_where_the_gap_of_the_first_drive_does_at_theta_c_of_the_margin():
+def test_a_layout_closes_where_the_gap_of_the_first_rollout_does_at_theta_c_of_the_margin():
     assert screen(paper.LAYOUTS["A"]).kind == "open"
     (x, y), second, *others = paper.LAYOUTS["A"]
     towards = np.array(second) - [x, y]
@@ -95,10 +95,10 @@ def test_the_sampler_repeats_itself_and_keeps_its_promises():
         assert np.allclose(np.round(centres, 1), centres, atol=1e-9)
 
 
-def test_the_named_layouts_are_the_first_that_were_drawn_and_pass():
-    named = dict(paper.LAYOUTS)
+def test_the_layouts_of_the_study_are_the_first_that_were_drawn_and_pass():
+    named = {name: paper.LAYOUTS[name] for name in design.LAYOUTS}
+    kinds = [screen(centres).kind for centres in named.values()]
     first = named.pop("A")
     assert screen(first).passed
     assert layouts.drawn() == named
-    kinds = [screen(centres).kind for centres in paper.LAYOUTS.values()]
     assert {kind: kinds.count(kind) for kind in set(kinds)} == layouts.NAMED

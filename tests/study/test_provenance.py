@@ -47,7 +47,7 @@ NUMBERS = [
     ("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6"),
     ("study/setup.py", "spawn(3)", "spawn(4)"),
     ("study/run.py", "evaluate_every == 0", "evaluate_every == 1"),
-    ("analysis/summary.py", "LATE = 20", "LATE = 21"),
+    ("analysis/metrics.py", "LATE = 20", "LATE = 21"),
     ("analysis/metrics.py", "TOUCH = 1e-6", "TOUCH = 1e-5"),
     ("analysis/imitation.py", "FITS = 4000", "FITS = 4001"),
     ("analysis/policy_search.py", "SPREAD = 0.3", "SPREAD = 0.4"),

@@ -124,12 +124,12 @@ def test_a_file_cut_short_is_damaged(path, share):
     max_examples=300,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
-@given(place=st.floats(0, 1, exclude_max=True), flip=st.integers(1, 255))
-def test_a_file_with_a_wrong_byte_is_damaged_or_reads_as_some_run(path, place, flip):
+@given(place=st.floats(0, 1, exclude_max=True), wrong=st.integers(1, 255))
+def test_a_file_with_a_wrong_byte_is_damaged_or_reads_as_some_run(path, place, wrong):
     """Whatever the disk did, reading it raises nothing but `DamagedRecords`."""
     example().save(path)
     content = bytearray(path.read_bytes())
-    content[int(place * len(content))] ^= flip
+    content[int(place * len(content))] ^= wrong
     path.write_bytes(bytes(content))
     with contextlib.suppress(DamagedRecords):
         Records.load(path)

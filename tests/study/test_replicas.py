@@ -1,4 +1,4 @@
-"""Twins: what is moved, and how their distance is counted."""
+"""Perturbed replicas: what is moved, and how their distance is counted."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def with_theta(*rows) -> RunSummary:
     return RunSummary({}, {"theta": np.array(rows, float)}, {}, nothing, nothing, {})
 
 
-def test_a_twin_differs_from_its_run_in_the_twelfth_digit_of_theta_x():
+def test_a_replica_differs_from_its_run_in_the_twelfth_digit_of_theta_x():
     experiment = Experiment()
     replica = replicas.perturbed(experiment)
     moved = np.array(replica.theta) - experiment.theta
@@ -26,7 +26,7 @@ def test_a_twin_differs_from_its_run_in_the_twelfth_digit_of_theta_x():
     assert replica.seed == experiment.seed
 
 
-def test_every_learner_that_moves_has_a_twin_in_both_readings_of_the_decay():
+def test_every_learner_that_moves_has_a_replica_in_both_readings_of_the_decay():
     found = [(e.learner, e.decay) for e, _ in replicas.pairs(**SHORT)]
     moving = ("ES", "DES", "RDES", "GES")
     wanted = [(name, decay) for name in moving for decay in ("step", "episode")]

@@ -1,6 +1,6 @@
 """Python text to machine code by numba, kept on disk: compiled once on a machine, then loaded.
 
-A package of modules lives in a folder named by a digest of its text and of all versions concerned,
+A package of modules lives in a folder named by a hash of its text and of all versions concerned,
 so what is there is right by construction. numba keeps the machine code in the same folder.
 """
 
@@ -52,7 +52,8 @@ def compiled(function: ca.Function) -> Callable[..., Any]:
         arguments=", ".join("float64[::1]" if k == 1 else "float64[:, ::1]" for _, k in sizes),
     )
     name = function.name()
-    return getattr(load(name, {"__init__": header + source(function)}), name)
+    result: Callable[..., Any] = getattr(load(name, {"__init__": header + source(function)}), name)
+    return result
 
 
 def callable_of(function: ca.Function) -> Callable[..., Any]:
@@ -71,7 +72,8 @@ def callable_of(function: ca.Function) -> Callable[..., Any]:
     def call(*vectors: Vector) -> Vector | float:
         arrays = [np.ascontiguousarray(vector, dtype=float) for vector in vectors]
         if scalar:
-            return code(*arrays)
+            result: Vector | float = code(*arrays)
+            return result
         out = np.empty(shape)
         code(*arrays, out)
         return out
@@ -100,7 +102,7 @@ def load(name: str, texts: Mapping[str, str], notice: str = "") -> ModuleType:
     """Import a package of modules; what numba compiles there is found again the next time.
 
     Args:
-        name: what the package is called; a digest is added.
+        name: what the package is called; a hash is added.
         texts: the text of each module by its name; that of `__init__` is returned.
         notice: said on standard error while something is compiled.
 

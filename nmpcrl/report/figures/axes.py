@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from nmpcrl import Vector
 from nmpcrl.control import Task
-from nmpcrl.report.figures.style import DECAYS, INK, LOOKS, hatched, line, subplots, thin
+from nmpcrl.report.figures.style import DECAY_TITLES, INK, LOOKS, hatched, line, subplots, thin
 
 DEEP = 1e4  # what is less than this part of a threshold is drawn as much
 LEAST = 1.5  # high over low of an axis that has hardly anything to show
@@ -62,7 +62,7 @@ def map_grid(names: Sequence[str], row: float, rest: float) -> tuple[Figure, dic
 
 def label_panel(axes: Axes, decay: str = "", xlabel: str = "episode") -> None:
     """Which reading of the decay a panel shows, and whole episodes below."""
-    axes.set_title(DECAYS.get(decay, ""), fontsize="medium", fontweight="normal")
+    axes.set_title(DECAY_TITLES.get(decay, ""), fontsize="medium", fontweight="normal")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel(xlabel)
 

@@ -20,11 +20,10 @@ from nmpcrl import Vector
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import interquartile_mean, performance_profile
 from nmpcrl.bench.learners import ratio
-from nmpcrl.claims import paper_claims, rule
-from nmpcrl.claims.assumptions import Assumption
+from nmpcrl.claims import paper_claims
 from nmpcrl.claims.evidence import Evidence, paths
-from nmpcrl.claims.measures import MEASURES
-from nmpcrl.claims.rule import Verdict
+from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.rule import Assumption, Verdict
 from nmpcrl.report.figures.axes import jitter, label_panel, logarithmic
 from nmpcrl.report.figures.panels import part, shares, strips
 from nmpcrl.report.figures.style import (
@@ -73,17 +72,17 @@ def instability(found: Evidence, verdict: Verdict) -> Figure:
 @page
 def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     """C3 and C4: a step of a learner in steps of ES, by solver and by what takes the time."""
-    band = {"RDES": paper_claims.HALF, "GES": paper_claims.SAME_TIME}[learner]
+    claim = paper_claims.BY_TIME[verdict.claim]
     solvers = list(timings.solver.unique())
     figure, axis = subplots(height=1.1 + 0.55 * len(solvers))
-    axis.axvspan(*band, color="0.9", zorder=0, label="as claimed")
+    axis.axvspan(*claim.claimed, color="0.9", zorder=0, label="as claimed")
     for row, solver in enumerate(solvers):
         per_learner = timings[timings.solver == solver].set_index("learner")
         for y, name in ((row - 0.2, "ES"), (row + 0.2, learner)):
             end = _bar(axis, y, per_learner.loc[name], per_learner.loc["ES"])
-            text = f" {name} {ratio(timings, solver, name):.2f}"
+            text = f" {name} {ratio(timings, solver, name).value:.2f}"
             axis.annotate(text, (end, y), va="center", fontsize="small")
-    axis.set_yticks(range(len(solvers)), [SOLVERS[solver] for solver in solvers])
+    axis.set_yticks(range(len(solvers)), [SOLVERS.get(solver, solver) for solver in solvers])
     axis.invert_yaxis()
     axis.margins(x=0.12)
     axis.set_xlabel("time of a step / time of a step of ES")
@@ -94,9 +93,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     if paper_claims.SOLVER not in solvers:
         return _titled(figure, verdict, f"no time was taken with {SOLVERS[paper_claims.SOLVER]}")
     value = ratio(timings, paper_claims.SOLVER, learner)
-    finding = (
-        f"with {SOLVERS[paper_claims.SOLVER]}, a step of {learner} takes {value:.2f} of one of ES"
-    )
+    finding = f"with {SOLVERS[paper_claims.SOLVER]}, a step of {learner} takes {value} of one of ES"
     return marked(_titled(figure, verdict, finding), "measured while this page was made")
 
 
@@ -174,7 +171,7 @@ def theorem(
 @page
 def gains(found: Evidence, verdict: Verdict) -> Figure:
     """C9: noise-free cost at the end over that at the start, of RDES and GES."""
-    figure, panel, drawn = _measured(found, verdict)
+    figure, panel, drawn = _measured(found, verdict, left=True)
     finding = f"learning saves {paper_claims.BETTER:.0%} of the cost or more"
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
@@ -210,11 +207,16 @@ def _panels(measured: int = 1) -> tuple[Figure, Column]:
     return subplots(1, measured + 1, 3.7, width_ratios=widths)
 
 
-def _measured(found: Evidence, verdict: Verdict) -> tuple[Figure, Axes, Evidence]:
-    """A figure with the claim's measure drawn, its panel for the shares, and whose runs it has."""
-    measure = MEASURES[verdict.claim]
-    values, border, label = measure.of(found.runs, paths(found)), measure.border, measure.label
-    if verdict.claim == "C9":  # a share that may be minus infinity; what is left of the cost is not
+def _measured(
+    found: Evidence, verdict: Verdict, *, left: bool = False
+) -> tuple[Figure, Axes, Evidence]:
+    """A figure with the claim's measure drawn, its panel for the shares, and whose runs it has.
+
+    A share by which the cost is reduced may be minus infinity; what is left of the cost is not.
+    """
+    claim = BY_RUNS[verdict.claim]
+    values, border, label = claim.measure(found.runs, paths(found)), claim.threshold, claim.label
+    if left:
         values, border, label = 1 - values, 1 - border, "noise-free cost, end / start"
     figure, (measured, panel) = _panels()
     strips(measured, values, border)
@@ -223,18 +225,9 @@ def _measured(found: Evidence, verdict: Verdict) -> tuple[Figure, Axes, Evidence
 
 
 def _pairs(drawn: Evidence) -> pd.DataFrame:
-    """How far RDES and GES are apart in trajectory and in cost, a row a layout, decay and seed."""
-    rdes, ges = rule.arms(drawn.runs, "RDES", "GES")
-    states = {
-        (e.learner, e.layout, e.decay, e.seed): summary.states
-        for e, summary in drawn.summaries.items()
-    }
-    path = [
-        paper_claims.apart(states.get(("RDES", *cell)), states.get(("GES", *cell)))
-        for cell in rdes.index
-    ]
-    cost = paper_claims.costlier(rdes, ges).abs().mask(np.isinf(rdes.final_cost), np.inf)
-    return pd.DataFrame({"path": path, "cost": cost}, rdes.index).reset_index()
+    """How far RDES and GES are apart in path and in cost, a row a layout, decay and seed."""
+    apart = paper_claims.policy_distances(drawn.runs, paths(drawn))
+    return apart.assign(cost=apart.cost.mask(apart.failed, np.inf)).reset_index()
 
 
 def _scatter(axis: Axes, pairs: pd.DataFrame, decay: str) -> None:

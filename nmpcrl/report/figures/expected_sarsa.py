@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.metrics import by_episode, noise_free_cost, training_cost
 from nmpcrl.report.figures.style import (
-    DECAYS,
+    DECAY_TITLES,
     INK,
     LOOKS,
     SUBTITLE,
@@ -25,7 +25,7 @@ from nmpcrl.study.records import Records
 
 
 @page
-def theta_paths(runs: Runs) -> Figure:
+def theta_paths(runs: Runs[Records]) -> Figure:
     """theta of the given runs over training, one panel a reading of the decay.
 
     Components that move by less than 0.02 in every run are drawn in grey.
@@ -47,7 +47,7 @@ def theta_paths(runs: Runs) -> Figure:
                     ls=lines[i % len(lines)],
                     label=f"${SYMBOLS[THETA_NAMES[component]]}$" if run == 0 else None,
                 )
-        axes.set_title(DECAYS[decay], **SUBTITLE)
+        axes.set_title(DECAY_TITLES[decay], **SUBTITLE)
         axes.set_xlabel("episode")
     panels[0, 0].set_ylabel("component of θ (no unit)")
     handles, labels = panels[0, 0].get_legend_handles_labels()
@@ -56,7 +56,7 @@ def theta_paths(runs: Runs) -> Figure:
 
 
 @page
-def overshoot(runs: Runs) -> Figure:
+def overshoot(runs: Runs[Records]) -> Figure:
     """The largest alpha ||phi||^2 of each episode of the given runs."""
     figure, axes = subplots(height=3.4)
     worst = 0.0
@@ -69,7 +69,7 @@ def overshoot(runs: Runs) -> Figure:
             largest,
             color=color,
             ls=line,
-            label=DECAYS[experiment.decay] if first else None,
+            label=DECAY_TITLES[experiment.decay] if first else None,
         )
         worst = max(worst, np.nanmax(largest))
     axes.axhline(2, color=INK, ls=":", lw=1)
@@ -91,7 +91,7 @@ def overshoot(runs: Runs) -> Figure:
 
 
 @page
-def two_costs(runs: Runs) -> Figure:
+def two_costs(runs: Runs[Records]) -> Figure:
     """Cost with noise and without, of a learner and of the frozen arm; a column a decay."""
     decays = runs.values_of("decay")
     figure, grid = subplots(2, len(decays), height=5.2, sharex=True, sharey="row", squeeze=False)
@@ -103,7 +103,7 @@ def two_costs(runs: Runs) -> Figure:
             cost = training_cost(records)
             column[0].plot(np.arange(1, len(cost) + 1), cost, label=label, lw=1.2, **look.line)
             column[1].plot(*noise_free_cost(records), label=label, **look.line)
-        column[0].set_title(DECAYS[decay], **SUBTITLE)
+        column[0].set_title(DECAY_TITLES[decay], **SUBTITLE)
         column[1].set_xlabel("episodes trained")
     grid[0, 0].set_ylabel("with noise [cost]")
     grid[1, 0].set_ylabel("without noise [cost]")
@@ -119,7 +119,7 @@ def two_costs(runs: Runs) -> Figure:
     )
 
 
-def frozen_fall(runs: Runs) -> float:
+def frozen_fall(runs: Runs[Records]) -> float:
     """The largest share by which the noisy cost of a frozen run fell: nothing was learned."""
     return max(_fall(records) for records in runs.select(learner="frozen").values())
 

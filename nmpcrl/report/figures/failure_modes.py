@@ -13,7 +13,15 @@ from matplotlib.ticker import MaxNLocator
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.evidence import Evidence
-from nmpcrl.claims.failure_modes import ENDINGS, MECHANISMS, OVER_PREDICTED, OVERSHOOT, WELL, rise
+from nmpcrl.claims.failure_modes import (
+    ENDINGS,
+    MECHANISMS,
+    OVER_PREDICTED,
+    WELL,
+    Failure,
+    rise,
+)
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.axes import FEW, plain, stacked
 from nmpcrl.report.figures.style import (
     LIMIT,
@@ -47,7 +55,7 @@ def reasons(found: Evidence) -> Figure:
     """How many runs of each learner met which mechanism, and how their last rollouts ended."""
     moved = found.runs[found.runs.learner != "frozen"]
     figure, axes = subplots(1, 2, 1.5 + 0.32 * moved.learner.nunique(), sharey=True)
-    ends = moved.ending.mask(moved.wrong == "stopped", STOPPED)
+    ends = moved.ending.mask(moved.wrong == Failure.STOPPED, STOPPED)
     kinds = (moved.mechanism, (*MECHANISMS, WELL)), (ends, (STOPPED, *ENDINGS[1:], ENDINGS[0]))
     for axis, (said, names) in zip(axes, kinds, strict=True):
         counts = pd.crosstab(moved.learner, said)

@@ -17,7 +17,7 @@ CEILING = 1.3  # multiple of theta_init's noise-free cost at which the panels wi
 
 
 @page
-def figure_1(runs: Runs) -> Figure:
+def figure_1(runs: Runs[Records]) -> Figure:
     """Figure 1 of the paper, DES against RDES, with the noise-free cost and the frozen arm."""
     figure = _curves(runs, ("DES", "RDES"))
     counts = [f"{name} in {_runs_where(runs, name, diverged)}" for name in ("DES", "RDES")]
@@ -25,7 +25,7 @@ def figure_1(runs: Runs) -> Figure:
 
 
 @page
-def figure_2(runs: Runs) -> Figure:
+def figure_2(runs: Runs[Records]) -> Figure:
     """Figure 2 of the paper, ES against GES, with the noise-free cost and the frozen arm."""
     figure = _curves(runs, ("ES", "GES"))
     counts = [f"{name} in {_runs_where(runs, name, unstable)}" for name in ("ES", "GES")]
@@ -33,7 +33,7 @@ def figure_2(runs: Runs) -> Figure:
 
 
 @page
-def _curves(runs: Runs, learners: tuple[str, ...]) -> Figure:
+def _curves(runs: Runs[Records], learners: tuple[str, ...]) -> Figure:
     """Summed RL cost of each training episode above, cost without noise below; frozen beside.
 
     One column a reading of the decay, one line a seed.
@@ -59,7 +59,7 @@ def _curves(runs: Runs, learners: tuple[str, ...]) -> Figure:
 
 
 def _runs_where(
-    runs: Runs, learner: str, measure: Callable[[Runs, Experiment, Records], bool]
+    runs: Runs[Records], learner: str, measure: Callable[[Runs[Records], Experiment, Records], bool]
 ) -> str:
     """In how many of the learner's runs `measure` holds, in words."""
     holds = [measure(runs, *pair) for pair in runs.select(learner=learner).items()]

@@ -6,11 +6,12 @@ from matplotlib.figure import Figure
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import Curvature, directions
 from nmpcrl.analysis.two_state import Chain, follow, spectral_radius
-from nmpcrl.claims.failure_modes import OVERSHOOT
 from nmpcrl.learning.learners import gradient_td, semi_gradient
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.axes import label_panel, one_entry_each
-from nmpcrl.report.figures.style import DECAYS, LOOKS, headed, page, subplots, thin
+from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS, headed, page, subplots, thin
 from nmpcrl.study import paper
+from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
 
@@ -46,7 +47,7 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
 
 
 @page
-def overshoots(runs: Runs, learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
+def overshoots(runs: Runs[Records], learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
     """Largest alpha ||phi||^2 of each episode, one panel a reading of the decay; 2 is marked."""
     decays = runs.values_of("decay")
     figure, axes = subplots(1, len(decays), 3.0, sharey=True, squeeze=False)
@@ -71,7 +72,7 @@ def overshoots(runs: Runs, learners: tuple[str, ...] = ("ES", "GES")) -> Figure:
 
 
 @page
-def corrections(runs: Runs) -> Figure:
+def corrections(runs: Runs[Records]) -> Figure:
     """Corrections beside semi-gradients, summed over each episode of GES; a line a run."""
     figure, axes = subplots(height=2.9)
     shares = []
@@ -83,7 +84,7 @@ def corrections(runs: Runs) -> Figure:
         shares.append(parts.share)
     for decay in runs.values_of("decay"):
         line = "-" if decay == "step" else ":"
-        axes.plot([], [], color=LOOKS["GES"].color, linestyle=line, label=DECAYS[decay])
+        axes.plot([], [], color=LOOKS["GES"].color, linestyle=line, label=DECAY_TITLES[decay])
     axes.axhline(1, color="0.6", linewidth=1)
     label_panel(axes)
     axes.set(ylabel="correction / semi-gradient [-]", ylim=(0, None))

@@ -15,8 +15,9 @@ from matplotlib.lines import Line2D
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.analysis.trajectory import closes_at
+from nmpcrl.claims.by_runs import Values
 from nmpcrl.claims.evidence import Evidence
-from nmpcrl.claims.measures import MEASURES, Values, at_borders, steady
+from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.rule import NEARLY_ALL, NEARLY_NONE
 from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import draw_task, map_grid, plain
@@ -38,14 +39,7 @@ LEARNING = ("ES", "RDES", "GES", "TDC")  # whose theta_c is drawn; that of DES m
 NEAR = 0.05  # of theta_c from d_o
 NARROW = 1.0  # a gap that is drawn leaves less than this [m]
 SEEN = (-0.1, 0.6)  # of theta_c; what goes beyond ends at the edge
-BORDERS = {  # at which each claim is decided once more
-    "C1": np.geomspace(1.02, 15, 60),
-    "C2": np.geomspace(0.005, 1.5, 60),
-    "C5": np.geomspace(0.1, 30, 60),
-    "C6": np.geomspace(0.3, 1.3, 60),
-    "C7": np.geomspace(1e-8, 1.0, 60),
-    "C9": np.linspace(-0.05, 0.15, 60),
-}
+FEW = 100  # high over low of borders for which powers of ten are too few
 
 
 @page
@@ -121,23 +115,24 @@ def borders(values: Mapping[str, Values], mark: str) -> Figure:
     """
     figure, grid = subplots(2, 3, 4.6, sharey=True)
     for axes, (claim, measured) in zip(grid.flat, values.items(), strict=True):
-        measure = MEASURES[claim]
-        curve = at_borders(measure, measured, np.sort([*BORDERS[claim], measure.border]))
+        asked = BY_RUNS[claim]
+        first, last = asked.borders[[0, -1]]
+        curve = asked.at_borders(measured, np.sort([*asked.borders, asked.threshold]))
         axes.plot(curve.border, curve.share, color="black")
         axes.fill_between(curve.border, curve.low, curve.high, color="0.85", linewidth=0)
-        axes.axvline(measure.border, **LIMIT)
+        axes.axvline(asked.threshold, **LIMIT)
         for share in (NEARLY_NONE, NEARLY_ALL):
             axes.axhline(share, color="0.7", linewidth=0.7)
-        axes.set(xscale="linear" if claim == "C9" else "log", ylim=(-0.03, 1.03))
-        if claim in ("C1", "C6"):  # less than two decades
+        axes.set(xscale="log" if first > 0 else "linear", ylim=(-0.03, 1.03))
+        if 0 < last < FEW * first:
             plain(axes.xaxis)
-        axes.set_xlabel(measure.label, fontsize=8)
-        low, high = same_verdict(curve, measure.border)
+        axes.set_xlabel(asked.label, fontsize=8)
+        low, high = same_verdict(curve, asked.threshold)
         kept = f"same {low:.2g} to {high:.2g}" if len(curve) else "not decidable"
         axes.set_title(f"{claim}: {kept}", fontsize=9)
     for row in grid:
         row[0].set_ylabel("share of yes")
-    stay = sum(steady(MEASURES[claim], measured) for claim, measured in values.items())
+    stay = sum(BY_RUNS[claim].steady(measured) for claim, measured in values.items())
     finding = f"{stay} of {len(values)} verdicts stay with a border half as far, and twice as far"
     return marked(headed(figure, finding), mark)
 
@@ -148,7 +143,7 @@ def same_verdict(curve: pd.DataFrame, border: float) -> tuple[float, float]:
     nan where nothing is known.
 
     Args:
-        curve: of `at_borders`, in ascending order.
+        curve: of `RunClaim.at_borders`, in ascending order.
         border: one of them.
     """
     if curve.empty:

@@ -33,14 +33,16 @@ def figure_1(found: Evidence, layout: str) -> Figure:
     """Fig. 1 of the paper: DES against RDES."""
     drawn = part(found, ("DES", "RDES", "frozen"), layout)
     counts = _counted(drawn, divergence, ("DES", "RDES"))
-    return _learning_curves(drawn, f"Divergence in layout {layout}: {counts} runs")
+    result: Figure = _learning_curves(drawn, f"Divergence in layout {layout}: {counts} runs")
+    return result
 
 
 def figure_2(found: Evidence, layout: str) -> Figure:
     """Fig. 2 of the paper: ES against GES."""
     drawn = part(found, ("ES", "GES", "frozen"), layout)
     counts = _counted(drawn, instability, ("ES", "GES"))
-    return _learning_curves(drawn, f"Instability in layout {layout}: {counts} runs")
+    result: Figure = _learning_curves(drawn, f"Instability in layout {layout}: {counts} runs")
+    return result
 
 
 @page

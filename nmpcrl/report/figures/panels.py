@@ -7,8 +7,8 @@ from matplotlib.lines import Line2D
 
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.claims import rule
+from nmpcrl.claims.by_runs import Values
 from nmpcrl.claims.evidence import Evidence
-from nmpcrl.claims.measures import Values
 from nmpcrl.claims.rule import Verdict
 from nmpcrl.report.figures.axes import jitter, logarithmic
 from nmpcrl.report.figures.style import INK, LIMIT, LOOKS, dots, headed, line, marked

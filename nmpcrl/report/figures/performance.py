@@ -14,7 +14,7 @@ from nmpcrl.report.figures.axes import stacked
 from nmpcrl.report.figures.style import INK, LOOKS, STEP_PARTS, SUBTITLE, headed, page, subplots
 from nmpcrl.study import paper
 
-NAMES = {
+LABELS = {
     "riccati": "riccati",
     "fatrop": "fatrop",
     "ipopt": "Ipopt, SX",
@@ -40,13 +40,13 @@ def solve_times(bench: Bench) -> Figure:
                 place = {"textcoords": "offset points", "ha": "center", "fontsize": "small"}
                 panel.annotate(f"{one.times:.0f}×", (one["median"], row), (0, 7), **place)
         panel.set_title(loop, **SUBTITLE)
-        panel.set(xscale="log", xlabel="time of a solve [µs]", ylim=(len(NAMES) - 0.4, -0.6))
-    axes[0, 0].set_yticks(range(len(NAMES)), NAMES.values())
+        panel.set(xscale="log", xlabel="time of a solve [µs]", ylim=(len(LABELS) - 0.4, -0.6))
+    axes[0, 0].set_yticks(range(len(LABELS)), LABELS.values())
     medians = table.loc[loops[0]]["median"]
     fastest, slowest = medians.idxmin(), medians.idxmax()
     times = medians[slowest] / medians[fastest]
     found = (
-        f"{NAMES[fastest]} is fastest; {NAMES[slowest]}, a solve takes {times:.0f} times as long"
+        f"{LABELS[fastest]} is fastest; {LABELS[slowest]}, a solve takes {times:.0f} times as long"
     )
     return headed(figure, found)
 
@@ -59,14 +59,14 @@ def learning_steps(bench: Bench) -> Figure:
     figure, axes = subplots(1, len(solvers), 2.6, sharey=True, squeeze=False)
     for panel, solver in zip(axes[0], solvers, strict=True):
         stacked(panel, _parts(table[table.solver == solver]), STEP_PARTS, 0.65)
-        panel.set_title(NAMES[solver], **SUBTITLE)
+        panel.set_title(LABELS[solver], **SUBTITLE)
         panel.set_xlabel("ms a step")
     axes[0, 0].invert_yaxis()
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     shares = {}
     for solver in (solvers[0], solvers[-1]):
         rdes = _parts(table[table.solver == solver]).loc["RDES"]
-        shares[NAMES[solver]] = rdes["network"] / rdes.sum()
+        shares[LABELS[solver]] = rdes["network"] / rdes.sum()
     found = " and ".join(f"{share:.0%} with {name}" for name, share in shares.items())
     return headed(figure, f"Of a step of RDES the network takes {found}")
 
@@ -190,12 +190,12 @@ def _mark(axes: Axes, solver: str, solve: float, ratio: float, *, filled: bool) 
     face = INK if filled else "white"
     axes.plot(solve, ratio, MARKERS[solver], color=INK, markerfacecolor=face, zorder=3)
     place, side = PLACES[solver]
-    axes.annotate(NAMES[solver], (solve, ratio), place, ha=side, **SMALL)
+    axes.annotate(LABELS[solver], (solve, ratio), place, ha=side, **SMALL)
 
 
 def _found(ratios: pd.Series, model: summary.Saving) -> str:
     slowest = (
-        f"With {NAMES[str(ratios.idxmax())]}, RDES takes {ratios.max():.2f} times as long as ES"
+        f"With {LABELS[str(ratios.idxmax())]}, RDES takes {ratios.max():.2f} times as long as ES"
     )
     if ratios.max() > 1:
         return f"{slowest}; the break-even is at {model.break_even:.2f} ms"

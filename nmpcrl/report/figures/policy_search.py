@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from nmpcrl import Matrix
 from nmpcrl.analysis.policy_search import Found
-from nmpcrl.analysis.trajectory import described
+from nmpcrl.analysis.trajectory import describe
 from nmpcrl.report.figures.axes import draw_task, map_grid
 from nmpcrl.report.figures.style import LOOKS, TEAL, WINE, headed, page, subplots
 from nmpcrl.study import paper
@@ -36,7 +36,7 @@ def searches(found: Mapping[str, Found]) -> Figure:
     ends = {layout: one.cost / one.initial for layout, one in found.items()}
     for one, shade in zip(found.values(), shades, strict=True):
         share = np.array([*one.best, one.cost]) / one.initial
-        axes.step([*one.drives, one.made], share, where="post", color=str(shade), linewidth=1.2)
+        axes.step([*one.rollouts, one.made], share, where="post", color=str(shade), linewidth=1.2)
     for layout, y in _spaced(ends, 0.06 * (1 - min(ends.values()))).items():
         axes.annotate(f"  {layout}", (max(one.made for one in found.values()), y), va="center")
     axes.set(xlabel="rollouts without noise", ylabel="lowest cost / first", xscale="log")
@@ -79,7 +79,7 @@ def trajectories(rollouts: Mapping[str, Mapping[str, Matrix]]) -> Figure:
 
 def _arrives(states: Matrix, layout: str) -> bool:
     """Whether a rollout in a layout ends at the target."""
-    return bool(np.isfinite(described(states, paper.task(layout), 1.0).arrival))
+    return bool(np.isfinite(describe(states, paper.task(layout), 1.0).arrival))
 
 
 def _spaced(ends: Mapping[str, float], least: float) -> dict[str, float]:

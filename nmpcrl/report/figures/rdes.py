@@ -33,7 +33,7 @@ def literal_and_gated(literal: Records, gated: Records) -> Figure:
 
 
 @page
-def online_errors(runs: Runs, learners: tuple[str, ...] = ("DES", "RDES")) -> Figure:
+def online_errors(runs: Runs[Records], learners: tuple[str, ...] = ("DES", "RDES")) -> Figure:
     """Root mean square of the online error in each episode, one panel a reading of the decay."""
     decays = runs.values_of("decay")
     figure, axes = subplots(1, len(decays), sharey=True, squeeze=False)

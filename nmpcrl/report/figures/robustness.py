@@ -12,10 +12,10 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.analysis.summary import RunSummary, experiment_of
+from nmpcrl.claims.by_runs import RunClaim, Values
 from nmpcrl.claims.evidence import Evidence, paths
-from nmpcrl.claims.measures import MEASURES, Values
-from nmpcrl.claims.paper_claims import experiment_of
+from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import WHOLE, groups
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report.figures.axes import plain
@@ -23,14 +23,6 @@ from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, marked, page, subp
 from nmpcrl.report.tables import WORDS
 from nmpcrl.study.experiment import Experiment
 
-ASKED = {  # at the head of a column
-    "C1": "DES diverges,\nRDES does not",
-    "C2": "ES is unstable,\nGES is not",
-    "C5": "RDES and GES:\nsame policy",
-    "C6": "θ helps the\nnetwork",
-    "C7": "constraints\nhold",
-    "C9": "RDES and GES\nbeat $\\theta_\\mathrm{init}$",
-}
 FILLS = {  # with the colour of the word; the darker, the more is left of the claim
     REPRODUCED: ("#1a6b3c", "white"),
     PARTLY: ("#e0b050", "black"),
@@ -38,10 +30,6 @@ FILLS = {  # with the colour of the word; the darker, the more is left of the cl
     UNDECIDABLE: ("white", "0.45"),
 }
 SYMBOLS = {"c_epsilon": r"$c_\epsilon$", "alpha x": "α ×", "beta x": "β ×"}
-SCALES: dict[str, dict[str, Any]] = {  # others are logarithmic
-    "C7": {"value": "symlog", "linthresh": 1e-6},
-    "C9": {"value": "symlog", "linthresh": 0.1},
-}
 MOST_COST = 1.5  # of theta_init's, that is drawn
 
 
@@ -50,7 +38,7 @@ def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
     """What becomes of each claim in each row; a frame where it is not what it is held against.
 
     Args:
-        judged: of `robustness.atlas`.
+        judged: of `robustness_map`.
         mark: where the runs come from.
     """
     claims, rows = list(judged.claim.unique()), list(judged.variant.unique())
@@ -64,7 +52,7 @@ def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
         axes.text(-2.3, y, letters[row], ha="center", va="center", fontsize=8)
     axes.text(-2.3, -0.8, "departure", ha="center", va="bottom", fontsize=7.5)
     for i, claim in enumerate(claims):
-        head = f"{claim}\n{ASKED[claim]}"
+        head = f"{claim}\n{BY_RUNS[claim].short}"
         axes.text(i + 0.5, -0.8, head, ha="center", va="bottom", fontsize=7.5)
     axes.set(xlim=(-2.5, len(claims)), ylim=(max(height.values(), default=0) + 0.7, -3.0))
     axes.set_axis_off()
@@ -72,11 +60,11 @@ def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
 
 
 @page
-def telling(cells: pd.DataFrame, found: Evidence) -> Figure:
+def clearest_changes(cells: pd.DataFrame, found: Evidence) -> Figure:
     """What lies behind some cells: a row each, the claim's measure and the costs of its runs.
 
     Args:
-        cells: of `robustness.telling`.
+        cells: of `robustness.clearest_changes`.
         found: runs and summaries of the main table and of the variants.
     """
     if cells.empty:
@@ -88,9 +76,9 @@ def telling(cells: pd.DataFrame, found: Evidence) -> Figure:
     )
     for (left, right), cell in zip(grid, cells.to_dict("records"), strict=True):
         here, base = groups(found.runs, cell["variant"])
-        measure, where = MEASURES[cell["claim"]], paths(found)
-        values = measure.of(here, where), measure.of(base, where)
-        _strips(left, cell["claim"], *values)
+        claim, where = BY_RUNS[cell["claim"]], paths(found)
+        values = claim.measure(here, where), claim.measure(base, where)
+        _strips(left, claim, *values)
         learners = [name for name in LOOKS if any(name in arm.split() for arm in values[0])]
         _costs(right, found.summaries, here, base, learners)
         left.set_title(f"{cell['claim']}: {cell['outcome']}; was: {cell['base']}", fontsize=9)
@@ -109,7 +97,8 @@ def named(row: str) -> str:
 def _heights(letters: list[str]) -> list[float]:
     """Where each row of the map lies, with some room between departures."""
     steps = [1.0 + 0.4 * (one != other) for one, other in pairwise(letters)]
-    return np.cumsum([0.0, *steps]).tolist()
+    result: list[float] = np.cumsum([0.0, *steps]).tolist()
+    return result
 
 
 def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
@@ -118,7 +107,7 @@ def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
     place, size = (column + 0.03, y - 0.46), (0.94, 0.92)
     axes.add_patch(Rectangle(place, *size, facecolor=fill, edgecolor="0.8", linewidth=0.5))
     text = WORDS[cell["outcome"]]
-    if cell["flips"]:
+    if cell["changes"]:
         text = f"{WORDS[cell['base']]} → {text}"
         axes.add_patch(Rectangle(place, *size, fill=False, edgecolor="black", linewidth=1.8))
     elif 0 < cell["share"] < 1:
@@ -130,16 +119,15 @@ def _changed(judged: pd.DataFrame) -> str:
     """How many verdicts change, and of which claims none does."""
     decided = judged[(judged.variant != WHOLE) & (judged.outcome != UNDECIDABLE)]
     decided = decided[decided.base != UNDECIDABLE]
-    changes = decided.groupby("claim", sort=False).flips.sum()
+    changes = decided.groupby("claim", sort=False).changes.sum()
     never = [str(claim) for claim, count in changes.items() if not count]
     steady = f"; those on {' and '.join(never)} never" if never and changes.any() else ""
     return f"{int(changes.sum())} of {len(decided)} decided verdicts change{steady}"
 
 
-def _strips(axes: Axes, claim: str, here: Values, base: Values) -> None:
+def _strips(axes: Axes, claim: RunClaim, here: Values, base: Values) -> None:
     """The measure of each run, arm by arm: hollow for the baseline, filled for the variant."""
-    measure = MEASURES[claim]
-    low, high = _finite_range(pd.concat([here, base]), measure.border)
+    low, high = _finite_range(pd.concat([here, base]), claim.threshold)
     for i, arm in enumerate(here):
         look = LOOKS[arm.split()[-1]]
         for shift, values, face in ((-0.2, base, "none"), (0.2, here, look.color)):
@@ -152,14 +140,15 @@ def _strips(axes: Axes, claim: str, here: Values, base: Values) -> None:
                 "alpha": 0.8,
             }
             axes.plot(x, numbers, look.marker, linestyle="", **style)
-    axes.axhline(measure.border, **LIMIT)
-    axes.set_yscale(**SCALES.get(claim, {"value": "log"}))
-    if claim in SCALES:
+    axes.axhline(claim.threshold, **LIMIT)
+    if claim.linear_to:
+        axes.set_yscale("symlog", linthresh=claim.linear_to)
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     else:
+        axes.set_yscale("log")
         plain(axes.yaxis)
     axes.set_xticks(range(len(here.columns)), list(here))
-    axes.set_ylabel(measure.label, fontsize=8)
+    axes.set_ylabel(claim.label, fontsize=8)
 
 
 def _costs(

@@ -16,7 +16,7 @@ from nmpcrl.claims.failure_modes import ending
 from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import draw_task, legend, map_grid
 from nmpcrl.report.figures.panels import bundle, part, sourced
-from nmpcrl.report.figures.style import DECAYS, LIMIT, LOOKS, SUBTITLE, page, subplots
+from nmpcrl.report.figures.style import DECAY_TITLES, LIMIT, LOOKS, SUBTITLE, page, subplots
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column
@@ -73,7 +73,7 @@ def paths(found: Evidence, layout: str) -> Figure:
     figure, axes = subplots(1, len(decays), 3.5, sharey=True, squeeze=False)
     for axis, decay in zip(axes[0], decays, strict=True):
         _map(axis, paper.task(layout), finished.summaries.select(decay=decay))
-        axis.set_title(DECAYS[decay], **SUBTITLE)
+        axis.set_title(DECAY_TITLES[decay], **SUBTITLE)
         axis.set_xlabel("x [m]")
     axes[0, 0].set_ylabel("y [m]")
     legend(figure, SHOWN)
@@ -111,7 +111,7 @@ def _against_time(
             values = np.array([getattr(summary, name) for summary in runs])
             for i, axis in enumerate(column if values.size else ()):
                 bundle(axis, period * np.arange(values.shape[1]), values[:, :, i], learner)
-        column[0].set_title(DECAYS[decay], **SUBTITLE)
+        column[0].set_title(DECAY_TITLES[decay], **SUBTITLE)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     for axis, component in zip(axes[:, 0], components, strict=True):

@@ -15,7 +15,7 @@ from nmpcrl.bench.scaling import exponents
 from nmpcrl.report.figures.style import INK, TEAL, WINE, headed, page, subplots
 
 STARTS = {"cold": (INK, "o-"), "shifted": (TEAL, "s--"), "same state": (WINE, "D-.")}
-SOLVERS = {"riccati": (WINE, "o-"), "fatrop": (TEAL, "s--"), "ipopt": (INK, "^:")}
+SOLVER_LOOKS = {"riccati": (WINE, "o-"), "fatrop": (TEAL, "s--"), "ipopt": (INK, "^:")}
 
 
 @page
@@ -143,7 +143,7 @@ def horizons(timings: pd.DataFrame) -> Figure:
         _against_horizon(axes, timings, column)
     left.set(title="A solve", ylabel="time [ms]")
     right.set(title="An iteration", ylabel="time [µs]")
-    first = next(name for name in SOLVERS if name in set(timings.solver))
+    first = next(name for name in SOLVER_LOOKS if name in set(timings.solver))
     solve, iteration = (exponents(timings, column)[first] for column in columns)
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     orders = f"a solve grows like $N^{{{solve:.2f}}}$, an iteration like $N^{{{iteration:.2f}}}$"
@@ -152,7 +152,7 @@ def horizons(timings: pd.DataFrame) -> Figure:
 
 def _against_horizon(axes: Axes, timings: pd.DataFrame, column: str) -> None:
     for solver, rows in timings.groupby("solver"):
-        color, line = SOLVERS[str(solver)]
+        color, line = SOLVER_LOOKS[str(solver)]
         axes.loglog(rows.horizon, rows[column], ".", color=color, ms=3, alpha=0.4)
         medians = rows.groupby("horizon")[column].median()
         axes.loglog(medians, line, color=color, ms=5, label=str(solver))

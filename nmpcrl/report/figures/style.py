@@ -1,7 +1,9 @@
 """What all figures share: the look of each learner, of a line and of a page."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec
 
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
@@ -19,7 +21,18 @@ PAGE: dict[Any, Any] = {
     "lines.linewidth": 1.6,
 }
 
-page: Any = plt.rc_context(PAGE)  # as a decorator; matplotlib's types do not know that it is one
+Parameters = ParamSpec("Parameters")
+
+
+def page(draw: Callable[Parameters, Figure]) -> Callable[Parameters, Figure]:
+    """Let a function draw with the look of `PAGE`."""
+
+    @wraps(draw)
+    def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Figure:
+        with plt.rc_context(PAGE):
+            return draw(*args, **kwargs)
+
+    return drawn
 
 
 @dataclass(frozen=True)
@@ -51,7 +64,7 @@ LOOKS = {
 INK, TEAL, WINE = "0.25", "#1B7F79", "#882255"  # none of them is a learner's
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
 SUBTITLE: dict[str, Any] = {"loc": "left", "fontsize": "medium", "fontweight": "normal"}
-DECAYS = {"step": "noise decays per step", "episode": "noise decays per episode"}
+DECAY_TITLES = {"step": "noise decays per step", "episode": "noise decays per episode"}
 SYMBOLS = {  # of paper.THETA_NAMES, between dollar signs
     "x": r"\theta_x",
     "y": r"\theta_y",

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.claims.failure_modes import OVERSHOOT
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, page, subplots
 from nmpcrl.study.records import LAST
 

@@ -160,15 +160,15 @@ def sides(solution: Solution) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     ocp, z, nu = solution.ocp, solution.primal, solution.bound_duals
     of_box = np.zeros(z.size, bool)
     of_box[ocp.states] = True
-    excess = np.concatenate([ocp.lower - z, z - ocp.upper])
+    beyond = np.concatenate([ocp.lower - z, z - ocp.upper])
     multiplier = np.concatenate([np.maximum(-nu, 0), np.maximum(nu, 0)])
-    return excess, multiplier, np.tile(of_box, 2)
+    return beyond, multiplier, np.tile(of_box, 2)
 
 
 def box_weight(solution: Solution) -> float:
     """What a unit beyond the box costs: the multiplier of whatever is beyond it."""
-    excess, multiplier, of_box = sides(solution)
-    return multiplier[np.argmax(np.where(of_box, excess, -np.inf))]
+    beyond, multiplier, of_box = sides(solution)
+    return multiplier[np.argmax(np.where(of_box, beyond, -np.inf))]
 
 
 def residual(solution: Solution) -> float:
@@ -182,11 +182,11 @@ def residual(solution: Solution) -> float:
     parts = conditions(solution.ocp)(z, parameters(solution), lam)
     _, g, slope, _ = (part.full().ravel() for part in parts)
     equality = solution.ocp.equality
-    excess, multiplier, of_box = sides(solution)
+    beyond, multiplier, of_box = sides(solution)
     multiplier[solution.ocp.slacks[0]] = 0  # nothing is planned about them  # departure L
     with np.errstate(invalid="ignore"):  # infinite bounds
-        inside = np.where(multiplier > 0, multiplier * np.minimum(excess, 0), 0)
-        outside = np.where(of_box & (excess > 0), (weight - multiplier) * excess, 0)
+        inside = np.where(multiplier > 0, multiplier * np.minimum(beyond, 0), 0)
+        outside = np.where(of_box & (beyond > 0), (weight - multiplier) * beyond, 0)
     length = np.abs(solution.states).max(initial=1)
     violations = (
         (slope + nu) / max(scale, np.abs(lam).max(), np.abs(nu).max()),
@@ -196,15 +196,15 @@ def residual(solution: Solution) -> float:
         (lam * g)[~equality] / scale,
         inside / scale,
         outside / scale,
-        np.where(of_box, 0, np.maximum(excess, 0)),
+        np.where(of_box, 0, np.maximum(beyond, 0)),
     )
     return float(max(np.abs(violation).max(initial=0) for violation in violations))
 
 
 def beyond(solution: Solution) -> np.ndarray:
     """How far the predicted states leave the box."""
-    excess, _, of_box = sides(solution)
-    return np.maximum(excess[of_box], 0)
+    beyond, _, of_box = sides(solution)
+    return np.maximum(beyond[of_box], 0)
 
 
 @cache
@@ -389,8 +389,8 @@ def test_features_are_the_differences_of_the_value_away_from_kinks():
         nmpc = controller(rng, longest=10)
         for _ in range(10):
             problem = drawn(rng, nmpc)
-            excess = nmpc.task.overlap(problem.state) + problem.theta[-1]
-            if np.abs(excess).min(initial=1) < 1e-2:
+            beyond = nmpc.task.overlap(problem.state) + problem.theta[-1]
+            if np.abs(beyond).min(initial=1) < 1e-2:
                 continue
             solution = problem.solve(nmpc)
             if solution.violation > 1e-6:  # then the features are those of `total`
@@ -443,11 +443,11 @@ def test_whatever_is_asked_the_answer_is_a_solution_or_an_error(problem, nmpc):
 
 def mirrored(nmpc: Nmpc) -> Nmpc:
     """The same world with y for -y."""
-    task, flip = nmpc.task, np.array([1.0, -1.0, -1.0])
-    lower, upper = np.sort([task.lower * flip, task.upper * flip], axis=0)
+    task, mirror = nmpc.task, np.array([1.0, -1.0, -1.0])
+    lower, upper = np.sort([task.lower * mirror, task.upper * mirror], axis=0)
     other = Task(
-        start=task.start * flip,
-        target=task.target * flip,
+        start=task.start * mirror,
+        target=task.target * mirror,
         lower=lower,
         upper=upper,
         obstacles=tuple(Obstacle(one.x, -one.y, one.diameter) for one in task.obstacles),
@@ -467,11 +467,11 @@ PAIRS = [(one, mirrored(one)) for one in LAYOUTS if one.horizon <= 10]
 @settings(derandomize=True, deadline=None, max_examples=100)
 @given(problem=typical, pair=st.sampled_from(PAIRS))
 def test_a_mirrored_world_has_mirrored_plans(problem, pair):
-    flip = np.array([1.0, -1.0, -1.0])
+    mirror = np.array([1.0, -1.0, -1.0])
     one = problem.solve(pair[0])
-    other = problem._replace(state=problem.state * flip).solve(pair[1])
+    other = problem._replace(state=problem.state * mirror).solve(pair[1])
     assert other.value == pytest.approx(one.value, rel=1e-6, abs=1e-7)
-    np.testing.assert_allclose(other.states[-1] * flip, one.states[-1], atol=1e-2)
+    np.testing.assert_allclose(other.states[-1] * mirror, one.states[-1], atol=1e-2)
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)

@@ -49,7 +49,7 @@ def test_a_solve_from_its_own_solution_comes_back_to_it(robot, draw):
     assert warm < cold
 
 
-def test_along_a_drive_warm_starts_save_iterations_and_change_nothing(robot, theta):
+def test_along_a_closed_loop_warm_starts_save_iterations_and_change_nothing(robot, theta):
     state, warm_start, warm, cold = robot.task.start, None, 0, 0
     for _ in range(40):
         warm_start, without = robot.solve(state, theta, warm_start), robot.solve(state, theta)
@@ -118,8 +118,8 @@ def test_on_a_boundary_the_slack_of_stage_zero_is_not_active(solver, theta, coun
     features = {}
     for place, inward in {"outside": -1e-4, "on": 0.0, "inside": 1e-4}.items():
         nmpc = beside(count, solver, inward=inward, angle=angle)
-        excess = nmpc.task.overlap(nmpc.task.start) + theta[-1]
-        expected = {"outside": excess < -1e-5, "on": abs(excess) < 1e-14, "inside": excess > 1e-5}
+        beyond = nmpc.task.overlap(nmpc.task.start) + theta[-1]
+        expected = {"outside": beyond < -1e-5, "on": abs(beyond) < 1e-14, "inside": beyond > 1e-5}
         assert expected[place].all()
         solution = nmpc.solve(nmpc.task.start, theta)
         assert nmpc.kkt_residual(solution) < 1e-4

@@ -27,15 +27,15 @@ def riccati(controllers) -> Nmpc:
 def test_from_outside_there_is_a_plan_that_says_how_far_it_leaves_the_box(riccati, state):
     solution = riccati.solve(np.array(state), THETA)
     later, task = solution.states[1:], riccati.task
-    excess = np.maximum(later - task.upper, task.lower - later).max()
-    assert solution.violation == pytest.approx(max(0, excess), abs=1e-9)
+    beyond = np.maximum(later - task.upper, task.lower - later).max()
+    assert solution.violation == pytest.approx(max(0, beyond), abs=1e-9)
     reach = 0.6 * riccati.plant.period  # of one step
     outside = np.maximum(solution.states - task.upper, task.lower - solution.states).max()
     assert solution.violation >= outside - reach - 1e-9
     assert (np.abs(solution.inputs) <= riccati.plant.upper).all()
 
 
-def test_from_far_outside_the_plan_drives_towards_the_box_as_fast_as_it_can(riccati):
+def test_from_far_outside_the_plan_heads_for_the_box_as_fast_as_it_can(riccati):
     solution = riccati.solve(np.array([50.0, 1.0, np.pi]), THETA)
     np.testing.assert_allclose(np.diff(solution.states[:, 0]), -0.12, atol=1e-4)
 

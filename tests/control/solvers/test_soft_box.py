@@ -185,10 +185,10 @@ def test_inside_the_box_a_soft_one_is_a_hard_one(controllers, draw):
 def test_only_a_soft_box_is_left_for_a_target_behind_it():
     """The target lies 2.5 m behind the wall, and the walls' price is a tenth of the obstacles'."""
     state = np.array([5.9, 2.0, 0.0])
-    hard, cheap = (soft(10.0, 6.0, soft_box=one).solve(state, THETA) for one in (False, True))
+    hard, priced = (soft(10.0, 6.0, soft_box=one).solve(state, THETA) for one in (False, True))
     assert hard.violation <= 1e-6
-    assert cheap.violation > 0.1
-    assert cheap.value < hard.value
+    assert priced.violation > 0.1
+    assert priced.value < hard.value
 
 
 @pytest.mark.parametrize("omega", [0.1, 3.0, 100.0])

@@ -1,0 +1,84 @@
+"""The paired ratio and its interval, on times whose law is known; no clock is read here."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.bench.paired import BLOCK, LEAST, PLACEMENT, paired_ratio
+
+ROUNDS = 30 * BLOCK
+
+
+def drawn(seed: int, ratio: float, rounds: int = ROUNDS, noise: float = 0.05):
+    """Times of two that take turns: as hard as each other's step, each disturbed on its own."""
+    rng = np.random.default_rng(seed)
+    hard = np.exp(rng.normal(0.0, 0.5, rounds))
+    one, other = np.exp(rng.normal(0.0, noise, (2, rounds)))
+    return ratio * hard * one, hard * other
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 3.0])
+def test_the_ratio_is_found_through_steps_that_are_differently_hard(seed, ratio):
+    mine, theirs = drawn(seed, ratio)
+    found = paired_ratio(mine, theirs, mine, theirs)
+    assert found.value == pytest.approx(ratio, rel=0.02)
+    assert found.low <= ratio <= found.high
+    assert found.high / found.low < 1.1
+    assert found.waited == 0
+
+
+def test_who_is_compared_with_itself_takes_as_long_but_for_what_one_process_cannot_see():
+    times, _ = drawn(0, 1.0)
+    found = paired_ratio(times, times, times, times)
+    assert (found.value, found.low, found.high) == pytest.approx((1, 1 / 1.03, 1.03))
+
+
+def test_a_machine_that_becomes_slower_for_all_changes_nothing():
+    mine, theirs = drawn(1, 0.6)
+    slow = np.where(np.arange(ROUNDS) > ROUNDS / 2, 2.0, 1.0)
+    before, after = (
+        paired_ratio(a, b, a, b) for a, b in ((mine, theirs), (slow * mine, slow * theirs))
+    )
+    assert after == before
+
+
+def test_a_third_of_the_rounds_disturbed_in_one_learner_alone_widens_the_interval_first():
+    mine, theirs = drawn(2, 1.0)
+    disturbed = mine * np.where(np.random.default_rng(0).random(ROUNDS) < 1 / 3, 3.0, 1.0)
+    calm, found = (paired_ratio(a, theirs, a, theirs) for a in (mine, disturbed))
+    assert found.value == pytest.approx(1, abs=0.05)
+    assert found.high / found.low > calm.high / calm.low
+
+
+def test_rounds_that_resemble_their_neighbours_are_worth_fewer():
+    rng = np.random.default_rng(0)
+    alone = np.exp(rng.normal(0, 0.2, ROUNDS))
+    alike = np.exp(np.repeat(rng.normal(0, 0.2, ROUNDS // BLOCK), BLOCK))
+    ones = np.ones(ROUNDS)
+    widths = [
+        np.log(found.high / found.low) - 2 * np.log(1 + PLACEMENT)
+        for found in (paired_ratio(one, ones, one, ones) for one in (alone, alike))
+    ]
+    assert widths[1] > 2 * widths[0]
+
+
+def test_the_interval_of_95_percent_misses_about_as_often_even_without_the_margin():
+    missed = 0
+    for seed in range(200):
+        mine, theirs = drawn(seed, 1.0)
+        found = paired_ratio(mine, theirs, mine, theirs)
+        missed += not found.low * (1 + PLACEMENT) <= 1 <= found.high / (1 + PLACEMENT)
+    assert 1 <= missed <= 24
+
+
+@pytest.mark.parametrize(("blocks", "known"), [(LEAST - 1, False), (LEAST, True)])
+def test_too_few_rounds_have_no_interval(blocks, known):
+    mine, theirs = drawn(0, 1.0, blocks * BLOCK + BLOCK - 1)
+    found = paired_ratio(mine, theirs, mine, theirs)
+    assert np.isfinite([found.low, found.high]).all() == known
+
+
+def test_the_share_of_waiting_is_what_the_two_clocks_disagree_by():
+    mine, theirs = drawn(0, 0.5)
+    assert paired_ratio(mine, theirs, 4 * mine, 4 * theirs).waited == pytest.approx(0.75)
+    assert paired_ratio(mine, theirs, mine / 2, theirs / 2).waited == 0  # threads beside each other

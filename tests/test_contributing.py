@@ -1,0 +1,414 @@
+"""CONTRIBUTING's table at its word: each thing is added in the files of its row, and works."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from fnmatch import fnmatch
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from nmpcrl.__main__ import main
+from nmpcrl.study.provenance import changed, sources
+
+ROOT = Path(__file__).resolve().parents[1]
+TEXT = (ROOT / "CONTRIBUTING.md").read_text()
+CELLS = re.findall(r"^\| an? (\w+) \| (.*?) \| ?(.*?) ?\|$", TEXT, flags=re.M)
+FILES = {name: re.findall(r"`([^`]+)`", files) for name, files, _ in CELLS}
+LOCK = {name: lock for name, _, lock in CELLS}
+COPIED = ("nmpcrl", "book", "_toc.yml", "tests/test_architecture.py", "tests/book")
+IGNORED = shutil.ignore_patterns("__pycache__", "published")
+
+Edit = Callable[[Path], None]  # of the file at this path
+
+
+def entered(name: str, entry: str) -> Edit:
+    """Put an entry first in the dictionary of this name."""
+
+    def edit(path: Path) -> None:
+        opened = rf"^{name}\b.*{{(?: *#.*)?\n"
+        text, count = re.subn(opened, rf"\g<0>{entry}", path.read_text(), count=1, flags=re.M)
+        assert count, f"there is no {name} in {path}"
+        path.write_text(text)
+
+    return edit
+
+
+def replaced(before: str, after: str) -> Edit:
+    """Replace a text, where it first stands."""
+
+    def edit(path: Path) -> None:
+        assert before in path.read_text(), f"{path} does not hold {before!r}"
+        path.write_text(path.read_text().replace(before, after, 1))
+
+    return edit
+
+
+def imported(line: str) -> Edit:
+    """Import something from the package, before all else that is."""
+    return replaced("\nfrom nmpcrl", f"\n{line}\nfrom nmpcrl")
+
+
+def added(text: str) -> Edit:
+    """Add a text at the end, or make the file."""
+
+    def edit(path: Path) -> None:
+        path.write_text(path.read_text() + text if path.exists() else text)
+
+    return edit
+
+
+def copied(name: str) -> Edit:
+    """Make a chapter after the model of another."""
+
+    def edit(path: Path) -> None:
+        model = path.with_name(f"{name}.ipynb").read_text()
+        path.write_text(model.replace(name, path.stem))
+
+    return edit
+
+
+def shown(source: str) -> Edit:
+    """Add a cell with a figure to a chapter."""
+
+    def edit(path: Path) -> None:
+        notebook = nbformat.read(path, as_version=4)
+        figure = {"name": "fig:new", "caption": "The end of theta."}
+        mystnb = {"figure": figure, "image": {"alt": "A few dots.", "width": "100%"}}
+        metadata = {"tags": ["hide-input"], "mystnb": mystnb}
+        notebook.cells.append(nbformat.v4.new_code_cell(source, metadata=metadata))
+        nbformat.write(notebook, path)
+
+    return edit
+
+
+def both(*edits: Edit) -> Edit:
+    """Some edits of one file."""
+
+    def edit(path: Path) -> None:
+        for one in edits:
+            one(path)
+
+    return edit
+
+
+EDITS: dict[str, dict[str, Edit]] = {  # what is added in which file, by row
+    "learner": {
+        "nmpcrl/learning/learners.py": added('''
+
+def half_expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
+    """ES with steps half as long."""
+    return Learner("half", SecondSolve(nmpc), semi_gradient(alpha / 2), nmpc.gamma)
+'''),
+        "nmpcrl/study/setup.py": both(
+            imported("from nmpcrl.learning.learners import half_expected_sarsa"),
+            entered(
+                "LEARNERS", '    "half": lambda e, nmpc, _: half_expected_sarsa(nmpc, e.alpha),\n'
+            ),
+        ),
+        "nmpcrl/report/figures/style.py": entered(
+            "LOOKS", '    "half": Look("#332288", "-", "*"),\n'
+        ),
+    },
+    "plant": {},
+    "layout": {
+        "nmpcrl/study/paper.py": replaced(
+            '\n    "F": (',
+            '\n    "G": ((0.2, 1.9), (2.1, 4.4), (3.6, 2.3), (4.9, -0.4)),\n    "F": (',
+        ),
+    },
+    "solver": {
+        "nmpcrl/control/solvers/relay.py": added('''"""A solver that leaves the work to another."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from nmpcrl.control.ocp import Ocp
+from nmpcrl.control.solvers.nlpsol import Ipopt
+from nmpcrl.control.solvers.solver import Prepared, Solver
+
+
+@dataclass(frozen=True)
+class Relay(Solver):
+    """Ipopt by another name."""
+
+    name: ClassVar[str] = "relay"
+
+    def prepare(self, ocp: Ocp) -> Prepared:
+        """See `Solver.prepare`."""
+        return Ipopt(self.tolerance).prepare(ocp)
+'''),
+        "nmpcrl/control/solvers/__init__.py": both(
+            imported("from nmpcrl.control.solvers.relay import Relay"),
+            replaced("(Riccati, Fatrop, Ipopt)", "(Riccati, Fatrop, Ipopt, Relay)"),
+        ),
+    },
+    "metric": {
+        "nmpcrl/analysis/metrics.py": added('''
+
+def last_reduction(cost: Vector) -> float:
+    """By how much the last of some noise-free costs is below the one before."""
+    return float(cost[-2] - cost[-1])
+'''),
+        "nmpcrl/analysis/summary.py": replaced(
+            '        "best_cost"',
+            '        "last_reduction": metrics.last_reduction(cost),\n        "best_cost"',
+        ),
+    },
+    "variant": {
+        "nmpcrl/study/design.py": replaced(
+            "    found |= {\n",
+            '    found |= {\n        "N = 8": Variant("", "horizon N = 8", {"horizon": 8}),\n',
+        ),
+    },
+    "claim": {
+        "nmpcrl/claims/own_claims.py": replaced(
+            "    for claim in (\n",
+            """    for claim in (
+        AtMost(
+            name="B9",
+            statement="GES is at least as good as ES.",
+            question="Does GES end at no higher cost than ES?",
+            border="not higher",
+            would_change="Nothing that we know of.",
+            threshold=0.0,
+            **compared(("GES", "ES")),
+        ),
+""",
+        ),
+    },
+    "figure": {
+        "nmpcrl/report/figures/ends.py": added('''"""Where theta ends."""
+
+from matplotlib.figure import Figure
+
+from nmpcrl.analysis.metrics import final_theta
+from nmpcrl.report.figures.style import dots, headed, page, subplots
+from nmpcrl.study.store import Runs
+
+
+@page
+def ends(runs: Runs) -> Figure:
+    """The last theta of each run, a marker a learner."""
+    figure, axes = subplots()
+    for experiment, records in runs.items():
+        axes.plot(final_theta(records), **dots(experiment.learner))
+    axes.set_xlabel("component")
+    return headed(figure, f"theta ends in {len(runs)} places")
+'''),
+        "book/02_expected_sarsa.ipynb": shown(
+            "from nmpcrl.report.figures.ends import ends\n\nends(runs)"
+        ),
+    },
+    "chapter": {
+        "book/08_again.ipynb": copied("01_mdp_and_nmpc"),
+        "_toc.yml": replaced("book/07_beyond\n", "book/07_beyond\n      - file: book/08_again\n"),
+        "book/reproduce.md": replaced(
+            "| `solver` |", "| `08_again` | `layout`, `horizon` |\n| `solver` |"
+        ),
+    },
+}
+
+PROBES = {  # what is to work then, by row; run in the copy, in one process
+    "learner": """
+from nmpcrl.report.figures import style
+from nmpcrl.study import Experiment, run
+
+short = {"episodes": 2, "steps": 5, "evaluate_every": 1}
+half, es = run(Experiment("half", **short)), run(Experiment(alpha=Experiment().alpha / 2, **short))
+assert half.facts["stopped"] == "finished"
+assert (half.steps["theta"][-1] != half.experiment["theta"]).any()
+assert (half.steps["theta"] == es.steps["theta"]).all()
+style.line("half")
+""",
+    "layout": """
+from nmpcrl.study import Experiment, design, layouts, paper, run
+
+assert layouts.screen(paper.LAYOUTS["G"]).passed
+assert run(Experiment(layout="G", episodes=1, steps=5)).facts["stopped"] == "finished"
+assert {one.layout for one in design.whole_study()} == set("ABCDEF")
+""",
+    "solver": """
+import numpy as np
+
+from nmpcrl.bench.learners import time_learners
+from nmpcrl.claims import published
+from nmpcrl.control.solvers.relay import Relay
+from nmpcrl.report.figures import claims
+from nmpcrl.study import Experiment, paper, run
+
+theta = np.array(paper.THETA_INIT)
+values = [paper.nmpc(solver=one).solve(paper.START, theta).value for one in (Relay(), "riccati")]
+np.testing.assert_allclose(*values, rtol=1e-6)
+assert run(Experiment(solver="relay", episodes=1, steps=5)).facts["stopped"] == "finished"
+timings = time_learners(("ES", "RDES"), ("ipopt", "relay"), steps=2)
+(verdict,) = [one for one in published.load().verdicts if one.claim == "C3"]
+axis = claims.times(timings, verdict, "RDES").axes[0]
+assert "relay" in [label.get_text() for label in axis.get_yticklabels()]
+""",
+    "metric": """
+from nmpcrl.analysis.summary import summarise, table
+from nmpcrl.study import Experiment, run
+
+records = run(Experiment(episodes=2, steps=5, evaluate_every=1))
+*_, before, last = records.evaluations["cost"]
+assert table([summarise(records)]).last_reduction.tolist() == [before - last]
+""",
+    "variant": """
+from click.testing import CliRunner
+
+from nmpcrl.__main__ import main
+from nmpcrl.study import design
+
+found = CliRunner().invoke(main, ["study", "--part", "N = 8", "--dry-run"])
+assert found.output.startswith(f"0 of {len(design.variant('N = 8'))} runs are stored"), found.output
+""",
+    "claim": """
+import pandas as pd
+
+from nmpcrl.claims import own_claims, published
+from nmpcrl.report.tables import claim_table
+
+runs = pd.DataFrame(published.load().rows.values())
+runs = runs[runs.variant == "main"]
+(verdict,) = [one for one in own_claims.judge_own(runs) if one.claim == "B9"]
+assert verdict.counts["all"][1] == 120
+assert "GES is at least as good as ES." in claim_table(own_claims.OWN_CLAIMS.values(), "")
+""",
+    "figure": """
+from nmpcrl.report.figures.ends import ends
+from nmpcrl.study import Experiment, Runs, run
+
+one = Experiment(episodes=1, steps=5)
+ends(Runs({one: run(one)})).savefig("ends.svg")
+assert "theta ends in 1 places" in ends(Runs({one: run(one)})).get_suptitle()
+""",
+    "chapter": """
+import build
+
+assert build.ROOT.samefile(".")
+assert "08_again" in build.notebooks()
+assert build.ask(build.known("08_again"), {"layout": "D"}).keys() == set(build.NEEDS)
+""",
+}
+OWN_TESTS = (  # of the project, in the copy
+    "tests/test_architecture.py",
+    *("tests/book/test_notebooks.py", "tests/book/test_notation.py"),
+    *("-k", "architecture or 08_again or contents or parameters or (figures and 02_expected)"),
+)
+SCRIPT = """
+import json, sys, traceback
+
+failures = {}
+for name, probe in json.load(sys.stdin).items():
+    try:
+        exec(probe, {})
+    except Exception:
+        failures[name] = traceback.format_exc()
+print(json.dumps(failures))
+"""
+
+if not (ROOT / "nmpcrl/claims/by_runs.py").exists():  # where a claim is not one object yet
+    for rows in (FILES, LOCK, EDITS, PROBES):
+        del rows["claim"]
+
+each_row = pytest.mark.parametrize("name", EDITS)
+
+
+def copy(target: Path) -> Path:
+    """The project in another folder."""
+    for name in COPIED:
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, target / name, ignore=IGNORED)
+        else:
+            shutil.copy2(ROOT / name, target / name)
+    return target
+
+
+def called(scratch: Path, *arguments: str, given: str = "") -> subprocess.CompletedProcess[str]:
+    """Python in the copy, with the published study of the project."""
+    places = {"PYTHONPATH": f"{scratch}{os.pathsep}{scratch / 'book'}", "NMPCRL_RUNS": "runs"}
+    places["NMPCRL_PUBLISHED"] = str(ROOT / "book/published")
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=scratch,
+        env=os.environ | places,
+        input=given,
+        capture_output=True,
+        text=True,
+    )
+
+
+@pytest.fixture(scope="module")
+def scratch(tmp_path_factory) -> Path:
+    """A copy of the project with one more of everything."""
+    target = copy(tmp_path_factory.mktemp("scratch"))
+    for edits in EDITS.values():
+        for file, edit in edits.items():
+            edit(target / file)
+    return target
+
+
+@pytest.fixture(scope="module")
+def failures(scratch) -> dict[str, str]:
+    """What did not work of what was added, by row."""
+    done = called(scratch, "-c", SCRIPT, given=json.dumps(PROBES))
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_files_rooms_commands_and_targets_that_are_named_are_there():
+    for name in re.findall(r"`([\w.]+/[\w./]+\.\w+)`", TEXT):
+        assert re.search(r"/[A-Z_]{4,}\.", name) or (ROOT / name).is_file(), name
+    rooms = {path.parent.name for path in ROOT.glob("nmpcrl/*/__init__.py")}
+    assert set(re.findall(r"^\| `(\w+)` \|", TEXT, flags=re.M)) == rooms
+    targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), flags=re.M))
+    assert set(re.findall(r"\bmake ([a-z-]+)(?=[ `]|$)", TEXT, flags=re.M)) <= targets
+    for command in re.findall(r"`nmpcrl ([^`]+)`", TEXT):
+        name, *arguments = shlex.split(command)
+        main.commands[name].make_context(name, arguments)
+
+
+def test_the_table_has_these_rows():
+    assert set(FILES) == set(LOCK) == set(EDITS) == {*PROBES, "plant"}
+
+
+@each_row
+def test_a_thing_is_added_in_the_files_of_its_row_and_in_no_other(name):
+    patterns = [re.sub(r"[A-Z][A-Z_]+", "*", file) for file in FILES[name]]
+    assert len(patterns) == len(EDITS[name])
+    for file in EDITS[name]:
+        assert any(fnmatch(file, pattern) for pattern in patterns), file
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROBES)
+def test_what_was_added_works(failures, name):
+    assert name not in failures, failures[name]
+
+
+@pytest.mark.slow
+def test_the_projects_own_tests_take_what_was_added(scratch):
+    done = called(scratch, "-m", "pytest", "-q", "-p", "no:cacheprovider", *OWN_TESTS)
+    assert done.returncode == 0, done.stdout
+
+
+def test_a_plant_is_added_by_the_example_of_the_readme():
+    assert re.search(r"\*\*A plant\*\*.*README trains one of its own", TEXT)
+    assert "plant = Plant(" in (ROOT / "README.md").read_text()
+
+
+@pytest.mark.slow
+@each_row
+def test_the_lock_is_made_anew_where_the_row_says_so(name, tmp_path):
+    target = copy(tmp_path)
+    for file, edit in EDITS[name].items():
+        edit(target / file)
+    assert bool(changed(sources(target / "nmpcrl"), sources())) == (LOCK[name] == "anew")
