@@ -181,12 +181,12 @@ def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     from nmpcrl.analysis.summaries import fetch_summaries
     from nmpcrl.claims import published  # only here: a refusal should not wait for it
     from nmpcrl.study import Experiment
+    from nmpcrl.study.provenance import warn_of_changes
     from nmpcrl.study.setup import compile_ahead
     from nmpcrl.study.store import fetch_all
 
-    compile_ahead(
-        (*experiments, *summaries) or (Experiment(),)
-    )  # no page is a place for its notice
+    warn_of_changes()  # no page is a place for this notice, nor for that of the compiler
+    compile_ahead((*experiments, *summaries) or (Experiment(),))
     fetch_all(experiments, progress=True)
     contradictions = published.compare(fetch_summaries(summaries), published.load())
     if len(contradictions):

@@ -4,18 +4,23 @@ a benchmark that nobody measured, and evidence that nobody trained."""
 import copy
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from nmpcrl.analysis.summary import RunSummary, table
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.published import failure_modes_of
-from nmpcrl.study import Experiment, Runs, design, paper
+from nmpcrl.study import Experiment, Runs, design, executor, paper
+
+settings.register_profile("no clock", deadline=None)  # the machine may be busy
+settings.load_profile("no clock")
 
 ROOT = Path(__file__).resolve().parent.parent
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -33,9 +38,25 @@ def missing(reason: str) -> None:
 
 
 @pytest.fixture(scope="session")
-def root() -> Path:
-    """The repository."""
-    return ROOT
+def nobodys(tmp_path_factory) -> Iterator[Path]:
+    """Where a run is stored whose test names no folder: never among the user's own."""
+    folder = tmp_path_factory.mktemp("nobodys") / "runs"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("NMPCRL_RUNS", str(folder))
+        yield folder
+
+
+@pytest.fixture(autouse=True)
+def stores_in_a_folder_of_its_own(nobodys) -> Iterator[None]:
+    """A test that stores runs says where; otherwise it would read what another has stored."""
+    yield
+    assert not nobodys.exists(), "set NMPCRL_RUNS to a folder of this test's own"
+
+
+@pytest.fixture
+def trains_here(monkeypatch) -> None:
+    """Where nobody names an executor, jobs are done in a thread: no process has to start."""
+    monkeypatch.setattr(executor, "processes", lambda *_: ThreadPoolExecutor(1))
 
 
 @pytest.fixture(scope="session")

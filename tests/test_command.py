@@ -12,7 +12,7 @@ from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.study import Experiment, design, executor, paper, sweep
+from nmpcrl.study import Experiment, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 
 WHOLE = len(design.whole_study())
@@ -117,6 +117,7 @@ def test_a_dry_run_says_how_much_is_to_be_done_and_does_nothing(command, small, 
     assert not (tmp_path / "runs").exists()
 
 
+@pytest.mark.slow
 def test_study_trains_what_is_missing(command, small):
     asked = command("study", "--workers", "2")
     assert asked.exit_code == 0, asked.output
@@ -124,7 +125,7 @@ def test_study_trains_what_is_missing(command, small):
     assert "6 of 6 runs are stored" in command("study", "--dry-run").output
 
 
-def test_study_trains_a_part_of_itself(command, small):
+def test_study_trains_a_part_of_itself(command, small, trains_here):
     asked = command("study", "--part", "N = 5", "--workers", "1")
     assert asked.exit_code == 0, asked.output
     assert {STUDY[e] for e in STUDY if summaries.is_stored(e)} == {"N = 5"}
@@ -150,7 +151,9 @@ def test_study_refuses_what_it_cannot_do_in_one_sentence(command, small, words, 
     assert f"Error: {sentence}" in refused.output
 
 
-def test_a_run_that_fails_is_told_and_the_others_are_kept(command, trained, monkeypatch):
+def test_a_run_that_fails_is_told_and_the_others_are_kept(
+    command, trained, trains_here, monkeypatch
+):
     (path,) = [summaries.path_of(e) for e in STUDY if e.learner == "ES" and e.seed == 1]
     path.unlink()
 
@@ -158,7 +161,6 @@ def test_a_run_that_fails_is_told_and_the_others_are_kept(command, trained, monk
         raise ArithmeticError("a mistake")
 
     monkeypatch.setattr(summaries, "run", fail)
-    monkeypatch.setattr(executor, "processes", lambda *_: ThreadPoolExecutor(1))
     told = command("study")
     assert told.exit_code == 1
     assert "1 of 6 runs failed" in told.output
@@ -181,6 +183,7 @@ def test_the_table_of_episodes_tells_every_run_from_every_other(command, trained
         np.testing.assert_allclose(mine.cost, one.episodes["cost"], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_table_of_the_whole_study_takes_100_megabytes_at_most(command, trained, tmp_path):
     """Every number as noisy as can be, in runs of full length."""
     rng, shape = np.random.default_rng(0), (paper.EPISODES,)
@@ -230,7 +233,7 @@ def test_verify_names_what_contradicts_and_fails(command, trained, tmp_path):
     assert "ES" in verified.output
 
 
-def test_verify_trains_a_sample_where_nothing_was_trained(command, trained, tmp_path):
+def test_verify_trains_a_sample_where_nothing_was_trained(command, trained, trains_here):
     command("study", "--publish")
     for experiment in STUDY:
         summaries.path_of(experiment).unlink()

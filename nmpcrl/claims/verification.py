@@ -73,6 +73,8 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
             f" {layout}, decay per {decay}, seed {seed}: {what} is {now!r} and was {then}; if that"
             " is meant, raise the epoch of the room in nmpcrl/study/provenance.py"
         )
+    for experiment, made in fresh.items():  # what the next edit is held against
+        made.save(summaries.path_of(experiment))
     return Relocked(provenance.relock(), len(exact), len(drawn) - len(exact))
 
 

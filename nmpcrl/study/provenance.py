@@ -17,6 +17,7 @@ either the epoch of its room is raised, so that all runs are trained anew, or
 import ast
 import hashlib
 import json
+import os
 import platform
 import sys
 from collections import Counter
@@ -68,6 +69,7 @@ ORIGINAL: dict[str, Any] = {
     "evaluate_every": 10,
 }
 
+WARNED = "NMPCRL_WARNED"  # set in the environment once the warning has been given
 ROOT = Path(__file__).parent.parent
 LOCK = Path(__file__).with_name("sources.lock.json")
 WHOLE_ROOMS = ("control", "learning")  # every file of which counts
@@ -194,9 +196,15 @@ def relock() -> Path:
 
 @cache
 def warn_of_changes() -> None:
-    """Say once, on standard error, that stored runs may be of other code than this."""
+    """Say once, on standard error, that stored runs may be of other code than this.
+
+    Processes that are started after that keep quiet: a chapter that the driver executes, a worker.
+    """
+    if os.environ.get(WARNED):
+        return
     files = changed(sources(), locked())
     if files:
+        os.environ[WARNED] = "1"
         print(
             f"{', '.join(files)}: not the code that stored runs were made with;"
             " `nmpcrl verify --relock` shows whether their numbers hold; if not, raise the epoch of"

@@ -1,6 +1,5 @@
 """The search: it finds a known best, keeps to its budget, and is made once."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,7 +9,7 @@ import pytest
 from nmpcrl.analysis import policy_search
 from nmpcrl.analysis.policy_search import LEAST, SCALE, Found, Search, search_all
 from nmpcrl.learning.rollout import Persistent, evaluate
-from nmpcrl.study import ParameterError, executor, paper
+from nmpcrl.study import ParameterError, paper
 
 BEST = np.array([0.5, 1.5, 0.1, 0.02, 0.08, 2.0, 0.3, 0.15, 0.3])  # of the bowl below
 FOUND = Found(paper.THETA_INIT, 40, (1, 7), (100.0, 80.0))
@@ -36,7 +35,7 @@ def bowl(monkeypatch):
 
 
 @pytest.fixture
-def searched(monkeypatch):
+def searched(monkeypatch, trains_here):
     """The searches that are made from here on, in this process; all find the same."""
     made = []
 
@@ -45,7 +44,6 @@ def searched(monkeypatch):
         return FOUND
 
     monkeypatch.setattr(policy_search, "search", note)
-    monkeypatch.setattr(executor, "processes", lambda *_: ThreadPoolExecutor(1))
     return made
 
 
@@ -104,6 +102,7 @@ def test_where_all_rollouts_fail_theta_init_is_what_was_found(monkeypatch):
     assert (found.rollouts, found.best) == ((1,), (np.inf,))
 
 
+@pytest.mark.slow
 def test_a_search_in_processes_costs_what_a_rollout_with_its_theta_costs():
     wanted = Search("D", budget=LEAST)
     found = search_all([wanted], workers=1, progress=False)[wanted]

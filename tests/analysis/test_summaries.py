@@ -111,6 +111,7 @@ def assert_same_summary(one: RunSummary, other: RunSummary):
             np.testing.assert_array_equal(columns[name], others[name])
 
 
+@pytest.mark.slow
 def test_what_is_fetched_is_the_summary_of_the_run():
     experiments = sweep(learner=("RDES", "GES"), episodes=2, steps=65)
     study = fetch_summaries(experiments, workers=2, progress=False)
@@ -234,6 +235,7 @@ def test_nothing_to_do_needs_nobody(capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_a_killed_worker_is_replaced_and_what_had_ended_is_not_done_again(workers):
     log = workers(killed=(3,))
     study = fetch_summaries(SIX, workers=1, progress=False)
@@ -242,6 +244,7 @@ def test_a_killed_worker_is_replaced_and_what_had_ended_is_not_done_again(worker
     assert times(log, "ended") == [0, 1, 2, 3, 4, 5]
 
 
+@pytest.mark.slow
 def test_a_run_that_always_kills_its_worker_is_a_failure_like_any_other(workers, folder):
     log = workers(killed=(1,), always=True)
     with pytest.raises(Failed, match="1 of 3 runs failed"):
@@ -333,6 +336,7 @@ def interrupted(tmp_path):
     program.communicate()
 
 
+@pytest.mark.slow
 def test_an_interrupted_study_goes_on_where_it_was(workers, folder, request):
     log = workers(pause=2)
     program = request.getfixturevalue("interrupted")
@@ -352,6 +356,7 @@ def test_an_interrupted_study_goes_on_where_it_was(workers, folder, request):
     assert {path: path.stat().st_mtime_ns for path in stored} == stored
 
 
+@pytest.mark.slow
 def test_a_process_that_starts_while_a_study_is_interrupted_is_ended_too(monkeypatch):
     starting, process = threading.Event(), executor._process
 

@@ -76,6 +76,7 @@ def test_the_semi_gradient_turns_where_the_share_of_the_first_state_passes_its_b
     assert expected_matrix(Chain(share=bound + 0.01), rule)[0, 0] > 1
 
 
+@pytest.mark.slow
 @given(gamma=discounts, share=shares, theta=numbers)
 def test_w_moves_to_its_fixed_point_while_theta_is_held(gamma, share, theta):
     chain = Chain(gamma, share)

@@ -7,6 +7,7 @@ import pytest
 from nmpcrl.bench import fresh_process, processes
 
 
+@pytest.mark.slow
 def test_a_whole_run_reports_every_episode():
     totals, progress = processes.whole_runs(("frozen",), episodes=3)
     assert totals["learner"] == ["frozen"]
@@ -17,6 +18,7 @@ def test_a_whole_run_reports_every_episode():
     assert min(progress["memory"]) > 10_000_000
 
 
+@pytest.mark.slow
 def test_runs_at_once_leave_neither_files_nor_environment(tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
     before = dict(os.environ)
@@ -31,6 +33,7 @@ def test_no_runs_at_once_are_no_rows():
     assert not any(processes.at_once(runs=0, episodes=1).values())
 
 
+@pytest.mark.slow
 def test_a_first_call_with_machine_code_kept_says_nothing():
     fresh_process.first_call()  # keeps it
     measured = processes.first_calls(1, compile_too=False)
@@ -39,6 +42,7 @@ def test_a_first_call_with_machine_code_kept_says_nothing():
     assert measured["process"][0] > measured["solve"][0] > 0
 
 
+@pytest.mark.slow
 def test_a_measurement_that_fails_says_which_and_why():
     with pytest.raises(RuntimeError, match=r"measuring run SARSA 1 failed(.|\n)*SARSA"):
         processes._alone("run", "SARSA", "1")

@@ -141,6 +141,7 @@ def test_every_size_has_as_many_warm_solves():
     assert (counts == 2).all()
 
 
+@pytest.mark.slow
 def test_learners_are_timed_with_every_solver_and_what_is_missing_is_none():
     columns = learners.learners(steps=2)
     assert len(columns["solver"]) == 3 * 4

@@ -122,6 +122,7 @@ def run(place: Path, *arguments: str) -> subprocess.CompletedProcess:
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
 
 
+@pytest.mark.book
 def test_a_whole_build_ends_with_the_path_of_the_book(small):
     result = run(small)
     assert result.returncode == 0, result.stderr
@@ -131,6 +132,7 @@ def test_a_whole_build_ends_with_the_path_of_the_book(small):
     assert (small / "_build/executed/one.ipynb").exists()
 
 
+@pytest.mark.book
 def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(small):
     assert run(small, "--smoke").returncode == 0
     assert not (small / "_build/html").exists()
@@ -140,6 +142,7 @@ def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(
     assert executed.cells[-1].outputs[0].text == f"{build.SMOKE['episodes']}\n"
 
 
+@pytest.mark.book
 def test_one_chapter_is_built_apart_with_the_given_parameters(small):
     result = run(small, "--chapter", "one", "-p", "episodes", "7")
     assert result.stdout.splitlines()[-1] == "_build/chapter/one/html/book/one.html"
@@ -149,6 +152,7 @@ def test_one_chapter_is_built_apart_with_the_given_parameters(small):
     )
 
 
+@pytest.mark.book
 def test_a_cell_that_fails_is_named_and_no_older_book_survives(small):
     (small / "_build/html").mkdir(parents=True)
     write(small, "1 / 0")
@@ -160,6 +164,7 @@ def test_a_cell_that_fails_is_named_and_no_older_book_survives(small):
     assert not (small / "_build/html").exists()
 
 
+@pytest.mark.book
 def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(small):
     (small / "_build/html").mkdir(parents=True)
     (small / "book/intro.md").write_text("# A small book\n\nSee {ref}`ch:two`.\n")

@@ -11,6 +11,8 @@ import build
 import pytest
 from bs4 import BeautifulSoup
 
+pytestmark = pytest.mark.book
+
 PAGES = build.pages()
 LOADED = {  # what a browser fetches by itself
     "script": "src",

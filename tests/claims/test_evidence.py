@@ -15,7 +15,7 @@ ASKED = {"learners": ["ES"], "layouts": ["A"], "seeds": [0], "episodes": 2}
 
 
 @pytest.fixture(autouse=True)
-def places(tmp_path, monkeypatch):
+def places(tmp_path, monkeypatch, trains_here):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
     monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "published"))
     published._load.cache_clear()

@@ -603,6 +603,7 @@ def test_a_claim_about_learners_that_a_variant_does_not_change_cannot_change():
     assert set(variant_changes(runs, paths(runs)).claim) == {"C2", "C5", "C7", "C9"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(RUNS_DECIDE | set(own_claims.OWN_CLAIMS)))
 def test_those_whom_a_claim_asks_decide_it(name):
     runs = study(lambda e: BAD if e.learner in ("DES", "ES", "matched", "QL") else {})

@@ -95,6 +95,8 @@ def test_the_lock_is_written_where_no_bit_has_changed(known, lock, edited):
     done = relock(known, 4)
     assert (done.published, done.stored) == (0, 4)
     assert json.loads(lock.read_text())["sources"] == {"learning/updates.py": "edited"}
+    for experiment in sample(known, 4):  # the next edit is held against these
+        assert summaries.load(experiment).facts["sources"] == "edited"
 
 
 def test_a_changed_bit_leaves_the_lock_and_is_named(known, lock, edited):

@@ -10,6 +10,11 @@ from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import MAIN, frozen_arm
 
 
+@pytest.fixture(scope="module")
+def main_table() -> set[Experiment]:
+    return set(design.main_table())
+
+
 def differing(one: Experiment, other: Experiment) -> set[str]:
     first, second = asdict(one), asdict(other)
     return {name for name in first if first[name] != second[name]}
@@ -53,13 +58,13 @@ def base_of(experiment: Experiment, name: str) -> Experiment:
 
 
 @pytest.mark.parametrize("name", design.VARIANTS)
-def test_a_variant_changes_one_thing(name):
+def test_a_variant_changes_one_thing(name, main_table):
     variant = design.VARIANTS[name]
     for experiment in design.variant(name):
         if experiment.learner != "frozen":
             base = base_of(experiment, name)
             assert differing(experiment, base) == set(variant.fields) - {"decay"}
-            assert base in set(design.main_table())
+            assert base in main_table
 
 
 def test_variants_name_departures_that_there_are_and_no_two_are_the_same():

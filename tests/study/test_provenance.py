@@ -12,6 +12,12 @@ from nmpcrl.study.provenance import ORIGINAL, changed, identity, key, sources, s
 from nmpcrl.study.setup import LEARNERS
 
 
+@pytest.fixture(scope="module")
+def unedited() -> dict[str, str]:
+    """The sources as they are."""
+    return sources()
+
+
 @pytest.fixture
 def edited(tmp_path):
     """The sources of a copy of the package after an edit, as `sources` has them."""
@@ -61,8 +67,8 @@ NO_NUMBERS = [
 
 
 @pytest.mark.parametrize(("place", "before", "after"), NUMBERS)
-def test_an_edit_of_what_bears_on_numbers_is_noticed(edited, place, before, after):
-    assert changed(edited(place, before, after), sources()) == [place]
+def test_an_edit_of_what_bears_on_numbers_is_noticed(edited, unedited, place, before, after):
+    assert changed(edited(place, before, after), unedited) == [place]
 
 
 @pytest.mark.parametrize(
@@ -70,24 +76,24 @@ def test_an_edit_of_what_bears_on_numbers_is_noticed(edited, place, before, afte
     [row for row in NUMBERS if row[0].startswith(provenance.WHOLE_ROOMS)],
 )
 def test_such_an_edit_is_noticed_in_a_file_that_was_moved_into_a_subfolder(
-    edited, place, before, after
+    edited, unedited, place, before, after
 ):
     room, _, name = place.partition("/")
     moved_to = f"{room}/below/{name.rpartition('/')[2]}"
-    assert changed(edited(place, before, after, moved_to=moved_to), sources()) == sorted(
+    assert changed(edited(place, before, after, moved_to=moved_to), unedited) == sorted(
         [place, moved_to]
     )
 
 
 @pytest.mark.parametrize(("place", "before", "after"), NO_NUMBERS)
-def test_an_edit_of_what_bears_on_no_number_is_not(edited, place, before, after):
-    assert changed(edited(place, before, after), sources()) == []
+def test_an_edit_of_what_bears_on_no_number_is_not(edited, unedited, place, before, after):
+    assert changed(edited(place, before, after), unedited) == []
 
 
-def test_a_moved_and_a_renamed_file_change_nothing(edited):
+def test_a_moved_and_a_renamed_file_change_nothing(edited, unedited):
     now = edited("learning/updates.py", moved_to="learning/below/rules.py")
     assert "learning/below/rules.py" in now
-    assert changed(now, sources()) == []
+    assert changed(now, unedited) == []
 
 
 def test_the_code_is_what_the_lock_has():
@@ -99,6 +105,8 @@ def test_the_code_is_what_the_lock_has():
 def test_who_reads_stored_runs_is_warned_of_other_code(monkeypatch, capsys):
     lock = {**sources(), "learning/updates.py": "another"}
     monkeypatch.setattr(provenance, "locked", lambda: lock)
+    monkeypatch.setenv(provenance.WARNED, "")
+    provenance.warn_of_changes.__wrapped__()
     provenance.warn_of_changes.__wrapped__()
     said = capsys.readouterr().err
     assert said.startswith("learning/updates.py: not the code that stored runs were made with")

@@ -117,6 +117,7 @@ def test_a_file_cut_short_is_damaged(path, share):
             read(path)
 
 
+@pytest.mark.slow
 @settings(
     derandomize=True,
     deadline=None,

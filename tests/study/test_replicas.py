@@ -46,6 +46,7 @@ def test_separation_is_the_largest_difference_over_the_episodes_that_both_reache
     np.testing.assert_array_equal(separation(one, other), [0, 0.5])
 
 
+@pytest.mark.slow
 def test_a_run_learns_the_same_with_our_solver_as_with_ipopt():
     """Until rounding separates them; two episodes of a learner that settles are far from it."""
     one, other = (summarise(run(e)) for e in replicas.solver_pair(Experiment(episodes=2)))

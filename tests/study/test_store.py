@@ -140,6 +140,7 @@ fetch(Experiment(learner="frozen", episodes=1, steps=3))
 """
 
 
+@pytest.mark.slow
 def test_a_run_killed_while_it_is_written_leaves_no_half_file(runs, capsys):
     killed = subprocess.run([sys.executable, "-c", KILLED], check=False, timeout=120)
     assert killed.returncode == -signal.SIGKILL
@@ -150,6 +151,7 @@ def test_a_run_killed_while_it_is_written_leaves_no_half_file(runs, capsys):
     assert list(stored()) == [path_of(QUICK)]
 
 
+@pytest.mark.slow
 def test_runs_train_in_processes_and_come_out_as_in_this_one():
     experiments = sweep(learner=("RDES", "GES"), episodes=2, steps=65)
     study = fetch_all(experiments, workers=2, progress=False)
@@ -212,6 +214,7 @@ def kill_workers_once_stored(runs: Path, killed: list[int]) -> None:
             killed.append(child.pid)
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_only_the_run_it_was_at(runs):
     short = Experiment(learner="frozen", episodes=1, steps=3)
     long = Experiment(learner="ES", episodes=8, steps=100, evaluate_every=8)
@@ -226,6 +229,7 @@ def test_a_killed_worker_costs_only_the_run_it_was_at(runs):
     assert set(runs.glob("*.npz")) == {path_of(short), path_of(long)}
 
 
+@pytest.mark.slow
 def test_workers_that_are_killed_again_and_again_are_given_up(monkeypatch):
     monkeypatch.setattr(store, "_fetch_quietly", kill_oneself)
     with pytest.raises(Killed, match=f"killed {ATTEMPTS} times"):

@@ -1,6 +1,7 @@
 """Machine code is compiled once, found again, and compiled again when something happened to it."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,16 @@ SCRIPT = f"""
 from nmpcrl.control.codegen.jit import load
 print(load("tiny", {{"__init__": {TEXT!r}}}, "Compiling ...").double(4.0))
 """
+TURNS = f"""
+import os, sys
+from nmpcrl.control.codegen.jit import load
+for cache in sys.argv[1:]:
+    os.environ["NMPCRL_CACHE"] = cache
+    package = load("tiny", {{"__init__": {TEXT!r}}}, "Compiling ...")
+    print(package.double(4.0))
+    print(cache, file=sys.stderr)
+    del sys.modules[package.__name__]
+"""
 SOLVE = """
 import numpy as np
 from nmpcrl.study import paper
@@ -37,49 +48,85 @@ def said(cache: Path | None, script: str = SCRIPT, answer: str = "8.0") -> list[
     return ended.stderr.splitlines()
 
 
-@pytest.fixture
-def full(tmp_path) -> Path:
-    """A cache in which the code is already."""
-    first = said(tmp_path)
+def said_in_turn(caches: list[Path]) -> list[list[str]]:
+    """What one process prints that looks for the code in one cache after the other."""
+    command = [sys.executable, "-c", TURNS, *map(str, caches)]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.split() == ["8.0"] * len(caches)
+    found: list[list[str]] = [[]]
+    for line in ended.stderr.splitlines():
+        if line == str(caches[len(found) - 1]):
+            found.append([])
+        else:
+            found[-1].append(line)
+    return found[:-1]
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory) -> Path:
+    """A cache that a process found empty."""
+    cache = tmp_path_factory.mktemp("cache")
+    first = said(cache)
     assert len(first) == 1
     assert first[0].startswith("Compiling ... done in ")
-    return tmp_path
+    return cache
 
 
+@pytest.fixture
+def full(filled, tmp_path) -> Path:
+    """A cache of this test's own in which the code is already."""
+    return shutil.copytree(filled, tmp_path / "cache")
+
+
+@pytest.mark.slow
 def test_a_second_process_does_not_compile(full):
     assert said(full) == []
 
 
+@pytest.mark.slow
 def test_a_process_finds_the_solver_that_another_compiled(controllers):
     controllers["riccati"].solve([-2.5, 1.5, 0.0], [1, 1, 0.05, 0.05, 0.05, 1, 1, 0.1, 0.001])
     assert said(None, SOLVE, "1037") == []
 
 
-@pytest.mark.parametrize(
-    ("pattern", "damage"),
-    [
-        ("*.nbi", "emptied"),
-        ("*.nbi", "cut"),
-        ("*.nbc", "emptied"),
-        ("*.nbc", "cut"),
-        ("*.nbc", "garbled"),
-        ("__init__.py", "emptied"),
-        ("__init__.py", "garbled"),
-    ],
-)
-def test_a_damaged_file_is_noticed_and_compiled_again(full, pattern, damage):
-    (file,) = full.rglob(pattern)
-    content = file.read_bytes()
-    changed = {"emptied": b"", "cut": content[: len(content) // 2], "garbled": b"= " + content}
-    file.write_bytes(changed[damage])
-    lines = said(full)
+DAMAGES = [
+    ("*.nbi", "emptied"),
+    ("*.nbi", "cut"),
+    ("*.nbc", "emptied"),
+    ("*.nbc", "cut"),
+    ("*.nbc", "garbled"),
+    ("__init__.py", "emptied"),
+    ("__init__.py", "garbled"),
+]
+
+
+@pytest.fixture(scope="module")
+def after_damage(filled, tmp_path_factory) -> dict[tuple[str, str], list[list[str]]]:
+    """By damage: what the next process prints, and the one after it."""
+    folder, caches = tmp_path_factory.mktemp("damaged"), []
+    for number, (pattern, damage) in enumerate(DAMAGES):
+        caches.append(shutil.copytree(filled, folder / str(number)))
+        (file,) = caches[-1].rglob(pattern)
+        content = file.read_bytes()
+        changed = {"emptied": b"", "cut": content[: len(content) // 2], "garbled": b"= " + content}
+        file.write_bytes(changed[damage])
+    first, second = said_in_turn(caches), said_in_turn(caches)
+    return dict(zip(DAMAGES, map(list, zip(first, second, strict=True)), strict=True))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("pattern", "damage"), DAMAGES)
+def test_a_damaged_file_is_noticed_and_compiled_again(after_damage, pattern, damage):
+    lines, later = after_damage[pattern, damage]
     assert len(lines) == 2
     assert "is damaged" in lines[0]
     assert lines[0].endswith("and is compiled again")
     assert lines[1].startswith("Compiling ... done in ")
-    assert said(full) == []
+    assert later == []
 
 
+@pytest.mark.slow
 def test_an_interrupted_compilation_is_repeated(full):
     (complete,) = full.rglob(jit.COMPLETE)
     complete.unlink()
@@ -98,6 +145,7 @@ def test_an_interruption_leaves_nothing_that_counts_as_complete(tmp_path, monkey
     assert not [name for name in sys.modules if name.startswith("stopped_")]
 
 
+@pytest.mark.slow
 def test_where_nothing_can_be_written_the_code_is_compiled_for_now(tmp_path):
     (tmp_path / "file").touch()
     lines = said(tmp_path / "file" / "cache")
@@ -106,6 +154,7 @@ def test_where_nothing_can_be_written_the_code_is_compiled_for_now(tmp_path):
     assert lines[0].endswith("compiling for now only")
 
 
+@pytest.mark.slow
 def test_two_processes_at_once_do_not_disturb_each_other(tmp_path):
     command, chosen = [sys.executable, "-c", SCRIPT], {"NMPCRL_CACHE": str(tmp_path)}
     started = [

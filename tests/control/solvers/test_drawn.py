@@ -279,6 +279,7 @@ def mass(point_mass) -> Plant:
     return point_mass(bound=2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "layouts", "failures"), [("robot", 44, 8), ("mass", 12, 3)])
 def test_of_thousands_of_problems_nearly_all_are_solved_and_none_wrongly(
     name, layouts, failures, mass
@@ -301,6 +302,7 @@ def test_of_thousands_of_problems_nearly_all_are_solved_and_none_wrongly(
     assert ended["restarted"] <= 12
 
 
+@pytest.mark.slow
 def test_values_are_ipopts_or_those_of_another_minimum():
     """Compared with a problem that tolerates the box being left; at most 3 % are worse."""
     compared, elsewhere, worse = 0, 0, 0
@@ -327,6 +329,7 @@ def test_values_are_ipopts_or_those_of_another_minimum():
     assert worse <= 0.03 * compared
 
 
+@pytest.mark.slow
 def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
     same = 0
     for state, theta in draw(100, seed=40):
@@ -342,6 +345,7 @@ def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
     assert same >= 92
 
 
+@pytest.mark.slow
 def test_from_the_same_warm_start_no_more_than_one_in_two_hundred_is_worse_than_ipopts():
     """After a step, after a noisy one, and after a change of theta."""
     compared, worse = 0, 0
@@ -376,6 +380,7 @@ def test_from_the_same_warm_start_no_more_than_one_in_two_hundred_is_worse_than_
     assert worse <= 0.005 * compared
 
 
+@pytest.mark.slow
 def test_features_are_the_differences_of_the_value_away_from_kinks():
     """Along drawn directions; a solve that falls into another minimum shows in the curvature."""
     compared, jumped, step = 0, 0, 1e-4
@@ -425,6 +430,7 @@ typical = st.builds(
 LAYOUTS = [controller(np.random.default_rng([5, layout])) for layout in range(30)]
 
 
+@pytest.mark.slow
 @settings(derandomize=True, deadline=None, max_examples=400)
 @given(problem=problems | typical, nmpc=st.sampled_from(LAYOUTS))
 def test_whatever_is_asked_the_answer_is_a_solution_or_an_error(problem, nmpc):

@@ -16,6 +16,7 @@ OMEGA = 100.0
 CASADI_SOLVERS = ("fatrop", "ipopt")
 
 
+@pytest.mark.slow
 def test_fatrop_and_ipopt_find_the_same_value_on_a_hundred_problems(controllers, draw):
     """Or another local minimum, as in 3 % of all problems; fatrop gives up on 0.1 %."""
     others, failed = 0, 0
@@ -254,6 +255,7 @@ for exponent in np.arange(1.0, 6.5, 0.25):
 """
 
 
+@pytest.mark.slow
 def test_from_however_far_outside_the_box_a_solve_ends(solver):
     """In a process of its own: a solver that never returns cannot be interrupted from Python."""
     command = [sys.executable, "-c", ENDLESS, solver]
