@@ -118,7 +118,7 @@ class Records:
     def about(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         """The experiment's fields and the facts, without reading the tables."""
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with path.open("rb") as whole, np.load(whole, allow_pickle=False) as file:
                 about = json.loads(str(file["about"]))
             return about["experiment"], about["facts"]
         except Exception as error:
@@ -144,7 +144,7 @@ def load_arrays(path: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], Tab
         DamagedRecords: it cannot be read whole.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as whole, np.load(whole, allow_pickle=False) as file:
             about = json.loads(str(file["about"]))
             tables: Tables = {name: {} for name in names}
             for key in file.files:
