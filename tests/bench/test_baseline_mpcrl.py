@@ -9,7 +9,10 @@ pytest.importorskip("mpcrl")
 
 from nmpcrl.bench import baseline_mpcrl
 
-pytestmark = pytest.mark.filterwarnings("ignore::FutureWarning")
+# csnlp, which mpcrl rests on, calls NumPy's functions on CasADi's values.
+pytestmark = pytest.mark.filterwarnings(
+    r"ignore:\s*casadi. a numpy function was called on a casadi value:FutureWarning"
+)
 
 THETA = np.array(paper.THETA_INIT)
 INSIDE = np.array([-0.5, 1.5, 0.0])  # the rim of an obstacle, where the slacks are at work
