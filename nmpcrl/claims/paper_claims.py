@@ -36,7 +36,7 @@ from nmpcrl.claims.timing import TimeClaim
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.layouts import ARRIVED
-from nmpcrl.study.records import Column, Records
+from nmpcrl.study.records import Column, Records, Stopped
 from nmpcrl.study.store import Runs
 
 # A run diverged if it had to be stopped, or if its training cost over the last 20 episodes has a
@@ -76,7 +76,7 @@ UP_TO = 60  # borders at which a claim is decided once more
 
 def was_stopped(runs: pd.DataFrame) -> pd.Series:
     """Whether training had to be stopped; False for a run that is missing."""
-    return runs.stopped.notna() & (runs.stopped != "finished")
+    return runs.stopped.notna() & (runs.stopped != Stopped.FINISHED)
 
 
 def training_cost_ratio(runs: pd.DataFrame) -> pd.Series:

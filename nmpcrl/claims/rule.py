@@ -32,7 +32,7 @@ import pandas as pd
 from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.records import Column
+from nmpcrl.study.records import Column, Stopped
 
 MAJORITY = 0.5
 NEARLY_ALL = 0.9
@@ -226,7 +226,9 @@ def _arm(runs: pd.DataFrame, learner: str) -> pd.DataFrame:
         raise ValueError(
             f"{learner} has several runs in {cell}: judge the runs of one setting at a time"
         )
-    return whole.assign(final_cost=whole.final_cost.where(whole.stopped == "finished", np.inf))
+    return whole.assign(
+        final_cost=whole.final_cost.where(whole.stopped == Stopped.FINISHED, np.inf)
+    )
 
 
 def scope(answers: pd.Series) -> str:

@@ -14,6 +14,7 @@ from nmpcrl.control.codegen import jit
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, ParameterError, paper, paper_runs, run, sweep
 from nmpcrl.study.experiment import PAPER
+from nmpcrl.study.records import StepStatus
 from nmpcrl.study.setup import DECAYS, LEARNERS, prepare
 
 RUN = import_module("nmpcrl.study.run")  # the module; its name in the package is the function
@@ -231,7 +232,7 @@ def test_every_step_has_a_row_and_every_column_every_row(runs, learner):
     np.testing.assert_array_equal(steps["time"], np.tile(np.arange(70), 2))
     assert {len(column) for column in steps.values()} == {140}
     assert runs[learner].facts["stopped"] == "finished"
-    assert (steps["status"] == 0).all()
+    assert (steps["status"] == StepStatus.SOLVED).all()
 
 
 @pytest.mark.parametrize(
@@ -359,7 +360,7 @@ def test_failures_and_restarts_are_recorded(monkeypatch):
     np.testing.assert_array_equal(s["episode"], [0] * 4 + [1] * 6)
     np.testing.assert_array_equal(s["status"], [0, 1, 0, 2] + [0] * 6)
     np.testing.assert_array_equal(s["restarts"], [0, 1, 0, 0] + [0] * 6)
-    np.testing.assert_array_equal(np.isnan(s["violation"]), s["status"] == 2)
+    np.testing.assert_array_equal(np.isnan(s["violation"]), s["status"] == StepStatus.FAILED)
     assert np.isnan(s["features"][3]).all()
     assert np.isnan(s["cost"][3])
     assert np.isnan(s["action"][3]).all()

@@ -39,7 +39,7 @@ from nmpcrl.report.figures.style import (
     subplots,
 )
 from nmpcrl.study.experiment import PAPER, Experiment
-from nmpcrl.study.records import Column, Records
+from nmpcrl.study.records import Column, Records, Stopped
 
 LINE = 80  # characters of a title
 SOLVERS = {"riccati": "riccati", "fatrop": "fatrop", "ipopt": "Ipopt"}
@@ -286,7 +286,7 @@ def _final_costs(found: Evidence, learner: str) -> tuple[Vector, list[str]]:
     A run that had to be stopped left no policy, so that its cost is infinite.
     """
     runs = part(found, (learner,)).runs
-    cost = runs.final_cost.where(runs.stopped == "finished", np.inf) / runs.initial_cost
+    cost = runs.final_cost.where(runs.stopped == Stopped.FINISHED, np.inf) / runs.initial_cost
     return cost.to_numpy(float), runs.layout.tolist()
 
 

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.metrics import by_episode, noise_free_cost, training_cost
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.style import (
     DECAY_TITLES,
     INK,
@@ -72,11 +73,11 @@ def overshoot(runs: Runs[Records]) -> Figure:
             label=DECAY_TITLES[experiment.decay] if first else None,
         )
         worst = max(worst, np.nanmax(largest))
-    axes.axhline(2, color=INK, ls=":", lw=1)
+    axes.axhline(OVERSHOOT, color=INK, ls=":", lw=1)
     axes.annotate(
         "above: overshoots", (0, 2), (4, 3), axes.get_yaxis_transform(), textcoords="offset points"
     )
-    side = "passes 2: such a step overshoots" if worst > 2 else "stays below 2"
+    side = "passes 2: such a step overshoots" if worst > OVERSHOOT else "stays below 2"
     axes.set(
         title=f"The largest step of an episode {side}",
         xlabel="episode",

@@ -19,7 +19,7 @@ from nmpcrl.report.figures.panels import bundle, part, sourced
 from nmpcrl.report.figures.style import DECAY_TITLES, LIMIT, LOOKS, SUBTITLE, page, subplots
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
-from nmpcrl.study.records import Column
+from nmpcrl.study.records import Column, Stopped
 from nmpcrl.study.store import Runs
 
 LEARNED = ("RDES", "GES")  # the paper's two methods, whose policies its Figs. 3 and 4 show
@@ -139,14 +139,14 @@ def _learned(drawn: Evidence) -> list[RunSummary]:
 
 def _finished(found: Evidence) -> Evidence:
     """Without the runs that had to be stopped, which left no policy."""
-    return found.where(found.runs.stopped == "finished")
+    return found.where(found.runs.stopped == Stopped.FINISHED)
 
 
 def _endings(summaries: list[RunSummary]) -> str:
     """How many rollouts end in which way, the most common first."""
     ends = Counter(
         ending(one.states, paper.task(one.name.layout))
-        if one.facts["stopped"] == "finished"
+        if one.facts["stopped"] == Stopped.FINISHED
         else "stopped in training"
         for one in summaries
     )

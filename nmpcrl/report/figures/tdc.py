@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, page, subplots
-from nmpcrl.study.records import LAST
+from nmpcrl.study.records import LAST, Stopped
 
 PARTS: dict[
     str, dict[str, Any]
@@ -44,7 +44,7 @@ def step_of_w(runs: Mapping[float, RunSummary]) -> Figure:
         over = np.flatnonzero(size > OVERSHOOT)
         if over.size and not first:
             first = f"With {label}, it passes {OVERSHOOT:g} in episode {over[0] + 1}"
-            lost = " and w is lost" if run.facts["stopped"] != "finished" else ""
+            lost = " and w is lost" if run.facts["stopped"] != Stopped.FINISHED else ""
     axes.axhline(OVERSHOOT, **LIMIT)
     axes.set(xlabel="episode", ylabel=r"largest $\beta\,\|\phi\|^2$", ylim=(0, 1.5 * OVERSHOOT))
     axes.legend(loc="lower right")
