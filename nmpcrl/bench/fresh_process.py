@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import psutil
 
+from nmpcrl.bench.learners import time_learners
 from nmpcrl.study import Experiment, paper, run
 
 
@@ -49,7 +50,18 @@ def first_call() -> dict[str, float]:
     return {"solve": solved - began, "step": time.perf_counter() - solved}
 
 
-MEASURES: dict[str, Callable[..., Any]] = {"run": whole_run, "first": first_call}
+def learning_steps() -> dict[str, list[Any]]:
+    """The columns of `time_learners`; None where there is no number."""
+    table = time_learners().astype(object)
+    columns: dict[str, list[Any]] = table.where(table.notna(), None).to_dict("list")
+    return columns
+
+
+MEASURES: dict[str, Callable[..., Any]] = {
+    "run": whole_run,
+    "first": first_call,
+    "steps": learning_steps,
+}
 
 if __name__ == "__main__":
     name, *arguments = sys.argv[1:]

@@ -18,12 +18,15 @@ so few is too narrow.
 
 One process cannot see what is the same in all of its rounds: where code and data come to lie in
 memory. It moves times by some per cent from one process to the next (Mytkowicz et al. 2009), so
-the interval is widened by `PLACEMENT` = 3 % at both ends.
+the interval is widened by `PLACEMENT` = 3 % at both ends. Several processes do see it, and `pooled`
+takes the interval from how far their ratios are apart.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from nmpcrl import Vector
 
@@ -68,6 +71,18 @@ def paired_ratio(
         float(np.exp(high)) * (1 + PLACEMENT),
         max(0.0, 1 - float(ran)),
     )
+
+
+def pooled(ratios: Sequence[Ratio]) -> Ratio:
+    """The ratio that several processes found: geometric mean, with Student's interval of its log.
+
+    Args:
+        ratios: one a process, two or more.
+    """
+    logs = np.log([one.value for one in ratios])
+    middle, width = logs.mean(), stats.t.ppf((1 + CONFIDENCE) / 2, len(logs) - 1) * stats.sem(logs)
+    value, low, high = np.exp([middle, middle - width, middle + width]).tolist()
+    return Ratio(value, low, high, waited=float(np.mean([one.waited for one in ratios])))
 
 
 def _interval(logs: Vector) -> tuple[float, float]:

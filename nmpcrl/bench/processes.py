@@ -8,8 +8,13 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import astuple
 from typing import Any
 
+import pandas as pd
+
+from nmpcrl.bench.learners import COMPARED
+from nmpcrl.bench.paired import Ratio, pooled
 from nmpcrl.bench.solves import Columns
 from nmpcrl.study.executor import THREADS
 from nmpcrl.study.store import fetch_all
@@ -74,6 +79,25 @@ def first_calls(times: int, *, compile_too: bool) -> Columns:
                 process = time.perf_counter() - began
             _add(columns, cached, *measured.values(), process, "Compiling" in said)
     return columns
+
+
+def time_learners_afresh(processes: int = 7) -> pd.DataFrame:
+    """`time_learners` in so many fresh processes, one after the other, each number their median.
+
+    But for the ratios to ES and their intervals, which are `pooled`: so the interval also covers
+    where code and data come to lie in memory. Seven processes leave Student's interval 2.4 standard
+    errors wide on each side; three times as many would leave 2.1.
+    """
+    tables = [pd.DataFrame(_alone("steps")[0]) for _ in range(processes)]
+    named = ["solver", "learner"]
+    numbers = tables[0].columns.difference(named)
+    whole = pd.concat(tables).astype(dict.fromkeys(numbers, float)).groupby(named, sort=False)
+    rows = []
+    for (solver, learner), group in whole:
+        ratios = [Ratio(*one) for one in group[COMPARED].itertuples(index=False)]
+        row = {"solver": solver, "learner": learner, **group[numbers].median()}
+        rows.append(row | dict(zip(COMPARED, astuple(pooled(ratios)), strict=True)))
+    return pd.DataFrame(rows)[list(tables[0])]
 
 
 def _alone(*arguments: str) -> tuple[dict[str, Any], str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from nmpcrl.analysis import summary
 from nmpcrl.analysis.gradient_td import dropped_curvature
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.bench.learners import time_learners
+from nmpcrl.bench.processes import time_learners_afresh
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import audit
 from nmpcrl.claims.own_claims import judge_own
@@ -34,12 +34,13 @@ def publish_study(
 def publish_timing() -> tuple[Verdict, ...]:
     """Time the learners here, and publish the verdicts that rest on it anew; all else stays.
 
-    Nothing is published unless all of them are decided, since the machine may be busy.
+    They are timed in several fresh processes. Nothing is published unless all verdicts are decided,
+    since the machine may be busy.
 
     Returns:
         The verdicts.
     """
-    observed = Observations(timings=time_learners())
+    observed = Observations(timings=time_learners_afresh())
     judged = tuple(claim.judge(observed) for claim in BY_TIME.values())
     if UNDECIDABLE not in {verdict.outcome for verdict in judged}:
         published.republish(judged)
@@ -58,7 +59,7 @@ def verdicts(
     claimed = judge(
         main,
         paths={e: one.states for e, one in runs.items()},
-        timings=time_learners(),
+        timings=time_learners_afresh(),
         assumptions=audit(study, dropped_curvature(study[AUDITED])),
     )
     return (*claimed, *judge_own(added))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nmpcrl.bench.paired import BLOCK, LEAST, PLACEMENT, paired_ratio
+from nmpcrl.bench.paired import BLOCK, LEAST, PLACEMENT, Ratio, paired_ratio, pooled
 
 ROUNDS = 30 * BLOCK
 
@@ -82,3 +82,21 @@ def test_the_share_of_waiting_is_what_the_two_clocks_disagree_by():
     mine, theirs = drawn(0, 0.5)
     assert paired_ratio(mine, theirs, 4 * mine, 4 * theirs).waited == pytest.approx(0.75)
     assert paired_ratio(mine, theirs, mine / 2, theirs / 2).waited == 0  # threads beside each other
+
+
+def test_processes_that_agree_leave_no_doubt_and_their_mean_is_geometric():
+    same = pooled([Ratio(0.5, 0.4, 0.6, 0.1)] * 3)
+    assert (same.value, same.waited) == pytest.approx((0.5, 0.1))
+    apart = pooled([Ratio(one, np.nan, np.nan, 0.0) for one in (0.5, 2.0)])
+    assert apart.value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("processes", [3, 7, 20])
+def test_the_interval_over_processes_holds_the_ratio_as_often_as_it_says(processes):
+    rng = np.random.default_rng(processes)
+    held = 0
+    for _ in range(400):
+        values = 0.6 * np.exp(rng.normal(0, 0.03, processes))
+        found = pooled([Ratio(value, np.nan, np.nan, 0.0) for value in values])
+        held += found.low <= 0.6 <= found.high
+    assert held / 400 == pytest.approx(0.95, abs=0.04)

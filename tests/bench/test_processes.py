@@ -29,6 +29,24 @@ def test_runs_at_once_leave_neither_files_nor_environment(tmp_path, monkeypatch)
     assert dict(os.environ) == before
 
 
+def test_learners_that_are_timed_afresh_are_pooled_over_the_processes(monkeypatch):
+    found = iter([0.5, 0.6, 0.72])
+
+    def alone(what):
+        numbers = {"ms_per_step": next(found), "ms_per_fit": None}
+        times = {"ratio": numbers["ms_per_step"], "ratio_low": None, "ratio_high": None}
+        columns = {"solver": "ipopt", "learner": "RDES"} | numbers | times | {"waited": 0.1}
+        return {name: [value] for name, value in columns.items()}, ""
+
+    monkeypatch.setattr(processes, "_alone", alone)
+    (row,) = processes.time_learners_afresh(3).to_dict("records")
+    assert row["ms_per_step"] == 0.6
+    assert row["ratio"] == pytest.approx(0.6)
+    assert row["ratio_low"] < 0.5
+    assert row["ratio_high"] > 0.72
+    assert row["ms_per_fit"] != row["ms_per_fit"]
+
+
 def test_no_runs_at_once_are_no_rows():
     assert not any(processes.at_once(runs=0, episodes=1).values())
 

@@ -22,7 +22,7 @@ def timings(width: float) -> pd.DataFrame:
 )
 def test_verdicts_on_time_are_published_if_all_are_decided(monkeypatch, width, outcomes):
     kept = []
-    monkeypatch.setattr(publish, "time_learners", lambda: timings(width))
+    monkeypatch.setattr(publish, "time_learners_afresh", lambda: timings(width))
     monkeypatch.setattr(publish.published, "republish", kept.append)
     judged = publish.publish_timing()
     assert [verdict.claim for verdict in judged] == ["C3", "C4"]
