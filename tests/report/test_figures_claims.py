@@ -100,6 +100,7 @@ def test_every_run_has_its_point(claim, made_up):
     assert len(points(drawn(claim, found).axes[0])) == learners * CELLS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
 def test_the_shares_are_those_of_the_verdict_with_wilson_s_interval(claim, made_up):
     """DES diverges in layout A alone; ES swings, RDES goes aside and saves nothing there too."""
@@ -147,6 +148,7 @@ def test_a_median_between_a_half_that_failed_and_one_that_did_not_is_one_of_them
     assert set(np.round(medians, 9)) <= set(points(axis)[:, 1].round(9))
 
 
+@pytest.mark.slow
 def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
     aside = made_up().summaries[Experiment("RDES")].states.copy()
     aside[2, 1] -= 1.0
@@ -160,6 +162,7 @@ def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
     np.testing.assert_allclose(points(drawn("C5", found).axes[0]), [[1.0, 0.1]] * 8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stopped", [("RDES",), ("GES",), ("RDES", "GES")])
 def test_a_pair_of_which_a_run_was_stopped_is_not_in_the_box(stopped, made_up):
     found = made_up(lambda e: {"reached": 40} if e.learner in stopped else {})
@@ -176,6 +179,7 @@ def test_states_in_an_obstacle_are_counted_by_size(made_up):
     assert len(points(training)) == len(points(judged)) == 4 * 3 * CELLS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
 def test_runs_shorter_than_the_paper_s_can_be_drawn_and_decide_nothing(claim, made_up):
     figure = drawn(claim, made_up(episodes=4, seeds=(0, 1)))
