@@ -93,6 +93,7 @@ def test_the_title_is_the_verdict_and_what_it_rests_on(claim, made_up):
     assert not plt.get_fignums()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", ["C1", "C2", "C6", "C9"])
 def test_every_run_has_its_point(claim, made_up):
     found = made_up(as_the_paper_says)
@@ -127,6 +128,7 @@ def test_the_shares_are_those_of_the_verdict_with_wilson_s_interval(claim, made_
     assert one.by_layout["A"] != one.by_layout["D"]
 
 
+@pytest.mark.slow
 def test_runs_that_were_stopped_are_drawn_beyond_all_others_and_not_dropped(made_up):
     found = made_up(
         lambda e: {"reached": 40} if (e.learner, e.seed) == ("DES", 0) else as_the_paper_says(e)
@@ -188,6 +190,7 @@ def test_runs_shorter_than_the_paper_s_can_be_drawn_and_decide_nothing(claim, ma
     assert not shares(figure.axes[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
 def test_a_claim_whose_learners_were_not_run_can_be_drawn(claim, made_up):
     found = made_up(seeds=(0,))
