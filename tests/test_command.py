@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.study import Experiment, design, paper, sweep
+from nmpcrl.study import Experiment, cluster, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 
 WHOLE = len(design.whole_study())
@@ -145,7 +146,10 @@ def test_the_whole_study_takes_hours(command):
         (("--scheduler", "tcp://nowhere:1"), "no scheduler answers at tcp://nowhere:1"),
     ],
 )
-def test_study_refuses_what_it_cannot_do_in_one_sentence(command, small, words, sentence):
+def test_study_refuses_what_it_cannot_do_in_one_sentence(
+    command, small, monkeypatch, words, sentence
+):
+    monkeypatch.setattr(cluster, "executor", partial(cluster.executor, patience=1))
     refused = command("study", *words)
     assert refused.exit_code == 1
     assert f"Error: {sentence}" in refused.output

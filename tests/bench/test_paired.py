@@ -62,6 +62,7 @@ def test_rounds_that_resemble_their_neighbours_are_worth_fewer():
     assert widths[1] > 2 * widths[0]
 
 
+@pytest.mark.slow
 def test_the_interval_of_95_percent_misses_about_as_often_even_without_the_margin():
     missed = 0
     for seed in range(200):

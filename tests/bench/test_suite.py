@@ -21,6 +21,7 @@ def counted(tmp_path, monkeypatch):
 
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
     monkeypatch.setattr(suite, "_stages", stages)
+    monkeypatch.setattr(suite.psutil, "cpu_percent", lambda _: 25.0)  # it would watch for a second
     return lengths
 
 
@@ -78,6 +79,7 @@ def test_the_file_is_whole_and_alone(counted):
 
 def test_a_benchmark_says_where_and_of_what_it_is(counted):
     about = measured_here("short")["about"]
+    assert about["others"] == 0.25
     assert about["machine"].keys() == {"processor", "architecture", "cores", "system"}
     assert {"python", "casadi", "numpy", "torch", "mpcrl"} <= about["versions"].keys()
 

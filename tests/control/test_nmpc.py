@@ -228,6 +228,7 @@ def test_a_controller_refuses_nonsense_and_says_which(changed, message):
         Nmpc(differential_drive(), paper.task(), **changed)
 
 
+@pytest.mark.slow
 def test_a_smaller_tolerance_buys_exactness_with_iterations(solver, draw):
     """From 1e-2 to 1e-12, both ends of what is allowed; 1e-8 is what is taken when none is said."""
     nmpcs = [paper.nmpc(solver=SOLVERS[solver](tolerance=t)) for t in (1e-2, 1e-5, 1e-8, 1e-12)]

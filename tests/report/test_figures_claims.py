@@ -93,6 +93,7 @@ def test_the_title_is_the_verdict_and_what_it_rests_on(claim, made_up):
     assert not plt.get_fignums()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", ["C1", "C2", "C6", "C9"])
 def test_every_run_has_its_point(claim, made_up):
     found = made_up(as_the_paper_says)
@@ -100,6 +101,7 @@ def test_every_run_has_its_point(claim, made_up):
     assert len(points(drawn(claim, found).axes[0])) == learners * CELLS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
 def test_the_shares_are_those_of_the_verdict_with_wilson_s_interval(claim, made_up):
     """DES diverges in layout A alone; ES swings, RDES goes aside and saves nothing there too."""
@@ -126,6 +128,7 @@ def test_the_shares_are_those_of_the_verdict_with_wilson_s_interval(claim, made_
     assert one.by_layout["A"] != one.by_layout["D"]
 
 
+@pytest.mark.slow
 def test_runs_that_were_stopped_are_drawn_beyond_all_others_and_not_dropped(made_up):
     found = made_up(
         lambda e: {"reached": 40} if (e.learner, e.seed) == ("DES", 0) else as_the_paper_says(e)
@@ -147,6 +150,7 @@ def test_a_median_between_a_half_that_failed_and_one_that_did_not_is_one_of_them
     assert set(np.round(medians, 9)) <= set(points(axis)[:, 1].round(9))
 
 
+@pytest.mark.slow
 def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
     aside = made_up().summaries[Experiment("RDES")].states.copy()
     aside[2, 1] -= 1.0
@@ -160,6 +164,7 @@ def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
     np.testing.assert_allclose(points(drawn("C5", found).axes[0]), [[1.0, 0.1]] * 8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stopped", [("RDES",), ("GES",), ("RDES", "GES")])
 def test_a_pair_of_which_a_run_was_stopped_is_not_in_the_box(stopped, made_up):
     found = made_up(lambda e: {"reached": 40} if e.learner in stopped else {})
@@ -176,6 +181,7 @@ def test_states_in_an_obstacle_are_counted_by_size(made_up):
     assert len(points(training)) == len(points(judged)) == 4 * 3 * CELLS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
 def test_runs_shorter_than_the_paper_s_can_be_drawn_and_decide_nothing(claim, made_up):
     figure = drawn(claim, made_up(episodes=4, seeds=(0, 1)))
@@ -184,6 +190,7 @@ def test_runs_shorter_than_the_paper_s_can_be_drawn_and_decide_nothing(claim, ma
     assert not shares(figure.axes[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
 def test_a_claim_whose_learners_were_not_run_can_be_drawn(claim, made_up):
     found = made_up(seeds=(0,))

@@ -103,6 +103,7 @@ def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
     assert thick(figure.axes[2])[0].get_ydata()[-1] == pytest.approx(0.8)
 
 
+@pytest.mark.slow
 def test_every_layout_has_its_column_headed_by_its_verdict(made_up):
     found = made_up(des_fails)
     (c1, *_) = paper_claims.judge_runs(found.runs, paths(found))
@@ -191,6 +192,7 @@ def test_every_layout_has_its_map(made_up):
 # All of them
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "draw",
     [

@@ -71,6 +71,7 @@ def test_an_edit_of_what_bears_on_numbers_is_noticed(edited, unedited, place, be
     assert changed(edited(place, before, after), unedited) == [place]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "before", "after"),
     [row for row in NUMBERS if row[0].startswith(provenance.WHOLE_ROOMS)],
@@ -85,6 +86,7 @@ def test_such_an_edit_is_noticed_in_a_file_that_was_moved_into_a_subfolder(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("place", "before", "after"), NO_NUMBERS)
 def test_an_edit_of_what_bears_on_no_number_is_not(edited, unedited, place, before, after):
     assert changed(edited(place, before, after), unedited) == []

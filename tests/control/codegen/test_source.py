@@ -61,6 +61,7 @@ def test_an_operation_of_one_number_is_casadis(unary, index):
         same(code([number])[index], casadi(number).full()[index, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", range(len(BINARY)), ids=[NAMES[k] for k in BINARY])
 def test_an_operation_of_two_numbers_is_casadis(binary, index):
     casadi, code = binary

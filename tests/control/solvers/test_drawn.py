@@ -513,6 +513,7 @@ def remembered(case: dict, mass: Plant) -> tuple[Nmpc, Problem]:
     return nmpc, Problem(np.array(case["state"]), np.array(case["theta"]), action)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", HARDEST, ids=lambda case: case["why"])
 def test_the_hardest_problems_stay_solved(case, mass):
     """No worse than when they were recorded: two were minima 4 and 5 % above Ipopt's even then."""

@@ -110,6 +110,7 @@ def beside(count, solver, theta_c=0.1, inward=0.0, angle=1.0, **options):
     return Nmpc(differential_drive(), task, solver=solver, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3])
 @pytest.mark.parametrize("angle", [1.0, 0.3])
 def test_on_a_boundary_the_slack_of_stage_zero_is_not_active(solver, theta, count, angle):
@@ -145,6 +146,7 @@ def test_the_kink_is_where_differences_say_it_is(solver, theta):
     assert (above - here.value) / 1e-4 == pytest.approx(here.features[-1] + OMEGA, abs=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3])
 @pytest.mark.parametrize("angle", [1.0, 0.3])
 def test_with_ties_active_the_other_side_of_the_kink_is_chosen(solver, theta, count, angle):
@@ -268,6 +270,7 @@ def test_from_however_far_outside_the_box_a_solve_ends(solver):
     assert ended.stdout.count("ValueError") > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("giver", SOLVERS)
 @pytest.mark.parametrize("fixed", [False, True])
 def test_a_solution_of_any_solver_is_a_warm_start_for_any_other(

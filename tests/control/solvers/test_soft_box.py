@@ -93,6 +93,7 @@ def drawn(nmpc: Nmpc, count: int, seed: int) -> Iterator[Solution]:
             yield nmpc.solve(state, theta)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("omega", "upper"), [(100.0, 9.0), (100.0, 6.0), (3.0, 6.0)])
 def test_value_and_features_are_those_of_ipopt_with_slacks(omega, upper):
     nmpc, left = soft(omega, upper), 0
