@@ -14,7 +14,7 @@ from nmpcrl.study import paper
 Bench = dict[str, dict[str, Any]]
 
 WORSE = 1e-6  # a value this much above the best, relative to it or to 1, is a worse minimum
-SOLVERS = ("riccati", "fatrop", "ipopt", "ipopt MX", "rebuilt")  # fastest first
+FORMULATIONS = ("riccati", "fatrop", "ipopt", "ipopt MX", "rebuilt")  # fastest first
 PAPER_SOLVE = PAPER_HOURS["ES"] * 3600 / (2 * paper.EPISODES * paper.STEPS)  # [s]
 BESIDE_OBSTACLES = 8  # inequalities of a stage: four bounds of its inputs, four sides of the box
 
@@ -29,8 +29,8 @@ def solvers(bench: Bench) -> pd.DataFrame:
     rows = []
     for loop in LOOPS:
         mine = solves[solves.warm & (solves.loop == loop)]
-        fastest = mine.seconds[mine.solver == SOLVERS[0]].median()
-        for solver in SOLVERS:
+        fastest = mine.seconds[mine.solver == FORMULATIONS[0]].median()
+        for solver in FORMULATIONS:
             one = mine[mine.solver == solver]
             rows.append(
                 {
@@ -180,7 +180,7 @@ class Saving:
 def saving(bench: Bench) -> Saving:
     """C3's curve, from the learners with the fastest solver."""
     table = learners(bench)
-    mine = table[table.solver == SOLVERS[0]].set_index("learner")
+    mine = table[table.solver == FORMULATIONS[0]].set_index("learner")
     return Saving(
         network=float(mine.ms_per_fit["RDES"]),
         rest=float(mine.ms_per_rest["ES"]),

@@ -42,7 +42,7 @@ from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.records import Column, Records, Stopped
 
 LINE = 80  # characters of a title
-SOLVERS = {"riccati": "riccati", "fatrop": "fatrop", "ipopt": "Ipopt"}
+SOLVER_NAMES = {"riccati": "riccati", "fatrop": "fatrop", "ipopt": "Ipopt"}
 LAGS = 30  # steps
 ABOVE: dict[str, Any] = {
     "xycoords": ("data", "axes fraction"),
@@ -82,7 +82,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
             end = _bar(axis, y, per_learner.loc[name], per_learner.loc["ES"])
             text = f" {name} {ratio(timings, solver, name).value:.2f}"
             axis.annotate(text, (end, y), va="center", fontsize="small")
-    axis.set_yticks(range(len(solvers)), [SOLVERS.get(solver, solver) for solver in solvers])
+    axis.set_yticks(range(len(solvers)), [SOLVER_NAMES.get(solver, solver) for solver in solvers])
     axis.invert_yaxis()
     axis.margins(x=0.12)
     axis.set_xlabel("time of a step / time of a step of ES")
@@ -90,10 +90,11 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     handles.append(Rectangle((0, 0), 1, 1, color="0.9"))
     names = [*STEP_PARTS, "as claimed"]
     figure.legend(handles, names, loc="outside lower left", ncols=len(names), fontsize="small")
+    solver = SOLVER_NAMES[paper_claims.SOLVER]
     if paper_claims.SOLVER not in solvers:
-        return _titled(figure, verdict, f"no time was taken with {SOLVERS[paper_claims.SOLVER]}")
+        return _titled(figure, verdict, f"no time was taken with {solver}")
     value = ratio(timings, paper_claims.SOLVER, learner)
-    finding = f"with {SOLVERS[paper_claims.SOLVER]}, a step of {learner} takes {value} of one of ES"
+    finding = f"with {solver}, a step of {learner} takes {value} of one of ES"
     return marked(_titled(figure, verdict, finding), "measured while this page was made")
 
 
