@@ -1,0 +1,101 @@
+"""Prose with numbers, and the library's own source, as Markdown that every notebook shows."""
+
+import ast
+import inspect
+import re
+from importlib.util import find_spec
+from pathlib import Path
+from textwrap import dedent
+from typing import Any
+
+from IPython.display import Markdown, display
+
+import nmpcrl
+
+ROOT = Path(nmpcrl.__file__).parents[1]
+
+# `{name}` or `{name:.2f}`, and neither `\\text{init}` nor `x_{max}` nor `\\frac{a}{b}`.
+PLACEHOLDER = re.compile(r"(?<![\w\\^}\])])\{([^\W\d]\w*)(?::([^{}]*))?\}")
+
+
+def say(template: str, **numbers: Any) -> None:
+    """Display a paragraph of Markdown with its numbers filled in, as `filled` does."""
+    _show(filled(template, **numbers))
+
+
+def filled(template: str, **numbers: Any) -> str:
+    """The template with `{name}` and `{name:.2f}` replaced; the braces of LaTeX stay.
+
+    Raises:
+        NameError: a placeholder has no number, or a number no placeholder.
+    """
+    text = inspect.cleandoc(template)
+    wanted = {found[1] for found in PLACEHOLDER.finditer(text)}
+    if missing := wanted - set(numbers):
+        raise NameError(f"no number is given for {{{min(missing)}}} in: {text}")
+    if unused := set(numbers) - wanted:
+        raise NameError(f"{min(unused)} is given, and there is no {{{min(unused)}}} in: {text}")
+    return PLACEHOLDER.sub(lambda found: format(numbers[found[1]], found[2] or ""), text)
+
+
+def source(shown: Any, title: str = "") -> None:
+    """Display where the library defines `shown`, as `listing` does; with a title it is folded."""
+    text = listing(shown)
+    _show(folded(text, title) if title else text)
+
+
+def listing(shown: Any) -> str:
+    """The file in which a name is defined, and its definition there, in Markdown.
+
+    Args:
+        shown: a function or class, or "module:name" of what has no name of its own: a constant,
+            or a function that only exists compiled.
+
+    Raises:
+        NameError: the module defines no such name.
+    """
+    if isinstance(shown, str):
+        module, _, name = shown.partition(":")
+    else:
+        module, name = shown.__module__, shown.__qualname__
+    spec = find_spec(module)
+    assert spec
+    assert spec.origin
+    text = Path(spec.origin).read_text()
+    lines = text.splitlines()[slice(*_extent(ast.parse(text), name))]
+    path = Path(spec.origin).relative_to(ROOT).as_posix()
+    return f"`{path}`\n\n```python\n{dedent(chr(10).join(lines))}\n```"
+
+
+def folded(text: str, title: str) -> str:
+    """Markdown behind a title that opens it."""
+    return f"<details><summary>{title}</summary>\n\n{text}\n\n</details>"
+
+
+def _extent(tree: ast.AST, name: str) -> tuple[int, int]:
+    """The lines of a definition, decorators included: the first from 0, and the one after it."""
+    outer, _, inner = name.partition(".")
+    for node in ast.iter_child_nodes(tree):
+        if outer not in _defined(node):
+            continue
+        if inner:
+            return _extent(node, inner)
+        assert isinstance(node, ast.stmt)
+        assert node.end_lineno
+        decorators = getattr(node, "decorator_list", [])
+        return min(one.lineno for one in (node, *decorators)) - 1, node.end_lineno
+    raise NameError(f"{name} is not defined there")
+
+
+def _defined(node: ast.AST) -> set[str]:
+    """The names that a statement gives a meaning."""
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return {node.name}
+    if isinstance(node, ast.Assign | ast.AnnAssign):
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+        return {target.id for target in targets if isinstance(target, ast.Name)}
+    return set()
+
+
+def _show(text: str) -> None:
+    display(Markdown(text))  # type: ignore[no-untyped-call]
