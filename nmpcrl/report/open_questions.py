@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from nmpcrl.report.text import listed
+from nmpcrl.report.text import departure_link, listed
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ QUESTIONS = (
     ),
     Question(
         "Which activation, first weights, scaling, buffer and number of fits a step has the"
-        " network, and does $\\vtheta$ wait for the first fit?",
+        " network, and does $\\boldsymbol{\\theta}$ wait for the first fit?",
         ("H", "G"),
     ),
     Question("Does DES differ from RDES in the network's inputs only?", ("I",)),
@@ -55,7 +55,7 @@ def question_list(decides: Mapping[str, Collection[str]], varied: Collection[str
 
 
 def _links(question: Question) -> str:
-    refs = " and ".join(f"{{ref}}`{letter} <departure-{letter}>`" for letter in question.departures)
+    refs = " and ".join(departure_link(letter, letter) for letter in question.departures)
     return f"(departure{'s' if len(question.departures) > 1 else ''} {refs})."
 
 

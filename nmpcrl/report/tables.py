@@ -20,7 +20,7 @@ from nmpcrl.claims.rule import (
     Outcome,
     Verdict,
 )
-from nmpcrl.report.text import SURE, listed
+from nmpcrl.report.text import SURE, departure_link, listed
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 
@@ -134,10 +134,10 @@ def timing_table(timings: pd.DataFrame) -> str:
 
 
 def evidence(verdicts: Iterable[Verdict]) -> str:
-    """One definition a claim, in Markdown: verdict, evidence, and where it would change."""
+    """One item a claim, in Markdown: verdict, evidence, and where it would change."""
     return "\n\n".join(
-        f"{v.claim}: {v.statement}\n"
-        f": [{v.outcome}]{{.{BADGES[v.outcome]}}} {v.evidence}\n\n"
+        f"- **{v.claim}: {v.statement}**\n\n"
+        f"  {_badge(v.outcome, BADGES[v.outcome])} {v.evidence}\n\n"
         f"  *Where it would change.* {_linked(v.would_change)}"
         for v in verdicts
     )
@@ -157,7 +157,7 @@ def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
             f"{_letter(str(letter))}: {listed(map(_weighed, group.variant, group.p))}"
             for letter, group in mine.groupby("departure", sort=False)
         ]
-        outcome = f"[{WORDS[v.outcome]}]{{.{BADGES[v.outcome]}}}{_share(v)}"
+        outcome = f"{_word(v.outcome)}{_share(v)}"
         rows.append(f"| **{v.claim}** {v.statement} | {outcome} | {'<br>'.join(by) or 'nothing'} |")
     return "\n".join(rows)
 
@@ -179,7 +179,7 @@ def departure(letter: str) -> str:
     parts = {"The paper": entry.gap, "Here": entry.reading, "Why": entry.why}
     if entry.variant:
         parts["To run another reading"] = _options(entry.variant.split(", "))
-    return "\n\n".join(f"{name}\n: {text}" for name, text in parts.items())
+    return "\n\n".join(f"**{name}.** {text}" for name, text in parts.items())
 
 
 def _options(names: list[str]) -> str:
@@ -232,7 +232,7 @@ def _share(verdict: Verdict) -> str:
 
 def _letter(letter: str) -> str:
     """A link to a departure; the paper is clear about what has none."""
-    return f"{{ref}}`{letter} <departure-{letter}>`" if letter else "beside the departures"
+    return departure_link(letter, letter) if letter else "beside the departures"
 
 
 def _weighed(variant: str, p: float) -> str:
@@ -245,7 +245,7 @@ def _sentence(text: str) -> str:
 
 def _linked(text: str) -> str:
     """Turn the letter of a departure into a link to its entry."""
-    return re.sub(r"\b(departure) ([A-Z])\b", r"\1 {ref}`\2 <departure-\2>`", text)
+    return re.sub(r"\b(departure ([A-Z]))\b", lambda it: departure_link(it[1], it[2]), text)
 
 
 def _named(name: str, values: tuple[object, ...]) -> str:

@@ -99,7 +99,8 @@ def open_gaps(depends_on: Mapping[str, tuple[str, ...]]) -> str:
     if not depends_on:
         return "Nothing was found on which a verdict depends."
     return "\n".join(
-        f"- {DEPARTURES[letter].gap} It matters to {listed(claims)} ({{ref}}`departure-{letter}`)."
+        f"- {DEPARTURES[letter].gap} It matters to {listed(claims)}"
+        f" ({departure_link(f'departure {letter}', letter)})."
         for letter, claims in depends_on.items()
     )
 
@@ -107,6 +108,11 @@ def open_gaps(depends_on: Mapping[str, tuple[str, ...]]) -> str:
 def own_claims(verdicts: Iterable[Verdict]) -> str:
     """One item a claim of our own: what it says, and whether that holds."""
     return "\n".join(f"- {v.claim}. {v.statement} *{HOLDS[v.outcome]}*" for v in verdicts)
+
+
+def departure_link(words: str, letter: str) -> str:
+    """A link to a departure's entry, in Markdown."""
+    return f"[{words}](departures.ipynb#departure-{letter})"
 
 
 def disagree(outcomes: Iterable[str]) -> bool:

@@ -10,7 +10,7 @@ from nmpcrl.study.departures import DEPARTURES
 
 def item(letter: str, text: str) -> str:
     """The line of the question about a departure."""
-    (line,) = [line for line in text.splitlines() if f"`{letter} <departure-{letter}>`" in line]
+    (line,) = [line for line in text.splitlines() if f"#departure-{letter})" in line]
     return line
 
 
@@ -25,7 +25,7 @@ def test_they_are_numbered_and_linked():
     lines = question_list({}, ()).splitlines()
     assert [int(line.split(".")[0]) for line in lines] == list(range(1, len(QUESTIONS) + 1))
     for line, question in zip(lines, QUESTIONS, strict=True):
-        assert re.findall(r"<departure-([A-Z])>", line) == list(question.departures)
+        assert re.findall(r"#departure-([A-Z])\)", line) == list(question.departures)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Assumption, Verdict
 from nmpcrl.report import tables
+from nmpcrl.report.text import departure_link
 from nmpcrl.study import paper_runs
 from nmpcrl.study.departures import DEPARTURES
 
@@ -91,9 +92,10 @@ def test_what_changes_a_verdict_is_named_by_departure_and_bold_where_it_is_sure(
     )
     table = tables.dependence([verdict(PARTLY), replace(verdict(NOT), claim="C2")], changed)
     first, second = table.splitlines()[2:]
-    by = "{ref}`B <departure-B>`: **layout E** and layout F<br>beside the departures: N = 5"
-    assert first.endswith(f" | [partly]{{.{tables.BADGES[PARTLY]}}} | {by} |")
-    assert second.endswith(f" | [no]{{.{tables.BADGES[NOT]}}} | nothing |")
+    by = f"{departure_link('B', 'B')}: **layout E** and layout F<br>beside the departures: N = 5"
+    badge = '<span class="{}">{}</span>'
+    assert first.endswith(f" | {badge.format(tables.BADGES[PARTLY], 'partly')} | {by} |")
+    assert second.endswith(f" | {badge.format(tables.BADGES[NOT], 'no')} | nothing |")
 
 
 def test_what_a_claim_says_cannot_break_the_page():
@@ -109,7 +111,7 @@ def test_an_assumption_says_in_words_whether_it_holds():
 
 
 def test_the_evidence_links_to_departures():
-    assert "departure {ref}`G <departure-G>`" in tables.evidence([verdict(NOT)])
+    assert departure_link("departure G", "G") in tables.evidence([verdict(NOT)])
 
 
 def runs(seeds) -> pd.DataFrame:

@@ -135,8 +135,8 @@ def test_a_question_quotes_the_gap_and_leads_to_its_entry():
     said = text.open_gaps({"B": ("C2",), "H": ("C1", "C6")})
     first, second = said.splitlines()
     assert first.startswith(f"- {DEPARTURES['B'].gap} ")
-    assert first.endswith("matters to C2 ({ref}`departure-B`).")
-    assert "C1 and C6 ({ref}`departure-H`)." in second
+    assert first.endswith("matters to C2 ([departure B](departures.ipynb#departure-B)).")
+    assert "C1 and C6 ([departure H](departures.ipynb#departure-H))." in second
 
 
 @pytest.mark.parametrize(
