@@ -4,7 +4,7 @@
     python book/build.py --smoke                           few episodes   _build/smoke
     python book/build.py --chapter 03_rdes -p episodes 20  one chapter    _build/chapter/03_rdes
 
-Each build has its own place, in the last column, and five steps, each a function:
+Each build has its own place, in the last column, and six steps, each a function:
 
 1. `ask`      run the two first cells of each chapter, its parameters and their check: a bad value
               ends here, in one sentence; a good one says which `experiments` the chapter needs
@@ -14,7 +14,8 @@ Each build has its own place, in the last column, and five steps, each a functio
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
               the published ones end the build
 4. `execute`  the chapters of the mirror with papermill, two at a time, into PLACE/executed
-5. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html
+5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says
+6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html
 
 PLACE/html is removed first and put there last: it exists only if everything went well.
 """
@@ -42,6 +43,7 @@ from pathlib import Path
 from typing import IO, Any
 
 import click
+import enrich
 import nbformat
 import papermill
 import yaml
@@ -55,6 +57,7 @@ Given = dict[str, Any]  # parameters of a chapter by name
 
 ROOT = Path(__file__).resolve().parent.parent
 SMOKE = {"episodes": 4, "length": "smoke", "layouts": ["A", "D"], "seeds": [0, 1], "budget": 40}
+BUTTONS = ("use_repository_button", "use_edit_page_button", "use_issues_button")
 INDEX = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><title>{title}</title>
@@ -168,6 +171,8 @@ def mirror(place: Path, announcement: str) -> Path:
     (source / "nmpcrl").symlink_to(ROOT / "nmpcrl")  # for literalinclude
     config = yaml.safe_load((ROOT / "_config.yml").read_text())
     config["html"]["announcement"] = announcement
+    if config["repository"]["url"]:
+        config["html"] |= dict.fromkeys(BUTTONS, True)
     (source / "_config.yml").write_text(yaml.safe_dump(config, allow_unicode=True))
     with as_file(files("sphinx-mathjax-offline") / "static/mathjax/tex-svg-full.js") as script:
         target = source / "book/_static/mathjax"
@@ -255,8 +260,25 @@ def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
         shutil.copy2(executed / notebook.name, place / "src" / notebook)
 
 
+def dress(source: Path, executed: Iterable[Path]) -> None:
+    """Give the pages of the mirror what they have beyond their sources."""
+    read = {path: nbformat.read(source / path, 4) for path in notebooks().values()}
+
+    def output(page: str, tag: str) -> str:
+        return enrich.output(read[Path("book") / page], tag)
+
+    for path in source.glob("book/*.md"):
+        path.write_text(enrich.page(path.read_text(), output))
+    for path, notebook in read.items():
+        download = path.name if path in executed else ""
+        nbformat.write(enrich.notebook(notebook, download), source / path)
+
+
 def render(place: Path, strict: bool) -> None:
-    """Run Jupyter Book on the mirror and put the result at PLACE/html, if it is whole."""
+    """Run Jupyter Book on the mirror and put the result at PLACE/html, if it is whole.
+
+    The executed notebooks lie beside their pages.
+    """
     work, log = place / "render", place / "logs/render.log"
     shutil.rmtree(work, ignore_errors=True)  # a remembered page would not repeat its warnings
     log.parent.mkdir(parents=True, exist_ok=True)
@@ -267,6 +289,9 @@ def render(place: Path, strict: bool) -> None:
         result = subprocess.run(command + strictness, stdout=out, stderr=subprocess.STDOUT)
     if result.returncode:
         raise Failure(f"Jupyter Book refused the pages (all of it: {shown(log)}):\n{warnings(log)}")
+    for path in (place / "executed").glob("*.ipynb"):
+        notebook = enrich.download(nbformat.read(path, 4))
+        nbformat.write(notebook, work / "_build/html/book" / path.name)
     (work / "_build/html").rename(place / "html")
     title = yaml.safe_load((ROOT / "_config.yml").read_text())["title"]
     (place / "html/index.html").write_text(INDEX.format(title=title, page=pages()[0]))
@@ -305,7 +330,7 @@ def values(
 
 
 def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool) -> Path:
-    """The five steps."""
+    """The six steps."""
     with reported(place / "logs/build.log"):
         needs = [ask(notebook, given) for notebook, given in jobs.items()]
         shutil.rmtree(place / "html", ignore_errors=True)
@@ -315,6 +340,7 @@ def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool)
         for call in wanted["beforehand"]:
             call()
         execute_all(place, jobs)
+        dress(place / "src", jobs)
         render(place, strict)
     return place / "html"
 

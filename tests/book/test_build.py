@@ -23,7 +23,7 @@ def driver(monkeypatch):
     def never(*_):
         raise AssertionError("the driver went on to build")
 
-    for step in ("mirror", "train", "execute_all", "render"):
+    for step in ("mirror", "train", "execute_all", "dress", "render"):
         monkeypatch.setattr(build, step, never)
     return lambda *arguments: CliRunner().invoke(build.main, arguments)
 
@@ -88,7 +88,7 @@ def test_values_are_read_as_papermill_reads_them():
 def small(tmp_path):
     """A copy of the driver with a book of one page and one chapter."""
     shutil.copytree(ROOT / "book/_static", tmp_path / "book/_static")
-    for name in ("_config.yml", "book/build.py", "book/references.bib"):
+    for name in ("_config.yml", "book/build.py", "book/enrich.py", "book/references.bib"):
         shutil.copy2(ROOT / name, tmp_path / name)
     (tmp_path / "nmpcrl").symlink_to(ROOT / "nmpcrl")
     toc = {
@@ -97,7 +97,7 @@ def small(tmp_path):
         "parts": [{"caption": "Part", "numbered": True, "chapters": [{"file": "book/one"}]}],
     }
     (tmp_path / "_toc.yml").write_text(yaml.safe_dump(toc))
-    (tmp_path / "book/intro.md").write_text("# A small book\n\nSee {ref}`ch:one` and $\\vs$.\n")
+    (tmp_path / "book/intro.md").write_text("# A small book\n\nSee [Chapter 1](one.ipynb).\n")
     write(tmp_path, "print(episodes)")
     return tmp_path
 
@@ -105,7 +105,7 @@ def small(tmp_path):
 def write(place: Path, last: str) -> None:
     """Write the small book's chapter, which ends in the cell `last`."""
     cells = [
-        new_markdown_cell("(ch:one)=\n# One"),
+        new_markdown_cell("# One"),
         new_code_cell("episodes = 300", metadata={"tags": ["parameters"]}),
         new_code_cell("experiments = ()"),
         new_code_cell(last),
@@ -130,6 +130,7 @@ def test_a_whole_build_ends_with_the_path_of_the_book(small):
     assert "book/intro.html" in (small / "_build/html/index.html").read_text()
     assert "300" in (small / "_build/html/book/one.html").read_text()
     assert (small / "_build/executed/one.ipynb").exists()
+    assert "_repository" not in (small / "_build/html/book/intro.html").read_text()
 
 
 @pytest.mark.book
@@ -140,6 +141,20 @@ def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(
     assert all("A smoke build" in page.read_text() for page in pages)
     executed = nbformat.read(small / "_build/smoke/executed/one.ipynb", 4)
     assert executed.cells[-1].outputs[0].text == f"{build.SMOKE['episodes']}\n"
+
+
+@pytest.mark.book
+def test_a_page_offers_its_executed_notebook_and_links_to_a_repository_that_is_set(small):
+    config = yaml.safe_load((small / "_config.yml").read_text())
+    config["repository"]["url"] = "https://github.com/us/book"
+    (small / "_config.yml").write_text(yaml.safe_dump(config))
+    assert run(small).returncode == 0
+    page = (small / "_build/html/book/one.html").read_text()
+    assert '<a href="one.ipynb" download' in page
+    assert 'href="https://github.com/us/book"' in page
+    executed = nbformat.read(small / "_build/html/book/one.ipynb", 4)
+    assert executed.cells[-1].outputs[0].text == "300\n"
+    assert "github.com/us/book" in (small / "_build/html/book/intro.html").read_text()
 
 
 @pytest.mark.book
@@ -167,11 +182,11 @@ def test_a_cell_that_fails_is_named_and_no_older_book_survives(small):
 @pytest.mark.book
 def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(small):
     (small / "_build/html").mkdir(parents=True)
-    (small / "book/intro.md").write_text("# A small book\n\nSee {ref}`ch:two`.\n")
+    (small / "book/intro.md").write_text("# A small book\n\nSee [the other](#two).\n")
     result = run(small)
     assert result.returncode == 1
     assert "intro.md:3: WARNING" in result.stderr
-    assert "ch:two" in result.stderr
+    assert "'two'" in result.stderr
     assert not (small / "_build/html").exists()
 
 
