@@ -15,7 +15,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book smoke chapter study bench test test-fast check locks clean anew
+.PHONY: help book smoke chapter lab study bench test test-lab test-fast check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -29,17 +29,23 @@ smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/h
 chapter: .venv/ready  ## One chapter: make chapter CHAPTER=03_rdes P="-p episodes 20"
 	@$(BIN)/python book/build.py --chapter "$(CHAPTER)" $(P)
 
+lab: .venv-lab/ready  ## Open the chapters in JupyterLab, which has an environment of its own
+	@NMPCRL_RUNS="$(or $(NMPCRL_RUNS),$(CURDIR)/runs)" .venv-lab/bin/jupyter lab book
+
 study: .venv/ready  ## Train the whole study, or what is missing of it: hours, and it can be interrupted
 	@$(BIN)/python -m nmpcrl study
 
 bench: .venv/ready  ## Measure how long solves, steps and runs take, and print what is reached
 	@$(BIN)/python -m nmpcrl bench
 
-test: .venv/ready  ## All tests; those of the site need a built book and a Chromium
-	@$(BIN)/python -m pytest
+test: .venv/ready  ## All tests but the next; those of the site need a built book and a Chromium
+	@$(BIN)/python -m pytest -m "not lab"
+
+test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
+	@$(BIN)/python -m pytest -m lab
 
 test-fast: .venv/ready  ## The fast tests: no book, no training
-	@$(BIN)/python -m pytest -m "not slow and not book"
+	@$(BIN)/python -m pytest -m "not slow and not book and not lab"
 
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks
 	@$(BIN)/ruff check .
@@ -66,3 +72,11 @@ clean:  ## Remove the built book; stored runs stay
 	  $(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])').txt,-r environment.txt)
 	@$(BIN)/pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $(if $(LOCKS),.venv/locked) $@
+
+# The kernel of JupyterLab is the Python of .venv.
+.venv-lab/ready: book/lab.txt .venv/ready
+	@echo "Installing JupyterLab, the pinned packages of $<, into .venv-lab: a minute, once."
+	@$(BIN)/python -m venv --clear .venv-lab
+	@.venv-lab/bin/pip install -qq --disable-pip-version-check -r $<
+	@$(BIN)/python -m ipykernel install --prefix .venv-lab --name python3 >/dev/null
+	@touch $@

@@ -82,6 +82,15 @@ def browser():
         chromium.close()
 
 
+@pytest.fixture(scope="session")
+def jupyter_lab() -> str:
+    """The command of the JupyterLab that `make lab` installs."""
+    path = ROOT / ".venv-lab/bin/jupyter"
+    if not path.exists():
+        missing("no JupyterLab is installed: run `make .venv-lab/ready`")
+    return str(path)
+
+
 LOOPS = ("without noise", "with noise")
 SOLVERS = {"riccati": 40e-6, "fatrop": 0.8e-3, "ipopt": 2e-3, "ipopt MX": 4e-3, "rebuilt": 40e-3}
 SOLVES = {"ES": 2.0, "GES": 2.0, "RDES": 1.0, "DES": 1.0}
