@@ -79,10 +79,12 @@ def shown(source: str) -> Edit:
 
     def edit(path: Path) -> None:
         notebook = nbformat.read(path, as_version=4)
-        figure = {"name": "fig:new", "caption": "The end of theta."}
-        mystnb = {"figure": figure, "image": {"alt": "A few dots.", "width": "100%"}}
+        mystnb = {"image": {"alt": "A few dots.", "width": "100%"}}
         metadata = {"tags": ["hide-input"], "mystnb": mystnb}
         notebook.cells.append(nbformat.v4.new_code_cell(source, metadata=metadata))
+        caption = '<a id="fig:new"></a>\n**Fig. 2.7.** The end of theta.'
+        tags = {"tags": ["caption"]}
+        notebook.cells.append(nbformat.v4.new_markdown_cell(caption, metadata=tags))
         nbformat.write(notebook, path)
 
     return edit

@@ -81,7 +81,7 @@ def test_the_functions_named_below_the_table_exist(name):
 
 def test_every_departure_has_a_section_that_renders_it():
     text = (ROOT / "book/departures.ipynb").read_text()
-    assert re.findall(r"\(departure-([A-Z])\)=", text) == list(DEPARTURES)
+    assert re.findall(r'<a id=\\"departure-([A-Z])\\"', text) == list(DEPARTURES)
     assert re.findall(r"tables\.departure\(\\\"([A-Z])\\\"\)", text) == list(DEPARTURES)
 
 

@@ -3,9 +3,12 @@
 import ast
 import re
 import shlex
+from itertools import pairwise
 from pathlib import Path
+from textwrap import dedent
 
 import build
+import enrich
 import nbformat
 import pytest
 from papermill.cli import papermill
@@ -33,8 +36,23 @@ def tags(cell) -> list[str]:
     return cell.metadata.get("tags", [])
 
 
-def figures(name: str) -> list:
-    return [cell for cell in code(name) if "figure" in cell.metadata.get("mystnb", {})]
+def tagged(name: str, tag: str) -> list:
+    return [cell for cell in NOTEBOOKS[name].cells if tag in tags(cell)]
+
+
+def figures(name: str) -> list[tuple]:
+    """The cells that draw, each with the caption that follows it."""
+    pairs = pairwise(NOTEBOOKS[name].cells)
+    return [(figure, caption) for figure, caption in pairs if "caption" in tags(caption)]
+
+
+def lines_of_code(source: str) -> int:
+    """The lines of a cell, without those of the prose that it says."""
+    count = len(source.splitlines())
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "say":
+            count -= node.args[0].end_lineno - node.args[0].lineno
+    return count
 
 
 def test_the_chapters_are_there_and_in_the_table_of_contents():
@@ -62,8 +80,44 @@ def test_nothing_that_a_run_produces_is_stored(name):
 @each_notebook
 def test_a_cell_has_at_most_20_lines_of_plain_python(name):
     for cell in code(name):
-        ast.parse(cell.source)
-        assert len(cell.source.splitlines()) <= 20, cell.source
+        assert lines_of_code(cell.source) <= 20, cell.source
+
+
+@each_notebook
+def test_prose_with_numbers_and_shown_source_have_cells_of_their_own(name):
+    for cell in code(name):
+        if re.search(r"^(say|source)\(", cell.source, flags=re.M):
+            assert enrich.calls_prose(cell.source), cell.source
+
+
+PAGE_ONLY = {  # what only the page would know, and a notebook editor shows as it is written
+    "a role": r"\{[\w:.-]+\}`",
+    "a directive": r"^ *(```+|:::+)\{",
+    "a box of colons": r"^ *:{3,}",
+    "a label": r"^\([\w:-]+\)=|\$\$ *\([\w:-]+\) *$",
+    "a definition list": r"^ *: ",
+    "attributes": r"\]\{[.#]|\)\{[.#]|^\{[.#]",
+    "a substitution": r"\{\{",
+    "a comment of MyST": r"^%",
+    "a macro of our own": r"\\(v[saxuw]|vtheta|vphi|vpi|vsigma|vomega|vnn|E|T)(?![A-Za-z])",
+    "a number from a cell elsewhere": r"\bglue\b",
+}
+
+
+@each_notebook
+@pytest.mark.parametrize("what", PAGE_ONLY)
+def test_a_source_has_nothing_that_only_the_page_can_show(name, what):
+    for cell in NOTEBOOKS[name].cells:
+        shown = cell.cell_type == "markdown" or enrich.calls_prose(cell.source)
+        if shown or what.startswith("a number"):
+            assert not re.search(PAGE_ONLY[what], dedent(cell.source), flags=re.M), cell.source
+        assert "figure" not in cell.metadata.get("mystnb", {})
+
+
+@each_notebook
+def test_html_in_prose_is_what_every_editor_shows(name):
+    elements = set(re.findall(r"</?([a-z]+)[ >]", re.sub(r"`[^`]*`", "", prose(name))))
+    assert elements <= {"a", "details", "summary", "br", "code", "sup", "sub"}
 
 
 @each_notebook
@@ -77,22 +131,13 @@ def test_definitions_are_short_and_there_is_no_class(name):
 
 @each_notebook
 def test_figures_hide_their_code_and_have_a_name_a_caption_and_alt_text(name):
-    for cell in figures(name):
-        figure, image = cell.metadata.mystnb.figure, cell.metadata.mystnb.get("image", {})
-        assert "hide-input" in tags(cell), cell.source
-        assert figure.name.startswith("fig:")
-        assert figure.caption.strip().endswith(".")
-        assert image.get("alt", "").strip(), cell.source
-
-
-def test_every_label_is_used_once():
-    pages = [prose(name) for name in NOTEBOOKS]
-    pages += [path.read_text() for path in sorted((ROOT / "book").glob("*.md"))]
-    text = "\n".join(pages)
-    labels = re.findall(r"^:label: (\S+)$|^\((\S+)\)=$|\$\$ \((\S+)\)$", text, flags=re.M)
-    names = [one for groups in labels for one in groups if one]
-    names += [cell.metadata.mystnb.figure.name for name in NOTEBOOKS for cell in figures(name)]
-    assert sorted(names) == sorted(set(names))
+    assert len(figures(name)) == sum("mystnb" in cell.metadata for cell in code(name))
+    for figure, caption in figures(name):
+        assert "hide-input" in tags(figure), figure.source
+        assert re.fullmatch(
+            r'<a id="fig:[\w-]+"></a>\n\*\*Fig\. [\d.]+\*\* .*\.', caption.source, flags=re.S
+        )
+        assert figure.metadata.mystnb.image.alt.strip(), figure.source
 
 
 @each_chapter
@@ -114,27 +159,29 @@ def test_the_second_code_cell_refuses_parameters_that_make_no_sense(name):
 
 @each_chapter
 def test_a_chapter_names_its_learning_goals(name):
-    assert re.search(r"\{admonition\} Learning goals\n", prose(name))
+    (goals,) = tagged(name, "goals")
+    assert goals.source.startswith("**Learning goals.** After this chapter you can\n\n- ")
 
 
 @each_chapter
 def test_every_exercise_has_a_cell_that_checks_and_a_folded_solution(name):
+    kinds = {"exercise", "solution"}
     cells = NOTEBOOKS[name].cells
-    text = "\n\n".join(f"\n{cell.source}" for cell in cells)
-    exercises = re.findall(r"^:{3,}\{exercise\}.*\n:label: (\S+)$", text, flags=re.M)
-    solutions = re.findall(r"^:{3,}\{solution\} (\S+)\n:class: dropdown$", text, flags=re.M)
-    assert len(exercises) >= 2
-    assert exercises == solutions
-    for label in exercises:
-        between = text.split(f":label: {label}\n")[1].split(f"{{solution}} {label}\n")[0]
-        assert re.search(r"^assert ", between, flags=re.M), label
+    places = [i for i, cell in enumerate(cells) if kinds & set(tags(cell))]
+    assert len(places) >= 4
+    for exercise, solution in zip(places[::2], places[1::2], strict=True):
+        assert "exercise" in tags(cells[exercise])
+        assert "solution" in tags(cells[solution])
+        assert cells[solution].source.startswith("<details><summary>Solution</summary>\n\n")
+        between = [cell.source for cell in cells[exercise + 1 : solution]]
+        assert any(re.search(r"^ *assert ", source, flags=re.M) for source in between)
 
 
 def commands(name: str) -> list[list[str]]:
     """The command lines of the Try box, each split as a shell would."""
-    box = re.search(r"^(:{3,})\{admonition\} Try\n(.*?)^\1$", prose(name), flags=re.M | re.S)
-    assert box, "there is no Try box"
-    lines = re.sub(r"\\\n", " ", box[2]).splitlines()
+    (box,) = tagged(name, "try")
+    assert box.source.startswith("**Try.** ")
+    lines = re.sub(r"\\\n", " ", box.source).splitlines()
     return [shlex.split(line) for line in lines if re.match(r"(papermill|make chapter) ", line)]
 
 

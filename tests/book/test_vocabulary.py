@@ -23,7 +23,7 @@ OLD = {  # the word that replaces it: the pattern of the old one, and where it m
     "trajectory": (r"roads?", ""),
     "rollout": (
         r"dr(ive|ives|iven|iving|ove)",
-        r"differential[ _]drive|driven wheels|robots?( that)? (drives?|drove)",
+        r"data-driven|differential[ _]drive|driven wheels|robots?( that)? (drives?|drove)",
     ),
     "cost ratio": (r"excess(es)?", ""),
     "late cost range": (r"wander(s|ed|ing)?", ""),

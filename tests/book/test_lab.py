@@ -1,0 +1,207 @@
+"""Every chapter reads well in JupyterLab as it comes: as a source, and as papermill leaves it."""
+
+import json
+import os
+import re
+import socket
+import subprocess
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from time import sleep
+from typing import Any
+
+import build
+import nbformat
+import pytest
+
+from nmpcrl.learning import td_error
+from nmpcrl.study import paper
+
+pytestmark = pytest.mark.lab
+
+ROOT = Path(__file__).resolve().parents[2]
+NOTEBOOKS = list(build.notebooks())
+LAYOUT = "D"  # of chapter 2, where its numbers are not those of the default
+SETTINGS = {  # all cells at once, and no request to another host; the rest is as it comes
+    "notebook-extension/tracker": {"windowingMode": "none"},
+    "apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
+}
+SHOWN = ".jp-MarkdownOutput, .jp-OutputArea-output"
+# What is read as text: neither code nor what MathJax has set.
+READ = """node => {
+  const copy = node.cloneNode(true)
+  copy.querySelectorAll("pre, code, style, script, mjx-container").forEach(one => one.remove())
+  return copy.textContent
+}"""
+RAW = {  # in text
+    "a role": r"\{[\w:.-]+\}|\b(glue|cite|numref):",
+    "a directive": r":::|```",
+    "a label": r"\([a-z]+:[\w-]+\)=?",
+    "a formula": r"\$|\\[a-zA-Z]+",
+    "an error": r"Undefined control sequence|Math input error",
+    "a tag": r"</?[a-z]+[ >]",
+}
+UNREAD = {  # by selector
+    "a directive": "code[class*='{']",
+    "a formula": "mjx-merror, [data-mjx-error]",
+    "a macro": "mjx-container mtext[mathcolor=red]",
+}
+
+each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
+each_state = pytest.mark.parametrize("state", ["source", "executed"])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Iterator[Path]:
+    """The sources, and what papermill makes of them with a smoke build's parameters."""
+    place = tmp_path_factory.mktemp("lab")
+    for state in ("source", "executed", "src/book"):
+        (place / state).mkdir(parents=True)
+    jobs: dict[Path, dict[str, Any]] = {}
+    for path in build.notebooks().values():
+        nbformat.write(nbformat.read(ROOT / path, 4), place / "source" / path.name)
+        names = build.parameters(ROOT / path)
+        jobs[path] = {name: build.SMOKE[name] for name in names if name in build.SMOKE}
+    jobs[build.known("02_expected_sarsa")]["layout"] = LAYOUT
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        patch.setenv("NMPCRL_RUNS", str(place / "runs"))
+        needs = [build.ask(notebook, given) for notebook, given in jobs.items()]
+        build.train(*(sum((need[what] for need in needs), ()) for what in build.NEEDS[:2]))
+        for call in [call for need in needs for call in need["beforehand"]]:
+            call()
+        build.execute_all(place, jobs)
+        yield place
+
+
+@pytest.fixture(scope="module")
+def address(folder, jupyter_lab) -> Iterator[str]:
+    """A JupyterLab without extensions, settings or kernels of anybody's."""
+    for name, settings in SETTINGS.items():
+        file = folder / f"settings/@jupyterlab/{name}.jupyterlab-settings"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(settings))
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    names = ("CONFIG_DIR", "DATA_DIR", "RUNTIME_DIR")
+    own = {f"JUPYTER_{name}": str(folder / name.lower()) for name in names}
+    own |= {"JUPYTERLAB_SETTINGS_DIR": str(folder / "settings"), "IPYTHONDIR": str(folder / "i")}
+    own |= {"JUPYTERLAB_WORKSPACES_DIR": str(folder / "workspaces")}
+    options = ["--no-browser", "--allow-root", "--IdentityProvider.token=", f"--port={port}"]
+    options += [f"--ServerApp.root_dir={folder}", "--KernelSpecManager.allowed_kernelspecs=none"]
+    options += ["--KernelSpecManager.ensure_native_kernel=False", "--ServerApp.port_retries=0"]
+    with (folder / "lab.log").open("w") as log:
+        server = subprocess.Popen(
+            [jupyter_lab, "lab", *options], env=os.environ | own, stdout=log, stderr=log
+        )
+    try:
+        await_answer(f"http://127.0.0.1:{port}/api", server)
+        yield f"http://127.0.0.1:{port}/doc/tree"
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def await_answer(address: str, server: subprocess.Popen) -> None:
+    while server.poll() is None:
+        try:
+            urllib.request.urlopen(address).close()
+        except OSError:
+            sleep(0.2)
+        else:
+            return
+    pytest.fail(f"JupyterLab ended with {server.returncode}")
+
+
+@pytest.fixture
+def opened(address, folder, browser) -> Iterator[Any]:
+    """Opens a notebook, and waits until every cell is there and every formula is typeset."""
+    tab = browser.new_page(viewport={"width": 1200, "height": 1000})
+
+    def open_notebook(state: str, name: str) -> Any:
+        cells = nbformat.read(folder / state / f"{name}.ipynb", 4).cells
+        prose = sum(cell.cell_type == "markdown" for cell in cells)
+        tab.goto(f"{address}/{state}/{name}.ipynb?reset")
+        tab.wait_for_function(
+            "([all, prose]) => document.querySelectorAll('.jp-Notebook .jp-Cell').length == all"
+            " && document.querySelectorAll('.jp-MarkdownOutput').length == prose",
+            arg=[len(cells), prose],
+        )
+        tab.wait_for_function(
+            f"() => [...document.querySelectorAll('{SHOWN}')]"
+            f".every(one => one.childElementCount && !({READ})(one).includes('$'))",
+            timeout=20_000,
+        )
+        return tab
+
+    yield open_notebook
+    tab.close()
+
+
+def raw(tab: Any) -> list[tuple[str, str]]:
+    """What a notebook editor could not read: its kind, and where it stands."""
+    shown = tab.locator(SHOWN)
+    texts = shown.evaluate_all(f"all => all.map({READ})")
+    found = [(what, text) for text in texts for what in RAW if re.search(RAW[what], text)]
+    for what, selector in UNREAD.items():
+        found += [(what, text) for text in shown.locator(selector).all_inner_texts()]
+    return found
+
+
+@each_notebook
+@each_state
+def test_nothing_is_left_raw_in_a_plain_jupyterlab(opened, state, name):
+    assert raw(opened(state, name)) == []
+
+
+@pytest.mark.parametrize(
+    ("source", "what"),
+    [
+        ("see {ref}`ch:mdp`", "a role"),
+        ("costs {glue:text}`es-cost:.2f`", "a role"),
+        (":::{admonition} Try\n:::", "a directive"),
+        ("```{math}\nx\n```", "a directive"),
+        ("(ch:mdp)=\n# Title", "a label"),
+        ("$$x$$ (eq:a)", "a label"),
+        ("where $\\vtheta$ is", "a macro"),
+        ("where $\\frac{a}$ is", "a formula"),
+    ],
+)
+def test_what_only_the_page_can_show_would_be_found(opened, folder, source, what):
+    cell = nbformat.v4.new_markdown_cell(source)
+    nbformat.write(nbformat.v4.new_notebook(cells=[cell]), folder / "source/raw.ipynb")
+    assert what in dict(raw(opened("source", "raw")))
+
+
+def test_chapter_2_shows_the_td_error_of_its_parameters(opened):
+    nmpc = paper.nmpc(LAYOUT)
+    start, theta = nmpc.task.start, paper.THETA_INIT
+    first = nmpc.solve(start, theta)
+    following = nmpc.solve(nmpc.plant.step(start, first.action), theta, first)
+    cost = nmpc.task.stage_cost(start, first.action)
+    delta = td_error(cost, nmpc.gamma, first.value, following.value)
+    item = opened("executed", "02_expected_sarsa").locator("li", has_text="It is positive")
+    assert item.inner_text().endswith(
+        f"{delta:.2f}. It is positive: the value was too small, as Chapter 1 found."
+    )
+
+
+def test_a_link_to_another_chapter_leads_to_its_file(opened):
+    link = opened("source", "02_expected_sarsa").locator(SHOWN).get_by_text("Chapter 1").first
+    assert "source/01_mdp_and_nmpc.ipynb" in link.get_attribute("href")
+
+
+def test_a_link_to_an_equation_leads_there(opened):
+    tab = opened("source", "02_expected_sarsa")
+    tab.evaluate("document.querySelectorAll('details').forEach(one => { one.open = true })")
+    tab.locator(".jp-Dialog-footer button").first.click()  # it asks for a kernel, and gets none
+    tab.locator(".jp-MarkdownOutput").get_by_text("Eq. (2.4)").last.click()  # in a solution
+    tab.wait_for_function(
+        """() => {
+          const place = document.querySelector("[data-jupyter-id='eq:es-features']")
+          const { top } = place.getBoundingClientRect()
+          return 0 < top && top < innerHeight
+        }"""
+    )
