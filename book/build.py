@@ -134,6 +134,7 @@ def ask(notebook: Path, given: Given) -> dict[str, tuple[Any, ...]]:
 
     Returns what that cell gives each of `NEEDS`.
     """
+    refuse_unknown(notebook, given)
     cells = [cell for cell in nbformat.read(notebook, 4).cells if cell.cell_type == "code"]
     if not cells or "parameters" not in cells[0].metadata.get("tags", []):
         return dict.fromkeys(NEEDS, ())
@@ -322,7 +323,6 @@ def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool)
 def build_chapter(name: str, given: Given) -> Path:
     """Execute one chapter; the other pages are there to be referred to. Returns its page."""
     notebook = known(name)
-    refuse_unknown(notebook, given)
     changed = ", ".join(f"{name} = {value}" for name, value in given.items())
     note = f"Only {notebook.stem} was executed for this build, with {changed or 'its defaults'}."
     place = Path("_build/chapter") / notebook.stem
