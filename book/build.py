@@ -7,9 +7,9 @@
 Each build has its own place, in the last column, and five steps, each a function:
 
 1. `ask`      run the two first cells of each chapter, its parameters and their check: a bad value
-              ends here, in one sentence, and so does a missing `book/published`; a good one says which `experiments` the chapter needs
+              ends here, in one sentence; a good one says which `experiments` the chapter needs
               whole, of which runs it needs `summaries`, and what is to be done `beforehand`, with
-              the machine to itself
+              the machine to itself. A build without `book/published` ends here, too
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
               the published ones end the build

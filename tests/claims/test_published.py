@@ -292,9 +292,9 @@ WORDS = ("learner", "files", "seal", "hours", "2", "cost", ",", "\n", '"', "{", 
 @st.composite
 def damages(draw):
     """What may happen to the bytes of a file, or of all: a function of them."""
-    kind = draw(st.sampled_from(["flip", "cut", "grow", "rename", "deep", "other", "gone"]))
+    kind = draw(st.sampled_from(["bits", "cut", "grow", "rename", "deep", "other", "gone"]))
     share, byte = draw(st.floats(0, 1)), draw(st.integers(1, 255))
-    if kind == "flip":
+    if kind == "bits":
         at = lambda whole: min(int(share * len(whole)), len(whole) - 1)  # noqa: E731
         return lambda whole: (
             whole[: at(whole)] + bytes([whole[at(whole)] ^ byte]) + whole[at(whole) + 1 :]
