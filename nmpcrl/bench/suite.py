@@ -22,7 +22,7 @@ from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
 from nmpcrl.study import paper, provenance, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.machine import machine
-from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.parameters import OneOf
 
 Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
 Stage = tuple[str, Callable[[], Bench]]
@@ -163,8 +163,7 @@ def check(length: object) -> None:
     Raises:
         ParameterError: there is none of this name.
     """
-    if length not in list(LENGTHS):
-        raise ParameterError(f"length = {length!r} must be one of {', '.join(LENGTHS)}")
+    OneOf(LENGTHS).check("length", length)
 
 
 def stored() -> Bench | None:
