@@ -37,8 +37,8 @@ def check_workers(workers: int | None, *, sure: bool = False) -> int:
         )
     if workers > room and not sure:
         raise ParameterError(
-            f"workers = {workers} must be at most {room}: each takes about {_size(MEMORY)} of memory,"
-            f" and {_size(free)} are free"
+            f"workers = {workers} must be at most {room}: each takes about {_size(MEMORY)} of"
+            f" memory, and {_size(free)} are free"
         )
     return workers
 

@@ -80,6 +80,16 @@ def run(experiment):
 
 summaries.run = run
 """
+TOO_DEEP = """
+from nmpcrl.analysis import summaries
+
+
+def run(experiment):
+    return run(experiment)
+
+
+summaries.run = run
+"""
 OTHER_VERSIONS = """
 from nmpcrl.study import provenance
 
@@ -309,9 +319,14 @@ def test_a_run_that_kills_every_worker_fails_and_the_others_end(address, worker,
 
 
 @pytest.mark.slow
-def test_a_run_that_fails_on_a_worker_is_told_with_its_reason(address, worker):
-    worker(MISTAKEN)
-    with pytest.raises(Failed, match="ArithmeticError: a mistake"):
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [(MISTAKEN, "ArithmeticError: a mistake"), (TOO_DEEP, "RecursionError: maximum recursion")],
+    ids=["a mistake", "too many calls for Dask to send"],
+)
+def test_a_run_that_fails_on_a_worker_is_told_with_its_reason(address, worker, text, reason):
+    worker(text)
+    with pytest.raises(Failed, match=reason):
         on_cluster(address, TEN[:1])
 
 
