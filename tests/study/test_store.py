@@ -55,6 +55,11 @@ def no_run(monkeypatch):
     return lambda: monkeypatch.setattr(store, "run", refuse)
 
 
+def files(folder: Path) -> list[Path]:
+    """All but what is hidden."""
+    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+
+
 def assert_same_numbers(one, other):
     for name in set(one.steps) - CLOCKS:
         np.testing.assert_array_equal(one.steps[name], other.steps[name])
@@ -62,7 +67,7 @@ def assert_same_numbers(one, other):
 
 def test_a_run_is_stored_under_its_experiment(runs):
     records = fetch(QUICK)
-    assert [path_of(QUICK)] == list(runs.iterdir())
+    assert files(runs) == [path_of(QUICK)]
     assert folder() == runs
     assert path_of(QUICK).name.startswith("frozen-A-step-seed0-1ep-")
     assert_same_numbers(Records.load(path_of(QUICK)), records)
@@ -98,7 +103,7 @@ def test_a_damaged_file_is_set_aside_and_the_run_done_again(runs, capsys):
     records, path = fetch(QUICK), path_of(QUICK)
     path.write_bytes(path.read_bytes()[:-200])
     assert_same_numbers(fetch(QUICK), records)
-    assert sorted(p.suffix for p in runs.iterdir()) == [".damaged", ".npz"]
+    assert [p.suffix for p in files(runs)] == [".damaged", ".npz"]
     assert "is kept as" in capsys.readouterr().err
 
 
