@@ -50,7 +50,7 @@ def check_folder(needed: int = 0, place: Path | None = None) -> None:
         raise StoreError(refusal(f"cannot be written ({error.strerror})", place)) from error
     if free < needed:
         raise StoreError(
-            refusal(f"has room for {free / 1e6:.0f} MB and not for {needed / 1e6:.0f} MB", place)
+            refusal(f"has room for {free / 1e6:.2f} MB and not for {needed / 1e6:.2f} MB", place)
         )
 
 

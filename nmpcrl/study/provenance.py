@@ -135,6 +135,7 @@ def epochs() -> dict[str, int]:
     return _epochs(SUMMARY_ROOMS)
 
 
+@cache
 def _version(library: str) -> str:
     try:
         return version(library)
