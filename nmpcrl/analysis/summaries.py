@@ -4,7 +4,6 @@ A worker trains, summarises, and hands the summary back; who asked for it stores
 reserved the run until then. What somebody else has reserved is left for the end.
 """
 
-import sys
 import threading
 import traceback
 from collections.abc import Iterable, Mapping
@@ -131,7 +130,7 @@ def _tell(failures: Mapping[Experiment, Exception], wanted: int, strict: bool) -
     )
     if strict:
         raise Failed(said)
-    print(said, file=sys.stderr)
+    place.say(said)
 
 
 def folder() -> Path:
@@ -243,7 +242,7 @@ def _note(experiment: Experiment, error: Exception) -> None:
     try:
         write_json(note, content)
     except OSError as refused:
-        print(f"{note} cannot be written ({refused.strerror}): {said}", file=sys.stderr)
+        place.say(f"{note} cannot be written ({refused.strerror}): {said}")
 
 
 def _note_of(path: Path) -> Path:

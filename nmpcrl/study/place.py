@@ -7,6 +7,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from nmpcrl.study.archive import DamagedRecords
@@ -54,6 +55,12 @@ def check_folder(needed: int = 0, place: Path | None = None) -> None:
         )
 
 
+def say(sentence: str) -> None:
+    """Tell the user something on the side; that nobody can hear it ends no study."""
+    with suppress(OSError, ValueError):  # a log on a full disk, a terminal that was closed
+        print(sentence, file=sys.stderr, flush=True)
+
+
 def refusal(why: str, place: Path | None = None) -> str:
     """The sentence that refuses a folder."""
     return (
@@ -81,7 +88,7 @@ def keep(path: Path, save: Callable[[Path], None]) -> bool:
     except (OSError, StoreError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         said += f", nor anything in {tempfile.gettempdir()} ({why}); the run is not stored"
-    print(said, file=sys.stderr)
+    say(said)
     return False
 
 
@@ -116,4 +123,4 @@ def set_aside(path: Path, error: DamagedRecords) -> None:
         return
     except OSError as refused:
         raise StoreError(f"{error}, and cannot be renamed ({refused.strerror})") from error
-    print(f"{error}; it is kept as {aside.name} and made again", file=sys.stderr)
+    say(f"{error}; it is kept as {aside.name} and made again")

@@ -6,7 +6,6 @@ cannot be written. Who else trains a run in the same folder is waited for.
 """
 
 import re
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
@@ -16,7 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.place import StoreError, check_folder, folder, keep, refusal, set_aside
+from nmpcrl.study.place import StoreError, check_folder, folder, keep, refusal, say, set_aside
 from nmpcrl.study.provenance import ORIGINAL, identity, key, provenance, warn_of_changes
 from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
 from nmpcrl.study.reservation import reservations, reserved
@@ -203,7 +202,7 @@ def _read_or_train(experiment: Experiment, **options: Any) -> tuple[Records, boo
     records = run(experiment, **options)
     records.facts.update(provenance(experiment))
     if other := solved_by_another(experiment, records.facts):
-        print(f"{experiment} is not stored: it was {other}", file=sys.stderr)
+        say(f"{experiment} is not stored: it was {other}")
         return records, False
     return records, keep(path, records.save)
 
@@ -276,7 +275,7 @@ def stored() -> dict[Path, tuple[dict[str, Any], dict[str, Any]]]:
             _check_name(path, fields, facts)
             whole[path] = fields, facts
         except (FileNotFoundError, DamagedRecords) as error:
-            print(f"{error}; it is left alone", file=sys.stderr)
+            say(f"{error}; it is left alone")
     return whole
 
 
@@ -297,7 +296,7 @@ def wait_for(names: list[str], first: Experiment) -> None:
     """Say that somebody else is at runs, and wait until he has one less."""
     more = len(names) - 1
     said = f"{first} and {more} others are" if more else f"{first} is"
-    print(f"{said} being trained by another process, which is waited for", file=sys.stderr)
+    say(f"{said} being trained by another process, which is waited for")
     while len(reservations(folder()).taken(names)) == len(names):
         time.sleep(POLL)
 
