@@ -37,6 +37,7 @@ EXPERIMENTS = tuple(
     for seed in (0, 1)
 )
 SYSTEM = {"posix", "fcntl", "io", "_io"}  # the modules whose functions call it
+MEMORY = Path("/dev/shm")  # where nobody waits for a disk
 each = st.sampled_from(EXPERIMENTS)
 
 
@@ -136,9 +137,10 @@ class OfRuns(RuleBasedStateMachine):
 
     def __init__(self) -> None:
         super().__init__()
-        self.root = Path(tempfile.mkdtemp())
+        self.root = Path(tempfile.mkdtemp(dir=MEMORY if MEMORY.is_dir() else None))
         self.patch = pytest.MonkeyPatch()
         self.patch.setenv("NMPCRL_RUNS", str(self.root / "runs"))
+        self.patch.setenv("NMPCRL_WARNED", "1")
         self.patch.setattr(tempfile, "tempdir", str(self.root))
         self.patch.setattr(store, "compile_ahead", lambda _: None)
         self.patch.setattr(store, "run", trained)
@@ -232,7 +234,7 @@ class OfRuns(RuleBasedStateMachine):
             self.path_of(one).write_bytes(kept)
             self.whole.remove(one)
 
-    @rule(experiment=each, call=st.integers(0, 400))
+    @rule(experiment=each, call=st.integers(0, 750))
     def kill(self, experiment, call) -> None:
         before, there = self.times(experiment), os.path.lexists(self.path_of(experiment))
         code = in_a_fork(lambda: (kill_before(call), self.ask(experiment)))()
