@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
-CHOSEN = "NMPCRL_CACHE"  # in the environment: another folder than the usual one
+CHOSEN = "NMPCRL_CACHE"  # in the environment: another folder than the default
 ROOM = 4_000_000  # bytes: thrice what numba makes of the solver
 OTHERS = 0o022  # may write: the group, and everybody
 
