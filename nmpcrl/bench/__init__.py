@@ -1,4 +1,7 @@
-"""How long a step takes, and how long it takes others: measured, kept, and held against targets."""
+"""How long a step takes, and how long it takes others: measured, kept, and held against targets.
+
+`sweep` counts how the solves of very many drawn problems end.
+"""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

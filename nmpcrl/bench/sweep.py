@@ -5,6 +5,7 @@ state anywhere in the box, the eight weights of theta log-uniform, so that some 
 """
 
 import json
+import sys
 import time
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -33,6 +34,10 @@ WEIGHTS = (0.01, 10.0)  # of theta, log-uniform; `paper.THETA_SET` begins at 0
 TIGHTENED = (0.0, 1.0)  # theta_c, uniform: at 1 a circle has 1.4 times its diameter
 KEPT = 1e-6  # [m]; a plan that leaves the box by more has no KKT conditions with a hard box
 SAME = 1e-6  # relative difference of two values that are the same minimum's
+
+
+class DamagedSweep(ValueError):
+    """A file is not a sweep's table."""
 
 
 @dataclass(frozen=True)
@@ -67,24 +72,23 @@ class SweepTable:
 
     def rows(self) -> list[tuple[str, str]]:
         """What was counted, and how often."""
-        t = self.tally
+        t, count = self.tally, "{:,}".format
         compared = t.better + t.equal + t.worse + t.ipopt_failed
-        counts = [
-            ("problems tried", t.tried),
-            ("of them with u_0 = a fixed", t.with_action),
-            ("solved at once", t.at_once),
-            ("solved after a restart", t.restarted),
-            ("given up with a SolverError", t.failed),
-            ("plans that cannot keep to the box", t.outside),
-            ("inputs out of bounds, or numbers not finite", t.broken),
-            ("held against Ipopt", compared),
-            ("a better minimum than Ipopt's", t.better),
-            ("the same minimum", t.equal),
-            ("a worse minimum than Ipopt's", t.worse),
-            ("not solved by Ipopt", t.ipopt_failed),
+        return [
+            ("problems tried", count(t.tried)),
+            ("of them with u_0 = a fixed", count(t.with_action)),
+            ("solved at once", count(t.at_once)),
+            ("solved after a restart", count(t.restarted)),
+            ("given up with a SolverError", count(t.failed)),
+            ("plans that cannot keep to the box", count(t.outside)),
+            ("inputs out of bounds, or numbers not finite", count(t.broken)),
+            ("largest KKT residual in the box", f"{t.kkt:.1e}"),
+            ("held against Ipopt", count(compared)),
+            ("a better minimum than Ipopt's", count(t.better)),
+            ("the same minimum", count(t.equal)),
+            ("a worse minimum than Ipopt's", count(t.worse)),
+            ("not solved by Ipopt", count(t.ipopt_failed)),
         ]
-        rows = [(name, f"{count:,}") for name, count in counts]
-        return [*rows[:7], ("largest KKT residual in the box", f"{t.kkt:.1e}"), *rows[7:]]
 
     def __str__(self) -> str:
         rows = self.rows()
@@ -129,7 +133,11 @@ def sweep(problems: int, *, workers: int | None = None, progress: bool = True) -
     for error in failures.values():
         raise error
     table = SweepTable(total, _about(time.perf_counter() - began))
-    write_json(path(), {"about": table.about, "tally": asdict(total)}, indent=1)
+    try:
+        write_json(path(), {"about": table.about, "tally": asdict(total)}, indent=1)
+    except OSError as error:
+        reason = error.strerror or error
+        print(f"{path()}: {reason}; the sweep is shown and not kept", file=sys.stderr)
     return table
 
 
@@ -139,9 +147,18 @@ def path() -> Path:
 
 
 def read(place: Path) -> SweepTable:
-    """A table that `sweep` kept."""
-    kept = json.loads(place.read_text("utf-8"))
-    return SweepTable(Tally(**kept["tally"]), kept["about"])
+    """A table that `sweep` kept.
+
+    Raises:
+        DamagedSweep: it is missing, or something else.
+    """
+    try:
+        kept = json.loads(place.read_text("utf-8"))
+        return SweepTable(Tally(**kept["tally"]), kept["about"])
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise DamagedSweep(
+            f"{place} is missing or damaged ({error}); `nmpcrl bench --sweep` makes one"
+        ) from error
 
 
 def tally_of(layout: int, problems: int) -> Tally:

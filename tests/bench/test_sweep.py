@@ -47,6 +47,23 @@ def test_the_same_problems_are_drawn_again_and_kept_beside_the_benchmark(here):
     assert sweep.sweep(5, progress=False).tally == found.tally
 
 
+def test_a_sweep_that_cannot_be_kept_is_shown_all_the_same(here, monkeypatch, capsys):
+    (here / "file").touch()
+    monkeypatch.setenv("NMPCRL_RUNS", str(here / "file"))
+    assert sweep.sweep(1, progress=False).tally.tried == 1
+    said = f"{here / 'file' / 'sweep.json'}: File exists; the sweep is shown and not kept\n"
+    assert capsys.readouterr().err == said
+
+
+@pytest.mark.parametrize("content", [None, "", "[]", '{"tally": {"tried": 1}}', '{"tally": 1}'])
+def test_what_is_no_sweep_is_refused_with_what_makes_one(tmp_path, content):
+    place = tmp_path / "sweep.json"
+    if content is not None:
+        place.write_text(content)
+    with pytest.raises(sweep.DamagedSweep, match=r"sweep.json is missing or damaged .*--sweep"):
+        sweep.read(place)
+
+
 def test_problems_are_drawn_from_where_a_run_may_go():
     rng, nmpc = np.random.default_rng(0), paper.nmpc()
     for _ in range(200):
