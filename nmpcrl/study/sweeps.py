@@ -44,7 +44,7 @@ def _values(name: str, given: Any) -> tuple[Any, ...]:
     if name not in FIELDS:
         raise ParameterError(f"{name!r} is not a parameter; there are {', '.join(FIELDS)}")
     text = isinstance(given, str) and given.strip().startswith("[")
-    if text or (is_list(given) and name != "theta"):
+    if (text or is_list(given)) and name != "theta":
         values: tuple[Any, ...] = AXES[f"{name}s"].check(f"{name}s", given)
         return values
     return (FIELDS[name].check(name, given),)

@@ -215,6 +215,7 @@ def test_whatever_a_chapter_is_given_it_takes_little_or_refuses_in_a_sentence(dr
         ("04_ges", ["-p", "episodes", "90000"], "GB of memory; 4 GB are allowed"),
         ("06_what_the_paper_leaves_open", ["-p", "layouts", "A"], "must be a list, such as ['A']"),
         ("07_beyond", ["-p", "budget", "1000000000"], "budget = 1000000000 must be a whole"),
+        ("01_mdp_and_nmpc", ["-p", "horizon", "21"], "must be 20 or less here: a longer plan"),
         ("performance", ["-p", "lenght", "smoke"], "(did you mean 'length'?)"),
         ("solver", ["-p", "horizon", "1000000000000"], "from 1 to 500"),
     ],

@@ -201,6 +201,7 @@ def test_a_sweep_is_every_combination_in_order():
 def test_theta_is_one_value_of_a_sweep_not_an_axis():
     (only,) = sweep(theta=[2.0] * 9)
     assert only.theta == (2.0,) * 9
+    assert message_of(sweep, theta="[2.0]").startswith("theta = '[2.0]' must be 9 numbers")
 
 
 def test_the_study_of_a_chapter_is_five_learners_two_decays_and_the_seeds():
