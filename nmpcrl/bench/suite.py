@@ -17,7 +17,7 @@ from nmpcrl.bench.learners import against_mpcrl, learners
 from nmpcrl.bench.processes import at_once, first_calls, whole_runs
 from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import interleaved, own_loop, parts
-from nmpcrl.study import paper, provenance, store
+from nmpcrl.study import paper, place, provenance, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import ParameterError
@@ -126,13 +126,18 @@ def stored() -> Bench | None:
         return kept if kept["about"]["key"] == depends_on() else None
     except FileNotFoundError:
         return None
-    except (ValueError, LookupError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError) as error:
         print(f"{path()} is damaged ({error}) and is measured again", file=sys.stderr)
         return None
 
 
 def measure(length: str, *, progress: bool = True) -> Bench:
-    """Measure everything, and store it."""
+    """Measure everything, and store it.
+
+    Raises:
+        StoreError: it could not be stored; nothing is measured.
+    """
+    store.check_folder()
     size, began = LENGTHS[length], time.perf_counter()
     about: dict[str, Any] = {
         "length": length,
@@ -148,7 +153,7 @@ def measure(length: str, *, progress: bool = True) -> Bench:
         bar.set_description(f"benchmark ({length}): {name}")
         bench |= stage()
     about["seconds"] = time.perf_counter() - began
-    write_json(path(), bench)
+    place.keep(path(), lambda here: write_json(here, bench))
     return bench
 
 
