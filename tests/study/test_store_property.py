@@ -240,10 +240,7 @@ class OfRuns(RuleBasedStateMachine):
         code = in_a_fork(lambda: (kill_before(call), self.ask(experiment)))()
         assert code in (0, 9), (self.root / "wrong").read_text()
         assert experiment not in self.whole or self.times(experiment) == before
-        moved = there and experiment not in self.whole
-        self.aside = max(self.aside, self.count_aside()) if moved else self.aside
-        if experiment not in self.whole and os.path.lexists(self.path_of(experiment)):
-            self.doubtful.add(experiment)
+        self.look_after(experiment, there)
         if code == 0:
             self.whole.add(experiment)
 
@@ -270,10 +267,20 @@ class OfRuns(RuleBasedStateMachine):
             finally:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY,) * 2)
 
+        there = os.path.lexists(self.path_of(experiment))
         assert in_a_fork(ask)() == 0, (self.root / "wrong").read_text()
-        self.aside = max(self.aside, self.count_aside())
-        if experiment not in self.whole and os.path.lexists(self.path_of(experiment)):
+        self.look_after(experiment, there)
+
+    def look_after(self, experiment: Experiment, there: bool) -> None:
+        """Writing may have been broken off: what was not there before is whole, or not there."""
+        if experiment in self.whole:
+            return
+        if there:
+            self.aside = max(self.aside, self.count_aside())
+        if os.path.lexists(self.path_of(experiment)):
             self.doubtful.add(experiment)
+            if not there:
+                assert same(self.kind.load(self.path_of(experiment)), self.truth(experiment))
 
     def count_aside(self) -> int:
         return len(list((self.root / "runs").rglob("*.damaged*")))
@@ -319,7 +326,7 @@ class OfSummaries(OfRuns):
 
 
 each_machine = settings(
-    max_examples=25,
+    max_examples=20,
     stateful_step_count=12,
     derandomize=True,
     deadline=None,
