@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.rule import Verdict
+from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 
