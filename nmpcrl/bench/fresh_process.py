@@ -13,6 +13,7 @@ import numpy as np
 import psutil
 
 from nmpcrl.bench.learners import time_learners
+from nmpcrl.bench.solves import Columns, columns_of
 from nmpcrl.study import Experiment, paper, run
 
 
@@ -50,11 +51,9 @@ def first_call() -> dict[str, float]:
     return {"solve": solved - began, "step": time.perf_counter() - solved}
 
 
-def learning_steps() -> dict[str, list[Any]]:
+def learning_steps(steps: str) -> Columns:
     """The columns of `time_learners`; None where there is no number."""
-    table = time_learners().astype(object)
-    columns: dict[str, list[Any]] = table.where(table.notna(), None).to_dict("list")
-    return columns
+    return columns_of(time_learners(steps=int(steps)))
 
 
 MEASURES: dict[str, Callable[..., Any]] = {

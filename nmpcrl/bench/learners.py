@@ -24,13 +24,6 @@ COMPARED = ["ratio", "ratio_low", "ratio_high", "waited"]  # columns: the fields
 TURN = 20  # steps that a learner takes at a time: then the caches hold what its own loop leaves
 
 
-def learners(steps: int) -> Columns:
-    """Table II with every solver: the columns of `time_learners`; None where there is no number."""
-    table = time_learners(steps=steps, turn=TURN).astype(object)
-    result: Columns = table.where(table.notna(), None).to_dict("list")
-    return result
-
-
 def against_mpcrl(rounds: int, steps: int) -> Columns:
     """ES and mpcrl's Q-learning in turn, an episode's first steps each; seconds of every step.
 
@@ -69,7 +62,7 @@ def time_learners(
     learners: tuple[str, ...] = ("ES", "GES", "RDES", "DES"),
     solvers: tuple[str, ...] = tuple(SOLVERS),
     steps: int = 3 * paper.STEPS,
-    turn: int = 1,
+    turn: int = TURN,
 ) -> pd.DataFrame:
     """Time of one learning step, one row a learner and solver.
 

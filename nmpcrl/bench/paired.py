@@ -33,6 +33,7 @@ from nmpcrl import Vector
 BLOCK = 13  # rounds
 LEAST = 10  # blocks
 PLACEMENT = 0.03
+IDLE = 0.05  # share of waiting on a machine with nothing else to do, at most
 CONFIDENCE = 0.95
 RESAMPLES = 2000
 SEED = 0  # of the bootstrap: the same times give the same interval

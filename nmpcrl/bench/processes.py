@@ -16,9 +16,12 @@ import pandas as pd
 from nmpcrl.bench.learners import COMPARED
 from nmpcrl.bench.paired import Ratio, pooled
 from nmpcrl.bench.solves import Columns
+from nmpcrl.study import paper
 from nmpcrl.study.executor import THREADS
 from nmpcrl.study.store import fetch_all
 from nmpcrl.study.sweeps import sweep
+
+PROCESSES = 7  # leave Student's interval 2.4 standard errors wide on each side; 21 would leave 2.1
 
 
 def whole_runs(learners: tuple[str, ...], episodes: int) -> tuple[Columns, Columns]:
@@ -81,14 +84,17 @@ def first_calls(times: int, *, compile_too: bool) -> Columns:
     return columns
 
 
-def time_learners_afresh(processes: int = 7) -> pd.DataFrame:
+def time_learners_afresh(processes: int = PROCESSES, steps: int = paper.STEPS) -> pd.DataFrame:
     """`time_learners` in so many fresh processes, one after the other, each number their median.
 
     But for the ratios to ES and their intervals, which are `pooled`: so the interval also covers
-    where code and data come to lie in memory. Seven processes leave Student's interval 2.4 standard
-    errors wide on each side; three times as many would leave 2.1.
+    where code and data come to lie in memory.
+
+    Args:
+        processes: how many, two or more.
+        steps: of each learner, in each of them; a whole episode shows a median in each.
     """
-    tables = [pd.DataFrame(_alone("steps")[0]) for _ in range(processes)]
+    tables = [pd.DataFrame(_alone("steps", str(steps))[0]) for _ in range(processes)]
     named = ["solver", "learner"]
     numbers = tables[0].columns.difference(named)
     whole = pd.concat(tables).astype(dict.fromkeys(numbers, float)).groupby(named, sort=False)

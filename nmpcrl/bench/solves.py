@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
@@ -21,6 +22,13 @@ THETA = np.array(paper.THETA_INIT)
 LOOPS = {"without noise": 0.0, "with noise": paper.NOISE}  # that of training's first episode
 WIDTH = 3 + 2 + len(THETA)  # of what RDES tells its network: (s, a, theta)
 STRETCH = 26  # problems that a solver is given at a time: then its code is in the caches, as in use
+
+
+def columns_of(table: pd.DataFrame) -> Columns:
+    """The columns of a table, with None where there is no number: JSON knows no nan."""
+    objects = table.astype(object)
+    columns: Columns = objects.where(objects.notna(), None).to_dict("list")
+    return columns
 
 
 def solvers() -> dict[str, Solve]:

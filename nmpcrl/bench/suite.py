@@ -1,11 +1,12 @@
-"""The benchmark as a whole: measured into a dict of columns, kept as one JSON file."""
+"""The benchmark as a whole: measured stage by stage into columns, kept as one JSON file."""
 
 import json
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -13,16 +14,20 @@ from typing import Any
 import psutil
 from tqdm import tqdm
 
-from nmpcrl.bench.learners import against_mpcrl, learners
-from nmpcrl.bench.processes import at_once, first_calls, whole_runs
+from nmpcrl.bench.learners import against_mpcrl
+from nmpcrl.bench.paired import IDLE
+from nmpcrl.bench.processes import PROCESSES, at_once, first_calls, time_learners_afresh, whole_runs
 from nmpcrl.bench.scaling import solve_times
-from nmpcrl.bench.solves import interleaved, own_loop, parts
+from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
 from nmpcrl.study import paper, provenance, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import ParameterError
 
 Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
+Stage = tuple[str, Callable[[], Bench]]
+
+STEPS = "learning steps"  # the stage that Table II and the verdicts on time rest on
 
 ALL = ("ES", "GES", "RDES", "DES")
 
@@ -34,7 +39,8 @@ class Length:
     episodes: int  # of the recorded closed loops, each with and without noise
     problems: int  # of each of their episodes
     loops: int  # episodes of the default solver's own loop, and of every other small measure
-    turns: int  # learning steps of every learner with every solver
+    processes: int  # that time the learners, one after the other
+    turns: int  # learning steps of every learner with every solver, in each of these
     rounds: int  # of mpcrl
     mpcrl_steps: int  # of each round
     run: int  # episodes of a whole run
@@ -50,6 +56,7 @@ LENGTHS = {  # from the shortest
         episodes=1,
         problems=20,
         loops=1,
+        processes=2,
         turns=20,
         rounds=1,
         mpcrl_steps=8,
@@ -64,7 +71,8 @@ LENGTHS = {  # from the shortest
         episodes=1,
         problems=paper.STEPS,
         loops=10,
-        turns=120,
+        processes=PROCESSES,
+        turns=paper.STEPS,
         rounds=2,
         mpcrl_steps=40,
         run=30,
@@ -78,7 +86,8 @@ LENGTHS = {  # from the shortest
         episodes=4,
         problems=paper.STEPS,
         loops=40,
-        turns=400,
+        processes=PROCESSES,
+        turns=3 * paper.STEPS,
         rounds=5,
         mpcrl_steps=60,
         run=paper.EPISODES,
@@ -91,22 +100,61 @@ LENGTHS = {  # from the shortest
 }
 
 
-def read_or_measure(length: str = "full", *, progress: bool = True) -> Bench:
+@dataclass(frozen=True)
+class Measured:
+    """When and how a stage was measured."""
+
+    length: str
+    date: str
+    others: float  # share of the cores that was in use when it began
+    seconds: float  # that it took
+
+
+def read_or_measure(
+    length: str = "full",
+    *,
+    only: Collection[str] = (),
+    calm: bool = False,
+    progress: bool = True,
+) -> Bench:
     """The benchmark: read if this code was measured here, and at least so long; else measured.
 
     Args:
         length: "smoke", "short" or "full".
+        only: the stages that are needed; all of them if empty.
+        calm: whether to measure again what was measured beside other programs, if its verdict may
+            hang on that.
         progress: whether to show a bar on standard error.
 
     Raises:
         ParameterError: there is no such length.
     """
     check(length)
-    kept = stored()
-    names = list(LENGTHS)
-    if kept and names.index(kept["about"]["length"]) >= names.index(length):
-        return kept
-    return measure(length, progress=progress)
+    kept = stored() or _empty()
+    missing = [
+        stage
+        for stage in _stages(LENGTHS[length])
+        if (not only or stage[0] in only) and not _serves(kept, stage[0], length, calm)
+    ]
+    return _measured(kept, missing, length, progress) if missing else kept
+
+
+def _serves(kept: Bench, stage: str, length: str, calm: bool) -> bool:
+    """Whether what is kept of a stage is long enough, and calm enough where that is asked for."""
+    measured = kept["stages"].get(stage)
+    if measured is None or list(LENGTHS).index(measured["length"]) < list(LENGTHS).index(length):
+        return False
+    return not (calm and stage == STEPS and max(kept["learners"]["waited"]) > IDLE)
+
+
+def beforehand(length: str, only: Collection[str] = ()) -> tuple[Callable[[], Bench], ...]:
+    """What a chapter's driver calls with the machine to itself, so that `read_or_measure` reads.
+
+    Raises:
+        ParameterError: there is no such length.
+    """
+    check(length)
+    return (partial(read_or_measure, length, only=only, calm=True),)
 
 
 def check(length: object) -> None:
@@ -123,7 +171,7 @@ def stored() -> Bench | None:
     """What is in the file, if it is of this code, these versions and this machine."""
     try:
         kept = json.loads(path().read_text())
-        return kept if kept["about"]["key"] == depends_on() else None
+        return kept if kept["about"]["key"] == depends_on() and dict(kept["stages"]) else None
     except FileNotFoundError:
         return None
     except (ValueError, LookupError, TypeError) as error:
@@ -133,26 +181,49 @@ def stored() -> Bench | None:
 
 def measure(length: str, *, progress: bool = True) -> Bench:
     """Measure everything, and store it."""
-    size, began = LENGTHS[length], time.perf_counter()
-    about: dict[str, Any] = {
-        "length": length,
-        "key": depends_on(),
-        "date": datetime.now(UTC).date().isoformat(),
-        "others": psutil.cpu_percent(1.0) / 100,  # share of the cores that is in use already
-        "machine": machine(),
-        "versions": versions(),
-    }
-    bench: Bench = {"about": about}
-    bar = tqdm(_stages(size), "benchmark", disable=not progress, leave=False)
+    return _measured(_empty(), _stages(LENGTHS[length]), length, progress)
+
+
+def _empty() -> Bench:
+    """A benchmark of which nothing is measured yet."""
+    about = {"key": depends_on(), "machine": machine(), "versions": versions()}
+    return {"about": about, "stages": {}}
+
+
+def _measured(kept: Bench, stages: Iterable[Stage], length: str, progress: bool) -> Bench:
+    """`kept` with these stages measured; each is stored as soon as it is."""
+    bar = tqdm(list(stages), "benchmark", disable=not progress, leave=False)
     for name, stage in bar:
         bar.set_description(f"benchmark ({length}): {name}")
-        bench |= stage()
-    about["seconds"] = time.perf_counter() - began
-    write_json(path(), bench)
-    return bench
+        others, began = psutil.cpu_percent(1.0) / 100, time.perf_counter()
+        kept |= stage()
+        kept["stages"][name] = asdict(
+            Measured(
+                length=length,
+                date=datetime.now(UTC).date().isoformat(),
+                others=others,
+                seconds=time.perf_counter() - began,
+            )
+        )
+        kept["about"] |= _summed(kept["stages"].values())
+        write_json(path(), kept)
+    return kept
 
 
-def _stages(size: Length) -> list[tuple[str, Callable[[], Bench]]]:
+def _summed(stages: Collection[dict[str, Any]]) -> dict[str, Any]:
+    """What `Measured` says of all stages together: the least length, the last day, ..."""
+    one = [Measured(**stage) for stage in stages]
+    return asdict(
+        Measured(
+            length=min((stage.length for stage in one), key=list(LENGTHS).index),
+            date=max(stage.date for stage in one),
+            others=max(stage.others for stage in one),
+            seconds=sum(stage.seconds for stage in one),
+        )
+    )
+
+
+def _stages(size: Length) -> list[Stage]:
     """What is measured, in order; what needs a quiet machine is not behind what starts many."""
 
     def runs() -> Bench:
@@ -160,15 +231,15 @@ def _stages(size: Length) -> list[tuple[str, Callable[[], Bench]]]:
         return {"runs": totals, "episodes": progress}
 
     def steps() -> Bench:
-        steps = against_mpcrl(size.rounds, size.mpcrl_steps)
-        return {"learners": learners(size.turns), "mpcrl": steps}
+        return {"learners": columns_of(time_learners_afresh(size.processes, size.turns))}
 
     return [
         ("every solver", lambda: {"solves": interleaved(size.episodes, size.problems)}),
         ("its own loop", lambda: {"loop": own_loop(size.loops, paper.STEPS)}),
         ("parts of a step", lambda: {"parts": parts(size.loops)}),
         ("scaling", lambda: {"scaling": solve_times(max(3, size.loops // 2), paper.STEPS)}),
-        ("learning steps", steps),
+        (STEPS, steps),
+        ("mpcrl", lambda: {"mpcrl": against_mpcrl(size.rounds, size.mpcrl_steps)}),
         ("whole runs", runs),
         ("runs at once", lambda: {"parallel": at_once(size.seeds, size.seed_run)}),
         ("first call", lambda: {"first": first_calls(size.firsts, compile_too=size.compile)}),

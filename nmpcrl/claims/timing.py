@@ -17,8 +17,8 @@ of 1 ms or more, so that up to a tenth of what the processor's clock shows may b
 much as C4 leaves between its claim and its border; beyond that, pairs are not trusted to cancel it.
 
 An interval that reaches across a border is blamed on the machine where the process had to wait for
-more than `IDLE` = 5 % of the time; a machine with nothing else to do makes it wait for less. Below
-that, the ratio is too near to the border for so many steps.
+more than `paired.IDLE` = 5 % of the time; a machine with nothing else to do makes it wait for less.
+Below that, the ratio is too near to the border for so many steps.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.bench.learners import REFERENCE, ratio
-from nmpcrl.bench.paired import Ratio
+from nmpcrl.bench.paired import IDLE, Ratio
 from nmpcrl.claims.rule import (
     NOT,
     PARTLY,
@@ -41,7 +41,6 @@ from nmpcrl.claims.rule import (
 )
 
 WAITED = 0.75  # share of the time
-IDLE = 0.05
 
 Range: TypeAlias = tuple[float, float]
 

@@ -7,6 +7,8 @@ from html import escape
 
 import pandas as pd
 
+from nmpcrl.bench.learners import COMPARED
+from nmpcrl.bench.paired import Ratio
 from nmpcrl.bench.targets import Target
 from nmpcrl.claims.rule import (
     NOT,
@@ -100,6 +102,35 @@ def target_table(targets: Iterable[Target], caption: str) -> str:
         for t in targets
     )
     return _table(caption, ("What", "To reach", "Here"), rows)
+
+
+TIMES = {  # columns of `time_learners` with one number each
+    "solves": "solves",
+    "ms_per_step": "ms per step",
+    "ms_per_solve": "ms per solve",
+    "ms_per_fit": "ms per fit",
+    "ms_per_rest": "ms per rest",
+    "hours": "hours",
+    "hours_paper": "hours, paper",
+}
+
+
+def timing_table(timings: pd.DataFrame) -> str:
+    """One row a solver and learner, in HTML: Table II, with each ratio to ES and its interval.
+
+    Args:
+        timings: of `time_learners`.
+    """
+    rows = (
+        (
+            *(escape(row[name]) for name in ("solver", "learner")),
+            *("–" if pd.isna(row[name]) else f"{row[name]:.3g}" for name in TIMES),
+            str(Ratio(*(row[name] for name in COMPARED))),
+        )
+        for row in timings.to_dict("records")
+    )
+    header = ("solver", "learner", *TIMES.values(), "ratio")
+    return _table("Times of a learning step.", header, rows)
 
 
 def evidence(verdicts: Iterable[Verdict]) -> str:

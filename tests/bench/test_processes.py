@@ -32,7 +32,8 @@ def test_runs_at_once_leave_neither_files_nor_environment(tmp_path, monkeypatch)
 def test_learners_that_are_timed_afresh_are_pooled_over_the_processes(monkeypatch):
     found = iter([0.5, 0.6, 0.72])
 
-    def alone(what):
+    def alone(what, steps):
+        assert (what, steps) == ("steps", "130")
         numbers = {"ms_per_step": next(found), "ms_per_fit": None}
         times = {"ratio": numbers["ms_per_step"], "ratio_low": None, "ratio_high": None}
         columns = {"solver": "ipopt", "learner": "RDES"} | numbers | times | {"waited": 0.1}

@@ -143,7 +143,7 @@ def test_every_size_has_as_many_warm_solves():
 
 @pytest.mark.slow
 def test_learners_are_timed_with_every_solver_and_what_is_missing_is_none():
-    columns = learners.learners(steps=2)
+    columns = solves.columns_of(learners.time_learners(steps=2))
     assert len(columns["solver"]) == 3 * 4
     fits = dict(zip(columns["learner"], columns["ms_per_fit"], strict=True))
     assert fits["ES"] is None

@@ -11,13 +11,22 @@ from nmpcrl.study import ParameterError
 
 
 @pytest.fixture
-def counted(tmp_path, monkeypatch):
+def waited():
+    """The share of the time that learning steps wait for a processor, when they are measured."""
+    return [0.0]
+
+
+@pytest.fixture
+def counted(tmp_path, monkeypatch, waited):
     """The lengths that were measured, in a folder of their own; measuring takes no time."""
     lengths = []
 
     def stages(size):
-        lengths.append(next(name for name, one in suite.LENGTHS.items() if one == size))
-        return [("nothing", lambda: {"nothing": {"seconds": [1.0]}})]
+        def steps():
+            lengths.append(next(name for name, one in suite.LENGTHS.items() if one == size))
+            return {"learners": {"waited": [0.0, waited[0]]}}
+
+        return [(suite.STEPS, steps), ("nothing", lambda: {"nothing": {"seconds": [1.0]}})]
 
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
     monkeypatch.setattr(suite, "_stages", stages)
@@ -25,8 +34,8 @@ def counted(tmp_path, monkeypatch):
     return lengths
 
 
-def measured_here(length):
-    return suite.read_or_measure(length, progress=False)
+def measured_here(length, **options):
+    return suite.read_or_measure(length, progress=False, **options)
 
 
 def test_what_was_measured_is_read_again(counted):
@@ -62,13 +71,54 @@ def test_another_source_measures_again(counted, monkeypatch, what):
     assert counted == ["short", "short"]
 
 
-@pytest.mark.parametrize("content", ["{", "[]", "{}"])
+@pytest.mark.parametrize("content", ["{", "[]", "{}", '{"about": {"key": "KEY"}}'])
 def test_a_damaged_file_is_told_and_measured_again(counted, capsys, content):
     measured_here("short")
-    suite.path().write_text(content)
+    suite.path().write_text(content.replace("KEY", suite.depends_on()))
     measured_here("short")
     assert counted == ["short", "short"]
     assert "is damaged" in capsys.readouterr().err
+
+
+def test_what_is_asked_for_alone_is_measured_alone_and_then_read_with_the_rest(counted):
+    alone = measured_here("short", only=[suite.STEPS])
+    assert "nothing" not in alone
+    assert "nothing" in measured_here("short")
+    assert counted == ["short"]
+
+
+def test_an_interrupted_benchmark_keeps_the_stages_that_it_has_measured(counted, monkeypatch):
+    stages = suite._stages
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(suite, "_stages", lambda size: [stages(size)[0], ("cut", interrupted)])
+    with pytest.raises(KeyboardInterrupt):
+        measured_here("short")
+    monkeypatch.setattr(suite, "_stages", stages)
+    measured_here("short")
+    assert counted == ["short"]
+
+
+def test_steps_that_were_timed_on_a_busy_machine_are_timed_again_where_calm_is_asked_for(
+    counted, waited
+):
+    waited[0] = 0.5
+    measured_here("short")
+    measured_here("short")
+    assert counted == ["short"]
+    waited[0] = 0.0
+    measured_here("short", calm=True)
+    measured_here("short", calm=True)
+    assert counted == ["short", "short"]
+
+
+def test_a_benchmark_in_stages_says_of_all_together_the_least_length(counted):
+    measured_here("full", only=[suite.STEPS])
+    about = measured_here("smoke")["about"]
+    assert about["length"] == "smoke"
+    assert about["seconds"] >= 0
 
 
 def test_the_file_is_whole_and_alone(counted):
@@ -80,6 +130,7 @@ def test_the_file_is_whole_and_alone(counted):
 def test_a_benchmark_says_where_and_of_what_it_is(counted):
     about = measured_here("short")["about"]
     assert about["others"] == 0.25
+    assert about["length"] == "short"
     assert about["machine"].keys() == {"processor", "architecture", "cores", "system"}
     assert {"python", "casadi", "numpy", "torch", "mpcrl"} <= about["versions"].keys()
 

@@ -182,3 +182,10 @@ def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
     (call,) = needs["beforehand"]
     assert call.func.__name__ == "read_or_measure"
     assert call.args == ("smoke",)
+
+
+def test_the_chapter_that_judges_times_asks_only_for_theirs_beforehand():
+    needs = build.ask(ROOT / "book/05_results.ipynb", build.SMOKE | {"layout": "A"})
+    (call,) = needs["beforehand"]
+    assert (call.func.__name__, call.args) == ("read_or_measure", ("smoke",))
+    assert call.keywords == {"only": ["learning steps"], "calm": True}

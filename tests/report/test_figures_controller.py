@@ -56,25 +56,9 @@ def study(slope: float = 0.1) -> Runs:
     return Runs({run: records(run, slope * (run.learner == "ES")) for run in runs})
 
 
-def texts(figure) -> str:
-    """All titles of a figure."""
-    above = figure.get_suptitle()
-    return " ".join([above, *(axes.get_title(loc="left") for axes in figure.axes)])
-
-
-def assert_readable(figure):
-    """A title, labels on the outer axes with a unit where there is a quantity, and it renders."""
-    figure.canvas.draw()
-    assert texts(figure).strip()
-    labels = [axes.get_xlabel() for axes in figure.axes] + [a.get_ylabel() for a in figure.axes]
-    labels = [label for label in labels if label]
-    assert len(labels) >= 2
-    counted = ("episode", "episodes trained", "noise-free RL cost", "relative")
-    for label in labels:
-        assert "[" in label or "(no unit)" in label or label.endswith(counted), label
-
-
-def test_the_closed_loop_is_drawn_with_its_plans_and_its_length(nmpc, theta, rollout):
+def test_the_closed_loop_is_drawn_with_its_plans_and_its_length(
+    nmpc, theta, rollout, assert_readable, texts
+):
     plan = nmpc.solve(nmpc.task.start, theta)
     figure = controller.closed_loop(nmpc.task, rollout, [plan])
     assert_readable(figure)
@@ -87,7 +71,7 @@ def test_every_obstacle_has_its_disc_and_its_circle(nmpc, rollout):
 
 
 @pytest.mark.parametrize(("lowest", "says"), [(10.0, "never below"), (9.0, "falls below")])
-def test_the_title_says_whether_q_stays_above_v(lowest, says):
+def test_the_title_says_whether_q_stays_above_v(lowest, says, assert_readable, texts):
     speeds, turn_rates = np.array([0.0, 0.6]), np.linspace(-1, 1, 3)
     values = np.array([[12.0, 11.0], [12.0, lowest], [12.0, 11.0]])
     policy = np.array([0.6, 0.0])
@@ -96,7 +80,9 @@ def test_the_title_says_whether_q_stays_above_v(lowest, says):
     assert says in texts(figure)
 
 
-def test_nine_panels_name_the_two_parameters_that_bend_the_trajectory_most(nmpc):
+def test_nine_panels_name_the_two_parameters_that_bend_the_trajectory_most(
+    nmpc, assert_readable, texts
+):
     changes = {name: {"×¼": straight(1.5), "×4": straight(1.6)} for name in paper.THETA_NAMES}
     changes["c"] = {"−0.2": straight(1.5), "0.35": straight(3.0, cost=np.inf)}
     changes["nu"] = {"×¼": straight(0.5), "×4": straight(1.5)}
@@ -107,7 +93,7 @@ def test_nine_panels_name_the_two_parameters_that_bend_the_trajectory_most(nmpc)
     assert "0.35: fails" in [text.get_text() for text in figure.axes[8].texts]
 
 
-def test_the_printed_box_says_how_near_the_robot_comes(nmpc):
+def test_the_printed_box_says_how_near_the_robot_comes(nmpc, assert_readable, texts):
     stopped = straight(2.0)
     stopped.states[:, 0] = np.minimum(stopped.states[:, 0], 3.0)
     figure = controller.printed_box(nmpc.task, straight(2.0), stopped, wall=3.0)
@@ -115,7 +101,9 @@ def test_the_printed_box_says_how_near_the_robot_comes(nmpc):
     assert "no nearer than 5.5 m" in texts(figure)
 
 
-def test_the_penalty_figure_names_the_best_theta_c_and_leaves_failures_out(nmpc):
+def test_the_penalty_figure_names_the_best_theta_c_and_leaves_failures_out(
+    nmpc, assert_readable, texts
+):
     theta_c, costs = np.array([0.001, 0.35, 0.5]), np.array([3.0, 1.0, np.inf])
     figure = controller.penalty_gap(nmpc.task, theta_c, costs)
     assert_readable(figure)
@@ -125,7 +113,7 @@ def test_the_penalty_figure_names_the_best_theta_c_and_leaves_failures_out(nmpc)
     assert legend == ["the NMPC keeps 1.251 m", "the penalty begins at 1.452 m"]
 
 
-def test_the_one_variable_problem_and_its_tangent():
+def test_the_one_variable_problem_and_its_tangent(assert_readable):
     theta = np.linspace(-1, 2, 7)
     figure = sensitivity.one_variable(theta, np.maximum(0, 1 - theta) ** 2, at=0.0, slope=-2.0)
     assert_readable(figure)
@@ -133,14 +121,14 @@ def test_the_one_variable_problem_and_its_tangent():
     assert np.diff(tangent.get_ydata()) / np.diff(tangent.get_xdata()) == pytest.approx(-2)
 
 
-def test_the_differences_figure_names_the_best_step():
+def test_the_differences_figure_names_the_best_step(assert_readable, texts):
     steps = np.array([1e-6, 1e-4, 1e-2])
     figure = sensitivity.gradient_errors(steps, 10 * steps, np.array([1e-7, 1e-9, 1e-5]))
     assert_readable(figure)
     assert "to 1e-09, if the step is near 1e-04" in texts(figure)
 
 
-def test_the_kink_figure_names_the_jump():
+def test_the_kink_figure_names_the_jump(assert_readable, texts):
     offsets = np.linspace(-0.01, 0.01, 5)
     values = np.where(offsets > 0, 120 * offsets, 20 * offsets)
     figure = sensitivity.kink(offsets, values, edge=0.001, slopes=(20.0, 120.0))
@@ -148,20 +136,20 @@ def test_the_kink_figure_names_the_jump():
     assert "jumps by 100.0" in texts(figure)
 
 
-def test_theta_paths_name_the_component_that_moves_most():
+def test_theta_paths_name_the_component_that_moves_most(assert_readable, texts):
     figure = expected_sarsa.theta_paths(study().select(learner="ES"))
     assert_readable(figure)
     assert r"$\theta_x$ moves most, by up to 0.4" in texts(figure)
 
 
 @pytest.mark.parametrize(("slope", "says"), [(0.1, "stays below 2"), (1.0, "passes 2")])
-def test_the_overshoot_figure_says_whether_2_was_passed(slope, says):
+def test_the_overshoot_figure_says_whether_2_was_passed(slope, says, assert_readable, texts):
     figure = expected_sarsa.overshoot(study(slope).select(learner="ES"))
     assert_readable(figure)
     assert says in texts(figure)
 
 
-def test_the_frozen_arm_is_drawn_beside_the_learner_in_both_rows():
+def test_the_frozen_arm_is_drawn_beside_the_learner_in_both_rows(assert_readable, texts):
     figure = expected_sarsa.two_costs(study())
     assert_readable(figure)
     assert "falls by up to 60% by itself" in texts(figure)
@@ -172,7 +160,7 @@ def test_the_fall_of_the_frozen_arm_is_a_share_of_its_first_cost():
     assert expected_sarsa.frozen_fall(study()) == pytest.approx(0.6)
 
 
-def test_one_seed_and_one_decay_are_enough_for_every_figure_of_a_study():
+def test_one_seed_and_one_decay_are_enough_for_every_figure_of_a_study(assert_readable):
     runs = sweep(learner=LEARNERS, decay="step", seed=3, episodes=EPISODES)
     small = Runs({run: records(run, 0.0) for run in runs})
     for figure in (expected_sarsa.theta_paths, expected_sarsa.overshoot, expected_sarsa.two_costs):

@@ -7,23 +7,6 @@ import pytest
 from nmpcrl.report.figures import solver as draw
 
 
-def texts(figure) -> str:
-    """All titles of a figure."""
-    above = figure.get_suptitle()
-    return " ".join([above, *(axes.get_title(loc="left") for axes in figure.axes)])
-
-
-def assert_readable(figure):
-    """A title, labels with a unit, and it renders."""
-    figure.canvas.draw()
-    assert texts(figure).strip()
-    labels = [axes.get_xlabel() for axes in figure.axes] + [a.get_ylabel() for a in figure.axes]
-    labels = [label for label in labels if label]
-    assert len(labels) >= 2
-    for label in labels:
-        assert "[" in label or "(no unit)" in label, label
-
-
 def iterates(*errors: float) -> pd.DataFrame:
     """A trace with these errors."""
     errors_ = np.array(errors)
@@ -46,7 +29,7 @@ def timings(solvers: tuple[str, ...] = ("fatrop", "riccati")) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def test_the_rows_are_drawn_with_their_limit():
+def test_the_rows_are_drawn_with_their_limit(assert_readable):
     h = np.linspace(-1, 1, 5)
     curves = {mu: np.maximum(0, 100 * h) + mu for mu in (10.0, 1.0, 0.1)}
     figure = draw.row_prices(h, curves, {mu: np.linspace(0, 1, 5) for mu in curves})
@@ -56,7 +39,7 @@ def test_the_rows_are_drawn_with_their_limit():
     assert list(right.lines[-1].get_ydata()) == [0, 0, 0.5, 1, 1]
 
 
-def test_the_sparsity_title_says_how_narrow_the_band_is():
+def test_the_sparsity_title_says_how_narrow_the_band_is(assert_readable, texts):
     far = np.eye(9) + np.eye(9, k=7) + np.eye(9, k=-7)
     narrow = np.eye(9) + np.eye(9, k=2) + np.eye(9, k=-2)
     figure = draw.sparsity(far, narrow, np.eye(5), step=2)
@@ -74,13 +57,15 @@ def test_the_bandwidth_of_nothing_is_zero():
 @pytest.mark.parametrize(
     ("last", "says"), [(1e-9, "without it 3"), (1e-3, "without it more than 3")]
 )
-def test_the_curvature_title_counts_iterations_and_says_whether_they_were_enough(last, says):
+def test_the_curvature_title_counts_iterations_and_says_whether_they_were_enough(
+    last, says, assert_readable, texts
+):
     figure = draw.curvature(iterates(10, 1, 1e-9), iterates(10, 1, 0.1, last), tolerance=1e-8)
     assert_readable(figure)
     assert texts(figure).strip() == f"With the curvature 2 iterations, {says}"
 
 
-def test_the_starts_are_distinct_and_counted():
+def test_the_starts_are_distinct_and_counted(assert_readable, texts):
     traces = {
         "cold": iterates(10, 1, 0.1, 1e-9),
         "shifted": iterates(1, 0.1, 1e-9),
@@ -93,14 +78,14 @@ def test_the_starts_are_distinct_and_counted():
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 3
 
 
-def test_an_iterate_of_the_final_value_does_not_break_the_logarithm():
+def test_an_iterate_of_the_final_value_does_not_break_the_logarithm(assert_readable):
     early = iterates(10, 1, 1e-9).assign(value=[800.0, 700.0, 700.0])
     figure = draw.convergence({"cold": early}, tolerance=1e-8)
     assert_readable(figure)
     assert (figure.axes[1].lines[0].get_ydata() > 0).all()
 
 
-def test_the_title_states_how_the_first_solver_scales():
+def test_the_title_states_how_the_first_solver_scales(assert_readable, texts):
     figure = draw.horizons(timings())
     assert_readable(figure)
     assert "With riccati a solve grows like $N^{1.50}$, an iteration like $N^{1.00}$" in texts(

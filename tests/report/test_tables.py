@@ -3,6 +3,7 @@
 import re
 from dataclasses import asdict, replace
 
+import numpy as np
 import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
@@ -40,6 +41,20 @@ def test_a_verdict_shows_its_share_and_interval_where_it_has_one():
     shares = {"share": 0.75, "interval": (0.5, 0.875)}
     judged = cells(tables.verdict_table([verdict(PARTLY, **shares), verdict(NOT)], "All of it."))
     assert [row[1] for row in judged[1:]] == [f"{PARTLY}|75% [50%, 88%]", NOT]
+
+
+def test_a_timing_shows_each_ratio_with_its_interval_and_a_dash_for_no_number():
+    numbers = dict.fromkeys(tables.TIMES, 1.2345) | {"ms_per_fit": np.nan}
+    ratio = {"ratio": 0.6349, "ratio_low": 0.6251, "ratio_high": 0.641, "waited": 0.2}
+    timings = pd.DataFrame([{"solver": "ipopt", "learner": "RDES", **numbers, **ratio}])
+    header, row = cells(tables.timing_table(timings))
+    assert dict(zip(header, row, strict=True)) == {
+        "solver": "ipopt",
+        "learner": "RDES",
+        **dict.fromkeys(tables.TIMES.values(), "1.23"),
+        "ms per fit": "–",
+        "ratio": "0.63 [0.63, 0.64]",
+    }
 
 
 def test_a_claim_is_shown_with_all_that_was_fixed_beforehand():
