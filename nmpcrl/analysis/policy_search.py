@@ -22,14 +22,20 @@ from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.executor import execute
-from nmpcrl.study.parameters import one_of, whole
+from nmpcrl.study.parameters import LARGEST_SEED, Allowed, OneOf, Whole
 from nmpcrl.study.provenance import epochs, versions
 
 BUDGET = 2000  # rollouts without noise that a search may make
 LEAST = 40  # rollouts: the first one and some generations
+MOST = 100_000  # long before which a search has converged and ends by itself
 SPREAD = 0.3  # of the first rollouts, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
+ALLOWED: Mapping[str, Allowed] = {  # by field of `Search`
+    "layout": OneOf(paper.LAYOUTS),
+    "seed": Whole(0, LARGEST_SEED - 1),  # one more is CMA-ES's
+    "budget": Whole(LEAST, MOST),
+}
 FAILED = 1e6  # stands for the cost of a rollout on which a solve failed
 
 
@@ -46,9 +52,8 @@ class Search:
     budget: int = BUDGET
 
     def __post_init__(self) -> None:
-        one_of(self, "layout", tuple(paper.LAYOUTS))
-        whole(self, "seed", least=0)
-        whole(self, "budget", least=LEAST)
+        for name, allowed in ALLOWED.items():
+            object.__setattr__(self, name, allowed.check(name, getattr(self, name)))
 
 
 @dataclass(frozen=True)
