@@ -4,10 +4,13 @@ import click
 
 from nmpcrl import __version__
 from nmpcrl.commands.bench import bench
+from nmpcrl.commands.clean import clean
+from nmpcrl.commands.compare import compare
 from nmpcrl.commands.completion import completion
 from nmpcrl.commands.evaluate import evaluate
 from nmpcrl.commands.refusals import Commands
 from nmpcrl.commands.runs import runs
+from nmpcrl.commands.show import show
 from nmpcrl.commands.study import study
 from nmpcrl.commands.train import train
 from nmpcrl.commands.verify import verify
@@ -24,8 +27,9 @@ def main() -> None:
     Example:
       nmpcrl train --learner GES --episodes 20
       nmpcrl runs --sort cost
+      nmpcrl show GES
     """
 
 
-for command in (train, runs, evaluate, study, verify, bench, completion):
+for command in (train, runs, show, evaluate, compare, clean, study, verify, bench, completion):
     main.add_command(command)

@@ -26,14 +26,14 @@ def train(yes: bool, **fields: Any) -> None:
     from nmpcrl.study.store import path_of
 
     experiment = Experiment(**fields)
-    records = _fetched(experiment)
+    records = fetched(experiment)
     path = path_of(experiment)
     click.echo(f"{path}: {records.facts['stopped']}")
     click.echo(verdict(records))
     click.echo(f"Next: nmpcrl evaluate {path.stem}")
 
 
-def _fetched(experiment: "Experiment") -> "Records":
+def fetched(experiment: "Experiment") -> "Records":
     """The run, with a bar while it is trained."""
     from tqdm import tqdm
 

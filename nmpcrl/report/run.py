@@ -4,7 +4,7 @@ import numpy as np
 
 from nmpcrl.analysis import metrics
 from nmpcrl.study import paper
-from nmpcrl.study.records import Records, StepStatus
+from nmpcrl.study.records import Records, StepStatus, Stopped
 
 
 def verdict(records: Records) -> str:
@@ -36,3 +36,21 @@ def figures(records: Records) -> dict[str, str]:
         "steps with alpha ||phi||^2 above 2": f"{metrics.overshooting(records):.2%}",
         "theta": theta,
     }
+
+
+def finding(records: Records) -> str:
+    """What became of the noise-free cost, as the title of a picture."""
+    learner, stopped = records.experiment["learner"], records.facts["stopped"]
+    before, after = metrics.initial_cost(records), metrics.final_cost(records)
+    if stopped != Stopped.FINISHED:
+        episodes = int(records.steps["episode"][-1]) + 1
+        largest = np.nanmax(np.abs(metrics.final_theta(records)), initial=0.0)
+        of = f"{episodes} of {records.experiment['episodes']}"
+        return f"{learner} diverged in episode {of}, where a component of theta was {largest:.2g}"
+    if learner == "frozen":
+        return f"A frozen theta keeps its noise-free cost of {before:.0f}"
+    if not np.isfinite([before, after]).all():
+        return f"{learner} ends without a noise-free cost: a solve failed"
+    verb = "lowers" if after <= before else "raises"
+    change = abs(1 - after / before)
+    return f"{learner} {verb} the noise-free cost by {change:.1%}, from {before:.0f} to {after:.0f}"
