@@ -19,8 +19,17 @@ from nmpcrl.analysis.metrics import LATE, TOUCH
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
+from nmpcrl.study.archive import Column, Field, Form, Forms, load_about, load_arrays, save_arrays
 from nmpcrl.study.experiment import Experiment, frozen_arm
-from nmpcrl.study.records import Column, Records, StepStatus, final_cost, load_arrays, save_arrays
+from nmpcrl.study.records import (
+    INPUTS,
+    STATES,
+    Records,
+    StepStatus,
+    final_cost,
+    most_evaluations,
+    named_in,
+)
 from nmpcrl.study.setup import controller_of
 
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
@@ -53,7 +62,11 @@ class RunSummary:
     facts: dict[str, Any]  # those of the records, and `imitation` where C6 asks for it
 
     def save(self, path: Path) -> None:
-        """Write the whole file beside `path`, then rename it into place."""
+        """Write the whole file beside `path`, then rename it into place.
+
+        Raises:
+            OSError: it cannot be written; what was there stays.
+        """
         rollout = {"states": self.states, "actions": self.actions}
         tables = {"episodes": self.episodes, "evaluations": self.evaluations, "rollout": rollout}
         save_arrays(path, {"experiment": self.experiment, "facts": self.facts}, tables)
@@ -64,9 +77,9 @@ class RunSummary:
 
         Raises:
             FileNotFoundError: there is none.
-            DamagedRecords: it cannot be read whole.
+            DamagedRecords: it cannot be read whole, or is not a summary.
         """
-        about, tables = load_arrays(path, ("episodes", "evaluations", "rollout"))
+        about, tables = load_arrays(path, _forms)
         return cls(
             about["experiment"],
             tables["episodes"],
@@ -76,10 +89,35 @@ class RunSummary:
             about["facts"],
         )
 
+    @staticmethod
+    def about(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The experiment's fields and the facts, as `Records.about`."""
+        about = load_about(path, _forms)
+        return about["experiment"], about["facts"]
+
     @property
     def name(self) -> Experiment:
         """The experiment as the value that names the run."""
         return Experiment(**self.experiment)
+
+
+def _forms(about: dict[str, Any]) -> Forms:
+    """Of the tables of a summary."""
+    experiment = named_in(about)
+    d, sizes = len(experiment.theta), len(SIZES)
+    counts = ("steps", "failed", "restarts", "outside", "inputs", "over")
+    numbers = ("cost", "overlap", "alpha_phi2", "delta", "loss", "bias", "error", "iterations")
+    episodes: list[Field] = [(name, int) for name in counts]
+    episodes += [(name, float) for name in (*numbers, "seconds")]
+    episodes += [("inside", int, sizes), ("theta", float, d), ("w", float, d)]
+    evaluations: list[Field] = [("episode", int), ("theta", float, d), ("cost", float)]
+    evaluations += [("inside", int, sizes), ("overlap", float), ("distance", float)]
+    rollout: list[Field] = [("states", float, STATES), ("actions", float, INPUTS)]
+    return {
+        "episodes": Form(episodes, [experiment.episodes]),
+        "evaluations": Form(evaluations, range(1, most_evaluations(experiment) + 1)),
+        "rollout": Form(rollout, [experiment.steps]),
+    }
 
 
 def summarise(records: Records) -> RunSummary:
