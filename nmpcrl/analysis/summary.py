@@ -7,10 +7,9 @@ takes a hundredth of that and is enough for every figure, verdict and mechanism 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
@@ -31,6 +30,9 @@ from nmpcrl.study.records import (
     named_in,
 )
 from nmpcrl.study.setup import controller_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
 NAMES = ("learner", "layout", "decay", "seed", "episodes")  # of a row: without them it names no run
@@ -203,8 +205,10 @@ def experiment_of(row: Mapping[str, Any]) -> Experiment:
     return Experiment(**named)
 
 
-def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> pd.DataFrame:
+def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> "pd.DataFrame":
     """One `row` a run, with `cost_ratio` as `cost_ratios` gives it."""
+    import pandas as pd  # not for those who only make summaries
+
     listed = list(summaries.values() if isinstance(summaries, Mapping) else summaries)
     rows = {one.name: row(one) for one in listed}
     ratios = cost_ratios(rows)
@@ -220,8 +224,10 @@ def cost_ratios(rows: Mapping[Experiment, Mapping[str, Any]]) -> dict[Experiment
     }
 
 
-def tidy(summaries: Iterable[RunSummary]) -> pd.DataFrame:
+def tidy(summaries: Iterable[RunSummary]) -> "pd.DataFrame":
     """One row an episode of each run: what names the run, and the columns that are numbers."""
+    import pandas as pd
+
     named = ("learner", "layout", "decay", "seed")
     frames = []
     for one in summaries:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.control import Plant
-from nmpcrl.learning import Successor, Weights
+from nmpcrl.learning import Exploration, Learner, Successor, Weights
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import Diverged, Step, absurd, train
 from nmpcrl.study.experiment import Experiment
@@ -44,16 +44,24 @@ def run(experiment: Experiment, on_episode: Callable[[int, float], None] | None 
         experiment: names the run; what its learner does not read is set to its default.
         on_episode: called after each episode with how many are done and the episode's summed cost.
     """
+    experiment = experiment.canonical
+    controller = controller_of(experiment)
+    ready = prepare(experiment, controller)
     gc.freeze()  # the collector need not look through all that was imported, again and again
     try:
-        return _run(experiment.canonical, on_episode)
+        return _run(experiment, controller, *ready, on_episode)
     finally:
         gc.unfreeze()
 
 
-def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None) -> Records:
-    controller = controller_of(experiment)
-    learner, weights, explore = prepare(experiment, controller)
+def _run(
+    experiment: Experiment,
+    controller: Persistent,
+    learner: Learner,
+    weights: Weights,
+    explore: Exploration,
+    on_episode: Callable[[int, float], None] | None,
+) -> Records:
     steps, evaluations = _tables(experiment, controller.nmpc.plant)
     evaluations.append(_evaluation(controller, weights, 0, experiment.steps))
     stopped, cost, began = str(Stopped.FINISHED), 0.0, time.perf_counter()
