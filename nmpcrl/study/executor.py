@@ -27,6 +27,7 @@ from typing import Any, TypeVar
 from tqdm import tqdm
 
 from nmpcrl.study.orphans import end_with_parent
+from nmpcrl.study.outcome import pack, unpack
 from nmpcrl.study.workers import check_workers as check_workers
 from nmpcrl.study.workers import told
 
@@ -68,8 +69,8 @@ def execute(
         unit: of the bar.
 
     Returns:
-        What each job raised that failed; `Killed` where it lost its worker `ATTEMPTS` times. A
-        failure stops no other job.
+        What each job raised that failed; `Killed` where it lost its worker `ATTEMPTS` times, and
+        `Unsendable` where what came of it cannot be pickled. A failure stops no other job.
     """
     if not jobs:
         return {}
@@ -81,14 +82,14 @@ def execute(
         pool as chosen,
         tqdm(total=total, unit=unit, disable=not progress, mininterval=interval()) as bar,
     ):
-        pending = {chosen.submit(job): name for name, job in jobs.items()}
+        pending = {chosen.submit(pack, job): name for name, job in jobs.items()}
         while pending:
             for future in wait(pending, timeout=WAIT, return_when=FIRST_COMPLETED).done:
                 # The future is forgotten: as long as it is held, Dask does a job again whose
                 # worker it loses.
                 name, shown = pending.pop(future), ""
                 try:
-                    shown = keep(name, future.result())
+                    shown = keep(name, unpack(future.result()))
                 except Exception as error:
                     failures[name] = error
                 del future

@@ -37,8 +37,8 @@ def check_workers(workers: int | None, *, sure: bool = False) -> int:
         )
     if workers > room and not sure:
         raise ParameterError(
-            f"workers = {workers} must be at most {room}: each takes about {_gb(MEMORY)} of memory,"
-            f" and {_gb(free)} are free"
+            f"workers = {workers} must be at most {room}: each takes about {_size(MEMORY)} of"
+            f" memory, and {_size(free)} are free"
         )
     return workers
 
@@ -46,7 +46,7 @@ def check_workers(workers: int | None, *, sure: bool = False) -> int:
 def told(workers: int) -> str:
     """What so many workers take, in a sentence."""
     each = f"{workers} workers, each of which takes" if workers > 1 else "1 worker, which takes"
-    return f"{each} about {_gb(MEMORY)} of memory; {_gb(free_memory())} are free"
+    return f"{each} about {_size(MEMORY)} of memory; {_size(free_memory())} are free"
 
 
 def usable_cores() -> int:
@@ -88,5 +88,5 @@ def _words(file: Path) -> list[str]:
         return ["max"]
 
 
-def _gb(size: float) -> str:
-    return f"{size / 1e9:.1f} GB"
+def _size(memory: float) -> str:
+    return f"{memory / 1e9:.1f} GB" if memory >= 1e9 else f"{memory / 1e6:.0f} MB"

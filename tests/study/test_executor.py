@@ -79,7 +79,7 @@ class Program:
 
     def start(self, **jobs: str) -> subprocess.Popen:
         pairs = [f"{name}={then}" for name, then in jobs.items()]
-        paths = [str(self.folder), os.getcwd()]
+        paths = [str(self.folder), str(Path.cwd())]
         self.sessions.append(
             subprocess.Popen(
                 [sys.executable, "-c", PROGRAM, *pairs],
