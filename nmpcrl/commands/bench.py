@@ -2,6 +2,8 @@
 
 import click
 
+PROBLEMS = 100_000  # of a sweep
+
 
 @click.command()
 @click.option("--full", "length", flag_value="full", default=True, help="Minutes; the default.")
@@ -9,18 +11,37 @@ import click
 @click.option("--smoke", "length", flag_value="smoke", help="To see that it works.")
 @click.option("--again", is_flag=True, help="Measure even if there is a benchmark of this code.")
 @click.option("--publish", is_flag=True, help="Only time the learners; publish C3 and C4 anew.")
-def bench(length: str, again: bool, publish: bool) -> None:
+@click.option(
+    "--sweep",
+    metavar="[N]",
+    is_flag=False,
+    flag_value=PROBLEMS,
+    type=int,
+    help=f"Solve N drawn problems, {PROBLEMS:,} by default, and count what became of them.",
+)
+def bench(length: str, again: bool, publish: bool, sweep: int | None) -> None:
     """Measure how long solves, steps and runs take, and hold it against what is
     to be reached.
 
     \b
     Example:
       nmpcrl bench --short
+      nmpcrl bench --sweep 1000
     """
-    if publish:
+    if sweep is not None:
+        _sweep(sweep)
+    elif publish:
         _publish_timing()
     else:
         _print_times(length, again=again)
+
+
+def _sweep(problems: int) -> None:
+    """What became of so many drawn problems, and where that is kept."""
+    from nmpcrl.bench import sweep
+
+    click.echo(str(sweep.sweep(problems)))
+    click.echo(f"{sweep.path()}: kept")
 
 
 def _print_times(length: str, *, again: bool) -> None:

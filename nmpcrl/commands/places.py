@@ -7,6 +7,17 @@ from typing import Any
 import click
 
 
+def refuse_unwritable(folder: Path) -> None:
+    """Refuse a folder that takes no file, or that cannot be made.
+
+    Raises:
+        OSError: it is so; the error names the place.
+    """
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    with tempfile.TemporaryFile(dir=there):
+        return
+
+
 class NewFile(click.Path):
     """A file that can be written: its folder is there, and takes files."""
 

@@ -9,7 +9,9 @@ import click
 SAID = (  # errors whose message is a sentence for the reader, and where they are defined
     ("nmpcrl.study.parameters", "ParameterError"),
     ("nmpcrl.study.records", "DamagedRecords"),
+    ("nmpcrl.study.place", "StoreError"),
     ("nmpcrl.study.cluster", "NoCluster"),
+    ("nmpcrl.bench.sweep", "DamagedSweep"),
     ("nmpcrl.analysis.summaries", "Failed"),
     ("nmpcrl.claims.published", "Damaged"),
     ("nmpcrl.claims.verification", "CannotRelock"),

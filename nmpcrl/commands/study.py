@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nmpcrl.commands.places import NewFile
+from nmpcrl.commands.places import NewFile, refuse_unwritable
+from nmpcrl.commands.workers import check
 
 if TYPE_CHECKING:
     from nmpcrl.analysis.summary import RunSummary
@@ -16,18 +17,22 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--part", "parts", multiple=True, help="Only this part: main, controls or a variant.")
-@click.option("--workers", type=click.IntRange(1), help="Processes; as many as cores by default.")
+@click.option("--workers", metavar="N", type=int, help="Processes; by default one a core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster that trains instead.")
+@click.option("--security", metavar="FILE", help="Certificates for a scheduler at tls://.")
 @click.option("--dry-run", is_flag=True, help="Only say how much is to be done.")
 @click.option("--table", metavar="PATH", type=NewFile(), help="Episodes, as CSV.")
 @click.option("--publish", is_flag=True, help="Judge what was asked for and write book/published.")
+@click.option("--yes", "-y", is_flag=True, help="More workers than there is room for.")
 def study(
     parts: tuple[str, ...],
     workers: int | None,
     scheduler: str | None,
+    security: str | None,
     dry_run: bool,
     table: Path | None,
     publish: bool,
+    yes: bool,
 ) -> None:
     """Train whatever is missing of the study; interrupt it and start it again
     as you like.
@@ -37,10 +42,10 @@ def study(
       nmpcrl study --part main --table episodes.csv.gz
     """
     from nmpcrl.analysis import summaries
-    from nmpcrl.claims.publish import publish_study
     from nmpcrl.study import cluster
 
     chosen = _chosen(parts)
+    _check(workers, scheduler, security, publish=publish, sure=yes)
     missing = [e for e in chosen if not summaries.is_stored(e)]
     hours = sum(map(summaries.seconds_of, missing)) / 3600
     click.echo(
@@ -49,16 +54,41 @@ def study(
     )
     if dry_run:
         return
-    with cluster.executor(scheduler) if scheduler else nullcontext() as executor:
+    there = cluster.executor(scheduler, security=security) if scheduler else nullcontext()
+    with there as executor:
         found = summaries.fetch_summaries(
             chosen, executor=executor, workers=workers, strict=publish
         )
     if table:
         _write(table, found, chosen)
     if publish:
+        from nmpcrl.claims.publish import publish_study
+
         click.echo(f"{publish_study(found, chosen)}: published")
     if len(found) < len(chosen):
         raise SystemExit(1)  # what failed has been said
+
+
+def _check(
+    workers: int | None,
+    scheduler: str | None,
+    security: str | None,
+    *,
+    publish: bool,
+    sure: bool,
+) -> None:
+    """Refuse, before any work, what would fail after it."""
+    from nmpcrl.study import cluster
+
+    check(workers, sure=sure)
+    if scheduler is not None:
+        cluster.check(scheduler, security=security)
+    elif security is not None:
+        raise click.ClickException("--security goes with --scheduler, which is not given")
+    if publish:
+        from nmpcrl.claims import published
+
+        refuse_unwritable(published.place())
 
 
 def _chosen(parts: tuple[str, ...]) -> "dict[Experiment, str]":

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Settings)
-@click.option("-y", "--yes", is_flag=True, help="Train it even if it takes very long.")
+@click.option("--yes", "-y", is_flag=True, help="Train it even if it takes very long.")
 def train(yes: bool, **fields: Any) -> None:
     """Train one run and store it; a stored one is read.
 
@@ -23,14 +23,22 @@ def train(yes: bool, **fields: Any) -> None:
     """
     from nmpcrl.report.run import verdict
     from nmpcrl.study import Experiment
+    from nmpcrl.study.limits import estimate
     from nmpcrl.study.store import path_of
 
     experiment = Experiment(**fields)
-    records = fetched(experiment)
     path = path_of(experiment)
+    if not path.is_file():
+        estimate([experiment]).refuse(sure=yes or None, lift="--yes")
+    records = fetched(experiment)
+    if not path.is_file():  # the store has said why
+        click.echo(f"{experiment}: {records.facts['stopped']}")
+        click.echo(verdict(records))
+        raise SystemExit(1)
     click.echo(f"{path}: {records.facts['stopped']}")
     click.echo(verdict(records))
-    click.echo(f"Next: nmpcrl evaluate {path.stem}")
+    click.echo(f"Next: nmpcrl show {path.stem}")
+    click.echo(f"      nmpcrl compare {path.stem} {_other(experiment)}")
 
 
 def fetched(experiment: "Experiment") -> "Records":

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from nmpcrl.commands.workers import check
+
 if TYPE_CHECKING:
     from nmpcrl.claims.published import Published
 
@@ -13,14 +15,16 @@ RELOCKED = 60  # runs that are trained afresh before the code is locked anew
 @click.command()
 @click.option("--sample", type=click.IntRange(0), default=0, help="Train so many runs for it.")
 @click.option("--relock", is_flag=True, help="Show that an edit changed no bit, and lock the code.")
-@click.option("--workers", type=click.IntRange(1), help="Processes; as many as cores by default.")
-def verify(sample: int, relock: bool, workers: int | None) -> None:
+@click.option("--workers", metavar="N", type=int, help="Processes; by default one a core.")
+@click.option("--yes", "-y", is_flag=True, help="More workers than there is room for.")
+def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
     """Hold the runs that were trained here against the published ones.
 
     \b
     Example:
       nmpcrl verify --sample 5
     """
+    check(workers, sure=yes)
     from nmpcrl.claims import published
 
     known = published.load()
