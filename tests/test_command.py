@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.rule import Verdict
+from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 
@@ -79,9 +79,9 @@ def test_training_again_reads_the_stored_run(command, tmp_path, monkeypatch):
     ("words", "sentence"),
     [
         (("--learner", "SARSA"), f"learner = 'SARSA' must be one of {', '.join(LEARNERS)}"),
-        (("--episodes", "0"), "episodes = 0 must be a whole number, 1 or more"),
+        (("--episodes", "0"), "episodes = 0 must be a whole number from 1 to 100000"),
         (("--layout", "Z"), f"layout = 'Z' must be one of {', '.join(paper.LAYOUTS)}"),
-        (("--alpha", "-1"), "alpha = -1.0 must be a positive number"),
+        (("--alpha", "-1"), "alpha = -1.0 must be a number in (0, 1e+06]"),
         (("--decay", "k"), "decay = 'k' must be one of step, episode"),
     ],
 )

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
+from nmpcrl.commands import main
 
 ROOT = Path(__file__).resolve().parents[1]
 PATHS = sorted((ROOT / ".github/workflows").glob("*.yml"))

@@ -6,8 +6,8 @@ import tempfile
 import pytest
 from click.testing import CliRunner
 
-from nmpcrl.__main__ import main
 from nmpcrl.bench import suite
+from nmpcrl.commands import main
 from nmpcrl.study import ParameterError, StoreError, store
 
 

@@ -24,10 +24,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import Failed, fetch_summaries
 from nmpcrl.analysis.summary import summarise
+from nmpcrl.commands import main
 from nmpcrl.study import cluster, provenance, run, sweep
 from nmpcrl.study.cluster import NoCluster
 
