@@ -174,7 +174,7 @@ def rewritten(path: Path, change) -> None:
 
 
 DAMAGES = {
-    "two bytes flipped": lambda path: flip(path, 2),
+    "two bytes garbled": lambda path: garble(path, 2),
     "cut short": lambda path: path.write_bytes(path.read_bytes()[:-300]),
     "empty": lambda path: path.write_bytes(b""),
     "of another run": lambda path: shutil.copy(summaries.path_of(THREE[1]), path),
@@ -191,7 +191,7 @@ DAMAGES = {
 }
 
 
-def flip(path: Path, count: int) -> None:
+def garble(path: Path, count: int) -> None:
     content = bytearray(path.read_bytes())
     for place in range(1, count + 1):
         content[place * len(content) // (count + 2)] ^= 0x5A

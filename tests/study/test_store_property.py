@@ -200,7 +200,7 @@ class OfRuns(RuleBasedStateMachine):
 
     @rule(
         experiment=each,
-        how=st.sampled_from(["flip", "cut", "empty", "folder", "gone", "text"]),
+        how=st.sampled_from(["garble", "cut", "empty", "folder", "gone", "text"]),
         places=st.lists(st.floats(0, 1, exclude_max=True), min_size=1, max_size=3),
         wrong=st.integers(1, 255),
     )
@@ -210,7 +210,7 @@ class OfRuns(RuleBasedStateMachine):
             return
         content = bytearray(path.read_bytes())
         at = [int(place * len(content)) for place in places]
-        if how == "flip":
+        if how == "garble":
             for place in at:
                 content[place] ^= wrong
             path.write_bytes(content)
@@ -221,7 +221,7 @@ class OfRuns(RuleBasedStateMachine):
         else:
             path.write_bytes({"cut": content[: at[0]], "empty": b"", "text": b"hello"}[how])
         self.whole.discard(experiment)
-        self.doubtful |= {experiment} if how == "flip" else set()
+        self.doubtful |= {experiment} if how == "garble" else set()
 
     @rule(one=each, other=each, swap=st.booleans())
     def mistake(self, one, other, swap) -> None:
