@@ -33,8 +33,7 @@ from nmpcrl.study.reservation import PLACE
 
 EXPERIMENTS = tuple(
     Experiment(learner, seed=seed, episodes=2, steps=3, evaluate_every=1)
-    for learner in ("ES", "frozen")
-    for seed in (0, 1)
+    for learner, seed in (("ES", 0), ("ES", 1), ("frozen", 0))
 )
 SYSTEM = {"posix", "fcntl", "io", "_io"}  # the modules whose functions call it
 MEMORY = Path("/dev/shm")  # where nobody waits for a disk
