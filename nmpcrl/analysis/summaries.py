@@ -92,27 +92,29 @@ def _make_all(
     """Make what nobody else is at; what is left, once one of those is no longer."""
     expected = signature()
     names = {e: f"{FOLDER}/{path_of(e).name}" for e in missing}
-    reserved = reservations(store.folder())
-    mine = reserved.take(names.values())
-    left = [e for e in missing if names[e] not in mine]
+    mine, left = reservations(store.folder()), list[Experiment]()
+
+    def begin(experiment: Experiment) -> bool:
+        if not mine.take([names[experiment]]):
+            left.append(experiment)
+        elif one := _read_or_set_aside(experiment):  # it has been stored meanwhile
+            found[experiment] = one
+            mine.release([names[experiment]])
+        else:
+            return True
+        return False
 
     def store_it(experiment: Experiment, made: RunSummary) -> str:
         found[experiment] = made
         keep(experiment, made)
-        reserved.release([names[experiment]])
-        mine.remove(names[experiment])
+        mine.release([names[experiment]])
         return ""
 
+    jobs = {e: partial(make, e, expected) for e in missing}
     try:
-        jobs = {}
-        for experiment in (e for e in missing if e not in left):
-            if one := _read_or_set_aside(experiment):  # it has been stored meanwhile
-                found[experiment] = one
-            else:
-                jobs[experiment] = partial(make, experiment, expected)
-        failed = execute(jobs, store_it, **options)
+        failed = execute(jobs, store_it, begin=begin, **options)
     finally:
-        reserved.release(mine)
+        mine.release(names.values())
     for experiment, error in failed.items():
         _note(experiment, error)
     failures |= failed
