@@ -92,29 +92,34 @@ def _make_all(
     """Make what nobody else is at; what is left, once one of those is no longer."""
     expected = signature()
     names = {e: f"{FOLDER}/{path_of(e).name}" for e in missing}
-    mine, left = reservations(store.folder()), list[Experiment]()
+    reserved, mine, left = reservations(store.folder()), set[str](), list[Experiment]()
 
     def begin(experiment: Experiment) -> bool:
-        if not mine.take([names[experiment]]):
+        if not reserved.take([names[experiment]]):
             left.append(experiment)
-        elif one := _read_or_set_aside(experiment):  # it has been stored meanwhile
+            return False
+        mine.add(names[experiment])
+        if one := _read_or_set_aside(experiment):  # it has been stored meanwhile
             found[experiment] = one
-            mine.release([names[experiment]])
-        else:
-            return True
-        return False
+            end(experiment)
+            return False
+        return True
+
+    def end(experiment: Experiment) -> None:
+        reserved.release([names[experiment]])
+        mine.remove(names[experiment])
 
     def store_it(experiment: Experiment, made: RunSummary) -> str:
         found[experiment] = made
         keep(experiment, made)
-        mine.release([names[experiment]])
+        end(experiment)
         return ""
 
     jobs = {e: partial(make, e, expected) for e in missing}
     try:
         failed = execute(jobs, store_it, begin=begin, **options)
     finally:
-        mine.release(names.values())
+        reserved.release(mine)
     for experiment, error in failed.items():
         _note(experiment, error)
     failures |= failed
