@@ -45,7 +45,7 @@ test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; n
 	@$(BIN)/python -m pytest -m lab
 
 test-fast: .venv/ready  ## The fast tests: no book, no training
-	@$(BIN)/python -m pytest -m "not slow and not book and not lab"
+	@$(BIN)/python -m pytest -m "not slow and not book and not slurm and not lab"
 
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks
 	@$(BIN)/ruff check .

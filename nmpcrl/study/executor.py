@@ -26,6 +26,11 @@ from typing import Any, TypeVar
 
 from tqdm import tqdm
 
+from nmpcrl.study.orphans import end_with_parent
+from nmpcrl.study.outcome import pack, unpack
+from nmpcrl.study.workers import check_workers as check_workers
+from nmpcrl.study.workers import told
+
 SPAWN = get_context("spawn")  # a fork would copy the threads' locks but not the threads
 ATTEMPTS = 3  # how often a job is begun whose worker is killed
 THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -43,6 +48,7 @@ def execute(
     jobs: Mapping[Name, Callable[[], Result]],
     keep: Callable[[Name, Result], str],
     *,
+    begin: Callable[[Name], bool] = lambda _: True,
     executor: Executor | None = None,
     workers: int | None = None,
     progress: bool = True,
@@ -54,57 +60,76 @@ def execute(
     Args:
         jobs: what is called in a worker, in the order in which they begin; to be pickled.
         keep: called here with each result; it says what the bar shows of it, or "".
+        begin: asked here right before a job is handed over; one that it refuses is left out.
         executor: runs the jobs; by default processes, one thread each. One that the caller gives is
             not replaced if it loses a worker.
-        workers: how many processes; by default as many as there are cores.
-        progress: whether to show a bar with what has ended, what failed, and the time left.
+        workers: how many processes; by default as many as there are cores and memory for.
+            `check_workers` refuses more than that.
+        progress: whether to say what the processes take, and to show a bar with what has ended,
+            what failed, and the time left.
         size: of a job, in units of the bar.
         unit: of the bar.
 
     Returns:
-        What each job raised that failed; `Killed` where it lost its worker `ATTEMPTS` times. A
-        failure stops no other job.
+        What each job raised that failed; `Killed` where it lost its worker `ATTEMPTS` times, and
+        `Unsendable` where what came of it cannot be pickled. A failure stops no other job.
     """
     if not jobs:
         return {}
     failures: dict[Name, Exception] = {}
-    pool = nullcontext(executor) if executor else processes(workers, len(jobs))
+    count = min(check_workers(workers, sure=True), len(jobs))
+    pool = nullcontext(executor) if executor else processes(count, tell=progress)
+    ahead = len(jobs) if executor else 2 * count  # in flight: what waits there, others cannot take
     total = sum(map(size, jobs))
     with (
         without_main(),
         pool as chosen,
         tqdm(total=total, unit=unit, disable=not progress, mininterval=interval()) as bar,
     ):
-        pending = {chosen.submit(job): name for name, job in jobs.items()}
-        while pending:
+        waiting, pending = [*jobs][::-1], dict[Future[bytes], Name]()
+
+        def hand_over() -> bool:
+            """Keep as many jobs in flight as there should be; whether any is."""
+            while waiting and len(pending) < ahead:
+                name = waiting.pop()
+                if begin(name):
+                    pending[chosen.submit(pack, jobs[name])] = name
+                else:
+                    bar.total -= size(name)
+            return bool(pending)
+
+        while hand_over():
             for future in wait(pending, timeout=WAIT, return_when=FIRST_COMPLETED).done:
                 # The future is forgotten: as long as it is held, Dask does a job again whose
                 # worker it loses.
                 name, shown = pending.pop(future), ""
                 try:
-                    shown = keep(name, future.result())
+                    shown = keep(name, unpack(future.result()))
                 except Exception as error:
                     failures[name] = error
                 del future
                 bar.update(size(name))
-                _describe(bar, len(jobs), pending, len(failures), shown)
+                ended = len(jobs) - len(waiting) - len(pending)
+                _describe(bar, f"{ended}/{len(jobs)}", pending, len(failures), shown)
     return failures
 
 
 def _describe(
-    bar: "tqdm[Any]", jobs: int, pending: Mapping[Future[Any], Any], failed: int, shown: str
+    bar: "tqdm[Any]", ended: str, pending: Mapping[Future[Any], Any], failed: int, shown: str
 ) -> None:
     """What the bar says beside its numbers."""
     running = sum(future.running() for future in pending)  # a cluster does not tell
     parts = [f"{running} running"] * (running > 0) + [f"{failed} failed"] * (failed > 0)
-    bar.set_description(f"{jobs - len(pending)}/{jobs} done", refresh=False)
+    bar.set_description(f"{ended} done", refresh=False)
     bar.set_postfix_str(", ".join([*parts, *([shown] if shown else [])]), refresh=False)
 
 
 @contextmanager
-def processes(workers: int | None, jobs: int) -> Iterator[Executor]:
-    """Processes of this machine, no more than there are jobs; an error ends them at once."""
-    slots = Slots(min(workers or os.cpu_count() or 1, jobs))
+def processes(workers: int, *, tell: bool = False) -> Iterator[Executor]:
+    """So many processes of this machine; an error ends them at once."""
+    if tell:
+        print(told(workers), file=sys.stderr)
+    slots = Slots(workers)
     try:
         yield slots
     except BaseException:
@@ -163,8 +188,13 @@ class Slots(Executor):
 def _process() -> ProcessPoolExecutor:
     """A worker process with one thread; the setting is inherited, so it is made here."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
-    quiet = (signal.SIGINT, signal.SIG_DFL)  # an interrupt ends a worker without a traceback
-    return ProcessPoolExecutor(1, SPAWN, initializer=signal.signal, initargs=quiet)
+    return ProcessPoolExecutor(1, SPAWN, initializer=_begin_worker)
+
+
+def _begin_worker() -> None:
+    """What a worker does first."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # an interrupt ends it without a traceback
+    end_with_parent()
 
 
 def kill(pool: ProcessPoolExecutor) -> None:
