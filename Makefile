@@ -30,7 +30,7 @@ chapter: .venv/ready  ## One chapter: make chapter CHAPTER=03_rdes P="-p episode
 	@$(BIN)/python book/build.py --chapter "$(CHAPTER)" $(P)
 
 lab: .venv-lab/ready  ## Open the chapters in JupyterLab, which has an environment of its own
-	@NMPCRL_RUNS="$(or $(NMPCRL_RUNS),$(CURDIR)/runs)" .venv-lab/bin/jupyter lab book
+	@NMPCRL_RUNS="$(or $(NMPCRL_RUNS),$(CURDIR)/runs)" .venv-lab/bin/jupyter lab --preferred-dir=book
 
 study: .venv/ready  ## Train the whole study, or what is missing of it: hours, and it can be interrupted
 	@$(BIN)/python -m nmpcrl study
@@ -78,5 +78,5 @@ clean:  ## Remove the built book; stored runs stay
 	@echo "Installing JupyterLab, the pinned packages of $<, into .venv-lab: a minute, once."
 	@$(BIN)/python -m venv --clear .venv-lab
 	@.venv-lab/bin/pip install -qq --disable-pip-version-check -r $<
-	@$(BIN)/python -m ipykernel install --prefix .venv-lab --name python3 >/dev/null
+	@$(BIN)/python -m ipykernel install --prefix .venv-lab --name python3 >/dev/null 2>&1
 	@touch $@
