@@ -290,7 +290,7 @@ import nbformat
 from nmpcrl.study import Experiment, Runs, run
 
 one = Experiment(episodes=1, steps=5)
-cell = nbformat.read("book/02_expected_sarsa.ipynb", as_version=4).cells[-1]
+cell = nbformat.read("book/02_expected_sarsa.ipynb", as_version=4).cells[-2]
 names = {"runs": Runs({one: run(one)})}
 exec(cell.source.replace("\\nends(", "\\nfigure = ends("), names)
 names["figure"].savefig("ends.svg")
