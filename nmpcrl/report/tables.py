@@ -43,9 +43,9 @@ def claim_table(claims: Iterable[Claim], caption: str) -> str:
     """One row a claim, in HTML: what will be asked of each run, and how it will be decided."""
     rows = (
         (
-            f"<strong>{escape(c.name)}</strong> {escape(c.statement)}",
-            f"{escape(c.question)}<br>{escape(_sentence(c.measured))}",
-            f"{escape(_sentence(c.border))}<br>{escape(_sentence(c.test))}",
+            f"<strong>{_text(c.name)}</strong> {_text(c.statement)}",
+            f"{_text(c.question)}<br>{_text(_sentence(c.measured))}",
+            f"{_text(_sentence(c.border))}<br>{_text(_sentence(c.test))}",
         )
         for c in claims
     )
@@ -61,7 +61,7 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str) -> str:
     """
     rows = (
         (
-            f"<strong>{escape(v.claim)}</strong> {escape(v.statement)}",
+            f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}",
             f"{_badge(v.outcome, BADGES[v.outcome])}{_share(v)}",
         )
         for v in verdicts
@@ -77,7 +77,7 @@ def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
     header = ("Claim", "All", *layouts, *(f"per {name}" for name in decays))
     rows = (
         (
-            f"<strong>{escape(v.claim)}</strong>",
+            f"<strong>{_text(v.claim)}</strong>",
             _word(v.outcome),
             *(_word(v.by_layout.get(name)) for name in layouts),
             *(_word(v.by_decay.get(name)) for name in decays),
@@ -89,16 +89,14 @@ def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
 
 def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
     """One row an assumption of the theorem, in HTML: what it asks for and what is run."""
-    rows = (
-        (escape(a.theorem), f"{_badge(*HELD[a.holds])}<br>{escape(a.here)}") for a in assumptions
-    )
+    rows = ((_text(a.theorem), f"{_badge(*HELD[a.holds])}<br>{_text(a.here)}") for a in assumptions)
     return _table(caption, ("The theorem assumes", "Here"), rows)
 
 
 def target_table(targets: Iterable[Target], caption: str) -> str:
     """One row a figure to reach, in HTML: what was measured, and whether that is enough."""
     rows = (
-        (escape(t.what), escape(t.to_reach), f"{_badge(*MET[t.reached])}<br>{escape(t.measured)}")
+        (_text(t.what), _text(t.to_reach), f"{_badge(*MET[t.reached])}<br>{_text(t.measured)}")
         for t in targets
     )
     return _table(caption, ("What", "To reach", "Here"), rows)
@@ -123,7 +121,7 @@ def timing_table(timings: pd.DataFrame) -> str:
     """
     rows = (
         (
-            *(escape(row[name]) for name in ("solver", "learner")),
+            *(_text(row[name]) for name in ("solver", "learner")),
             *("–" if pd.isna(row[name]) else f"{row[name]:.3g}" for name in TIMES),
             str(Ratio(*(row[name] for name in COMPARED))),
         )
@@ -192,23 +190,30 @@ def _options(names: list[str]) -> str:
     return f"Set {given}, as in `sweep({first}={value or '...'})`."
 
 
+LEFT = 'style="text-align: left"'  # the theme and Jupyter turn cells to the right
+
+
 def _table(
     caption: str, header: tuple[str, ...], rows: Iterable[tuple[str, ...]], *, headed: bool = False
 ) -> str:
     """A table whose cells are HTML already; `headed` if they are words in rows that have a name."""
-    left = 'style="text-align: left"'  # the theme turns headers to the right
-    head = "".join(f'<th scope="col" {left}>{escape(name)}</th>' for name in header)
-    body = "".join(f"<tr>{_row(row, left if headed else '')}</tr>" for row in rows)
+    head = "".join(f'<th scope="col" {LEFT}>{_text(name)}</th>' for name in header)
+    body = "".join(f"<tr>{_row(row, headed)}</tr>" for row in rows)
     return (
-        f'<table class="table dataframe{" words" * headed}"><caption>{escape(caption)}</caption>'
+        f'<table class="table dataframe{" words" * headed}"><caption>{_text(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
     )
 
 
-def _row(cells: tuple[str, ...], left: str) -> str:
-    first, *others = cells
-    name = f'<th scope="row" {left}>{first}</th>' if left else f"<td>{first}</td>"
-    return name + "".join(f"<td>{cell}</td>" for cell in others)
+def _row(cells: tuple[str, ...], headed: bool) -> str:
+    first, *others = (f"{LEFT}>{cell}" for cell in cells)
+    name = f'<th scope="row" {first}</th>' if headed else f"<td {first}</td>"
+    return name + "".join(f"<td {cell}</td>" for cell in others)
+
+
+def _text(text: str) -> str:
+    """Text as HTML, with the code in it marked."""
+    return re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(text))
 
 
 def _badge(text: str, style: str) -> str:

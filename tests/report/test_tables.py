@@ -27,7 +27,7 @@ def verdict(outcome: str, **judged) -> Verdict:
 
 def cells(table: str) -> list[list[str]]:
     """The words of a table, row by row, its header included."""
-    rows = BeautifulSoup(table, "html.parser").find_all("tr")
+    rows = BeautifulSoup(re.sub("</?code>", "`", table), "html.parser").find_all("tr")
     return [[cell.get_text("|") for cell in row.find_all(["th", "td"])] for row in rows]
 
 
