@@ -48,6 +48,17 @@ UNREAD = {  # by selector
     "a macro": "mjx-container mtext[mathcolor=red]",
 }
 
+PAGE_ONLY = {  # a source, and what should be found in it
+    "see {ref}`ch:mdp`": "a role",
+    "costs {glue:text}`es-cost:.2f`": "a role",
+    ":::{admonition} Try\n:::": "a directive",
+    "```{math}\nx\n```": "a directive",
+    "(ch:mdp)=\n# Title": "a label",
+    "$$x$$ (eq:a)": "a label",
+    "where $\\vtheta$ is": "a macro",
+    "where $\\frac{a}$ is": "a formula",
+}
+
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_state = pytest.mark.parametrize("state", ["source", "executed"])
 
@@ -140,9 +151,9 @@ def opened(address, folder, browser) -> Iterator[Any]:
     tab.close()
 
 
-def raw(tab: Any) -> list[tuple[str, str]]:
-    """What a notebook editor could not read: its kind, and where it stands."""
-    shown = tab.locator(SHOWN)
+def raw(part: Any) -> list[tuple[str, str]]:
+    """What a notebook editor could not read in a part of its page: kinds, and where they stand."""
+    shown = part.locator(SHOWN)
     texts = shown.evaluate_all(f"all => all.map({READ})")
     found = [(what, text) for text in texts for what in RAW if re.search(RAW[what], text)]
     for what, selector in UNREAD.items():
@@ -156,23 +167,12 @@ def test_nothing_is_left_raw_in_a_plain_jupyterlab(opened, state, name):
     assert raw(opened(state, name)) == []
 
 
-@pytest.mark.parametrize(
-    ("source", "what"),
-    [
-        ("see {ref}`ch:mdp`", "a role"),
-        ("costs {glue:text}`es-cost:.2f`", "a role"),
-        (":::{admonition} Try\n:::", "a directive"),
-        ("```{math}\nx\n```", "a directive"),
-        ("(ch:mdp)=\n# Title", "a label"),
-        ("$$x$$ (eq:a)", "a label"),
-        ("where $\\vtheta$ is", "a macro"),
-        ("where $\\frac{a}$ is", "a formula"),
-    ],
-)
-def test_what_only_the_page_can_show_would_be_found(opened, folder, source, what):
-    cell = nbformat.v4.new_markdown_cell(source)
-    nbformat.write(nbformat.v4.new_notebook(cells=[cell]), folder / "source/raw.ipynb")
-    assert what in dict(raw(opened("source", "raw")))
+def test_what_only_the_page_can_show_would_be_found(opened, folder):
+    cells = [nbformat.v4.new_markdown_cell(source) for source in PAGE_ONLY]
+    nbformat.write(nbformat.v4.new_notebook(cells=cells), folder / "source/raw.ipynb")
+    shown = opened("source", "raw").locator(".jp-Cell").all()
+    for cell, (source, what) in zip(shown, PAGE_ONLY.items(), strict=True):
+        assert what in dict(raw(cell)), source
 
 
 def test_chapter_2_shows_the_td_error_of_its_parameters(opened):
