@@ -7,12 +7,10 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 
@@ -22,13 +20,6 @@ STUDY = {
     **dict.fromkeys(sweep(learner=("ES", "frozen"), seed=(0, 1), **SHORT), "main"),
     **dict.fromkeys(sweep(learner=("ES", "frozen"), horizon=5, **SHORT), "N = 5"),
 }
-
-
-@pytest.fixture
-def command(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "published"))
-    return lambda *words: CliRunner().invoke(main, words)
 
 
 @pytest.fixture
