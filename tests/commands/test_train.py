@@ -141,7 +141,9 @@ def test_a_run_that_cannot_be_stored_is_refused_before_it_is_trained(command, as
     (tmp_path / "runs").write_text("a file")
     refused = command("train", "--episodes", "1")
     assert refused.exit_code == 1
-    assert not asked or "Traceback" not in refused.output
+    assert refused.output.startswith(f"Error: {tmp_path / 'runs'}")
+    assert len(refused.output.splitlines()) == 1
+    assert not asked
 
 
 def test_the_verdict_of_a_run_that_could_not_be_stored_is_told_all_the_same(command, monkeypatch):
