@@ -38,6 +38,7 @@ assert "QNetwork" in nmpcrl.learning.__all__
         ("import nmpcrl.learning", []),
         ("import nmpcrl.study", []),
         ("import nmpcrl.analysis.metrics", []),
+        ("import nmpcrl.analysis.summaries", []),
         ("import nmpcrl.bench", []),
         (NETWORK, ["torch"]),
         (TRAIN.format(learner="ES"), ["numba"]),

@@ -22,9 +22,9 @@ def imported(tree: ast.AST) -> set[str]:
     return names
 
 
-def test_nothing_is_unpickled():
+def test_nothing_is_unpickled_but_what_a_worker_answers():
     for path, tree in TREES.items():
-        assert not imported(tree) & UNPICKLERS, path
+        assert not imported(tree) & UNPICKLERS or path.name == "outcome.py", path
         calls = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Call)]
         loads = [call for call in calls if call.startswith("np.load(")]
         assert all("allow_pickle=False" in load for load in loads), path
@@ -37,5 +37,5 @@ def test_only_a_cluster_is_connected_to():
 
 def test_files_that_the_page_names_are_there():
     named = re.findall(r"`([\w/]+\.(?:py|md))`", TEXT)
-    assert len(named) == 2
+    assert len(named) == 3
     assert all((ROOT / name).is_file() for name in named)

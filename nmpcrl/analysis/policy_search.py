@@ -19,7 +19,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.learning.rollout import Persistent, evaluate
-from nmpcrl.study import paper, store
+from nmpcrl.study import paper, place, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.executor import execute
 from nmpcrl.study.parameters import LARGEST_SEED, Allowed, OneOf, Whole
@@ -116,11 +116,14 @@ def search_all(
         progress: whether to show a bar.
 
     Raises:
+        StoreError: searches are missing and could not be stored; nothing is searched.
         Exception: what the first search raised that failed; the others are stored.
     """
     wanted = tuple(dict.fromkeys(searches))
     kept = _kept()
     missing = [one for one in wanted if one not in kept]
+    if missing:
+        store.check_folder()
 
     def keep(one: Search, found: Found) -> str:
         kept[one] = found
@@ -162,22 +165,23 @@ def _depends_on() -> dict[str, Any]:
 
 def _kept() -> dict[Search, Found]:
     """The searches in the file, if they are of this code and these versions."""
-    place = _place()
+    path = _place()
     try:
-        kept = json.loads(place.read_text())
+        kept = json.loads(path.read_text())
         if kept["key"] != _depends_on():
             return {}
         return {Search(**one): Found(**_tuples(found)) for one, found in kept["searches"]}
     except FileNotFoundError:
         return {}
-    except (ValueError, LookupError, TypeError) as error:
-        print(f"{place} is damaged ({error}) and is searched again", file=sys.stderr)
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        print(f"{path} is damaged ({error}) and is searched again", file=sys.stderr)
         return {}
 
 
 def _keep(found: Mapping[Search, Found]) -> None:
     searches = [[asdict(one), asdict(result)] for one, result in found.items()]
-    write_json(_place(), {"key": _depends_on(), "searches": searches})
+    content = {"key": _depends_on(), "searches": searches}
+    place.keep(_place(), lambda path: write_json(path, content))
 
 
 def _tuples(fields: Mapping[str, Any]) -> dict[str, Any]:

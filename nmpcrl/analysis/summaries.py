@@ -92,25 +92,32 @@ def _make_all(
     """Make what nobody else is at; what is left, once one of those is no longer."""
     expected = signature()
     names = {e: f"{FOLDER}/{path_of(e).name}" for e in missing}
-    reserved = reservations(store.folder())
-    mine = reserved.take(names.values())
-    left = [e for e in missing if names[e] not in mine]
+    reserved, mine, left = reservations(store.folder()), set[str](), list[Experiment]()
+
+    def begin(experiment: Experiment) -> bool:
+        if not reserved.take([names[experiment]]):
+            left.append(experiment)
+            return False
+        mine.add(names[experiment])
+        if one := _read_or_set_aside(experiment):  # it has been stored meanwhile
+            found[experiment] = one
+            end(experiment)
+            return False
+        return True
+
+    def end(experiment: Experiment) -> None:
+        reserved.release([names[experiment]])
+        mine.remove(names[experiment])
 
     def store_it(experiment: Experiment, made: RunSummary) -> str:
         found[experiment] = made
         keep(experiment, made)
-        reserved.release([names[experiment]])
-        mine.remove(names[experiment])
+        end(experiment)
         return ""
 
+    jobs = {e: partial(make, e, expected) for e in missing}
     try:
-        jobs = {}
-        for experiment in (e for e in missing if e not in left):
-            if one := _read_or_set_aside(experiment):  # it has been stored meanwhile
-                found[experiment] = one
-            else:
-                jobs[experiment] = partial(make, experiment, expected)
-        failed = execute(jobs, store_it, **options)
+        failed = execute(jobs, store_it, begin=begin, **options)
     finally:
         reserved.release(mine)
     for experiment, error in failed.items():

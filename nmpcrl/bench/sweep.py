@@ -5,7 +5,6 @@ state anywhere in the box, the eight weights of theta log-uniform, so that some 
 """
 
 import json
-import sys
 import time
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -22,10 +21,13 @@ from nmpcrl.study.atomic import write_json
 from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.machine import machine
-from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.parameters import Whole
+from nmpcrl.study.place import check_folder
+from nmpcrl.study.place import keep as keep_file
 from nmpcrl.study.setup import compile_ahead
 
 SEED = 2025
+PROBLEMS = Whole(1, 10**9)  # that a sweep may have
 OF_A_LAYOUT = 400  # problems: a layout is transcribed anew
 COMPARED = 4  # every so many problems are given to Ipopt, too, which takes most of the time
 OBSTACLES = 4
@@ -108,10 +110,11 @@ def sweep(problems: int, *, workers: int | None = None, progress: bool = True) -
 
     Raises:
         ParameterError: it is no number of problems.
+        StoreError: the table could not be kept; nothing is solved.
         RuntimeError: riccati could not be compiled, so that another solver would have been judged.
     """
-    if isinstance(problems, bool) or not isinstance(problems, int) or problems < 1:
-        raise ParameterError(f"problems = {problems!r} must be a whole number, 1 or more")
+    problems = PROBLEMS.check("problems", problems)
+    check_folder()
     began, total = time.perf_counter(), Tally()
     compile_ahead([Experiment()])
     whole, rest = divmod(problems, OF_A_LAYOUT)
@@ -133,11 +136,8 @@ def sweep(problems: int, *, workers: int | None = None, progress: bool = True) -
     for error in failures.values():
         raise error
     table = SweepTable(total, _about(time.perf_counter() - began))
-    try:
-        write_json(path(), {"about": table.about, "tally": asdict(total)}, indent=1)
-    except OSError as error:
-        reason = error.strerror or error
-        print(f"{path()}: {reason}; the sweep is shown and not kept", file=sys.stderr)
+    content = {"about": table.about, "tally": asdict(total)}
+    keep_file(path(), partial(write_json, content=content, indent=1))
     return table
 
 

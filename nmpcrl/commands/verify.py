@@ -53,7 +53,7 @@ def _compare(known: "Published", sample: int, workers: int | None) -> None:
     from nmpcrl.claims import published, verification
 
     drawn = set(verification.sample(known, sample)) if sample else set()
-    own = [e for e in known.rows if e in drawn or summaries.is_stored(e)]
+    own = [e for e in known.rows if e in drawn or summaries.path_of(e).exists()]
     if not own:
         raise click.ClickException(
             "no run of the study was trained here; --sample 5 trains five for this"

@@ -150,9 +150,9 @@ def _check(table: str, columns: Mapping[str, Column], form: Form) -> None:
 
 def _checksum(arrays: Mapping[str, Column]) -> str:
     """SHA-256 of the names, types, shapes and content of arrays."""
-    digest = sha256()
+    hashed = sha256()
     for name in sorted(arrays):
         array = arrays[name]
-        digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
-        digest.update(array.tobytes())
-    return digest.hexdigest()
+        hashed.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
+        hashed.update(array.tobytes())
+    return hashed.hexdigest()

@@ -18,7 +18,7 @@ from concurrent.futures import (
     wait,
 )
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from multiprocessing import get_context
 from types import ModuleType
@@ -48,6 +48,7 @@ def execute(
     jobs: Mapping[Name, Callable[[], Result]],
     keep: Callable[[Name, Result], str],
     *,
+    begin: Callable[[Name], bool] = lambda _: True,
     executor: Executor | None = None,
     workers: int | None = None,
     progress: bool = True,
@@ -59,6 +60,7 @@ def execute(
     Args:
         jobs: what is called in a worker, in the order in which they begin; to be pickled.
         keep: called here with each result; it says what the bar shows of it, or "".
+        begin: asked here right before a job is handed over; one that it refuses is left out.
         executor: runs the jobs; by default processes, one thread each. One that the caller gives is
             not replaced if it loses a worker.
         workers: how many processes; by default as many as there are cores and memory for.
@@ -75,15 +77,28 @@ def execute(
     if not jobs:
         return {}
     failures: dict[Name, Exception] = {}
-    pool = nullcontext(executor) if executor else _processes(workers, len(jobs), tell=progress)
+    count = min(check_workers(workers, sure=True), len(jobs))
+    pool = nullcontext(executor) if executor else processes(count, tell=progress)
+    ahead = len(jobs) if executor else 2 * count  # in flight: what waits there, others cannot take
     total = sum(map(size, jobs))
     with (
         without_main(),
         pool as chosen,
         tqdm(total=total, unit=unit, disable=not progress, mininterval=interval()) as bar,
     ):
-        pending = {chosen.submit(pack, job): name for name, job in jobs.items()}
-        while pending:
+        waiting, pending = [*jobs][::-1], dict[Future[bytes], Name]()
+
+        def hand_over() -> bool:
+            """Keep as many jobs in flight as there should be; whether any is."""
+            while waiting and len(pending) < ahead:
+                name = waiting.pop()
+                if begin(name):
+                    pending[chosen.submit(pack, jobs[name])] = name
+                else:
+                    bar.total -= size(name)
+            return bool(pending)
+
+        while hand_over():
             for future in wait(pending, timeout=WAIT, return_when=FIRST_COMPLETED).done:
                 # The future is forgotten: as long as it is held, Dask does a job again whose
                 # worker it loses.
@@ -94,31 +109,26 @@ def execute(
                     failures[name] = error
                 del future
                 bar.update(size(name))
-                _describe(bar, len(jobs), pending, len(failures), shown)
+                ended = len(jobs) - len(waiting) - len(pending)
+                _describe(bar, f"{ended}/{len(jobs)}", pending, len(failures), shown)
     return failures
 
 
 def _describe(
-    bar: "tqdm[Any]", jobs: int, pending: Mapping[Future[Any], Any], failed: int, shown: str
+    bar: "tqdm[Any]", ended: str, pending: Mapping[Future[Any], Any], failed: int, shown: str
 ) -> None:
     """What the bar says beside its numbers."""
     running = sum(future.running() for future in pending)  # a cluster does not tell
     parts = [f"{running} running"] * (running > 0) + [f"{failed} failed"] * (failed > 0)
-    bar.set_description(f"{jobs - len(pending)}/{jobs} done", refresh=False)
+    bar.set_description(f"{ended} done", refresh=False)
     bar.set_postfix_str(", ".join([*parts, *([shown] if shown else [])]), refresh=False)
 
 
-def _processes(workers: int | None, jobs: int, *, tell: bool) -> AbstractContextManager[Executor]:
-    """Processes of this machine, no more than there are jobs."""
-    count = min(check_workers(workers, sure=True), jobs)
-    if tell:
-        print(told(count), file=sys.stderr)
-    return processes(count)
-
-
 @contextmanager
-def processes(workers: int) -> Iterator[Executor]:
+def processes(workers: int, *, tell: bool = False) -> Iterator[Executor]:
     """So many processes of this machine; an error ends them at once."""
+    if tell:
+        print(told(workers), file=sys.stderr)
     slots = Slots(workers)
     try:
         yield slots

@@ -84,15 +84,6 @@ def estimate(experiments: Iterable[Experiment]) -> Estimate:
     )
 
 
-def affordable(
-    experiments: Iterable[Experiment], *, sure: bool | None = None
-) -> tuple[Experiment, ...]:
-    """The experiments, once `Estimate.refuse` has not refused them."""
-    runs = tuple(experiments)
-    estimate(runs).refuse(sure=sure)
-    return runs
-
-
 def seconds_of(experiment: Experiment) -> float:
     """About how long one core takes [s]."""
     e = experiment

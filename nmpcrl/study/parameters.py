@@ -1,5 +1,6 @@
 """What a parameter may be: each kind says so in words, and refuses all else in one sentence."""
 
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
 from math import inf, nextafter
@@ -12,6 +13,7 @@ import numpy as np
 from nmpcrl.control.nmpc import ABSURD
 
 LARGEST_SEED = 2**31 - 1  # what every generator takes, whichever library's
+MOST_VALUES = 10_000  # of an axis
 LONGEST = 100  # characters of a value in a message
 
 
@@ -154,6 +156,40 @@ class Numbers:
             raise refused(name, value, self.text) from None
 
 
+@dataclass(frozen=True)
+class Several:
+    """A list of what `each` may be, without repetition: the values of an axis."""
+
+    each: Allowed
+    name: str  # of one value; the parameter's is its plural
+    choices: None = None
+
+    @property
+    def text(self) -> str:
+        """See `Allowed`."""
+        return f"a list in which each {self.name} is {self.each.text}"
+
+    def check(self, name: str, value: Any) -> tuple[Any, ...]:
+        """See `Allowed`."""
+        if isinstance(value, str) and value.strip().startswith("["):
+            raise ParameterError(
+                f"{name} = {shown(value)} arrived as text, not as a list;"
+                f" write -y '{{{name}: {shortened(value.strip())}}}'"
+            )
+        if not is_list(value):
+            single = isinstance(value, str | int | float)
+            raise refused(name, value, f"a list{f', such as [{shown(value)}]' if single else ''}")
+        if not 0 < len(value) <= MOST_VALUES:
+            many = f"{MOST_VALUES} {name} at most, not {len(value)}"
+            must = many if len(value) else f"at least one {self.name}"
+            raise ParameterError(f"{name} = {shown(value)} must name {must}")
+        values = tuple(self.each.check(self.name, one) for one in value)
+        twice = {one for one, count in Counter(values).items() if count > 1}
+        if twice:
+            raise refused(name, value, f"a list that names {shown(min(twice))} once")
+        return values
+
+
 def is_list(value: Any) -> bool:
     """Whether it holds values in a row."""
     rows = isinstance(value, np.ndarray) and value.ndim == 1
@@ -180,5 +216,10 @@ class _Short(Repr):
 
 def shown(value: Any) -> str:
     """A value as one line of a message."""
-    text = " ".join(_Short().repr(value).split())
+    return shortened(_Short().repr(value))
+
+
+def shortened(text: str) -> str:
+    """A text on one line, cut where it is long."""
+    text = " ".join(text.split())
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."

@@ -70,7 +70,7 @@ def refusal(why: str, place: Path | None = None) -> str:
 
 
 def keep(path: Path, save: Callable[[Path], None]) -> bool:
-    """Let `save` write a run to `path`, or, where that fails, to a temporary folder; say so.
+    """Let `save` write what is finished to `path`; where that fails, elsewhere, and say so.
 
     Returns:
         Whether it is where it belongs.
@@ -84,10 +84,10 @@ def keep(path: Path, save: Callable[[Path], None]) -> bool:
         place = _temporary()
         instead = place / os.path.relpath(path, folder())
         save(instead)
-        said += f"; the run is kept as {instead}: move it, or set NMPCRL_RUNS={place}"
+        said += f"; it is kept as {instead}: move it, or set NMPCRL_RUNS={place}"
     except (OSError, StoreError) as error:
         why = error.strerror if isinstance(error, OSError) else error
-        said += f", nor anything in {tempfile.gettempdir()} ({why}); the run is not stored"
+        said += f", nor anything in {tempfile.gettempdir()} ({why}); it is not stored"
     say(said)
     return False
 

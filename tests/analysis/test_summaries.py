@@ -174,7 +174,7 @@ def rewritten(path: Path, change) -> None:
 
 
 DAMAGES = {
-    "two bytes flipped": lambda path: flip(path, 2),
+    "two bytes garbled": lambda path: garble(path, 2),
     "cut short": lambda path: path.write_bytes(path.read_bytes()[:-300]),
     "empty": lambda path: path.write_bytes(b""),
     "of another run": lambda path: shutil.copy(summaries.path_of(THREE[1]), path),
@@ -191,7 +191,7 @@ DAMAGES = {
 }
 
 
-def flip(path: Path, count: int) -> None:
+def garble(path: Path, count: int) -> None:
     content = bytearray(path.read_bytes())
     for place in range(1, count + 1):
         content[place * len(content) // (count + 2)] ^= 0x5A
@@ -452,7 +452,7 @@ def wait_until(holds, seconds: float = 240.0):
         time.sleep(0.02)
 
 
-def test_one_who_asks_while_another_trains_waits_for_that(folder, trained, capsys):
+def test_two_who_ask_at_once_have_each_run_trained_once(folder, trained):
     """Two calls at once train each run once, and both end well."""
     studies = []
     threads = [threading.Thread(target=lambda: studies.append(here(THREE))) for _ in range(2)]
@@ -463,4 +463,3 @@ def test_one_who_asks_while_another_trains_waits_for_that(folder, trained, capsy
     assert [list(study) for study in studies] == [list(THREE)] * 2
     assert {path.suffix for path in folder.iterdir()} == {".npz"}
     assert sorted(e.seed for e in trained) == [0, 1, 2]
-    assert "being trained by another process, which is waited for" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """A sweep draws the same problems every time, counts each once, and keeps what it counted."""
 
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 from nmpcrl.bench import sweep
 from nmpcrl.bench.sweep import SweepTable, Tally
 from nmpcrl.control import Nmpc, SolverError
-from nmpcrl.study import ParameterError, executor, paper
+from nmpcrl.study import ParameterError, StoreError, executor, paper
 
 ROOT = Path(__file__).resolve().parents[2]
 START, THETA = np.array(paper.START), np.array(paper.THETA_INIT)
@@ -47,12 +48,18 @@ def test_the_same_problems_are_drawn_again_and_kept_beside_the_benchmark(here):
     assert sweep.sweep(5, progress=False).tally == found.tally
 
 
-def test_a_sweep_that_cannot_be_kept_is_shown_all_the_same(here, monkeypatch, capsys):
+def test_without_a_folder_to_keep_it_in_nothing_is_solved(here, monkeypatch):
     (here / "file").touch()
     monkeypatch.setenv("NMPCRL_RUNS", str(here / "file"))
+    with pytest.raises(StoreError, match="cannot be a folder"):
+        sweep.sweep(1, progress=False)
+
+
+def test_a_sweep_that_cannot_be_kept_after_all_is_shown(here, monkeypatch, capsys):
+    monkeypatch.setattr(tempfile, "tempdir", str(here))
+    sweep.path().mkdir(parents=True)
     assert sweep.sweep(1, progress=False).tally.tried == 1
-    said = f"{here / 'file' / 'sweep.json'}: File exists; the sweep is shown and not kept\n"
-    assert capsys.readouterr().err == said
+    assert f"{sweep.path()} cannot be written" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("content", [None, "", "[]", '{"tally": {"tried": 1}}', '{"tally": 1}'])
@@ -121,7 +128,7 @@ def test_another_solver_than_riccati_is_not_judged(monkeypatch):
 
 @pytest.mark.parametrize("problems", [0, -1, 2.5, True, "many"])
 def test_what_is_no_number_of_problems_is_refused(problems):
-    with pytest.raises(ParameterError, match=r"must be a whole number, 1 or more"):
+    with pytest.raises(ParameterError, match=r"must be a whole number from 1"):
         sweep.sweep(problems)
 
 

@@ -228,6 +228,20 @@ def test_verify_names_what_contradicts_and_fails(command, trained, tmp_path):
     assert "ES" in verified.output
 
 
+@pytest.mark.parametrize("share", [0.5, 0.99])
+def test_verify_makes_a_damaged_summary_again(command, trained, trains_here, share):
+    command("study", "--publish")
+    path = summaries.path_of(next(iter(STUDY)))
+    content = bytearray(path.read_bytes())
+    for place in range(400):  # more than what lies between the columns, which nobody reads
+        content[int(share * len(content)) - place] ^= 0xFF
+    path.write_bytes(bytes(content))
+    verified = command("verify")
+    assert verified.exit_code == 0, verified.output
+    assert f"it is kept as {path.stem}.damaged and made again" in verified.output
+    assert "6 runs: 6 held against the published ones bit for bit" in verified.output
+
+
 def test_verify_trains_a_sample_where_nothing_was_trained(command, trained, trains_here):
     command("study", "--publish")
     for experiment in STUDY:

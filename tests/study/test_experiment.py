@@ -163,6 +163,23 @@ def test_an_axis_without_values_is_refused(empty):
     assert message_of(sweep, seed=empty) == f"seeds = {empty!r} must name at least one seed"
 
 
+@pytest.mark.parametrize(
+    ("axes", "said"),
+    [
+        (
+            {"seed": range(9_999), "learner": ("ES", "GES")},
+            "seeds = range(0, 9999) and the other axes make 19,998 runs; 10,000 are allowed",
+        ),
+        ({"seed": (3, 3)}, "seeds = (3, 3) must be a list that names 3 once"),
+        ({"layout": ["A", "A"]}, "layouts = ['A', 'A'] must be a list that names 'A' once"),
+        ({"seed": [range(10**9)]}, "seed = range(0, 1000000000) must be a whole number"),
+        ({"seed": range(10**12)}, "must name 10000 seeds at most, not 1000000000000"),
+    ],
+)
+def test_too_many_runs_and_runs_twice_are_refused(axes, said):
+    assert said in message_of(sweep, **axes)
+
+
 def test_an_unknown_parameter_is_refused_with_those_there_are():
     message = message_of(sweep, episode=3)
     assert message.startswith("'episode' is not a parameter")
@@ -184,6 +201,7 @@ def test_a_sweep_is_every_combination_in_order():
 def test_theta_is_one_value_of_a_sweep_not_an_axis():
     (only,) = sweep(theta=[2.0] * 9)
     assert only.theta == (2.0,) * 9
+    assert message_of(sweep, theta="[2.0]").startswith("theta = '[2.0]' must be 9 numbers")
 
 
 def test_the_study_of_a_chapter_is_five_learners_two_decays_and_the_seeds():

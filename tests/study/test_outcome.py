@@ -64,7 +64,7 @@ def test_an_error_is_small_however_deep_it_was_raised():
     [
         (nested, "a list, which cannot be sent: RecursionError"),
         (lambda: lambda: None, "a function, which cannot be sent: "),
-        (partial(failing, Two("a", "b")), "Two: a and b, which cannot be sent: TypeError"),
+        (partial(failing, Two("a", "b")), "Two: a and b, which cannot be sent: "),
     ],
     ids=["too deep", "a local function", "an error that pickle cannot make again"],
 )

@@ -11,6 +11,7 @@ from nmpcrl.study.parameters import (
     Numbers,
     OneOf,
     ParameterError,
+    Several,
     Truth,
     Whole,
     shown,
@@ -23,6 +24,7 @@ KINDS = {
     "range": Number.within(-1, 1),
     "truth": Truth(),
     "numbers": Numbers(2),
+    "list": Several(Whole(0, 9), "it"),
 }
 ANYTHING = st.recursive(
     st.one_of(
@@ -54,9 +56,11 @@ def test_whatever_is_given_is_taken_or_refused_in_one_short_sentence(kind, value
         taken = allowed.check("it", value)
     except ParameterError as error:
         said = str(error)
-        assert said == f"it = {shown(value)} must be {allowed.text}"
+        if kind != "list":
+            assert said == f"it = {shown(value)} must be {allowed.text}"
+        assert said.startswith("it = ")
         assert "\n" not in said
-        assert len(said) < LONGEST + 100
+        assert len(said) < 2 * LONGEST + 100
     else:
         assert type(taken) in (str, int, float, bool, tuple)
         assert allowed.check("it", taken) == taken
@@ -75,6 +79,8 @@ def test_whatever_is_given_is_taken_or_refused_in_one_short_sentence(kind, value
         ("numbers", np.ones(2), (1.0, 1.0)),
         ("numbers", [1, np.float64(2)], (1.0, 2.0)),
         ("numbers", range(2), (0.0, 1.0)),
+        ("list", np.arange(3), (0, 1, 2)),
+        ("list", range(3), (0, 1, 2)),
     ],
 )
 def test_numbers_of_numpy_become_pythons_own(kind, given, taken):
@@ -92,6 +98,7 @@ def test_numbers_of_numpy_become_pythons_own(kind, given, taken):
         ("range", "a number in [-1, 1]", None),
         ("truth", "true or false", None),
         ("numbers", "2 numbers of size at most 1e+06", None),
+        ("list", "a list in which each it is a whole number from 0 to 9", None),
     ],
 )
 def test_what_is_allowed_is_said_in_words(kind, text, choices):
@@ -127,6 +134,28 @@ def test_what_is_allowed_is_said_in_words(kind, text, choices):
 def test_texts_truths_and_lists_are_no_numbers(kind, given):
     with pytest.raises(ParameterError, match=r"^it = .* must be "):
         KINDS[kind].check("it", given)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (3, "seeds = 3 must be a list, such as [3]"),
+        ("A", "seeds = 'A' must be a list, such as ['A']"),
+        ("[3]", "seeds = '[3]' arrived as text, not as a list; write -y '{seeds: [3]}'"),
+        ([], "seeds = [] must name at least one seed"),
+        ([3, 4, 3], "seeds = [3, 4, 3] must be a list that names 3 once"),
+        ([3, "4"], "seed = '4' must be a whole number from 0 to 100"),
+        ([[3]], "seed = [3] must be a whole number from 0 to 100"),
+        ([1, True], "seed = True must be a whole number from 0 to 100"),
+        ({3: 4}, "seeds = {3: 4} must be a list"),
+        (range(10**5), "seeds = range(0, 100000) must name 10000 seeds at most, not 100000"),
+    ],
+    ids=shown,
+)
+def test_a_list_that_is_none_is_refused_in_one_sentence(given, said):
+    with pytest.raises(ParameterError) as caught:
+        Several(Whole(0, 100), "seed").check("seeds", given)
+    assert str(caught.value) == said
 
 
 @pytest.mark.parametrize(

@@ -225,7 +225,7 @@ def test_what_cannot_be_written_is_returned_and_kept_elsewhere(runs, full, capsy
     (kept,) = elsewhere.rglob("*.npz")
     assert kept.relative_to(elsewhere) == path_of(QUICK).relative_to(runs)
     assert said == (
-        f"{path_of(QUICK)} cannot be written (No space left on device); the run is kept as {kept}:"
+        f"{path_of(QUICK)} cannot be written (No space left on device); it is kept as {kept}:"
         f" move it, or set NMPCRL_RUNS={elsewhere}\n"
     )
     assert kind.load(kept).facts == found.facts
@@ -240,7 +240,7 @@ def test_what_can_be_written_nowhere_is_returned_at_least(full, capsys, monkeypa
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "cannot be written (No space left on device), nor anything in /proc/nowhere (" in said
-    assert "; the run is not stored" in said
+    assert "; it is not stored" in said
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o755])
@@ -314,7 +314,7 @@ def test_a_full_disk_costs_no_run(small, capsys, monkeypatch):
 
     monkeypatch.setattr(store, "run", run_while_another_writes)
     assert fetch(QUICK).facts["stopped"] == "finished"
-    assert "cannot be written (No space left on device); the run is kept" in capsys.readouterr().err
+    assert "cannot be written (No space left on device); it is kept" in capsys.readouterr().err
     assert [path.name for path in small.iterdir() if path.is_file()] == ["another"]
 
 

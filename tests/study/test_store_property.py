@@ -33,8 +33,7 @@ from nmpcrl.study.reservation import PLACE
 
 EXPERIMENTS = tuple(
     Experiment(learner, seed=seed, episodes=2, steps=3, evaluate_every=1)
-    for learner in ("ES", "frozen")
-    for seed in (0, 1)
+    for learner, seed in (("ES", 0), ("ES", 1), ("frozen", 0))
 )
 SYSTEM = {"posix", "fcntl", "io", "_io"}  # the modules whose functions call it
 MEMORY = Path("/dev/shm")  # where nobody waits for a disk
@@ -200,7 +199,7 @@ class OfRuns(RuleBasedStateMachine):
 
     @rule(
         experiment=each,
-        how=st.sampled_from(["flip", "cut", "empty", "folder", "gone", "text"]),
+        how=st.sampled_from(["garble", "cut", "empty", "folder", "gone", "text"]),
         places=st.lists(st.floats(0, 1, exclude_max=True), min_size=1, max_size=3),
         wrong=st.integers(1, 255),
     )
@@ -210,7 +209,7 @@ class OfRuns(RuleBasedStateMachine):
             return
         content = bytearray(path.read_bytes())
         at = [int(place * len(content)) for place in places]
-        if how == "flip":
+        if how == "garble":
             for place in at:
                 content[place] ^= wrong
             path.write_bytes(content)
@@ -221,7 +220,7 @@ class OfRuns(RuleBasedStateMachine):
         else:
             path.write_bytes({"cut": content[: at[0]], "empty": b"", "text": b"hello"}[how])
         self.whole.discard(experiment)
-        self.doubtful |= {experiment} if how == "flip" else set()
+        self.doubtful |= {experiment} if how == "garble" else set()
 
     @rule(one=each, other=each, swap=st.booleans())
     def mistake(self, one, other, swap) -> None:
@@ -240,10 +239,7 @@ class OfRuns(RuleBasedStateMachine):
         code = in_a_fork(lambda: (kill_before(call), self.ask(experiment)))()
         assert code in (0, 9), (self.root / "wrong").read_text()
         assert experiment not in self.whole or self.times(experiment) == before
-        moved = there and experiment not in self.whole
-        self.aside = max(self.aside, self.count_aside()) if moved else self.aside
-        if experiment not in self.whole and os.path.lexists(self.path_of(experiment)):
-            self.doubtful.add(experiment)
+        self.look_after(experiment, there)
         if code == 0:
             self.whole.add(experiment)
 
@@ -270,10 +266,20 @@ class OfRuns(RuleBasedStateMachine):
             finally:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY,) * 2)
 
+        there = os.path.lexists(self.path_of(experiment))
         assert in_a_fork(ask)() == 0, (self.root / "wrong").read_text()
-        self.aside = max(self.aside, self.count_aside())
-        if experiment not in self.whole and os.path.lexists(self.path_of(experiment)):
+        self.look_after(experiment, there)
+
+    def look_after(self, experiment: Experiment, there: bool) -> None:
+        """Writing may have been broken off: what was not there before is whole, or not there."""
+        if experiment in self.whole:
+            return
+        if there:
+            self.aside = max(self.aside, self.count_aside())
+        if os.path.lexists(self.path_of(experiment)):
             self.doubtful.add(experiment)
+            if not there:
+                assert same(self.kind.load(self.path_of(experiment)), self.truth(experiment))
 
     def count_aside(self) -> int:
         return len(list((self.root / "runs").rglob("*.damaged*")))
@@ -319,7 +325,7 @@ class OfSummaries(OfRuns):
 
 
 each_machine = settings(
-    max_examples=25,
+    max_examples=20,
     stateful_step_count=12,
     derandomize=True,
     deadline=None,

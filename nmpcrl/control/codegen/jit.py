@@ -30,7 +30,6 @@ from nmpcrl.control.codegen.source import CannotCompile, returns, source
 COMPLETE = "complete"  # a file of this name says that everything in its folder is compiled
 LOADING = threading.Lock()  # a package that one thread is importing is no package yet
 
-
 HEADER = """import math
 
 import numpy as np
@@ -152,9 +151,9 @@ def _from_disk(parent: Path, package: str, texts: Mapping[str, str], notice: str
     try:
         with _announced(notice):
             module = importing.from_folder(package, place)
+    except OSError:
+        raise
     except Exception as error:
-        if isinstance(error, OSError):
-            raise
         disturbed = not _holds(place, texts)
         shutil.rmtree(place, ignore_errors=True)
         if disturbed:
