@@ -1,6 +1,6 @@
 """One run on one page: what `nmpcrl show` draws."""
 
-from typing import Any
+from typing import IO, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -57,6 +57,12 @@ def run_page(records: Records, frozen: Records | None = None) -> Figure:
     _steps(panels["step"], records)
     _costs(panels["noisy"], panels["noise-free"], records, frozen)
     return marked(headed(figure, finding(records)), _source(records, frozen))
+
+
+def write(figure: Figure, file: IO[bytes], kind: str) -> None:
+    """Write a page as "svg" or "png"; the same page gives the same bytes."""
+    with plt.rc_context({"svg.hashsalt": "nmpcrl"}):
+        figure.savefig(file, format=kind, metadata={"Date": None} if kind == "svg" else None)
 
 
 def _map(axes: Axes, records: Records) -> None:
