@@ -11,8 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.figures.axes import draw_task
-from nmpcrl.report.figures.expected_sarsa import logarithmic_if_wide, most_moved, thetas
+from nmpcrl.report.figures.axes import draw_task, logarithmic_if_wide
 from nmpcrl.report.figures.style import (
     DECAY_TITLES,
     INK,
@@ -23,9 +22,10 @@ from nmpcrl.report.figures.style import (
     WIDTH,
     headed,
     marked,
+    most_moved,
     page,
 )
-from nmpcrl.report.run import finding
+from nmpcrl.report.run import finding, thetas
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records
