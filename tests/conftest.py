@@ -56,7 +56,7 @@ def stores_in_a_folder_of_its_own(nobodys) -> Iterator[None]:
 @pytest.fixture
 def trains_here(monkeypatch) -> None:
     """Where nobody names an executor, jobs are done in a thread: no process has to start."""
-    monkeypatch.setattr(executor, "processes", lambda *_, **__: ThreadPoolExecutor(1))
+    monkeypatch.setattr(executor, "processes", lambda *_: ThreadPoolExecutor(1))
 
 
 @pytest.fixture(scope="session")
