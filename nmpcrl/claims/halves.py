@@ -110,17 +110,21 @@ def reversals(found: list[Halves]) -> Iterator[Halves]:
 
 
 def counted(found: Iterable[Halves]) -> str:
-    """How often each learner went wrong, in a sentence a way of going wrong, by reading."""
+    """How often each learner went wrong in each reading, in a sentence a way of going wrong."""
     wholes = [one for one in found if one.layouts == (WHOLE,)]
-    sentences = []
-    for wrong, group in groupby(wholes, key=lambda one: one.wrong):
-        readings = [
-            f"per {one.decay} in {one.counts[0]} and {one.counts[1]} of {one.pairs} runs"
-            for one in group
-        ]
-        first, second = wholes[0].learners
-        sentences.append(f"{first} and {second} {wrong} {', '.join(readings)}.")
-    return " ".join(sentences)
+    return " ".join(
+        _counted(list(group)) for _, group in groupby(wholes, key=lambda one: one.wrong)
+    )
+
+
+def _counted(readings: list[Halves]) -> str:
+    first, second = readings[0].learners
+    parts = [
+        f"with noise per {one.decay} in {one.counts[0]} of {one.pairs} runs of {first} and"
+        f" {one.counts[1]} of {second}"
+        for one in readings
+    ]
+    return f"{readings[0].wrong.capitalize()}: {', '.join(parts)}."
 
 
 def sentence(found: Halves) -> str:
@@ -129,7 +133,7 @@ def sentence(found: Halves) -> str:
     several = "s" if len(found.layouts) > 1 else ""
     where = "" if found.layouts == (WHOLE,) else f", layout{several} {' and '.join(found.layouts)}"
     return (
-        f"With noise per {found.decay}{where}, it is the reverse: {second} {found.wrong} in"
+        f"With noise per {found.decay}{where}, the reverse was seen: {second} {found.wrong} in"
         f" {found.counts[1]} of {found.pairs} runs and {first} in {found.counts[0]}. Of the"
         f" {found.apart} pairs that tell the two apart, {found.against} go against the claim:"
         f" {found.share:.0%}."
