@@ -39,7 +39,7 @@ test: .venv/ready  ## All tests; those of the site need a built book and a Chrom
 	@$(BIN)/python -m pytest
 
 test-fast: .venv/ready  ## The fast tests: no book, no training
-	@$(BIN)/python -m pytest -m "not slow and not book"
+	@$(BIN)/python -m pytest -m "not slow and not book and not slurm"
 
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks
 	@$(BIN)/ruff check .

@@ -9,7 +9,7 @@ Each build has its own place, in the last column, and five steps, each a functio
 1. `ask`      run the two first cells of each chapter, its parameters and their check: a bad value
               ends here, in one sentence; a good one says which `experiments` the chapter needs
               whole, of which runs it needs `summaries`, and what is to be done `beforehand`, with
-              the machine to itself
+              the machine to itself. A build without `book/published` ends here, too
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
               the published ones end the build
@@ -134,6 +134,7 @@ def ask(notebook: Path, given: Given) -> dict[str, tuple[Any, ...]]:
 
     Returns what that cell gives each of `NEEDS`.
     """
+    refuse_unknown(notebook, given)
     cells = [cell for cell in nbformat.read(notebook, 4).cells if cell.cell_type == "code"]
     if not cells or "parameters" not in cells[0].metadata.get("tags", []):
         return dict.fromkeys(NEEDS, ())
@@ -176,10 +177,20 @@ def mirror(place: Path, announcement: str) -> Path:
     return source
 
 
+def require_published() -> None:
+    """End the build, before any work, if there is nothing that its runs could be held against."""
+    from nmpcrl.claims import published  # only here: a refusal should not wait for it
+
+    try:
+        published.load()
+    except published.Damaged as error:
+        raise Failure(str(error)) from error
+
+
 def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     """Run what is not stored yet; the bars are the store's."""
     from nmpcrl.analysis.summaries import fetch_summaries
-    from nmpcrl.claims import published  # only here: a refusal should not wait for it
+    from nmpcrl.claims import published
     from nmpcrl.study import Experiment
     from nmpcrl.study.provenance import warn_of_changes
     from nmpcrl.study.setup import compile_ahead
@@ -308,6 +319,7 @@ def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool)
     """The five steps."""
     with reported(place / "logs/build.log"):
         needs = [ask(notebook, given) for notebook, given in jobs.items()]
+        require_published()
         shutil.rmtree(place / "html", ignore_errors=True)
         mirror(place, announcement)
         wanted = {n: tuple(dict.fromkeys(one for need in needs for one in need[n])) for n in NEEDS}
@@ -322,7 +334,6 @@ def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool)
 def build_chapter(name: str, given: Given) -> Path:
     """Execute one chapter; the other pages are there to be referred to. Returns its page."""
     notebook = known(name)
-    refuse_unknown(notebook, given)
     changed = ", ".join(f"{name} = {value}" for name, value in given.items())
     note = f"Only {notebook.stem} was executed for this build, with {changed or 'its defaults'}."
     place = Path("_build/chapter") / notebook.stem

@@ -1,8 +1,8 @@
 """Reinforcement learning on top of nonlinear model predictive control: one paper, reproduced.
 
-Seven rooms, imported one way: `report` (what pages show) -> `claims` (verdicts) -> `analysis`
-(numbers) and `bench` (times) -> `study` (what is run, and where it is kept) -> `learning` (how the
-parameters move) -> `control` (what the controller is).
+Eight rooms, imported one way: `commands` (the command `nmpcrl`) -> `report` (what pages show) ->
+`claims` (verdicts) -> `analysis` (numbers) and `bench` (times) -> `study` (what is run, and where
+it is kept) -> `learning` (how the parameters move) -> `control` (what the controller is).
 """
 
 import numpy as np

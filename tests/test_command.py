@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.rule import Verdict
+from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 
@@ -79,9 +79,9 @@ def test_training_again_reads_the_stored_run(command, tmp_path, monkeypatch):
     ("words", "sentence"),
     [
         (("--learner", "SARSA"), f"learner = 'SARSA' must be one of {', '.join(LEARNERS)}"),
-        (("--episodes", "0"), "episodes = 0 must be a whole number, 1 or more"),
+        (("--episodes", "0"), "episodes = 0 must be a whole number from 1 to 100000"),
         (("--layout", "Z"), f"layout = 'Z' must be one of {', '.join(paper.LAYOUTS)}"),
-        (("--alpha", "-1"), "alpha = -1.0 must be a positive number"),
+        (("--alpha", "-1"), "alpha = -1.0 must be a number in (0, 1e+06]"),
         (("--decay", "k"), "decay = 'k' must be one of step, episode"),
     ],
 )
@@ -235,6 +235,20 @@ def test_verify_names_what_contradicts_and_fails(command, trained, tmp_path):
     assert "1 contradictions" in verified.output
     assert "final_cost" in verified.output
     assert "ES" in verified.output
+
+
+@pytest.mark.parametrize("share", [0.5, 0.99])
+def test_verify_makes_a_damaged_summary_again(command, trained, trains_here, share):
+    command("study", "--publish")
+    path = summaries.path_of(next(iter(STUDY)))
+    content = bytearray(path.read_bytes())
+    for place in range(400):  # more than what lies between the columns, which nobody reads
+        content[int(share * len(content)) - place] ^= 0xFF
+    path.write_bytes(bytes(content))
+    verified = command("verify")
+    assert verified.exit_code == 0, verified.output
+    assert f"it is kept as {path.stem}.damaged and made again" in verified.output
+    assert "6 runs: 6 held against the published ones bit for bit" in verified.output
 
 
 def test_verify_trains_a_sample_where_nothing_was_trained(command, trained, trains_here):

@@ -14,7 +14,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from nmpcrl.__main__ import main
+from nmpcrl.commands import main
 from nmpcrl.study.provenance import changed, sources
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -264,7 +264,7 @@ assert table([summarise(records)]).largest_reduction.tolist() == [cost[0] - cost
     "variant": """
 from click.testing import CliRunner
 
-from nmpcrl.__main__ import main
+from nmpcrl.commands import main
 from nmpcrl.study import design
 
 found = CliRunner().invoke(main, ["study", "--part", "N = 8", "--dry-run"])

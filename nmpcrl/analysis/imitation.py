@@ -6,7 +6,6 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
-from nmpcrl.learning import QNetwork
 from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 
@@ -41,6 +40,8 @@ def imitate(records: Records, *, fits: int = FITS, seed: int = 0) -> Imitation:
         fits: mini-batches a network is given.
         seed: of weights and batches, the same for both networks.
     """
+    from nmpcrl.learning.network import QNetwork  # and with it torch
+
     steps = records.steps
     whole = np.isfinite(steps["value"])
     state_action = np.hstack([steps["state"], steps["action"]])[whole]

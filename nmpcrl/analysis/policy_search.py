@@ -19,17 +19,23 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.learning.rollout import Persistent, evaluate
-from nmpcrl.study import paper, store
+from nmpcrl.study import paper, place, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.executor import execute
-from nmpcrl.study.parameters import one_of, whole
+from nmpcrl.study.parameters import LARGEST_SEED, Allowed, OneOf, Whole
 from nmpcrl.study.provenance import epochs, versions
 
 BUDGET = 2000  # rollouts without noise that a search may make
 LEAST = 40  # rollouts: the first one and some generations
+MOST = 100_000  # long before which a search has converged and ends by itself
 SPREAD = 0.3  # of the first rollouts, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
+ALLOWED: Mapping[str, Allowed] = {  # by field of `Search`
+    "layout": OneOf(paper.LAYOUTS),
+    "seed": Whole(0, LARGEST_SEED - 1),  # one more is CMA-ES's
+    "budget": Whole(LEAST, MOST),
+}
 FAILED = 1e6  # stands for the cost of a rollout on which a solve failed
 
 
@@ -46,9 +52,8 @@ class Search:
     budget: int = BUDGET
 
     def __post_init__(self) -> None:
-        one_of(self, "layout", tuple(paper.LAYOUTS))
-        whole(self, "seed", least=0)
-        whole(self, "budget", least=LEAST)
+        for name, allowed in ALLOWED.items():
+            object.__setattr__(self, name, allowed.check(name, getattr(self, name)))
 
 
 @dataclass(frozen=True)
@@ -111,11 +116,14 @@ def search_all(
         progress: whether to show a bar.
 
     Raises:
+        StoreError: searches are missing and could not be stored; nothing is searched.
         Exception: what the first search raised that failed; the others are stored.
     """
     wanted = tuple(dict.fromkeys(searches))
     kept = _kept()
     missing = [one for one in wanted if one not in kept]
+    if missing:
+        store.check_folder()
 
     def keep(one: Search, found: Found) -> str:
         kept[one] = found
@@ -157,22 +165,23 @@ def _depends_on() -> dict[str, Any]:
 
 def _kept() -> dict[Search, Found]:
     """The searches in the file, if they are of this code and these versions."""
-    place = _place()
+    path = _place()
     try:
-        kept = json.loads(place.read_text())
+        kept = json.loads(path.read_text())
         if kept["key"] != _depends_on():
             return {}
         return {Search(**one): Found(**_tuples(found)) for one, found in kept["searches"]}
     except FileNotFoundError:
         return {}
-    except (ValueError, LookupError, TypeError) as error:
-        print(f"{place} is damaged ({error}) and is searched again", file=sys.stderr)
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        print(f"{path} is damaged ({error}) and is searched again", file=sys.stderr)
         return {}
 
 
 def _keep(found: Mapping[Search, Found]) -> None:
     searches = [[asdict(one), asdict(result)] for one, result in found.items()]
-    write_json(_place(), {"key": _depends_on(), "searches": searches})
+    content = {"key": _depends_on(), "searches": searches}
+    place.keep(_place(), lambda path: write_json(path, content))
 
 
 def _tuples(fields: Mapping[str, Any]) -> dict[str, Any]:

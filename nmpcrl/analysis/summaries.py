@@ -1,33 +1,42 @@
 """Summaries of many runs: trained once, run by run, wherever there is room.
 
-A worker trains, summarises, and hands the summary back; who asked for it stores it.
+A worker trains, summarises, and hands the summary back; who asked for it stores it, and has
+reserved the run until then. What somebody else has reserved is left for the end.
 """
 
-import sys
 import threading
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from nmpcrl.analysis.summary import RunSummary, summarise
-from nmpcrl.study import paper, store
+from nmpcrl.study import paper, place, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import NETWORK_LEARNERS, Experiment
 from nmpcrl.study.provenance import provenance, signature, summary_key, warn_of_changes
-from nmpcrl.study.records import DamagedRecords, Records
+from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
+from nmpcrl.study.reservation import reservations
 from nmpcrl.study.run import run
 from nmpcrl.study.setup import compile_ahead
 from nmpcrl.study.store import Runs
 
+FOLDER = "summaries"  # among the runs
+EPISODE, EVALUATION, STEP, REST = 280, 140, 40, 10_000  # bytes that a summary's file takes at most
 ALONE = threading.Lock()  # of a process: torch's generator, which draws weights, is its only one
 
 
 class Failed(RuntimeError):
     """Some runs of a study could not be made; the others are stored."""
+
+
+class OtherSolver(RuntimeError):
+    """A run was solved by another solver than its experiment names, and so is none of that."""
 
 
 class OtherCode(RuntimeError):
@@ -55,37 +64,78 @@ def fetch_summaries(
         strict: whether a failure is raised when all others are done, or only said.
 
     Raises:
+        StoreError: summaries are missing and cannot be stored; nothing is trained.
         Failed: runs failed, and `strict` holds.
     """
     wanted = tuple(dict.fromkeys(experiments))
-    missing = [e for e in wanted if not is_stored(e)]
-    compile_ahead(missing)
+    found = {e: one for e in wanted if (one := read(e))}
+    failures: dict[Experiment, Exception] = {}
     # the long ones first, so that no worker is alone with one at the end
-    ordered = sorted(missing, key=seconds_of, reverse=True)
-    failures = execute(
-        {e: partial(make, e, signature()) for e in ordered},
-        _keep,
-        executor=executor,
-        workers=workers,
-        progress=progress,
-    )
-    for experiment, error in failures.items():
-        _note(experiment, error)
+    missing = sorted((e for e in wanted if e not in found), key=seconds_of, reverse=True)
+    if missing:
+        store.check_folder(sum(map(size_of, missing)), folder())
+        compile_ahead(missing)
+    options = {"executor": executor, "workers": workers, "progress": progress}
+    while missing:
+        missing = _make_all(missing, found, failures, **options)
     if failures:
-        first, error = next(iter(failures.items()))
-        said = (
-            f"{len(failures)} of {len(wanted)} runs failed, {first} because of"
-            f" {type(error).__name__}: {error}; each has its reason in {folder()}"
-        )
-        if strict:
-            raise Failed(said)
-        print(said, file=sys.stderr)
-    return Runs({e: load(e) for e in wanted if e not in failures})
+        _tell(failures, len(wanted), strict)
+    return Runs({e: found[e] for e in wanted if e in found})
+
+
+def _make_all(
+    missing: list[Experiment],
+    found: dict[Experiment, RunSummary],
+    failures: dict[Experiment, Exception],
+    **options: Any,
+) -> list[Experiment]:
+    """Make what nobody else is at; what is left, once one of those is no longer."""
+    expected = signature()
+    names = {e: f"{FOLDER}/{path_of(e).name}" for e in missing}
+    reserved = reservations(store.folder())
+    mine = reserved.take(names.values())
+    left = [e for e in missing if names[e] not in mine]
+
+    def store_it(experiment: Experiment, made: RunSummary) -> str:
+        found[experiment] = made
+        keep(experiment, made)
+        reserved.release([names[experiment]])
+        mine.remove(names[experiment])
+        return ""
+
+    try:
+        jobs = {}
+        for experiment in (e for e in missing if e not in left):
+            if one := _read_or_set_aside(experiment):  # it has been stored meanwhile
+                found[experiment] = one
+            else:
+                jobs[experiment] = partial(make, experiment, expected)
+        failed = execute(jobs, store_it, **options)
+    finally:
+        reserved.release(mine)
+    for experiment, error in failed.items():
+        _note(experiment, error)
+    failures |= failed
+    if left:
+        store.wait_for([names[e] for e in left], left[0])
+    return left
+
+
+def _tell(failures: Mapping[Experiment, Exception], wanted: int, strict: bool) -> None:
+    """Raise, or only say, what failed."""
+    first, error = next(iter(failures.items()))
+    said = (
+        f"{len(failures)} of {wanted} runs failed, {first} because of"
+        f" {type(error).__name__}: {error}; each has its reason in {folder()}"
+    )
+    if strict:
+        raise Failed(said)
+    place.say(said)
 
 
 def folder() -> Path:
     """Where summaries are kept, among the runs."""
-    return store.folder() / "summaries"
+    return store.folder() / FOLDER
 
 
 def path_of(experiment: Experiment) -> Path:
@@ -94,22 +144,47 @@ def path_of(experiment: Experiment) -> Path:
 
 
 def is_stored(experiment: Experiment) -> bool:
-    """Whether the summary of a run is there; a damaged one is put aside."""
-    path = path_of(experiment)
-    if not path.exists():
-        return False
-    try:
-        Records.about(path)
-    except DamagedRecords as error:
-        store.set_aside(path, error)
-        return False
-    return True
+    """Whether there is a file that says it is the summary; all of it is read by `load` alone."""
+    return store.is_there(path_of(experiment), experiment, RunSummary.about)
 
 
 def load(experiment: Experiment) -> RunSummary:
-    """The stored summary of a run."""
+    """The stored summary of a run.
+
+    Raises:
+        FileNotFoundError: there is none.
+        DamagedRecords: it is not whole, or that of another run.
+    """
     warn_of_changes()
-    return RunSummary.load(path_of(experiment))
+    path = path_of(experiment)
+    summary = RunSummary.load(path)
+    store.check_run(path, experiment, summary.experiment, summary.facts)
+    return summary
+
+
+def read(experiment: Experiment) -> RunSummary | None:
+    """The stored summary of a run, if there is a whole one."""
+    try:
+        return load(experiment)
+    except (FileNotFoundError, DamagedRecords):
+        return None
+
+
+def _read_or_set_aside(experiment: Experiment) -> RunSummary | None:
+    """As `_read`, for who has reserved it and makes it again."""
+    try:
+        return load(experiment)
+    except FileNotFoundError:
+        return None
+    except DamagedRecords as error:
+        place.set_aside(path_of(experiment), error)
+        return None
+
+
+def size_of(experiment: Experiment) -> int:
+    """How many bytes the file of a summary takes at most."""
+    e = experiment
+    return EPISODE * e.episodes + EVALUATION * most_evaluations(e) + STEP * e.steps + REST
 
 
 def seconds_of(experiment: Experiment) -> float:
@@ -129,6 +204,7 @@ def make(experiment: Experiment, expected: str, *, afresh: bool = False) -> RunS
 
     Raises:
         OtherCode: this worker would make other numbers than who asked.
+        OtherSolver: the run needed another solver than its experiment names.
     """
     if signature() != expected:
         raise OtherCode("the worker has other code, or other versions of what the numbers need")
@@ -137,22 +213,24 @@ def make(experiment: Experiment, expected: str, *, afresh: bool = False) -> RunS
         if records is None:
             records = run(experiment)
             records.facts.update(provenance(experiment))
+        if other := store.solved_by_another(experiment, records.facts):
+            raise OtherSolver(f"it was {other}")
         return summarise(records)
 
 
 def _stored_run(experiment: Experiment) -> Records | None:
     try:
-        return Records.load(store.path_of(experiment))
+        return store.read(experiment)
     except (FileNotFoundError, DamagedRecords):
         return None
 
 
-def _keep(experiment: Experiment, made: RunSummary) -> str:
+def keep(experiment: Experiment, made: RunSummary) -> None:
     """Store a summary; what may lie there of an earlier failure goes."""
     path = path_of(experiment)
-    made.save(path)
-    _note_of(path).unlink(missing_ok=True)
-    return ""
+    if place.keep(path, made.save):
+        with suppress(OSError):
+            _note_of(path).unlink()
 
 
 def _note(experiment: Experiment, error: Exception) -> None:
@@ -160,7 +238,11 @@ def _note(experiment: Experiment, error: Exception) -> None:
     said = f"{type(error).__name__}: {error}"
     trace = "".join(traceback.format_exception(error))
     content = {"experiment": asdict(experiment), "reason": said, "traceback": trace}
-    write_json(_note_of(path_of(experiment)), content)
+    note = _note_of(path_of(experiment))
+    try:
+        write_json(note, content)
+    except OSError as refused:
+        place.say(f"{note} cannot be written ({refused.strerror}): {said}")
 
 
 def _note_of(path: Path) -> Path:

@@ -7,10 +7,9 @@ takes a hundredth of that and is enough for every figure, verdict and mechanism 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
@@ -19,9 +18,21 @@ from nmpcrl.analysis.metrics import LATE, TOUCH
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
+from nmpcrl.study.archive import Column, Field, Form, Forms, load_about, load_arrays, save_arrays
 from nmpcrl.study.experiment import Experiment, frozen_arm
-from nmpcrl.study.records import Column, Records, StepStatus, final_cost, load_arrays, save_arrays
+from nmpcrl.study.records import (
+    INPUTS,
+    STATES,
+    Records,
+    StepStatus,
+    final_cost,
+    most_evaluations,
+    named_in,
+)
 from nmpcrl.study.setup import controller_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
 NAMES = ("learner", "layout", "decay", "seed", "episodes")  # of a row: without them it names no run
@@ -53,7 +64,11 @@ class RunSummary:
     facts: dict[str, Any]  # those of the records, and `imitation` where C6 asks for it
 
     def save(self, path: Path) -> None:
-        """Write the whole file beside `path`, then rename it into place."""
+        """Write the whole file beside `path`, then rename it into place.
+
+        Raises:
+            OSError: it cannot be written; what was there stays.
+        """
         rollout = {"states": self.states, "actions": self.actions}
         tables = {"episodes": self.episodes, "evaluations": self.evaluations, "rollout": rollout}
         save_arrays(path, {"experiment": self.experiment, "facts": self.facts}, tables)
@@ -64,9 +79,9 @@ class RunSummary:
 
         Raises:
             FileNotFoundError: there is none.
-            DamagedRecords: it cannot be read whole.
+            DamagedRecords: it cannot be read whole, or is not a summary.
         """
-        about, tables = load_arrays(path, ("episodes", "evaluations", "rollout"))
+        about, tables = load_arrays(path, _forms)
         return cls(
             about["experiment"],
             tables["episodes"],
@@ -76,10 +91,35 @@ class RunSummary:
             about["facts"],
         )
 
+    @staticmethod
+    def about(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The experiment's fields and the facts, as `Records.about`."""
+        about = load_about(path, _forms)
+        return about["experiment"], about["facts"]
+
     @property
     def name(self) -> Experiment:
         """The experiment as the value that names the run."""
         return Experiment(**self.experiment)
+
+
+def _forms(about: dict[str, Any]) -> Forms:
+    """Of the tables of a summary."""
+    experiment = named_in(about)
+    d, sizes = len(experiment.theta), len(SIZES)
+    counts = ("steps", "failed", "restarts", "outside", "inputs", "over")
+    numbers = ("cost", "overlap", "alpha_phi2", "delta", "loss", "bias", "error", "iterations")
+    episodes: list[Field] = [(name, int) for name in counts]
+    episodes += [(name, float) for name in (*numbers, "seconds")]
+    episodes += [("inside", int, sizes), ("theta", float, d), ("w", float, d)]
+    evaluations: list[Field] = [("episode", int), ("theta", float, d), ("cost", float)]
+    evaluations += [("inside", int, sizes), ("overlap", float), ("distance", float)]
+    rollout: list[Field] = [("states", float, STATES), ("actions", float, INPUTS)]
+    return {
+        "episodes": Form(episodes, [experiment.episodes]),
+        "evaluations": Form(evaluations, range(1, most_evaluations(experiment) + 1)),
+        "rollout": Form(rollout, [experiment.steps]),
+    }
 
 
 def summarise(records: Records) -> RunSummary:
@@ -165,8 +205,10 @@ def experiment_of(row: Mapping[str, Any]) -> Experiment:
     return Experiment(**named)
 
 
-def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> pd.DataFrame:
+def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> "pd.DataFrame":
     """One `row` a run, with `cost_ratio` as `cost_ratios` gives it."""
+    import pandas as pd  # not for those who only make summaries
+
     listed = list(summaries.values() if isinstance(summaries, Mapping) else summaries)
     rows = {one.name: row(one) for one in listed}
     ratios = cost_ratios(rows)
@@ -182,8 +224,10 @@ def cost_ratios(rows: Mapping[Experiment, Mapping[str, Any]]) -> dict[Experiment
     }
 
 
-def tidy(summaries: Iterable[RunSummary]) -> pd.DataFrame:
+def tidy(summaries: Iterable[RunSummary]) -> "pd.DataFrame":
     """One row an episode of each run: what names the run, and the columns that are numbers."""
+    import pandas as pd
+
     named = ("learner", "layout", "decay", "seed")
     frames = []
     for one in summaries:

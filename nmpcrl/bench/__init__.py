@@ -1,5 +1,20 @@
-"""How long a step takes, and how long it takes others: measured, kept, and held against targets."""
+"""How long a step takes, and how long it takes others: measured, kept, and held against targets.
 
-from nmpcrl.bench.suite import LENGTHS, STEPS, beforehand, read_or_measure
+`sweep` counts how the solves of very many drawn problems end.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from nmpcrl.bench.suite import LENGTHS, STEPS, beforehand, read_or_measure
+else:
+
+    def __getattr__(name: str) -> Any:
+        """The suite where it is asked for: the workers of a sweep need none of what it imports."""
+        if name not in __all__:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module("nmpcrl.bench.suite"), name)
+
 
 __all__ = ["LENGTHS", "STEPS", "beforehand", "read_or_measure"]

@@ -19,10 +19,10 @@ from nmpcrl.bench.paired import IDLE
 from nmpcrl.bench.processes import PROCESSES, at_once, first_calls, time_learners_afresh, whole_runs
 from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
-from nmpcrl.study import paper, provenance, store
+from nmpcrl.study import paper, place, provenance, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.machine import machine
-from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.parameters import OneOf
 
 Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
 Stage = tuple[str, Callable[[], Bench]]
@@ -163,8 +163,7 @@ def check(length: object) -> None:
     Raises:
         ParameterError: there is none of this name.
     """
-    if length not in list(LENGTHS):
-        raise ParameterError(f"length = {length!r} must be one of {', '.join(LENGTHS)}")
+    OneOf(LENGTHS).check("length", length)
 
 
 def stored() -> Bench | None:
@@ -174,13 +173,17 @@ def stored() -> Bench | None:
         return kept if kept["about"]["key"] == depends_on() and dict(kept["stages"]) else None
     except FileNotFoundError:
         return None
-    except (ValueError, LookupError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError) as error:
         print(f"{path()} is damaged ({error}) and is measured again", file=sys.stderr)
         return None
 
 
 def measure(length: str, *, progress: bool = True) -> Bench:
-    """Measure everything, and store it."""
+    """Measure everything, and store it.
+
+    Raises:
+        StoreError: it could not be stored; nothing is measured.
+    """
     return _measured(_empty(), _stages(LENGTHS[length]), length, progress)
 
 
@@ -192,6 +195,7 @@ def _empty() -> Bench:
 
 def _measured(kept: Bench, stages: Iterable[Stage], length: str, progress: bool) -> Bench:
     """`kept` with these stages measured; each is stored as soon as it is."""
+    store.check_folder()
     bar = tqdm(list(stages), "benchmark", disable=not progress, leave=False)
     for name, stage in bar:
         bar.set_description(f"benchmark ({length}): {name}")
@@ -206,7 +210,7 @@ def _measured(kept: Bench, stages: Iterable[Stage], length: str, progress: bool)
             )
         )
         kept["about"] |= _summed(kept["stages"].values())
-        write_json(path(), kept)
+        place.keep(path(), partial(write_json, content=kept))
     return kept
 
 

@@ -16,7 +16,7 @@ from nmpcrl.analysis.summary import RunSummary, cost_ratios, table
 from nmpcrl.claims.published import failure_modes_of, load
 from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
-from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.parameters import OneOf, ParameterError
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import Runs
 
@@ -70,8 +70,7 @@ def needed(
     Raises:
         ParameterError: a value is not what it may be, or something asked for is not published.
     """
-    if source not in SOURCES:
-        raise ParameterError(f"study = {source!r} must be one of {', '.join(SOURCES)}")
+    OneOf(SOURCES).check("study", source)
     asked = _asked(learners, layouts, seeds, episodes)
     known = load().summaries
     if source == "published":

@@ -9,7 +9,6 @@
 
 import json
 import os
-import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
@@ -17,7 +16,6 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
@@ -29,7 +27,8 @@ from nmpcrl.claims.rule import UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.machine import fingerprint
-from nmpcrl.study.provenance import EPOCHS, environment, summary_key
+from nmpcrl.study.parameters import Refusal, shortened
+from nmpcrl.study.provenance import EPOCHS, environment, hash_of, summary_key
 from nmpcrl.study.records import Column
 
 FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
@@ -47,13 +46,19 @@ SLACK = 0.01  # of theta_init's cost, that they may be out of the published rang
 EXACT = 1e-6  # relative: the cost of theta_init, which no noise and no learning moves
 
 
-class Damaged(ValueError):
-    """What is published cannot be read."""
+RESTORE = (
+    "`git checkout -- book/published` restores what came with the project,"
+    " `nmpcrl study --publish` makes it anew"
+)
+
+
+class Damaged(Refusal):
+    """What is published is not there, or not what was written."""
 
 
 @dataclass(frozen=True, eq=False)
 class Published:
-    """The published study; empty where nothing is published.
+    """The published study.
 
     Of a summary it holds episodes["cost"], evaluations["episode"], ["theta"] and ["cost"], states
     and the facts "stopped" and "seconds"; single precision but for the summaries in `rows`.
@@ -69,7 +74,7 @@ class Published:
 def place() -> Path:
     """The folder, or what the environment variable NMPCRL_PUBLISHED says."""
     beside = Path(nmpcrl.__file__).parent.parent / "book" / "published"
-    return Path(os.environ.get("NMPCRL_PUBLISHED", beside))
+    return Path(os.environ.get("NMPCRL_PUBLISHED") or beside)
 
 
 def publish(
@@ -103,10 +108,8 @@ def publish(
         "machine": fingerprint(),
         "runs": runs.variant.value_counts(sort=False).to_dict(),
         "hours": float(runs.seconds.sum() / 3600),
-        "files": _sums(folder),
     }
-    write_json(folder / "about.json", about, indent=1)
-    _load.cache_clear()
+    _seal(folder, about)
     return folder
 
 
@@ -127,8 +130,7 @@ def republish(verdicts: Iterable[Verdict]) -> Path:
             raise KeyError(f"no verdict on {verdict.claim} is published in {folder}")
         kept[verdict.claim] = verdict
     write_json(folder / "verdicts.json", [asdict(verdict) for verdict in kept.values()], indent=1)
-    write_json(folder / "about.json", {**found.about, "files": _sums(folder)}, indent=1)
-    _load.cache_clear()
+    _seal(folder, found.about)
     return folder
 
 
@@ -145,41 +147,47 @@ def load() -> Published:
     """What is published.
 
     Raises:
-        Damaged: a file is missing, or not what `publish` wrote.
+        Damaged: nothing is there, or not all that was written and as it was written.
     """
     return _load(place())
 
 
 @cache
 def _load(folder: Path) -> Published:
-    if not any((folder / name).exists() for name in FILES):
-        return Published()
     try:
-        about = json.loads((folder / "about.json").read_text())
-        if about["files"] != _sums(folder):
-            raise ValueError("a file is not the one that about.json speaks of")
-        runs = pd.read_csv(folder / "runs.csv", dtype=dict.fromkeys(WORDS, str))
-        runs = runs.fillna(dict.fromkeys(WORDS, ""))
-        for name, known in WORDS.items():
-            if unknown := set(runs[name]) - known:
-                raise ValueError(f"no {name} is called {', '.join(sorted(unknown))}")
-        rows = {experiment_of(one): one for one in runs.to_dict("records")}
-        with np.load(folder / "curves.npz", allow_pickle=False) as file:
-            curves = {name: file[name] for name in file.files}
-        if {len(rows)} != {len(column) for column in curves.values()}:
-            raise ValueError("runs.csv and curves.npz are not of the same runs")
-        verdicts = json.loads((folder / "verdicts.json").read_text())
-        return Published(
-            {e: _summary_of(one, curves, i) for i, (e, one) in enumerate(rows.items())},
-            {e: one["variant"] for e, one in rows.items()},
-            rows,
-            tuple(_verdict(one) for one in verdicts),
-            about,
-        )
-    except (OSError, EOFError, ValueError, LookupError, TypeError, BadZipFile, zlib.error) as error:
-        raise Damaged(
-            f"{folder} is damaged ({error}); `git checkout` or `nmpcrl study --publish` mends it"
-        ) from error
+        if not folder.is_dir() or not any(folder.iterdir()):
+            kind = ", which is no folder" if folder.exists() and not folder.is_dir() else ""
+            raise Damaged(f"nothing is published in {folder}{kind}; {RESTORE}")
+        return _read(folder)
+    except Damaged:
+        raise
+    except Exception as error:  # whatever a damaged file may lead to, a RecursionError included
+        why = shortened(f"{type(error).__name__}: {error}")
+        raise Damaged(f"{folder} is damaged ({why}); {RESTORE}") from error
+
+
+def _read(folder: Path) -> Published:
+    about = json.loads((folder / "about.json").read_text())
+    if about["seal"] != _sealed(about) or about["files"] != _sums(folder):
+        raise ValueError("a file is not the one that was written")
+    runs = pd.read_csv(folder / "runs.csv", dtype=dict.fromkeys(WORDS, str))
+    runs = runs.fillna(dict.fromkeys(WORDS, ""))
+    for name, known in WORDS.items():
+        if unknown := set(runs[name]) - known:
+            raise ValueError(f"no {name} is called {', '.join(sorted(unknown))}")
+    rows = {experiment_of(one): one for one in runs.to_dict("records")}
+    with (folder / "curves.npz").open("rb") as whole, np.load(whole, allow_pickle=False) as file:
+        curves = {name: file[name] for name in file.files}
+    if {len(rows)} != {len(column) for column in curves.values()}:
+        raise ValueError("runs.csv and curves.npz are not of the same runs")
+    verdicts = json.loads((folder / "verdicts.json").read_text())
+    return Published(
+        {e: _summary_of(one, curves, i) for i, (e, one) in enumerate(rows.items())},
+        {e: one["variant"] for e, one in rows.items()},
+        rows,
+        tuple(_verdict(one) for one in verdicts),
+        about,
+    )
 
 
 def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.DataFrame:
@@ -270,6 +278,18 @@ def _sums(folder: Path) -> dict[str, str]:
     """What tells that the files belong together and are whole."""
     contents = {name: (folder / name).read_bytes() for name in FILES[:-1]}
     return {name: sha256(content).hexdigest() for name, content in contents.items()}
+
+
+def _seal(folder: Path, about: Mapping[str, Any]) -> None:
+    """Write about.json, by which the other files and itself are known again."""
+    sealed = {**about, "files": _sums(folder)}
+    write_json(folder / "about.json", sealed | {"seal": _sealed(sealed)}, indent=1)
+    _load.cache_clear()
+
+
+def _sealed(about: Mapping[str, Any]) -> str:
+    """What tells that about.json is whole."""
+    return hash_of({name: value for name, value in about.items() if name != "seal"})
 
 
 def _curves(summaries: list[RunSummary]) -> dict[str, Column]:

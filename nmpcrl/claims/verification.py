@@ -74,7 +74,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
             " is meant, raise the epoch of the room in nmpcrl/study/provenance.py"
         )
     for experiment, made in fresh.items():  # what the next edit is held against
-        made.save(summaries.path_of(experiment))
+        summaries.keep(experiment, made)
     return Relocked(provenance.relock(), len(exact), len(drawn) - len(exact))
 
 
@@ -90,7 +90,7 @@ def _stored_by_lock(drawn: Iterable[Experiment]) -> list[tuple[Experiment, RunSu
         "machine": fingerprint(),
         "versions": provenance.environment(),
     }
-    stored = [(e, summaries.load(e)) for e in drawn if summaries.is_stored(e)]
+    stored = [(e, one) for e in drawn if (one := summaries.read(e))]
     return [(e, one) for e, one in stored if all(one.facts.get(k) == v for k, v in made.items())]
 
 

@@ -3,6 +3,8 @@
 `train` is Algorithm 1, and `evaluate` judges its result by a rollout without noise.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from nmpcrl.learning.baselines import frozen, random_direction, step_matched
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, SecondSolve, Successor, Transition
 from nmpcrl.learning.learners import (
@@ -16,7 +18,6 @@ from nmpcrl.learning.learners import (
     q_learning,
     regularized_deep_expected_sarsa,
 )
-from nmpcrl.learning.network import QNetwork
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
 from nmpcrl.learning.training import (
     Diverged,
@@ -34,6 +35,19 @@ from nmpcrl.learning.updates import (
     semi_gradient_step,
     td_error,
 )
+
+if TYPE_CHECKING:
+    from nmpcrl.learning.network import QNetwork
+else:
+
+    def __getattr__(name: str) -> Any:
+        """`QNetwork` where it is asked for: most learners need no torch, whose import is long."""
+        if name != "QNetwork":
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        from nmpcrl.learning.network import QNetwork
+
+        return QNetwork
+
 
 __all__ = [
     "Bootstrap",

@@ -2,13 +2,15 @@
 
 import time
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Solution
-from nmpcrl.learning.network import QNetwork
+
+if TYPE_CHECKING:
+    from nmpcrl.learning.network import QNetwork
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +82,7 @@ class SecondSolve:
 class Imitation:
     """Let a network learn the NMPC's value and ask it: DES, and RDES if theta is an input."""
 
-    network: QNetwork
+    network: "QNetwork"
     with_theta: bool
     gated: bool = True  # wait for the first fit; Algorithm 1 read literally does not  # departure G
     fits: int = 1  # mini-batches a step  # departure H

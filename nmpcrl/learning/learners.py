@@ -14,6 +14,7 @@ The control arms that they are held against are in `baselines`.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from nmpcrl import Vector
 from nmpcrl.control import Solution
@@ -25,7 +26,6 @@ from nmpcrl.learning.bootstrap import (
     Successor,
     Transition,
 )
-from nmpcrl.learning.network import QNetwork
 from nmpcrl.learning.updates import (
     auxiliary_step,
     curvature_correction,
@@ -34,6 +34,9 @@ from nmpcrl.learning.updates import (
     semi_gradient_step,
     td_error,
 )
+
+if TYPE_CHECKING:
+    from nmpcrl.learning.network import QNetwork
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +151,7 @@ def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
 
 
 def deep_expected_sarsa(
-    nmpc: Controller, network: QNetwork, alpha: float, *, gated: bool = True, fits: int = 1
+    nmpc: Controller, network: "QNetwork", alpha: float, *, gated: bool = True, fits: int = 1
 ) -> Learner:
     """DES: a network of 5 inputs, (s, a), instead of the second solve."""
     bootstrap = Imitation(network, with_theta=False, gated=gated, fits=fits)
@@ -156,7 +159,7 @@ def deep_expected_sarsa(
 
 
 def regularized_deep_expected_sarsa(
-    nmpc: Controller, network: QNetwork, alpha: float, *, gated: bool = True, fits: int = 1
+    nmpc: Controller, network: "QNetwork", alpha: float, *, gated: bool = True, fits: int = 1
 ) -> Learner:
     """RDES, the paper's first method: the network of DES with theta as an input, too."""
     bootstrap = Imitation(network, with_theta=True, gated=gated, fits=fits)

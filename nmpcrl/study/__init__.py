@@ -5,7 +5,7 @@ from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.parameters import ParameterError
 from nmpcrl.study.records import DamagedRecords, Records
 from nmpcrl.study.run import run
-from nmpcrl.study.store import Runs, fetch, fetch_all, stored
+from nmpcrl.study.store import Runs, StoreError, fetch, fetch_all, stored
 from nmpcrl.study.sweeps import paper_runs, sweep
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "ParameterError",
     "Records",
     "Runs",
+    "StoreError",
     "fetch",
     "fetch_all",
     "paper",

@@ -18,13 +18,18 @@ from concurrent.futures import (
     wait,
 )
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from multiprocessing import get_context
 from types import ModuleType
 from typing import Any, TypeVar
 
 from tqdm import tqdm
+
+from nmpcrl.study.orphans import end_with_parent
+from nmpcrl.study.outcome import pack, unpack
+from nmpcrl.study.workers import check_workers as check_workers
+from nmpcrl.study.workers import told
 
 SPAWN = get_context("spawn")  # a fork would copy the threads' locks but not the threads
 ATTEMPTS = 3  # how often a job is begun whose worker is killed
@@ -56,33 +61,35 @@ def execute(
         keep: called here with each result; it says what the bar shows of it, or "".
         executor: runs the jobs; by default processes, one thread each. One that the caller gives is
             not replaced if it loses a worker.
-        workers: how many processes; by default as many as there are cores.
-        progress: whether to show a bar with what has ended, what failed, and the time left.
+        workers: how many processes; by default as many as there are cores and memory for.
+            `check_workers` refuses more than that.
+        progress: whether to say what the processes take, and to show a bar with what has ended,
+            what failed, and the time left.
         size: of a job, in units of the bar.
         unit: of the bar.
 
     Returns:
-        What each job raised that failed; `Killed` where it lost its worker `ATTEMPTS` times. A
-        failure stops no other job.
+        What each job raised that failed; `Killed` where it lost its worker `ATTEMPTS` times, and
+        `Unsendable` where what came of it cannot be pickled. A failure stops no other job.
     """
     if not jobs:
         return {}
     failures: dict[Name, Exception] = {}
-    pool = nullcontext(executor) if executor else processes(workers, len(jobs))
+    pool = nullcontext(executor) if executor else _processes(workers, len(jobs), tell=progress)
     total = sum(map(size, jobs))
     with (
         without_main(),
         pool as chosen,
         tqdm(total=total, unit=unit, disable=not progress, mininterval=interval()) as bar,
     ):
-        pending = {chosen.submit(job): name for name, job in jobs.items()}
+        pending = {chosen.submit(pack, job): name for name, job in jobs.items()}
         while pending:
             for future in wait(pending, timeout=WAIT, return_when=FIRST_COMPLETED).done:
                 # The future is forgotten: as long as it is held, Dask does a job again whose
                 # worker it loses.
                 name, shown = pending.pop(future), ""
                 try:
-                    shown = keep(name, future.result())
+                    shown = keep(name, unpack(future.result()))
                 except Exception as error:
                     failures[name] = error
                 del future
@@ -101,10 +108,18 @@ def _describe(
     bar.set_postfix_str(", ".join([*parts, *([shown] if shown else [])]), refresh=False)
 
 
+def _processes(workers: int | None, jobs: int, *, tell: bool) -> AbstractContextManager[Executor]:
+    """Processes of this machine, no more than there are jobs."""
+    count = min(check_workers(workers, sure=True), jobs)
+    if tell:
+        print(told(count), file=sys.stderr)
+    return processes(count)
+
+
 @contextmanager
-def processes(workers: int | None, jobs: int) -> Iterator[Executor]:
-    """Processes of this machine, no more than there are jobs; an error ends them at once."""
-    slots = Slots(min(workers or os.cpu_count() or 1, jobs))
+def processes(workers: int) -> Iterator[Executor]:
+    """So many processes of this machine; an error ends them at once."""
+    slots = Slots(workers)
     try:
         yield slots
     except BaseException:
@@ -163,8 +178,13 @@ class Slots(Executor):
 def _process() -> ProcessPoolExecutor:
     """A worker process with one thread; the setting is inherited, so it is made here."""
     os.environ.update(dict.fromkeys(THREADS, "1"))
-    quiet = (signal.SIGINT, signal.SIG_DFL)  # an interrupt ends a worker without a traceback
-    return ProcessPoolExecutor(1, SPAWN, initializer=signal.signal, initargs=quiet)
+    return ProcessPoolExecutor(1, SPAWN, initializer=_begin_worker)
+
+
+def _begin_worker() -> None:
+    """What a worker does first."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # an interrupt ends it without a traceback
+    end_with_parent()
 
 
 def kill(pool: ProcessPoolExecutor) -> None:

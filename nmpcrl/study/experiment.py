@@ -1,17 +1,21 @@
 """An `Experiment` is a frozen value that names one run."""
 
+from collections.abc import Collection
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any
 
 from nmpcrl.control import solvers
+from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.study import paper
 from nmpcrl.study.parameters import (
+    LARGEST_SEED,
+    Allowed,
+    Number,
+    Numbers,
+    OneOf,
     ParameterError,
-    number,
-    one_of,
-    parameter_vector,
-    true_or_false,
-    whole,
+    Truth,
+    Whole,
 )
 from nmpcrl.study.setup import DECAYS, LEARNERS, NETWORKS
 
@@ -19,11 +23,26 @@ PAPER = ("ES", "DES", "RDES", "GES")  # the paper's learners
 MAIN = (*PAPER, "TDC", "frozen")  # of the main table
 NETWORK_LEARNERS = ("DES", "RDES")
 MOVING = tuple(name for name in LEARNERS if name != "frozen")  # whose theta moves
+VALUING = tuple(name for name in MOVING if name != "QL")  # which may value u_0 = a or not
+
+# Nothing sensible lies above these.
+MOST_EPISODES = 100_000  # 333 times the paper's: exploration has long ended
+MOST_STEPS = 10_000  # 77 times the paper's; the robot arrives within 92
+MOST_STAGES = 500  # of a plan: four times an episode; gamma^500 is 2e-7
+
+STEP_SIZE = Number.above_zero(ABSURD)  # with more, theta leaves the numbers in one step
 
 
-def read_by(learners: tuple[str, ...], default: Any) -> Any:
-    """A field that only these learners read; to the others it is nothing, and no part of a key."""
-    return field(default=default, metadata={"read_by": learners})
+def option(
+    default: Any, allowed: Allowed, about: str, read_by: Collection[str] | None = None
+) -> Any:
+    """A field: its default, what it may be, and a line of help.
+
+    Learners that `read_by` does not name do not read it: to them it is nothing, and no part of a
+    key.
+    """
+    metadata = {"allowed": allowed, "help": about}
+    return field(default=default, metadata=metadata | ({"read_by": read_by} if read_by else {}))
 
 
 @dataclass(frozen=True)
@@ -34,52 +53,57 @@ class Experiment:
         ParameterError: a field is not what it may be.
     """
 
-    learner: str = "ES"
-    seed: int = 0
-    episodes: int = paper.EPISODES
-    layout: str = "A"
-    decay: str = "step"  # what k of Eq. (5) counts: "step" or "episode"  # departure C
-    decay_rate: float = paper.DECAY_RATE  # c_epsilon
-    alpha: float = read_by(MOVING, paper.ALPHA)
-    beta: float = read_by(("GES", "matched"), paper.BETA)
-    zeta: float = read_by(NETWORK_LEARNERS, paper.ZETA)
-    gated: bool = read_by(NETWORK_LEARNERS, default=True)  # False: Algorithm 1 # departure G
-    clipped: bool = True  # False: the noise may leave the action space  # departure E
-    constrained: bool = read_by(  # True: Q(s, a), u_0 = a fixed, instead of V(s)  # departure F
-        tuple(name for name in MOVING if name != "QL"), default=False
+    learner: str = option("ES", OneOf(LEARNERS), "What learns.")
+    seed: int = option(0, Whole(0, LARGEST_SEED), "Of the noise and of the network.")
+    episodes: int = option(paper.EPISODES, Whole(1, MOST_EPISODES), "Of training.")
+    layout: str = option("A", OneOf(paper.LAYOUTS), "Of the obstacles.")
+    decay: str = option("step", OneOf(DECAYS), "What k of Eq. (5) counts.")  # departure C
+    decay_rate: float = option(
+        paper.DECAY_RATE, Number.above_zero(1), "c_epsilon, by which exploration decays."
     )
-    network: str = read_by(NETWORK_LEARNERS, "plain")  # departure H
-    box: str = "hard"  # departures A and M
-    ties_active: bool = read_by(MOVING, default=False)  # the other side of the kink # departure L
-    curvature: bool = read_by(("TDC",), default=True)  # subtract h
-    projected: bool = read_by(("TDC",), default=True)  # keep theta in `paper.THETA_SET`
-    beta_tdc: float = read_by(("TDC",), paper.BETA_TDC)  # step size of w
-    theta: tuple[float, ...] = paper.THETA_INIT
-    steps: int = paper.STEPS  # of an episode
-    horizon: int = paper.HORIZON
-    solver: str = "riccati"
-    tolerance: float = solvers.TOLERANCE  # of the solver
-    evaluate_every: int = 10  # episodes between rollouts without noise
+    alpha: float = option(paper.ALPHA, STEP_SIZE, "Step size of theta.", MOVING)
+    beta: float = option(paper.BETA, STEP_SIZE, "Step size of w.", ("GES", "matched"))
+    zeta: float = option(paper.ZETA, STEP_SIZE, "Learning rate of the network.", NETWORK_LEARNERS)
+    gated: bool = option(  # False: Algorithm 1 # departure G
+        True, Truth(), "Whether theta waits for the network's first fit.", NETWORK_LEARNERS
+    )
+    clipped: bool = option(
+        True, Truth(), "Whether noise is kept in the action space."
+    )  # departure E
+    constrained: bool = option(  # departure F
+        False, Truth(), "Whether Q(s, a) is learned, with u_0 = a fixed, and not V(s).", VALUING
+    )
+    network: str = option(  # departure H
+        "plain", OneOf(NETWORKS), "What the paper leaves open of the network.", NETWORK_LEARNERS
+    )
+    box: str = option("hard", OneOf(paper.BOXES), "The bounds of the state.")  # departures A and M
+    ties_active: bool = option(  # the other side of the kink # departure L
+        False, Truth(), "Whether a state on an obstacle's boundary is in it.", MOVING
+    )
+    curvature: bool = option(True, Truth(), "Whether TDC subtracts h.", ("TDC",))
+    projected: bool = option(True, Truth(), "Whether theta is projected into [0, 10].", ("TDC",))
+    beta_tdc: float = option(paper.BETA_TDC, STEP_SIZE, "Step size of w in TDC.", ("TDC",))
+    theta: tuple[float, ...] = option(
+        paper.THETA_INIT,
+        Numbers(len(paper.THETA_INIT)),
+        "The controller's parameters at the start.",
+    )
+    steps: int = option(paper.STEPS, Whole(1, MOST_STEPS), "Of an episode.")
+    horizon: int = option(paper.HORIZON, Whole(1, MOST_STAGES), "N, the inputs of a plan.")
+    solver: str = option("riccati", OneOf(solvers.SOLVERS), "What solves Eq. (2).")
+    tolerance: float = option(
+        solvers.TOLERANCE,
+        Number.within(solvers.LEAST_TOLERANCE, solvers.LARGEST_TOLERANCE),
+        "Of the solver.",
+    )
+    evaluate_every: int = option(
+        10, Whole(1, MOST_EPISODES), "Episodes between rollouts without noise."
+    )
 
     def __post_init__(self) -> None:
-        one_of(self, "learner", tuple(LEARNERS))
-        one_of(self, "layout", tuple(paper.LAYOUTS))
-        one_of(self, "decay", tuple(DECAYS))
-        one_of(self, "solver", tuple(solvers.SOLVERS))
-        one_of(self, "network", tuple(NETWORKS))
-        one_of(self, "box", paper.BOXES)
-        whole(self, "seed", least=0)
-        for name in ("episodes", "steps", "horizon", "evaluate_every"):
-            whole(self, name, least=1)
-        for name in ("alpha", "beta", "beta_tdc", "zeta"):
-            number(self, name, "a positive number", lambda value: value > 0)
-        number(self, "decay_rate", "a number in (0, 1]", lambda value: 0 < value <= 1)
-        least, largest = solvers.LEAST_TOLERANCE, solvers.LARGEST_TOLERANCE
-        allowed = f"a number in [{least:g}, {largest:g}]"
-        number(self, "tolerance", allowed, lambda value: least <= value <= largest)
-        for name in ("gated", "clipped", "constrained", "ties_active", "curvature", "projected"):
-            true_or_false(self, name)
-        parameter_vector(self, "theta", len(paper.THETA_INIT))
+        for one in fields(self):
+            value = one.metadata["allowed"].check(one.name, getattr(self, one.name))
+            object.__setattr__(self, one.name, value)
         if self.values_actions and not self.clipped:
             raise ParameterError(
                 f"clipped = False leaves actions that {self.learner} with constrained ="

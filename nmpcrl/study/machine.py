@@ -7,7 +7,11 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 CPUINFO = Path("/proc/cpuinfo")
+BOOT = Path("/proc/sys/kernel/random/boot_id")  # another after each start of the machine
+NAMESPACE = Path("/proc/self/ns/pid")  # another in each container
 
 
 def machine() -> dict[str, Any]:
@@ -31,6 +35,25 @@ def fingerprint() -> dict[str, Any]:
     told = sorted({line for line in _cpuinfo() if line.startswith(kept)})
     abilities = sha256("\n".join(told).encode()).hexdigest()[:16]
     return {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities}
+
+
+@cache
+def host() -> str:
+    """Where a number of a process means the same process: a container's, until the next start."""
+    told = [platform.node(), *map(_told_by, (BOOT, NAMESPACE))]
+    return sha256("\n".join(told).encode()).hexdigest()[:8]
+
+
+def is_running(process: int) -> bool:
+    """Whether there is a process of this number on this `host`."""
+    return bool(psutil.pid_exists(process))
+
+
+def _told_by(path: Path) -> str:
+    try:
+        return str(path.readlink()) if path.is_symlink() else path.read_text()
+    except OSError:
+        return ""
 
 
 def _processor() -> str:

@@ -1,54 +1,225 @@
-"""What a parameter may be: each check names the parameter, what was given and what is allowed."""
+"""What a parameter may be: each kind says so in words, and refuses all else in one sentence."""
 
-from collections.abc import Callable
-from math import isfinite
+from collections import Counter
+from collections.abc import Collection
+from dataclasses import dataclass
+from math import inf, nextafter
+from numbers import Integral, Real
+from reprlib import Repr
+from typing import Any, Protocol
+
+import numpy as np
 
 from nmpcrl.control.nmpc import ABSURD
 
-
-class ParameterError(ValueError):
-    """A parameter is not what it may be; the message is one sentence that says so."""
-
-
-def one_of(owner: object, name: str, allowed: tuple[str, ...]) -> None:
-    """The field is one of the names `allowed`."""
-    value = getattr(owner, name)
-    if not isinstance(value, str) or value not in allowed:
-        raise ParameterError(f"{name} = {value!r} must be one of {', '.join(allowed)}")
+LARGEST_SEED = 2**31 - 1  # what every generator takes, whichever library's
+MOST_VALUES = 10_000  # of an axis
+LONGEST = 100  # characters of a value in a message
 
 
-def whole(owner: object, name: str, *, least: int) -> None:
-    """The field is a whole number, `least` or more."""
-    value = getattr(owner, name)
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise ParameterError(f"{name} = {value!r} must be a whole number, {least} or more")
+class Refusal(ValueError):
+    """What was asked for cannot be done; the message is one sentence that says why."""
+
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows in the place of a traceback, and so Jupyter and papermill."""
+        return [f"{type(self).__name__}: {self}"]
 
 
-def number(owner: object, name: str, allowed: str, accept: Callable[[float], bool]) -> None:
-    """The field is a finite number that `accept` accepts; `allowed` says which in words."""
-    value = getattr(owner, name)
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not isfinite(value) or not accept(value):
-        raise ParameterError(f"{name} = {value!r} must be {allowed}")
-    object.__setattr__(owner, name, float(value))
+class ParameterError(Refusal):
+    """A parameter is not what it may be; the message names it, its value and what is allowed."""
 
 
-def true_or_false(owner: object, name: str) -> None:
-    """The field is a truth value."""
-    value = getattr(owner, name)
-    if not isinstance(value, bool):
-        raise ParameterError(f"{name} = {value!r} must be true or false")
+class Allowed(Protocol):
+    """What a parameter may be."""
+
+    @property
+    def text(self) -> str:
+        """In words, as they stand after "must be"."""
+
+    @property
+    def choices(self) -> tuple[str, ...] | None:
+        """All that it may be, if these are words."""
+
+    def check(self, name: str, value: Any) -> Any:
+        """The value in its own type: an int for NumPy's, a tuple for a list.
+
+        Raises:
+            ParameterError: the parameter `name` may not be this.
+        """
 
 
-def parameter_vector(owner: object, name: str, size: int) -> None:
-    """The field is a list of `size` numbers that a solver can be given; it becomes a tuple."""
-    given = getattr(owner, name)
-    try:
-        vector = () if isinstance(given, str | bytes) else tuple(float(value) for value in given)
-    except (TypeError, ValueError):
-        vector = ()
-    if len(vector) != size or not all(isfinite(v) and abs(v) <= ABSURD for v in vector):
-        raise ParameterError(
-            f"{name} = {given!r} must be {size} numbers of size at most {ABSURD:g}"
-        )
-    object.__setattr__(owner, name, vector)
+@dataclass(frozen=True)
+class OneOf:
+    """One of some words."""
+
+    words: Collection[str]
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """See `Allowed`."""
+        return tuple(self.words)
+
+    @property
+    def text(self) -> str:
+        """See `Allowed`."""
+        return f"one of {', '.join(self.words)}"
+
+    def check(self, name: str, value: Any) -> str:
+        """See `Allowed`."""
+        if not isinstance(value, str) or value not in self.words:
+            raise refused(name, value, self.text)
+        return str(value)
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A whole number from `least` to `most`."""
+
+    least: int
+    most: int
+    choices: None = None
+
+    @property
+    def text(self) -> str:
+        """See `Allowed`."""
+        return f"a whole number from {self.least} to {self.most}"
+
+    def check(self, name: str, value: Any) -> int:
+        """See `Allowed`."""
+        whole = isinstance(value, Integral) and not isinstance(value, bool)
+        if not whole or not self.least <= value <= self.most:
+            raise refused(name, value, self.text)
+        return int(value)
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number from `least` to `most`."""
+
+    least: float
+    most: float
+    text: str
+    choices: None = None
+
+    @classmethod
+    def within(cls, least: float, most: float) -> "Number":
+        """A number in [least, most]."""
+        return cls(least, most, f"a number in [{least:g}, {most:g}]")
+
+    @classmethod
+    def above_zero(cls, most: float) -> "Number":
+        """A number in (0, most]."""
+        return cls(nextafter(0, inf), most, f"a number in (0, {most:g}]")
+
+    def check(self, name: str, value: Any) -> float:
+        """See `Allowed`."""
+        real = isinstance(value, Real) and not isinstance(value, bool)
+        if not real or not self.least <= value <= self.most:  # which nan is not
+            raise refused(name, value, self.text)
+        return float(value)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """True or false."""
+
+    text: str = "true or false"
+    choices: None = None
+
+    def check(self, name: str, value: Any) -> bool:
+        """See `Allowed`."""
+        if not isinstance(value, bool | np.bool_):
+            raise refused(name, value, self.text)
+        return bool(value)
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """So many numbers that a solver can be given."""
+
+    size: int
+    choices: None = None
+
+    @property
+    def text(self) -> str:
+        """See `Allowed`."""
+        return f"{self.size} numbers of size at most {ABSURD:g}"
+
+    def check(self, name: str, value: Any) -> tuple[float, ...]:
+        """See `Allowed`."""
+        if not is_list(value) or len(value) != self.size:
+            raise refused(name, value, self.text)
+        each = Number.within(-ABSURD, ABSURD)
+        try:
+            return tuple(each.check(name, one) for one in value)
+        except ParameterError:
+            raise refused(name, value, self.text) from None
+
+
+@dataclass(frozen=True)
+class Several:
+    """A list of what `each` may be, without repetition: the values of an axis."""
+
+    each: Allowed
+    name: str  # of one value; the parameter's is its plural
+    choices: None = None
+
+    @property
+    def text(self) -> str:
+        """See `Allowed`."""
+        return f"a list in which each {self.name} is {self.each.text}"
+
+    def check(self, name: str, value: Any) -> tuple[Any, ...]:
+        """See `Allowed`."""
+        if isinstance(value, str) and value.strip().startswith("["):
+            raise ParameterError(
+                f"{name} = {shown(value)} arrived as text, not as a list;"
+                f" write -y '{{{name}: {shortened(value.strip())}}}'"
+            )
+        if not is_list(value):
+            single = isinstance(value, str | int | float)
+            raise refused(name, value, f"a list{f', such as [{shown(value)}]' if single else ''}")
+        if not 0 < len(value) <= MOST_VALUES:
+            many = f"{MOST_VALUES} {name} at most, not {len(value)}"
+            must = many if len(value) else f"at least one {self.name}"
+            raise ParameterError(f"{name} = {shown(value)} must name {must}")
+        values = tuple(self.each.check(self.name, one) for one in value)
+        twice = {one for one, count in Counter(values).items() if count > 1}
+        if twice:
+            raise refused(name, value, f"a list that names {shown(min(twice))} once")
+        return values
+
+
+def is_list(value: Any) -> bool:
+    """Whether it holds values in a row."""
+    rows = isinstance(value, np.ndarray) and value.ndim == 1
+    return rows or isinstance(value, list | tuple | range)
+
+
+def refused(name: str, value: Any, text: str) -> ParameterError:
+    """The refusal of a value: what it `must be` is the `text`."""
+    return ParameterError(f"{name} = {shown(value)} must be {text}")
+
+
+class _Short(Repr):
+    """As `repr`, on one line, however large the value is."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlist = self.maxtuple = self.maxarray = self.maxdict = self.maxset = 10
+        self.maxstring = self.maxother = LONGEST
+
+    def repr_int(self, x: int, level: int) -> str:
+        """Python refuses to print the largest."""
+        return repr(x) if abs(x) < 10**40 else f"an integer of {x.bit_length()} bits"
+
+
+def shown(value: Any) -> str:
+    """A value as one line of a message."""
+    return shortened(_Short().repr(value))
+
+
+def shortened(text: str) -> str:
+    """A text on one line, cut where it is long."""
+    text = " ".join(text.split())
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."

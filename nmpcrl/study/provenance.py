@@ -20,6 +20,7 @@ import json
 import os
 import platform
 import sys
+import threading
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
@@ -75,6 +76,7 @@ LOCK = Path(__file__).with_name("sources.lock.json")
 WHOLE_ROOMS = ("control", "learning")  # every file of which counts
 ENTRIES = ("study/run.py", "analysis/summary.py")  # which count with all that they import
 ALONE = ("analysis/policy_search.py",)  # which count without
+PARSING = threading.Lock()  # Python 3.11 fails where two threads parse at once
 
 
 def key(experiment: Experiment) -> str:
@@ -135,6 +137,7 @@ def epochs() -> dict[str, int]:
     return _epochs(SUMMARY_ROOMS)
 
 
+@cache
 def _version(library: str) -> str:
     try:
         return version(library)
@@ -153,10 +156,11 @@ def hash_of(depends: Any) -> str:
 
 def sources(root: Path = ROOT) -> dict[str, str]:
     """A hash of the code of each file that bears on the numbers of runs and summaries, by path."""
-    paths = {path for room in WHOLE_ROOMS for path in (root / room).rglob("*.py")}
-    paths |= _reached(root, [root / entry for entry in ENTRIES])
-    paths |= {root / entry for entry in ALONE}
-    codes = {path: code(path.read_text()) for path in sorted(paths)}
+    with PARSING:
+        paths = {path for room in WHOLE_ROOMS for path in (root / room).rglob("*.py")}
+        paths |= _reached(root, [root / entry for entry in ENTRIES])
+        paths |= {root / entry for entry in ALONE}
+        codes = {path: code(path.read_text()) for path in sorted(paths)}
     return {
         path.relative_to(root).as_posix(): hashlib.sha256(text.encode()).hexdigest()
         for path, text in codes.items()

@@ -3,24 +3,38 @@
 Analyses read records and nothing else. Loading never unpickles.
 """
 
-import json
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from nmpcrl import Vector
-from nmpcrl.study.atomic import write_whole
+from nmpcrl.study import paper
+from nmpcrl.study.archive import (
+    Column,
+    DamagedRecords,
+    Field,
+    Form,
+    Forms,
+    load_about,
+    load_arrays,
+    save_arrays,
+)
+from nmpcrl.study.experiment import Experiment
 
-Column = NDArray[Any]
-Tables = dict[str, dict[str, Column]]  # columns by name, by the name of their table
-Field = tuple[str, type] | tuple[str, type, int | tuple[int, ...]]  # name, type[, shape]
-
+__all__ = ["Column", "DamagedRecords", "Records", "StepStatus", "Stopped", "Table", "final_cost"]
 
 LAST = 3  # rollouts that the final cost averages
+STATES = len(paper.START)  # n of the robot
+INPUTS = len(paper.THETA_INIT) - 2 * STATES - 1  # m of the robot
+FACTS: dict[str, Any] = {  # which every run has
+    "stopped": str,
+    "solver": str,
+    "seconds": int | float,
+    "final_cost": int | float,
+}
 
 
 class Stopped(StrEnum):
@@ -56,8 +70,46 @@ def final_cost(cost: Vector) -> float:
     return float(learned.mean()) if learned.size else np.inf
 
 
-class DamagedRecords(ValueError):
-    """A file is not a whole run."""
+def step_fields(n: int, m: int, d: int) -> list[Field]:
+    """The columns of `Records.steps` that are filled step by step."""
+    return [
+        ("episode", int),
+        ("time", int),
+        ("state", float, n),
+        ("action", float, m),
+        ("cost", float),
+        ("value", float),
+        ("next_value", float),
+        ("delta", float),
+        ("features", float, d),
+        ("theta", float, d),
+        ("w", float, d),
+        ("loss", float),
+        ("status", int),
+        ("restarts", int),
+        ("violation", float),
+        ("iterations", int),
+        ("solves", int),
+        ("solve_seconds", float),
+        ("fit_seconds", float),
+        ("seconds", float),
+    ]
+
+
+def evaluation_fields(n: int, m: int, d: int, steps: int) -> list[Field]:
+    """The columns of `Records.evaluations`, for rollouts of so many steps."""
+    return [
+        ("episode", int),
+        ("theta", float, d),
+        ("cost", float),
+        ("states", float, (steps, n)),
+        ("actions", float, (steps, m)),
+    ]
+
+
+def most_evaluations(experiment: Experiment) -> int:
+    """How many rollouts without noise a run has at most: the first, the last and those between."""
+    return experiment.episodes // experiment.evaluate_every + 2
 
 
 class Table:
@@ -99,7 +151,11 @@ class Records:
     facts: dict[str, Any]  # stopped, solver, seconds, final_cost; when stored those of `provenance`
 
     def save(self, path: Path) -> None:
-        """Write the whole file beside `path`, then rename it into place."""
+        """Write the whole file beside `path`, then rename it into place.
+
+        Raises:
+            OSError: it cannot be written; what was there stays.
+        """
         about = {"experiment": self.experiment, "facts": self.facts}
         save_arrays(path, about, {"steps": self.steps, "evaluations": self.evaluations})
 
@@ -109,52 +165,46 @@ class Records:
 
         Raises:
             FileNotFoundError: there is none.
-            DamagedRecords: it cannot be read whole.
+            DamagedRecords: it cannot be read whole, or is not what a run leaves behind.
         """
-        about, tables = load_arrays(path, ("steps", "evaluations"))
+        about, tables = load_arrays(path, _forms)
         return cls(about["experiment"], tables["steps"], tables["evaluations"], about["facts"])
 
     @staticmethod
     def about(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-        """The experiment's fields and the facts, without reading the tables."""
-        try:
-            with path.open("rb") as whole, np.load(whole, allow_pickle=False) as file:
-                about = json.loads(str(file["about"]))
-            return about["experiment"], about["facts"]
-        except Exception as error:
-            raise DamagedRecords(f"{path} is damaged, or not a run") from error
+        """The experiment's fields and the facts, without reading the tables.
+
+        Raises:
+            FileNotFoundError: there is no file.
+            DamagedRecords: it does not say what a run says, or has other columns.
+        """
+        about = load_about(path, _forms)
+        return about["experiment"], about["facts"]
 
 
-def save_arrays(path: Path, about: dict[str, Any], tables: Tables) -> None:
-    """Write columns and facts beside `path`, whole, then rename the file into place."""
-    arrays: dict[str, Any] = {
-        f"{table}/{name}": column
-        for table, columns in tables.items()
-        for name, column in columns.items()
-    }
-    arrays["about"] = np.array(json.dumps(about))
-    write_whole(path, lambda file: np.savez_compressed(file, **arrays))
-
-
-def load_arrays(path: Path, names: tuple[str, ...]) -> tuple[dict[str, Any], Tables]:
-    """The facts and the tables of these names from a file that `save_arrays` wrote.
+def named_in(about: dict[str, Any]) -> Experiment:
+    """The experiment of a file, which also has all `FACTS`.
 
     Raises:
-        FileNotFoundError: there is none.
-        DamagedRecords: it cannot be read whole.
+        ValueError: it does not name one, or a fact is missing.
     """
     try:
-        with path.open("rb") as whole, np.load(whole, allow_pickle=False) as file:
-            about = json.loads(str(file["about"]))
-            tables: Tables = {name: {} for name in names}
-            for key in file.files:
-                table, _, name = key.partition("/")
-                if name:
-                    tables[table][name] = file[key]
-        if not (set(about) >= {"experiment", "facts"} and all(tables.values())):
-            raise LookupError("a table or the facts are missing")
-        return about, tables
-    except FileNotFoundError:
-        raise
-    except Exception as error:
-        raise DamagedRecords(f"{path} is damaged, or not a run") from error
+        experiment = Experiment(**about["experiment"])
+        for fact, kind in FACTS.items():
+            if not isinstance(about["facts"][fact], kind):
+                raise ValueError(f"its {fact} is {about['facts'][fact]!r}")
+    except (LookupError, TypeError) as error:
+        raise ValueError("it does not say which run it is, or what became of it") from error
+    return experiment
+
+
+def _forms(about: dict[str, Any]) -> Forms:
+    """Of the tables of a run."""
+    experiment = named_in(about)
+    d, steps = len(experiment.theta), experiment.steps
+    of_steps = [*step_fields(STATES, INPUTS, d), ("alpha_phi2", float)]
+    of_evaluations = evaluation_fields(STATES, INPUTS, d, steps)
+    return {
+        "steps": Form(of_steps, range(experiment.episodes * steps + 1)),
+        "evaluations": Form(of_evaluations, range(1, most_evaluations(experiment) + 1)),
+    }

@@ -10,11 +10,20 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.control import Plant
-from nmpcrl.learning import Successor, Weights
+from nmpcrl.learning import Exploration, Learner, Successor, Weights
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import Diverged, Step, absurd, train
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.records import Field, Records, StepStatus, Stopped, Table, final_cost
+from nmpcrl.study.records import (
+    Records,
+    StepStatus,
+    Stopped,
+    Table,
+    evaluation_fields,
+    final_cost,
+    most_evaluations,
+    step_fields,
+)
 from nmpcrl.study.setup import controller_of, prepare
 
 UNKNOWN = Successor(np.nan)  # of a step that was not bootstrapped
@@ -35,27 +44,35 @@ def run(experiment: Experiment, on_episode: Callable[[int, float], None] | None 
         experiment: names the run; what its learner does not read is set to its default.
         on_episode: called after each episode with how many are done and the episode's summed cost.
     """
+    experiment = experiment.canonical
+    controller = controller_of(experiment)
+    ready = prepare(experiment, controller)
     gc.freeze()  # the collector need not look through all that was imported, again and again
     try:
-        return _run(experiment.canonical, on_episode)
+        return _run(experiment, controller, *ready, on_episode)
     finally:
         gc.unfreeze()
 
 
-def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None) -> Records:
-    controller = controller_of(experiment)
-    learner, weights, explore = prepare(experiment, controller)
+def _run(
+    experiment: Experiment,
+    controller: Persistent,
+    learner: Learner,
+    weights: Weights,
+    explore: Exploration,
+    on_episode: Callable[[int, float], None] | None,
+) -> Records:
     steps, evaluations = _tables(experiment, controller.nmpc.plant)
     evaluations.append(_evaluation(controller, weights, 0, experiment.steps))
     stopped, cost, began = str(Stopped.FINISHED), 0.0, time.perf_counter()
-    solver = controller.nmpc.solver.name
+    named = solver = controller.nmpc.solver.name
     try:
         options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
         for step in train(learner, controller, weights, explore, **options):
             seconds = time.perf_counter() - began
             steps.append(_row(step, seconds))
             cost += step.cost
-            solver = step.plan.solver if step.plan else solver
+            solver = next((one for one in _solvers(step) if one != named), solver)
             if step.failure or step.time == experiment.steps - 1:
                 done = step.episode + 1
                 due = done % experiment.evaluate_every == 0 or done == experiment.episodes
@@ -72,7 +89,7 @@ def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None
     table["alpha_phi2"] = experiment.alpha * (table["features"] ** 2).sum(axis=1)
     facts = {
         "stopped": stopped,
-        "solver": solver,  # what solved: fatrop where riccati was not to be had
+        "solver": solver,  # what solved: fatrop where riccati was not to be had, if only once
         "seconds": float(table["seconds"].sum()),
         "final_cost": final_cost(judged["cost"]),
     }
@@ -81,42 +98,21 @@ def _run(experiment: Experiment, on_episode: Callable[[int, float], None] | None
 
 def _tables(experiment: Experiment, plant: Plant) -> tuple[Table, Table]:
     """Room for `Records.steps` and `Records.evaluations`."""
-    n, m, d, steps = plant.n, plant.m, len(experiment.theta), experiment.steps
-    step: list[Field] = [
-        ("episode", int),
-        ("time", int),
-        ("state", float, n),
-        ("action", float, m),
-        ("cost", float),
-        ("value", float),
-        ("next_value", float),
-        ("delta", float),
-        ("features", float, d),
-        ("theta", float, d),
-        ("w", float, d),
-        ("loss", float),
-        ("status", int),
-        ("restarts", int),
-        ("violation", float),
-        ("iterations", int),
-        ("solves", int),
-        ("solve_seconds", float),
-        ("fit_seconds", float),
-        ("seconds", float),
-    ]
-    evaluation: list[Field] = [
-        ("episode", int),
-        ("theta", float, d),
-        ("cost", float),
-        ("states", float, (steps, n)),
-        ("actions", float, (steps, m)),
-    ]
-    rollouts = experiment.episodes // experiment.evaluate_every + 2  # the first and the last
-    return Table(step, experiment.episodes * steps), Table(evaluation, rollouts)
+    n, m, d = plant.n, plant.m, len(experiment.theta)
+    return (
+        Table(step_fields(n, m, d), experiment.episodes * experiment.steps),
+        Table(evaluation_fields(n, m, d, experiment.steps), most_evaluations(experiment)),
+    )
+
+
+def _solvers(step: Step) -> list[str]:
+    """What solved the problems of a step."""
+    successor = (step.update and step.update.successor) or UNKNOWN
+    return [one.solver for one in (step.plan, step.solution, successor.solution) if one]
 
 
 def _row(step: Step, seconds: float) -> tuple[Any, ...]:
-    """The row of `Records.steps` for one step of training, in the order of `_tables`."""
+    """The row of `Records.steps` for one step of training, in the order of `step_fields`."""
     update = step.update
     successor = (update and update.successor) or UNKNOWN
     first = step.solution or UNSOLVED

@@ -11,7 +11,6 @@ from nmpcrl import Vector
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning import (
     Learner,
-    QNetwork,
     Weights,
     deep_expected_sarsa,
     expected_sarsa,
@@ -116,6 +115,8 @@ def _network_learner(
     with_theta: bool,
 ) -> Learner:
     """A learner that asks a network for the next value."""
+    from nmpcrl.learning.network import QNetwork  # and with it torch: not for the other learners
+
     plant, (options, fits, normalised) = controller.nmpc.plant, NETWORKS[experiment.network]
     if normalised:
         scales = _scales(controller, np.array(experiment.theta), with_theta=with_theta)

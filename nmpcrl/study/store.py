@@ -1,24 +1,44 @@
 """Where runs are kept: `fetch` and `fetch_all` train what is missing and read what is there.
 
-A run's file is named by its experiment and by the key of `provenance`.
+A run's file is named by its experiment and by the key of `provenance`. What is read is the whole
+run that was asked for, or it is set aside and made again; what was trained is not lost, even if it
+cannot be written. Who else trains a run in the same folder is waited for.
 """
 
-import os
-import sys
-from collections.abc import Iterable, Iterator, Mapping
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.provenance import key, provenance, warn_of_changes
-from nmpcrl.study.records import DamagedRecords, Records
+from nmpcrl.study.place import StoreError, check_folder, folder, keep, refusal, say, set_aside
+from nmpcrl.study.provenance import ORIGINAL, identity, key, provenance, warn_of_changes
+from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
+from nmpcrl.study.reservation import reservations, reserved
 from nmpcrl.study.run import run
 from nmpcrl.study.setup import compile_ahead
 
+__all__ = [
+    "Runs",
+    "StoreError",
+    "check_folder",
+    "fetch",
+    "fetch_all",
+    "folder",
+    "is_stored",
+    "name_of",
+    "path_of",
+    "stored",
+]
+
 Run = TypeVar("Run")  # Records, or a summary of them
+
+POLL = 0.25  # seconds between two looks at what others are at
+STEP, ROLLOUT_STEP, REST = 300, 40, 20_000  # bytes that a run's file takes at most
 
 
 class Runs(Mapping[Experiment, Run]):
@@ -54,23 +74,22 @@ class Runs(Mapping[Experiment, Run]):
 def fetch(experiment: Experiment, **options: Any) -> Records:
     """The run of `experiment`: read if it is stored, otherwise trained and stored.
 
+    A run that another solver had to solve is returned, and not stored.
+
     Args:
         experiment: names the run.
         options: as `run` takes them.
+
+    Raises:
+        StoreError: the run is not stored, and could not be.
     """
-    path = path_of(experiment)
     try:
-        records = Records.load(path)
-        warn_of_changes()
-        return records
-    except FileNotFoundError:
-        pass
-    except DamagedRecords as error:
-        set_aside(path, error)
-    records = run(experiment, **options)
-    records.facts.update(provenance(experiment))
-    records.save(path)
-    return records
+        return read(experiment)
+    except (FileNotFoundError, DamagedRecords):
+        check_folder(size_of(experiment))
+    name = path_of(experiment).name
+    with reserved(folder(), name, lambda: wait_for([name], experiment)):
+        return _read_or_train(experiment, **options)[0]
 
 
 def fetch_all(
@@ -89,51 +108,197 @@ def fetch_all(
         progress: whether to show a bar with episodes done, time left and the latest cost.
 
     Raises:
+        StoreError: runs are missing and cannot be stored; nothing is trained.
         Exception: what the first of them raised that could not be trained; the others are stored.
     """
     experiments = tuple(dict.fromkeys(experiments))
-    missing = [e for e in experiments if not _is_whole(path_of(e))]
-    compile_ahead(missing)
+    missing = [e for e in experiments if not is_stored(e)]
+    if missing:
+        check_folder(sum(map(size_of, missing)))
+        compile_ahead(missing)
+    unstored: dict[Experiment, Records] = {}
+    options = {"executor": executor, "workers": workers, "progress": progress}
+    while missing:
+        missing = _train(missing, unstored, **options)
+    return Runs({e: unstored[e] if e in unstored else fetch(e) for e in experiments})
+
+
+def _train(
+    missing: list[Experiment], unstored: dict[Experiment, Records], **options: Any
+) -> list[Experiment]:
+    """Train what nobody else is at; what is left, once one of those is no longer."""
+    left = _elsewhere(missing)
+
+    def keep(experiment: Experiment, trained: _Trained | None) -> str:
+        if trained is None:
+            left.append(experiment)
+            return ""
+        if trained.unstored:
+            unstored[experiment] = trained.unstored
+        return f"{experiment}: cost {trained.cost:.0f}"
+
     failures = execute(
-        {e: partial(_fetch_quietly, e) for e in missing},
-        lambda e, cost: f"{e}: cost {cost:.0f}",
-        executor=executor,
-        workers=workers,
-        progress=progress,
+        {e: partial(_fetch_quietly, e) for e in missing if e not in left},
+        keep,
         size=lambda e: e.episodes,
         unit="ep",
+        **options,
     )
     for error in failures.values():
         raise error
-    return Runs({e: fetch(e) for e in experiments})
+    if left:
+        wait_for([path_of(e).name for e in left], left[0])
+    return left
 
 
-def _fetch_quietly(experiment: Experiment) -> float:
-    """What a worker does: its records go to disk, not through the pipe; the final cost does."""
-    return float(fetch(experiment).facts["final_cost"])
+def _elsewhere(experiments: list[Experiment]) -> list[Experiment]:
+    """Those that somebody is at."""
+    taken = reservations(folder()).taken(path_of(e).name for e in experiments)
+    return [e for e in experiments if path_of(e).name in taken]
+
+
+class _Trained(NamedTuple):
+    """What a worker hands back: its records go to disk and not through the pipe, if they can."""
+
+    cost: float
+    unstored: Records | None
+
+
+def _fetch_quietly(experiment: Experiment) -> _Trained | None:
+    """What a worker does; None if somebody else is at the run."""
+    mine, name = reservations(folder()), path_of(experiment).name
+    if not mine.take([name]):
+        return None
+    try:
+        records, is_kept = _read_or_train(experiment)
+    finally:
+        mine.release([name])
+    return _Trained(float(records.facts["final_cost"]), None if is_kept else records)
+
+
+def read(experiment: Experiment) -> Records:
+    """The stored run.
+
+    Raises:
+        FileNotFoundError: there is none.
+        DamagedRecords: it is not whole, or another run.
+    """
+    path = path_of(experiment)
+    records = Records.load(path)
+    check_run(path, experiment, records.experiment, records.facts)
+    warn_of_changes()
+    return records
+
+
+def _read_or_train(experiment: Experiment, **options: Any) -> tuple[Records, bool]:
+    """The run, and whether it is where it belongs; for who has reserved it."""
+    path = path_of(experiment)
+    try:
+        return read(experiment), True
+    except FileNotFoundError:
+        pass
+    except DamagedRecords as error:
+        set_aside(path, error)
+    records = run(experiment, **options)
+    records.facts.update(provenance(experiment))
+    if other := solved_by_another(experiment, records.facts):
+        say(f"{experiment} is not stored: it was {other}")
+        return records, False
+    return records, keep(path, records.save)
+
+
+def solved_by_another(experiment: Experiment, facts: Mapping[str, Any]) -> str:
+    """By which solver a run was solved, if not by the one that its experiment names."""
+    solver = facts["solver"]
+    same = solver == experiment.solver
+    return "" if same else f"solved by {solver} and not by {experiment.solver}"
+
+
+def check_run(
+    path: Path, experiment: Experiment, fields: Mapping[str, Any], facts: Mapping[str, Any]
+) -> None:
+    """See that a file is of the run asked for.
+
+    Args:
+        path: of the file.
+        experiment: names the run.
+        fields: of the experiment that the file names.
+        facts: that it states.
+
+    Raises:
+        DamagedRecords: it is of another run.
+    """
+    before = {name: value for name, value in ORIGINAL.items() if name != "obstacles"}
+    stated = Experiment(**{**before, **fields})
+    if identity(stated) != identity(experiment):
+        raise DamagedRecords(f"{path} holds another run, {name_of(stated)}")
+    if facts.get("key", key(experiment)) != key(experiment):
+        raise DamagedRecords(f"{path} holds a run of other code or other versions than it says")
+    if other := solved_by_another(experiment, facts):
+        raise DamagedRecords(f"{path} holds a run {other}")
+
+
+def is_stored(experiment: Experiment) -> bool:
+    """Whether there is a file that says it is the run; all of it is read only by `fetch`."""
+    return is_there(path_of(experiment), experiment, Records.about)
+
+
+def is_there(
+    path: Path,
+    experiment: Experiment,
+    about: Callable[[Path], tuple[dict[str, Any], dict[str, Any]]],
+) -> bool:
+    """Whether a file says that it is of a run; `about` reads that."""
+    try:
+        check_run(path, experiment, *about(path))
+    except (FileNotFoundError, DamagedRecords):
+        return False
+    return True
 
 
 def stored() -> dict[Path, tuple[dict[str, Any], dict[str, Any]]]:
-    """Every whole run in the folder: its experiment's fields and its facts, by path."""
+    """Every run in the folder: its experiment's fields and its facts, by path.
+
+    Raises:
+        StoreError: there is no such folder, but something else, or it cannot be read.
+    """
+    try:
+        paths = sorted(folder().iterdir())
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise StoreError(refusal(f"cannot be read ({error.strerror})")) from error
     whole = {}
-    for path in sorted(folder().glob("*.npz")):
+    for path in filter(lambda path: path.suffix == ".npz", paths):
         try:
-            whole[path] = Records.about(path)
-        except DamagedRecords as error:
-            print(f"{error}; it is left alone", file=sys.stderr)
+            fields, facts = Records.about(path)
+            _check_name(path, fields, facts)
+            whole[path] = fields, facts
+        except (FileNotFoundError, DamagedRecords) as error:
+            say(f"{error}; it is left alone")
     return whole
 
 
-def set_aside(path: Path, error: DamagedRecords) -> None:
-    """Keep a damaged file under another name, and say so."""
-    aside = path.with_suffix(".damaged")
-    path.replace(aside)
-    print(f"{error}; it is kept as {aside.name} and made again", file=sys.stderr)
+def _check_name(path: Path, fields: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
+    """See that a file which has the name of a run has that of its own."""
+    own = f"{name_of(Experiment(**fields))}-{facts.get('key', '')[:10]}"
+    if re.fullmatch(r".*-seed\d+-\d+ep-[0-9a-f]{10}", path.stem) and path.stem != own:
+        raise DamagedRecords(f"{path} holds another run, {own}")
 
 
-def folder() -> Path:
-    """Where runs are kept: `runs`, or what the environment variable NMPCRL_RUNS says."""
-    return Path(os.environ.get("NMPCRL_RUNS", "runs"))
+def size_of(experiment: Experiment) -> int:
+    """How many bytes the file of a run takes at most."""
+    e = experiment
+    return e.steps * (STEP * e.episodes + ROLLOUT_STEP * most_evaluations(e)) + REST
+
+
+def wait_for(names: list[str], first: Experiment) -> None:
+    """Say that somebody else is at runs, and wait until he has one less."""
+    more = len(names) - 1
+    said = f"{first} and {more} others are" if more else f"{first} is"
+    say(f"{said} being trained by another process, which is waited for")
+    while len(reservations(folder()).taken(names)) == len(names):
+        time.sleep(POLL)
 
 
 def path_of(experiment: Experiment) -> Path:
@@ -145,11 +310,3 @@ def name_of(experiment: Experiment) -> str:
     """The run's name for people; the key says the rest."""
     e = experiment
     return f"{e.learner}-{e.layout}-{e.decay}-seed{e.seed}-{e.episodes}ep"
-
-
-def _is_whole(path: Path) -> bool:
-    try:
-        Records.about(path)
-    except DamagedRecords:
-        return False
-    return True

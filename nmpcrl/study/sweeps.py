@@ -3,12 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import fields
 from itertools import product
+from math import prod
 from typing import Any
 
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment
-from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.parameters import Allowed, ParameterError, Several, is_list, shown
 from nmpcrl.study.setup import DECAYS
+
+MOST_RUNS = 10_000  # of a sweep: more than five times the whole study
+FIELDS: dict[str, Allowed] = {field.name: field.metadata["allowed"] for field in fields(Experiment)}
+AXES: dict[str, Allowed] = {f"{name}s": Several(one, name) for name, one in FIELDS.items()}
 
 
 def sweep(**axes: Any) -> tuple[Experiment, ...]:
@@ -17,27 +22,32 @@ def sweep(**axes: Any) -> tuple[Experiment, ...]:
     `sweep(learner=("ES", "GES"), seed=[0, 1], episodes=20)` names four runs. `theta` is one value.
 
     Raises:
-        ParameterError: a value is not what it may be, or an axis is empty or names none.
+        ParameterError: a value is not what it may be, an axis is empty, repeats itself or names
+            no field, or there are too many runs.
     """
-    known = {field.name for field in fields(Experiment)}
-    for name, value in axes.items():
-        if name not in known:
-            raise ParameterError(f"{name!r} is not a parameter; there are {', '.join(known)}")
-        if isinstance(value, str) and value.strip().startswith("["):
-            raise ParameterError(
-                f"{name}s = {value!r} arrived as text, not as a list;"
-                f" write -y '{{{name}s: {value}}}'"
-            )
-        if isinstance(value, list | tuple) and not value:
-            raise ParameterError(f"{name}s = {value!r} must name at least one {name}")
-    choices = {
-        name: value if isinstance(value, list | tuple) and name != "theta" else [value]
-        for name, value in axes.items()
-    }
+    choices = {name: _values(name, given) for name, given in axes.items()}
+    count = prod(map(len, choices.values()))
+    if count > MOST_RUNS:
+        longest = max(choices, key=lambda name: len(choices[name]))
+        raise ParameterError(
+            f"{longest}s = {shown(axes[longest])} and the other axes make {count:,} runs;"
+            f" {MOST_RUNS:,} are allowed"
+        )
     return tuple(
         Experiment(**dict(zip(choices, combination, strict=True)))
         for combination in product(*choices.values())
     )
+
+
+def _values(name: str, given: Any) -> tuple[Any, ...]:
+    """The values of an axis, or the one value that is fixed."""
+    if name not in FIELDS:
+        raise ParameterError(f"{name!r} is not a parameter; there are {', '.join(FIELDS)}")
+    text = isinstance(given, str) and given.strip().startswith("[")
+    if (text or is_list(given)) and name != "theta":
+        values: tuple[Any, ...] = AXES[f"{name}s"].check(f"{name}s", given)
+        return values
+    return (FIELDS[name].check(name, given),)
 
 
 def paper_runs(

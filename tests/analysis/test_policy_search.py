@@ -1,5 +1,6 @@
 """The search: it finds a known best, keeps to its budget, and is made once."""
 
+import tempfile
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -9,7 +10,7 @@ import pytest
 from nmpcrl.analysis import policy_search
 from nmpcrl.analysis.policy_search import LEAST, SCALE, Found, Search, search_all
 from nmpcrl.learning.rollout import Persistent, evaluate
-from nmpcrl.study import ParameterError, paper
+from nmpcrl.study import ParameterError, StoreError, paper
 
 BEST = np.array([0.5, 1.5, 0.1, 0.02, 0.08, 2.0, 0.3, 0.15, 0.3])  # of the bowl below
 FOUND = Found(paper.THETA_INIT, 40, (1, 7), (100.0, 80.0))
@@ -138,3 +139,17 @@ def test_a_damaged_file_is_reported_and_searched_again(searched, runs, capsys):
     assert search_all([Search()], progress=False) == {Search(): FOUND}
     assert "is damaged" in capsys.readouterr().err
     assert len(searched) == 2
+
+
+def test_without_a_folder_to_keep_them_in_nothing_is_searched(searched, runs, monkeypatch):
+    (runs / "file").write_text("no folder")
+    monkeypatch.setenv("NMPCRL_RUNS", str(runs / "file"))
+    with pytest.raises(StoreError, match="cannot be a folder"):
+        search_all([Search()], progress=False)
+    assert searched == []
+
+
+def test_what_cannot_be_written_is_found_all_the_same(searched, runs, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(runs))
+    (runs / "policy_search.json").mkdir()
+    assert search_all([Search()], progress=False) == {Search(): FOUND}

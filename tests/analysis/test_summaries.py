@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import threading
 import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -162,6 +164,75 @@ def test_a_damaged_summary_is_put_aside_and_made_again(folder, trained, capsys):
     assert trained == [QUICK, QUICK]
     assert sorted(p.suffix for p in folder.iterdir()) == [".damaged", ".npz"]
     assert "is kept as" in capsys.readouterr().err
+
+
+def rewritten(path: Path, change) -> None:
+    """A file with other members, whole in every other respect."""
+    with np.load(path) as file:
+        members = dict(file)
+    np.savez_compressed(path, **change(members))
+
+
+DAMAGES = {
+    "two bytes garbled": lambda path: garble(path, 2),
+    "cut short": lambda path: path.write_bytes(path.read_bytes()[:-300]),
+    "empty": lambda path: path.write_bytes(b""),
+    "of another run": lambda path: shutil.copy(summaries.path_of(THREE[1]), path),
+    "a run": lambda path: shutil.copy(store.path_of(THREE[0]), path),
+    "another number": lambda path: rewritten(
+        path, lambda kept: kept | {"episodes/cost": kept["episodes/cost"] + 1}
+    ),
+    "a column under another name": lambda path: rewritten(
+        path, lambda kept: {name.replace("/cost", "/costs"): a for name, a in kept.items()}
+    ),
+    "another shape": lambda path: rewritten(
+        path, lambda kept: kept | {"rollout/states": kept["rollout/states"][:, :2]}
+    ),
+}
+
+
+def garble(path: Path, count: int) -> None:
+    content = bytearray(path.read_bytes())
+    for place in range(1, count + 1):
+        content[place * len(content) // (count + 2)] ^= 0x5A
+    path.write_bytes(bytes(content))
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_whatever_is_damaged_is_one_sentence_and_made_again(folder, capsys, name):
+    fetch(THREE[0])
+    first = here(THREE)
+    path = summaries.path_of(THREE[0])
+    DAMAGES[name](path)
+    again = here(THREE)
+    for experiment in THREE:
+        assert_same_summary(again[experiment], first[experiment])
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert said.startswith(str(path))
+    assert said.endswith(f"it is kept as {path.stem}.damaged and made again\n")
+    assert_same_summary(RunSummary.load(path), first[THREE[0]])
+
+
+def test_looking_whether_a_summary_is_stored_changes_nothing(folder, capsys):
+    here([QUICK])
+    path = summaries.path_of(QUICK)
+    path.write_bytes(b"damaged")
+    assert not summaries.is_stored(QUICK)
+    assert path.read_bytes() == b"damaged"
+    assert capsys.readouterr().err == ""
+
+
+def test_a_run_that_another_solver_had_to_solve_is_a_failure(monkeypatch, folder):
+    def run_by_another(experiment):
+        records = run(experiment)
+        solver = "fatrop" if experiment.seed == 1 else records.facts["solver"]
+        return replace(records, facts=records.facts | {"solver": solver})
+
+    monkeypatch.setattr(summaries, "run", run_by_another)
+    with pytest.raises(Failed, match="OtherSolver: it was solved by fatrop and not by riccati"):
+        here(THREE)
+    assert [summaries.is_stored(e) for e in THREE] == [True, False, True]
 
 
 @pytest.fixture
@@ -381,8 +452,8 @@ def wait_until(holds, seconds: float = 240.0):
         time.sleep(0.02)
 
 
-def test_one_who_asks_while_another_trains_finds_whole_files_only(folder):
-    """Two calls at once may train a run twice, and both end well."""
+def test_one_who_asks_while_another_trains_waits_for_that(folder, trained, capsys):
+    """Two calls at once train each run once, and both end well."""
     studies = []
     threads = [threading.Thread(target=lambda: studies.append(here(THREE))) for _ in range(2)]
     for thread in threads:
@@ -391,3 +462,5 @@ def test_one_who_asks_while_another_trains_finds_whole_files_only(folder):
         thread.join()
     assert [list(study) for study in studies] == [list(THREE)] * 2
     assert {path.suffix for path in folder.iterdir()} == {".npz"}
+    assert sorted(e.seed for e in trained) == [0, 1, 2]
+    assert "being trained by another process, which is waited for" in capsys.readouterr().err

@@ -1,13 +1,14 @@
 """When a benchmark is read and when it is measured, and what the command prints."""
 
 import json
+import tempfile
 
 import pytest
 from click.testing import CliRunner
 
-from nmpcrl.__main__ import main
 from nmpcrl.bench import suite
-from nmpcrl.study import ParameterError
+from nmpcrl.commands import main
+from nmpcrl.study import ParameterError, StoreError, store
 
 
 @pytest.fixture
@@ -119,6 +120,18 @@ def test_a_benchmark_in_stages_says_of_all_together_the_least_length(counted):
     about = measured_here("smoke")["about"]
     assert about["length"] == "smoke"
     assert about["seconds"] >= 0
+
+
+def test_without_a_folder_to_keep_it_in_nothing_is_measured(counted, monkeypatch):
+    store.folder().write_text("no folder")
+    with pytest.raises(StoreError, match="cannot be a folder"):
+        measured_here("short")
+
+
+def test_what_cannot_be_written_is_measured_all_the_same(counted, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    suite.path().mkdir(parents=True)
+    assert measured_here("short")["about"]["length"] == "short"
 
 
 def test_the_file_is_whole_and_alone(counted):

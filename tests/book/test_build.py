@@ -59,6 +59,10 @@ def test_a_chapter_that_does_not_exist_is_refused_with_those_that_do(driver):
         ("-p", "episodes", "2.5"),
         ("-r", "episodes", "20"),
         ("-p", "layout", "nowhere"),
+        ("-p", "episodes", "100000000"),
+        ("-p", "seeds", "3"),
+        ("-p", "episodes", "90000"),
+        ("-p", "alpha", "nan"),
     ],
 )
 def test_a_value_of_the_wrong_type_or_range_is_refused_by_name(driver, option, name, value):
@@ -73,6 +77,23 @@ def test_a_list_of_seeds_given_as_text_is_answered_with_the_right_form(driver):
 
 def test_parameters_without_a_chapter_are_refused(driver):
     assert "--chapter" in refused(driver("-p", "episodes", "20"))
+
+
+@pytest.mark.parametrize("chapter", ["02_expected_sarsa", "05_results"])
+@pytest.mark.parametrize("kind", ["missing", "empty", "file", "damaged"])
+def test_without_what_is_published_nothing_is_built(driver, tmp_path, monkeypatch, chapter, kind):
+    """Neither a chapter that reads it, nor one whose runs would have nothing to contradict."""
+    place = tmp_path / "published"
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(place))
+    if kind == "file":
+        place.write_text("")
+    elif kind != "missing":
+        place.mkdir()
+    if kind == "damaged":
+        (place / "about.json").write_text("[" * 100_000)
+    sentence = refused(driver("--chapter", chapter))
+    assert str(place) in sentence
+    assert "`git checkout -- book/published` restores" in sentence
 
 
 def test_yaml_that_is_no_mapping_is_refused(driver):
@@ -185,7 +206,9 @@ def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
 
 
 def test_the_chapter_that_judges_times_asks_only_for_theirs_beforehand():
-    needs = build.ask(ROOT / "book/05_results.ipynb", build.SMOKE | {"layout": "A"})
+    chapter = ROOT / "book/05_results.ipynb"
+    given = {name: build.SMOKE[name] for name in build.parameters(chapter) if name in build.SMOKE}
+    needs = build.ask(chapter, given)
     (call,) = needs["beforehand"]
     assert (call.func.__name__, call.args) == ("read_or_measure", ("smoke",))
     assert call.keywords == {"only": ["learning steps"], "calm": True}

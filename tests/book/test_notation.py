@@ -10,7 +10,7 @@ import build
 import click
 import pytest
 
-from nmpcrl.__main__ import main
+from nmpcrl.commands import main
 from nmpcrl.study.departures import DEPARTURES
 
 ROOT = Path(__file__).resolve().parents[2]

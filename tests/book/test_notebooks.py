@@ -3,20 +3,31 @@
 import ast
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import build
 import nbformat
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from papermill.cli import papermill
+
+from nmpcrl.study import chapter, paper
+from nmpcrl.study.chapter import INJECTED
+from nmpcrl.study.experiment import MAIN
+from nmpcrl.study.limits import HOURS, MEMORY, estimate
 
 ROOT = Path(__file__).resolve().parents[2]
 PATHS = sorted((ROOT / "book").glob("*.ipynb"))
 NOTEBOOKS = {path.stem: nbformat.read(path, as_version=4) for path in PATHS}
 CHAPTERS = [name for name in NOTEBOOKS if re.match(r"\d\d_|solver", name)]
+GIVEN = [*CHAPTERS, "performance"]  # which have parameters
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)
+each_given = pytest.mark.parametrize("name", GIVEN)
 
 
 def code(name: str) -> list:
@@ -110,6 +121,125 @@ def test_the_second_code_cell_refuses_parameters_that_make_no_sense(name):
         if parameter in nonsense:
             with pytest.raises(build.Failure, match=parameter):
                 build.ask(path, {parameter: nonsense[parameter]})
+
+
+@each_given
+def test_the_parameters_are_declared_in_the_metadata_and_all_are_checked(name):
+    """The second cell refuses names that it does not check, so it may leave none out."""
+    declared = build.parameters(ROOT / f"book/{name}.ipynb")
+    assert NOTEBOOKS[name].metadata.nmpcrl.parameters == declared
+    assert not code(name)[0].source.startswith(INJECTED)
+    shown: dict = {}
+    exec(code(name)[0].source, shown)
+    check = chapter.check
+    try:
+        chapter.check = lambda **given: shown.update(checked=given)
+        build.ask(ROOT / f"book/{name}.ipynb", {})
+    finally:
+        chapter.check = check
+    assert shown["checked"] == {one: shown[one] for one in declared}
+
+
+def test_a_notebook_without_parameters_declares_none():
+    for name in set(NOTEBOOKS) - set(GIVEN):
+        assert "nmpcrl" not in NOTEBOOKS[name].metadata
+        assert build.parameters(ROOT / f"book/{name}.ipynb") == []
+
+
+MAY_BE = {  # what is drawn for a parameter, so that it is sometimes right
+    "episodes": st.integers(0, 300) | st.integers(1, 200_000),
+    "seeds": st.lists(st.integers(-1, 20), max_size=3, unique=True),
+    "layout": st.sampled_from([*paper.LAYOUTS, "Z"]),
+    "layouts": st.lists(st.sampled_from([*paper.LAYOUTS, "Z"]), max_size=3, unique=True),
+    "learners": st.lists(st.sampled_from([*MAIN, "QL", "SARSA"]), max_size=4),
+    "alpha": st.floats(0, 1e-3) | st.floats(),
+    "beta": st.floats(0, 1e-3) | st.floats(),
+    "horizon": st.integers(-1, 30) | st.integers(),
+    "seed": st.integers(),
+    "study": st.sampled_from(["fresh", "published", "stale"]),
+    "budget": st.integers(0, 10**7),
+    "length": st.sampled_from(["smoke", "short", "full", "long"]),
+}
+LARGE = [10**400, -(10**20), 2**31, 100_000, 10**12, 1e308, 5e-324]
+ANYTHING = st.recursive(  # that JSON or YAML can hold
+    st.none()
+    | st.booleans()
+    | st.integers(-2, 2)
+    | st.floats()
+    | st.text(max_size=4)
+    | st.dates()
+    | st.sampled_from([*LARGE, "A", "[3]", "[A]", " 3", list(range(100_000)), [0] * 20_000]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=2), inner),
+    max_leaves=5,
+)
+
+
+@st.composite
+def asked(draw):
+    """A chapter and what it is given, some of it right."""
+    name = draw(st.sampled_from(GIVEN))
+    names = st.sampled_from(build.parameters(ROOT / f"book/{name}.ipynb"))
+    chosen = draw(st.lists(names, unique=True, min_size=1))
+    values = {one: draw(MAY_BE[one] | MAY_BE[one] | MAY_BE[one] | ANYTHING) for one in chosen}
+    if draw(st.integers(0, 9)) == 0:
+        values[draw(st.sampled_from(["episode", "open", "Seeds", "x"]))] = draw(ANYTHING)
+    return name, values
+
+
+@pytest.mark.slow
+@settings(derandomize=True, deadline=None, max_examples=1500)
+@given(asked())
+def test_whatever_a_chapter_is_given_it_takes_little_or_refuses_in_a_sentence(drawn):
+    name, values = drawn
+    try:
+        needs = build.ask(ROOT / f"book/{name}.ipynb", values)
+    except build.Failure as refusal:
+        said = refusal.message
+        assert "\n" not in said
+        assert len(said) < 400
+        return
+    cost = estimate((*needs["experiments"], *needs["summaries"]))
+    assert cost.seconds <= HOURS * 3600
+    assert cost.memory <= MEMORY
+
+
+@pytest.mark.slow
+@pytest.mark.book
+@pytest.mark.parametrize(
+    ("name", "words", "said"),
+    [
+        ("02_expected_sarsa", ["-p", "episode", "2"], "(did you mean 'episodes'?)"),
+        ("02_expected_sarsa", ["-p", "episodes", "100000000"], "from 1 to 100000"),
+        ("02_expected_sarsa", ["-y", "{seeds: 3}"], "seeds = 3 must be a list, such as [3]"),
+        ("03_rdes", ["-y", "{layout: [A]}"], "layout = ['A'] must be one of A, B"),
+        ("04_ges", ["-p", "episodes", "90000"], "GB of memory; 4 GB are allowed"),
+        ("06_what_the_paper_leaves_open", ["-p", "layouts", "A"], "must be a list, such as ['A']"),
+        ("07_beyond", ["-p", "budget", "1000000000"], "budget = 1000000000 must be a whole"),
+        ("01_mdp_and_nmpc", ["-p", "horizon", "21"], "must be 20 or less here: a longer plan"),
+        ("performance", ["-p", "lenght", "smoke"], "(did you mean 'length'?)"),
+        ("solver", ["-p", "horizon", "1000000000000"], "from 1 to 500"),
+    ],
+)
+def test_papermill_itself_ends_in_the_sentence_before_anything_is_trained(
+    name, words, said, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    output = tmp_path / "o.ipynb"
+    command = [sys.executable, "-m", "papermill", f"book/{name}.ipynb", str(output), *words]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("ParameterError: ")
+    assert said in last
+    (error,) = [
+        one
+        for cell in nbformat.read(output, 4).cells
+        if cell.cell_type == "code"
+        for one in cell.outputs
+        if one.output_type == "error"
+    ]
+    assert error.traceback == [last]
+    assert not (tmp_path / "runs").exists()
 
 
 @each_chapter

@@ -30,7 +30,13 @@ def known():
     return summaries
 
 
-def test_what_is_not_published_is_trained_with_its_frozen_arms():
+def test_where_nothing_is_published_no_chapter_goes_on():
+    with pytest.raises(published.Damaged, match=r"nothing is published in .* restores"):
+        needed("fresh", **ASKED)
+
+
+def test_what_is_not_published_is_trained_with_its_frozen_arms(monkeypatch):
+    monkeypatch.setattr(evidence, "load", published.Published)
     wanted = set(needed("fresh", **ASKED))
     assert wanted == {*main_table(["ES", "frozen"], ["A"], [0], 2)}
     assert {frozen_arm(e) for e in wanted} <= wanted

@@ -3,12 +3,13 @@
 import json
 import shutil
 from dataclasses import asdict, fields, replace
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from nmpcrl.analysis.summary import row, summarise, table
 from nmpcrl.claims import published
@@ -62,6 +63,12 @@ def known(summaries) -> Published:
 
 
 @pytest.fixture
+def whole(known, folder):
+    """What is published, and the bytes of its files."""
+    return known, {name: (folder / name).read_bytes() for name in FILES}
+
+
+@pytest.fixture
 def elsewhere(monkeypatch):
     """From here on this is another machine."""
     there = fingerprint() | {"processor": "another"}
@@ -73,10 +80,49 @@ def changed(one, **rollouts):
     return replace(one, evaluations=one.evaluations | rollouts)
 
 
-def test_where_nothing_is_published_there_is_nothing(folder):
-    for found in (load(), folder.mkdir() or load()):
-        assert (found.summaries, found.variants, found.rows) == ({}, {}, {})
-        assert found.verdicts == ()
+def refusal(folder) -> str:
+    """The one sentence that `load` ends in; it names the folder and what restores it."""
+    published._load.cache_clear()
+    with pytest.raises(Damaged) as refused:
+        load()
+    said = str(refused.value)
+    assert str(folder) in said
+    assert "`git checkout -- book/published` restores" in said
+    assert "\n" not in said
+    return said
+
+
+@pytest.mark.parametrize(
+    ("make", "kind"),
+    [
+        (lambda path: None, ""),
+        (lambda path: path.mkdir(), ""),
+        (lambda path: path.write_text("a file"), ", which is no folder"),
+        (lambda path: path.symlink_to("nowhere"), ""),
+    ],
+    ids=["missing", "empty", "file", "dangling"],
+)
+def test_where_nothing_is_published_that_is_refused(folder, make, kind):
+    make(folder)
+    assert refusal(folder).startswith(f"nothing is published in {folder}{kind}; `git checkout")
+
+
+def test_a_folder_without_the_files_and_folders_instead_of_files_are_refused(folder):
+    folder.mkdir()
+    for name in FILES:
+        (folder / name).mkdir()
+        assert f"{folder} is damaged" in refusal(folder)
+
+
+def test_a_notebook_shows_the_sentence_alone(folder):
+    with pytest.raises(Damaged) as refused:
+        load()
+    assert refused.value._render_traceback_() == [f"Damaged: {refused.value}"]
+
+
+def test_where_no_folder_is_named_the_projects_own_is_read(monkeypatch):
+    monkeypatch.setenv("NMPCRL_PUBLISHED", "")
+    assert published.place().parts[-2:] == ("book", "published")
 
 
 def test_what_is_published_is_in_four_files(known, folder):
@@ -151,7 +197,9 @@ def test_the_same_content_gives_the_same_bytes(known, summaries, folder):
     again = {name: (folder / name).read_bytes() for name in FILES}
     about, about_again = (json.loads(files.pop("about.json")) for files in (before, again))
     assert again == before
-    assert about_again | {"date": about["date"]} == about
+    for name in ("date", "seal"):
+        about.pop(name), about_again.pop(name)
+    assert about_again == about
 
 
 def test_what_is_published_anew_takes_the_place_of_what_was_read(known, summaries):
@@ -218,9 +266,7 @@ def test_a_column_that_an_older_table_lacks_takes_the_fields_default(known, summ
     runs = pd.read_csv(folder / "runs.csv").drop(columns=["projected", "evaluate_every"])
     runs.to_csv(folder / "runs.csv", index=False)
     about = json.loads((folder / "about.json").read_text())
-    about["files"]["runs.csv"] = sha256((folder / "runs.csv").read_bytes()).hexdigest()
-    (folder / "about.json").write_text(json.dumps(about))
-    published._load.cache_clear()
+    published._seal(folder, about)
     default = Experiment().evaluate_every
     assert list(load().rows) == [replace(e, evaluate_every=default) for e in summaries]
 
@@ -230,19 +276,93 @@ def test_a_word_that_is_not_known_is_refused(known, folder, name, word):
     text = (folder / name).read_text()
     (folder / name).write_text(text.replace(word, "hardly"))
     about = json.loads((folder / "about.json").read_text())
-    about["files"] = published._sums(folder)
-    (folder / "about.json").write_text(json.dumps(about))
+    published._seal(folder, about)
     assert word in text
     assert_refused(folder)
 
 
 def assert_refused(folder):
+    assert f"{folder} is damaged" in refusal(folder)
+
+
+DEEP = "[" * 100_000 + "]" * 100_000
+WORDS = ("learner", "files", "seal", "hours", "2", "cost", ",", "\n", '"', "{", "ES", "nan")
+
+
+@st.composite
+def damages(draw):
+    """What may happen to the bytes of a file, or of all: a function of them."""
+    kind = draw(st.sampled_from(["bits", "cut", "grow", "rename", "deep", "other", "gone"]))
+    share, byte = draw(st.floats(0, 1)), draw(st.integers(1, 255))
+    if kind == "bits":
+        at = lambda whole: min(int(share * len(whole)), len(whole) - 1)  # noqa: E731
+        return lambda whole: (
+            whole[: at(whole)] + bytes([whole[at(whole)] ^ byte]) + whole[at(whole) + 1 :]
+        )
+    if kind == "cut":
+        return lambda whole: whole[: int(share * len(whole))]
+    if kind == "grow":
+        return lambda whole: whole + bytes([byte]) * int(1 + 9 * share)
+    if kind == "rename":
+        before, after = draw(st.sampled_from(WORDS)), draw(st.sampled_from(WORDS))
+        return lambda whole: whole.replace(before.encode(), after.encode(), 1 + byte % 2)
+    if kind == "deep":
+        return lambda whole: draw(st.sampled_from([DEEP, f'{{"files": {DEEP}}}'])).encode()
+    if kind == "other":
+        text = st.sampled_from(["", "null", "[]", "{}", "3", "NaN", '"x"', "a,b\n1,2", "\0"])
+        return draw(text.map(lambda one: lambda whole: one.encode()))
+    return lambda whole: None
+
+
+@pytest.mark.slow
+@settings(
+    derandomize=True,
+    deadline=None,
+    max_examples=600,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    names=st.lists(st.sampled_from(FILES), min_size=1, max_size=2, unique=True),
+    damage=damages(),
+    resealed=st.booleans(),
+)
+def test_whatever_is_damaged_either_all_is_read_as_it_was_or_it_is_refused(
+    whole, folder, names, damage, resealed
+):
+    """Sealed anew, a file is what somebody wrote on purpose; even so nothing else is raised."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    found, contents = whole
+    for name, content in contents.items():
+        made = damage(content) if name in names else content
+        if made is not None:
+            (folder / name).write_bytes(made)
+    if resealed and "about.json" not in names and all((folder / n).exists() for n in FILES):
+        published._seal(folder, json.loads((folder / "about.json").read_text()))
     published._load.cache_clear()
-    with pytest.raises(Damaged, match="is damaged") as refused:
-        load()
-    said = str(refused.value)
-    assert str(folder) in said
+    said = ""
+    try:
+        again = load()
+    except Damaged as refused:
+        said = str(refused)
     assert "\n" not in said
+    assert len(said) < 500
+    if not said and not resealed:
+        np.testing.assert_equal(parts(again), parts(found))
+
+
+def parts(found: Published) -> dict:
+    """All that is in it, in terms that can be compared."""
+    names = ("experiment", "episodes", "evaluations", "states", "facts")
+    summaries = {str(e): [getattr(one, n) for n in names] for e, one in found.summaries.items()}
+    rows = {repr(e): row for e, row in found.rows.items()}
+    return {
+        "summaries": summaries,
+        "rows": rows,
+        "variants": {repr(e): part for e, part in found.variants.items()},
+        "verdicts": found.verdicts,
+        "about": dict(found.about),
+    }
 
 
 def test_single_verdicts_are_published_anew_and_all_else_stays(known, folder):
@@ -252,8 +372,9 @@ def test_single_verdicts_are_published_anew_and_all_else_stays(known, folder):
     found = load()
     assert found.verdicts == (VERDICTS[0], measured)
     assert before == [(folder / name).read_bytes() for name in ("runs.csv", "curves.npz")]
-    kept = {name: value for name, value in known.about.items() if name != "files"}
-    assert {name: value for name, value in found.about.items() if name != "files"} == kept
+    sums = {"files", "seal"}
+    kept = {name: value for name, value in known.about.items() if name not in sums}
+    assert {name: value for name, value in found.about.items() if name not in sums} == kept
     with pytest.raises(KeyError, match="no verdict on C9"):
         published.republish([replace(measured, claim="C9")])
 

@@ -4,12 +4,15 @@ The workers have a folder of runs of their own, as on machines that share no dis
 """
 
 import ast
+import contextlib
 import importlib
 import json
 import os
 import re
 import shlex
+import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -21,10 +24,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nmpcrl.__main__ import main
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import Failed, fetch_summaries
 from nmpcrl.analysis.summary import summarise
+from nmpcrl.commands import main
 from nmpcrl.study import cluster, provenance, run, sweep
 from nmpcrl.study.cluster import NoCluster
 
@@ -77,6 +80,16 @@ def run(experiment):
 
 summaries.run = run
 """
+TOO_DEEP = """
+from nmpcrl.analysis import summaries
+
+
+def run(experiment):
+    return run(experiment)
+
+
+summaries.run = run
+"""
 OTHER_VERSIONS = """
 from nmpcrl.study import provenance
 
@@ -103,6 +116,21 @@ sys.modules["nmpcrl"] = None
 """
 
 
+PAGE = (Path(__file__).resolve().parents[2] / "book/cluster.md").read_text()
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)
+
+
+def page_commands() -> list[list[str]]:
+    lines = "".join(blocks("bash")).replace("\\\n", "").splitlines()
+    return [shlex.split(line) for line in lines]
+
+
+(WHOLE,) = blocks("toml")
+
+
 @pytest.fixture(autouse=True)
 def runs(tmp_path, monkeypatch) -> Path:
     """A folder of this test's own."""
@@ -122,12 +150,12 @@ def dask(tmp_path_factory):
         "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "1",  # Dask's own 3 take as much longer
     }
 
-    def start(*arguments: str) -> subprocess.Popen:
+    def start(*arguments: str, cwd: Path = elsewhere) -> subprocess.Popen:
         command = [sys.executable, "-m", "dask", *arguments, "--no-dashboard"]
         with (elsewhere / f"{len(started)}.log").open("w") as log:
             started.append(
                 subprocess.Popen(
-                    command, cwd=elsewhere, env=os.environ | variables, stdout=log, stderr=log
+                    command, cwd=cwd, env=os.environ | variables, stdout=log, stderr=log
                 )
             )
         return started[-1]
@@ -291,9 +319,14 @@ def test_a_run_that_kills_every_worker_fails_and_the_others_end(address, worker,
 
 
 @pytest.mark.slow
-def test_a_run_that_fails_on_a_worker_is_told_with_its_reason(address, worker):
-    worker(MISTAKEN)
-    with pytest.raises(Failed, match="ArithmeticError: a mistake"):
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [(MISTAKEN, "ArithmeticError: a mistake"), (TOO_DEEP, "RecursionError: maximum recursion")],
+    ids=["a mistake", "too many calls for Dask to send"],
+)
+def test_a_run_that_fails_on_a_worker_is_told_with_its_reason(address, worker, text, reason):
+    worker(text)
+    with pytest.raises(Failed, match=reason):
         on_cluster(address, TEN[:1])
 
 
@@ -354,12 +387,148 @@ def test_a_scheduler_without_workers_is_refused_in_a_sentence(address):
         pass
 
 
-def test_an_address_where_no_scheduler_is_is_refused_in_a_sentence():
-    with (
-        pytest.raises(NoCluster, match=r"no scheduler answers at tcp://127[.]0[.]0[.]1:9"),
-        cluster.executor("tcp://127.0.0.1:9", patience=1),
-    ):
+@pytest.fixture
+def threads() -> Iterator[None]:
+    """What is refused leaves no thread behind: Dask's may keep a process from its end."""
+    before = set(threading.enumerate())
+    yield
+    assert set(threading.enumerate()) <= before
+
+
+def refusal(address: str, **options) -> str:
+    """The one sentence in which a cluster is refused, however much patience there is."""
+    with pytest.raises(NoCluster) as refused, cluster.executor(address, patience=3600, **options):
         pass
+    assert "\n" not in str(refused.value)
+    return str(refused.value)
+
+
+@pytest.mark.usefixtures("threads")
+@pytest.mark.parametrize(
+    "address",
+    ["", "foo", "foo:x", "foo:0", "foo:99999", "tcp://foo", "tcp://:8786", "http://foo:80"]
+    + ["tcp://foo:8786/bar", "tcp://me@foo:8786", "tcp://foo:8786?bar", "[::1:8786"],
+)
+def test_an_address_that_is_none_is_refused_before_anybody_is_asked(address):
+    assert refusal(address) == (
+        f"the scheduler's address {address!r} must be HOST:PORT, tcp://HOST:PORT or tls://HOST:PORT"
+    )
+
+
+@pytest.mark.usefixtures("threads")
+@pytest.mark.parametrize("host", ["127.0.0.1:9", "[::1]:9", "nowhere.invalid:8786"])
+def test_where_nobody_listens_nobody_is_waited_for(host):
+    for address in (host, f"tcp://{host}"):
+        assert refusal(address).startswith(f"no scheduler answers at tcp://{host}: ")
+
+
+SAYS = {"nothing": b"", "something else": b"SSH-2.0-OpenSSH_9.2\r\n" * 9, "that it ends": None}
+
+
+@pytest.mark.usefixtures("threads")
+@pytest.mark.parametrize("says", SAYS.values(), ids=SAYS)
+def test_who_is_no_scheduler_is_not_waited_for(says, monkeypatch):
+    monkeypatch.setattr(cluster, "ANSWER", 0.3)
+    with listening(says) as address:
+        said = refusal(address)
+    assert said.startswith(f"what is at {address} does not answer as Dask's scheduler does")
+
+
+@contextmanager
+def listening(says: bytes | None) -> Iterator[str]:
+    """Somebody who takes every connection, and says this or closes it."""
+    taken: list[socket.socket] = []
+
+    def take():
+        with contextlib.suppress(OSError):
+            while True:
+                taken.append(server.accept()[0])
+                if says is None:
+                    taken[-1].close()
+                else:
+                    taken[-1].sendall(says)
+
+    server = socket.create_server(("127.0.0.1", 0))
+    thread = threading.Thread(target=take)
+    thread.start()
+    try:
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+    finally:
+        server.shutdown(socket.SHUT_RDWR)
+        thread.join()
+        for one in (server, *taken):
+            one.close()
+
+
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory) -> Path:
+    """Make the page's certificate and security file, and say where that is."""
+    if not shutil.which("openssl"):
+        pytest.skip("needs openssl")
+    folder = tmp_path_factory.mktemp("tls")
+    (making,) = [text for text in blocks("bash") if "openssl" in text]
+    subprocess.run(["bash", "-ec", making], cwd=folder, check=True, capture_output=True)
+    (folder / "tls.toml").write_text(WHOLE)
+    return folder / "tls.toml"
+
+
+def test_the_key_of_the_page_is_for_its_owner_alone(certificate):
+    assert certificate.with_name("key.pem").stat().st_mode & 0o777 == 0o600
+
+
+FILES = {
+    "tls-ca-file = ": "is not TOML",
+    "": "each a path; it names nothing",
+    'ca = "cert.pem"': "must name tls-ca-file, tls-client-cert, tls-client-key",
+    WHOLE.replace('"key.pem"', "7"): "each a path",
+    WHOLE.replace("key.pem", "none.pem"): "names tls-client-key = 'none.pem': no such file",
+    WHOLE.replace("key.pem", "."): "names tls-client-key = '.': no such file",
+    WHOLE.replace("key.pem", "cert.pem"): "cannot be used",
+    WHOLE.replace("cert.pem", "key.pem"): "cannot be used",
+    WHOLE.replace("key.pem", "locked.pem"): "has a passphrase, and must have none",
+}
+
+
+@pytest.mark.parametrize(("text", "sentence"), FILES.items(), ids=range(len(FILES)))
+def test_a_security_file_that_is_none_is_refused_before_anybody_is_asked(
+    certificate, text, sentence
+):
+    file = certificate.with_name("other.toml")
+    file.write_text(text)
+    certificate.with_name("locked.pem").write_text("-----BEGIN ENCRYPTED PRIVATE KEY-----\n")
+    assert sentence in refusal("tls://127.0.0.1:9", security=file)
+
+
+def test_an_address_goes_with_certificates_if_it_says_so(certificate):
+    at = "127.0.0.1:9"
+    assert "cannot be read: No such file" in refusal(at, security=certificate.with_name("none"))
+    assert "needs a security file" in refusal(f"tls://{at}")
+    assert "only tls:// does" in refusal(f"tcp://{at}", security=certificate)
+    assert f"no scheduler answers at tls://{at}" in refusal(at, security=certificate)
+
+
+@pytest.mark.slow
+def test_only_who_has_the_key_of_a_cluster_is_let_in(certificate, dask, tmp_path, monkeypatch):
+    """With the commands of the page, except for the port."""
+    file = certificate.with_name("scheduler.json")
+    scheduler, worker = [line[1:] for line in page_commands() if line[0] == "dask"]
+    scheduler[scheduler.index("--port") + 1] = "0"
+    dask(*scheduler, "--scheduler-file", str(file), cwd=certificate.parent)
+    wait_until(file.exists)
+    address = json.loads(file.read_text())["address"]
+    assert address.startswith("tls://")
+    worker[worker.index("tls://127.0.0.1:8786")] = address
+    dask(*worker, cwd=certificate.parent)
+    with cluster.executor(address, security=certificate, patience=PATIENCE) as executor:
+        study = fetch_summaries(TEN[:2], executor=executor, progress=False)
+    assert set(study) == set(TEN[:2])
+
+    monkeypatch.setattr(cluster, "ANSWER", 2.0)
+    assert "or only with certificates" in refusal(address.replace("tls", "tcp"))
+    (making,) = [text for text in blocks("bash") if "openssl" in text]
+    subprocess.run(["bash", "-ec", making], cwd=tmp_path, check=True, capture_output=True)
+    (tmp_path / "tls.toml").write_text(WHOLE)
+    assert "not with these certificates" in refusal(address, security=tmp_path / "tls.toml")
 
 
 def test_without_dask_it_is_said_what_to_install(monkeypatch):
@@ -369,13 +538,6 @@ def test_without_dask_it_is_said_what_to_install(monkeypatch):
         cluster.executor("tcp://127.0.0.1:9"),
     ):
         pass
-
-
-PAGE = (Path(__file__).resolve().parents[2] / "book/cluster.md").read_text()
-
-
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)
 
 
 @pytest.mark.parametrize("text", blocks("python"), ids=["SLURM", "Kubernetes"])
@@ -390,8 +552,7 @@ def test_the_programs_of_the_page_import_what_there_is(text):
 
 @pytest.mark.slow
 def test_the_commands_of_the_page_have_the_options_they_are_given():
-    lines = "".join(blocks("bash")).replace("\\\n", "").splitlines()
-    commands = [shlex.split(line) for line in lines]
+    commands = page_commands()
     ours = [words[1:] for words in commands if words[0] == "nmpcrl"]
     assert len(ours) == 2
     for name, *options in ours:

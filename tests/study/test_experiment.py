@@ -14,6 +14,7 @@ from nmpcrl.control.codegen import jit
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, ParameterError, paper, paper_runs, run, sweep
 from nmpcrl.study.experiment import PAPER
+from nmpcrl.study.provenance import key
 from nmpcrl.study.records import StepStatus
 from nmpcrl.study.setup import DECAYS, LEARNERS, prepare
 
@@ -32,18 +33,25 @@ def message_of(make, *arguments, **fields):
 
 
 REFUSED = [
-    ("episodes", 0, "must be a whole number, 1 or more"),
-    ("episodes", -3, "must be a whole number, 1 or more"),
-    ("episodes", 20.0, "must be a whole number, 1 or more"),
-    ("episodes", "20", "must be a whole number, 1 or more"),
-    ("episodes", True, "must be a whole number, 1 or more"),
-    ("episodes", None, "must be a whole number, 1 or more"),
-    ("steps", 0, "must be a whole number, 1 or more"),
-    ("horizon", 0, "must be a whole number, 1 or more"),
-    ("evaluate_every", 0, "must be a whole number, 1 or more"),
-    ("seed", -1, "must be a whole number, 0 or more"),
-    ("seed", 1.5, "must be a whole number, 0 or more"),
-    ("seed", False, "must be a whole number, 0 or more"),
+    ("episodes", 0, "must be a whole number from 1 to 100000"),
+    ("episodes", -3, "must be a whole number from 1 to 100000"),
+    ("episodes", 20.0, "must be a whole number from 1 to 100000"),
+    ("episodes", "20", "must be a whole number from 1 to 100000"),
+    ("episodes", True, "must be a whole number from 1 to 100000"),
+    ("episodes", None, "must be a whole number from 1 to 100000"),
+    ("steps", 0, "must be a whole number from 1 to 10000"),
+    ("horizon", 0, "must be a whole number from 1 to 500"),
+    ("evaluate_every", 0, "must be a whole number from 1 to 100000"),
+    ("seed", -1, "must be a whole number from 0 to 2147483647"),
+    ("seed", 1.5, "must be a whole number from 0 to 2147483647"),
+    ("seed", False, "must be a whole number from 0 to 2147483647"),
+    ("seed", 10**30, "must be a whole number from 0 to 2147483647"),
+    ("episodes", 100_000_000, "must be a whole number from 1 to 100000"),
+    ("steps", 10**9, "must be a whole number from 1 to 10000"),
+    ("horizon", 10**12, "must be a whole number from 1 to 500"),
+    ("evaluate_every", np.nan, "must be a whole number from 1 to 100000"),
+    ("layout", ("A",), "must be one of A"),
+    ("layout", None, "must be one of A"),
     ("layout", "Z", "must be one of A"),
     ("layout", 1, "must be one of A"),
     ("learner", "SARSA", f"must be one of {', '.join(LEARNERS)}"),
@@ -56,23 +64,27 @@ REFUSED = [
     ("ties_active", None, "must be true or false"),
     ("curvature", 1.0, "must be true or false"),
     ("projected", "off", "must be true or false"),
-    ("beta_tdc", 0.0, "must be a positive number"),
+    ("beta_tdc", 0.0, "must be a number in (0, 1e+06]"),
     ("tolerance", 0.1, "must be a number in [1e-12, 0.01]"),
     ("tolerance", 1e-13, "must be a number in [1e-12, 0.01]"),
     ("solver", "acados", "must be one of riccati, fatrop, ipopt"),
-    ("alpha", -1e-7, "must be a positive number"),
-    ("alpha", 0, "must be a positive number"),
-    ("alpha", np.nan, "must be a positive number"),
-    ("alpha", np.inf, "must be a positive number"),
-    ("alpha", "1e-7", "must be a positive number"),
-    ("alpha", True, "must be a positive number"),
-    ("beta", -1.0, "must be a positive number"),
-    ("zeta", 0.0, "must be a positive number"),
+    ("alpha", -1e-7, "must be a number in (0, 1e+06]"),
+    ("alpha", 0, "must be a number in (0, 1e+06]"),
+    ("alpha", np.nan, "must be a number in (0, 1e+06]"),
+    ("alpha", np.inf, "must be a number in (0, 1e+06]"),
+    ("alpha", "1e-7", "must be a number in (0, 1e+06]"),
+    ("alpha", True, "must be a number in (0, 1e+06]"),
+    ("beta", -1.0, "must be a number in (0, 1e+06]"),
+    ("zeta", 0.0, "must be a number in (0, 1e+06]"),
     ("decay_rate", 0.0, "must be a number in (0, 1]"),
     ("decay_rate", 1.01, "must be a number in (0, 1]"),
     ("gated", 1, "must be true or false"),
     ("gated", "no", "must be true or false"),
+    ("alpha", 10**30, "must be a number in (0, 1e+06]"),
     ("theta", (1.0,) * 8, "must be 9 numbers"),
+    ("theta", ("1",) * 9, "must be 9 numbers"),
+    ("theta", (True,) * 9, "must be 9 numbers"),
+    ("theta", [[1.0]] * 9, "must be 9 numbers"),
     ("theta", (1.0,) * 8 + (np.nan,), "must be 9 numbers"),
     ("theta", (1.0,) * 8 + (1e7,), "of size at most 1e+06"),
     ("theta", 1.0, "must be 9 numbers"),
@@ -89,13 +101,31 @@ def test_a_field_that_is_not_what_it_may_be_is_refused_in_one_sentence(name, giv
 
 
 @pytest.mark.parametrize(
-    ("name", "given", "allowed"), [row for row in REFUSED if row[0] not in ("theta",)]
+    ("name", "given", "allowed"), [row for row in REFUSED if not isinstance(row[1], tuple | list)]
 )
 def test_a_sweep_refuses_the_same_fixed_or_on_an_axis(name, given, allowed):
     for value in (given, [given]):
         message = message_of(sweep, **{name: value})
         assert name in message
         assert allowed in message
+
+
+def test_every_field_says_what_it_is_and_what_it_may_be():
+    for field in dataclasses.fields(Experiment):
+        about, allowed = field.metadata["help"], field.metadata["allowed"]
+        assert about.endswith(".")
+        assert len(about.splitlines()) == 1
+        assert allowed.text
+        assert allowed.check(field.name, field.default) == field.default
+
+
+def test_numbers_of_numpy_name_the_same_run():
+    fields = {"seed": np.int64(3), "alpha": np.float64(2e-7), "clipped": np.True_}
+    theta = np.array(paper.THETA_INIT)
+    same = Experiment(**fields, theta=theta, layout=np.str_("B"))
+    assert same == Experiment(seed=3, alpha=2e-7, layout="B")
+    assert key(same) == key(Experiment(seed=3, alpha=2e-7, layout="B"))
+    assert type(same.seed) is int
 
 
 @settings(derandomize=True, deadline=None, max_examples=60)
@@ -133,6 +163,23 @@ def test_an_axis_without_values_is_refused(empty):
     assert message_of(sweep, seed=empty) == f"seeds = {empty!r} must name at least one seed"
 
 
+@pytest.mark.parametrize(
+    ("axes", "said"),
+    [
+        (
+            {"seed": range(9_999), "learner": ("ES", "GES")},
+            "seeds = range(0, 9999) and the other axes make 19,998 runs; 10,000 are allowed",
+        ),
+        ({"seed": (3, 3)}, "seeds = (3, 3) must be a list that names 3 once"),
+        ({"layout": ["A", "A"]}, "layouts = ['A', 'A'] must be a list that names 'A' once"),
+        ({"seed": [range(10**9)]}, "seed = range(0, 1000000000) must be a whole number"),
+        ({"seed": range(10**12)}, "must name 10000 seeds at most, not 1000000000000"),
+    ],
+)
+def test_too_many_runs_and_runs_twice_are_refused(axes, said):
+    assert said in message_of(sweep, **axes)
+
+
 def test_an_unknown_parameter_is_refused_with_those_there_are():
     message = message_of(sweep, episode=3)
     assert message.startswith("'episode' is not a parameter")
@@ -154,6 +201,7 @@ def test_a_sweep_is_every_combination_in_order():
 def test_theta_is_one_value_of_a_sweep_not_an_axis():
     (only,) = sweep(theta=[2.0] * 9)
     assert only.theta == (2.0,) * 9
+    assert message_of(sweep, theta="[2.0]").startswith("theta = '[2.0]' must be 9 numbers")
 
 
 def test_the_study_of_a_chapter_is_five_learners_two_decays_and_the_seeds():

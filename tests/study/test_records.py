@@ -2,33 +2,55 @@
 
 import contextlib
 import io
+import json
 import os
 import pickle
 import zipfile
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from nmpcrl.study import DamagedRecords, Records
-from nmpcrl.study.records import LAST, StepStatus, Table, final_cost
+from nmpcrl.study import DamagedRecords, Experiment, Records, archive
+from nmpcrl.study.records import (
+    LAST,
+    StepStatus,
+    Table,
+    evaluation_fields,
+    final_cost,
+    step_fields,
+)
+
+EXPERIMENT = Experiment("ES", seed=3, episodes=40, steps=10, evaluate_every=20)
 
 
-def example(rows=40):
+def example(rows=40, experiment=EXPERIMENT):
+    """A run with drawn numbers in every column."""
     rng = np.random.default_rng(0)
-    steps = {
-        "episode": np.repeat(np.arange(2), rows // 2),
-        "cost": np.where(np.arange(rows) % 7, rng.normal(size=rows), np.nan),
-        "theta": rng.normal(size=(rows, 9)),
-    }
-    evaluations = {"episode": np.array([0, 2]), "cost": np.array([1.5, np.inf])}
-    facts = {"stopped": "diverged: “why”", "seconds": 1.25}
-    return Records({"learner": "ES", "seed": 3, "theta": [1.0, 0.05]}, steps, evaluations, facts)
+
+    def drawn(fields, rows):
+        columns = {}
+        for name, (kind, _) in np.dtype(fields).fields.items():
+            shape = (rows, *kind.shape)
+            known = rng.random(shape) > 0.1
+            number = np.where(known, rng.normal(size=shape), np.nan)
+            columns[name] = number if kind.base.kind == "f" else rng.integers(0, 9, shape)
+        return columns
+
+    steps = drawn([*step_fields(3, 2, 9), ("alpha_phi2", float)], rows)
+    evaluations = drawn(evaluation_fields(3, 2, 9, experiment.steps), 2)
+    facts = {"stopped": "diverged: “why”", "seconds": 1.25, "solver": "riccati"}
+    return Records(asdict(experiment), steps, evaluations, facts | {"final_cost": np.inf})
+
+
+def as_read(content):
+    return json.loads(json.dumps(content))
 
 
 def assert_equal(one, other):
-    assert one.experiment == other.experiment
+    assert as_read(one.experiment) == as_read(other.experiment)
     assert one.facts == other.facts
     for table, beside in ((one.steps, other.steps), (one.evaluations, other.evaluations)):
         assert list(table) == list(beside)
@@ -49,7 +71,7 @@ def test_what_is_saved_is_loaded(path):
 
 def test_what_a_run_is_about_can_be_read_alone(path):
     example().save(path)
-    assert Records.about(path) == (example().experiment, example().facts)
+    assert Records.about(path) == (as_read(example().experiment), example().facts)
 
 
 def test_saving_leaves_nothing_else_behind(path):
@@ -125,17 +147,129 @@ def test_a_file_cut_short_is_damaged(path, share):
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(place=st.floats(0, 1, exclude_max=True), wrong=st.integers(1, 255))
-def test_a_file_with_a_wrong_byte_is_damaged_or_reads_as_some_run(path, place, wrong):
-    """Whatever the disk did, reading it raises nothing but `DamagedRecords`."""
+def test_a_file_with_a_wrong_byte_is_damaged_or_reads_as_the_same_run(path, place, wrong):
+    """Whatever the disk did, reading it raises nothing but `DamagedRecords`, or nothing is lost."""
     example().save(path)
     content = bytearray(path.read_bytes())
     content[int(place * len(content))] ^= wrong
     path.write_bytes(bytes(content))
     with contextlib.suppress(DamagedRecords):
+        assert_equal(Records.load(path), example())
+    with contextlib.suppress(DamagedRecords):
+        assert Records.about(path) == (as_read(example().experiment), example().facts)
+
+
+def members(path):
+    with np.load(path, allow_pickle=False) as file:
+        return dict(file)
+
+
+def checked(arrays):
+    """With the checksum that belongs to them: only their form is wrong."""
+    kept = {name: array for name, array in arrays.items() if name != "checksum"}
+    return kept | {"checksum": np.array(archive._checksum(kept))}
+
+
+def renamed(arrays):
+    return {f"{name}s" if name == "steps/theta" else name: a for name, a in arrays.items()}
+
+
+FORMS = {
+    "a column under another name": (renamed, "there is no steps/theta in it"),
+    "a column too many": (
+        lambda arrays: arrays | {"steps/reward": arrays["steps/cost"]},
+        "steps/reward is in it, which is nothing of a run",
+    ),
+    "a column too few": (
+        lambda arrays: {name: a for name, a in arrays.items() if name != "evaluations/cost"},
+        "there is no evaluations/cost in it",
+    ),
+    "a short column": (
+        lambda arrays: arrays | {"steps/cost": arrays["steps/cost"][1:]},
+        r"steps/cost holds float64 of shape \(39,\)",
+    ),
+    "another shape": (
+        lambda arrays: arrays | {"steps/theta": arrays["steps/theta"][:, :4]},
+        r"steps/theta holds float64 of shape \(40, 4\), and float64 of shape \(40, 9\)",
+    ),
+    "another type": (
+        lambda arrays: arrays | {"steps/cost": arrays["steps/cost"].astype(np.float32)},
+        "steps/cost holds float32",
+    ),
+    "texts": (
+        lambda arrays: arrays | {"steps/cost": arrays["steps/cost"].astype(str)},
+        "steps/cost holds <U",
+    ),
+    "more rows than the experiment has steps": (
+        lambda arrays: {
+            n: np.resize(a, (401, *a.shape[1:])) if n[:5] == "steps" else a
+            for n, a in arrays.items()
+        },
+        "there are 401 rows of steps",
+    ),
+    "facts that are none": (
+        lambda arrays: told(arrays, lambda about: about["facts"].update(seconds="long")),
+        "its seconds is 'long'",
+    ),
+    "a fact too few": (
+        lambda arrays: told(arrays, lambda about: about["facts"].pop("final_cost")),
+        "does not say which run it is, or what became of it",
+    ),
+    "an experiment that is none": (
+        lambda arrays: told(arrays, lambda about: about["experiment"].update(layout="Z")),
+        "layout = 'Z' must be one of",
+    ),
+}
+
+
+def told(arrays, change):
+    about = json.loads(str(arrays["about"]))
+    change(about)
+    return arrays | {"about": np.array(json.dumps(about))}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_file_of_another_form_is_damaged_and_says_what_is_wrong(path, name):
+    change, why = FORMS[name]
+    example().save(path)
+    np.savez_compressed(path, **checked(change(members(path))))
+    with pytest.raises(DamagedRecords, match=rf"run\.npz is damaged, or not a run: .*{why}"):
         Records.load(path)
 
 
-def archive(**members):
+def test_a_number_that_was_changed_in_a_file_is_noticed(path):
+    example().save(path)
+    arrays = members(path)
+    arrays["steps/cost"][7] += 1e-12
+    np.savez_compressed(path, **arrays)
+    with pytest.raises(DamagedRecords, match="its content is not what its checksum says"):
+        Records.load(path)
+
+
+def test_a_fact_that_was_changed_in_a_file_is_noticed(path):
+    example().save(path)
+    change = told(members(path), lambda about: about["facts"].update(final_cost=1.0))
+    np.savez_compressed(path, **change)
+    with pytest.raises(DamagedRecords, match="its content is not what its checksum says"):
+        Records.load(path)
+
+
+def test_a_file_of_before_there_were_checksums_is_read(path):
+    example().save(path)
+    arrays = members(path)
+    del arrays["checksum"]
+    np.savez_compressed(path, **arrays)
+    assert_equal(Records.load(path), example())
+
+
+def test_a_folder_where_a_run_belongs_is_a_sentence(path):
+    path.mkdir(parents=True)
+    for read in (Records.load, Records.about):
+        with pytest.raises(DamagedRecords, match="is a folder where the file of a run belongs"):
+            read(path)
+
+
+def packed(**members):
     content = io.BytesIO()
     np.savez(content, **members)
     return content.getvalue()
@@ -154,10 +288,10 @@ def pickled():
         b"hello",
         pickle.dumps({"experiment": {}, "facts": {}}),
         pickled(),
-        archive(x=np.arange(3)),
-        archive(about=np.array("not json")),
-        archive(about=np.array([{"experiment": {}}], dtype=object)),
-        archive(about=np.array('{"experiment": {}}')),
+        packed(x=np.arange(3)),
+        packed(about=np.array("not json")),
+        packed(about=np.array([{"experiment": {}}], dtype=object)),
+        packed(about=np.array('{"experiment": {}}')),
     ],
     ids=["text", "pickle", "pickle inside", "no about", "no json", "an object", "no facts"],
 )

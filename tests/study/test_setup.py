@@ -1,19 +1,26 @@
 """From names to learners and networks: one registry each, which refuses what it does not know."""
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.learning.rollout import Persistent
-from nmpcrl.study import Experiment, ParameterError, experiment, paper, setup
+from nmpcrl.study import Experiment, ParameterError, paper, setup
 from nmpcrl.study.setup import LEARNERS, NETWORKS, controller_of, prepare
 
 
-def without(monkeypatch, registry, name):
-    """Take a name out of a registry; what is taken out in place would come back at its end."""
-    left = {key: value for key, value in getattr(setup, registry).items() if key != name}
-    for module in (setup, experiment):
-        monkeypatch.setattr(module, registry, left)
+@contextmanager
+def without(registry, name):
+    """Take a name out of a registry for a while; it comes back at its old place."""
+    whole = dict(registry)
+    del registry[name]
+    try:
+        yield
+    finally:
+        registry.clear()
+        registry.update(whole)
 
 
 @pytest.mark.parametrize("name", LEARNERS)
@@ -23,22 +30,22 @@ def test_every_learner_calls_itself_by_its_name_in_the_registry(name):
     assert learner.name == name
 
 
-def test_a_learner_without_a_factory_is_refused_and_never_frozen(monkeypatch):
+def test_a_learner_without_a_factory_is_refused_and_never_frozen():
     wanted = Experiment("matched", episodes=1)
-    without(monkeypatch, "LEARNERS", "matched")
-    with pytest.raises(KeyError, match="matched"):
-        prepare(wanted, controller_of(wanted))
-    with pytest.raises(ParameterError, match="learner = 'matched' must be one of"):
-        Experiment("matched")
+    with without(LEARNERS, "matched"):
+        with pytest.raises(KeyError, match="matched"):
+            prepare(wanted, controller_of(wanted))
+        with pytest.raises(ParameterError, match="learner = 'matched' must be one of"):
+            Experiment("matched")
 
 
-def test_a_network_that_is_not_in_the_registry_is_refused_and_never_plain(monkeypatch):
+def test_a_network_that_is_not_in_the_registry_is_refused_and_never_plain():
     wanted = Experiment("DES", network="four fits", episodes=1)
-    without(monkeypatch, "NETWORKS", "four fits")
-    with pytest.raises(KeyError, match="four fits"):
-        prepare(wanted, controller_of(wanted))
-    with pytest.raises(ParameterError, match="network = 'four fits' must be one of"):
-        Experiment("DES", network="four fits")
+    with without(NETWORKS, "four fits"):
+        with pytest.raises(KeyError, match="four fits"):
+            prepare(wanted, controller_of(wanted))
+        with pytest.raises(ParameterError, match="network = 'four fits' must be one of"):
+            Experiment("DES", network="four fits")
 
 
 @pytest.mark.parametrize(("network", "fits"), [("plain", 1), ("four fits", 4), ("tanh", 1)])

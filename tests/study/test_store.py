@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -9,11 +10,14 @@ import threading
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from nmpcrl.control import Nmpc
+from nmpcrl.control.solvers import Fatrop
 from nmpcrl.study import (
     Experiment,
     Records,
@@ -30,7 +34,7 @@ from nmpcrl.study.executor import ATTEMPTS, THREADS, Killed
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import key
 from nmpcrl.study.records import Stopped
-from nmpcrl.study.store import folder, path_of
+from nmpcrl.study.store import folder, name_of, path_of
 
 QUICK = Experiment(learner="frozen", episodes=1, steps=3)
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
@@ -55,6 +59,11 @@ def no_run(monkeypatch):
     return lambda: monkeypatch.setattr(store, "run", refuse)
 
 
+def files(folder: Path) -> list[Path]:
+    """All but what is hidden."""
+    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+
+
 def assert_same_numbers(one, other):
     for name in set(one.steps) - CLOCKS:
         np.testing.assert_array_equal(one.steps[name], other.steps[name])
@@ -62,7 +71,7 @@ def assert_same_numbers(one, other):
 
 def test_a_run_is_stored_under_its_experiment(runs):
     records = fetch(QUICK)
-    assert [path_of(QUICK)] == list(runs.iterdir())
+    assert files(runs) == [path_of(QUICK)]
     assert folder() == runs
     assert path_of(QUICK).name.startswith("frozen-A-step-seed0-1ep-")
     assert_same_numbers(Records.load(path_of(QUICK)), records)
@@ -98,8 +107,128 @@ def test_a_damaged_file_is_set_aside_and_the_run_done_again(runs, capsys):
     records, path = fetch(QUICK), path_of(QUICK)
     path.write_bytes(path.read_bytes()[:-200])
     assert_same_numbers(fetch(QUICK), records)
-    assert sorted(p.suffix for p in runs.iterdir()) == [".damaged", ".npz"]
+    assert [p.suffix for p in files(runs)] == [".damaged", ".npz"]
     assert "is kept as" in capsys.readouterr().err
+
+
+OTHERS = {
+    "another seed": replace(QUICK, seed=1),
+    "another learner": replace(QUICK, learner="ES"),
+    "another step size": replace(QUICK, learner="ES", alpha=1e-9),
+    "another layout": replace(QUICK, layout="B"),
+    "another tolerance": replace(QUICK, tolerance=1e-7),
+}
+
+
+def copied(experiment: Experiment, to: Experiment) -> None:
+    """The run of an experiment, under the name of another."""
+    fetch(experiment)
+    shutil.copy(path_of(experiment), path_of(to))
+
+
+@pytest.mark.parametrize("other", OTHERS.values(), ids=OTHERS)
+def test_the_run_of_another_experiment_is_never_returned(runs, capsys, other):
+    copied(other, QUICK)
+    assert not store.is_stored(QUICK)
+    with ThreadPoolExecutor(1) as executor:
+        assert_same_numbers(fetch_all([QUICK], executor=executor, progress=False)[QUICK], fresh())
+    said = f"{path_of(QUICK)} holds another run, {name_of(other)}; it is kept as"
+    assert said in capsys.readouterr().err
+    copied(other, QUICK)
+    assert_same_numbers(fetch(QUICK), fresh())
+    assert said in capsys.readouterr().err
+    assert len(list(runs.glob("*.damaged*"))) == 2  # and neither is written over
+
+
+def fresh() -> Records:
+    return run(QUICK)
+
+
+def test_a_run_that_lies_under_the_name_of_another_is_listed_under_none(runs, capsys):
+    copied(OTHERS["another learner"], QUICK)
+    (runs / "a-name-of-my-own.npz").write_bytes(path_of(QUICK).read_bytes())
+    kept = (path_of(OTHERS["another learner"]), runs / "a-name-of-my-own.npz")
+    assert sorted(stored()) == sorted(kept)
+    said = capsys.readouterr().err
+    assert f"{path_of(QUICK)} holds another run, ES-A-step-seed0-1ep-" in said
+    assert "; it is left alone" in said
+
+
+def test_a_run_of_other_versions_under_this_name_is_damaged(runs, monkeypatch, capsys):
+    with monkeypatch.context() as patch:
+        patch.setattr(provenance, "_version", lambda library: "0.0.1")
+        fetch(QUICK)
+        (path,) = runs.glob("*.npz")
+    path.rename(path_of(QUICK))
+    fetch(QUICK)
+    assert "of other code or other versions than it says; it is kept" in capsys.readouterr().err
+
+
+def test_a_run_of_before_a_field_was_made_is_the_run_asked_for(no_run):
+    """It lacks a field whose default may have changed since; `ORIGINAL` has what it was."""
+    records = fetch(QUICK)
+    del records.experiment["tolerance"]
+    records.save(path_of(QUICK))
+    no_run()
+    fetch(QUICK)
+
+
+def test_what_is_damaged_inside_is_noticed_late_and_made_again(capsys):
+    """Its name, its columns and what it is about are right; only its numbers are not."""
+    records = fetch(QUICK)
+    with np.load(path_of(QUICK)) as file:
+        members = dict(file)
+    members["steps/cost"] = members["steps/cost"] + 1.0
+    np.savez_compressed(path_of(QUICK), **members)
+    assert store.is_stored(QUICK)
+    assert_same_numbers(fetch_all([QUICK], progress=False)[QUICK], records)
+    assert "its content is not what its checksum says; it is kept" in capsys.readouterr().err
+    assert_same_numbers(Records.load(path_of(QUICK)), records)
+
+
+@pytest.fixture
+def by_fatrop(monkeypatch):
+    """Training says that it needed another solver."""
+
+    def run_by_another(experiment, **options):
+        records = run(experiment, **options)
+        return replace(records, facts=records.facts | {"solver": "fatrop"})
+
+    monkeypatch.setattr(store, "run", run_by_another)
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_a_run_that_another_solver_had_to_solve_is_returned_and_not_stored(
+    runs, by_fatrop, capsys, many
+):
+    with ThreadPoolExecutor(1) as executor:
+        options = {"executor": executor, "progress": False}
+        found = fetch_all([QUICK], **options)[QUICK] if many else fetch(QUICK)
+    assert found.facts["solver"] == "fatrop"
+    said = f"{QUICK} is not stored: it was solved by fatrop and not by riccati\n"
+    assert capsys.readouterr().err == said  # once: it is not trained again, either
+    assert files(runs) == []
+
+
+def test_a_run_that_another_solver_solved_and_that_was_stored_is_made_again(capsys):
+    records = fetch(QUICK)
+    replace(records, facts=records.facts | {"solver": "fatrop"}).save(path_of(QUICK))
+    assert fetch(QUICK).facts["solver"] == "riccati"
+    assert "holds a run solved by fatrop and not by riccati; it is" in capsys.readouterr().err
+
+
+def test_a_run_says_if_any_of_its_problems_needed_another_solver(monkeypatch):
+    """Q(s, a) is another problem than V(s): one may compile and the other not."""
+    prepared = Nmpc._prepared
+
+    def not_with_a_fixed_action(nmpc, ocp):
+        if ocp.fixed_action.size:
+            nmpc._solves = Fatrop(nmpc.solver.tolerance)
+        return prepared(nmpc, ocp)
+
+    monkeypatch.setattr(Nmpc, "_prepared", not_with_a_fixed_action)
+    assert run(replace(QUICK, learner="QL")).facts["solver"] == "fatrop"
+    assert run(QUICK).facts["solver"] == "riccati"
 
 
 def test_many_runs_do_again_what_is_damaged(runs):

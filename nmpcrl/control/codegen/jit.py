@@ -1,18 +1,19 @@
 """Python text to machine code by numba, kept on disk: compiled once on a machine, then loaded.
 
 A package of modules lives in a folder named by a hash of its text and of all versions concerned,
-so what is there is right by construction. numba keeps the machine code in the same folder.
+so what is there is right by construction. numba keeps the machine code in the same folder, which
+`folder` finds; where the disk fails, the same text is compiled in memory.
 """
 
 import hashlib
-import importlib.util
-import os
 import platform
 import shutil
 import sys
-import tempfile
+import threading
 import time
-from collections.abc import Callable, Mapping
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -23,10 +24,11 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.control.codegen import folder, importing
 from nmpcrl.control.codegen.source import CannotCompile, returns, source
 
 COMPLETE = "complete"  # a file of this name says that everything in its folder is compiled
-
+LOADING = threading.Lock()  # a package that one thread is importing is no package yet
 
 HEADER = """import math
 
@@ -90,14 +92,6 @@ def numba_version() -> str | None:
         return None
 
 
-def folder() -> Path:
-    """Where machine code is kept: what NMPCRL_CACHE says, or nmpcrl in the user's cache folder."""
-    chosen = os.environ.get("NMPCRL_CACHE")
-    if chosen:
-        return Path(chosen)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "nmpcrl"
-
-
 def load(name: str, texts: Mapping[str, str], notice: str = "") -> ModuleType:
     """Import a package of modules; what numba compiles there is found again the next time.
 
@@ -107,81 +101,109 @@ def load(name: str, texts: Mapping[str, str], notice: str = "") -> ModuleType:
         notice: said on standard error while something is compiled.
 
     Raises:
-        CannotCompile: numba is not installed.
+        CannotCompile: numba is not installed, or cannot compile this.
+        RuntimeError: the texts do not fit each other.
     """
     if numba_version() is None:
         raise CannotCompile("numba is not installed")
     depends = [sorted(texts.items()), sys.version, numba_version(), platform.machine()]
     package = f"{name}_{hashlib.sha256(repr(depends).encode()).hexdigest()[:16]}"
-    if package not in sys.modules:
-        place = _prepared(package, texts)
-        if (place / COMPLETE).exists():
-            try:
-                return _import(package, place)
-            except Exception as error:  # whatever a damaged file makes numba raise
-                print(f"{place} is damaged ({error}) and is compiled again", file=sys.stderr)
-                shutil.rmtree(place)
-                place = _prepared(package, texts)
-        _compile(package, place, notice)
-    return sys.modules[package]
+    with LOADING:
+        return sys.modules.get(package) or _load(package, texts, notice)
 
 
-def _compile(package: str, place: Path, notice: str) -> None:
-    began = time.perf_counter()
-    if notice:
-        print(notice, end=" ", file=sys.stderr, flush=True)
-    try:
-        _import(package, place)
-    except Exception as error:  # numba's own; it cannot be imported to be named before it is found
-        reason = str(error).strip().splitlines()[-1]
-        raise CannotCompile(f"numba cannot compile {package}: {reason}") from error
-    (place / COMPLETE).touch()
-    if notice:
-        print(f"done in {time.perf_counter() - began:.0f} s.", file=sys.stderr)
-
-
-def _prepared(package: str, texts: Mapping[str, str]) -> Path:
-    """The package's folder, its text written whole; a temporary one where no other can be."""
-    place = folder() / package
-    if place.exists():
-        if all(_says(place / f"{module}.py", text) for module, text in texts.items()):
-            return place
-        print(f"{place} is damaged and is compiled again", file=sys.stderr)
-        shutil.rmtree(place)
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        drafted = Path(tempfile.mkdtemp(dir=place.parent, prefix=".draft"))
-    except OSError as error:
-        print(
-            f"{place.parent} cannot be written ({error}): compiling for now only", file=sys.stderr
-        )
-        drafted = place = Path(tempfile.mkdtemp()) / package
-        place.mkdir()
-    for module, text in texts.items():
-        (drafted / f"{module}.py").write_text(text)
-    if drafted != place:
+def _load(package: str, texts: Mapping[str, str], notice: str) -> ModuleType:
+    """From the cache, from a temporary folder, from memory: no fault of a disk has a say."""
+    for find, instead in (
+        (folder.chosen, "in a temporary folder"),
+        (folder.temporary, "in memory"),
+    ):
         try:
-            drafted.rename(place)
-        except OSError:  # another process was faster
-            shutil.rmtree(drafted)
-    return place
+            return _from_disk(folder.private(find()), package, texts, notice)
+        except OSError as error:
+            folder.say_once(error, f"machine code is kept {instead} until this process ends")
+        except Exception:  # of the text, or of what became of it on the disk: memory will tell
+            break
+    return _from_memory(package, texts, notice)
 
 
-def _says(path: Path, text: str) -> bool:
-    return path.is_file() and path.read_bytes() == text.encode()
+def _from_disk(parent: Path, package: str, texts: Mapping[str, str], notice: str) -> ModuleType:
+    """The package from its folder, where it is written and compiled if it is not there whole.
 
-
-def _import(package: str, place: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(
-        package, place / "__init__.py", submodule_search_locations=[str(place)]
-    )
-    if spec is None or spec.loader is None:
-        raise ImportError(f"{place} is no package")
-    module = sys.modules[package] = importlib.util.module_from_spec(spec)
+    Raises:
+        OSError: the disk does not let it.
+    """
+    place = parent / package
+    if not place.exists():
+        folder.write(place, texts)
+    folder.private(place)
     try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        for name in [name for name in sys.modules if name.split(".")[0] == package]:
-            del sys.modules[name]
+        if not _holds(place, texts):
+            raise ImportError("its text is another")
+        if (place / COMPLETE).exists():
+            return importing.from_folder(package, place)
+    except OSError:
         raise
+    except Exception as error:  # whatever a damaged file makes numba raise
+        print(f"{place} is damaged ({error}) and is compiled again", file=sys.stderr)
+        shutil.rmtree(place)
+        folder.write(place, texts)
+    try:
+        with _announced(notice):
+            module = importing.from_folder(package, place)
+    except OSError:
+        raise
+    except Exception as error:
+        disturbed = not _holds(place, texts)
+        shutil.rmtree(place, ignore_errors=True)
+        if disturbed:
+            raise OSError(f"{place} was changed while it was compiled") from error
+        raise
+    with suppress(OSError):  # it is compiled, and the next process compiles it once more
+        (place / COMPLETE).touch()
     return module
+
+
+def _holds(place: Path, texts: Mapping[str, str]) -> bool:
+    """Whether the modules in a folder have these texts."""
+    paths = {place / f"{module}.py": text.encode() for module, text in texts.items()}
+    return all(path.is_file() and path.read_bytes() == text for path, text in paths.items())
+
+
+def _from_memory(package: str, texts: Mapping[str, str], notice: str) -> ModuleType:
+    """The package without any file, for this process alone; numba caches in files only."""
+    uncached = {module: text.replace(", cache=True", "") for module, text in texts.items()}
+    try:
+        with _announced(notice):
+            return importing.from_memory(package, uncached)
+    except Exception as error:
+        reason = (str(error).strip() or type(error).__name__).splitlines()[-1]
+        if _passed_through_numba(error):
+            raise CannotCompile(f"numba cannot compile {package}: {reason}") from error
+        raise RuntimeError(
+            f"the modules of {package} do not fit each other ({reason}): if nmpcrl was changed"
+            " while it ran, start it again"
+        ) from error
+
+
+def _passed_through_numba(error: Exception) -> bool:
+    """Whether it was raised while numba compiled, and not by a module's own lines."""
+    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+    names = {frame.f_globals.get("__name__", "").partition(".")[0] for frame in frames}
+    return bool(names & {"numba", "llvmlite"})
+
+
+@contextmanager
+def _announced(notice: str) -> Iterator[None]:
+    """Say `notice` before something that takes long, and how long it took after it."""
+    if not notice:
+        yield
+        return
+    began = time.perf_counter()
+    print(notice, end=" ", file=sys.stderr, flush=True)
+    try:
+        yield
+    except BaseException:
+        print("stopped.", file=sys.stderr)
+        raise
+    print(f"done in {time.perf_counter() - began:.0f} s.", file=sys.stderr)

@@ -29,7 +29,10 @@ ENDS = {
     End.LIMIT: "ran out of iterations",
     End.BROKEN: "met numbers that are not finite",
 }
-COMPILED = ("codes", "kernel", "hessian")  # modules of this package, put beside `model`
+TEXTS = {  # compiled beside `model`; read with the other modules, so that an edit mixes nothing
+    name: files(__package__).joinpath(f"{name}.py").read_text("utf-8")
+    for name in ("codes", "kernel", "hessian")
+}
 UNBOUNDED = 1e20  # stands for an input without a bound
 
 Attempt = tuple[int, Vector, int]  # which `Start`, with which (z, lam, nu), iterations allowed
@@ -52,7 +55,7 @@ def machine_code(plant: Plant) -> Code:
     texts = {
         "__init__": "from .hessian import hessian_times\nfrom .kernel import solve\n",
         "model": write(plant),
-        **{name: files(__package__).joinpath(f"{name}.py").read_text() for name in COMPILED},
+        **TEXTS,
     }
     module = load("riccati", texts, NOTICE)
     return Code(module.solve, module.hessian_times)

@@ -33,17 +33,17 @@ def theta_paths(runs: Runs[Records]) -> Figure:
     """
     decays = runs.values_of("decay")
     figure, panels = subplots(1, len(decays), height=3.8, sharey=True, squeeze=False)
-    change = np.max([np.ptp(_thetas(records), axis=0) for records in runs.values()], axis=0)
+    change = np.max([np.ptp(thetas(records), axis=0) for records in runs.values()], axis=0)
     moving = np.flatnonzero(change > 0.02)
     shades = plt.get_cmap("cividis")(np.linspace(0.0, 0.8, len(moving)))
     lines = ["-", "--", "-.", ":"]
     for axes, decay in zip(panels[0], decays, strict=True):
         for run, records in enumerate(runs.select(decay=decay).values()):
-            thetas = _thetas(records)
-            axes.plot(thetas, color="#BBBBBB", lw=0.7)
+            values = thetas(records)
+            axes.plot(values, color="#BBBBBB", lw=0.7)
             for i, (component, shade) in enumerate(zip(moving, shades, strict=True)):
                 axes.plot(
-                    thetas[:, component],
+                    values[:, component],
                     color=shade,
                     ls=lines[i % len(lines)],
                     label=f"${SYMBOLS[THETA_NAMES[component]]}$" if run == 0 else None,
@@ -53,7 +53,7 @@ def theta_paths(runs: Runs[Records]) -> Figure:
     panels[0, 0].set_ylabel("component of θ (no unit)")
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=max(1, len(labels)))
-    return headed(figure, _most(change))
+    return headed(figure, most_moved(change))
 
 
 @page
@@ -109,7 +109,7 @@ def two_costs(runs: Runs[Records]) -> Figure:
     grid[0, 0].set_ylabel("with noise [cost]")
     grid[1, 0].set_ylabel("without noise [cost]")
     for row in grid:
-        _logarithmic_if_wide(row)
+        logarithmic_if_wide(row)
     grid[0, 0].legend()
     fall = frozen_fall(runs)
     return headed(
@@ -131,19 +131,19 @@ def _fall(records: Records) -> float:
     return float(1 - np.nanmedian(cost[-window:]) / np.nanmedian(cost[:window]))
 
 
-def _thetas(records: Records) -> Matrix:
+def thetas(records: Records) -> Matrix:
     """theta at the start and after each episode, shape (episodes + 1, d)."""
     last = np.append(np.flatnonzero(np.diff(records.steps["episode"])), -1)
     return np.vstack([records.experiment["theta"], records.steps["theta"][last]])
 
 
-def _most(change: Vector) -> str:
+def most_moved(change: Vector) -> str:
     """The title of `theta_paths`: which component moved most, in any run."""
     most = int(np.argmax(change))
     return f"${SYMBOLS[THETA_NAMES[most]]}$ moves most, by up to {change[most]:.2g}"
 
 
-def _logarithmic_if_wide(row: list[Axes]) -> None:
+def logarithmic_if_wide(row: list[Axes]) -> None:
     """A run that blows up must not flatten the others."""
     points = [line.get_ydata() for axes in row for line in axes.get_lines()]
     values = np.concatenate([np.asarray(y, float) for y in points])

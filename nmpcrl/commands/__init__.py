@@ -1,0 +1,35 @@
+"""The command `nmpcrl`, a module a command; what a command needs is imported when it is called."""
+
+import click
+
+from nmpcrl import __version__
+from nmpcrl.commands.bench import bench
+from nmpcrl.commands.clean import clean
+from nmpcrl.commands.compare import compare
+from nmpcrl.commands.completion import completion
+from nmpcrl.commands.evaluate import evaluate
+from nmpcrl.commands.refusals import Commands
+from nmpcrl.commands.runs import runs
+from nmpcrl.commands.show import show
+from nmpcrl.commands.study import study
+from nmpcrl.commands.train import train
+from nmpcrl.commands.verify import verify
+
+__all__ = ["main"]
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, message="nmpcrl %(version)s")
+def main() -> None:
+    """Reinforcement learning on top of nonlinear MPC: one paper, reproduced.
+
+    \b
+    Example:
+      nmpcrl train --learner GES --episodes 20
+      nmpcrl runs --sort cost
+      nmpcrl show GES
+    """
+
+
+for command in (train, runs, show, evaluate, compare, clean, study, verify, bench, completion):
+    main.add_command(command)

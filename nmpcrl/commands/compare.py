@@ -1,0 +1,68 @@
+"""`nmpcrl compare`: two runs side by side."""
+
+from typing import TYPE_CHECKING
+
+import click
+
+from nmpcrl.commands.names import RunName, file_of
+from nmpcrl.commands.tables import columns
+
+if TYPE_CHECKING:
+    from nmpcrl.analysis.comparison import Comparison
+
+
+@click.command()
+@click.argument("run", type=RunName())
+@click.argument("other", type=RunName())
+def compare(run: str, other: str) -> None:
+    """Hold two runs against each other.
+
+    The fields in which they differ, the figures of both, whether their bits are
+    equal, and the largest differences of theta and of the noise-free cost.
+
+    \b
+    Example:
+      nmpcrl compare ES-A-step-seed0 GES-A-step-seed0
+    """
+    paths = file_of(run), file_of(other)
+    from nmpcrl.analysis import comparison
+    from nmpcrl.report.run import figures
+    from nmpcrl.study import Records
+
+    first, second = map(Records.load, paths)
+    found = comparison.compare(first, second)
+    rows = [["", "first", "second"]]
+    rows += [[name, *map(_word, pair)] for name, pair in found.fields.items()]
+    one, two = figures(first), figures(second)
+    rows += [[name, value, two[name]] for name, value in one.items() if name != "theta"]
+    click.echo(f"first   {paths[0].stem}\nsecond  {paths[1].stem}\n")
+    for line in columns(rows):
+        click.echo(line)
+    click.echo(f"\ntheta   {one['theta']}\n        {two['theta']}\n")
+    _print_differences(found)
+    if found.warning:
+        click.echo(f"Warning: {found.warning}", err=True)
+
+
+def _print_differences(found: "Comparison") -> None:
+    """How far the numbers are apart."""
+    if found.same_bits:
+        click.echo("All bits are equal, but for the clocks.")
+        return
+    names = ", ".join(found.differing)
+    click.echo(click.wrap_text(f"Bits differ, in {len(found.differing)} columns: {names}."))
+    if found.theta:
+        apart, name, episode = found.theta
+        click.echo(f"Largest difference of theta: {apart:.4g}, of {name} in episode {episode}.")
+    if found.cost:
+        cost, after = found.cost
+        click.echo(
+            f"Largest difference of the noise-free cost: {cost:.4g}, after {after} episodes."
+        )
+
+
+def _word(value: object) -> str:
+    """A field's value in a table."""
+    if isinstance(value, list):
+        return ",".join(f"{one:g}" for one in value)
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,25 @@
+"""`nmpcrl evaluate`: the figures of a run's last rollout."""
+
+import click
+
+from nmpcrl.commands.names import RunName, file_of
+
+
+@click.command()
+@click.argument("run", type=RunName())
+def evaluate(run: str) -> None:
+    """Print the figures of the last noise-free rollout of RUN.
+
+    RUN is a name that `nmpcrl runs` lists, or its beginning.
+
+    \b
+    Example:
+      nmpcrl evaluate GES-A-step-seed0
+    """
+    from nmpcrl.report.run import figures, verdict
+    from nmpcrl.study import Records
+
+    records = Records.load(file_of(run))
+    click.echo(verdict(records))
+    for name, value in figures(records).items():
+        click.echo(f"{name:38} {value}")

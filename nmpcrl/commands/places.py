@@ -1,0 +1,37 @@
+"""Files that a command is to write: looked at before any work, not after it."""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+def refuse_unwritable(folder: Path) -> None:
+    """Refuse a folder that takes no file, or that cannot be made.
+
+    Raises:
+        OSError: it is so; the error names the place.
+    """
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    with tempfile.TemporaryFile(dir=there):
+        return
+
+
+class NewFile(click.Path):
+    """A file that can be written: its folder is there, and takes files."""
+
+    def __init__(self) -> None:
+        """A file, not a folder; as a Path."""
+        super().__init__(dir_okay=False, writable=True, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """The path, once a file beside it could be made."""
+        try:
+            path = Path(str(super().convert(value, param, ctx)))
+            with tempfile.TemporaryFile(dir=path.parent):
+                return path
+        except OSError as error:
+            self.fail(f"{str(value)!r} cannot be written: {error.strerror}.", param, ctx)
+        except ValueError as error:
+            self.fail(f"{str(value)!r} is no path: {error}.", param, ctx)

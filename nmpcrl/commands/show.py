@@ -1,0 +1,73 @@
+"""`nmpcrl show`: one page of pictures of a run."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from nmpcrl.commands.names import RunName, file_of
+from nmpcrl.commands.places import NewFile
+
+if TYPE_CHECKING:
+    from nmpcrl.study import Records
+
+FORMATS = ("svg", "png")
+
+
+@click.command()
+@click.argument("run", type=RunName())
+@click.option("--out", metavar="PATH", type=NewFile(), help="Where; by default beside the run.")
+@click.option("--format", "kind", type=click.Choice(FORMATS), help="By default as PATH ends; svg.")
+@click.option("--frozen", is_flag=True, help="Train the frozen arm if it is not stored.")
+def show(run: str, out: Path | None, kind: str | None, frozen: bool) -> None:
+    """Draw one page of pictures of RUN, and print its path.
+
+    The trajectory without noise, theta, the cost with noise and without, and
+    alpha ||phi||^2, where steps above 2 overshoot. The frozen arm, whose theta
+    never moves, is drawn beside the costs if it is stored.
+
+    \b
+    Example:
+      nmpcrl show GES-A-step-seed0 --out ges.png
+    """
+    path = file_of(run)
+    out, kind = _place(path, out, kind)
+    from nmpcrl.report.figures.run import run_page
+    from nmpcrl.study import Records
+    from nmpcrl.study.atomic import write_whole
+
+    records = Records.load(path)
+    figure = run_page(records, _frozen_arm(records, train=frozen))
+    metadata = {"Date": None} if kind == "svg" else None  # the same run, the same file
+    write_whole(out, lambda file: figure.savefig(file, format=kind, metadata=metadata))
+    click.echo(out)
+
+
+def _place(run: Path, out: Path | None, kind: str | None) -> tuple[Path, str]:
+    """Where the page goes and in which format; one follows from the other."""
+    if out is None:
+        kind = kind or FORMATS[0]
+        return run.with_suffix(f".{kind}"), kind
+    ending = out.suffix.lower().removeprefix(".")
+    kind = kind or ending
+    if kind not in FORMATS or ending not in (kind, ""):
+        raise click.ClickException(
+            f"the name of the file, {str(out)!r}, must end in .svg or .png, as its format does"
+        )
+    return out, kind
+
+
+def _frozen_arm(records: "Records", *, train: bool) -> "Records | None":
+    """The frozen arm of a run, if it has one and that is stored or to be trained."""
+    from nmpcrl.commands.train import fetched
+    from nmpcrl.study import Experiment, Records
+    from nmpcrl.study.experiment import frozen_arm
+    from nmpcrl.study.store import path_of
+
+    if records.experiment["learner"] == "frozen":
+        return None
+    arm = frozen_arm(Experiment(**records.experiment))
+    if train:
+        return fetched(arm)
+    path = path_of(arm)
+    return Records.load(path) if path.is_file() else None

@@ -1,0 +1,116 @@
+"""`nmpcrl study`: all runs of the book, or parts of them."""
+
+from collections.abc import Mapping
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from nmpcrl.commands.places import NewFile, refuse_unwritable
+from nmpcrl.commands.workers import check
+
+if TYPE_CHECKING:
+    from nmpcrl.analysis.summary import RunSummary
+    from nmpcrl.study import Experiment
+
+
+@click.command()
+@click.option("--part", "parts", multiple=True, help="Only this part: main, controls or a variant.")
+@click.option("--workers", metavar="N", type=int, help="Processes; by default one a core.")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster that trains instead.")
+@click.option("--security", metavar="FILE", help="Certificates for a scheduler at tls://.")
+@click.option("--dry-run", is_flag=True, help="Only say how much is to be done.")
+@click.option("--table", metavar="PATH", type=NewFile(), help="Episodes, as CSV.")
+@click.option("--publish", is_flag=True, help="Judge what was asked for and write book/published.")
+@click.option("--yes", "-y", is_flag=True, help="More workers than there is room for.")
+def study(
+    parts: tuple[str, ...],
+    workers: int | None,
+    scheduler: str | None,
+    security: str | None,
+    dry_run: bool,
+    table: Path | None,
+    publish: bool,
+    yes: bool,
+) -> None:
+    """Train whatever is missing of the study; interrupt it and start it again
+    as you like.
+
+    \b
+    Example:
+      nmpcrl study --part main --table episodes.csv.gz
+    """
+    from nmpcrl.analysis import summaries
+    from nmpcrl.study import cluster
+
+    chosen = _chosen(parts)
+    _check(workers, scheduler, security, publish=publish, sure=yes)
+    missing = [e for e in chosen if not summaries.is_stored(e)]
+    hours = sum(map(summaries.seconds_of, missing)) / 3600
+    click.echo(
+        f"{len(chosen) - len(missing)} of {len(chosen)} runs are stored in {summaries.folder()};"
+        f" the others take about {hours:.1f} hours of one core"
+    )
+    if dry_run:
+        return
+    there = cluster.executor(scheduler, security=security) if scheduler else nullcontext()
+    with there as executor:
+        found = summaries.fetch_summaries(
+            chosen, executor=executor, workers=workers, strict=publish
+        )
+    if table:
+        _write(table, found, chosen)
+    if publish:
+        from nmpcrl.claims.publish import publish_study
+
+        click.echo(f"{publish_study(found, chosen)}: published")
+    if len(found) < len(chosen):
+        raise SystemExit(1)  # what failed has been said
+
+
+def _check(
+    workers: int | None,
+    scheduler: str | None,
+    security: str | None,
+    *,
+    publish: bool,
+    sure: bool,
+) -> None:
+    """Refuse, before any work, what would fail after it."""
+    from nmpcrl.study import cluster
+
+    check(workers, sure=sure)
+    if scheduler is not None:
+        cluster.check(scheduler, security=security)
+    elif security is not None:
+        raise click.ClickException("--security goes with --scheduler, which is not given")
+    if publish:
+        from nmpcrl.claims import published
+
+        refuse_unwritable(published.place())
+
+
+def _chosen(parts: tuple[str, ...]) -> "dict[Experiment, str]":
+    """The runs of some parts of the study, or of all, with the part of each."""
+    from nmpcrl.study import design
+
+    whole = design.whole_study()
+    unknown = set(parts) - set(whole.values())
+    if unknown:
+        known = ", ".join(dict.fromkeys(whole.values()))
+        raise click.ClickException(f"there is no part {min(unknown)!r}; there are {known}")
+    return {e: name for e, name in whole.items() if not parts or name in parts}
+
+
+def _write(
+    table: Path, found: "Mapping[Experiment, RunSummary]", parts: "Mapping[Experiment, str]"
+) -> None:
+    """One row an episode, as CSV."""
+    import pandas as pd
+
+    from nmpcrl.analysis import summary
+
+    frames = [summary.tidy([one]).assign(variant=parts[e]) for e, one in found.items()]
+    pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
+    click.echo(f"{table}: {table.stat().st_size / 1e6:.0f} MB")

@@ -1,0 +1,72 @@
+"""`nmpcrl train`: one run, any field of it."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from nmpcrl.commands.fields import Settings
+
+if TYPE_CHECKING:
+    from nmpcrl.study import Experiment, Records
+
+
+@click.command(cls=Settings)
+@click.option("--yes", "-y", is_flag=True, help="Train it even if it takes very long.")
+def train(yes: bool, **fields: Any) -> None:
+    """Train one run and store it; a stored one is read.
+
+    Each field of an experiment is an option; the defaults are the paper's.
+
+    \b
+    Example:
+      nmpcrl train --learner RDES --layout B --episodes 50 --no-gated
+    """
+    from nmpcrl.report.run import verdict
+    from nmpcrl.study import Experiment
+    from nmpcrl.study.limits import estimate
+    from nmpcrl.study.store import path_of
+
+    experiment = Experiment(**fields)
+    path = path_of(experiment)
+    if not path.is_file():
+        estimate([experiment]).refuse(sure=yes or None, lift="--yes")
+    records = fetched(experiment)
+    if not path.is_file():  # the store has said why
+        click.echo(f"{experiment}: {records.facts['stopped']}")
+        click.echo(verdict(records))
+        raise SystemExit(1)
+    click.echo(f"{path}: {records.facts['stopped']}")
+    click.echo(verdict(records))
+    click.echo(f"Next: nmpcrl show {path.stem}")
+    click.echo(f"      nmpcrl compare {path.stem} {_other(experiment)}")
+
+
+def fetched(experiment: "Experiment") -> "Records":
+    """The run, with a bar while it is trained."""
+    from tqdm import tqdm
+
+    from nmpcrl.study import fetch
+    from nmpcrl.study.records import Stopped
+
+    with tqdm(total=experiment.episodes, unit="ep", desc=experiment.learner) as bar:
+
+        def on_episode(done: int, cost: float) -> None:
+            bar.set_postfix_str(f"cost {cost:.0f}", refresh=False)
+            bar.update(done - bar.n)
+
+        records = fetch(experiment, on_episode=on_episode)
+        finished = records.facts["stopped"] == Stopped.FINISHED
+        bar.update(experiment.episodes - bar.n if finished else 0)
+    return records
+
+
+def _other(experiment: "Experiment") -> str:
+    """A stored run that this one can be held against; without one, where its name goes."""
+    from nmpcrl.commands.names import names
+    from nmpcrl.study.experiment import frozen_arm
+    from nmpcrl.study.store import path_of
+
+    own, arm = path_of(experiment).stem, path_of(frozen_arm(experiment)).stem
+    stored = [name for name in names() if name != own]
+    alike = [name for name in stored if f"-{experiment.layout}-" in name]
+    return arm if arm in stored else next(iter(alike), "RUN")

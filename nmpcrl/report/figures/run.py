@@ -1,0 +1,198 @@
+"""One run on one page: what `nmpcrl show` draws."""
+
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from nmpcrl import Vector
+from nmpcrl.analysis import metrics
+from nmpcrl.learning.updates import OVERSHOOT
+from nmpcrl.report.figures.axes import draw_task
+from nmpcrl.report.figures.expected_sarsa import logarithmic_if_wide, most_moved, thetas
+from nmpcrl.report.figures.style import (
+    DECAY_TITLES,
+    INK,
+    LIMIT,
+    LOOKS,
+    SUBTITLE,
+    SYMBOLS,
+    WIDTH,
+    headed,
+    marked,
+    page,
+)
+from nmpcrl.report.run import finding
+from nmpcrl.study import paper
+from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.records import Column, Records
+
+HEIGHT = 8.8  # inches
+PANELS = (("map", "map"), ("theta", "step"), ("noisy", "noise-free"))
+ROWS = (1.25, 1, 1)  # relative heights
+NAMED = 4  # components of theta that are named, those that move most; the others are grey
+WIDE = 10  # what an axis goes up to that is linear
+MOVES = 1e-3  # as a share of the largest movement; what moves less is grey
+FIRST: dict[str, Any] = {"color": INK, "linestyle": ":", "linewidth": 1.2}
+
+
+@page
+def run_page(records: Records, frozen: Records | None = None) -> Figure:
+    """The trajectory without noise, theta, both costs and the size of the steps of one run.
+
+    Args:
+        records: the run.
+        frozen: its frozen arm, drawn beside its costs.
+    """
+    options: dict[str, Any] = {"layout": "constrained", "height_ratios": ROWS}
+    figure, panels = plt.subplot_mosaic(
+        [list(row) for row in PANELS], figsize=(WIDTH, HEIGHT), **options
+    )
+    plt.close(figure)
+    _map(panels["map"], records)
+    _theta(panels["theta"], records)
+    _steps(panels["step"], records)
+    _costs(panels["noisy"], panels["noise-free"], records, frozen)
+    return marked(headed(figure, finding(records)), _source(records, frozen))
+
+
+def _map(axes: Axes, records: Records) -> None:
+    """Where theta_init and the last theta lead the robot, without noise."""
+    task, episode = paper.task(records.experiment["layout"]), records.evaluations["episode"]
+    draw_task(axes, task)
+    look = LOOKS[records.experiment["learner"]]
+    for row, style in ((0, FIRST), (-1, {**look.line, "linewidth": 1.8})):
+        path = _known(records.evaluations["states"][row])
+        label = "θ at the start" if row == 0 else f"θ after {_episodes(episode[row])}"
+        if row == 0 or len(episode) > 1:
+            axes.plot(path[:, 0], path[:, 1], label=label, **style)
+            axes.plot(*path[-1:, :2].T, look.marker, color=style["color"], markersize=4)
+    axes.set(xlim=(task.lower[0] - 0.5, task.upper[0]), ylim=(-2.6, 5.4))
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    axes.legend(loc="lower left")
+    axes.set_title(f"Without noise, {_ending(records)}", **SUBTITLE)
+
+
+def _ending(records: Records) -> str:
+    """How the last rollout without noise ends."""
+    task = paper.task(records.experiment["layout"])
+    states, _ = metrics.final_rollout(records)
+    path = _known(states)
+    if len(path) < len(states):
+        return f"a solve fails after {len(path)} of {len(states)} steps"
+    inside = metrics.obstacle_violations(states, task).size
+    away = task.distance(path[-1])
+    end = "at the target" if away <= ARRIVED else f"{away:.1f} from the target"
+    return f"it ends {end}, with {inside or 'no'} state{'s' * (inside > 1)} in an obstacle"
+
+
+def _theta(axes: Axes, records: Records) -> None:
+    """theta after each episode; the components that move most are named."""
+    values = thetas(records)
+    change = np.nan_to_num(np.ptp(values, axis=0))
+    order = np.argsort(-change, kind="stable")
+    named = [i for i in order[:NAMED] if change[i] > MOVES * change.max()]
+    axes.plot(values[:, [i for i in order if i not in named]], color="#BBBBBB", lw=0.7)
+    shades = plt.get_cmap("cividis")(np.linspace(0.0, 0.8, len(named)))
+    for i, shade, line in zip(named, shades, ("-", "--", "-.", ":"), strict=False):
+        name = f"${SYMBOLS[paper.THETA_NAMES[i]]}$"
+        axes.plot(values[:, i], color=shade, linestyle=line, label=name)
+    axes.set_title(most_moved(change) if named else "θ does not move", **SUBTITLE)
+    axes.set_ylabel("component of θ [-]")
+    _by_episode(axes, records)
+    if change.max() > WIDE:
+        axes.set_yscale("symlog", linthresh=1, linscale=3)
+        axes.yaxis.get_major_locator().set_params(numticks=7)  # type: ignore[call-arg]
+    if named:
+        axes.margins(y=0.2)
+        axes.legend(loc="upper center", ncols=NAMED, handlelength=1.5, columnspacing=1)
+
+
+def _steps(axes: Axes, records: Records) -> None:
+    """The largest alpha ||phi||^2 of each episode, and the line at 2."""
+    largest = metrics.by_episode(records, records.steps["alpha_phi2"], np.max)
+    over, count = (records.steps["alpha_phi2"] > OVERSHOOT).sum(), len(records.steps["episode"])
+    mark = "o" if np.isfinite(largest).sum() == 1 else None
+    axes.plot(_episode(largest), largest, marker=mark, **LOOKS[records.experiment["learner"]].line)
+    axes.axhline(OVERSHOOT, **LIMIT)
+    worst = np.nanmax(largest, initial=0.0)
+    if worst > WIDE:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(0, 1.08 * max(1.1 * OVERSHOOT, worst))
+    axes.set_title(f"{over or 'None'} of {count:,} steps above 2", **SUBTITLE)
+    axes.set_ylabel(r"largest $\alpha\,\|\phi\|^2$ [-]")
+    _by_episode(axes, records)
+
+
+def _costs(noisy: Axes, free: Axes, records: Records, frozen: Records | None) -> None:
+    """The cost of each training episode, and of the rollouts without noise."""
+    for one in filter(None, (frozen, records)):
+        learner = one.experiment["learner"]
+        look = {**LOOKS[learner].line, "label": learner}
+        cost = metrics.training_cost(one)
+        mark: dict[str, Any] = (
+            {"marker": "o", "markersize": 4} if np.isfinite(cost).sum() == 1 else {}
+        )
+        noisy.plot(_episode(cost), cost, lw=1.1, **look, **mark)
+        episode, judged = metrics.noise_free_cost(one)
+        known = np.isfinite(judged)
+        free.plot(episode[known], judged[known], **look, marker="o", markersize=2.5)
+    for axes, name in ((noisy, "cost with noise"), (free, "cost without noise")):
+        logarithmic_if_wide([axes])
+        axes.set_ylabel(name)
+        _by_episode(axes, records)
+    noisy.set_title(_against(records, frozen), **SUBTITLE)
+    before, after = metrics.initial_cost(records), metrics.final_cost(records)
+    ending = f"to {after:.0f}" if np.isfinite(after) else "on, cut short"
+    free.set_title(f"Without noise, from {before:.0f} {ending}", **SUBTITLE)
+    if not np.isfinite(metrics.training_cost(records)).any():
+        noisy.annotate("no episode was finished", (0.5, 0.5), xycoords="axes fraction", ha="center")
+        if frozen is None:
+            noisy.set_yticks([])
+    if frozen:
+        noisy.legend(fontsize="small")
+
+
+def _against(records: Records, frozen: Records | None) -> str:
+    """The training cost at the end, beside that of the frozen arm."""
+    if frozen is None:
+        return "Training, exploration included"
+    ratio = metrics.cost_ratio(metrics.training_cost(records), metrics.training_cost(frozen))
+    if not np.isfinite(ratio):
+        return "Training, cut short"
+    return f"Training ends at {ratio:.2f} times the frozen arm"
+
+
+def _source(records: Records, frozen: Records | None) -> str:
+    """Which run it is, and whether its frozen arm is drawn."""
+    e = records.experiment
+    without = frozen is None and e["learner"] != "frozen"
+    return (
+        f"{e['learner']}, layout {e['layout']}, {DECAY_TITLES[e['decay']]}, seed {e['seed']},"
+        f" {_episodes(e['episodes'])}" + ("; the frozen arm is not stored" if without else "")
+    )
+
+
+def _by_episode(axes: Axes, records: Records) -> None:
+    """The whole of training, even if it was stopped."""
+    episodes = records.experiment["episodes"]
+    axes.set(xlabel="episode", xlim=(-0.03 * episodes, 1.03 * episodes))
+    axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
+
+
+def _episode(values: Vector) -> Vector:
+    """1, 2, ... for one value an episode."""
+    return np.arange(1.0, len(values) + 1)
+
+
+def _known(states: Column) -> Column:
+    """The states that were reached."""
+    return states[np.isfinite(states).all(axis=1)]
+
+
+def _episodes(count: int) -> str:
+    return f"{count} episode{'' if count == 1 else 's'}"

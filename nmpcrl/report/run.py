@@ -1,0 +1,56 @@
+"""One run in words: what `nmpcrl train`, `evaluate`, `compare` and the titles of pictures say."""
+
+import numpy as np
+
+from nmpcrl.analysis import metrics
+from nmpcrl.study import paper
+from nmpcrl.study.records import Records, StepStatus, Stopped
+
+
+def verdict(records: Records) -> str:
+    """The noise-free cost before and after, in a sentence."""
+    before, after = metrics.initial_cost(records), metrics.final_cost(records)
+    if not np.isfinite(after):
+        return f"no noise-free cost at the end; theta_init's was {before:.1f}"
+    change = f"{abs(1 - after / before):.1%} {'less' if after <= before else 'more'}"
+    return f"noise-free cost {after:.1f}, {change} than the {before:.1f} of theta_init"
+
+
+def figures(records: Records) -> dict[str, str]:
+    """What a rollout without noise shows, ready to print."""
+    task = paper.task(records.experiment["layout"])
+    states, actions = metrics.final_rollout(records)
+    overlap = task.overlap(states).max(axis=-1)
+    theta = ", ".join(f"{value:.4g}" for value in records.evaluations["theta"][-1])
+    failed = records.steps["status"] == StepStatus.FAILED
+    return {
+        "cost of the last rollout": f"{records.evaluations['cost'][-1]:.1f}",
+        "steps": f"{np.isfinite(states[:, 0]).sum()} of {len(states)}",
+        "distance to the target at the end": f"{task.distance(states[-1]):.3f}",
+        "largest overlap Xi (above 0: inside)": f"{np.nanmax(overlap):.4f}",
+        "states inside an obstacle": f"{metrics.obstacle_violations(states, task).size}",
+        "largest speed and turn rate": " and ".join(
+            f"{value:.3f}" for value in np.nanmax(np.abs(actions), axis=0)
+        ),
+        "steps of training with a failed solve": f"{failed.sum()}",
+        "steps with alpha ||phi||^2 above 2": f"{metrics.overshooting(records):.2%}",
+        "theta": theta,
+    }
+
+
+def finding(records: Records) -> str:
+    """What became of the noise-free cost, as the title of a picture."""
+    learner, stopped = records.experiment["learner"], records.facts["stopped"]
+    before, after = metrics.initial_cost(records), metrics.final_cost(records)
+    if stopped != Stopped.FINISHED:
+        episodes = int(records.steps["episode"][-1]) + 1
+        largest = np.nanmax(np.abs(metrics.final_theta(records)), initial=0.0)
+        of = f"{episodes} of {records.experiment['episodes']}"
+        return f"{learner} diverged in episode {of}, where a component of theta was {largest:.2g}"
+    if learner == "frozen":
+        return f"A frozen theta keeps its noise-free cost of {before:.0f}"
+    if not np.isfinite([before, after]).all():
+        return f"{learner} ends without a noise-free cost: a solve failed"
+    verb = "lowers" if after <= before else "raises"
+    change = abs(1 - after / before)
+    return f"{learner} {verb} the noise-free cost by {change:.1%}, from {before:.0f} to {after:.0f}"

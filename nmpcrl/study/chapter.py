@@ -1,0 +1,57 @@
+"""What a chapter is given: its parameters, checked before anything else is done with them."""
+
+import ast
+import sys
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.limits import estimate
+from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.sweeps import AXES, FIELDS
+
+INJECTED = "# Parameters\n"  # so begins the cell in which papermill sets what it is given
+OF_PAPERMILL = "PAPERMILL_"  # so begin the names that it sets on its own account
+
+
+def check(**declared: Any) -> None:
+    """Refuse a value that is not what it may be, and a name that the chapter does not declare.
+
+    `check(seeds=seeds, layout=layout)` stands in the second cell. A parameter that is a field of
+    `Experiment`, or the plural of one, is checked here, and any other one where it is used.
+    Papermill sets whatever name it is given, so a misspelt one would change nothing.
+
+    Raises:
+        ParameterError: in one sentence.
+    """
+    for name in sorted(_injected() - set(declared)):
+        close = get_close_matches(name, declared, n=1)
+        meant = f" (did you mean {close[0]!r}?)" if close else ""
+        raise ParameterError(
+            f"this chapter has no parameter {name!r}{meant}; it has {', '.join(declared)}"
+        )
+    for name, value in declared.items():
+        allowed = (FIELDS | AXES).get(name)
+        if allowed:
+            allowed.check(name, value)
+
+
+def afford(experiments: Iterable[Experiment]) -> None:
+    """Refuse runs that take too long or too much memory, as `Estimate.refuse` does.
+
+    Raises:
+        ParameterError: in one sentence, which says how to train them nevertheless.
+    """
+    estimate(experiments).refuse()
+
+
+def _injected() -> set[str]:
+    """The names that papermill set in this session; none where there is no notebook."""
+    ipython = sys.modules.get("IPython")
+    shell = ipython.get_ipython() if ipython else None
+    cells = shell.history_manager.input_hist_raw if shell else []
+    *_, latest = ["", *(cell for cell in cells if cell.startswith(INJECTED))]
+    assigned = (node for node in ast.walk(ast.parse(latest)) if isinstance(node, ast.Assign))
+    names = {one.id for node in assigned for one in node.targets if isinstance(one, ast.Name)}
+    return {name for name in names if not name.startswith(("_", OF_PAPERMILL))}

@@ -1,0 +1,82 @@
+"""What a chapter is given, checked in its second cell."""
+
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from nmpcrl.study import Experiment, ParameterError, chapter
+
+PARAMETERS = {"episodes": 300, "seeds": [0, 1], "layout": "A", "budget": "checked elsewhere"}
+
+
+@pytest.fixture
+def session(monkeypatch):
+    """A notebook in which these cells were run."""
+
+    def begin(*cells: str) -> None:
+        shell = SimpleNamespace(history_manager=SimpleNamespace(input_hist_raw=["", *cells]))
+        ipython = SimpleNamespace(get_ipython=lambda: shell)
+        monkeypatch.setitem(sys.modules, "IPython", ipython)
+
+    return begin
+
+
+def refusal(**declared) -> str:
+    with pytest.raises(ParameterError) as caught:
+        chapter.check(**declared)
+    return str(caught.value)
+
+
+def test_what_is_allowed_passes_outside_of_a_notebook_too():
+    chapter.check(**PARAMETERS)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "said"),
+    [
+        ("episodes", 10**8, "episodes = 100000000 must be a whole number from 1 to 100000"),
+        ("episodes", "300", "episodes = '300' must be a whole number from 1 to 100000"),
+        ("layout", ["A"], "layout = ['A'] must be one of A, B, C, D, E, F"),
+        ("seeds", 3, "seeds = 3 must be a list, such as [3]"),
+        ("seeds", [-1], "seed = -1 must be a whole number from 0 to 2147483647"),
+    ],
+)
+def test_a_value_that_may_not_be_is_refused(name, given, said):
+    assert refusal(**PARAMETERS | {name: given}) == said
+
+
+def test_a_name_that_papermill_set_and_the_chapter_does_not_declare_is_refused(session):
+    session("episodes = 300", "# Parameters\nepisode = 2\n", "chapter.check()")
+    assert refusal(**PARAMETERS) == (
+        "this chapter has no parameter 'episode' (did you mean 'episodes'?);"
+        " it has episodes, seeds, layout, budget"
+    )
+
+
+def test_a_name_like_no_other_is_refused_without_a_suggestion(session):
+    session('# Parameters\nopen = "x"\nepisodes = 2\n')
+    assert refusal(**PARAMETERS).startswith("this chapter has no parameter 'open'; it has")
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ("episodes = 300", "# Parameters\nepisodes = 2\nseeds = [3]\n"),
+        ("# Parameters\n",),
+        ('# Parameters\nPAPERMILL_INPUT_PATH = "in.ipynb"\n',),
+        ("# Parameters\nepisode = 2\n", "# Parameters\nepisodes = 2\n"),  # it was mended
+        ("episode = 2", "# Parameter\nfigure = 2\n", "%matplotlib inline", "further = [1, 2]"),
+    ],
+)
+def test_what_a_reader_or_papermill_sets_besides_is_no_parameter(session, cells):
+    session(*cells)
+    chapter.check(**PARAMETERS)
+
+
+def test_days_of_training_are_refused(monkeypatch):
+    runs = [Experiment("RDES", seed=seed, episodes=20_000) for seed in range(100)]
+    with pytest.raises(ParameterError, match="more with NMPCRL_YES=1 in the environment"):
+        chapter.afford(runs)
+    monkeypatch.setenv("NMPCRL_YES", "1")
+    chapter.afford(runs)

@@ -1,0 +1,340 @@
+"""Whatever happens to a store: it gives no wrong number, and no finished run is lost or repeated.
+
+A machine writes, reads and damages runs, kills who writes between any two calls of the system, lets
+two processes ask at once, and lets files grow no further; after each step everything is looked at.
+Training is a stand-in that takes microseconds and notes that it took place.
+"""
+
+import os
+import resource
+import shutil
+import sys
+import tempfile
+import traceback
+import warnings
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+from nmpcrl.analysis import summaries
+from nmpcrl.analysis.summaries import fetch_summaries
+from nmpcrl.analysis.summary import RunSummary, _forms
+from nmpcrl.study import DamagedRecords, Experiment, Records, fetch, fetch_all, store, stored
+from nmpcrl.study.atomic import sweep
+from nmpcrl.study.records import evaluation_fields, step_fields
+from nmpcrl.study.reservation import PLACE
+
+EXPERIMENTS = tuple(
+    Experiment(learner, seed=seed, episodes=2, steps=3, evaluate_every=1)
+    for learner in ("ES", "frozen")
+    for seed in (0, 1)
+)
+SYSTEM = {"posix", "fcntl", "io", "_io"}  # the modules whose functions call it
+MEMORY = Path("/dev/shm")  # where nobody waits for a disk
+each = st.sampled_from(EXPERIMENTS)
+
+
+def drawn(fields, rows: int, seed: int) -> dict[str, np.ndarray]:
+    """A table of these fields, always the same for a seed."""
+    rng = np.random.default_rng(seed)
+    columns = {}
+    for name, (kind, _) in np.dtype(fields).fields.items():
+        numbers = rng.integers(0, 10**6, (rows, *kind.shape))
+        columns[name] = numbers if kind.base.kind == "i" else numbers / 7
+    return columns
+
+
+def trained(experiment: Experiment, **_) -> Records:
+    """What training gives; it is noted in a file, for it may be another process that trains."""
+    with (store.folder().parent / "trained").open("a") as log:
+        log.write(f"{EXPERIMENTS.index(experiment)}\n")
+    return truth(experiment)
+
+
+def truth(experiment: Experiment) -> Records:
+    seed = EXPERIMENTS.index(experiment)
+    steps = drawn([*step_fields(3, 2, 9), ("alpha_phi2", float)], 6, seed)
+    evaluations = drawn(evaluation_fields(3, 2, 9, 3), 3, seed)
+    facts = {"stopped": "finished", "solver": "riccati", "seconds": 1.0, "final_cost": seed / 7}
+    return Records(asdict(experiment), steps, evaluations, facts)
+
+
+def summarised(records: Records) -> RunSummary:
+    forms = _forms({"experiment": records.experiment, "facts": records.facts})
+    seed = records.experiment["seed"] + 10 * len(records.experiment["learner"])
+    tables = {name: drawn(form.fields, max(form.rows), seed) for name, form in forms.items()}
+    rollout = tables["rollout"]
+    return RunSummary(
+        records.experiment,
+        tables["episodes"],
+        tables["evaluations"],
+        rollout["states"],
+        rollout["actions"],
+        records.facts,
+    )
+
+
+def same(one, other) -> bool:
+    """Whether two runs, or two summaries, have the same numbers."""
+
+    def arrays(of):
+        for name, value in sorted(vars(of).items()):
+            if isinstance(value, np.ndarray):
+                yield name, value
+            elif name not in ("experiment", "facts"):
+                yield from ((f"{name}/{column}", value[column]) for column in sorted(value))
+
+    pairs = zip(arrays(one), arrays(other), strict=True)
+    return one.facts["final_cost"] == other.facts["final_cost"] and all(
+        name == beside and np.array_equal(a, b) for (name, a), (beside, b) in pairs
+    )
+
+
+def in_a_fork(do: Callable[[], object]) -> Callable[[], int]:
+    """Do something in another process; what is returned waits for its end and gives its code."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # this process may have threads
+        child = os.fork()
+    if child:
+        return lambda: os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    try:
+        sweep.cache_clear()
+        with Path(os.devnull).open("w") as sys.stderr:
+            do()
+    except BaseException:
+        (store.folder().parent / "wrong").write_text(traceback.format_exc())
+        os._exit(1)
+    os._exit(0)
+
+
+def kill_before(call: int) -> None:
+    """From here on, this process ends without another word before so many calls of the system."""
+    left = call
+
+    def watch(_, event, function):
+        nonlocal left
+        if event == "c_call":
+            owner = type(getattr(function, "__self__", None)).__module__
+            if function.__module__ in SYSTEM or owner in SYSTEM:
+                left -= 1
+                if left < 0:
+                    os._exit(9)
+
+    sys.setprofile(watch)
+
+
+class OfRuns(RuleBasedStateMachine):
+    """What is stored of each experiment, as far as it is known from what was done to it."""
+
+    kind = Records
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.root = Path(tempfile.mkdtemp(dir=MEMORY if MEMORY.is_dir() else None))
+        self.patch = pytest.MonkeyPatch()
+        self.patch.setenv("NMPCRL_RUNS", str(self.root / "runs"))
+        self.patch.setenv("NMPCRL_WARNED", "1")
+        self.patch.setattr(tempfile, "tempdir", str(self.root))
+        self.patch.setattr(store, "compile_ahead", lambda _: None)
+        self.patch.setattr(store, "run", trained)
+        self.patch.setattr(store, "POLL", 0.01)
+        self.patch.setattr(summaries, "compile_ahead", lambda _: None)
+        self.patch.setattr(summaries, "run", trained)
+        self.patch.setattr(summaries, "summarise", summarised)
+        (self.root / "trained").touch()
+        self.whole: set[Experiment] = set()  # is stored, and must not be trained again
+        self.doubtful: set[Experiment] = set()  # something is there, and may be whole
+        self.aside = 0
+
+    def teardown(self) -> None:
+        self.patch.undo()
+        shutil.rmtree(self.root)
+
+    def path_of(self, experiment: Experiment) -> Path:
+        return store.path_of(experiment)
+
+    def truth(self, experiment: Experiment) -> Records | RunSummary:
+        return truth(experiment)
+
+    def ask(self, *experiments: Experiment) -> None:
+        """What is asked for is what it should be; also in another process."""
+        if len(experiments) == 1:
+            found = {experiments[0]: fetch(experiments[0])}
+        else:
+            with ThreadPoolExecutor(2) as two:
+                found = dict(fetch_all(experiments, executor=two, progress=False))
+        self.compare(found, experiments)
+
+    def compare(self, found, experiments) -> None:
+        assert list(found) == list(experiments)
+        assert all(same(found[e], self.truth(e)) for e in experiments)
+
+    def times(self, experiment: Experiment) -> int:
+        log = (self.root / "trained").read_text().split()
+        return log.count(str(EXPERIMENTS.index(experiment)))
+
+    @rule(experiments=st.lists(each, min_size=1, unique=True))
+    def read_or_write(self, experiments) -> None:
+        sweep.cache_clear()  # as in a process that has just begun
+        before = {e: self.times(e) for e in experiments}
+        there = {e for e in experiments if os.path.lexists(self.path_of(e))}
+        self.ask(*experiments)
+        for e in experiments:
+            again = self.times(e) - before[e]
+            assert again <= 1
+            assert again == 0 or e not in self.whole
+            assert again == 1 or e in self.whole | self.doubtful
+            self.aside += again and e in there
+            self.whole.add(e)
+            self.doubtful.discard(e)
+        if any(self.times(e) > before[e] for e in experiments):
+            assert [path.name for path in (self.root / "runs" / PLACE).iterdir()] == ["lock"]
+            assert list(self.path_of(experiments[0]).parent.glob(".half-*")) == []
+
+    @rule(
+        experiment=each,
+        how=st.sampled_from(["garble", "cut", "empty", "folder", "gone", "text"]),
+        places=st.lists(st.floats(0, 1, exclude_max=True), min_size=1, max_size=3),
+        wrong=st.integers(1, 255),
+    )
+    def damage(self, experiment, how, places, wrong) -> None:
+        path = self.path_of(experiment)
+        if not path.is_file():
+            return
+        content = bytearray(path.read_bytes())
+        at = [int(place * len(content)) for place in places]
+        if how == "garble":
+            for place in at:
+                content[place] ^= wrong
+            path.write_bytes(content)
+        elif how in ("gone", "folder"):
+            path.unlink()
+            if how == "folder":
+                (path / "deeper").mkdir(parents=True)
+        else:
+            path.write_bytes({"cut": content[: at[0]], "empty": b"", "text": b"hello"}[how])
+        self.whole.discard(experiment)
+        self.doubtful |= {experiment} if how == "garble" else set()
+
+    @rule(one=each, other=each, swap=st.booleans())
+    def mistake(self, one, other, swap) -> None:
+        if one == other or not {one, other} <= self.whole:
+            return
+        kept = self.path_of(other).read_bytes()
+        shutil.copy(self.path_of(one), self.path_of(other))
+        self.whole.remove(other)
+        if swap:
+            self.path_of(one).write_bytes(kept)
+            self.whole.remove(one)
+
+    @rule(experiment=each, call=st.integers(0, 750))
+    def kill(self, experiment, call) -> None:
+        before, there = self.times(experiment), os.path.lexists(self.path_of(experiment))
+        code = in_a_fork(lambda: (kill_before(call), self.ask(experiment)))()
+        assert code in (0, 9), (self.root / "wrong").read_text()
+        assert experiment not in self.whole or self.times(experiment) == before
+        self.look_after(experiment, there)
+        if code == 0:
+            self.whole.add(experiment)
+
+    @rule(experiments=st.lists(each, min_size=1, unique=True))
+    def ask_in_two_processes(self, experiments) -> None:
+        before = {e: self.times(e) for e in experiments}
+        missing = {e for e in experiments if e not in self.whole}
+        both = [in_a_fork(lambda: self.ask(*experiments)) for _ in range(2)]
+        codes = [end() for end in both]
+        assert codes == [0, 0], (self.root / "wrong").read_text()
+        for e in experiments:
+            assert self.times(e) - before[e] <= (e in missing)
+        self.aside = max(self.aside, self.count_aside())
+        self.whole |= set(experiments)
+        self.doubtful -= set(experiments)
+
+    @rule(experiment=each, room=st.integers(1000, 20_000))
+    def ask_where_files_grow_no_further(self, experiment, room) -> None:
+        def ask() -> None:
+            self.patch.setattr(store, "check_folder", lambda *_: None)  # somebody fills it later
+            resource.setrlimit(resource.RLIMIT_FSIZE, (room, resource.RLIM_INFINITY))
+            try:
+                self.ask(experiment)
+            finally:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY,) * 2)
+
+        there = os.path.lexists(self.path_of(experiment))
+        assert in_a_fork(ask)() == 0, (self.root / "wrong").read_text()
+        self.look_after(experiment, there)
+
+    def look_after(self, experiment: Experiment, there: bool) -> None:
+        """Writing may have been broken off: what was not there before is whole, or not there."""
+        if experiment in self.whole:
+            return
+        if there:
+            self.aside = max(self.aside, self.count_aside())
+        if os.path.lexists(self.path_of(experiment)):
+            self.doubtful.add(experiment)
+            if not there:
+                assert same(self.kind.load(self.path_of(experiment)), self.truth(experiment))
+
+    def count_aside(self) -> int:
+        return len(list((self.root / "runs").rglob("*.damaged*")))
+
+    @invariant()
+    def every_file_is_the_truth_or_says_that_it_is_damaged(self) -> None:
+        for experiment in EXPERIMENTS:
+            try:
+                found = self.kind.load(self.path_of(experiment))
+            except (FileNotFoundError, DamagedRecords):
+                assert experiment not in self.whole
+                continue
+            theta = tuple(found.experiment["theta"])
+            assert same(found, self.truth(Experiment(**found.experiment | {"theta": theta})))
+
+    @invariant()
+    def what_is_listed_lies_under_its_own_name(self) -> None:
+        for path, (fields, facts) in stored().items():
+            own = Experiment(**fields | {"theta": tuple(fields["theta"])})
+            assert path == store.path_of(own)
+            assert facts["final_cost"] == truth(own).facts["final_cost"]
+
+    @invariant()
+    def what_was_set_aside_stays(self) -> None:
+        assert self.count_aside() == self.aside
+
+
+class OfSummaries(OfRuns):
+    """The same of summaries, which workers hand back and the parent stores."""
+
+    kind = RunSummary
+
+    def path_of(self, experiment: Experiment) -> Path:
+        return summaries.path_of(experiment)
+
+    def truth(self, experiment: Experiment) -> RunSummary:
+        return summarised(truth(experiment))
+
+    def ask(self, *experiments: Experiment) -> None:
+        with ThreadPoolExecutor(2) as two:
+            found = fetch_summaries(experiments, executor=two, progress=False)
+        self.compare(found, experiments)
+
+
+each_machine = settings(
+    max_examples=20,
+    stateful_step_count=12,
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork"),
+]
+TestRuns, TestSummaries = OfRuns.TestCase, OfSummaries.TestCase
+TestRuns.settings = TestSummaries.settings = each_machine

@@ -1,0 +1,52 @@
+"""What takes long to import is imported where it is used, so that other commands answer at once."""
+
+import subprocess
+import sys
+
+import pytest
+
+SLOW = ("torch", "pandas", "matplotlib", "scipy.stats", "numba")
+LIST = f"\nimport sys\nprint(*[name for name in {SLOW} if name in sys.modules])\n"
+TRAIN = """
+from nmpcrl.analysis.summary import summarise
+from nmpcrl.study import Experiment, run
+summarise(run(Experiment("{learner}", episodes=1, steps=3)))
+"""
+NETWORK = """
+import nmpcrl.learning
+network = nmpcrl.learning.QNetwork
+import torch
+assert torch.get_num_threads() == 1
+assert "QNetwork" in nmpcrl.learning.__all__
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("script", "needed"),
+    [
+        ("import nmpcrl", []),
+        ("import nmpcrl.control", []),
+        ("import nmpcrl.learning", []),
+        ("import nmpcrl.study", []),
+        ("import nmpcrl.analysis.metrics", []),
+        ("import nmpcrl.analysis.summaries", []),
+        ("import nmpcrl.bench", []),
+        (NETWORK, ["torch"]),
+        (TRAIN.format(learner="ES"), ["numba"]),
+        (TRAIN.format(learner="RDES"), ["torch", "numba"]),
+    ],
+)
+def test_nothing_is_imported_before_it_is_needed(script, needed, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    command = [sys.executable, "-c", script + LIST]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.stdout.split() == needed, ended.stderr
+
+
+@pytest.mark.parametrize("package", ["nmpcrl.learning", "nmpcrl.bench"])
+def test_a_package_has_the_names_that_it_exports_and_no_others(package):
+    exec(f"from {package} import *", names := {})
+    assert set(names) > set(sys.modules[package].__all__)
+    with pytest.raises(ImportError, match="cannot import name 'nothing'"):
+        exec(f"from {package} import nothing")

@@ -1,0 +1,41 @@
+"""What SECURITY.md promises of the code: nothing is unpickled, and no other machine is called."""
+
+import ast
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+TEXT = (ROOT / "SECURITY.md").read_text()
+TREES = {path: ast.parse(path.read_text()) for path in sorted((ROOT / "nmpcrl").rglob("*.py"))}
+UNPICKLERS = {"cloudpickle", "dill", "joblib", "marshal", "pickle", "shelve"}
+CALLERS = {"distributed", "ftplib", "http", "httpx", "requests", "smtplib", "socket", "urllib"}
+
+
+def imported(tree: ast.AST) -> set[str]:
+    """The libraries that a module imports, in functions too."""
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names.add((node.module or "").split(".")[0])
+    return names
+
+
+def test_nothing_is_unpickled_but_what_a_worker_answers():
+    for path, tree in TREES.items():
+        assert not imported(tree) & UNPICKLERS or path.name == "outcome.py", path
+        calls = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Call)]
+        loads = [call for call in calls if call.startswith("np.load(")]
+        assert all("allow_pickle=False" in load for load in loads), path
+
+
+def test_only_a_cluster_is_connected_to():
+    for path, tree in TREES.items():
+        assert not imported(tree) & CALLERS or path.name == "cluster.py", path
+
+
+def test_files_that_the_page_names_are_there():
+    named = re.findall(r"`([\w/]+\.(?:py|md))`", TEXT)
+    assert len(named) == 3
+    assert all((ROOT / name).is_file() for name in named)
