@@ -5,12 +5,20 @@ import sys
 
 import pytest
 
+from nmpcrl.study import Experiment, fetch
+
 SLOW = ("torch", "pandas", "matplotlib", "scipy.stats", "numba")
 LIST = f"\nimport sys\nprint(*[name for name in {SLOW} if name in sys.modules])\n"
 TRAIN = """
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.study import Experiment, run
 summarise(run(Experiment("{learner}", episodes=1, steps=3)))
+"""
+COMMAND = """
+from click.testing import CliRunner
+from nmpcrl.commands import main
+done = CliRunner().invoke(main, {words!r}.split())
+assert done.exit_code == 0, done.output
 """
 NETWORK = """
 import nmpcrl.learning
@@ -42,6 +50,20 @@ def test_nothing_is_imported_before_it_is_needed(script, needed, tmp_path, monke
     command = [sys.executable, "-c", script + LIST]
     ended = subprocess.run(command, capture_output=True, text=True)
     assert ended.stdout.split() == needed, ended.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    ["--help", "train --help", "runs", "runs --json", "evaluate ES", "compare ES ES", "clean"],
+)
+def test_a_command_imports_what_it_needs_and_no_more(words, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    fetch(Experiment(episodes=1, steps=3))
+    script = COMMAND.format(words=words) + LIST
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.split() == [], ended.stderr
 
 
 @pytest.mark.parametrize("package", ["nmpcrl.learning", "nmpcrl.bench"])

@@ -6,7 +6,7 @@ it is not known, is nan, and so is the answer missing.
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -14,6 +14,7 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis.statistics import rate
+from nmpcrl.claims.halves import counted, halves, reversals, sentence
 from nmpcrl.claims.rule import Claim, Observations, Paths, Verdict, arms, read, settle
 
 # One row a cell of layout, decay and seed, one column an arm; nan is unknown.
@@ -96,8 +97,20 @@ class AtLeast(RunClaim):
         return _known(numbers >= border, numbers)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Contrast(RunClaim):
     """Asked of each pair of numbers: is the first above the border, and the second not?"""
+
+    wrong: str  # what a run above the border did
+    worst: str  # and one whose number is infinite
+
+    def judge(self, observed: Observations) -> Verdict:
+        """See `RunClaim.judge`; both halves of the claim are counted, too."""
+        verdict, (first, second) = super().judge(observed), self.learners
+        borders = {self.wrong: self.threshold, self.worst: np.finfo(float).max}
+        found = halves((first, second), self.measure(observed.runs, observed.paths), borders)
+        evidence = f"{verdict.evidence} {counted(found)}".strip()
+        return replace(verdict, evidence=evidence, reverse=tuple(map(sentence, reversals(found))))
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """See `RunClaim.yes`."""

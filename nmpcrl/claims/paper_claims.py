@@ -282,11 +282,13 @@ def _c7_evidence(runs: pd.DataFrame, paths: Paths) -> str:
     training, judged = (_inside(every, name) for name in ("inside", "eval_inside"))
     worst = [shown(every[c].max(), ".3f") for c in ("worst_overlap", "eval_worst_overlap")]
     kept = BY_RUNS["C7"].answers(_largest_overlap(runs, paths))
+    by_learner = judged.sum(axis=1).groupby(level="learner", sort=False).sum()
+    listed = ", ".join(f"{name} {states:.0f}" for name, states in by_learner.items())
     return (
         f"{every.inputs.sum():.0f} actions left their bounds. Of {every.steps_done.sum():.0f}"
         f" states in training, {_sized(training)} lay in an obstacle by a small, a medium and a"
         f" large Xi (up to 0.01, up to 0.1, and above; the largest is {worst[0]}), and of those"
-        f" without noise {_sized(judged)} (the largest is {worst[1]})."
+        f" without noise {_sized(judged)} (the largest is {worst[1]}; by learner: {listed})."
         f" {every.outside.sum():.0f} states in training lay outside the box. Without noise,"
         f" {_of(kept)} runs kept the constraints."
     )
@@ -344,6 +346,8 @@ CLAIMS: dict[str, Claim] = {
             learners=("DES", "RDES"),
             measure=_cost_ratios,
             threshold=DIVERGED,
+            wrong="diverged",
+            worst="had to be stopped",
             evidence=_c1_evidence,
             nothing=1.0,
             label="training cost / frozen arm's",
@@ -362,6 +366,8 @@ CLAIMS: dict[str, Claim] = {
             learners=("ES", "GES"),
             measure=_late_cost_ranges,
             threshold=UNSTABLE,
+            wrong="was unstable",
+            worst="diverged",
             evidence=_c2_evidence,
             label="range of noise-free cost",
             borders=np.geomspace(0.005, 1.5, UP_TO),

@@ -332,9 +332,9 @@ def _verdict(stored: dict[str, Any]) -> Verdict:
     """A verdict as JSON has it, with its tuples again."""
     interval = stored["interval"] and tuple(stored["interval"])
     counts = {name: tuple(pair) for name, pair in stored["counts"].items()}
-    parts = {
+    parts: dict[str, Any] = {
         name: {part: Outcome(outcome) for part, outcome in stored[name].items()}
         for name in ("by_layout", "by_decay")
     }
-    outcome = Outcome(stored["outcome"])
-    return Verdict(**stored | parts | {"outcome": outcome, "interval": interval, "counts": counts})
+    parts |= {"outcome": Outcome(stored["outcome"]), "interval": interval, "counts": counts}
+    return Verdict(**stored | parts | {"reverse": tuple(stored.get("reverse", ()))})

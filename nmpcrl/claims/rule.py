@@ -70,6 +70,7 @@ class Verdict:
     by_decay: dict[str, Outcome] = field(default_factory=dict)  # and in each reading of the decay
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
     ratio: float | None = None  # of times, where the claim is about time
+    reverse: tuple[str, ...] = ()  # where the reverse of the claim was seen, in sentences
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,8 +20,9 @@ PROBLEMS = 100_000  # of a sweep
     help=f"Solve N drawn problems, {PROBLEMS:,} by default, and count what became of them.",
 )
 def bench(length: str, again: bool, publish: bool, sweep: int | None) -> None:
-    """Measure how long solves, steps and runs take, and hold it against what is
-    to be reached.
+    """Measure how long solves, steps and runs take.
+
+    It is held against what is to be reached, and kept beside the runs.
 
     \b
     Example:

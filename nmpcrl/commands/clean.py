@@ -18,7 +18,7 @@ LISTED = 20  # files of a kind that are named
 @click.option("--only", type=click.Choice(KINDS), multiple=True, help="Of this kind alone.")
 @click.option("--runs", is_flag=True, help="The finished runs and summaries as well.")
 def clean(yes: bool, only: tuple[str, ...], runs: bool) -> None:
-    """Say which stored files are not needed, and delete them with --yes.
+    """List the stored files that can go; --yes deletes them.
 
     \b
     damaged   files that were found damaged and set aside

@@ -11,7 +11,7 @@ VARIABLE = "_NMPCRL_COMPLETE"  # by which the shell asks
 @click.argument("shell", type=click.Choice(SHELLS))
 @click.pass_context
 def completion(ctx: click.Context, shell: str) -> None:
-    """Print the script that lets a shell complete commands, options and names.
+    """Print the script by which a shell completes what you type.
 
     Evaluate it in the file that your shell reads when it starts.
 

@@ -11,11 +11,14 @@ def refuse_unwritable(folder: Path) -> None:
     """Refuse a folder that takes no file, or that cannot be made.
 
     Raises:
-        OSError: it is so; the error names the place.
+        click.ClickException: it is so; the message names the place.
     """
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    with tempfile.TemporaryFile(dir=there):
-        return
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            return
+    except OSError as error:
+        raise click.ClickException(f"{there} cannot be written: {error.strerror}") from None
 
 
 class NewFile(click.Path):

@@ -32,14 +32,13 @@ def show(run: str, out: Path | None, kind: str | None, frozen: bool) -> None:
     """
     path = file_of(run)
     out, kind = _place(path, out, kind)
-    from nmpcrl.report.figures.run import run_page
+    from nmpcrl.report.figures.run import run_page, write
     from nmpcrl.study import Records
     from nmpcrl.study.atomic import write_whole
 
     records = Records.load(path)
     figure = run_page(records, _frozen_arm(records, train=frozen))
-    metadata = {"Date": None} if kind == "svg" else None  # the same run, the same file
-    write_whole(out, lambda file: figure.savefig(file, format=kind, metadata=metadata))
+    write_whole(out, lambda file: write(figure, file, kind))
     click.echo(out)
 
 

@@ -34,8 +34,9 @@ def study(
     publish: bool,
     yes: bool,
 ) -> None:
-    """Train whatever is missing of the study; interrupt it and start it again
-    as you like.
+    """Train whatever is missing of the study.
+
+    Interrupt it and start it again as you like: what is finished is stored.
 
     \b
     Example:

@@ -24,12 +24,13 @@ def train(yes: bool, **fields: Any) -> None:
     from nmpcrl.report.run import verdict
     from nmpcrl.study import Experiment
     from nmpcrl.study.limits import estimate
-    from nmpcrl.study.store import path_of
+    from nmpcrl.study.store import check_folder, path_of, size_of
 
     experiment = Experiment(**fields)
     path = path_of(experiment)
     if not path.is_file():
         estimate([experiment]).refuse(sure=yes or None, lift="--yes")
+        check_folder(size_of(experiment))
     records = fetched(experiment)
     if not path.is_file():  # the store has said why
         click.echo(f"{experiment}: {records.facts['stopped']}")

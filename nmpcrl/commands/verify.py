@@ -18,7 +18,7 @@ RELOCKED = 60  # runs that are trained afresh before the code is locked anew
 @click.option("--workers", metavar="N", type=int, help="Processes; by default one a core.")
 @click.option("--yes", "-y", is_flag=True, help="More workers than there is room for.")
 def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
-    """Hold the runs that were trained here against the published ones.
+    """Hold the runs trained here against the published ones.
 
     \b
     Example:

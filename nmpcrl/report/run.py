@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from nmpcrl import Matrix
 from nmpcrl.analysis import metrics
 from nmpcrl.study import paper
 from nmpcrl.study.records import Records, StepStatus, Stopped
@@ -54,3 +55,9 @@ def finding(records: Records) -> str:
     verb = "lowers" if after <= before else "raises"
     change = abs(1 - after / before)
     return f"{learner} {verb} the noise-free cost by {change:.1%}, from {before:.0f} to {after:.0f}"
+
+
+def thetas(records: Records) -> Matrix:
+    """theta at the start and after each episode, shape (episodes + 1, d)."""
+    last = np.append(np.flatnonzero(np.diff(records.steps["episode"])), -1)
+    return np.vstack([records.experiment["theta"], records.steps["theta"][last]])

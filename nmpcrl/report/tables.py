@@ -61,7 +61,7 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str) -> str:
     """
     rows = (
         (
-            f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}",
+            f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}{_reverse(v)}",
             f"{_badge(v.outcome, BADGES[v.outcome])}{_share(v)}",
         )
         for v in verdicts
@@ -233,6 +233,11 @@ def _share(verdict: Verdict) -> str:
     if verdict.share is None:
         return f"<br>{verdict.ratio:.2f} [{low:.2f}, {high:.2f}]"
     return f"<br>{verdict.share:.0%} [{low:.0%}, {high:.0%}]"
+
+
+def _reverse(verdict: Verdict) -> str:
+    """Below a claim, in a paragraph each: where the runs say the reverse of it."""
+    return "".join(f"<br><em>{_text(one)}</em>" for one in verdict.reverse)
 
 
 def _letter(letter: str) -> str:

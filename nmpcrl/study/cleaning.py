@@ -1,13 +1,16 @@
 """What lies in the folder of runs and is not needed: found by name, and never beyond the folder."""
 
+import json
 import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
+from nmpcrl.study.archive import ABOUT
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.records import DamagedRecords, Records
 
 RUN = re.compile(r"[A-Za-z]+-\w+-[a-z]+-seed\d+-\d+ep-[0-9a-f]{10}")  # what a run's file is called
 HALF = re.compile(r"\.half-.*\.tmp")
@@ -82,10 +85,11 @@ def _kind(path: Path, file_of: Callable[[Experiment], Path]) -> str:
 
 
 def _kind_of_run(path: Path, file_of: Callable[[Experiment], Path]) -> str:
-    """Whether this code would read the run; one that cannot be read now may yet be whole."""
+    """Whether this code would look for the run; one that cannot be read now may yet be whole."""
     try:
-        fields, _ = Records.about(path)
-    except DamagedRecords:
+        with path.open("rb") as whole, np.load(whole, allow_pickle=False) as file:
+            fields = dict(json.loads(str(file[ABOUT]))["experiment"])
+    except Exception:
         return ""
     try:
         current = file_of(Experiment(**fields)).name == path.name

@@ -78,7 +78,9 @@ def execute(
         return {}
     failures: dict[Name, Exception] = {}
     count = min(check_workers(workers, sure=True), len(jobs))
-    pool = nullcontext(executor) if executor else processes(count, tell=progress)
+    if progress and not executor:
+        print(told(count), file=sys.stderr)
+    pool = nullcontext(executor) if executor else processes(count)
     ahead = len(jobs) if executor else 2 * count  # in flight: what waits there, others cannot take
     total = sum(map(size, jobs))
     with (
@@ -125,10 +127,8 @@ def _describe(
 
 
 @contextmanager
-def processes(workers: int, *, tell: bool = False) -> Iterator[Executor]:
+def processes(workers: int) -> Iterator[Executor]:
     """So many processes of this machine; an error ends them at once."""
-    if tell:
-        print(told(workers), file=sys.stderr)
     slots = Slots(workers)
     try:
         yield slots

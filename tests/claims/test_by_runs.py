@@ -107,7 +107,11 @@ def test_a_run_that_is_missing_is_not_asked(claim):
 
 TEXTS = dict.fromkeys(("name", "statement", "question", "measured", "border", "would_change"), "X")
 ASKED = TEXTS | {"threshold": 0.5, "measure": None, "evidence": None}
-GAINS, LOSSES, CONTRAST = AtLeast(**ASKED), AtMost(**ASKED), Contrast(**ASKED)
+GAINS, LOSSES, CONTRAST = (
+    AtLeast(**ASKED),
+    AtMost(**ASKED),
+    Contrast(wrong="fell", worst="broke", **ASKED),
+)
 VALUES = pd.DataFrame({"one": np.linspace(0.1, 1.0, 10)})
 
 

@@ -208,6 +208,8 @@ class OfRuns(RuleBasedStateMachine):
         if not path.is_file():
             return
         content = bytearray(path.read_bytes())
+        if not content:  # it has been emptied already
+            return
         at = [int(place * len(content)) for place in places]
         if how == "garble":
             for place in at:

@@ -140,3 +140,12 @@ def stacked(
         bars[name] = axes.barh(parts.index, parts[name], height, left, label=name, **hatched(*look))
         left += parts[name].to_numpy()
     return bars
+
+
+def logarithmic_if_wide(row: list[Axes]) -> None:
+    """A run that blows up must not flatten the others."""
+    points = [line.get_ydata() for axes in row for line in axes.get_lines()]
+    values = np.concatenate([np.asarray(y, float) for y in points])
+    values = values[np.isfinite(values)]
+    if values.size and values.max() > 5 * values.min():
+        row[0].set_yscale("log")

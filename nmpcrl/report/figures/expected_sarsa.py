@@ -2,12 +2,11 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.metrics import by_episode, noise_free_cost, training_cost
 from nmpcrl.learning.updates import OVERSHOOT
+from nmpcrl.report.figures.axes import logarithmic_if_wide
 from nmpcrl.report.figures.style import (
     DECAY_TITLES,
     INK,
@@ -17,9 +16,11 @@ from nmpcrl.report.figures.style import (
     TEAL,
     WINE,
     headed,
+    most_moved,
     page,
     subplots,
 )
+from nmpcrl.report.run import thetas
 from nmpcrl.study import Runs
 from nmpcrl.study.paper import THETA_NAMES
 from nmpcrl.study.records import Records
@@ -129,24 +130,3 @@ def _fall(records: Records) -> float:
     cost = training_cost(records)
     window = max(1, len(cost) // 15)
     return float(1 - np.nanmedian(cost[-window:]) / np.nanmedian(cost[:window]))
-
-
-def thetas(records: Records) -> Matrix:
-    """theta at the start and after each episode, shape (episodes + 1, d)."""
-    last = np.append(np.flatnonzero(np.diff(records.steps["episode"])), -1)
-    return np.vstack([records.experiment["theta"], records.steps["theta"][last]])
-
-
-def most_moved(change: Vector) -> str:
-    """The title of `theta_paths`: which component moved most, in any run."""
-    most = int(np.argmax(change))
-    return f"${SYMBOLS[THETA_NAMES[most]]}$ moves most, by up to {change[most]:.2g}"
-
-
-def logarithmic_if_wide(row: list[Axes]) -> None:
-    """A run that blows up must not flatten the others."""
-    points = [line.get_ydata() for axes in row for line in axes.get_lines()]
-    values = np.concatenate([np.asarray(y, float) for y in points])
-    values = values[np.isfinite(values)]
-    if values.size and values.max() > 5 * values.min():
-        row[0].set_yscale("log")

@@ -1,6 +1,6 @@
 """One run on one page: what `nmpcrl show` draws."""
 
-from typing import Any
+from typing import IO, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -11,8 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.figures.axes import draw_task
-from nmpcrl.report.figures.expected_sarsa import logarithmic_if_wide, most_moved, thetas
+from nmpcrl.report.figures.axes import draw_task, logarithmic_if_wide
 from nmpcrl.report.figures.style import (
     DECAY_TITLES,
     INK,
@@ -23,9 +22,10 @@ from nmpcrl.report.figures.style import (
     WIDTH,
     headed,
     marked,
+    most_moved,
     page,
 )
-from nmpcrl.report.run import finding
+from nmpcrl.report.run import finding, thetas
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records
@@ -57,6 +57,12 @@ def run_page(records: Records, frozen: Records | None = None) -> Figure:
     _steps(panels["step"], records)
     _costs(panels["noisy"], panels["noise-free"], records, frozen)
     return marked(headed(figure, finding(records)), _source(records, frozen))
+
+
+def write(figure: Figure, file: IO[bytes], kind: str) -> None:
+    """Write a page as "svg" or "png"; the same page gives the same bytes."""
+    with plt.rc_context({"svg.hashsalt": "nmpcrl"}):
+        figure.savefig(file, format=kind, metadata={"Date": None} if kind == "svg" else None)
 
 
 def _map(axes: Axes, records: Records) -> None:

@@ -6,7 +6,11 @@ from functools import wraps
 from typing import Any, ParamSpec
 
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.figure import Figure
+
+from nmpcrl import Vector
+from nmpcrl.study.paper import THETA_NAMES
 
 WIDTH = 7.0  # inches; the book shows figures as wide as its text
 
@@ -127,3 +131,9 @@ def subplots(
         )
     plt.close(figure)
     return figure, axes
+
+
+def most_moved(change: Vector) -> str:
+    """A title: which component moved most, in any run."""
+    most = int(np.argmax(change))
+    return f"${SYMBOLS[THETA_NAMES[most]]}$ moves most, by up to {change[most]:.2g}"

@@ -7,12 +7,10 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
-from click.testing import CliRunner
 
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 
@@ -22,13 +20,6 @@ STUDY = {
     **dict.fromkeys(sweep(learner=("ES", "frozen"), seed=(0, 1), **SHORT), "main"),
     **dict.fromkeys(sweep(learner=("ES", "frozen"), horizon=5, **SHORT), "N = 5"),
 }
-
-
-@pytest.fixture
-def command(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "published"))
-    return lambda *words: CliRunner().invoke(main, words)
 
 
 @pytest.fixture
@@ -290,3 +281,61 @@ def test_bench_publishes_the_verdicts_on_time_only_where_they_are_decided(
     assert done.exit_code == code
     assert f"C3: {outcome}. 0.65" in done.output
     assert ("nothing is published" in done.output) == bool(code)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--table", "/nonexistent/d/x.csv"), "'/nonexistent/d/x.csv' cannot be written: No such"),
+        (("--table", "/dev/null/x.csv"), "'/dev/null/x.csv' cannot be written: Not a directory"),
+        (("--table", "."), "'.' is a directory"),
+        (("--workers", "0"), "workers = 0 must be a whole number, 1 or more"),
+        (("--workers", "999"), "; --yes starts them all the same"),
+        (("--scheduler", "foo"), "the scheduler's address 'foo' must be HOST:PORT"),
+        (("--security", "x.toml"), "--security goes with --scheduler, which is not given"),
+    ],
+)
+def test_what_would_fail_at_the_end_of_a_study_is_refused_at_its_start(
+    command, small, monkeypatch, words, sentence
+):
+    def refuse(*_, **__):
+        raise AssertionError("work has begun")
+
+    monkeypatch.setattr(summaries, "fetch_summaries", refuse)
+    refused = command("study", *words)
+    assert refused.exit_code in (1, 2)
+    assert sentence in refused.output
+    assert isinstance(refused.exception, SystemExit)
+
+
+def test_a_place_that_cannot_be_published_to_is_refused_before_any_work(
+    command, small, monkeypatch, tmp_path
+):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "file/published"))
+    monkeypatch.setattr(summaries, "fetch_summaries", pytest.fail)
+    refused = command("study", "--publish")
+    assert refused.exit_code == 1
+    assert refused.output == f"Error: {tmp_path / 'file'} cannot be written: Not a directory\n"
+
+
+def test_a_file_in_the_place_of_the_folder_of_runs_is_one_sentence(command, small, tmp_path):
+    (tmp_path / "runs").write_text("")
+    for words in (("study",), ("train",), ("runs",), ("evaluate", "x"), ("show", "x"), ("clean",)):
+        done = command(*words)
+        assert isinstance(done.exception, SystemExit | None), words
+        assert "Traceback" not in done.output
+        if words[0] not in ("runs", "clean"):
+            assert done.exit_code == 1
+            assert len(done.stderr.splitlines()) == 1
+
+
+def test_bench_sweeps_over_as_many_problems_as_asked_for(command, monkeypatch):
+    from nmpcrl.bench import sweep
+
+    asked = []
+    monkeypatch.setattr(sweep, "sweep", lambda problems: asked.append(problems) or "a table")
+    for words in (("--sweep",), ("--sweep", "20")):
+        done = command("bench", *words)
+        assert done.output == f"a table\n{sweep.path()}: kept\n"
+    assert asked == [100_000, 20]

@@ -1,0 +1,193 @@
+"""`nmpcrl runs`, and runs by the beginning of their names."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from nmpcrl.commands import main
+from nmpcrl.commands.tables import columns, duration, size
+from nmpcrl.study import Experiment, fetch_all, store, sweep
+from nmpcrl.study.records import Records
+
+SHORT = {"episodes": 2, "steps": 5, "evaluate_every": 1}
+STORED = sweep(learner=("ES", "GES", "frozen"), seed=(0, 1), **SHORT)
+
+
+@pytest.fixture(scope="module")
+def command(tmp_path_factory):
+    """The command on a folder with six runs, which no test here changes."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    folder = tmp_path_factory.mktemp("runs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("NMPCRL_RUNS", str(folder))
+        with ThreadPoolExecutor(1) as one:
+            fetch_all(STORED, executor=one, progress=False)
+        yield lambda *words: CliRunner().invoke(main, words)
+
+
+def listed(command, *words) -> list[str]:
+    """The names in the table."""
+    lines = command("runs", *words).stdout.splitlines()
+    return [line.split()[0] for line in lines[1:-1]]
+
+
+def names(**fields) -> set[str]:
+    return {
+        store.path_of(e).stem
+        for e in STORED
+        if all(getattr(e, name) == value for name, value in fields.items())
+    }
+
+
+@pytest.mark.parametrize(
+    ("words", "fields"),
+    [
+        ((), {}),
+        (("--learner", "GES"), {"learner": "GES"}),
+        (("--learner", "ES", "--seed", "1"), {"learner": "ES", "seed": 1}),
+        (("--clipped", "--seed", "0"), {"seed": 0}),
+        (("--theta", "1,1,0.05,0.05,0.05,1,1,0.1,0.001", "--seed", "0"), {"seed": 0}),
+    ],
+)
+def test_options_pick_runs_by_any_field(command, words, fields):
+    assert set(listed(command, *words)) == names(**fields)
+
+
+def test_an_option_given_twice_picks_runs_of_either_value(command):
+    found = listed(command, "--learner", "ES", "--learner", "frozen")
+    assert set(found) == names(learner="ES") | names(learner="frozen")
+
+
+def test_where_nothing_is_picked_it_says_so(command):
+    said = command("runs", "--layout", "F")
+    assert said.exit_code == 0
+    assert said.output.startswith("No run in ")
+
+
+@pytest.mark.parametrize("column", ["cost", "size", "seed", "learner", "run", "theta", "beta_tdc"])
+def test_any_column_and_any_field_sorts(command, column):
+    rows = json.loads(command("runs", "--sort", column, "--json").stdout)
+    measured = {
+        "cost": lambda row: row["facts"]["final_cost"],
+        "size": lambda row: row["bytes"],
+        "run": lambda row: row["run"],
+    }
+    values = [measured.get(column, lambda row: row["experiment"].get(column))(row) for row in rows]
+    assert values == sorted(values)
+    reverse = json.loads(command("runs", "--sort", column, "--reverse", "--json").stdout)
+    assert len(reverse) == len(rows) == len(STORED)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--sort", "costs"), "sort = 'costs' must be one of run, cost, minutes, size, stopped"),
+        (("--learner", "SARSA"), "learner = 'SARSA' must be one of ES"),
+        (("--seed", "-1"), "seed = -1 must be a whole number"),
+    ],
+)
+def test_what_no_run_can_be_is_refused(command, words, said):
+    refused = command("runs", *words)
+    assert refused.exit_code == 1
+    assert refused.output.startswith(f"Error: {said}")
+
+
+def test_the_table_ends_with_what_it_adds_up_to(command):
+    last = command("runs").stdout.splitlines()[-1]
+    whole = sum(store.path_of(e).stat().st_size for e in STORED)
+    assert last.startswith(f"6 runs, {size(whole)}, ")
+
+
+def test_json_has_what_the_help_says_and_no_infinity(command, tmp_path, monkeypatch):
+    (row,) = json.loads(command("runs", "--learner", "ES", "--seed", "0", "--json").stdout)
+    assert set(row) == {"run", "path", "bytes", "experiment", "facts"}
+    assert Experiment(**row["experiment"]) in STORED
+    assert {"stopped", "final_cost", "seconds", "solver"} <= set(row["facts"])
+    records = Records.load(store.path_of(STORED[0]))
+    records.facts["final_cost"] = float("inf")
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    records.save(store.path_of(STORED[0]))
+    text = command("runs", "--json").stdout
+    assert json.loads(text, parse_constant=pytest.fail)[0]["facts"]["final_cost"] is None
+
+
+def test_nothing_stored_is_an_empty_list_for_programs(command, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    assert json.loads(command("runs", "--json").stdout) == []
+
+
+def test_the_beginning_of_a_name_is_enough_where_no_other_begins_so(command):
+    whole = command("evaluate", store.path_of(STORED[2]).stem)
+    assert whole.exit_code == 0, whole.output
+    assert command("evaluate", "GES-A-step-seed0").stdout == whole.stdout
+    assert command("evaluate", str(store.path_of(STORED[2]))).stdout == whole.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("GES", "'GES' is the beginning of GES-A-step-seed0-2ep-"),
+        ("GSE-A-step-seed0", "no run 'GSE-A-step-seed0' in "),
+        ("nothing.npz", "no run 'nothing.npz' in "),
+        ("", "'' is the beginning of ES-A-step-seed0-2ep-"),
+        ("\udcff", r"no run '\udcff' in "),
+    ],
+)
+def test_a_name_that_is_none_or_several_lists_those_that_come_close(command, name, said):
+    for words in (("evaluate", name), ("show", name), ("compare", name, name)):
+        refused = command(*words)
+        assert refused.exit_code == 1
+        assert refused.output.startswith(f"Error: {said}")
+        assert "GES-A-step-seed0-2ep-" in refused.output
+        assert len(refused.output.splitlines()) == 1
+
+
+def test_the_shell_completes_commands_options_learners_and_runs(command, monkeypatch):
+    def completed(*words: str) -> list[str]:
+        monkeypatch.setenv("COMP_WORDS", " ".join(["nmpcrl", *words]))
+        monkeypatch.setenv("COMP_CWORD", str(len(words)))
+        asked = CliRunner().invoke(
+            main, prog_name="nmpcrl", env={"_NMPCRL_COMPLETE": "bash_complete"}, complete_var=None
+        )
+        return [line.partition(",")[2] for line in asked.stdout.splitlines()]
+
+    assert completed("comp") == ["compare", "completion"]
+    assert "--evaluate-every" in completed("train", "--eval")
+    assert completed("train", "--learner", "G") == ["GES"]
+    assert completed("runs", "--layout", "B") == ["B"]
+    assert set(completed("show", "GES-")) == names(learner="GES")
+    assert set(completed("compare", "ES", "fro")) == names(learner="frozen")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_completion_script_is_the_shells_own(command, shell):
+    script = command("completion", shell)
+    assert script.exit_code == 0
+    assert f"_NMPCRL_COMPLETE={shell}_complete" in script.stdout
+    assert command("completion", "tcsh").exit_code == 2
+
+
+def test_text_in_columns():
+    assert columns([["a", "1"], ["bcd", "20"]], frozenset({1})) == ["a     1", "bcd  20"]
+
+
+@pytest.mark.parametrize(
+    ("count", "text"),
+    [(0, "0 B"), (999, "999 B"), (1000, "1.0 kB"), (8.1e6, "8.1 MB"), (2e13, "20000.0 GB")],
+)
+def test_sizes_as_people_write_them(count, text):
+    assert size(count) == text
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(3, "3 s"), (120, "2.0 min"), (7200, "2.0 h")])
+def test_durations_as_people_write_them(seconds, text):
+    assert duration(seconds) == text
+
+
+def test_a_cost_that_is_not_known_sorts_last():
+    from nmpcrl.commands.runs import _order
+
+    assert sorted([np.nan, 2.0, None, 1.0], key=_order)[:2] == [1.0, 2.0]

@@ -1,0 +1,159 @@
+"""`nmpcrl train`: an option for every field, made from the class, and refusals before any work."""
+
+from dataclasses import fields
+
+import pytest
+from click.testing import CliRunner
+
+from nmpcrl.commands import main
+from nmpcrl.commands.fields import joined
+from nmpcrl.study import Experiment, paper, store
+from nmpcrl.study.experiment import frozen_arm
+
+FIELDS = fields(Experiment)
+THETA = "1,1,0.05,0.05,0.05,1,1,0.1,0.002"
+OTHERS = {  # another value than the default, as one types it
+    "learner": ("RDES", "RDES"),
+    "layout": ("B", "B"),
+    "decay": ("episode", "episode"),
+    "network": ("tanh", "tanh"),
+    "box": ("soft", "soft"),
+    "solver": ("fatrop", "fatrop"),
+    "theta": (THETA, (*paper.THETA_INIT[:-1], 0.002)),
+    "decay_rate": ("0.5", 0.5),
+    "tolerance": ("1e-7", 1e-7),
+}
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Which experiments would be trained; none is."""
+    asked = []
+
+    class Seen(Exception):
+        pass
+
+    def fetch(experiment, **_):
+        asked.append(experiment)
+        raise Seen
+
+    monkeypatch.setattr("nmpcrl.study.fetch", fetch)
+    return asked
+
+
+def words_of(field) -> tuple[list[str], object]:
+    """An option that sets a field, and the value that it then has."""
+    name = field.name.replace("_", "-")
+    if isinstance(field.default, bool):
+        return [f"--no-{name}" if field.default else f"--{name}"], not field.default
+    if field.name in OTHERS:
+        word, value = OTHERS[field.name]
+    else:
+        value = 2 * field.default + 2
+        word = str(value)
+    return [f"--{name}", word], value
+
+
+@pytest.mark.parametrize("field", FIELDS, ids=lambda field: field.name)
+def test_every_field_of_an_experiment_is_an_option(command, asked, field):
+    words, value = words_of(field)
+    command("train", *words)
+    assert asked == [Experiment(**{field.name: value})]
+
+
+def test_without_options_it_is_the_papers_run(command, asked):
+    command("train")
+    assert asked == [Experiment()]
+
+
+@pytest.mark.parametrize("field", FIELDS, ids=lambda field: field.name)
+def test_the_help_has_what_the_class_says_of_a_field(field):
+    text = " ".join(CliRunner().invoke(main, ["train", "--help"]).output.split()).replace("- ", "-")
+    assert f"--{field.name.replace('_', '-')} " in text
+    assert " ".join(field.metadata["help"].removesuffix(".").split()) in text
+    if not isinstance(field.default, bool):
+        assert field.metadata["allowed"].text in text
+
+
+def test_literal_is_another_name_of_not_gated(command, asked):
+    command("train", "--learner", "RDES", "--literal")
+    assert asked == [Experiment("RDES", gated=False)]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [(THETA,), (THETA.replace(",", " "),), THETA.split(",")],
+    ids=["commas", "text", "words"],
+)
+def test_theta_is_nine_numbers_however_they_are_separated(command, asked, words):
+    command("train", "--theta", *words, "--seed", "3")
+    assert asked == [Experiment(seed=3, theta=OTHERS["theta"][1])]
+
+
+def test_negative_numbers_of_a_vector_are_no_options():
+    assert joined(["--theta", "1", "-2", "3", "--seed", "-4"]) == [
+        "--theta",
+        "1,-2,3",
+        "--seed",
+        "-4",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--theta", "1,2"), "theta = (1.0, 2.0) must be 9 numbers of size at most 1e+06"),
+        (("--theta", "1,x"), "'1,x' is not a list of numbers"),
+        (("--seed", "x"), "'x' is not a valid int"),
+        (("--alpha", "nan"), "alpha = nan must be a number in (0, 1e+06]"),
+        (("--no-clipped", "--constrained"), "clipped = False leaves actions"),
+        (("--episodes", "10000", "--horizon", "500", "--solver", "ipopt"), "and more with --yes"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_before_any_work(command, asked, tmp_path, words, said):
+    refused = command("train", *words)
+    assert refused.exit_code in (1, 2)
+    assert said in refused.output
+    assert not asked
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_long_run_is_trained_by_who_is_sure(command, asked):
+    command("train", "--episodes", "10000", "--horizon", "500", "--solver", "ipopt", "--yes")
+    assert [e.episodes for e in asked] == [10_000]
+
+
+def test_a_trained_run_says_where_it_is_and_what_to_type_next(command, tmp_path):
+    path = store.path_of(Experiment(episodes=1, steps=5))
+    done = command("train", "--episodes", "1", "--steps", "5")
+    assert done.exit_code == 0, done.output
+    name = path.stem
+    assert f"{tmp_path / 'runs' / path.name}: finished" in done.stdout
+    assert f"Next: nmpcrl show {name}\n" in done.stdout
+    assert f"nmpcrl compare {name} RUN\n" in done.stdout
+    arm = frozen_arm(Experiment(episodes=1, steps=5))
+    command("train", "--learner", "frozen", "--episodes", "1", "--steps", "5")
+    again = command("train", "--episodes", "1", "--steps", "5")
+    assert f"nmpcrl compare {name} {store.path_of(arm).stem}\n" in again.stdout
+
+
+def test_a_run_that_cannot_be_stored_is_refused_before_it_is_trained(command, asked, tmp_path):
+    (tmp_path / "runs").write_text("a file")
+    refused = command("train", "--episodes", "1")
+    assert refused.exit_code == 1
+    assert refused.output.startswith(f"Error: {tmp_path / 'runs'}")
+    assert len(refused.output.splitlines()) == 1
+    assert not asked
+
+
+def test_the_verdict_of_a_run_that_could_not_be_stored_is_told_all_the_same(command, monkeypatch):
+    def run_only(experiment, **_):
+        from nmpcrl.study import run
+
+        return run(experiment)
+
+    monkeypatch.setattr("nmpcrl.study.fetch", run_only)
+    done = command("train", "--episodes", "1", "--steps", "5")
+    assert done.exit_code == 1
+    assert "noise-free cost" in done.stdout
+    assert "Next" not in done.stdout
