@@ -13,7 +13,17 @@ import pandas as pd
 from nmpcrl.analysis.statistics import probability_of_improvement
 from nmpcrl.claims.by_runs import AtMost, RunClaim, Values
 from nmpcrl.claims.paper_claims import BETTER, SAME_COST, cost_difference, cost_reduction
-from nmpcrl.claims.rule import Observations, Paths, Verdict, arms, median, shown
+from nmpcrl.claims.rule import (
+    NOT,
+    PARTLY,
+    REPRODUCED,
+    Observations,
+    Paths,
+    Verdict,
+    arms,
+    median,
+    shown,
+)
 from nmpcrl.study.experiment import PAPER
 
 
@@ -35,6 +45,11 @@ def compared(
         "measure": partial(_difference, learners, size),
         "evidence": partial(_evidence, learners),
         "label": f"noise-free cost, {first} - {second}",
+        "words": {
+            REPRODUCED: "confirmed",
+            PARTLY: "confirmed in part",
+            NOT: "not confirmed",
+        },
     }
 
 

@@ -23,6 +23,8 @@ from nmpcrl.claims.assumptions import TheoremClaim
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values, beside
 from nmpcrl.claims.rule import (
     CELL,
+    NOT,
+    REPRODUCED,
     Assumption,
     Claim,
     Observations,
@@ -464,12 +466,17 @@ CLAIMS: dict[str, Claim] = {
             measured="each assumption beside the code, with a measurement where one is possible",
             border="all of them",
             test="one assumption that does not hold is enough",
+            words={
+                REPRODUCED: "the guarantee applies",
+                NOT: "the guarantee does not apply",
+            },
             would_change="Decaying step sizes, w faster than theta, the curvature term and a"
             " projection would bring it closer.",
         ),
         AtLeast(
             name="C9",
-            statement="Learning with RDES and GES beats theta_init without noise.",
+            statement="Learning with RDES and GES beats theta_init without noise, which the paper"
+            " takes for granted.",
             short="RDES and GES\nbeat $\\theta_\\mathrm{init}$",
             question="Does the run of RDES, or of GES, end with a lower noise-free cost than"
             " theta_init's?",

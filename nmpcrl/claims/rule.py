@@ -71,6 +71,12 @@ class Verdict:
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
     ratio: float | None = None  # of times, where the claim is about time
     reverse: tuple[str, ...] = ()  # where the reverse of the claim was seen, in sentences
+    said: str = ""  # the outcome in the claim's own words, where it has any
+
+    @property
+    def words(self) -> str:
+        """The outcome as a page says it."""
+        return self.said or str(self.outcome)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +110,7 @@ class Claim(ABC):
     test: str = "share of yes, with its interval"
     would_change: str  # where another verdict is to be expected
     learners: tuple[str, ...] = ()  # whose runs answer, in the order of the question
+    words: Mapping[Outcome, str] = field(default_factory=dict)  # for outcomes, where not their own
 
     @abstractmethod
     def judge(self, observed: Observations) -> Verdict:
@@ -112,7 +119,7 @@ class Claim(ABC):
     def verdict(self, outcome: Outcome, evidence: str, **numbers: Any) -> Verdict:
         """A verdict on this claim; `numbers` are further fields of `Verdict`."""
         texts = (self.name, self.statement, outcome, evidence, self.would_change)
-        return Verdict(*texts, **numbers)
+        return Verdict(*texts, said=self.words.get(outcome, ""), **numbers)
 
 
 @dataclass(frozen=True)

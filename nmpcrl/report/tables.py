@@ -62,7 +62,7 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str) -> str:
     rows = (
         (
             f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}{_reverse(v)}",
-            f"{_badge(v.outcome, BADGES[v.outcome])}{_share(v)}",
+            f"{_badge(v.words, BADGES[v.outcome])}{_share(v)}",
         )
         for v in verdicts
     )
@@ -135,7 +135,7 @@ def evidence(verdicts: Iterable[Verdict]) -> str:
     """One item a claim, in Markdown: verdict, evidence, and where it would change."""
     return "\n\n".join(
         f"- **{v.claim}: {v.statement}**\n\n"
-        f"  {_badge(v.outcome, BADGES[v.outcome])} {v.evidence}\n\n"
+        f"  {_badge(v.words, BADGES[v.outcome])} {v.evidence}\n\n"
         f"  *Where it would change.* {_linked(v.would_change)}"
         for v in verdicts
     )

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import pandas as pd
 
 from nmpcrl.claims.published import Published
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
+from nmpcrl.claims.rule import UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import design
 from nmpcrl.study.departures import DEPARTURES
 
@@ -13,12 +13,6 @@ NOTHING = (
     "Nothing is published in this copy yet; `nmpcrl study --publish` trains the study, judges it"
     " and publishes it."
 )
-HOLDS = {  # of a claim that is no paper's
-    REPRODUCED: "It holds.",
-    PARTLY: "It holds in part.",
-    NOT: "It does not hold.",
-    UNDECIDABLE: "It is not decidable here.",
-}
 SURE = 0.01  # of Fisher's test: what chance explains as rarely is called more than chance
 LAYOUT, DECAY = "B", "C"  # the departures that the main table itself reads in several ways
 
@@ -45,12 +39,19 @@ def outcomes(verdicts: Sequence[Verdict]) -> str:
     """How many claims had each outcome, and which."""
     if not verdicts:
         return NOTHING
+    ordered = sorted(verdicts, key=lambda v: list(Outcome).index(v.outcome))
     counted = []
-    for outcome in (REPRODUCED, PARTLY, NOT, UNDECIDABLE):
-        names = [v.claim for v in verdicts if v.outcome == outcome]
-        if names:
-            counted.append(f"{len(names)} {outcome} ({listed(names)})")
+    for words in dict.fromkeys(v.words for v in ordered):
+        names = [v.claim for v in verdicts if v.words == words]
+        where = "where " if words.startswith("the ") else ""
+        counted.append(f"{len(names)} {where}{words} ({listed(names)})")
     return f"Of {len(verdicts)} claims: {listed(counted)}."
+
+
+def reversals(verdicts: Iterable[Verdict]) -> str:
+    """Where the runs say the reverse of a claim."""
+    found = [f"{v.claim}: {' '.join(v.reverse)}" for v in verdicts if v.reverse]
+    return " ".join(found) or "Nowhere was the reverse of a claim seen."
 
 
 def by_layout_and_decay(verdicts: Iterable[Verdict]) -> str:
@@ -107,7 +108,7 @@ def open_gaps(depends_on: Mapping[str, tuple[str, ...]]) -> str:
 
 def own_claims(verdicts: Iterable[Verdict]) -> str:
     """One item a claim of our own: what it says, and whether that holds."""
-    return "\n".join(f"- {v.claim}. {v.statement} *{HOLDS[v.outcome]}*" for v in verdicts)
+    return "\n".join(f"- {v.claim}. {v.statement} *{v.words.capitalize()}.*" for v in verdicts)
 
 
 def departure_link(words: str, letter: str) -> str:

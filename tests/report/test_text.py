@@ -1,10 +1,12 @@
 """What the one-page summary says of numbers that a test makes up."""
 
 import re
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
+from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.robustness import COLUMNS
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
@@ -106,13 +108,35 @@ def test_variants_that_change_a_verdict_are_counted_once():
     assert ", 0 of them" in text.verdicts_changed(table(*rows).assign(p=[0.3, 0.01, 0.001]))
 
 
-def test_claims_of_our_own_hold_or_do_not_and_are_not_called_reproduced():
-    said = text.own_claims([verdict("B1", NOT), verdict("B2", PARTLY)])
-    assert said.splitlines() == [
-        "- B1. It is so. *It does not hold.*",
-        "- B2. It is so. *It holds in part.*",
+def test_where_the_reverse_of_a_claim_was_seen_is_said_with_its_name():
+    judged = [verdict("C1", PARTLY), replace(verdict("C2", NOT), reverse=("So.", "And so."))]
+    assert text.reversals(judged) == "C2: So. And so."
+    assert text.reversals(judged[:1]) == "Nowhere was the reverse of a claim seen."
+
+
+def test_claims_of_our_own_are_confirmed_or_not_and_never_called_reproduced():
+    judged = [
+        replace(verdict(name, outcome), said=OWN_CLAIMS[name].words.get(outcome, ""))
+        for name, outcome in (("B1", NOT), ("B2", PARTLY), ("B3", REPRODUCED), ("B4", UNDECIDABLE))
     ]
-    assert set(text.HOLDS) == {REPRODUCED, PARTLY, NOT, UNDECIDABLE}
+    assert text.own_claims(judged).splitlines() == [
+        "- B1. It is so. *Not confirmed.*",
+        "- B2. It is so. *Confirmed in part.*",
+        "- B3. It is so. *Confirmed.*",
+        "- B4. It is so. *Not decidable here.*",
+    ]
+
+
+def test_a_claim_with_words_of_its_own_is_counted_apart():
+    judged = [
+        verdict("C2", NOT),
+        replace(verdict("C8", NOT), said="the guarantee does not apply"),
+        verdict("C9", PARTLY),
+    ]
+    assert text.outcomes(judged) == (
+        "Of 3 claims: 1 partly reproduced (C9), 1 not reproduced (C2) and 1 where the guarantee"
+        " does not apply (C8)."
+    )
 
 
 def test_a_departure_counts_every_variant_that_reads_it_otherwise():

@@ -303,5 +303,5 @@ def _finished(
 
 
 def _titled(figure: Figure, verdict: Verdict, finding: str) -> Figure:
-    title = f"{verdict.claim} {verdict.outcome}: {finding}"
+    title = f"{verdict.claim} {verdict.words}: {finding}"
     return headed(figure, textwrap.fill(title, LINE))
