@@ -276,6 +276,7 @@ def test_the_correlation_of_td_errors_is_drawn_lag_by_lag():
     bars = [patch.get_height() for patch in figure.axes[0].patches][: figures.LAGS]
     np.testing.assert_allclose(bars[:5], [0.8, 0.6, 0.4, 0.2, 0.0], atol=0.1)
     assert title(figure) == (
-        "C8 the guarantee does not apply: 1 of the theorem's 2 assumptions do not hold for what is run"
+        "C8 the guarantee does not apply: 1 of the theorem's 2 assumptions do not hold for what is"
+        " run"
     )
     np.testing.assert_allclose(figure.axes[1].get_lines()[0].get_ydata(), 0.01)
