@@ -120,8 +120,8 @@ def counted(found: Iterable[Halves]) -> str:
 def _counted(readings: list[Halves]) -> str:
     first, second = readings[0].learners
     parts = [
-        f"with noise per {one.decay} in {one.counts[0]} of {one.pairs} runs of {first} and"
-        f" {one.counts[1]} of {second}"
+        f"with noise that decays per {one.decay} in {one.counts[0]} of {one.pairs} runs of {first}"
+        f" and {one.counts[1]} of {second}"
         for one in readings
     ]
     return f"{readings[0].wrong.capitalize()}: {', '.join(parts)}."
@@ -131,10 +131,13 @@ def sentence(found: Halves) -> str:
     """The reverse of a claim, with its counts and its interval."""
     first, second = found.learners
     several = "s" if len(found.layouts) > 1 else ""
-    where = "" if found.layouts == (WHOLE,) else f", layout{several} {' and '.join(found.layouts)}"
+    where = (
+        "" if found.layouts == (WHOLE,) else f", in layout{several} {' and '.join(found.layouts)}"
+    )
     return (
-        f"With noise per {found.decay}{where}, the reverse was seen: {second} {found.wrong} in"
-        f" {found.counts[1]} of {found.pairs} runs and {first} in {found.counts[0]}. Of the"
+        f"With noise that decays per {found.decay}{where}, the reverse was seen: {second}"
+        f" {found.wrong} in {found.counts[1]} of {found.pairs} runs and {first} in"
+        f" {found.counts[0]}. Of the"
         f" {found.apart} pairs that tell the two apart, {found.against} go against the claim:"
         f" {found.share:.0%}."
     )

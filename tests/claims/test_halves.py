@@ -33,8 +33,8 @@ def test_both_halves_are_counted_in_every_reading_and_layout():
         ("had to be stopped", ("B",)): (0, 0),
     }
     assert counted(found) == (
-        "Diverged: with noise per step in 2 of 3 runs of DES and 1 of RDES."
-        " Had to be stopped: with noise per step in 0 of 3 runs of DES and 1 of RDES."
+        "Diverged: with noise that decays per step in 2 of 3 runs of DES and 1 of RDES."
+        " Had to be stopped: with noise that decays per step in 0 of 3 runs of DES and 1 of RDES."
     )
 
 
@@ -70,8 +70,8 @@ def test_where_a_whole_reading_is_undecided_its_reversed_layouts_are_named_toget
     (one,) = reversals(halves(LEARNERS, values(**cells), BORDERS))
     assert one.layouts == ("B", "C")
     assert sentence(one) == (
-        "With noise per episode, layouts B and C, the reverse was seen: RDES diverged in 11 of 11"
-        " runs and DES in 0. Of the 11 pairs that tell the two apart, 11 go against the claim:"
+        "With noise that decays per episode, in layouts B and C, the reverse was seen: RDES"
+        " diverged in 11 of 11 runs and DES in 0. Of the 11 pairs that tell the two apart, 11 go against the claim:"
         " 100% [74%, 100%]."
     )
 
@@ -79,4 +79,6 @@ def test_where_a_whole_reading_is_undecided_its_reversed_layouts_are_named_toget
 def test_a_reversal_of_a_whole_reading_is_said_of_all_layouts():
     (one,) = reversals(halves(LEARNERS, values(step_A=[(1, 2)] * 9, step_B=[(1, 1)]), BORDERS))
     assert one.layouts == (WHOLE,)
-    assert sentence(one).startswith("With noise per step, the reverse was seen: RDES diverged in 9")
+    assert sentence(one).startswith(
+        "With noise that decays per step, the reverse was seen: RDES diverged in 9"
+    )
