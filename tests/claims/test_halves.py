@@ -71,8 +71,8 @@ def test_where_a_whole_reading_is_undecided_its_reversed_layouts_are_named_toget
     assert one.layouts == ("B", "C")
     assert sentence(one) == (
         "With noise that decays per episode, in layouts B and C, the reverse was seen: RDES"
-        " diverged in 11 of 11 runs and DES in 0. Of the 11 pairs that tell the two apart, 11 go against the claim:"
-        " 100% [74%, 100%]."
+        " diverged in 11 of 11 runs and DES in 0. Of the 11 pairs that tell the two apart, 11 go"
+        " against the claim: 100% [74%, 100%]."
     )
 
 
