@@ -123,7 +123,7 @@ def timing_table(timings: pd.DataFrame) -> str:
         (
             *(_text(row[name]) for name in ("solver", "learner")),
             *("–" if pd.isna(row[name]) else f"{row[name]:.3g}" for name in TIMES),
-            str(Ratio(*(row[name] for name in COMPARED))),
+            _in_two_lines(Ratio(*(row[name] for name in COMPARED))),
         )
         for row in timings.to_dict("records")
     )
@@ -233,6 +233,12 @@ def _share(verdict: Verdict) -> str:
     if verdict.share is None:
         return f"<br>{verdict.ratio:.2f} [{low:.2f}, {high:.2f}]"
     return f"<br>{verdict.share:.0%} [{low:.0%}, {high:.0%}]"
+
+
+def _in_two_lines(ratio: Ratio) -> str:
+    """A ratio above its interval, for a narrow column."""
+    value, _, interval = str(ratio).partition(" ")
+    return f'{value}<br><span style="white-space: nowrap">{interval}</span>'
 
 
 def _reverse(verdict: Verdict) -> str:

@@ -54,7 +54,7 @@ def test_a_timing_shows_each_ratio_with_its_interval_and_a_dash_for_no_number():
         "learner": "RDES",
         **dict.fromkeys(tables.TIMES.values(), "1.23"),
         "ms per fit": "–",
-        "ratio": "0.63 [0.63, 0.64]",
+        "ratio": "0.63|[0.63, 0.64]",
     }
 
 
