@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from nmpcrl.analysis.summary import RunSummary, summarise
-from nmpcrl.study import paper, place, store
+from nmpcrl.study import place, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.executor import execute
-from nmpcrl.study.experiment import NETWORK_LEARNERS, Experiment
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.limits import seconds_of
 from nmpcrl.study.provenance import provenance, signature, summary_key, warn_of_changes
 from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
 from nmpcrl.study.reservation import reservations
@@ -192,13 +193,6 @@ def size_of(experiment: Experiment) -> int:
     """How many bytes the file of a summary takes at most."""
     e = experiment
     return EPISODE * e.episodes + EVALUATION * most_evaluations(e) + STEP * e.steps + REST
-
-
-def seconds_of(experiment: Experiment) -> float:
-    """About how long a run takes one core [s]."""
-    each = 12.0 if experiment.learner in NETWORK_LEARNERS else 4.0
-    whole = paper.EPISODES * paper.STEPS * paper.HORIZON
-    return each * experiment.episodes * experiment.steps * experiment.horizon / whole
 
 
 def make(experiment: Experiment, expected: str, *, afresh: bool = False) -> RunSummary:

@@ -18,6 +18,7 @@ from nmpcrl.claims.published import Published, comparable, unequal
 from nmpcrl.study import provenance
 from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.limits import seconds_of
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.setup import compile_ahead
 
@@ -104,7 +105,7 @@ def _trained_afresh(
         return ""
 
     compile_ahead(drawn)
-    ordered = sorted(drawn, key=summaries.seconds_of, reverse=True)
+    ordered = sorted(drawn, key=seconds_of, reverse=True)
     signature = provenance.signature()
     jobs = {e: partial(summaries.make, e, signature, afresh=True) for e in ordered}
     for experiment, error in execute(jobs, keep, workers=workers).items():

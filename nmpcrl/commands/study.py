@@ -44,11 +44,12 @@ def study(
     """
     from nmpcrl.analysis import summaries
     from nmpcrl.study import cluster
+    from nmpcrl.study.limits import estimate
 
     chosen = _chosen(parts)
     _check(workers, scheduler, security, publish=publish, sure=yes)
     missing = [e for e in chosen if not summaries.is_stored(e)]
-    hours = sum(map(summaries.seconds_of, missing)) / 3600
+    hours = estimate(missing).seconds / 3600
     click.echo(
         f"{len(chosen) - len(missing)} of {len(chosen)} runs are stored in {summaries.folder()};"
         f" the others take about {hours:.1f} hours of one core"
