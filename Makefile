@@ -39,7 +39,7 @@ bench: .venv/ready  ## Measure how long solves, steps and runs take, and print w
 	@$(BIN)/python -m nmpcrl bench
 
 test: .venv/ready  ## All tests but the next; those of the site need a built book and a Chromium
-	@$(BIN)/python -m pytest -m "not lab"
+	@$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal -m "not lab"
 
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
 	@$(BIN)/python -m pytest -m lab
