@@ -19,6 +19,7 @@ import sys
 import textwrap
 from collections.abc import Iterator
 from dataclasses import is_dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -58,12 +59,23 @@ def as_written(
     definition = _definition(getter)
     if not isinstance(definition, ast.FunctionDef):
         return None
+    if what == "property":  # of which autodoc shows the type that it has
+        if definition.returns:
+            names = inspect.unwrap(getter).__globals__ | ALIASES
+            getter.__annotations__["return"] = eval(ast.unparse(definition.returns), names)
+        return None
     _Named(inspect.unwrap(getter).__globals__).visit(definition)
     arguments = definition.args
     if what == "method" and arguments.args and arguments.args[0].arg in ("self", "cls"):
         del arguments.args[0]
     result = ast.unparse(definition.returns) if definition.returns else ""
     return f"({ast.unparse(arguments)})".replace("'", '"'), result
+
+
+# What autodoc is to show of an alias: its name.
+ALIASES = {
+    name: type(name, (), {"__module__": "nmpcrl"}) for name in ("Vector", "Matrix", "Column")
+}
 
 
 class _Named(ast.NodeTransformer):
@@ -100,9 +112,11 @@ def completed(
     """A docstring with links to equations and departures, and with the fields of a dataclass."""
     if what == "module":  # its further paragraphs are for who reads the source
         lines[:] = lines[: lines.index("")] if "" in lines else lines
-    if what == "class" and (is_dataclass(thing) or hasattr(thing, "_fields")):
+    if what == "class":
         fields = [f"    {field}" for field in _fields(thing)]
         lines += ["", "Fields:", *fields, ""] if fields else []
+        members = [f"    {member}" for member in _members(thing)]
+        lines += ["", "Members:", *members, ""] if members else []
     lines[:] = linked("\n".join(lines)).split("\n")
 
 
@@ -242,6 +256,8 @@ def _definition(thing: Any) -> ast.stmt | None:
 
 def _constructor(kind: type) -> str:
     """The names of what a class is made of, with defaults; types are in the list below."""
+    if issubclass(kind, Enum) or getattr(kind, "_is_protocol", False):
+        return ""
     if not (is_dataclass(kind) or hasattr(kind, "_fields")):
         definition = _definition(vars(kind).get("__init__"))
         if not isinstance(definition, ast.FunctionDef):
@@ -279,6 +295,17 @@ def _fields(kind: type) -> Iterator[str]:
                 comment = f"# {comment}"
             about = _help(one, node.target.id) or comment
             yield f"{node.target.id} ({kind_of}): {about}"
+
+
+def _members(kind: type) -> Iterator[str]:
+    """The members of an enumeration, each with its value and the comment beside it."""
+    if not issubclass(kind, Enum):
+        return
+    lines = textwrap.dedent(inspect.getsource(kind)).splitlines()
+    for member in kind:
+        (line,) = (line for line in lines if re.match(rf"    {member.name} = ", line))
+        comment = line.partition("  # ")[2]
+        yield f"{member.name}: `{member.value!r}`{', ' * bool(comment)}{comment}"
 
 
 def _help(kind: Any, name: str) -> str:
