@@ -37,6 +37,7 @@ DEPARTURES = re.compile(r"\s*# (?P<words>departures? [A-Z](?:(?:, | and )[A-Z])*
 def setup(app: Sphinx) -> dict[str, bool]:
     """Document the library that lies beside the book, whichever is installed."""
     sys.path.insert(0, str((HERE.parent / "nmpcrl").resolve().parent))
+    app.connect("source-read", each_module)
     app.connect("autodoc-process-signature", as_written)
     app.connect("autodoc-process-docstring", completed, priority=400)  # before napoleon's
     app.connect("doctree-read", number_rows)
@@ -44,6 +45,26 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("doctree-resolved", link_code)
     app.connect("doctree-resolved", link_source)
     return {"parallel_read_safe": False, "parallel_write_safe": True}
+
+
+def each_module(app: Sphinx, page: str, source: list[str]) -> None:
+    """`.. automodules:: package` as one `automodule` for each module of a package."""
+    source[0] = PACKAGE.sub(
+        lambda found: "\n\n".join(
+            f".. automodule:: {name}\n   :members:\n   :member-order: bysource"
+            for name in modules(found[1])
+        ),
+        source[0],
+    )
+
+
+PACKAGE = re.compile(r"^\.\. automodules:: ([\w.]+)$", flags=re.M)
+
+
+def modules(package: str) -> list[str]:
+    """The public modules of a package."""
+    folder = HERE.parent / package.replace(".", "/")
+    return sorted(f"{package}.{path.stem}" for path in folder.glob("[a-z]*.py"))
 
 
 def as_written(
@@ -267,6 +288,8 @@ def _constructor(kind: type) -> str:
     shown = []
     for parameter in inspect.signature(kind).parameters.values():
         default = parameter.default
+        if parameter.kind is parameter.KEYWORD_ONLY and "*" not in shown:
+            shown.append("*")
         if default is parameter.empty:
             shown.append(parameter.name)
         else:

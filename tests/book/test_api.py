@@ -20,7 +20,7 @@ from nmpcrl.control import Solution, Task
 from nmpcrl.study import Experiment
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = {path.stem: path.read_text() for path in sorted((ROOT / "book").glob("api*.md"))}
+SOURCES = {path.stem: path.read_text() for path in sorted((ROOT / "book").glob("api*.md"))}
 DIRECTIVE = re.compile(r"^\.\. (auto\w+|py:data):: ([\w.]+)(?:\n   :members: (.*))?$", re.M)
 EXPORTING = (
     "control",
@@ -30,6 +30,16 @@ EXPORTING = (
 )  # the rooms whose `__init__` says what is public
 DATA = ("nmpcrl.Vector", "nmpcrl.Matrix", "nmpcrl.bench.LENGTHS", "nmpcrl.bench.STEPS")
 WHOLE = ("analysis", "claims", "report")  # and those of which every public name of a module is
+
+
+def expanded(text: str) -> str:
+    """A page as Sphinx reads it."""
+    source = [text]
+    reference.each_module(None, "", source)
+    return source[0]
+
+
+PAGES = {page: expanded(text) for page, text in SOURCES.items()}
 
 
 def module(name: str) -> str:
