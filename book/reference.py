@@ -39,6 +39,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     sys.path.insert(0, str((HERE.parent / "nmpcrl").resolve().parent))
     app.connect("source-read", each_module)
     app.connect("autodoc-process-signature", as_written)
+    app.connect("autodoc-skip-member", without_aliases)
     app.connect("autodoc-process-docstring", completed, priority=400)  # before napoleon's
     app.connect("doctree-read", number_rows)
     app.connect("missing-reference", known_or_plain)
@@ -131,6 +132,9 @@ def completed(
     app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
 ) -> None:
     """A docstring with links to equations and departures, and with the fields of a dataclass."""
+    if lines and lines[0].startswith("Create new instance of"):  # so says every named tuple
+        lines.clear()
+        return
     if what == "module":  # its further paragraphs are for who reads the source
         lines[:] = lines[: lines.index("")] if "" in lines else lines
     if what == "class":
@@ -139,6 +143,13 @@ def completed(
         members = [f"    {member}" for member in _members(thing)]
         lines += ["", "Members:", *members, ""] if members else []
     lines[:] = linked("\n".join(lines)).split("\n")
+
+
+def without_aliases(
+    app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: Any
+) -> bool | None:
+    """Leave out the properties by which a named tuple gives its fields: they are in the list."""
+    return True if type(thing).__name__ == "_tuplegetter" else None
 
 
 def linked(docstring: str) -> str:

@@ -101,6 +101,15 @@ def test_every_entry_is_public_and_begins_with_a_sentence():
             assert paragraph.strip().endswith((".", ":", "?")) or "# departure" in paragraph, name
 
 
+def test_no_property_begins_with_what_napoleon_takes_for_a_type():
+    """`shape (m,): the first input` would be read as a type and a description."""
+    for path in sorted((ROOT / "nmpcrl").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            marks = map(ast.unparse, getattr(node, "decorator_list", []))
+            if any("property" in mark for mark in marks):
+                assert ": " not in (ast.get_docstring(node) or "").split("\n")[0], node.name
+
+
 def paths() -> set[str]:
     """Where what has an entry is defined, and the public members of classes with it."""
     found = set()
