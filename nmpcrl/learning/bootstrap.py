@@ -64,7 +64,7 @@ class Bootstrap(Protocol):
 
 @dataclass(frozen=True)
 class SecondSolve:
-    """Solve the NMPC again in the next state: ES and GES."""
+    """Solve the NMPC again in the next state, Eq. (7): ES and GES."""
 
     nmpc: Controller
 
@@ -80,10 +80,13 @@ class SecondSolve:
 
 @dataclass(frozen=True)
 class Imitation:
-    """Let a network learn the NMPC's value and ask it: DES, and RDES if theta is an input."""
+    """A network learns the NMPC's value, Eq. (10), and predicts the next one, Eq. (11).
 
-    network: "QNetwork"
-    with_theta: bool
+    It is that of DES, and of RDES if theta is an input.
+    """
+
+    network: "QNetwork"  # learns in place
+    with_theta: bool  # whether theta is an input
     gated: bool = True  # wait for the first fit; Algorithm 1 read literally does not  # departure G
     fits: int = 1  # mini-batches a step  # departure H
 
