@@ -29,7 +29,7 @@ class Comparison:
     def warning(self) -> str:
         """Why the costs of the two mean different things, or ""."""
         apart = [name for name in ("layout", "steps", "box") if name in self.fields]
-        return f"not comparable: {' and '.join(apart)} differ, and so does the task" * bool(apart)
+        return f"the costs are not comparable: other {' and '.join(apart)}" * bool(apart)
 
 
 def compare(a: Records, b: Records) -> Comparison:

@@ -1,4 +1,4 @@
-"""How long a step takes, and how long it takes others: measured, kept, and held against targets.
+"""How long a step takes, here and with other libraries: measured, stored, compared with targets.
 
 `sweep` counts how the solves of very many drawn problems end.
 """

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Settings)
-@click.option("--yes", "-y", is_flag=True, help="Train it even if it takes very long.")
+@click.option("--yes", "-y", is_flag=True, help="Train even if it takes more than a day.")
 def train(yes: bool, **fields: Any) -> None:
-    """Train one run and store it; a stored one is read.
+    """Train one run and store it, or read it if it is stored.
 
     Each field of an experiment is an option; the defaults are the paper's.
 

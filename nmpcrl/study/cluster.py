@@ -70,7 +70,7 @@ def check(address: str, *, security: str | Path | None = None) -> tuple[str, Any
         raise NoCluster(f"the scheduler's address {address!r} must be {ADDRESSES}")
     if not full.startswith(scheme):
         raise NoCluster(
-            f"the scheduler's address {address} does not go with a security file; only tls:// does"
+            f"the scheduler's address {address} goes without a security file; tls:// needs one"
             if security
             else f"the scheduler's address {address} needs a security file with certificates"
         )
@@ -132,7 +132,7 @@ def _certificates(file: Path) -> tuple[str, str, str]:
                 f"the security file {file} names {name} = {named[name]!r}: no such file"
             )
     if "ENCRYPTED" in places["tls-client-key"].read_text(errors="replace"):
-        raise NoCluster(f"the key {places['tls-client-key']} has a passphrase, and must have none")
+        raise NoCluster(f"the key {places['tls-client-key']} must not have a passphrase")
     ca, cert, key = (str(place.resolve()) for place in places.values())
     return ca, cert, key
 
@@ -159,8 +159,8 @@ def _greet(address: str, security: Any) -> None:
         asked = thread.submit(asyncio.run, _identity(address, security))
     # Any error will do: Dask's reader takes whatever comes for a message.
     if asked.exception() or asked.result().get("type") != "Scheduler":
-        mode = "or not with these certificates" if security else "or only with certificates"
-        raise NoCluster(f"what is at {address} does not answer as Dask's scheduler does, {mode}")
+        mode = "or refuses these certificates" if security else "or needs certificates"
+        raise NoCluster(f"{address} does not answer like a Dask scheduler, {mode}")
 
 
 async def _identity(address: str, security: Any) -> Mapping[str, Any]:
@@ -188,10 +188,10 @@ def _refuse_others(client: Any) -> None:
     try:
         signatures = client.run(signature)
     except Exception as error:  # Dask wraps whatever went wrong over there
-        raise NoCluster(f"a worker cannot say which code it has: {_line(error)}") from None
+        raise NoCluster(f"a worker cannot report which code it has: {_line(error)}") from None
     for worker, theirs in signatures.items():
         if theirs != ours:
             raise NoCluster(
-                f"the worker {worker} has other code or other versions of what the numbers depend"
-                " on than this machine"
+                f"the worker {worker} has other code or other versions of the libraries than this"
+                " machine, so its numbers may differ"
             )

@@ -1,8 +1,8 @@
 """Which layouts of the obstacles a study may use, decided before anything is trained.
 
-`screen` holds a layout against the criteria, `sampler` draws layouts, and `drawn` says which are
-the named ones: A is the first that we tried, the others are the first that a seeded sampler drew
-and the screening let through, so that nobody chose them for what is learned in them.
+`screen` applies the criteria to a layout, `sampler` draws layouts, and `drawn` returns the named
+ones: A is the first that we tried; the others are the first that a seeded sampler drew and the
+screening accepted, so that none was selected for what is learned in it.
 
 A layout may be used if
 
@@ -37,7 +37,7 @@ Centres = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class Screening:
-    """A layout held against the criteria."""
+    """How a layout meets the criteria."""
 
     blocked: bool  # 1: the straight way
     clear: bool  # 2: start and target
@@ -56,7 +56,7 @@ class Screening:
 
 
 def screen(centres: Centres) -> Screening:
-    """Hold a layout against the criteria; nothing is trained for it."""
+    """Apply the criteria to a layout; nothing is trained for it."""
     task = paper.task_among(centres)
     blocked = bool(_distances(task.start[:2], task.target[:2], centres).min() < _keep_out(task, 0))
     clear = task.collision_penalty(task.start) == 0 == task.collision_penalty(task.target)

@@ -210,9 +210,9 @@ def warn_of_changes() -> None:
     if files:
         os.environ[WARNED] = "1"
         print(
-            f"{', '.join(files)}: not the code that stored runs were made with;"
-            " `nmpcrl verify --relock` shows whether their numbers hold; if not, raise the epoch of"
-            " the room in nmpcrl/study/provenance.py",
+            f"{', '.join(files)}: changed since the stored runs were trained;"
+            " `nmpcrl verify --relock` shows whether the numbers stay the same; if not, raise the"
+            " epoch of the room in nmpcrl/study/provenance.py",
             file=sys.stderr,
         )
 

@@ -275,7 +275,7 @@ def stored() -> dict[Path, tuple[dict[str, Any], dict[str, Any]]]:
             _check_name(path, fields, facts)
             whole[path] = fields, facts
         except (FileNotFoundError, DamagedRecords) as error:
-            say(f"{error}; it is left alone")
+            say(f"{error}; it is ignored")
     return whole
 
 
@@ -293,10 +293,11 @@ def size_of(experiment: Experiment) -> int:
 
 
 def wait_for(names: list[str], first: Experiment) -> None:
-    """Say that somebody else is at runs, and wait until he has one less."""
+    """Say that another process is training runs, and wait until it has finished one."""
     more = len(names) - 1
-    said = f"{first} and {more} others are" if more else f"{first} is"
-    say(f"{said} being trained by another process, which is waited for")
+    others = f"{more} other{'s' * (more > 1)}"
+    said = f"{first} and {others} are" if more else f"{first} is"
+    say(f"{said} being trained by another process; waiting for it")
     while len(reservations(folder()).taken(names)) == len(names):
         time.sleep(POLL)
 

@@ -183,8 +183,13 @@ def test_compare_prints_fields_figures_and_differences(command):
     assert done.exit_code == 0, done.output
     assert "learner   " in done.stdout
     assert "cost of the last rollout" in done.stdout
-    assert "Bits differ, in " in done.stdout
+    assert "Numbers differ in " in done.stdout
     assert "Largest difference of theta: " in done.stdout
     assert not done.stderr
-    assert "All bits are equal" in command("compare", "ES-A", "ES-A").stdout
-    assert "Warning: not comparable: layout differ" in command("compare", "ES-A", "ES-B").stderr
+    assert (
+        "All numbers but the measured times are equal" in command("compare", "ES-A", "ES-A").stdout
+    )
+    assert (
+        "Warning: the costs are not comparable: other layout"
+        in command("compare", "ES-A", "ES-B").stderr
+    )
