@@ -485,7 +485,7 @@ FILES = {
     WHOLE.replace("key.pem", "."): "names tls-client-key = '.': no such file",
     WHOLE.replace("key.pem", "cert.pem"): "cannot be used",
     WHOLE.replace("cert.pem", "key.pem"): "cannot be used",
-    WHOLE.replace("key.pem", "locked.pem"): "has a passphrase, and must have none",
+    WHOLE.replace("key.pem", "locked.pem"): "must not have a passphrase",
 }
 
 
@@ -503,7 +503,7 @@ def test_an_address_goes_with_certificates_if_it_says_so(certificate):
     at = "127.0.0.1:9"
     assert "cannot be read: No such file" in refusal(at, security=certificate.with_name("none"))
     assert "needs a security file" in refusal(f"tls://{at}")
-    assert "only tls:// does" in refusal(f"tcp://{at}", security=certificate)
+    assert "tls:// needs one" in refusal(f"tcp://{at}", security=certificate)
     assert f"no scheduler answers at tls://{at}" in refusal(at, security=certificate)
 
 
