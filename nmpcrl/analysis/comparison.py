@@ -33,7 +33,7 @@ class Comparison:
 
 
 def compare(a: Records, b: Records) -> Comparison:
-    """Hold two runs against each other, as far as both go."""
+    """Compare two runs, as far as both go."""
     names = dict.fromkeys([*a.experiment, *b.experiment])
     pairs = {name: (a.experiment.get(name), b.experiment.get(name)) for name in names}
     return Comparison(

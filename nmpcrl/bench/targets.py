@@ -115,8 +115,7 @@ def _scaling(bench: Bench) -> Iterator[Target]:
         yield Target(
             f"growth from {sizes[0]} to {sizes[-1]} {of}",
             f"linear: time per {part} within {LINEAR}x",
-            f"at most {most:.2f}x that of a smaller size;"
-            f" one more adds {_between(low, high)} µs to an iteration",
+            f"{_growth(most)}; one more adds {_between(low, high)} µs to an iteration",
             bool(most <= LINEAR and high <= LINEAR * low),
         )
 
@@ -160,3 +159,9 @@ def _change(share: float) -> str:
     """ "+0.4%", or "unchanged" where that would be zero."""
     shown = f"{share:+.1%}"
     return "unchanged" if shown in ("+0.0%", "-0.0%") else shown
+
+
+def _growth(factor: float) -> str:
+    """ "at most 1.20x that of a smaller size", or in words where there is none."""
+    shown = f"{factor:.2f}x"
+    return "no growth" if shown == "1.00x" else f"at most {shown} that of a smaller size"

@@ -137,7 +137,7 @@ def _print(rows: list[Row], place: Path) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON gives it back, which can be held against another."""
+    """A value as JSON returns it, so that two can be compared."""
     return tuple(value) if isinstance(value, list) else value
 
 

@@ -62,7 +62,7 @@ def fetched(experiment: "Experiment") -> "Records":
 
 
 def _other(experiment: "Experiment") -> str:
-    """A stored run that this one can be held against; without one, where its name goes."""
+    """A stored run to compare this one with; without one, a placeholder for its name."""
     from nmpcrl.commands.names import names
     from nmpcrl.study.experiment import frozen_arm
     from nmpcrl.study.store import path_of

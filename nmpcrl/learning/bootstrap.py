@@ -80,7 +80,7 @@ class SecondSolve:
 
 @dataclass(frozen=True)
 class Imitation:
-    """Let a network learn the NMPC's value and ask it: DES, and RDES if theta is an input."""
+    """A network that predicts the NMPC's value: DES, and RDES if theta is an input."""
 
     network: "QNetwork"
     with_theta: bool
@@ -105,5 +105,5 @@ class Imitation:
         return Successor(value, loss=loss, seconds=time.perf_counter() - began)
 
     def inputs(self, state: Vector, action: Vector, theta: Vector) -> Vector:
-        """What the network sees: (s, a, theta) for RDES, (s, a) for DES.  # departure I"""
+        """The network's inputs: (s, a, theta) for RDES, (s, a) for DES.  # departure I"""
         return np.concatenate([state, action, theta] if self.with_theta else [state, action])

@@ -6,7 +6,7 @@ screening accepted, so that none was selected for what is learned in it.
 
 A layout may be used if
 
-1. the straight way from start to target is blocked;
+1. the straight line from start to target is blocked;
 2. start and target lie outside every penalty zone, Upsilon = 0;
 3. without noise, the controller with theta_init is at the target after K = 129 steps.
 
@@ -39,7 +39,7 @@ Centres = tuple[tuple[float, float], ...]
 class Screening:
     """How a layout meets the criteria."""
 
-    blocked: bool  # 1: the straight way
+    blocked: bool  # 1: the straight line
     clear: bool  # 2: start and target
     arrives: bool  # 3: the rollout of theta_init
     closing: bool  # a gap of this rollout is closed at theta_c = d_o

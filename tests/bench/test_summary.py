@@ -143,6 +143,7 @@ def test_a_run_that_had_to_share_the_processor_says_so(measured):
 def test_numbers_that_are_shown_alike_are_given_once(measured):
     shown = [target.measured for target in targets.targets(measured)]
     assert sum(bool(re.search(r"one more adds \d\.\d\d µs", one)) for one in shown) == 2
+    assert sum(one.startswith("no growth; one more adds") for one in shown) == 2
     assert sum(one.endswith("x with and without noise") for one in shown) == 3
     assert any(one.endswith("unchanged after the first tenth") for one in shown)
     measured["episodes"]["memory"][-1] *= 1.02

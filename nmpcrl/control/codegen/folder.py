@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 CHOSEN = "NMPCRL_CACHE"  # in the environment: another folder than the default
-ROOM = 4_000_000  # bytes: thrice what numba makes of the solver
+ROOM = 4_000_000  # bytes: three times the size of the compiled solver
 OTHERS = 0o022  # may write: the group, and everybody
 
 
