@@ -1,7 +1,7 @@
 """Runs on a Dask cluster; needs the optional extra `nmpcrl[cluster]`.
 
-The cluster's workers train and hand summaries back, so they need this package and nothing else: no
-shared disk, no way to the reader's files. Dask starts again what a lost worker was at.
+The cluster's workers train and return summaries, so they need only this package: no shared disk and
+no access to the reader's files. Dask restarts the job of a lost worker.
 """
 
 import asyncio
@@ -149,7 +149,7 @@ def _is_address(text: str) -> bool:
 
 
 def _greet(address: str, security: Any) -> None:
-    """Ask who is there: Dask's client tries on where nobody is, and has no end with some others."""
+    """See that a scheduler answers: Dask's client would retry without end where there is none."""
     parts = urlsplit(address)
     try:
         socket.create_connection((parts.hostname or "", parts.port or 0), timeout=ANSWER).close()

@@ -1,4 +1,4 @@
-"""The folder where runs are kept: whether it takes them, and what becomes of those it does not."""
+"""The folder of the runs: checked before training, with another place where it fails."""
 
 import errno
 import os

@@ -1,8 +1,8 @@
 """Where runs are kept: `fetch` and `fetch_all` train what is missing and read what is there.
 
-A run's file is named by its experiment and by the key of `provenance`. What is read is the whole
-run that was asked for, or it is set aside and made again; what was trained is not lost, even if it
-cannot be written. Who else trains a run in the same folder is waited for.
+A run's file is named by its experiment and by the key of `provenance`. A file that is damaged or of
+another run is set aside, and the run is done again. A trained run is not lost, even if it cannot be
+written. Runs that another process trains in the same folder are awaited.
 """
 
 import re

@@ -1,6 +1,6 @@
-"""The folder in which machine code is kept, and which nobody but its user may write to.
+"""The folder in which machine code is kept, and to which only its user may write.
 
-numba runs what it finds there, so whoever can write to the folder can run code as its user.
+numba runs what it finds there, so anyone who can write to it can run code as its user.
 """
 
 import atexit
