@@ -66,7 +66,7 @@ class Solution:
 
     @property
     def status(self) -> Status:
-        """Whether the solver began as it was asked to."""
+        """Whether the requested start succeeded."""
         return Status.RESTARTED if self.restarts else Status.SOLVED
 
     @property

@@ -108,5 +108,5 @@ class Imitation:
         return Successor(value, loss=loss, seconds=time.perf_counter() - began)
 
     def inputs(self, state: Vector, action: Vector, theta: Vector) -> Vector:
-        """What the network sees: (s, a, theta) for RDES, (s, a) for DES.  # departure I"""
+        """The network's inputs: (s, a, theta) for RDES, (s, a) for DES.  # departure I"""
         return np.concatenate([state, action, theta] if self.with_theta else [state, action])

@@ -9,7 +9,7 @@
 | TDC     | a second solve    | gradient TD with its curvature, projected  |
 | QL      | a second solve    | a semi-gradient of Q(s, a), u_0 = a fixed  |
 
-The control arms that they are held against are in `baselines`.
+The control arms that they are compared with are in `baselines`.
 """
 
 from collections.abc import Callable
