@@ -13,7 +13,7 @@ TERMS = ("TD error", "Expected Sarsa", "bootstrap", "semi-gradient", "on-policy"
 
 
 def read() -> list[str]:
-    """The cells of prose in the order of reading, without the goals, which look ahead, and labels."""
+    """The cells of prose in the order of reading, without labels and without the goals."""
     notebooks = [nbformat.read(BOOK / f"{name}.ipynb", 4) for name in FIRST_CHAPTERS]
     return [
         re.sub(enrich.ANCHOR, "", cell.source)
