@@ -170,7 +170,7 @@ DEPARTURES = {
         " Eq. (11) has it.",
         why=r"Algorithm 1 stores $\boldsymbol{\theta}$ with each value, and a value belongs to no"
         r" other $\boldsymbol{\theta}$. Both statements then hold, one of the fit and one of the"
-        r" prediction. The network is therefore asked about a $\boldsymbol{\theta}$ that is newer"
-        " than almost all of its examples.",
+        r" prediction. So the network predicts for a $\boldsymbol{\theta}$ that is newer than"
+        " almost all of its examples.",
     ),
 }
