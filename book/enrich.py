@@ -164,7 +164,7 @@ def _reference(found: re.Match[str]) -> str:
     return f"{{ref}}`{label}`" if label.startswith("ex-") else f"{{ref}}`{words} <{label}>`"
 
 
-NUMBERED = {"eq": "eq", "fig": "numref", "alg": "numref"}
+NUMBERED = {"eq": "eq", "fig": "numref", "alg": "prf:ref"}
 
 
 def _goals(source: str, _: str) -> str:

@@ -18,7 +18,7 @@ class Transition:
     """One step of the plant, and the NMPC's solution that led to it."""
 
     state: Vector  # s, shape (n,)
-    action: Vector  # a, the action applied, noise included, shape (m,)
+    action: Vector  # a, the action applied, noise included, shape (m,)  # departure Q
     cost: float  # l(s, a)
     next_state: Vector  # s+, shape (n,)
     solution: Solution  # of the NMPC in s: its value is Q_theta(s, a)  # departure F
@@ -94,7 +94,7 @@ class Imitation:
         """Remember (s, a[, theta]) -> Q, fit, and predict Q(s+, a+) with a+ = u_1 of the plan."""
         began = time.perf_counter()
         solution = transition.solution
-        self.network.remember(
+        self.network.remember(  # departure R
             self.inputs(transition.state, transition.action, solution.theta), solution.value
         )
         if self.gated and not self.network.ready:
