@@ -133,6 +133,7 @@ def described(pdf: bytes, headings: list[str], date: datetime) -> bytes:
     when = f"D:{date:%Y%m%d%H%M%S}"
     dates = {"/Creator": f"nmpcrl {__version__}", "/CreationDate": when, "/ModDate": when}
     writer.add_metadata(about | dates)
+    writer.pdf_header = "%PDF-1.7"  # tags and transparency are younger than its default
     writer.page_mode = "/UseOutlines"
     for entry, words in zip(outline(writer.get_outline_root()), headings, strict=True):
         entry[NameObject("/Title")] = TextStringObject(words)  # Chromium's lacks the formulas
