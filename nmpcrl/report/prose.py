@@ -38,6 +38,14 @@ def filled(template: str, **numbers: Any) -> str:
     return PLACEHOLDER.sub(lambda found: format(numbers[found[1]], found[2] or ""), text)
 
 
+def share(value: float, digits: int = 0) -> str:
+    """A share as a sentence has it: "2.4%", "none", or "less than 0.1%" where that rounds to 0."""
+    least = 10.0 ** -(digits + 2)
+    if 0 < value < least:
+        return f"less than {least:.{digits}%}"
+    return f"{value:.{digits}%}" if value else "none"
+
+
 def source(shown: Any, title: str = "") -> None:
     """Display where the library defines `shown`, as `listing` does; with a title it is folded."""
     text = listing(shown)
