@@ -11,6 +11,7 @@ from typing import Any
 from IPython.display import Markdown, display
 
 import nmpcrl
+from nmpcrl.claims.rule import Outcome, read
 
 ROOT = Path(nmpcrl.__file__).parents[1]
 
@@ -44,6 +45,12 @@ def share(value: float, digits: int = 0) -> str:
     if 0 < value < least:
         return f"less than {least:.{digits}%}"
     return f"{value:.{digits}%}" if value else "none"
+
+
+def held(yes: int, of: int) -> str:
+    """Whether an expectation held, by the rule for claims, as the end of a sentence."""
+    ends = ("held", "held in part", "did not hold", "cannot be decided")
+    return dict(zip(Outcome, ends, strict=True))[read(int(yes), int(of))]
 
 
 def source(shown: Any, title: str = "") -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from nmpcrl.learning import updates
 from nmpcrl.learning.learners import Learner
 from nmpcrl.report import prose
-from nmpcrl.report.prose import PLACEHOLDER, filled, folded, listing, say, share, source
+from nmpcrl.report.prose import PLACEHOLDER, filled, folded, held, listing, say, share, source
 
 LATEX = (
     r"$\mathbf{s}$, $\boldsymbol{\theta}_{init}$, $\frac{a}{b}$, $x^{ref}$, $\sqrt[3]{x}$,"
@@ -40,6 +40,19 @@ def test_a_number_is_written_as_its_placeholder_says():
 )
 def test_a_share_that_is_not_nothing_is_not_written_as_0(value, digits, said):
     assert share(value, digits) == said
+
+
+@pytest.mark.parametrize(
+    ("yes", "of", "said"),
+    [
+        (6, 6, "held"),
+        (20, 40, "held in part"),
+        (20, 480, "did not hold"),
+        (2, 2, "cannot be decided"),
+    ],
+)
+def test_an_expectation_held_by_the_rule_for_claims(yes, of, said):
+    assert held(yes, of) == said
 
 
 def test_the_braces_of_latex_are_no_placeholders():
