@@ -16,7 +16,7 @@
     const more = Object.keys(edges).filter((edge) => edges[edge]).join(" ");
     const said = { tabindex: "0", role: "group", "aria-label": name(box), "data-more": more };
     for (const [attribute, value] of Object.entries(said)) {
-      if (hidden > 0) box.setAttribute(attribute, value);
+      if (hidden > 1) box.setAttribute(attribute, value);
       else box.removeAttribute(attribute);
     }
   }

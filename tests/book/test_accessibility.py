@@ -45,7 +45,7 @@ THIN = """() => {
 
 # Elements of the article wider than their place, but not what is only heard (MathML) or drawn.
 WIDE = """[...document.querySelectorAll(".bd-article *")]
-  .filter(one => one.clientWidth > 1 && one.scrollWidth > one.clientWidth)
+  .filter(one => one.clientWidth > 1 && one.scrollWidth > one.clientWidth + 1)
   .filter(one => !one.closest("mjx-assistive-mml, svg"))
   .map(one => [one, getComputedStyle(one)])"""
 
