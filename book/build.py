@@ -15,7 +15,8 @@ Each build has its own place, in the last column, and six steps, each a function
               the published ones end the build
 4. `execute`  the chapters of the mirror with papermill, two at a time, into PLACE/executed
 5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says
-6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html
+6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
+              mended for all readers, as `accessible` says
 
 PLACE/html is removed first and put there last: it exists only if everything went well.
 """
@@ -42,6 +43,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import IO, Any
 
+import accessible
 import click
 import enrich
 import nbformat
@@ -303,6 +305,7 @@ def render(place: Path, strict: bool) -> None:
     for path in (place / "executed").glob("*.ipynb"):
         notebook = enrich.download(nbformat.read(path, 4))
         nbformat.write(notebook, work / "_build/html/book" / path.name)
+    accessible.site(work / "_build/html")
     (work / "_build/html").rename(place / "html")
     title = yaml.safe_load((ROOT / "_config.yml").read_text())["title"]
     (place / "html/index.html").write_text(INDEX.format(title=title, page=pages()[0]))
