@@ -26,18 +26,18 @@ from bs4.formatter import HTMLFormatter
 
 
 def site(html: Path) -> None:
-    """Mend every page below a folder, in place."""
+    """Repair every page below a folder, in place."""
     for path in html.rglob("*.html"):
         if "_static" not in path.parts:
             path.write_text(page(path.read_text()))
 
 
 def page(html: str) -> str:
-    """A whole page, mended; one that is mended already stays as it is."""
+    """A whole page, repaired; one that is repaired already stays as it is."""
     soup = BeautifulSoup(html, "html.parser")
-    for selector, mend in REPAIRS.items():
+    for selector, repair in REPAIRS.items():
         for element in soup.select(selector):
-            mend(element)
+            repair(element)
     html = soup.decode(formatter=InOrder(EntitySubstitution.substitute_xml))
     return html.replace(">\n\n", ">\n", 1)  # Beautiful Soup adds a line to the doctype
 
@@ -70,11 +70,11 @@ def _folded(box: Tag) -> None:
 
 
 def _without(*attributes: str) -> Callable[[Tag], None]:
-    def mend(element: Tag) -> None:
+    def repair(element: Tag) -> None:
         for name in attributes:
             del element[name]
 
-    return mend
+    return repair
 
 
 def _with(**attributes: str) -> Callable[[Tag], None]:

@@ -16,7 +16,7 @@ Each build has its own place, in the last column, and six steps, each a function
 4. `execute`  the chapters of the mirror with papermill, two at a time, into PLACE/executed
 5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says
 6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
-              mended for all readers, as `accessible` says
+              repaired for all readers, as `accessible` says
 
 PLACE/html is removed first and put there last: it exists only if everything went well.
 """

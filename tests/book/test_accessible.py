@@ -1,4 +1,4 @@
-"""What is mended in a page's HTML so that it can be heard and worked without a mouse."""
+"""What is repaired in a page's HTML so that it can be heard and worked without a mouse."""
 
 import accessible
 import pytest
@@ -12,37 +12,37 @@ SOLUTION = """<article><div class="solution dropdown admonition" id="book/04-sol
 </div></article>"""
 
 
-def mended(html: str) -> BeautifulSoup:
+def repaired(html: str) -> BeautifulSoup:
     return BeautifulSoup(accessible.page(html), "html.parser")
 
 
 def test_a_header_cell_that_heads_nothing_is_an_ordinary_cell():
-    rows = [[cell.name for cell in row.find_all(["th", "td"])] for row in mended(PANDAS)("tr")]
+    rows = [[cell.name for cell in row.find_all(["th", "td"])] for row in repaired(PANDAS)("tr")]
     assert rows == [["td", "th"], ["th", "td"], ["th", "td"]]
 
 
 def test_a_header_cell_says_whether_it_heads_a_column_or_a_row():
-    scopes = {cell.get_text(): cell["scope"] for cell in mended(PANDAS)("th")}
+    scopes = {cell.get_text(): cell["scope"] for cell in repaired(PANDAS)("th")}
     assert scopes == {"cost": "col", "layout": "col", "A": "row"}
 
 
 def test_a_header_cell_that_holds_a_picture_stays_one():
-    (cell,) = mended('<article><table><tr><th><img alt="A"></th></tr></table></article>')("th")
+    (cell,) = repaired('<article><table><tr><th><img alt="A"></th></tr></table></article>')("th")
     assert cell["scope"] == "row"
 
 
 def test_a_table_is_put_into_a_box_that_scrolls_in_its_place():
-    (table,) = mended(PANDAS)("table")
+    (table,) = repaired(PANDAS)("table")
     assert table.parent["class"] == ["scrolls"]
     assert table.parent.parent.name == "article"
 
 
 def test_a_table_of_the_theme_stays_as_it_is():
-    assert mended("<nav><table></table></nav>").select(".scrolls") == []
+    assert repaired("<nav><table></table></nav>").select(".scrolls") == []
 
 
 def test_a_box_that_a_script_folds_becomes_one_that_its_title_opens():
-    (box,) = mended(SOLUTION)("details")
+    (box,) = repaired(SOLUTION)("details")
     assert box["id"] == "book/04-solution-1"
     assert box["class"] == ["solution", "admonition", "folded"]
     assert not box.has_attr("open")
@@ -59,21 +59,21 @@ def test_a_box_that_is_not_folded_stays_open():
 
 
 def test_ids_that_every_exercise_repeats_go():
-    assert mended(SOLUTION).select("#solution-content") == []
+    assert repaired(SOLUTION).select("#solution-content") == []
 
 
 def test_a_summary_is_called_what_it_reads():
     html = '<details><summary aria-label="Toggle hidden content">Show the code</summary></details>'
-    assert not mended(html).summary.has_attr("aria-label")
+    assert not repaired(html).summary.has_attr("aria-label")
 
 
 def test_a_bibliography_is_a_list_of_items():
     html = '<div role="list"><div class="citation" role="doc-biblioentry">Gros</div></div>'
-    assert mended(html).select_one(".citation")["role"] == "listitem"
+    assert repaired(html).select_one(".citation")["role"] == "listitem"
 
 
 def test_the_side_bar_is_a_landmark_with_a_name():
-    bar = mended('<div id="pst-primary-sidebar"></div>').div
+    bar = repaired('<div id="pst-primary-sidebar"></div>').div
     assert (bar["role"], bar["aria-label"]) == ("navigation", "Book")
 
 

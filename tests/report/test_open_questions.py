@@ -1,4 +1,4 @@
-"""The questions: every one is about departures that exist, and says what hangs on it."""
+"""The questions: every one is about departures that exist, and says what depends on it."""
 
 import re
 
