@@ -450,8 +450,8 @@ CLAIMS: dict[str, Claim] = {
             measured="root mean square errors on held-out pairs of state and theta, with over"
             " without",
             border=f"at most {MORE_ACCURATE}",
-            would_change="How far theta moves: where it hardly does, there is nothing to tell the"
-            " network.",
+            would_change="How far theta moves: where it hardly does, the network gains nothing from"
+            " it.",
             learners=("RDES",),
             measure=_relative_error,
             threshold=MORE_ACCURATE,
