@@ -185,7 +185,7 @@ def mirror(place: Path, announcement: str) -> Path:
 
 
 def require_published() -> None:
-    """End the build, before any work, if there is nothing that its runs could be held against."""
+    """End the build, before any work, if there is nothing to compare its runs with."""
     from nmpcrl.claims import published  # only here: a refusal should not wait for it
 
     try:

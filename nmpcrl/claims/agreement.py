@@ -9,7 +9,7 @@ It does if all of this holds:
   overlap; of two samples from the same source, fewer than one pair in a hundred is so far apart.
   What rests on no sample (C8: assumptions hold or do not) leaves nothing to chance.
 
-Runs that were trained here are judged alone, and held against the published runs in the same
+Runs that were trained here are judged alone, and compared with the published runs in the same
 layouts and readings of the decay, so that a choice of layouts contradicts nothing. A time belongs
 to a machine: on another one than that of the published times, another verdict is a finding.
 """
@@ -56,7 +56,7 @@ def of_runs(fresh: Mapping[Experiment, RunSummary], published: Published) -> tup
 
     Args:
         fresh: any runs; those that are not as the main table's are left out.
-        published: what they are held against.
+        published: what they are compared with.
     """
     mine = {e: one for e, one in fresh.items() if _main(e)}
     if not mine:

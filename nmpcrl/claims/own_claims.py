@@ -1,4 +1,4 @@
-"""What we add to the paper: learners that it does not have, held against those that it has.
+"""What we add to the paper: learners that it does not have, compared with those that it has.
 
 Decided as the paper's claims are, by the thresholds of `paper_claims` and the rule of `rule`, and
 fixed with them before they were put to the study. A claim is judged wherever its learner was run.

@@ -87,7 +87,7 @@ def training_cost_ratio(runs: pd.DataFrame) -> pd.Series:
 
 
 def divergence(runs: pd.DataFrame) -> pd.Series:
-    """Which runs diverged (see `DIVERGED`); missing where there is nothing to hold them against."""
+    """Which runs diverged (see `DIVERGED`); missing where there is nothing to compare them with."""
     ratio = training_cost_ratio(runs)
     return (ratio > DIVERGED).astype("boolean").where(ratio.notna())
 

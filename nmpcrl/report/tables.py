@@ -98,7 +98,7 @@ def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
 
 
 def target_table(targets: Iterable[Target], caption: str) -> str:
-    """One row a figure to reach, in HTML: what was measured, and whether that is enough."""
+    """One row a target, in HTML: what was measured, and whether that is enough."""
     rows = (
         (_text(t.what), _text(t.to_reach), f"{_badge(*MET[t.reached])}<br>{_text(t.measured)}")
         for t in targets

@@ -5,27 +5,15 @@ from collections.abc import Callable, Sequence
 import pandas as pd
 
 from nmpcrl.claims import evidence
-from nmpcrl.claims.published import load
-from nmpcrl.claims.rule import Verdict
 
 EVERY = "all layouts"  # the last column of `went_wrong`
-
-
-def verdict(claim: str) -> Verdict:
-    """The published verdict on a claim.
-
-    Raises:
-        Damaged: what is published is not there, or not what was written.
-        KeyError: no verdict on this claim is published.
-    """
-    return {one.claim: one for one in load().verdicts}[claim]
 
 
 def main_table() -> pd.DataFrame:
     """The published runs of the main table, as `Evidence.runs` has them.
 
     Raises:
-        Damaged: as `verdict`.
+        Damaged: what is published is not there, or not what was written.
     """
     return evidence.gather("published").main.runs
 
@@ -42,7 +30,7 @@ def went_wrong(wrong: Callable[[pd.DataFrame], pd.Series], learners: Sequence[st
         many of each learner there are in a reading.
 
     Raises:
-        Damaged: as `verdict`.
+        Damaged: what is published is not there, or not what was written.
     """
     runs = main_table()
     runs = runs[runs.learner.isin(learners)]

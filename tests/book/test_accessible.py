@@ -78,7 +78,7 @@ def test_the_side_bar_is_a_landmark_with_a_name():
 
 
 @pytest.mark.parametrize("html", [PANDAS, SOLUTION])
-def test_a_page_that_is_mended_stays_as_it_is(html):
+def test_a_page_that_is_repaired_stays_as_it_is(html):
     once = accessible.page(html)
     assert accessible.page(once) == once
 
@@ -92,7 +92,7 @@ def test_words_code_and_scripts_keep_every_character():
     assert accessible.page(html) == html
 
 
-def test_every_page_of_a_folder_is_mended_but_those_of_the_theme(tmp_path):
+def test_every_page_of_a_folder_is_repaired_but_those_of_the_theme(tmp_path):
     own, theme = tmp_path / "book/a.html", tmp_path / "_static/b.html"
     for path in (own, theme):
         path.parent.mkdir()

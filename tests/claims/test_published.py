@@ -1,4 +1,4 @@
-"""The published study: read as it was written, small, refused when damaged, and held against."""
+"""The published study: read as it was written, small, refused when damaged, and compared with new runs."""
 
 import json
 import shutil

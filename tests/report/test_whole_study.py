@@ -1,12 +1,11 @@
 """What chapters quote of the whole study: the verdicts' own counts."""
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from nmpcrl.claims.halves import WHOLE, halves
 from nmpcrl.claims.paper_claims import CLAIMS, divergence, instability
-from nmpcrl.report.whole_study import EVERY, main_table, verdict, went_wrong
+from nmpcrl.report.whole_study import EVERY, main_table, went_wrong
 from nmpcrl.study import design, paper
 
 EACH = len(design.LAYOUTS) * len(design.SEEDS)  # runs of a learner in a reading of the decay
@@ -51,10 +50,3 @@ def test_a_run_that_went_wrong_is_counted_where_it_was_made(runs):
     layouts = found[[*paper.LAYOUTS]]
     assert layouts.loc[(runs.decay[first], "GES"), "B"] == 1
     assert layouts.to_numpy().sum() == 1
-
-
-def test_every_claim_has_a_published_verdict_and_no_other_has():
-    assert [verdict(claim).claim for claim in CLAIMS] == list(CLAIMS)
-    assert np.isfinite(verdict("C3").ratio)
-    with pytest.raises(KeyError):
-        verdict("C0")
