@@ -25,7 +25,7 @@ FUNCTION_INDEX, ADDRESS, SIGNED_ADDRESS, PLAIN_ADDRESS, TYPE_INDEX, GLOBAL_INDEX
 I32, MUTABLE, I32_CONST, END = 0x7F, 1, 0x41, 0x0B
 
 
-class CannotLink(Exception):
+class CannotLink(RuntimeError):
     """The object holds what no module of ours may hold; the message says what."""
 
 
