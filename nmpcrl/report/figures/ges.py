@@ -8,8 +8,8 @@ from nmpcrl.analysis.gradient_td import Curvature, directions
 from nmpcrl.analysis.two_state import Chain, follow, spectral_radius
 from nmpcrl.learning.learners import gradient_td, semi_gradient
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.figures.axes import label_panel, one_entry_each
-from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS, headed, page, subplots, thin
+from nmpcrl.report.figures.axes import below, label_panel, one_entry_each
+from nmpcrl.report.figures.style import AT_ONE, DECAY_TITLES, LOOKS, headed, page, subplots, thin
 from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
@@ -27,13 +27,13 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
         label = rf"gradient TD, $\beta = {ratio:g}\alpha$"
         left.semilogy(path, line, color=LOOKS["GES"].color, label=label)
     left.set(xlabel="update", ylabel=r"$|\theta|$ [-]", ylim=(1e-3, 1e4))
-    figure.legend(loc="outside lower center", ncols=4, fontsize="small")
+    below(figure, *left.get_legend_handles_labels())
     grid = np.geomspace(0.05, 20, 2000)
     radius = np.array(
         [spectral_radius(chain, gradient_td(alpha, r * alpha, chain.gamma)) for r in grid]
     )
     right.semilogx(grid, radius, color=LOOKS["GES"].color)
-    right.axhline(1, color="0.6", linewidth=1)
+    right.axhline(1, **AT_ONE)
     right.axvline(paper.BETA / paper.ALPHA, color="0.35", linewidth=1, linestyle=":")
     right.annotate(" Table I", (paper.BETA / paper.ALPHA, radius.max()), color="0.35", va="top")
     right.set(xlabel=r"$\beta / \alpha$ [-]", ylabel="spectral radius [-]")
@@ -85,7 +85,7 @@ def corrections(runs: Runs[Records]) -> Figure:
     for decay in runs.values_of("decay"):
         line = "-" if decay == "step" else ":"
         axes.plot([], [], color=LOOKS["GES"].color, linestyle=line, label=DECAY_TITLES[decay])
-    axes.axhline(1, color="0.6", linewidth=1)
+    axes.axhline(1, **AT_ONE)
     label_panel(axes)
     axes.set(ylabel="correction / semi-gradient [-]", ylim=(0, None))
     axes.legend()
@@ -98,9 +98,9 @@ def curvatures(measured: tuple[Curvature, ...]) -> Figure:
     """Size of the dropped term beside the printed direction, at sampled steps of GES."""
     figure, axes = subplots(height=2.6)
     for run in measured:
-        axes.semilogy(run.episode + 1, run.ratio, ".", color=LOOKS["GES"].color, alpha=0.5)
+        axes.semilogy(run.episode + 1, run.ratio, ".", color=LOOKS["GES"].color)
     every = np.concatenate([run.ratio for run in measured])
-    axes.axhline(1, color="0.6", linewidth=1)
+    axes.axhline(1, **AT_ONE)
     label_panel(axes)
     axes.set(ylabel="dropped / printed [-]")
     axes.set_title(f"The dropped term is {np.median(every):.1%} of the printed one (median)")
