@@ -43,6 +43,7 @@ from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.records import Column, Records, Stopped
 
 SOLVER_NAMES = {"riccati": "riccati", "fatrop": "fatrop", "ipopt": "Ipopt"}
+ROOM = 12  # over the largest count, for the sums that stand above
 LAGS = 30  # steps
 ABOVE: dict[str, Any] = {
     "xycoords": ("data", "axes fraction"),
@@ -136,7 +137,7 @@ def violations(found: Evidence, verdict: Verdict) -> Figure:
     axes[0].set_ylabel("states of a run\nin an obstacle")
     top = max(axis.get_ylim()[1] for axis in axes[:-1])
     for axis in axes[:-1]:
-        axis.set_ylim(-0.5, 2 * top)
+        axis.set_ylim(-0.5, ROOM * top)
     sizes = zip(SIZE_MARKS.values(), ("Ξ up to 0.01", "up to 0.1", "above"), strict=True)
     handles = [
         Line2D([], [], label=name, **dots("frozen", marker=m, color=c)) for (m, c), name in sizes
@@ -199,7 +200,7 @@ def learners(found: Evidence) -> Figure:
         xlabel="reduction of the noise-free cost, at least", ylabel="share of runs", ylim=(0, 1)
     )
     profile.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-    profile.legend(fontsize="small", loc="lower left")
+    below(figure, *profile.get_legend_handles_labels())
     best = min(means, key=lambda name: means[name].value)
     title = f"{best} ends lowest, at {means[best]:.3f} of the start's cost (interquartile mean)"
     return marked(headed(figure, title), found.mark)

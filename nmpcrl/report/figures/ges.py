@@ -1,5 +1,7 @@
 """Figures of GES: gradient TD in the place of the semi-gradient."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -63,12 +65,20 @@ def overshoots(runs: Runs[Records], learners: tuple[str, ...] = ("ES", "GES")) -
     axes[0, 0].set_ylim(0, None)
     axes[0, 0].set_ylabel(r"largest $\alpha\,\Vert\phi\Vert^2$ [-]")
     one_entry_each(axes[0, -1], learners)
-    shares = [
-        f"{np.median([metrics.overshooting(r) for r in mine.values()]):.1%} of the steps of {name}"
+    shares = {
+        name: float(np.median([metrics.overshooting(records) for records in mine.values()]))
         for name in learners
         if (mine := runs.select(learner=name))
-    ]
-    return headed(figure, f"Steps above 2: {' and '.join(shares)} (medians)")
+    }
+    return headed(figure, f"In the median run, {_above(shares)}")
+
+
+def _above(shares: Mapping[str, float]) -> str:
+    """What share of the steps of each learner is above 2, in words."""
+    if not any(shares.values()):
+        return f"no step of {' or '.join(shares)} is above {OVERSHOOT:g}"
+    listed = [f"{share:.1%} of the steps of {name}" for name, share in shares.items()]
+    return f"{' and '.join(listed)} are above {OVERSHOOT:g}"
 
 
 @page

@@ -71,7 +71,7 @@ def paths(found: Evidence, layout: str) -> Figure:
     """
     drawn = part(found, SHOWN, layout)
     finished, decays = _finished(drawn), drawn.summaries.values_of("decay")
-    figure, axes = subplots(1, len(decays), 3.5, sharey=True, squeeze=False)
+    figure, axes = subplots(1, len(decays), 3.8, sharey=True, squeeze=False)
     for axis, decay in zip(axes[0], decays, strict=True):
         _map(axis, paper.task(layout), finished.summaries.select(decay=decay))
         axis.set_title(DECAY_TITLES[decay], **SUBTITLE)
