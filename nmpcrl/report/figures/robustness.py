@@ -33,7 +33,7 @@ FILLS = {  # with the colour of the word; the darker, the more is left of the cl
 SYMBOLS = {"c_epsilon": r"$c_\epsilon$", "alpha x": "α ×", "beta x": "β ×"}
 ABREAST = 3  # claims side by side on a narrow sheet
 LETTERS = -2.15  # where the letters of the departures stand, in widths of a cell
-FOLD = {False: 12, True: 10}  # characters of a line above a column, wide and narrow
+FOLD = {False: 13, True: 10}  # characters of a line above a column, wide and narrow
 SMALL: dict[str, Any] = {"va": "center", "fontsize": "small"}
 MOST_COST = 1.5  # of theta_init's, that is drawn
 
@@ -59,7 +59,8 @@ def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
             _cell(axes, part.index(cell["claim"]), height[cell["variant"]], cell)
         for row, y in height.items():
             axes.text(-0.1, y, named(row), ha="right", **SMALL)
-            axes.text(LETTERS, y, letters[row], ha="left", **SMALL)
+            if height[row] == min(height[one] for one in rows if letters[one] == letters[row]):
+                axes.text(LETTERS, y, letters[row], ha="left", **SMALL)
         axes.text(LETTERS, -0.8, "departure", ha="left", **(SMALL | {"va": "bottom"}))
         for i, claim in enumerate(part):
             head = f"{claim}\n{_folded(BY_RUNS[claim].short, FOLD[sheet().narrow])}"

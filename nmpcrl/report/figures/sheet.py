@@ -36,6 +36,7 @@ PAGE: dict[Any, Any] = {
 MIME = "application/vnd.nmpcrl.figure+json"  # what the book's page shows, beside "image/png"
 FOR_PAGE = "NMPCRL_FIGURES_FOR_PAGE"  # set where `MIME` is wanted, too: it takes time and room
 HEAVY = 300_000  # bytes of an SVG from which on a PNG is shown
+SHARP = 216  # dots an inch of a narrow PNG: telephones show several where a page counts one
 TALL = 2.0  # inches of a panel that stands above others, at most
 REST = 1.1  # inches of a narrow figure for what is not a panel
 
@@ -79,7 +80,10 @@ class Drawn(Figure):
         """The figure as "svg" or "png"; the same figure gives the same bytes."""
         file = BytesIO()
         with plt.rc_context(PAGE):
-            self.savefig(file, format=kind, metadata={"Date": None} if kind == "svg" else None)
+            options: dict[str, Any] = {"metadata": {"Date": None}} if kind == "svg" else {}
+            if kind == "png" and self.get_figwidth() <= NARROW.width:
+                options["dpi"] = SHARP
+            self.savefig(file, format=kind, **options)
         self.set_layout_engine("none")  # what is laid out stays so
         return file.getvalue()
 
