@@ -45,10 +45,9 @@ def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
     axes.plot(*task.start[:2], "o", color=INK, ms=5)
     axes.plot(*task.target[:2], "*", color=INK, ms=9)
     if labels:
-        for point, name in ((task.start, "start"), (task.target, "target")):
-            axes.annotate(
-                name, tuple(point[:2]), (0, 7), textcoords="offset points", ha="center", va="bottom"
-            )
+        above: dict[str, Any] = {"xytext": (0, 7), "textcoords": "offset points", "va": "bottom"}
+        axes.annotate("start", tuple(task.start[:2]), ha="left", **above)
+        axes.annotate("target", tuple(task.target[:2]), ha="center", **above)
     axes.set_aspect("equal")
 
 
