@@ -15,13 +15,16 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book smoke chapter lab study bench test test-lab test-fast check locks clean anew
+.PHONY: help book pdf smoke chapter lab study bench test test-lab test-fast check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
 
 book: .venv/ready  ## Train what is missing, execute every chapter, build _build/html
 	@$(BIN)/python book/build.py
+
+pdf: .venv/ready  ## The built book as one PDF, _build/html/nmpcrl.pdf; needs a Chromium
+	@$(BIN)/python book/pdf.py
 
 smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/html
 	@$(BIN)/python book/build.py --smoke
@@ -39,7 +42,7 @@ bench: .venv/ready  ## Measure how long solves, steps and runs take, and print w
 	@$(BIN)/python -m nmpcrl bench
 
 test: .venv/ready  ## All tests but the next; those of the site need a built book and a Chromium
-	@$(BIN)/python -m pytest -m "not lab"
+	@$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal -m "not lab"
 
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
 	@$(BIN)/python -m pytest -m lab

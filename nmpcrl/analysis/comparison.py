@@ -29,11 +29,11 @@ class Comparison:
     def warning(self) -> str:
         """Why the costs of the two mean different things, or ""."""
         apart = [name for name in ("layout", "steps", "box") if name in self.fields]
-        return f"not comparable: {' and '.join(apart)} differ, and so does the task" * bool(apart)
+        return f"the costs are not comparable: other {' and '.join(apart)}" * bool(apart)
 
 
 def compare(a: Records, b: Records) -> Comparison:
-    """Hold two runs against each other, as far as both go."""
+    """Compare two runs, as far as both go."""
     names = dict.fromkeys([*a.experiment, *b.experiment])
     pairs = {name: (a.experiment.get(name), b.experiment.get(name)) for name in names}
     return Comparison(

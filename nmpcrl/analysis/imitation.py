@@ -28,7 +28,7 @@ class Imitation:
 
     @property
     def ratio(self) -> float:
-        """Error with theta over error without: below 1, theta helps."""
+        """Error with theta over error without; theta helps where this is below 1."""
         return self.error("with_theta") / self.error("without_theta")
 
 

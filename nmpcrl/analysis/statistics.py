@@ -78,7 +78,7 @@ def probability_of_improvement(
 ) -> Estimate:
     """Probability that a run of the first learner costs less than one of the second.
 
-    Within a layout every run of the one is held against every run of the other, a tie counting one
+    Within a layout every run of the one is compared with every run of the other, a tie counting one
     half (Mann and Whitney's U); the layouts weigh the same. Runs of one seed meet the same noise,
     so the bootstrap draws them together.
 

@@ -1,4 +1,4 @@
-"""How long a step takes, and how long it takes others: measured, kept, and held against targets.
+"""How long a step takes, here and with other libraries: measured, stored, compared with targets.
 
 `sweep` counts how the solves of very many drawn problems end.
 """
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 else:
 
     def __getattr__(name: str) -> Any:
-        """The suite where it is asked for: the workers of a sweep need none of what it imports."""
+        """The suite on demand: the workers of a sweep need none of its imports."""
         if name not in __all__:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return getattr(import_module("nmpcrl.bench.suite"), name)

@@ -67,9 +67,9 @@ def time_learners(
     """Time of one learning step, one row a learner and solver.
 
     All take some steps each in turn, in this process and with one thread, so that a change of the
-    machine's speed meets all alike; in a new order each time, because whoever follows a network's
-    fit finds the processor's cache full of it. Counting starts with the second episode, when the
-    networks are fitted; by default it covers whole episodes.
+    machine's speed affects all of them; in a new order each time, because a solve after a
+    network's fit finds the processor's cache full of it. Counting starts with the second episode,
+    when the networks are fitted; by default it covers whole episodes.
 
     All times are the processor's, and the parts of a step get their share of it. `paired` says why,
     and how the steps of two learners are compared.

@@ -51,7 +51,7 @@ def _add(columns: Columns, *row: Any) -> None:
 def at_once(runs: int, episodes: int) -> Columns:
     """The same runs of ES by one process, and by as many as there are cores: workers, seconds.
 
-    Making the processes counts. No rows where no runs are asked for.
+    The start of the processes counts. No rows where no runs are asked for.
     """
     columns: Columns = {"workers": [], "seconds": [], "runs": [], "episodes": []}
     if not runs:

@@ -20,7 +20,7 @@ Solve = Callable[..., Any]  # (state, theta, warm_start) -> what has value and i
 
 THETA = np.array(paper.THETA_INIT)
 LOOPS = {"without noise": 0.0, "with noise": paper.NOISE}  # that of training's first episode
-WIDTH = 3 + 2 + len(THETA)  # of what RDES tells its network: (s, a, theta)
+WIDTH = 3 + 2 + len(THETA)  # of the input of RDES's network: (s, a, theta)
 STRETCH = 26  # problems that a solver is given at a time: then its code is in the caches, as in use
 
 

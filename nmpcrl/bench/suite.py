@@ -122,8 +122,8 @@ def read_or_measure(
     Args:
         length: "smoke", "short" or "full".
         only: the stages that are needed; all of them if empty.
-        calm: whether to measure again what was measured beside other programs, if its verdict may
-            hang on that.
+        calm: whether to measure again what was measured while other programs ran, if its verdict
+            may depend on that.
         progress: whether to show a bar on standard error.
 
     Raises:

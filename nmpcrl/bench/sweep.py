@@ -1,4 +1,4 @@
-"""A sweep: riccati on very many drawn problems, judged one by one, and Ipopt on every fourth.
+"""A sweep: riccati on very many drawn problems, each checked, and Ipopt on every fourth.
 
 Layouts, states, theta and actions are drawn from where a run may take them: four obstacles and the
 state anywhere in the box, the eight weights of theta log-uniform, so that some are all but zero.
@@ -82,10 +82,10 @@ class SweepTable:
             ("solved at once", count(t.at_once)),
             ("solved after a restart", count(t.restarted)),
             ("given up with a SolverError", count(t.failed)),
-            ("plans that cannot keep to the box", count(t.outside)),
+            ("plans that leave the box", count(t.outside)),
             ("inputs out of bounds, or numbers not finite", count(t.broken)),
             ("largest KKT residual in the box", f"{t.kkt:.1e}"),
-            ("held against Ipopt", count(compared)),
+            ("compared with Ipopt", count(compared)),
             ("a better minimum than Ipopt's", count(t.better)),
             ("the same minimum", count(t.equal)),
             ("a worse minimum than Ipopt's", count(t.worse)),

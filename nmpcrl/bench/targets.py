@@ -1,4 +1,4 @@
-"""What the benchmark is held against: a row a figure to reach, with what was measured."""
+"""The targets of the benchmark, a row each, with what was measured."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ FLAT = 0.05  # share by which memory may grow after a tenth of the episodes
 
 @dataclass(frozen=True)
 class Target:
-    """One figure to reach."""
+    """A target, and what was measured."""
 
     what: str
     to_reach: str
@@ -38,7 +38,7 @@ class Target:
 
 
 def targets(bench: Bench) -> list[Target]:
-    """Every figure to reach, in the order of a reader's questions."""
+    """Every target, in the order of a reader's questions."""
     return [
         *_own_loop(bench),
         *_against_others(bench),
@@ -52,7 +52,7 @@ def targets(bench: Bench) -> list[Target]:
 def rows(bench: Bench) -> list[tuple[str, str, str, str]]:
     """`targets` as a table of texts, its header first."""
     texts = [(t.what, t.to_reach, t.measured, t.outcome) for t in targets(bench)]
-    return [("what", "to reach", "measured", "outcome"), *texts]
+    return [("what", "target", "measured", "outcome"), *texts]
 
 
 def _own_loop(bench: Bench) -> Iterator[Target]:
@@ -67,9 +67,13 @@ def _own_loop(bench: Bench) -> Iterator[Target]:
 
 
 def _against_others(bench: Bench) -> Iterator[Target]:
-    times = summary.solvers(bench).times.unstack("loop")[list(LOOPS)]
+    loops = list(LOOPS)
+    times = summary.solvers(bench).times.unstack("loop")[loops]
     for solver, least in TIMES.items():
-        shown = " and ".join(f"{value:.0f}x {loop}" for loop, value in times.loc[solver].items())
+        rounded = {loop: f"{value:.0f}x" for loop, value in times.loc[solver].items()}
+        shown = " and ".join(f"{value} {loop}" for loop, value in rounded.items())
+        if len(set(rounded.values())) == 1:
+            shown = f"{rounded[loops[0]]} with and without noise"
         yield Target(
             f"{NAMES[solver]} on the same problems, warm",
             f"at least {least:.0f}x as long",
@@ -78,7 +82,7 @@ def _against_others(bench: Bench) -> Iterator[Target]:
         )
     theirs, ours = summary.against_mpcrl(bench)
     yield Target(
-        "a learning step of mpcrl, beside one of ES",
+        "a learning step of mpcrl, relative to one of ES",
         f"at least {MPCRL:.0f}x as long",
         f"{theirs / ours:.0f}x ({theirs:.1f} ms, {1e3 * ours:.0f} µs)" if theirs > 0 else "–",
         bool(theirs / ours >= MPCRL) if theirs > 0 else None,
@@ -92,7 +96,7 @@ def _runs(bench: Bench) -> Iterator[Target]:
     done = min(bench["runs"]["episodes"])
     extended = "" if done >= paper.EPISODES else f", extended from {done} episodes"
     for learner, row in summary.runs(bench).iterrows():
-        waited = "" if row.processor > BUSY else f", the processor {row.processor:.0%} of it"
+        waited = "" if row.processor > BUSY else f", of which the processor {row.processor:.0%}"
         yield Target(
             f"{paper.EPISODES} episodes of {learner} on one core",
             f"at most {RUN[str(learner)]:.0f} s",
@@ -111,8 +115,7 @@ def _scaling(bench: Bench) -> Iterator[Target]:
         yield Target(
             f"growth from {sizes[0]} to {sizes[-1]} {of}",
             f"linear: time per {part} within {LINEAR}x",
-            f"at most {most:.2f}x that of a smaller size;"
-            f" one more adds {low:.2f} to {high:.2f} µs to an iteration",
+            f"{_growth(most)}; one more adds {_between(low, high)} µs to an iteration",
             bool(most <= LINEAR and high <= LINEAR * low),
         )
 
@@ -120,19 +123,19 @@ def _scaling(bench: Bench) -> Iterator[Target]:
 def _processes(bench: Bench) -> Iterator[Target]:
     workers, times = summary.speed_up(bench)
     yield Target(
-        "seeds over 2 cores",
+        "runs on 2 cores",
         f"at least {SPEED_UP}x as fast",
-        f"{times:.2f}x with {workers}" if workers > 1 else "–",
+        f"{times:.2f}x with {workers} workers" if workers > 1 else "–",
         times >= SPEED_UP if workers > 1 else None,
     )
     for cached, most in FIRST.items():
-        seconds, told = summary.first_call(bench, cached=cached)
-        said = "" if cached else ", with a notice" if told else ", without a notice"
+        seconds, noticed = summary.first_call(bench, cached=cached)
+        notice = "" if cached else ", with a notice" if noticed else ", without a notice"
         yield Target(
-            f"first call, compilation {'cached' if cached else 'not cached'}",
+            f"first call, machine code {'cached' if cached else 'not cached'}",
             f"at most {most:.0f} s{'' if cached else ', with a notice'}",
-            f"{seconds:.1f} s{said}" if np.isfinite(seconds) else "–",
-            bool(seconds <= most and (cached or told)) if np.isfinite(seconds) else None,
+            f"{seconds:.1f} s{notice}" if np.isfinite(seconds) else "–",
+            bool(seconds <= most and (cached or noticed)) if np.isfinite(seconds) else None,
         )
 
 
@@ -141,6 +144,24 @@ def _memory(bench: Bench) -> Target:
     return Target(
         "memory of a run",
         f"at most {MEMORY:.0f} MB, flat over episodes",
-        f"{runs.memory.max():.0f} MB, {runs.memory_growth.max():+.1%} after the first tenth",
+        f"{runs.memory.max():.0f} MB, {_change(runs.memory_growth.max())} after the first tenth",
         bool(runs.memory.max() <= MEMORY and runs.memory_growth.max() <= FLAT),
     )
+
+
+def _between(low: float, high: float) -> str:
+    """ "0.29 to 0.31", or "0.30" where both are shown so."""
+    first, last = f"{low:.2f}", f"{high:.2f}"
+    return first if first == last else f"{first} to {last}"
+
+
+def _change(share: float) -> str:
+    """ "+0.4%", or "unchanged" where that would be zero."""
+    shown = f"{share:+.1%}"
+    return "unchanged" if shown in ("+0.0%", "-0.0%") else shown
+
+
+def _growth(factor: float) -> str:
+    """ "at most 1.20x that of a smaller size", or in words where there is none."""
+    shown = f"{factor:.2f}x"
+    return "no growth" if shown == "1.00x" else f"at most {shown} that of a smaller size"

@@ -129,7 +129,8 @@ OWN_CLAIMS: dict[str, RunClaim] = {
             question="Does Q-learning end at no higher cost than ES with the same layout, decay"
             " and seed?",
             border=f"higher by at most {SAME_COST:.0%}",
-            would_change="Exploration late in training: without it, a is what the policy says.",
+            would_change="Exploration late in training: without it, a is the input that the policy"
+            " chooses.",
             threshold=SAME_COST,
             **compared(("QL", "ES")),
         ),

@@ -70,7 +70,9 @@ class Verdict:
     by_decay: dict[str, Outcome] = field(default_factory=dict)  # and in each reading of the decay
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
     ratio: float | None = None  # of times, where the claim is about time
-    reverse: tuple[str, ...] = ()  # where the reverse of the claim was seen, in sentences
+    halves: str = ""  # what a claim on several learners comes to for each, in sentences
+    as_claimed: tuple[str, ...] = ()  # where the learners clearly differ as claimed, likewise
+    reverse: tuple[str, ...] = ()  # and where they clearly differ the other way round
     said: str = ""  # the outcome in the claim's own words, where it has any
 
     @property

@@ -6,23 +6,25 @@ PROBLEMS = 100_000  # of a sweep
 
 
 @click.command()
-@click.option("--full", "length", flag_value="full", default=True, help="Minutes; the default.")
-@click.option("--short", "length", flag_value="short", help="As short as the book needs it.")
-@click.option("--smoke", "length", flag_value="smoke", help="To see that it works.")
-@click.option("--again", is_flag=True, help="Measure even if there is a benchmark of this code.")
-@click.option("--publish", is_flag=True, help="Only time the learners; publish C3 and C4 anew.")
+@click.option(
+    "--full", "length", flag_value="full", default=True, help="Measure for minutes; the default."
+)
+@click.option("--short", "length", flag_value="short", help="Measure what the book needs.")
+@click.option("--smoke", "length", flag_value="smoke", help="Only check that it works.")
+@click.option("--again", is_flag=True, help="Measure even if a benchmark is stored.")
+@click.option("--publish", is_flag=True, help="Only time the learners, and publish C3 and C4.")
 @click.option(
     "--sweep",
     metavar="[N]",
     is_flag=False,
     flag_value=PROBLEMS,
     type=int,
-    help=f"Solve N drawn problems, {PROBLEMS:,} by default, and count what became of them.",
+    help=f"Solve N drawn problems, {PROBLEMS:,} by default, and count the outcomes.",
 )
 def bench(length: str, again: bool, publish: bool, sweep: int | None) -> None:
     """Measure how long solves, steps and runs take.
 
-    It is held against what is to be reached, and kept beside the runs.
+    The times are compared with targets, and stored with the runs.
 
     \b
     Example:
@@ -38,15 +40,15 @@ def bench(length: str, again: bool, publish: bool, sweep: int | None) -> None:
 
 
 def _sweep(problems: int) -> None:
-    """What became of so many drawn problems, and where that is kept."""
+    """Print the outcomes of a sweep, and where its table is stored."""
     from nmpcrl.bench import sweep
 
     click.echo(str(sweep.sweep(problems)))
-    click.echo(f"{sweep.path()}: kept")
+    click.echo(f"{sweep.path()}: stored")
 
 
 def _print_times(length: str, *, again: bool) -> None:
-    """A row a figure, and where the benchmark is kept."""
+    """Print a row for each target, and where the benchmark is stored."""
     from nmpcrl.bench import suite, targets
 
     measured = suite.measure(length) if again else suite.read_or_measure(length)
@@ -56,11 +58,12 @@ def _print_times(length: str, *, again: bool) -> None:
         click.echo(" | ".join(map(str.ljust, row, widths)))
     about = measured["about"]
     took = f"{about['length']}, {about['date']}, {about['seconds']:.0f} s"
-    click.echo(f"{suite.path()}: {took}; other programs had {about['others']:.0%} of the cores")
+    others = f"other programs used up to {about['others']:.0%} of the cores"
+    click.echo(f"{suite.path()}: {took}; {others}")
 
 
 def _publish_timing() -> None:
-    """Publish the verdicts on time anew, if the machine lets them be decided."""
+    """Measure and publish the verdicts on time, if they can be decided on this machine."""
     from nmpcrl.claims.publish import publish_timing
     from nmpcrl.claims.rule import UNDECIDABLE
 

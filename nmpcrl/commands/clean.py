@@ -1,10 +1,10 @@
-"""`nmpcrl clean`: makes room among the stored runs."""
+"""`nmpcrl clean`: deletes stored files that are not needed."""
 
 from typing import TYPE_CHECKING
 
 import click
 
-from nmpcrl.commands.tables import columns, size
+from nmpcrl.commands.tables import columns, counted, size
 
 if TYPE_CHECKING:
     from nmpcrl.study.cleaning import Leftover
@@ -14,20 +14,20 @@ LISTED = 20  # files of a kind that are named
 
 
 @click.command()
-@click.option("--yes", "-y", is_flag=True, help="Delete what is listed.")
-@click.option("--only", type=click.Choice(KINDS), multiple=True, help="Of this kind alone.")
-@click.option("--runs", is_flag=True, help="The finished runs and summaries as well.")
+@click.option("--yes", "-y", is_flag=True, help="Delete the listed files.")
+@click.option("--only", type=click.Choice(KINDS), multiple=True, help="Only files of this kind.")
+@click.option("--runs", is_flag=True, help="Finished runs and summaries, too.")
 def clean(yes: bool, only: tuple[str, ...], runs: bool) -> None:
-    """List the stored files that can go; --yes deletes them.
+    """List the stored files that are not needed; --yes deletes them.
 
     \b
-    damaged   files that were found damaged and set aside
-    half      files that a killed process left half written, an hour ago or more
-    failed    notes of runs of the study that failed
+    damaged   damaged files that were set aside
+    half      unfinished files of killed processes, an hour old or more
+    failed    reasons why runs of the study failed
     old       runs of other code, or of other versions of the libraries
-    pictures  what `nmpcrl show` drew
+    pictures  pages that `nmpcrl show` drew
 
-    A finished run of this code stays, unless --runs is given.
+    Finished runs of this code are kept unless --runs is given.
 
     \b
     Example:
@@ -41,17 +41,17 @@ def clean(yes: bool, only: tuple[str, ...], runs: bool) -> None:
     names = {store.folder(): store.path_of, summaries.folder(): summaries.path_of}
     found = [one for one in leftovers(names) if one.kind in wanted]
     if not found:
-        click.echo(f"Nothing in {store.folder()} can go.")
+        click.echo(f"Nothing in {store.folder()} can be deleted.")
         return
     if yes:
         gone = sum(one.bytes for one in remove(found))
-        click.echo(f"{len(found)} files are deleted: {size(gone)}")
+        click.echo(f"{counted(len(found), 'file')} deleted: {size(gone)}")
     else:
         _list(found)
 
 
 def _list(found: "list[Leftover]") -> None:
-    """What would go and why, and how much room that makes."""
+    """Print which files would be deleted and why, and how much room that frees."""
     from nmpcrl.study.cleaning import KINDS as WORDS
 
     for kind, words in WORDS.items():
@@ -62,6 +62,6 @@ def _list(found: "list[Leftover]") -> None:
             for line in columns(rows, frozenset({2})):
                 click.echo(line)
         if len(mine) > LISTED:
-            click.echo(f"  and {len(mine) - LISTED} others")
+            click.echo(f"  and {counted(len(mine) - LISTED, 'other')}")
     whole = size(sum(one.bytes for one in found))
-    click.echo(f"{len(found)} files, {whole}; nothing is deleted: --yes does it")
+    click.echo(f"{counted(len(found), 'file')}, {whole}. Nothing is deleted; --yes deletes them.")

@@ -1,11 +1,11 @@
-"""`nmpcrl compare`: two runs side by side."""
+"""`nmpcrl compare`: the differences of two runs."""
 
 from typing import TYPE_CHECKING
 
 import click
 
 from nmpcrl.commands.names import RunName, file_of
-from nmpcrl.commands.tables import columns
+from nmpcrl.commands.tables import columns, counted
 
 if TYPE_CHECKING:
     from nmpcrl.analysis.comparison import Comparison
@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 @click.argument("run", type=RunName())
 @click.argument("other", type=RunName())
 def compare(run: str, other: str) -> None:
-    """Hold two runs against each other.
+    """Compare two runs.
 
-    The fields in which they differ, the figures of both, whether their bits are
-    equal, and the largest differences of theta and of the noise-free cost.
+    Prints the fields in which they differ, the results of both, whether their
+    numbers are the same bit for bit, and the largest differences of theta and of
+    the noise-free cost.
 
     \b
     Example:
@@ -45,20 +46,21 @@ def compare(run: str, other: str) -> None:
 
 
 def _print_differences(found: "Comparison") -> None:
-    """How far the numbers are apart."""
+    """Print how far the numbers are apart."""
     if found.same_bits:
-        click.echo("All bits are equal, but for the clocks.")
+        click.echo("All numbers but the measured times are equal bit for bit.")
         return
     names = ", ".join(found.differing)
-    click.echo(click.wrap_text(f"Bits differ, in {len(found.differing)} columns: {names}."))
+    count = counted(len(found.differing), "column")
+    click.echo(click.wrap_text(f"Numbers differ in {count}: {names}."))
     if found.theta:
         apart, name, episode = found.theta
-        click.echo(f"Largest difference of theta: {apart:.4g}, of {name} in episode {episode}.")
+        where = f"theta_{name}, episode {episode}"
+        click.echo(f"Largest difference of theta: {apart:.4g} ({where}).")
     if found.cost:
         cost, after = found.cost
-        click.echo(
-            f"Largest difference of the noise-free cost: {cost:.4g}, after {after} episodes."
-        )
+        when = f"after {counted(after, 'episode')}"
+        click.echo(f"Largest difference of the noise-free cost: {cost:.4g} ({when}).")
 
 
 def _word(value: object) -> str:

@@ -32,7 +32,7 @@ def vector(value: Any) -> tuple[float, ...]:
     except AttributeError:
         return tuple(value)  # the default
     except ValueError:
-        raise click.BadParameter(f"{value!r} is not a list of numbers, as 1,1,0.05 is.") from None
+        raise click.BadParameter(f"{value!r} is not a list of numbers such as 1,1,0.05.") from None
 
 
 class OfExperiment(click.Command):

@@ -6,6 +6,8 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
+from nmpcrl.commands.tables import counted
+
 SHOWN = 5  # names that a refusal lists
 
 
@@ -41,12 +43,15 @@ def file_of(run: str) -> Path:
     if len(begin) == 1:
         return folder() / f"{begin[0]}.npz"
     if begin:
-        raise click.ClickException(f"{run!r} is the beginning of {_listed(begin)}")
+        raise click.ClickException(f"{run!r} is the beginning of several runs: {_listed(begin)}")
     near = get_close_matches(wanted[:80], stored, n=SHOWN, cutoff=0.5) or stored
-    raise click.ClickException(f"no run {run!r} in {folder()}; there are: {_listed(near)}")
+    raise click.ClickException(
+        f"there is no run {run!r} in {folder()}; stored runs: {_listed(near)}"
+    )
 
 
 def _listed(found: list[str]) -> str:
     """The first of some names, and how many others there are."""
     others = len(found) - SHOWN
-    return (", ".join(found[:SHOWN]) or "none") + (f" and {others} others" if others > 0 else "")
+    more = f" and {counted(others, 'other')}" if others > 0 else ""
+    return (", ".join(found[:SHOWN]) or "none") + more

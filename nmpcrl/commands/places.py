@@ -37,4 +37,4 @@ class NewFile(click.Path):
         except OSError as error:
             self.fail(f"{str(value)!r} cannot be written: {error.strerror}.", param, ctx)
         except ValueError as error:
-            self.fail(f"{str(value)!r} is no path: {error}.", param, ctx)
+            self.fail(f"{str(value)!r} is not a path: {error}.", param, ctx)

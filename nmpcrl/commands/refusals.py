@@ -48,5 +48,5 @@ def sentence(error: Exception) -> str | None:
         reason = error.strerror or str(error) or type(error).__name__
         return f"{error.filename}: {reason}" if error.filename else reason
     if isinstance(error, MemoryError):
-        return "this machine has not enough memory for it"
+        return "this machine does not have enough memory for this"
     return None

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from nmpcrl.commands.fields import Conditions
-from nmpcrl.commands.tables import columns, duration, size
+from nmpcrl.commands.tables import columns, counted, duration, size
 
 SHOWN = ("learner", "layout", "decay", "seed", "episodes")  # fields in the table
 MEASURED = ("run", "cost", "minutes", "size", "stopped")  # what else runs can be sorted by
@@ -67,17 +67,17 @@ class Row:
     show_default=True,
     help=f"Any field, or one of {', '.join(MEASURED)}.",
 )
-@click.option("--reverse", is_flag=True, help="The largest first.")
-@click.option("--json", "as_json", is_flag=True, help="For programs: a list of objects.")
+@click.option("--reverse", is_flag=True, help="Largest first.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
 def runs(sort: str, reverse: bool, as_json: bool, **conditions: Any) -> None:
-    """List the stored runs, all or those that the options pick.
+    """List the stored runs, or only those that the options select.
 
-    An option that is given twice picks runs of either value.
+    An option that is given twice selects runs with either value.
 
     With --json, each run is an object with its name `run`, its `path`, its size
     in `bytes`, the fields of its `experiment`, and its `facts`: how it stopped
-    (`stopped`), `final_cost` without noise, `seconds`, the `solver`, and where
-    it was made. A number that is not finite is null.
+    (`stopped`), its noise-free `final_cost`, `seconds`, the `solver`, and where
+    it was trained. A number that is not finite is null.
 
     \b
     Example:
@@ -98,9 +98,9 @@ def runs(sort: str, reverse: bool, as_json: bool, **conditions: Any) -> None:
     elif rows:
         _print(rows, folder())
     elif wanted:
-        click.echo(f"No run in {folder()} is such a one; `nmpcrl runs` lists all.")
+        click.echo(f"No run in {folder()} matches; `nmpcrl runs` lists all.")
     else:
-        click.echo(f"No run is stored in {folder()}; `nmpcrl train` makes one.")
+        click.echo(f"No run is stored in {folder()}; `nmpcrl train` trains one.")
 
 
 def _wanted(conditions: dict[str, Any]) -> dict[str, tuple[Any, ...]]:
@@ -127,17 +127,17 @@ def _refuse_unknown(column: str) -> None:
 
 
 def _print(rows: list[Row], place: Path) -> None:
-    """The table, and what it adds up to."""
+    """Print the table and its totals."""
     head = ["run", *SHOWN, "final cost", "minutes", "size", "stopped"]
     for line in columns([head, *(row.words() for row in rows)], NUMBERS):
         click.echo(line)
     whole, seconds = sum(row.bytes for row in rows), sum(row.facts["seconds"] for row in rows)
-    count = f"{len(rows)} run{'s' if len(rows) != 1 else ''}"
+    count = counted(len(rows), "run")
     click.echo(f"{count}, {size(whole)}, {duration(seconds)} of one core, in {place}")
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON gives it back, which can be held against another."""
+    """A value as JSON returns it, so that two can be compared."""
     return tuple(value) if isinstance(value, list) else value
 
 

@@ -16,15 +16,17 @@ FORMATS = ("svg", "png")
 
 @click.command()
 @click.argument("run", type=RunName())
-@click.option("--out", metavar="PATH", type=NewFile(), help="Where; by default beside the run.")
-@click.option("--format", "kind", type=click.Choice(FORMATS), help="By default as PATH ends; svg.")
+@click.option("--out", metavar="PATH", type=NewFile(), help="By default next to the run.")
+@click.option(
+    "--format", "kind", type=click.Choice(FORMATS), help="By default as PATH ends, or svg."
+)
 @click.option("--frozen", is_flag=True, help="Train the frozen arm if it is not stored.")
 def show(run: str, out: Path | None, kind: str | None, frozen: bool) -> None:
     """Draw one page of pictures of RUN, and print its path.
 
-    The trajectory without noise, theta, the cost with noise and without, and
-    alpha ||phi||^2, where steps above 2 overshoot. The frozen arm, whose theta
-    never moves, is drawn beside the costs if it is stored.
+    They show the noise-free trajectory, theta, the cost with and without noise,
+    and alpha ||phi||^2, which is above 2 where a step overshoots. The costs of the
+    frozen arm, whose theta never moves, are drawn as well if it is stored.
 
     \b
     Example:
@@ -51,7 +53,7 @@ def _place(run: Path, out: Path | None, kind: str | None) -> tuple[Path, str]:
     kind = kind or ending
     if kind not in FORMATS or ending not in (kind, ""):
         raise click.ClickException(
-            f"the name of the file, {str(out)!r}, must end in .svg or .png, as its format does"
+            f"the name of the file, {str(out)!r}, must end in .svg or .png and agree with --format"
         )
     return out, kind
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from nmpcrl.commands.places import NewFile, refuse_unwritable
+from nmpcrl.commands.tables import counted, duration
 from nmpcrl.commands.workers import check
 
 if TYPE_CHECKING:
@@ -17,13 +18,13 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--part", "parts", multiple=True, help="Only this part: main, controls or a variant.")
-@click.option("--workers", metavar="N", type=int, help="Processes; by default one a core.")
-@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster that trains instead.")
+@click.option("--workers", metavar="N", type=int, help="Processes; by default one per core.")
+@click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that trains instead.")
 @click.option("--security", metavar="FILE", help="Certificates for a scheduler at tls://.")
-@click.option("--dry-run", is_flag=True, help="Only say how much is to be done.")
-@click.option("--table", metavar="PATH", type=NewFile(), help="Episodes, as CSV.")
-@click.option("--publish", is_flag=True, help="Judge what was asked for and write book/published.")
-@click.option("--yes", "-y", is_flag=True, help="More workers than there is room for.")
+@click.option("--dry-run", is_flag=True, help="Only report what is missing.")
+@click.option("--table", metavar="PATH", type=NewFile(), help="Write a CSV row per episode.")
+@click.option("--publish", is_flag=True, help="Judge these runs and write book/published.")
+@click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
 def study(
     parts: tuple[str, ...],
     workers: int | None,
@@ -34,9 +35,9 @@ def study(
     publish: bool,
     yes: bool,
 ) -> None:
-    """Train whatever is missing of the study.
+    """Train the runs of the study that are not stored.
 
-    Interrupt it and start it again as you like: what is finished is stored.
+    Finished runs are stored, so it can be interrupted and started again.
 
     \b
     Example:
@@ -49,11 +50,9 @@ def study(
     chosen = _chosen(parts)
     _check(workers, scheduler, security, publish=publish, sure=yes)
     missing = [e for e in chosen if not summaries.is_stored(e)]
-    hours = estimate(missing).seconds / 3600
-    click.echo(
-        f"{len(chosen) - len(missing)} of {len(chosen)} runs are stored in {summaries.folder()};"
-        f" the others take about {hours:.1f} hours of one core"
-    )
+    stored = f"{len(chosen) - len(missing)} of {counted(len(chosen), 'run')}"
+    left = f"; the others take about {duration(estimate(missing).seconds)} of one core"
+    click.echo(f"{stored} are stored in {summaries.folder()}{left * bool(missing)}")
     if dry_run:
         return
     there = cluster.executor(scheduler, security=security) if scheduler else nullcontext()
@@ -86,7 +85,7 @@ def _check(
     if scheduler is not None:
         cluster.check(scheduler, security=security)
     elif security is not None:
-        raise click.ClickException("--security goes with --scheduler, which is not given")
+        raise click.ClickException("--security needs --scheduler")
     if publish:
         from nmpcrl.claims import published
 
@@ -101,7 +100,7 @@ def _chosen(parts: tuple[str, ...]) -> "dict[Experiment, str]":
     unknown = set(parts) - set(whole.values())
     if unknown:
         known = ", ".join(dict.fromkeys(whole.values()))
-        raise click.ClickException(f"there is no part {min(unknown)!r}; there are {known}")
+        raise click.ClickException(f"there is no part {min(unknown)!r}; the parts are {known}")
     return {e: name for e, name in whole.items() if not parts or name in parts}
 
 

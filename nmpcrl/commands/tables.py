@@ -1,10 +1,10 @@
-"""Text in columns, and sizes and times as people write them."""
+"""Text in columns, and counts, sizes and times as people write them."""
 
 from collections.abc import Sequence
 
 
 def columns(rows: Sequence[Sequence[str]], right: frozenset[int] = frozenset()) -> list[str]:
-    """Rows of words below each other; the columns `right` end together, the others begin so."""
+    """Rows of words in columns: those in `right` aligned right, the others left."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [
         "  ".join(
@@ -13,6 +13,11 @@ def columns(rows: Sequence[Sequence[str]], right: frozenset[int] = frozenset()) 
         ).rstrip()
         for row in rows
     ]
+
+
+def counted(count: int, noun: str) -> str:
+    """ "1 run", "2 runs", "10,000 runs"."""
+    return f"{count:,} {noun}{'s' * (count != 1)}"
 
 
 def size(count: float) -> str:

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=Settings)
-@click.option("--yes", "-y", is_flag=True, help="Train it even if it takes very long.")
+@click.option("--yes", "-y", is_flag=True, help="Train even if it takes more than a day.")
 def train(yes: bool, **fields: Any) -> None:
-    """Train one run and store it; a stored one is read.
+    """Train one run and store it, or read it if it is stored.
 
     Each field of an experiment is an option; the defaults are the paper's.
 
@@ -62,7 +62,7 @@ def fetched(experiment: "Experiment") -> "Records":
 
 
 def _other(experiment: "Experiment") -> str:
-    """A stored run that this one can be held against; without one, where its name goes."""
+    """A stored run to compare this one with; without one, a placeholder for its name."""
     from nmpcrl.commands.names import names
     from nmpcrl.study.experiment import frozen_arm
     from nmpcrl.study.store import path_of

@@ -1,9 +1,10 @@
-"""`nmpcrl verify`: the runs of this machine against the published ones."""
+"""`nmpcrl verify`: compares the runs of this machine with the published ones."""
 
 from typing import TYPE_CHECKING
 
 import click
 
+from nmpcrl.commands.tables import counted
 from nmpcrl.commands.workers import check
 
 if TYPE_CHECKING:
@@ -13,12 +14,14 @@ RELOCKED = 60  # runs that are trained afresh before the code is locked anew
 
 
 @click.command()
-@click.option("--sample", type=click.IntRange(0), default=0, help="Train so many runs for it.")
-@click.option("--relock", is_flag=True, help="Show that an edit changed no bit, and lock the code.")
-@click.option("--workers", metavar="N", type=int, help="Processes; by default one a core.")
-@click.option("--yes", "-y", is_flag=True, help="More workers than there is room for.")
+@click.option(
+    "--sample", type=click.IntRange(0), default=0, help="Train so many runs for the comparison."
+)
+@click.option("--relock", is_flag=True, help="Check that an edit changes no bit; lock the code.")
+@click.option("--workers", metavar="N", type=int, help="Processes; by default one per core.")
+@click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
 def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
-    """Hold the runs trained here against the published ones.
+    """Compare the runs trained here with the published ones.
 
     \b
     Example:
@@ -35,13 +38,15 @@ def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
 
 
 def _relock(known: "Published", sample: int, workers: int | None) -> None:
-    """Lock the code, if fresh runs have the bits that they had."""
+    """Lock the code, if runs that are trained again have the same bits."""
     from nmpcrl.claims import verification
 
     done = verification.relock(known, sample, workers=workers)
+    known_bits = {"published": done.published, "stored here": done.stored}
+    parts = [f"{count} as {where}" for where, count in known_bits.items() if count]
     click.echo(
-        f"{done.published + done.stored} fresh runs have the same bits, {done.published} as the"
-        f" published ones and {done.stored} as those made here before: {done.lock} is written"
+        f"{counted(done.published + done.stored, 'run')} trained again gave the same bits,"
+        f" {' and '.join(parts)}: {done.lock} is written"
     )
 
 
@@ -54,14 +59,16 @@ def _compare(known: "Published", sample: int, workers: int | None) -> None:
     own = [e for e in known.rows if e in drawn or summaries.path_of(e).exists()]
     if not own:
         raise click.ClickException(
-            "no run of the study was trained here; --sample 5 trains five for this"
+            "no run of the study was trained here; --sample 5 trains five for the comparison"
         )
     found = summaries.fetch_summaries(own, workers=workers)
     wrong = published.compare(found, known)
     exact = published.comparable(found, known)
+    ways = {"bit for bit": len(exact), "by distribution": len(found) - len(exact)}
+    parts = [f"{count} {way}" for way, count in ways.items() if count]
     click.echo(
-        f"{len(found)} runs: {len(exact)} held against the published ones bit for bit,"
-        f" {len(found) - len(exact)} by distribution, {len(wrong)} contradictions"
+        f"{counted(len(found), 'run')} compared with the published ones, {' and '.join(parts)}:"
+        f" {counted(len(wrong), 'contradiction')}"
     )
     if len(wrong):
         click.echo(wrong.to_string(index=False))

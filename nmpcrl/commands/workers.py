@@ -19,4 +19,4 @@ def check(workers: int | None, *, sure: bool) -> None:
     try:
         check_workers(workers, sure=sure)
     except ParameterError as error:
-        raise click.ClickException(f"{error}; --yes starts them all the same") from None
+        raise click.ClickException(f"{error}; --yes starts them nevertheless") from None

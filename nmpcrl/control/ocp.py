@@ -35,13 +35,13 @@ class Theta(NamedTuple):
 
 
 def stage_cost(state: ca.SX, action: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
-    """L(s, u, theta) of the paper: ||s - s_ref||^2 and ||u||^2, weighted by theta squared."""
+    """L(s, u, theta) of Eq. (2a): ||s - s_ref||^2 and ||u||^2, weighted by theta squared."""
     result: ca.SX = ca.sumsqr(theta.stage * (state - target)) + ca.sumsqr(theta.inputs * action)
     return result
 
 
 def terminal_cost(state: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
-    """Gamma(s, theta) of the paper: ||s - s_ref||^2, weighted by theta squared."""
+    """Gamma(s, theta) of Eq. (2a): ||s - s_ref||^2, weighted by theta squared."""
     result: ca.SX = ca.sumsqr(theta.terminal * (state - target))
     return result
 

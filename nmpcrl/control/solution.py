@@ -66,7 +66,7 @@ class Solution:
 
     @property
     def status(self) -> Status:
-        """Whether the solver began as it was asked to."""
+        """Whether the requested start succeeded."""
         return Status.RESTARTED if self.restarts else Status.SOLVED
 
     @property
@@ -101,13 +101,13 @@ class Solution:
 
     @property
     def action(self) -> Vector:
-        """u_0, shape (m,): the policy of Eq. (4), or the action that was fixed."""
+        """The policy of Eq. (4), u_0, or the action that was fixed; shape (m,)."""
         result: Vector = self.point.take(self.ocp.inputs[0])
         return result
 
     @property
     def next_action(self) -> Vector:
-        """u_1, shape (m,): what the plan does next; u_0 when the horizon is 1."""
+        """What the plan does next, u_1, or u_0 when the horizon is 1; shape (m,)."""
         result: Vector = self.point.take(self.ocp.inputs[min(1, len(self.ocp.inputs) - 1)])
         return result
 

@@ -14,7 +14,7 @@ from nmpcrl.control.codegen.jit import callable_of
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A disc that the robot keeps away from."""
+    """A disc that the robot keeps away from: Eq. (19)."""
 
     x: float  # centre [m]
     y: float  # centre [m]
@@ -29,7 +29,11 @@ class Obstacle:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Go from `start` to `target` within a box and around the obstacles."""
+    """Go from `start` to `target` within a box and around the obstacles, at the cost of Eq. (20).
+
+    Raises:
+        ValueError: a field makes no sense; the message has its value.
+    """
 
     start: Vector  # s_0, shape (n,)
     target: Vector  # s_ref, shape (n,); the reference input is 0

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 else:
 
     def __getattr__(name: str) -> Any:
-        """`QNetwork` where it is asked for: most learners need no torch, whose import is long."""
+        """`QNetwork` on demand: most learners need no torch, whose import takes long."""
         if name != "QNetwork":
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         from nmpcrl.learning.network import QNetwork

@@ -1,4 +1,4 @@
-"""Control arms: what a learner is held against, under the same noise.
+"""Control arms: what a learner is compared with, under the same noise.
 
 | control | theta moves by                                                 |
 |---------|----------------------------------------------------------------|
@@ -32,13 +32,13 @@ def frozen(nmpc: Controller) -> Learner:
 
 
 def step_matched(nmpc: Controller, alpha: float, beta: float) -> Learner:
-    """ES whose steps are as long as those of GES: is it the direction, or the length?"""
+    """ES with steps as long as those of GES: it separates direction and length."""
     rule = as_far_as(gradient_td(alpha, beta, nmpc.gamma), semi_gradient(alpha))
     return Learner("matched", SecondSolve(nmpc), rule, nmpc.gamma)
 
 
 def random_direction(nmpc: Controller, alpha: float, rng: np.random.Generator) -> Learner:
-    """Steps as long as those of ES, in directions that know nothing.
+    """Steps as long as those of ES, in random directions.
 
     Args:
         nmpc: the controller.

@@ -18,7 +18,7 @@ class Transition:
     """One step of the plant, and the NMPC's solution that led to it."""
 
     state: Vector  # s, shape (n,)
-    action: Vector  # a, the action applied, noise included, shape (m,)
+    action: Vector  # a, the action applied, noise included, shape (m,)  # departure Q
     cost: float  # l(s, a)
     next_state: Vector  # s+, shape (n,)
     solution: Solution  # of the NMPC in s: its value is Q_theta(s, a)  # departure F
@@ -64,7 +64,7 @@ class Bootstrap(Protocol):
 
 @dataclass(frozen=True)
 class SecondSolve:
-    """Solve the NMPC again in the next state: ES and GES."""
+    """Solve the NMPC again in the next state, Eq. (7): ES and GES."""
 
     nmpc: Controller
 
@@ -80,10 +80,13 @@ class SecondSolve:
 
 @dataclass(frozen=True)
 class Imitation:
-    """Let a network learn the NMPC's value and ask it: DES, and RDES if theta is an input."""
+    """A network learns the NMPC's value, Eq. (10), and predicts the next one, Eq. (11).
 
-    network: "QNetwork"
-    with_theta: bool
+    It is that of DES, and of RDES if theta is an input.
+    """
+
+    network: "QNetwork"  # learns in place
+    with_theta: bool  # whether theta is an input
     gated: bool = True  # wait for the first fit; Algorithm 1 read literally does not  # departure G
     fits: int = 1  # mini-batches a step  # departure H
 
@@ -91,7 +94,7 @@ class Imitation:
         """Remember (s, a[, theta]) -> Q, fit, and predict Q(s+, a+) with a+ = u_1 of the plan."""
         began = time.perf_counter()
         solution = transition.solution
-        self.network.remember(
+        self.network.remember(  # departure R
             self.inputs(transition.state, transition.action, solution.theta), solution.value
         )
         if self.gated and not self.network.ready:
@@ -105,5 +108,5 @@ class Imitation:
         return Successor(value, loss=loss, seconds=time.perf_counter() - began)
 
     def inputs(self, state: Vector, action: Vector, theta: Vector) -> Vector:
-        """What the network sees: (s, a, theta) for RDES, (s, a) for DES.  # departure I"""
+        """The network's inputs: (s, a, theta) for RDES, (s, a) for DES.  # departure I"""
         return np.concatenate([state, action, theta] if self.with_theta else [state, action])

@@ -9,7 +9,7 @@
 | TDC     | a second solve    | gradient TD with its curvature, projected  |
 | QL      | a second solve    | a semi-gradient of Q(s, a), u_0 = a fixed  |
 
-The control arms that they are held against are in `baselines`.
+The control arms that they are compared with are in `baselines`.
 """
 
 from collections.abc import Callable
@@ -64,9 +64,9 @@ class Update:
 class Learner:
     """A bootstrap and an update rule; a step is pure but for a network or generator they hold."""
 
-    name: str
-    bootstrap: Bootstrap
-    rule: UpdateRule
+    name: str  # as tables show it
+    bootstrap: Bootstrap  # values the next state
+    rule: UpdateRule  # moves the weights
     gamma: float  # discount factor of the TD error
 
     def step(self, weights: Weights, transition: Transition) -> Update:
@@ -146,14 +146,20 @@ def exact_gradient_td(
 
 
 def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
-    """ES: two solves a step, semi-gradient (Moradimaryamnegari et al. 2022)."""
+    """ES: two solves a step, Eq. (7), and a semi-gradient, Eq. (9).
+
+    Source: Moradimaryamnegari et al. (2022).
+    """
     return Learner("ES", SecondSolve(nmpc), semi_gradient(alpha), nmpc.gamma)
 
 
 def deep_expected_sarsa(
     nmpc: Controller, network: "QNetwork", alpha: float, *, gated: bool = True, fits: int = 1
 ) -> Learner:
-    """DES: a network of 5 inputs, (s, a), instead of the second solve."""
+    """DES: a network of (s, a) instead of the second solve, Eq. (11); a semi-gradient, Eq. (9).
+
+    `gated` and `fits` are those of `Imitation`.
+    """
     bootstrap = Imitation(network, with_theta=False, gated=gated, fits=fits)
     return Learner("DES", bootstrap, semi_gradient(alpha), nmpc.gamma)
 
@@ -161,13 +167,16 @@ def deep_expected_sarsa(
 def regularized_deep_expected_sarsa(
     nmpc: Controller, network: "QNetwork", alpha: float, *, gated: bool = True, fits: int = 1
 ) -> Learner:
-    """RDES, the paper's first method: the network of DES with theta as an input, too."""
+    """RDES, the paper's first method: DES, and theta is an input of the network, too.
+
+    Eqs. (9), (10) and (11); `gated` and `fits` are those of `Imitation`.
+    """
     bootstrap = Imitation(network, with_theta=True, gated=gated, fits=fits)
     return Learner("RDES", bootstrap, semi_gradient(alpha), nmpc.gamma)
 
 
 def gradient_expected_sarsa(nmpc: Controller, alpha: float, beta: float) -> Learner:
-    """GES, the paper's second method: two solves a step, gradient TD."""
+    """GES, the paper's second method: two solves a step, Eq. (7), and gradient TD, Eq. (16)."""
     return Learner("GES", SecondSolve(nmpc), gradient_td(alpha, beta, nmpc.gamma), nmpc.gamma)
 
 

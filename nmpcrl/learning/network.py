@@ -83,7 +83,7 @@ class QNetwork:
 
     @property
     def ready(self) -> bool:
-        """Whether the buffer holds a mini-batch: line 12 of Algorithm 1."""
+        """Whether the buffer holds a mini-batch, line 12 of Algorithm 1."""
         return self._seen >= len(self._drawn)
 
     def remember(self, inputs: Vector, target: float) -> None:

@@ -64,7 +64,15 @@ def persistent(controller: Nmpc | Persistent) -> Persistent:
 
 
 def evaluate(controller: Nmpc | Persistent, theta: Vector, steps: int) -> Rollout:
-    """Follow the policy of `theta` from the start for `steps` steps, without noise."""
+    """Follow the policy of theta, Eq. (4), from the start and without noise.
+
+    A failed solve ends the rollout, which then says so and costs infinitely much.
+
+    Args:
+        controller: acts; its plant and its task are the closed loop's.
+        theta: NMPC parameters, shape (2n + m + 1,).
+        steps: K + 1, the most states that are visited.
+    """
     controller = persistent(controller)
     plant, task = controller.nmpc.plant, controller.nmpc.task
     state, plan, failure = task.start, None, ""

@@ -173,7 +173,7 @@ class _Trainer:
 
 
 def absurd(weights: Weights) -> str:
-    """Which of the weights no solve can be asked with, if any, and its value."""
+    """The name and value of a vector with which no solver can be called; "" if there is none."""
     for name, vector in (("theta", weights.theta), ("w", weights.w)):
         small = sum(map(abs, vector.tolist())) <= ABSURD  # false for nan, and faster than NumPy
         if not small and not (np.abs(vector) <= ABSURD).all():

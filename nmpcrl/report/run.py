@@ -7,14 +7,19 @@ from nmpcrl.analysis import metrics
 from nmpcrl.study import paper
 from nmpcrl.study.records import Records, StepStatus, Stopped
 
+SAME = f"{0:.1%}"  # how a change is shown that is less than half of the last digit
+
 
 def verdict(records: Records) -> str:
     """The noise-free cost before and after, in a sentence."""
     before, after = metrics.initial_cost(records), metrics.final_cost(records)
     if not np.isfinite(after):
         return f"no noise-free cost at the end; theta_init's was {before:.1f}"
-    change = f"{abs(1 - after / before):.1%} {'less' if after <= before else 'more'}"
-    return f"noise-free cost {after:.1f}, {change} than the {before:.1f} of theta_init"
+    change = f"{abs(1 - after / before):.1%}"
+    if change == SAME:
+        return f"noise-free cost {after:.1f}, within 0.1% of the {before:.1f} of theta_init"
+    word = "less" if after <= before else "more"
+    return f"noise-free cost {after:.1f}, {change} {word} than the {before:.1f} of theta_init"
 
 
 def figures(records: Records) -> dict[str, str]:
@@ -52,9 +57,11 @@ def finding(records: Records) -> str:
         return f"A frozen theta keeps its noise-free cost of {before:.0f}"
     if not np.isfinite([before, after]).all():
         return f"{learner} ends without a noise-free cost: a solve failed"
+    change = f"{abs(1 - after / before):.1%}"
+    if change == SAME:
+        return f"{learner} keeps the noise-free cost within 0.1% of {before:.0f}"
     verb = "lowers" if after <= before else "raises"
-    change = abs(1 - after / before)
-    return f"{learner} {verb} the noise-free cost by {change:.1%}, from {before:.0f} to {after:.0f}"
+    return f"{learner} {verb} the noise-free cost by {change}, from {before:.0f} to {after:.0f}"
 
 
 def thetas(records: Records) -> Matrix:

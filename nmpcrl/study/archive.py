@@ -1,7 +1,7 @@
 """Files of arrays: tables of columns and one JSON text that says what they are about.
 
-A file has a checksum of all that is in it, and what is read is held against the form that it must
-have. One without a checksum, as they were written before, is whole if all else is as expected.
+A file has a checksum of its content, and is checked against the form that it must have. An older
+file without a checksum is accepted if everything else is as expected.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Files that are written whole or not at all.
 
 A file is filled under another name beside its place, `.half-PROCESS-HOST-….tmp`, and then renamed.
-What a process leaves half written that is killed, `sweep` removes.
+`sweep` removes the unfinished files of killed processes.
 """
 
 import contextlib
@@ -22,7 +22,7 @@ BLOCK = 4096  # bytes that a folder must take before it is relied upon
 
 
 def write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
-    """Let `write` fill a file beside `path`, then rename it into place: nobody ever reads a half.
+    """Let `write` fill a file beside `path`, then rename it into place: no reader sees a part.
 
     Raises:
         OSError: the folder cannot be made or the file not be written; what was there stays.
@@ -44,10 +44,10 @@ def write_json(path: Path, content: Any, indent: int | None = None) -> None:
 
 
 def try_to_write(folder: Path) -> None:
-    """Write a little into `folder`, and take it away again.
+    """Write a small file to `folder`, and delete it again.
 
     Raises:
-        OSError: it does not take it.
+        OSError: it cannot be written.
     """
     with _half(folder) as (_, file):
         file.write(bytes(BLOCK))
@@ -69,9 +69,9 @@ def _half(folder: Path) -> Iterator[tuple[Path, IO[bytes]]]:
 
 @cache
 def sweep(folder: Path) -> None:
-    """Remove what writers left half written that are gone; once a process and folder.
+    """Remove the unfinished files of writers that have ended; once per process and folder.
 
-    A writer on this host is asked for by its number; a file of any other is left for an hour.
+    A writer on this host is looked up by its number; files of other hosts are kept for an hour.
     """
     for half in folder.glob(".half-*.tmp"):
         with contextlib.suppress(OSError):

@@ -1,4 +1,4 @@
-"""What lies in the folder of runs and is not needed: found by name, and never beyond the folder."""
+"""Files in the folder of runs that are not needed: found by name, and only in that folder."""
 
 import json
 import re
@@ -18,12 +18,12 @@ DAMAGED = re.compile(rf"{RUN.pattern}\.damaged\d*")
 NOTE = re.compile(rf"{RUN.pattern}\.failed\.json")
 PICTURE = re.compile(rf"{RUN.pattern}\.(svg|png)")
 OLD = 3600.0  # age [s] beyond which nobody is still filling a half written file
-KINDS = {  # of what can go, in words; runs go only if they are asked for
+KINDS = {  # of files that are not needed; runs are deleted only if that is asked for
     "damaged": "damaged files that were set aside",
-    "half": "files that were left half written",
-    "failed": "notes of runs that failed; the next study tries them again",
+    "half": "unfinished files of killed processes",
+    "failed": "reasons why runs failed; the next study trains them again",
     "old": "runs of other code or other versions of libraries",
-    "pictures": "pictures, which `nmpcrl show` draws again",
+    "pictures": "pages that `nmpcrl show` can draw again",
     "runs": "finished runs",
 }
 

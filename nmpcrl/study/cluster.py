@@ -1,7 +1,7 @@
 """Runs on a Dask cluster; needs the optional extra `nmpcrl[cluster]`.
 
-The cluster's workers train and hand summaries back, so they need this package and nothing else: no
-shared disk, no way to the reader's files. Dask starts again what a lost worker was at.
+The cluster's workers train and return summaries, so they need only this package: no shared disk and
+no access to the reader's files. Dask restarts the job of a lost worker.
 """
 
 import asyncio
@@ -70,7 +70,7 @@ def check(address: str, *, security: str | Path | None = None) -> tuple[str, Any
         raise NoCluster(f"the scheduler's address {address!r} must be {ADDRESSES}")
     if not full.startswith(scheme):
         raise NoCluster(
-            f"the scheduler's address {address} does not go with a security file; only tls:// does"
+            f"the scheduler's address {address} goes without a security file; tls:// needs one"
             if security
             else f"the scheduler's address {address} needs a security file with certificates"
         )
@@ -132,7 +132,7 @@ def _certificates(file: Path) -> tuple[str, str, str]:
                 f"the security file {file} names {name} = {named[name]!r}: no such file"
             )
     if "ENCRYPTED" in places["tls-client-key"].read_text(errors="replace"):
-        raise NoCluster(f"the key {places['tls-client-key']} has a passphrase, and must have none")
+        raise NoCluster(f"the key {places['tls-client-key']} must not have a passphrase")
     ca, cert, key = (str(place.resolve()) for place in places.values())
     return ca, cert, key
 
@@ -149,7 +149,7 @@ def _is_address(text: str) -> bool:
 
 
 def _greet(address: str, security: Any) -> None:
-    """Ask who is there: Dask's client tries on where nobody is, and has no end with some others."""
+    """See that a scheduler answers: Dask's client would retry without end where there is none."""
     parts = urlsplit(address)
     try:
         socket.create_connection((parts.hostname or "", parts.port or 0), timeout=ANSWER).close()
@@ -159,8 +159,8 @@ def _greet(address: str, security: Any) -> None:
         asked = thread.submit(asyncio.run, _identity(address, security))
     # Any error will do: Dask's reader takes whatever comes for a message.
     if asked.exception() or asked.result().get("type") != "Scheduler":
-        mode = "or not with these certificates" if security else "or only with certificates"
-        raise NoCluster(f"what is at {address} does not answer as Dask's scheduler does, {mode}")
+        mode = "or refuses these certificates" if security else "or needs certificates"
+        raise NoCluster(f"{address} does not answer like a Dask scheduler, {mode}")
 
 
 async def _identity(address: str, security: Any) -> Mapping[str, Any]:
@@ -188,10 +188,10 @@ def _refuse_others(client: Any) -> None:
     try:
         signatures = client.run(signature)
     except Exception as error:  # Dask wraps whatever went wrong over there
-        raise NoCluster(f"a worker cannot say which code it has: {_line(error)}") from None
+        raise NoCluster(f"a worker cannot report which code it has: {_line(error)}") from None
     for worker, theirs in signatures.items():
         if theirs != ours:
             raise NoCluster(
-                f"the worker {worker} has other code or other versions of what the numbers depend"
-                " on than this machine"
+                f"the worker {worker} has other code or other versions of the libraries than this"
+                " machine, so its numbers may differ"
             )

@@ -90,7 +90,7 @@ def controls(episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:
 
 
 def variant(name: str, episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:
-    """The runs of one variant, with the frozen arms that they are held against."""
+    """The runs of one variant, with the frozen arms that they are compared with."""
     one = VARIANTS[name]
     runs = sweep(learner=one.learners, episodes=episodes, **VARIED | dict(one.fields))
     return (*runs, *dict.fromkeys(map(frozen_arm, runs)))

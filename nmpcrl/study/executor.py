@@ -1,7 +1,7 @@
 """One engine for many jobs: on processes of this machine, or on any executor that is given.
 
-A job is called where there is room; who asked for it keeps what it returns, as it comes. So an
-interruption loses the jobs in flight and no other, and workers need not share a disk with anybody.
+A job runs on any free worker, and the caller keeps each result as it arrives. An interruption
+therefore loses only the jobs in progress, and workers need no shared disk.
 """
 
 import os
@@ -59,20 +59,20 @@ def execute(
 
     Args:
         jobs: what is called in a worker, in the order in which they begin; to be pickled.
-        keep: called here with each result; it says what the bar shows of it, or "".
-        begin: asked here right before a job is handed over; one that it refuses is left out.
+        keep: called in this process with each result; returns the text of the bar, or "".
+        begin: called in this process before a job is submitted; if false, the job is left out.
         executor: runs the jobs; by default processes, one thread each. One that the caller gives is
             not replaced if it loses a worker.
         workers: how many processes; by default as many as there are cores and memory for.
             `check_workers` refuses more than that.
-        progress: whether to say what the processes take, and to show a bar with what has ended,
-            what failed, and the time left.
+        progress: whether to print the memory of the processes, and to show a bar with the jobs
+            that have ended or failed, and the time left.
         size: of a job, in units of the bar.
         unit: of the bar.
 
     Returns:
-        What each job raised that failed; `Killed` where it lost its worker `ATTEMPTS` times, and
-        `Unsendable` where what came of it cannot be pickled. A failure stops no other job.
+        The error of each job that failed: `Killed` if it lost its worker `ATTEMPTS` times, and
+        `Unsendable` if its result cannot be pickled. A failure stops no other job.
     """
     if not jobs:
         return {}

@@ -38,8 +38,7 @@ def option(
 ) -> Any:
     """A field: its default, what it may be, and a line of help.
 
-    Learners that `read_by` does not name do not read it: to them it is nothing, and no part of a
-    key.
+    Learners that `read_by` does not name ignore it, and it is not part of their keys.
     """
     metadata = {"allowed": allowed, "help": about}
     return field(default=default, metadata=metadata | ({"read_by": read_by} if read_by else {}))

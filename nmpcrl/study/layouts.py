@@ -1,12 +1,12 @@
 """Which layouts of the obstacles a study may use, decided before anything is trained.
 
-`screen` holds a layout against the criteria, `sampler` draws layouts, and `drawn` says which are
-the named ones: A is the first that we tried, the others are the first that a seeded sampler drew
-and the screening let through, so that nobody chose them for what is learned in them.
+`screen` applies the criteria to a layout, `sampler` draws layouts, and `drawn` returns the named
+ones: A is the first that we tried; the others are the first that a seeded sampler drew and the
+screening accepted, so that none was selected for what is learned in it.
 
 A layout may be used if
 
-1. the straight way from start to target is blocked;
+1. the straight line from start to target is blocked;
 2. start and target lie outside every penalty zone, Upsilon = 0;
 3. without noise, the controller with theta_init is at the target after K = 129 steps.
 
@@ -37,9 +37,9 @@ Centres = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class Screening:
-    """A layout held against the criteria."""
+    """How a layout meets the criteria."""
 
-    blocked: bool  # 1: the straight way
+    blocked: bool  # 1: the straight line
     clear: bool  # 2: start and target
     arrives: bool  # 3: the rollout of theta_init
     closing: bool  # a gap of this rollout is closed at theta_c = d_o
@@ -56,7 +56,7 @@ class Screening:
 
 
 def screen(centres: Centres) -> Screening:
-    """Hold a layout against the criteria; nothing is trained for it."""
+    """Apply the criteria to a layout; nothing is trained for it."""
     task = paper.task_among(centres)
     blocked = bool(_distances(task.start[:2], task.target[:2], centres).min() < _keep_out(task, 0))
     clear = task.collision_penalty(task.start) == 0 == task.collision_penalty(task.target)

@@ -15,7 +15,7 @@ NAMESPACE = Path("/proc/self/ns/pid")  # another in each container
 
 
 def machine() -> dict[str, Any]:
-    """What a reader would ask of it."""
+    """What a reader has to know of it."""
     return {
         "processor": _processor(),
         "architecture": platform.machine(),
@@ -39,7 +39,7 @@ def fingerprint() -> dict[str, Any]:
 
 @cache
 def host() -> str:
-    """Where a number of a process means the same process: a container's, until the next start."""
+    """The host or container, until its next start: within it, a process has one number."""
     told = [platform.node(), *map(_told_by, (BOOT, NAMESPACE))]
     return sha256("\n".join(told).encode()).hexdigest()[:8]
 

@@ -1,7 +1,7 @@
-"""What comes of a job, as bytes that any executor can send.
+"""The result or the error of a job, as bytes that any executor can send.
 
-A worker pickles it itself: what an executor is given and cannot send, such as an error a thousand
-calls deep on Dask, may never come back, and who waits for it waits for ever.
+A worker pickles it itself. An executor that cannot send a result, such as an error a thousand calls
+deep on Dask, may never return it, and its caller would wait without end.
 """
 
 import pickle

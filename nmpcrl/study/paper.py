@@ -83,7 +83,7 @@ def nmpc(
 
     Args:
         layout: a name in `LAYOUTS`.
-        horizon: N.
+        horizon: N, the number of planned inputs.
         solver: as `Nmpc` takes it.
         box: one of `BOXES`.
         options: further ones of `Nmpc`.

@@ -1,4 +1,4 @@
-"""The folder where runs are kept: whether it takes them, and what becomes of those it does not."""
+"""The folder of the runs: checked before training, with another place where it fails."""
 
 import errno
 import os
@@ -51,12 +51,12 @@ def check_folder(needed: int = 0, place: Path | None = None) -> None:
         raise StoreError(refusal(f"cannot be written ({error.strerror})", place)) from error
     if free < needed:
         raise StoreError(
-            refusal(f"has room for {free / 1e6:.2f} MB and not for {needed / 1e6:.2f} MB", place)
+            refusal(f"has room for {free / 1e6:.2f} MB of the needed {needed / 1e6:.2f} MB", place)
         )
 
 
 def say(sentence: str) -> None:
-    """Tell the user something on the side; that nobody can hear it ends no study."""
+    """Print a sentence on standard error; no study fails because that cannot be written."""
     with suppress(OSError, ValueError):  # a log on a full disk, a terminal that was closed
         print(sentence, file=sys.stderr, flush=True)
 
@@ -64,8 +64,8 @@ def say(sentence: str) -> None:
 def refusal(why: str, place: Path | None = None) -> str:
     """The sentence that refuses a folder."""
     return (
-        f"{place or folder()}, where runs are kept, {why}; set NMPCRL_RUNS to a folder that can be"
-        " written, or mend this one"
+        f"{place or folder()}, where runs are kept, {why}; correct that, or set NMPCRL_RUNS to"
+        " another folder"
     )
 
 
@@ -112,7 +112,9 @@ def set_aside(path: Path, error: DamagedRecords) -> None:
     """
     cause = error.__cause__
     if isinstance(cause, OSError) and cause.errno in UNREADABLE:
-        raise StoreError(f"{path} cannot be read ({cause.strerror}); mend that, or move it away")
+        raise StoreError(
+            f"{path} cannot be read ({cause.strerror}); correct that, or move the file away"
+        )
     aside, count = path.with_suffix(".damaged"), 1
     while os.path.lexists(aside):
         count += 1
@@ -123,4 +125,4 @@ def set_aside(path: Path, error: DamagedRecords) -> None:
         return
     except OSError as refused:
         raise StoreError(f"{error}, and cannot be renamed ({refused.strerror})") from error
-    say(f"{error}; it is kept as {aside.name} and made again")
+    say(f"{error}; it is kept as {aside.name}, and the run is done again")

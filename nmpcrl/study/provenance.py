@@ -9,7 +9,7 @@ A run's *key* is a hash of what names its numbers:
 
 So a new field, layout or metric, a moved or a renamed file leaves every key as it is. Source code
 has no part in a key. Instead, `sources.lock.json` holds a hash of every file that bears on numbers.
-Where one is not what the lock says, a test fails and whoever reads a stored run is warned, until
+Where one differs from the lock, a test fails and every command that reads a run warns, until
 either the epoch of its room is raised, so that all runs are trained anew, or
 `nmpcrl verify --relock` has shown with fresh runs that no bit has changed.
 """
@@ -210,9 +210,9 @@ def warn_of_changes() -> None:
     if files:
         os.environ[WARNED] = "1"
         print(
-            f"{', '.join(files)}: not the code that stored runs were made with;"
-            " `nmpcrl verify --relock` shows whether their numbers hold; if not, raise the epoch of"
-            " the room in nmpcrl/study/provenance.py",
+            f"{', '.join(files)}: changed since the stored runs were trained;"
+            " `nmpcrl verify --relock` shows whether the numbers stay the same; if not, raise the"
+            " epoch of the room in nmpcrl/study/provenance.py",
             file=sys.stderr,
         )
 

@@ -53,7 +53,7 @@ class StepStatus(IntEnum):
 
     @classmethod
     def of(cls, *, failed: bool, restarts: int) -> "StepStatus":
-        """The worst that can be said of a step's solves."""
+        """The worst status of a step's solves."""
         return cls.FAILED if failed else cls.RESTARTED if restarts else cls.SOLVED
 
 

@@ -1,9 +1,9 @@
-"""Which runs are being trained, for all who keep theirs in one folder: so none is trained twice.
+"""Which runs processes that share a folder are training, so that none is trained twice.
 
-A process notes in `.reservations` which runs it is at, and holds a lock of the system beside its
-note as long as it lives. So the note of one that was killed is known for what it is, on every
-machine that sees the folder, and whoever looks next takes it away. Where there are no such locks,
-or the folder takes no file, nothing is reserved: a run may then be trained twice, to the same end.
+A process notes in `.reservations` which runs it is training, and holds a lock of the system next to
+its note as long as it runs. The note of a killed process is therefore recognised on every machine
+that sees the folder, and the next process that looks removes it. Where there are no such locks, or
+the folder cannot be written, nothing is reserved: a run may be trained twice, with the same result.
 """
 
 import json

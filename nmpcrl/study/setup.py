@@ -114,7 +114,7 @@ def _network_learner(
     *,
     with_theta: bool,
 ) -> Learner:
-    """A learner that asks a network for the next value."""
+    """A learner whose network predicts the next value."""
     from nmpcrl.learning.network import QNetwork  # and with it torch: not for the other learners
 
     plant, (options, fits, normalised) = controller.nmpc.plant, NETWORKS[experiment.network]

@@ -1,8 +1,8 @@
 """Where runs are kept: `fetch` and `fetch_all` train what is missing and read what is there.
 
-A run's file is named by its experiment and by the key of `provenance`. What is read is the whole
-run that was asked for, or it is set aside and made again; what was trained is not lost, even if it
-cannot be written. Who else trains a run in the same folder is waited for.
+A run's file is named by its experiment and by the key of `provenance`. A file that is damaged or of
+another run is set aside, and the run is done again. A trained run is not lost, even if it cannot be
+written. Runs that another process trains in the same folder are awaited.
 """
 
 import re
@@ -275,7 +275,7 @@ def stored() -> dict[Path, tuple[dict[str, Any], dict[str, Any]]]:
             _check_name(path, fields, facts)
             whole[path] = fields, facts
         except (FileNotFoundError, DamagedRecords) as error:
-            say(f"{error}; it is left alone")
+            say(f"{error}; it is ignored")
     return whole
 
 
@@ -293,10 +293,11 @@ def size_of(experiment: Experiment) -> int:
 
 
 def wait_for(names: list[str], first: Experiment) -> None:
-    """Say that somebody else is at runs, and wait until he has one less."""
+    """Say that another process is training runs, and wait until it has finished one."""
     more = len(names) - 1
-    said = f"{first} and {more} others are" if more else f"{first} is"
-    say(f"{said} being trained by another process, which is waited for")
+    others = f"{more} other{'s' * (more > 1)}"
+    said = f"{first} and {others} are" if more else f"{first} is"
+    say(f"{said} being trained by another process; waiting for it")
     while len(reservations(folder()).taken(names)) == len(names):
         time.sleep(POLL)
 

@@ -32,7 +32,7 @@ def check_workers(workers: int | None, *, sure: bool = False) -> int:
         raise ParameterError(f"workers = {workers!r} must be a whole number, 1 or more")
     if workers > cores and not sure:
         raise ParameterError(
-            f"workers = {workers} must be at most {cores}, as many as there are cores to use: more"
+            f"workers = {workers} must be at most {cores}, the number of usable cores: more would"
             " only slow each other down"
         )
     if workers > room and not sure:
@@ -44,8 +44,8 @@ def check_workers(workers: int | None, *, sure: bool = False) -> int:
 
 
 def told(workers: int) -> str:
-    """What so many workers take, in a sentence."""
-    each = f"{workers} workers, each of which takes" if workers > 1 else "1 worker, which takes"
+    """How much memory so many workers take, in a sentence."""
+    each = f"{workers} workers, each with" if workers > 1 else "1 worker with"
     return f"{each} about {_size(MEMORY)} of memory; {_size(free_memory())} are free"
 
 

@@ -210,7 +210,7 @@ def test_whatever_is_damaged_is_one_sentence_and_made_again(folder, capsys, name
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert said.startswith(str(path))
-    assert said.endswith(f"it is kept as {path.stem}.damaged and made again\n")
+    assert said.endswith(f"it is kept as {path.stem}.damaged, and the run is done again\n")
     assert_same_summary(RunSummary.load(path), first[THREE[0]])
 
 

@@ -1,5 +1,7 @@
 """From measured columns to numbers and verdicts; no clock is read here."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -135,7 +137,17 @@ def test_every_figure_can_be_missed(measured, part, column, value, count):
 def test_a_run_that_had_to_share_the_processor_says_so(measured):
     measured["runs"]["processor"][0] = 3.0
     (told,) = [t.measured for t in targets.targets(measured) if "the processor" in t.measured]
-    assert told == "4.0 s, the processor 75% of it"
+    assert told == "4.0 s, of which the processor 75%"
+
+
+def test_numbers_that_are_shown_alike_are_given_once(measured):
+    shown = [target.measured for target in targets.targets(measured)]
+    assert sum(bool(re.search(r"one more adds \d\.\d\d µs", one)) for one in shown) == 2
+    assert sum(one.startswith("no growth; one more adds") for one in shown) == 2
+    assert sum(one.endswith("x with and without noise") for one in shown) == 3
+    assert any(one.endswith("unchanged after the first tenth") for one in shown)
+    measured["episodes"]["memory"][-1] *= 1.02
+    assert any("2.0% after" in one.measured for one in targets.targets(measured))
 
 
 def test_the_table_has_a_row_and_a_badge_for_every_figure(measured):
@@ -148,7 +160,7 @@ def test_the_table_has_a_row_and_a_badge_for_every_figure(measured):
 
 def test_the_printed_table_has_the_same_rows(measured):
     header, *rows = targets.rows(measured)
-    assert header == ("what", "to reach", "measured", "outcome")
+    assert header == ("what", "target", "measured", "outcome")
     assert [row[0] for row in rows] == list(outcomes(measured))
 
 

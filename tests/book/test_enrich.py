@@ -47,7 +47,7 @@ def test_a_heading_with_an_anchor_gets_a_label():
     [
         ("[Eq. (1.6)](01_mdp.ipynb#eq:ocp)", "{eq}`eq:ocp`"),
         ("[Fig. 1.2](#fig:mdp-plan)", "{numref}`fig:mdp-plan`"),
-        ("[Algorithm 2.1](02_es.ipynb#alg:learning)", "{numref}`alg:learning`"),
+        ("[Algorithm 2.1](02_es.ipynb#alg:learning)", "{prf:ref}`alg:learning`"),
         ("[Exercise 1.2](#ex-mdp-scale)", "{ref}`ex-mdp-scale`"),
         ("[departure B](departures.ipynb#departure-B)", "{ref}`departure B <departure-B>`"),
         ("[Gros and Zanon (2020)](references.md#gros2019data)", "{cite:t}`gros2019data`"),

@@ -53,7 +53,8 @@ def numbers(page: str) -> dict[str, str]:
         kind = re.match(r"[a-z]+", label)[0]
         if kind in KINDS:
             count[kind] += 1
-            words[label] = KINDS[kind].format(f"{CHAPTER[page]}.{count[kind]}")
+            of_chapter = f"{CHAPTER[page]}." if page in CHAPTER else ""
+            words[label] = KINDS[kind].format(f"{of_chapter}{count[kind]}")
     return words
 
 

@@ -86,7 +86,8 @@ def test_every_departure_has_a_section_that_renders_it():
 
 
 def test_the_parameters_of_the_chapters_are_those_that_they_declare():
-    rows = re.findall(r"^\| `(\d\d_\w+|solver|performance)` \| (.*) \|$", REPRODUCE, flags=re.M)
+    pages = r"\d\d_\w+|solver|performance|paper_and_book"
+    rows = re.findall(rf"^\| `({pages})` \| (.*) \|$", REPRODUCE, flags=re.M)
     listed = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}
     declared = {name: build.parameters(ROOT / path) for name, path in build.notebooks().items()}
     assert listed == {name: parameters for name, parameters in declared.items() if parameters}

@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PATHS = sorted((ROOT / "book").glob("*.ipynb"))
 NOTEBOOKS = {path.stem: nbformat.read(path, as_version=4) for path in PATHS}
 CHAPTERS = [name for name in NOTEBOOKS if re.match(r"\d\d_|solver", name)]
-GIVEN = [*CHAPTERS, "performance"]  # which have parameters
+GIVEN = [*CHAPTERS, "paper_and_book", "performance"]  # which have parameters
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)

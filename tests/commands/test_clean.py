@@ -66,7 +66,7 @@ def test_it_says_what_would_go_and_how_much_room_that_makes_and_deletes_nothing(
         assert str(folder / name) in said.stdout
         assert f"{kind}: " in said.stdout
     assert f"{len(GOING)} files, " in said.stdout
-    assert "--yes does it" in said.stdout
+    assert "Nothing is deleted; --yes deletes them." in said.stdout
 
 
 def test_with_yes_it_deletes_that_and_nothing_else(command, folder, tmp_path):
@@ -74,7 +74,7 @@ def test_with_yes_it_deletes_that_and_nothing_else(command, folder, tmp_path):
     done = command("clean", "--yes")
     assert done.exit_code == 0, done.output
     assert before - files(folder) == set(GOING)
-    assert f"{len(GOING)} files are deleted" in done.stdout
+    assert f"{len(GOING)} files deleted: " in done.stdout
     assert (tmp_path / f"{NAME}.damaged").exists()
     assert "Nothing in" in command("clean").stdout
 

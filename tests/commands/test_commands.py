@@ -105,7 +105,7 @@ def test_a_dry_run_says_how_much_is_to_be_done_and_does_nothing(command, small, 
     said = command("study", "--dry-run")
     assert said.exit_code == 0, said.output
     assert "0 of 6 runs are stored" in said.output
-    assert "hours of one core" in said.output
+    assert " s of one core" in said.output
     assert not (tmp_path / "runs").exists()
 
 
@@ -114,7 +114,9 @@ def test_study_trains_what_is_missing(command, small):
     asked = command("study", "--workers", "2")
     assert asked.exit_code == 0, asked.output
     assert all(map(summaries.is_stored, STUDY))
-    assert "6 of 6 runs are stored" in command("study", "--dry-run").output
+    done = command("study", "--dry-run").output
+    assert "6 of 6 runs are stored" in done
+    assert "take about" not in done
 
 
 def test_study_trains_a_part_of_itself(command, small, trains_here):
@@ -125,15 +127,16 @@ def test_study_trains_a_part_of_itself(command, small, trains_here):
 
 def test_the_whole_study_takes_hours(command):
     said = command("study", "--dry-run").output
-    assert f"0 of {WHOLE} runs are stored" in said
-    hours = float(said.split("take about ")[1].split()[0])
-    assert 1 < hours < 24
+    assert f"0 of {WHOLE:,} runs are stored" in said
+    hours, unit, *_ = said.split("take about ")[1].split()
+    assert 1 < float(hours) < 24
+    assert unit == "h"
 
 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("--part", "mian"), "there is no part 'mian'; there are main, N = 5"),
+        (("--part", "mian"), "there is no part 'mian'; the parts are main, N = 5"),
         (("--scheduler", "tcp://nowhere:1"), "no scheduler answers at tcp://nowhere:1"),
     ],
 )
@@ -210,8 +213,8 @@ def test_what_is_published_verifies_the_runs_it_was_made_of(command, trained):
     assert list(published.load().rows) == list(STUDY)
     verified = command("verify")
     assert verified.exit_code == 0, verified.output
-    assert "6 runs: 6 held against the published ones bit for bit" in verified.output
-    assert "0 contradictions" in verified.output
+    assert "6 runs compared with the published ones, 6 bit for bit: " in verified.output
+    assert ": 0 contradictions" in verified.output
 
 
 def test_verify_names_what_contradicts_and_fails(command, trained, tmp_path):
@@ -223,7 +226,7 @@ def test_verify_names_what_contradicts_and_fails(command, trained, tmp_path):
     replace(one, evaluations=one.evaluations | {"cost": cost}).save(summaries.path_of(wrong))
     verified = command("verify")
     assert verified.exit_code == 1
-    assert "1 contradictions" in verified.output
+    assert ": 1 contradiction\n" in verified.output
     assert "final_cost" in verified.output
     assert "ES" in verified.output
 
@@ -238,8 +241,8 @@ def test_verify_makes_a_damaged_summary_again(command, trained, trains_here, sha
     path.write_bytes(bytes(content))
     verified = command("verify")
     assert verified.exit_code == 0, verified.output
-    assert f"it is kept as {path.stem}.damaged and made again" in verified.output
-    assert "6 runs: 6 held against the published ones bit for bit" in verified.output
+    assert f"it is kept as {path.stem}.damaged, and the run is done again" in verified.output
+    assert "6 runs compared with the published ones, 6 bit for bit: " in verified.output
 
 
 def test_verify_trains_a_sample_where_nothing_was_trained(command, trained, trains_here):
@@ -248,10 +251,10 @@ def test_verify_trains_a_sample_where_nothing_was_trained(command, trained, trai
         summaries.path_of(experiment).unlink()
     refused = command("verify")
     assert refused.exit_code == 1
-    assert "--sample 5 trains five for this" in refused.output
+    assert "--sample 5 trains five for the comparison" in refused.output
     verified = command("verify", "--sample", "2")
     assert verified.exit_code == 0, verified.output
-    assert "2 runs: 2 held against the published ones bit for bit" in verified.output
+    assert "2 runs compared with the published ones, 2 bit for bit: " in verified.output
     assert sum(map(summaries.is_stored, STUDY)) == 2
 
 
@@ -290,9 +293,9 @@ def test_bench_publishes_the_verdicts_on_time_only_where_they_are_decided(
         (("--table", "/dev/null/x.csv"), "'/dev/null/x.csv' cannot be written: Not a directory"),
         (("--table", "."), "'.' is a directory"),
         (("--workers", "0"), "workers = 0 must be a whole number, 1 or more"),
-        (("--workers", "999"), "; --yes starts them all the same"),
+        (("--workers", "999"), "; --yes starts them nevertheless"),
         (("--scheduler", "foo"), "the scheduler's address 'foo' must be HOST:PORT"),
-        (("--security", "x.toml"), "--security goes with --scheduler, which is not given"),
+        (("--security", "x.toml"), "--security needs --scheduler"),
     ],
 )
 def test_what_would_fail_at_the_end_of_a_study_is_refused_at_its_start(
@@ -337,5 +340,5 @@ def test_bench_sweeps_over_as_many_problems_as_asked_for(command, monkeypatch):
     monkeypatch.setattr(sweep, "sweep", lambda problems: asked.append(problems) or "a table")
     for words in (("--sweep",), ("--sweep", "20")):
         done = command("bench", *words)
-        assert done.output == f"a table\n{sweep.path()}: kept\n"
+        assert done.output == f"a table\n{sweep.path()}: stored\n"
     assert asked == [100_000, 20]

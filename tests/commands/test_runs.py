@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from nmpcrl.commands import main
-from nmpcrl.commands.tables import columns, duration, size
+from nmpcrl.commands.tables import columns, counted, duration, size
 from nmpcrl.study import Experiment, fetch_all, store, sweep
 from nmpcrl.study.records import Records
 
@@ -129,11 +129,11 @@ def test_the_beginning_of_a_name_is_enough_where_no_other_begins_so(command):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("GES", "'GES' is the beginning of GES-A-step-seed0-2ep-"),
-        ("GSE-A-step-seed0", "no run 'GSE-A-step-seed0' in "),
-        ("nothing.npz", "no run 'nothing.npz' in "),
-        ("", "'' is the beginning of ES-A-step-seed0-2ep-"),
-        ("\udcff", r"no run '\udcff' in "),
+        ("GES", "'GES' is the beginning of several runs: GES-A-step-seed0-2ep-"),
+        ("GSE-A-step-seed0", "there is no run 'GSE-A-step-seed0' in "),
+        ("nothing.npz", "there is no run 'nothing.npz' in "),
+        ("", "'' is the beginning of several runs: ES-A-step-seed0-2ep-"),
+        ("\udcff", r"there is no run '\udcff' in "),
     ],
 )
 def test_a_name_that_is_none_or_several_lists_those_that_come_close(command, name, said):
@@ -191,3 +191,10 @@ def test_a_cost_that_is_not_known_sorts_last():
     from nmpcrl.commands.runs import _order
 
     assert sorted([np.nan, 2.0, None, 1.0], key=_order)[:2] == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("count", "words"), [(0, "0 runs"), (1, "1 run"), (2, "2 runs"), (1760, "1,760 runs")]
+)
+def test_one_is_singular(count, words):
+    assert counted(count, "run") == words

@@ -70,6 +70,21 @@ def test_every_obstacle_has_its_disc_and_its_circle(nmpc, rollout):
     assert sorted(patch.radius for patch in figure.axes[0].patches) == [1.0] * 4 + [1.25] * 4
 
 
+def test_the_plan_that_ends_farthest_from_the_closed_loop_is_drawn_and_named(
+    theta, assert_readable, texts
+):
+    nmpc = paper.nmpc(horizon=4)
+    loop = evaluate(Persistent(nmpc), theta, steps=20)
+    plans = [nmpc.solve(state, theta) for state in loop.states[:-4]]
+    ends = np.array([plan.states[-1, :2] for plan in plans])
+    apart = np.linalg.norm(ends - loop.states[4:, :2], axis=1)
+    figure = controller.receding_horizon(nmpc.task, loop, plans)
+    assert_readable(figure)
+    assert f"A plan of 4 steps ends up to {apart.max():.2f} m from" in texts(figure)
+    drawn = [line.get_xydata() for line in figure.axes[0].lines]
+    assert any(np.array_equal(line, plans[apart.argmax()].states[:, :2]) for line in drawn)
+
+
 @pytest.mark.parametrize(("lowest", "says"), [(10.0, "never below"), (9.0, "falls below")])
 def test_the_title_says_whether_q_stays_above_v(lowest, says, assert_readable, texts):
     speeds, turn_rates = np.array([0.0, 0.6]), np.linspace(-1, 1, 3)

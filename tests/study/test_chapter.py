@@ -65,7 +65,7 @@ def test_a_name_like_no_other_is_refused_without_a_suggestion(session):
         ("episodes = 300", "# Parameters\nepisodes = 2\nseeds = [3]\n"),
         ("# Parameters\n",),
         ('# Parameters\nPAPERMILL_INPUT_PATH = "in.ipynb"\n',),
-        ("# Parameters\nepisode = 2\n", "# Parameters\nepisodes = 2\n"),  # it was mended
+        ("# Parameters\nepisode = 2\n", "# Parameters\nepisodes = 2\n"),  # it was corrected
         ("episode = 2", "# Parameter\nfigure = 2\n", "%matplotlib inline", "further = [1, 2]"),
     ],
 )

@@ -348,7 +348,7 @@ def test_a_worker_that_joins_while_others_train_trains_too(address, worker, log,
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "reason"),
-    [(OTHER_VERSIONS, "other versions"), (WITHOUT_PACKAGE, "cannot say which code it has")],
+    [(OTHER_VERSIONS, "other versions"), (WITHOUT_PACKAGE, "cannot report which code it has")],
     ids=["other versions", "no package"],
 )
 def test_workers_that_would_make_other_numbers_are_refused_in_a_sentence(
@@ -431,7 +431,7 @@ def test_who_is_no_scheduler_is_not_waited_for(says, monkeypatch):
     monkeypatch.setattr(cluster, "ANSWER", 0.3)
     with listening(says) as address:
         said = refusal(address)
-    assert said.startswith(f"what is at {address} does not answer as Dask's scheduler does")
+    assert said.startswith(f"{address} does not answer like a Dask scheduler")
 
 
 @contextmanager
@@ -485,7 +485,7 @@ FILES = {
     WHOLE.replace("key.pem", "."): "names tls-client-key = '.': no such file",
     WHOLE.replace("key.pem", "cert.pem"): "cannot be used",
     WHOLE.replace("cert.pem", "key.pem"): "cannot be used",
-    WHOLE.replace("key.pem", "locked.pem"): "has a passphrase, and must have none",
+    WHOLE.replace("key.pem", "locked.pem"): "must not have a passphrase",
 }
 
 
@@ -503,7 +503,7 @@ def test_an_address_goes_with_certificates_if_it_says_so(certificate):
     at = "127.0.0.1:9"
     assert "cannot be read: No such file" in refusal(at, security=certificate.with_name("none"))
     assert "needs a security file" in refusal(f"tls://{at}")
-    assert "only tls:// does" in refusal(f"tcp://{at}", security=certificate)
+    assert "tls:// needs one" in refusal(f"tcp://{at}", security=certificate)
     assert f"no scheduler answers at tls://{at}" in refusal(at, security=certificate)
 
 

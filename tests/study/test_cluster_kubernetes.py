@@ -1,4 +1,4 @@
-"""The page's program for Kubernetes, held against the operator's own description of a cluster.
+"""The page's program for Kubernetes, compared with the operator's own description of a cluster.
 
 Nothing is run: what dask-kubernetes would ask for is made by its own functions, out of its wheel.
 """

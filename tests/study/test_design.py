@@ -1,4 +1,4 @@
-"""The study as a list of runs: what varies, and what each run is held against."""
+"""The study as a list of runs: what varies, and what each run is compared with."""
 
 from collections import Counter
 from dataclasses import asdict, replace
@@ -51,7 +51,7 @@ def test_every_run_of_the_study_has_its_frozen_arm_in_the_study():
 
 
 def base_of(experiment: Experiment, name: str) -> Experiment:
-    """The run of the main table that a run of variant `name` is held against."""
+    """The run of the main table that a run of variant `name` is compared with."""
     default = Experiment()
     changed = {key: getattr(default, key) for key in design.VARIANTS[name].fields if key != "decay"}
     return replace(experiment, **changed)

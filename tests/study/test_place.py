@@ -92,14 +92,16 @@ def test_a_folder_that_cannot_be_made_is_refused_before_any_work(untrained, ask,
         raise PermissionError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr(Path, "mkdir", refuse)
-    with pytest.raises(StoreError, match=r"runs.*, cannot be made \(Permission denied\); set NMPC"):
+    with pytest.raises(
+        StoreError, match=r"runs.*, cannot be made \(Permission denied\); correct that, or set NMPC"
+    ):
         ask()
 
 
 @each_way
 def test_a_folder_without_room_is_refused_before_any_work(untrained, ask, monkeypatch):
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(10**6, 10**6, 0))
-    with pytest.raises(StoreError, match=r"runs.*, has room for 0\.00 MB and not for 0\.\d\d MB"):
+    with pytest.raises(StoreError, match=r"runs.*, has room for 0\.00 MB of the needed 0\.\d\d MB"):
         ask()
 
 
@@ -320,7 +322,7 @@ def test_a_full_disk_costs_no_run(small, capsys, monkeypatch):
 
 def test_a_disk_that_is_too_small_is_refused_before_any_work(small, untrained):
     long = Experiment(episodes=10, steps=100)
-    with pytest.raises(StoreError, match=r"has room for 0\.07 MB and not for 0\.33 MB"):
+    with pytest.raises(StoreError, match=r"has room for 0\.07 MB of the needed 0\.33 MB"):
         fetch(long)
 
 
@@ -336,7 +338,8 @@ def test_a_folder_where_a_run_belongs_is_set_aside(runs, capsys):
     fetch_here([QUICK])
     said = capsys.readouterr().err.splitlines()
     assert [line.partition(" ")[2] for line in said] == [
-        f"is a folder where the file of a run belongs; it is kept as {path.name} and made again"
+        f"is a folder where the file of a run belongs; it is kept as {path.name}, and the run is"
+        " done again"
         for path in (
             path_of(QUICK).with_suffix(".damaged"),
             summaries.path_of(QUICK).with_suffix(".damaged"),
@@ -363,6 +366,6 @@ def test_a_run_that_may_not_be_read_is_not_taken_for_a_damaged_one(untrained, mo
     path.write_text("whole, for all we know")
     with monkeypatch.context() as patch:
         patch.setattr(np, "load", refuse)
-        with pytest.raises(StoreError, match=r"cannot be read \(Permission denied\); mend that"):
+        with pytest.raises(StoreError, match=r"cannot be read \(Permission denied\); correct that"):
             fetch(QUICK)
     assert path.read_text() == "whole, for all we know"

@@ -111,7 +111,7 @@ def test_who_reads_stored_runs_is_warned_of_other_code(monkeypatch, capsys):
     provenance.warn_of_changes.__wrapped__()
     provenance.warn_of_changes.__wrapped__()
     said = capsys.readouterr().err
-    assert said.startswith("learning/updates.py: not the code that stored runs were made with")
+    assert said.startswith("learning/updates.py: changed since the stored runs were trained")
     assert said.count("\n") == 1
 
 

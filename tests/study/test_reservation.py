@@ -148,7 +148,7 @@ def test_two_who_want_a_run_train_it_once(runs, monkeypatch, capsys):
         thread.join()
     assert len(found) == 2
     assert trained == [QUICK]
-    said = f"{QUICK} is being trained by another process, which is waited for\n"
+    said = f"{QUICK} is being trained by another process; waiting for it\n"
     assert capsys.readouterr().err == said
 
 

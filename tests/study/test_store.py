@@ -151,7 +151,7 @@ def test_a_run_that_lies_under_the_name_of_another_is_listed_under_none(runs, ca
     assert sorted(stored()) == sorted(kept)
     said = capsys.readouterr().err
     assert f"{path_of(QUICK)} holds another run, ES-A-step-seed0-1ep-" in said
-    assert "; it is left alone" in said
+    assert "; it is ignored" in said
 
 
 def test_a_run_of_other_versions_under_this_name_is_damaged(runs, monkeypatch, capsys):

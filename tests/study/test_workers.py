@@ -39,7 +39,7 @@ def test_more_workers_than_cores_are_refused_unless_they_are_asked_for_twice(mac
     with pytest.raises(ParameterError) as refused:
         check_workers(8)
     assert str(refused.value) == (
-        "workers = 8 must be at most 2, as many as there are cores to use: more only slow each"
+        "workers = 8 must be at most 2, the number of usable cores: more would only slow each"
         " other down"
     )
     assert check_workers(8, sure=True) == 8
@@ -66,8 +66,8 @@ def test_what_workers_take_is_told_in_a_line_before_they_start(machine, trains_h
     machine(2, 7e9)
     execute({name: partial(int, name) for name in "123"}, lambda *_: "")
     first, *_ = capsys.readouterr().err.splitlines()
-    assert first == "2 workers, each of which takes about 450 MB of memory; 7.0 GB are free"
-    assert told(1) == "1 worker, which takes about 450 MB of memory; 7.0 GB are free"
+    assert first == "2 workers, each with about 450 MB of memory; 7.0 GB are free"
+    assert told(1) == "1 worker with about 450 MB of memory; 7.0 GB are free"
     execute({"1": partial(int, "1")}, lambda *_: "", progress=False)
     assert not capsys.readouterr().err
 

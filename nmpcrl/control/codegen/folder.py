@@ -1,6 +1,6 @@
-"""The folder in which machine code is kept, and which nobody but its user may write to.
+"""The folder in which machine code is kept, and to which only its user may write.
 
-numba runs what it finds there, so whoever can write to the folder can run code as its user.
+numba runs what it finds there, so anyone who can write to it can run code as its user.
 """
 
 import atexit
@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 CHOSEN = "NMPCRL_CACHE"  # in the environment: another folder than the default
-ROOM = 4_000_000  # bytes: thrice what numba makes of the solver
+ROOM = 4_000_000  # bytes: three times the size of the compiled solver
 OTHERS = 0o022  # may write: the group, and everybody
 
 

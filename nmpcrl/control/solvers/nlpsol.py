@@ -33,7 +33,7 @@ class Nlpsol(Solver):
         """The solver's own options, whatever the start."""
 
     def structure(self, ocp: Ocp) -> dict[str, Any]:
-        """What `nlpsol` is told of the problem's structure."""
+        """Options of `nlpsol` that describe the problem's structure."""
         return {}
 
     def prepare(self, ocp: Ocp) -> "Program":

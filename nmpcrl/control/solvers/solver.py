@@ -32,7 +32,7 @@ class Prepared(Protocol):
 
 @dataclass(frozen=True)
 class Solver(ABC):
-    """A way to solve Eq. (2), told apart by `name`."""
+    """A way to solve Eq. (2), identified by `name`."""
 
     name: ClassVar[str]
     prices_box: ClassVar[bool] = False  # whether it can do a task's `soft_box`

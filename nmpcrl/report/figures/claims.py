@@ -96,7 +96,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
         return _titled(figure, verdict, f"no time was taken with {solver}")
     value = ratio(timings, paper_claims.SOLVER, learner)
     finding = f"with {solver}, a step of {learner} takes {value} of one of ES"
-    return marked(_titled(figure, verdict, finding), "measured on the machine that made this page")
+    return marked(_titled(figure, verdict, finding), "the published measurement")
 
 
 @page

@@ -37,6 +37,39 @@ def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figu
 
 
 @page
+def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figure:
+    """Plans against the closed loop, around the plan that ends farthest from where the robot goes.
+
+    Args:
+        task: of the rollout.
+        rollout: the closed loop.
+        plans: those behind its first actions, in order; each ends within the rollout.
+    """
+    figure, axes = subplots(height=3.6)
+    draw_task(axes, task)
+    path, horizon = rollout.states[:, :2], len(plans[0].inputs)
+    ends = [np.array([p.states[-1, :2], path[i + horizon]]) for i, p in enumerate(plans)]
+    apart = [float(np.linalg.norm(planned - reached)) for planned, reached in ends]
+    farthest, every = int(np.argmax(apart)), max(1, horizon // 2)
+    first = max(farthest % every, farthest - every)
+    shown = range(first, min(farthest + horizon + 1, len(plans)), every)
+    axes.plot(*path.T, ".-", color=INK, lw=1.0, ms=4, label="closed loop, a dot a step")
+    for i in shown:
+        names = ("plan", "the same time") if i == first else (None, None)
+        planned = plans[i].states[:, :2].T
+        axes.plot(*planned, "D-", color=WINE, lw=1.8, ms=4, markevery=[0], label=names[0])
+        axes.plot(*ends[i].T, "o:", color=TEAL, ms=4.5, mfc="white", label=names[1])
+    drawn = np.vstack([path[first : shown[-1] + horizon], *(plans[i].states[:, :2] for i in shown)])
+    low, high = drawn.min(axis=0) - [0.3, 0.5], drawn.max(axis=0) + [0.3, 0.5]
+    axes.set(xlabel="x [m]", ylabel="y [m]", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_title(
+        f"A plan of {horizon} steps ends up to {apart[farthest]:.2f} m from where the robot then is"
+    )
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+@page
 def action_values(
     speeds: Vector, turn_rates: Vector, values: Matrix, value: float, policy: Vector
 ) -> Figure:
