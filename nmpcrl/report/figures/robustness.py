@@ -40,7 +40,7 @@ MOST_COST = 1.5  # of theta_init's, that is drawn
 
 @page
 def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
-    """What becomes of each claim in each row; a frame where it differs from the verdict it is compared with.
+    """What becomes of each claim in each row, framed where it is not what it is compared with.
 
     Args:
         judged: of `robustness_map`.
