@@ -26,6 +26,7 @@ import os
 # One thread a process, kernels included, and before NumPy or torch is imported.
 os.environ |= {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 os.environ |= {"PYDEVD_DISABLE_FILE_VALIDATION": "1", "NO_COLOR": "1"}
+os.environ["NMPCRL_FIGURES_FOR_PAGE"] = "1"  # narrow, too, for telephones: `pictures`
 
 import difflib
 import logging
@@ -48,6 +49,7 @@ import click
 import enrich
 import nbformat
 import papermill
+import pictures
 import yaml
 from papermill.cli import _resolve_type as papermill_value
 from papermill.exceptions import PapermillExecutionError
@@ -300,11 +302,15 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
     def output(page: str, tag: str) -> str:
         return enrich.output(read[Path("book") / page], tag)
 
+    (source / "book" / pictures.FOLDER).mkdir(exist_ok=True)
     for path in source.glob("book/*.md"):
         path.write_text(enrich.page(path.read_text(), output))
     for path, notebook in read.items():
         download = path.name if path in executed else ""
-        nbformat.write(enrich.notebook(notebook, download), source / path)
+        dressed = enrich.notebook(notebook, download)
+        for name, data in pictures.placed(dressed).items():
+            (source / "book" / pictures.FOLDER / name).write_bytes(data)
+        nbformat.write(dressed, source / path)
 
 
 def render(place: Path, strict: bool) -> None:
@@ -323,7 +329,7 @@ def render(place: Path, strict: bool) -> None:
     if result.returncode:
         raise Failure(f"Jupyter Book refused the pages (all of it: {shown(log)}):\n{warnings(log)}")
     for path in (place / "executed").glob("*.ipynb"):
-        notebook = enrich.download(nbformat.read(path, 4))
+        notebook = pictures.plain(enrich.download(nbformat.read(path, 4)))
         nbformat.write(notebook, work / "_build/html/book" / path.name)
     accessible.site(work / "_build/html")
     (work / "_build/html").rename(place / "html")

@@ -62,8 +62,8 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
     before |= {e: row(one) for e, one in _stored_by_lock(drawn) if e not in exact}
     if len(before) < len(drawn):
         raise CannotRelock(
-            f"only {len(before)} of {len(drawn)} runs can be compared with what the code of the"
-            f" lock made on such a machine: with that code, `nmpcrl verify --sample {count}` makes them"
+            f"only {len(before)} of {len(drawn)} runs can be compared with what the code of"
+            f" the lock made on such a machine: with that code, `nmpcrl verify --sample {count}` makes them"
         )
     fresh = _trained_afresh(drawn, workers)
     wrong = [found for e in drawn if (found := unequal(e, row(fresh[e]), before[e]))]

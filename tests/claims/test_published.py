@@ -1,4 +1,4 @@
-"""The published study: read as it was written, small, refused if damaged, compared with new runs."""
+"""The published study: read as written, small, refused if damaged, compared with new runs."""
 
 import json
 import shutil
