@@ -63,7 +63,8 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
     if len(before) < len(drawn):
         raise CannotRelock(
             f"only {len(before)} of {len(drawn)} runs can be compared with what the code of"
-            f" the lock made on such a machine: with that code, `nmpcrl verify --sample {count}` makes them"
+            " the lock made on such a machine: with that code,"
+            f" `nmpcrl verify --sample {count}` makes them"
         )
     fresh = _trained_afresh(drawn, workers)
     wrong = [found for e in drawn if (found := unequal(e, row(fresh[e]), before[e]))]

@@ -46,7 +46,7 @@ def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) ->
         plans: those behind its first actions, in order; each ends within the rollout.
     """
     figure, axes = subplots(height=3.6)
-    draw_task(axes, task)
+    draw_task(axes, task, labels=False)
     path, horizon = rollout.states[:, :2], len(plans[0].inputs)
     ends = [np.array([p.states[-1, :2], path[i + horizon]]) for i, p in enumerate(plans)]
     apart = [float(np.linalg.norm(planned - reached)) for planned, reached in ends]
@@ -65,7 +65,7 @@ def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) ->
     axes.set_title(
         f"A plan of {horizon} steps ends up to {apart[farthest]:.2f} m from where the robot then is"
     )
-    figure.legend(loc="outside lower center", ncols=3)
+    below(figure, axes.get_legend_handles_labels()[0])
     return figure
 
 
