@@ -69,6 +69,16 @@ def _folded(box: Tag) -> None:
     box["class"] = " ".join(name for name in box["class"] if name != "dropdown") + " folded"
 
 
+def _named(name: str, kind: str) -> Callable[[Tag], None]:
+    """Another element, of a class by which it is found again."""
+
+    def repair(element: Tag) -> None:
+        element.name = name
+        element["class"] = kind
+
+    return repair
+
+
 def _without(*attributes: str) -> Callable[[Tag], None]:
     def repair(element: Tag) -> None:
         for name in attributes:
@@ -85,6 +95,8 @@ REPAIRS: dict[str, Callable[[Tag], None]] = {
     "article th": _header,
     "article table:not(.scrolls > table)": _wrapped,
     "article div.admonition.dropdown": _folded,
+    "dt.sig dl": _named("div", "parameters"),  # a list without terms
+    "dt.sig dd": _named("div", "parameter"),
     "summary[aria-label]": _without("aria-label"),
     ".citation[role]": _with(role="listitem"),
     "#pst-primary-sidebar": _with(**{"role": "navigation", "aria-label": "Book"}),

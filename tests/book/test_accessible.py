@@ -100,3 +100,13 @@ def test_every_page_of_a_folder_is_repaired_but_those_of_the_theme(tmp_path):
     accessible.site(tmp_path)
     assert own.read_text() == accessible.page(SOLUTION)
     assert theme.read_text() == SOLUTION
+
+
+def test_the_parameters_of_a_long_signature_are_no_list_without_terms():
+    html = '<article><dl><dt class="sig">f(<dl><dd>x</dd><dd>y</dd></dl>)</dt><dd>It.</dd></dl>'
+    soup = repaired(html)
+    assert [one.get_text() for one in soup.select("dt div.parameters > div.parameter")] == [
+        "x",
+        "y",
+    ]
+    assert [one.get_text() for one in soup("dd")] == ["It."]
