@@ -17,6 +17,8 @@ from hypothesis import settings
 from nmpcrl.analysis.summary import RunSummary, table
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.published import failure_modes_of
+from nmpcrl.control import differential_drive
+from nmpcrl.learning import browser as in_browser
 from nmpcrl.study import Experiment, Runs, design, executor, paper
 
 settings.register_profile("no clock", deadline=None)  # the machine may be busy
@@ -98,6 +100,12 @@ def jupyter_lab() -> str:
     if not path.exists():
         missing("no JupyterLab is installed: run `make .venv-lab/ready`")
     return str(path)
+
+
+@pytest.fixture(scope="session")
+def robot_module() -> bytes:
+    """The robot's controller and the update rules as WebAssembly; a minute to make, once."""
+    return in_browser.module(differential_drive(), paper.task("A"))
 
 
 LOOPS = ("without noise", "with noise")

@@ -23,7 +23,12 @@ ROOMS = {  # each may import those that it names, and what they may
 DISK = {"io", "json", "os", "pathlib", "pickle", "shutil", "sqlite3", "tempfile"}
 HOMES = {  # foreign library -> where alone it may be imported
     "casadi": "control/",
-    "numba": ("control/solvers/kernel.py", "control/solvers/hessian.py"),
+    "numba": (
+        "control/solvers/entries.py",
+        "control/solvers/hessian.py",
+        "control/solvers/kernel.py",
+        "learning/rules.py",
+    ),
     "torch": "learning/network.py",
     "matplotlib": "report/figures",
 }

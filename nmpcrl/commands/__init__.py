@@ -14,6 +14,7 @@ from nmpcrl.commands.show import show
 from nmpcrl.commands.study import study
 from nmpcrl.commands.train import train
 from nmpcrl.commands.verify import verify
+from nmpcrl.commands.wasm import wasm
 
 __all__ = ["main"]
 
@@ -31,5 +32,17 @@ def main() -> None:
     """
 
 
-for command in (train, runs, show, evaluate, compare, clean, study, verify, bench, completion):
+for command in (
+    train,
+    runs,
+    show,
+    evaluate,
+    compare,
+    clean,
+    study,
+    verify,
+    bench,
+    wasm,
+    completion,
+):
     main.add_command(command)

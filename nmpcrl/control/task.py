@@ -105,12 +105,17 @@ class Task:
     def charge(self, inputs: int) -> ca.Function:
         """Eq. (20) in symbols, as a CasADi function of the state and so many inputs."""
         state, action = ca.SX.sym("state", self.start.size), ca.SX.sym("action", inputs)
-        away = state - self.target
-        xi = overlap(state[0], state[1], *map(ca.DM, self.discs))
+        cost = self.cost_of(state, action, self.target, tuple(map(ca.DM, self.discs)))
+        return ca.Function("charge", [state, action], [cost], ["state", "action"], ["cost"])
+
+    def cost_of(self, state: ca.SX, action: ca.SX, target: Any, discs: tuple[Any, ...]) -> ca.SX:
+        """Eq. (20) in symbols, for another target and other obstacles than the task's own."""
+        away = state - target
+        xi = overlap(state[0], state[1], *discs)
         upsilon = self.penalty * ca.sum1(ca.fmax(0, xi + self.margin))
         near = ca.norm_2(away) < self.near
-        cost = ca.dot(self.weights, away**2) + ca.if_else(near, ca.norm_2(action), upsilon)
-        return ca.Function("charge", [state, action], [cost], ["state", "action"], ["cost"])
+        cost: ca.SX = ca.dot(self.weights, away**2) + ca.if_else(near, ca.norm_2(action), upsilon)
+        return cost
 
 
 @cache

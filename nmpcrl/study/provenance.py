@@ -73,7 +73,15 @@ ORIGINAL: dict[str, Any] = {
 WARNED = "NMPCRL_WARNED"  # set in the environment once the warning has been given
 ROOT = Path(__file__).parent.parent
 LOCK = Path(__file__).with_name("sources.lock.json")
-WHOLE_ROOMS = ("control", "learning")  # every file of which counts
+WHOLE_ROOMS = ("control", "learning")  # every file of which counts, but
+ELSEWHERE = (  # those that are compiled for other hosts, where no stored run is made
+    "control/browser.py",
+    "control/codegen/browser/",
+    "control/solvers/charge.py",
+    "control/solvers/entries.py",
+    "learning/browser.py",
+    "learning/rules.py",
+)
 ENTRIES = ("study/run.py", "analysis/summary.py")  # which count with all that they import
 ALONE = ("analysis/policy_search.py",)  # which count without
 PARSING = threading.Lock()  # Python 3.11 fails where two threads parse at once
@@ -157,7 +165,7 @@ def hash_of(depends: Any) -> str:
 def sources(root: Path = ROOT) -> dict[str, str]:
     """A hash of the code of each file that bears on the numbers of runs and summaries, by path."""
     with PARSING:
-        paths = {path for room in WHOLE_ROOMS for path in (root / room).rglob("*.py")}
+        paths = {path for room in WHOLE_ROOMS for path in _counted(root, room)}
         paths |= _reached(root, [root / entry for entry in ENTRIES])
         paths |= {root / entry for entry in ALONE}
         codes = {path: code(path.read_text()) for path in sorted(paths)}
@@ -166,6 +174,12 @@ def sources(root: Path = ROOT) -> dict[str, str]:
         for path, text in codes.items()
         if text
     }
+
+
+def _counted(root: Path, room: str) -> list[Path]:
+    """The files of a room that bear on numbers."""
+    paths = (root / room).rglob("*.py")
+    return [path for path in paths if not path.relative_to(root).as_posix().startswith(ELSEWHERE)]
 
 
 @cache

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.plant import Plant
@@ -59,6 +59,12 @@ def machine_code(plant: Plant) -> Code:
     }
     module = load("riccati", texts, NOTICE)
     return Code(module.solve, module.hessian_times)
+
+
+def random_inputs(plant: Plant, seed: int, horizon: int) -> Matrix:
+    """Where a start begins that nothing else is known for, shape (horizon, m)."""
+    lower, upper = np.maximum(plant.lower, -1.0), np.minimum(plant.upper, 1.0)
+    return np.random.default_rng(seed).uniform(lower, upper, (horizon, plant.m))
 
 
 @dataclass(frozen=True)
@@ -163,13 +169,9 @@ class InteriorPoint:
             else:
                 yield SHIFTED, point, WARM_LIMIT
         yield COLD, self._standing, COLD_LIMIT
-        plant = self._ocp.plant
-        lower, upper = np.maximum(plant.lower, -1.0), np.minimum(plant.upper, 1.0)
         for seed in range(PERTURBED):
             point = self._standing.copy()
-            point[self._ocp.inputs] = np.random.default_rng(seed).uniform(
-                lower, upper, self._ocp.inputs.shape
-            )
+            point[self._ocp.inputs] = random_inputs(self._ocp.plant, seed, len(self._ocp.inputs))
             yield COLD, point, COLD_LIMIT
 
     def _from(self, warm_start: Solution) -> Vector:

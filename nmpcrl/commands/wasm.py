@@ -1,0 +1,69 @@
+"""`nmpcrl wasm`: the controller of a plant as a WebAssembly module."""
+
+import importlib
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from nmpcrl.commands.places import NewFile
+
+ROBOT = "nmpcrl.control:differential_drive"
+
+
+@click.command()
+@click.option(
+    "--plant", default=ROBOT, metavar="MODULE:NAME", help="Of a Plant.", show_default=True
+)
+@click.option("--task", metavar="MODULE:NAME", help="Of a Task; by default the paper's.")
+@click.option("--out", type=NewFile(), default="nmpc.wasm", show_default=True)
+def wasm(plant: str, task: str | None, out: Path) -> None:
+    """Compile the solver and the update rules to WebAssembly.
+
+    The module runs in any browser, in Node and in engines such as wasmtime; target, obstacles,
+    horizon and discount are arguments of its functions. It takes about a minute, once. MODULE:NAME
+    may be a function that returns a Plant or a Task.
+
+    \b
+    Example:
+      nmpcrl wasm --plant my_robot:plant --task my_robot:task --out robot.wasm
+    """
+    from nmpcrl.control import Plant, Task
+    from nmpcrl.control.codegen.browser import FUNCTIONS
+    from nmpcrl.control.codegen.source import CannotCompile
+    from nmpcrl.learning import browser
+    from nmpcrl.study import paper
+
+    moved = named(plant, Plant)
+    asked = paper.task() if task is None else named(task, Task)
+    if asked.start.size != moved.n:
+        raise click.ClickException(f"the task has {asked.start.size} states, the plant {moved.n}")
+    try:
+        module = browser.module(moved, asked)
+    except (CannotCompile, RuntimeError) as error:
+        raise click.ClickException(str(error)) from None
+    out.write_bytes(module)
+    click.echo(f"{out}: {len(module) / 1000:.0f} kB; its host gives it {', '.join(FUNCTIONS)}.")
+
+
+def named(name: str, kind: type) -> Any:
+    """The object called MODULE:NAME, or what it returns; the working directory is searched, too.
+
+    Raises:
+        click.ClickException: there is none, or it is not of this kind.
+    """
+    module, _, attribute = name.partition(":")
+    sys.path.insert(0, str(Path.cwd()))
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+        found = found() if callable(found) else found
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise click.ClickException(
+            f"{name!r} names no {kind.__name__}, as MODULE:NAME would: {error}"
+        ) from None
+    finally:
+        sys.path.pop(0)
+    if not isinstance(found, kind):
+        raise click.ClickException(f"{name} is no {kind.__name__}")
+    return found

@@ -1,0 +1,102 @@
+"""LLVM IR of numba's functions to an object file for wasm32, with `runtime.ll` linked to it."""
+
+import re
+from collections.abc import Iterable
+from importlib.resources import files
+from typing import Any
+
+import llvmlite.binding as llvm
+
+TRIPLE = "wasm32-unknown-unknown"
+FEATURES = "+sign-ext,+nontrapping-fptoint,+bulk-memory"  # in every browser since 2021
+RUNTIME = ("reserve", "release", "why")  # of runtime.ll, exported
+SET_LATER = ("bottom", "ceiling")  # by `link`: no constants
+OVERFLOWING = "@llvm.smul.with.overflow.i64"
+FOR_A_MACHINE = re.compile(r"^target (?:datalayout|triple) = .*\n", flags=re.M)
+
+# Hides the pointers to result and error that numba's functions begin with.
+WRAPPER = """
+declare i32 @"{symbol}"(ptr, ptr, {types})
+define {result} @{name}({arguments}) {{
+  %result = alloca {result}
+  %error = alloca ptr
+  store ptr null, ptr %error
+  %bottom = load i32, ptr @bottom
+  store i32 %bottom, ptr @heap
+  %status = call i32 @"{symbol}"(ptr %result, ptr %error, {arguments})
+  %failed = icmp ne i32 %status, 0
+  br i1 %failed, label %fails, label %returns
+fails:
+  call void @end_call(i32 3)
+  unreachable
+returns:
+  %value = load {result}, ptr %result
+  ret {result} %value
+}}
+"""
+
+
+def emit(functions: Iterable[dict[str, str]]) -> bytes:
+    """One object file of all functions, each as `ir.functions` describes it."""
+    functions = list(functions)
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    target = llvm.Target.from_triple(TRIPLE)
+    machine = target.create_target_machine(opt=3, reloc="static", features=FEATURES)
+    modules = [_parsed(function["ir"]) for function in functions]
+    wrappers = [
+        _wrapper(function, module) for function, module in zip(functions, modules, strict=True)
+    ]
+    runtime = files(__package__).joinpath("runtime.ll").read_text("utf-8")
+    whole = llvm.parse_assembly("\n".join([runtime, *wrappers]))
+    for module in modules:
+        whole.link_in(module)
+    whole.triple = TRIPLE
+    whole.data_layout = str(machine.target_data)
+    _keep(whole, {*RUNTIME, *SET_LATER, *(function["name"] for function in functions)})
+    whole.verify()
+    _optimise(whole, machine)
+    return bytes(machine.emit_object(whole))
+
+
+def _parsed(ir: str) -> Any:
+    ir = FOR_A_MACHINE.sub("", ir).replace(OVERFLOWING, "@product_of_sizes")
+    return llvm.parse_assembly(ir)
+
+
+def _wrapper(function: dict[str, str], module: Any) -> str:
+    _, _, *types = (str(one.type) for one in module.get_function(function["symbol"]).arguments)
+    return WRAPPER.format(
+        symbol=function["symbol"],
+        name=function["name"],
+        result=function["result"],
+        types=", ".join(types),
+        arguments=", ".join(f"{kind} %a{k}" for k, kind in enumerate(types)),
+    )
+
+
+def _keep(module: Any, exported: set[str]) -> None:
+    """Let everything but what is exported be inlined, or dropped."""
+    for one in (*module.functions, *module.global_variables):
+        if not one.is_declaration:
+            one.linkage = "external" if one.name in exported else "internal"
+
+
+def _optimise(module: Any, machine: Any) -> None:
+    """As numba does for a machine, without vectors: they were slower."""
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = options.slp_vectorization = False
+    builder = llvm.create_pass_builder(machine, options)
+    first = llvm.create_new_module_pass_manager()
+    first.add_global_dead_code_eliminate_pass()
+    first.add_always_inliner_pass()
+    first.add_sroa_pass()
+    first.add_instruction_combine_pass()
+    first.add_simplify_cfg_pass()
+    first.add_refprune_pass()
+    first.run(module, builder)
+    for _ in range(2):
+        builder.getModulePassManager().run(module, builder)
+        pruned = llvm.create_new_module_pass_manager()
+        pruned.add_refprune_pass()
+        pruned.run(module, builder)

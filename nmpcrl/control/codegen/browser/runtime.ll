@@ -1,0 +1,157 @@
+; What numba's code calls and a browser does not have. Sizes are 64 bit as in numba, addresses 32.
+;
+; Memory: [stack | constants | what the host reserves | scratch, given back at each call | end].
+
+@bottom = global i32 0   ; where scratch begins; `link` sets both
+@ceiling = global i32 0
+@heap = global i32 0     ; the first free byte of scratch
+@fault = global i32 0    ; why a call was ended: 1 no memory, 2 a size, 3 an error of the function
+
+declare void @llvm.trap()
+declare double @llvm.sqrt.f64(double)
+
+define void @end_call(i32 %why) noinline noreturn {
+  store i32 %why, ptr @fault
+  call void @llvm.trap()
+  unreachable
+}
+
+; Memory from `from` on, in multiples of 16, or the end.
+define i32 @after(i32 %from, i64 %size) alwaysinline {
+  %large = icmp ugt i64 %size, 1073741824
+  br i1 %large, label %none, label %small
+small:
+  %bytes = trunc i64 %size to i32
+  %more = add i32 %bytes, 15
+  %round = and i32 %more, -16
+  %next = add i32 %from, %round
+  %ceiling = load i32, ptr @ceiling
+  %beyond = icmp ugt i32 %next, %ceiling
+  br i1 %beyond, label %none, label %there
+none:
+  call void @end_call(i32 1)
+  unreachable
+there:
+  ret i32 %next
+}
+
+; For the host's own arrays, which stay.
+define i32 @reserve(i32 %size) {
+  %from = load i32, ptr @bottom
+  %wide = zext i32 %size to i64
+  %next = call i32 @after(i32 %from, i64 %wide)
+  store i32 %next, ptr @bottom
+  ret i32 %from
+}
+
+; Give back what was reserved from an address on.
+define void @release(i32 %from) {
+  store i32 %from, ptr @bottom
+  ret void
+}
+
+define i32 @why() {
+  %fault = load i32, ptr @fault
+  store i32 0, ptr @fault
+  ret i32 %fault
+}
+
+; An array of numba's: { references, destructor, its argument, data, size }, and then the data.
+define noalias ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %alignment) noinline {
+  %from = load i32, ptr @heap
+  %data = call i32 @after(i32 %from, i64 48)
+  %next = call i32 @after(i32 %data, i64 %size)
+  store i32 %next, ptr @heap
+  %info = inttoptr i32 %from to ptr
+  %array = inttoptr i32 %data to ptr
+  %destructor = getelementptr { i64, ptr, ptr, ptr, i64 }, ptr %info, i32 0, i32 1
+  %content = getelementptr { i64, ptr, ptr, ptr, i64 }, ptr %info, i32 0, i32 3
+  %length = getelementptr { i64, ptr, ptr, ptr, i64 }, ptr %info, i32 0, i32 4
+  store i64 1, ptr %info
+  store ptr null, ptr %destructor
+  store ptr %array, ptr %content
+  store i64 %size, ptr %length
+  ret ptr %info
+}
+
+; Scratch is given back as a whole.
+define void @NRT_MemInfo_call_dtor(ptr %info) alwaysinline {
+  ret void
+}
+
+define void @NRT_Free(ptr %info) alwaysinline {
+  ret void
+}
+
+; Of contiguous arrays only: there are no others.
+define i32 @numba_attempt_nocopy_reshape(i64 %nd, ptr %dims, ptr %strides, i64 %new_nd, ptr %new_dims, ptr %new_strides, i64 %itemsize, i32 %fortran) alwaysinline {
+begin:
+  br label %axis
+axis:
+  %left = phi i64 [ %new_nd, %begin ], [ %at, %body ]
+  %stride = phi i64 [ %itemsize, %begin ], [ %wider, %body ]
+  %more = icmp sgt i64 %left, 0
+  br i1 %more, label %body, label %done
+body:
+  %at = sub i64 %left, 1
+  %index = trunc i64 %at to i32
+  %to = getelementptr i64, ptr %new_strides, i32 %index
+  store i64 %stride, ptr %to
+  %of = getelementptr i64, ptr %new_dims, i32 %index
+  %dim = load i64, ptr %of
+  %wider = mul i64 %stride, %dim
+  br label %axis
+done:
+  ret i32 1
+}
+
+; x' y, for a @ b of two vectors.
+define i32 @numba_xxdot(i8 %kind, i8 %conjugate, i64 %count, ptr %x, ptr %y, ptr %result) alwaysinline {
+begin:
+  br label %next
+next:
+  %i = phi i64 [ 0, %begin ], [ %after, %term ]
+  %sum = phi double [ 0.0, %begin ], [ %more, %term ]
+  %left = icmp slt i64 %i, %count
+  br i1 %left, label %term, label %done
+term:
+  %index = trunc i64 %i to i32
+  %at_x = getelementptr double, ptr %x, i32 %index
+  %at_y = getelementptr double, ptr %y, i32 %index
+  %a = load double, ptr %at_x
+  %b = load double, ptr %at_y
+  %product = fmul double %a, %b
+  %more = fadd double %sum, %product
+  %after = add i64 %i, 1
+  br label %next
+done:
+  store double %sum, ptr %result
+  ret i32 0
+}
+
+; What numba calls where a product fails; ours does not.
+define void @Py_FatalError(ptr %text) noreturn {
+  call void @end_call(i32 3)
+  unreachable
+}
+
+define double @sqrt(double %x) alwaysinline {
+  %root = call double @llvm.sqrt.f64(double %x)
+  ret double %root
+}
+
+; Of sizes, which are small or wrong: LLVM's own would need a product of 128 bits.
+define { i64, i1 } @product_of_sizes(i64 %a, i64 %b) alwaysinline {
+  %large_a = icmp ugt i64 %a, 1073741824
+  %large_b = icmp ugt i64 %b, 1073741824
+  %large = or i1 %large_a, %large_b
+  br i1 %large, label %wrong, label %right
+wrong:
+  call void @end_call(i32 2)
+  unreachable
+right:
+  %product = mul i64 %a, %b
+  %value = insertvalue { i64, i1 } poison, i64 %product, 0
+  %result = insertvalue { i64, i1 } %value, i1 false, 1
+  ret { i64, i1 } %result
+}

@@ -1,0 +1,17 @@
+"""Everything that learns in a browser, as one WebAssembly module."""
+
+from importlib.resources import files
+
+from nmpcrl.control import Plant, Task, browser
+from nmpcrl.control.codegen.browser import from_texts
+
+
+def module(plant: Plant, task: Task) -> bytes:
+    """`control.browser.module` with the update rules, which `rules` describes.
+
+    Raises:
+        CannotCompile, RuntimeError, CannotLink: as there.
+    """
+    here = files(__package__)
+    own = {name: here.joinpath(f"{name}.py").read_text("utf-8") for name in ("updates", "rules")}
+    return from_texts(browser.texts(plant, task) | own)

@@ -1,0 +1,218 @@
+"""The solver as a WebAssembly module gives the numbers of the machine code."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from wasm_host import Controller, Module
+
+from nmpcrl.control import Nmpc, Obstacle, Plant, Task, browser, differential_drive
+from nmpcrl.control.codegen.browser import FUNCTIONS, build, from_texts, ir, link
+from nmpcrl.control.solvers import stages
+from nmpcrl.control.solvers.charge import DISCS, LONGEST
+from nmpcrl.study import paper
+
+pytestmark = pytest.mark.slow
+
+THETA = np.array(paper.THETA_INIT)
+ROBOT = differential_drive()
+TOLERANCE = 1e-7  # of solves that may end an iteration apart: ten times what they are solved to
+FREE = """from numba import float64, njit
+
+@njit(float64(float64))
+def f(x):
+    return {}
+
+EXPORTS = (f,)
+"""
+STEP = """from numba import carray, float64, int32, njit, types
+from .model import NU, NX, transition
+
+address = types.CPointer(float64)
+
+@njit(int32(address, address, address), error_model="numpy")
+def step(state, action, out):
+    transition(carray(state, NX), carray(action, NU), carray(out, NX))
+    return 0
+
+EXPORTS = (step,)
+"""
+
+
+def relative(found, expected) -> float:
+    return float(np.abs(found - expected).max() / np.abs(expected).max())
+
+
+def differs(found: dict, expected) -> float:
+    """How much a solution's value or gradient is another, relative to its size."""
+    return max(
+        relative(found["value"], expected.value), relative(found["features"], expected.features)
+    )
+
+
+def drawn(seed: int) -> tuple[Nmpc, np.ndarray, np.ndarray, np.ndarray]:
+    """A problem of any size, a state, theta and an action."""
+    rng = np.random.default_rng(seed)
+    obstacles = [Obstacle(*rng.uniform([-1, -1], [8, 4])) for _ in range(rng.integers(0, 9))]
+    task = replace(paper.task("A"), obstacles=tuple(obstacles))
+    nmpc = Nmpc(ROBOT, task, horizon=int(rng.choice([1, 2, 5, 10, 20, 40])))
+    state = task.start + rng.uniform(-0.4, 4, 3) * [1, 0.5, 0.2]
+    return nmpc, state, THETA * rng.uniform(0.3, 2.5, 9), rng.uniform(ROBOT.lower, ROBOT.upper)
+
+
+def test_a_rollout_without_noise_is_that_of_the_machine_code(robot_module):
+    nmpc = paper.nmpc("A")
+    there = Controller(Module(robot_module), nmpc)
+    state = theirs = nmpc.task.start
+    plan = their_plan = None
+    cost = their_cost = 0.0
+    for _ in range(paper.STEPS):
+        plan = nmpc.solve(state, THETA, plan)
+        their_plan = there.solve(theirs, THETA, their_plan)
+        assert differs(their_plan, plan) < 1e-11
+        assert their_plan["iterations"] == plan.iterations
+        cost += nmpc.task.stage_cost(state, plan.action)
+        their_cost += there.cost(theirs, their_plan["action"])
+        state = ROBOT.step(state, plan.action)
+        theirs = there.step(theirs, their_plan["action"])
+    assert their_cost == pytest.approx(cost, rel=0, abs=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_values_gradients_and_products_are_those_of_the_machine_code(robot_module, seed):
+    nmpc, state, theta, action = drawn(seed)
+    there = Controller(Module(robot_module), nmpc)
+    first, their_first = nmpc.solve(state, theta), there.solve(state, theta)
+    assert differs(their_first, first) < 1e-9
+    later = ROBOT.step(state, first.action)
+    second = nmpc.solve(later, theta, first)
+    their_second = there.solve(later, theta, their_first)
+    assert differs(their_second, second) < TOLERANCE
+    again = nmpc.solve(later, 1.01 * theta, second)
+    assert differs(there.solve(later, 1.01 * theta, their_second), again) < TOLERANCE
+    q = nmpc.solve(later, theta, second, action)
+    their_q = there.solve(later, theta, their_second, action)
+    assert differs(their_q, q) < TOLERANCE
+    last = ROBOT.step(later, action)
+    assert differs(there.solve(last, theta, their_q), nmpc.solve(last, theta, q)) < TOLERANCE
+    product = there.hessian_times(later, theta, their_second, theta)
+    assert relative(product, nmpc.value_hessian_times(second, theta)) < 1e-4
+
+
+def test_where_a_start_fails_the_next_one_is_tried_in_the_same_order(robot_module):
+    """From a warm start that leads nowhere, the machine code and the module restart alike."""
+    seen = set()
+    for seed in range(40):
+        nmpc, state, theta, _ = drawn(seed)
+        there = Controller(Module(robot_module), nmpc)
+        rng = np.random.default_rng(seed)
+        first = nmpc.solve(state, theta)
+        broken = replace(first, point=first.point * np.nan)
+        numbers = np.concatenate([broken.point, first.features])
+        known = {"fixed": 0, "numbers": numbers}
+        later = state + rng.normal(scale=0.1, size=3)
+        expected, found = nmpc.solve(later, theta, broken), there.solve(later, theta, known)
+        assert found["restarts"] == expected.restarts
+        assert differs(found, expected) < 1e-9
+        seen.add(expected.restarts)
+    assert seen - {0}
+
+
+def test_a_module_asks_its_host_for_four_functions(robot_module):
+    assert Module(robot_module).imports == sorted(FUNCTIONS)
+
+
+def test_two_builds_give_the_same_bytes(monkeypatch):
+    """The plant's step alone goes through every stage, in seconds instead of a minute."""
+    texts = {"model": stages.write(ROBOT), "one": STEP}
+    monkeypatch.setattr(build, "_kept", lambda called: None)
+    assert from_texts(texts) == from_texts(texts)
+
+
+def test_what_was_made_once_is_kept_and_damage_is_noticed(tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
+    texts = {"one": FREE.format("x + 1.0")}
+    first = from_texts(texts)
+    monkeypatch.setattr(ir, "functions", lambda texts: pytest.fail("it was made once"))
+    assert from_texts(texts) == first
+    (kept,) = tmp_path.glob("*.wasm")
+    kept.write_bytes(kept.read_bytes()[:-1] + b"?")
+    monkeypatch.undo()
+    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
+    assert from_texts(texts) == first
+
+
+def test_more_obstacles_or_stages_than_there_is_room_for_are_refused(robot_module):
+    module = Module(robot_module)
+    for horizon, count in ((LONGEST + 1, 1), (5, DISCS + 1)):
+        obstacles = tuple(Obstacle(0.5 * k, -2.0) for k in range(count))
+        nmpc = Nmpc(ROBOT, replace(paper.task("A"), obstacles=obstacles), horizon=horizon)
+        with pytest.raises(ArithmeticError, match="-1"):
+            Controller(module, nmpc).solve(nmpc.task.start, THETA)
+    assert np.isnan(Controller(module, nmpc).cost(nmpc.task.start, np.zeros(2)))
+
+
+def test_the_largest_problem_fits_and_a_host_that_reserves_too_much_is_told(robot_module):
+    module = Module(robot_module)
+    obstacles = tuple(Obstacle(0.4 * k, 6.0) for k in range(DISCS))
+    nmpc = Nmpc(ROBOT, replace(paper.task("A"), obstacles=obstacles), horizon=LONGEST)
+    there = Controller(module, nmpc)
+    start = nmpc.task.start
+    expected = nmpc.solve(start, THETA)
+    assert differs(there.solve(start, THETA), expected) < 1e-9
+    with pytest.raises(MemoryError):
+        module("reserve", 64 * 65_536)
+    left = 64 * 65_536 - module("reserve", 8)
+    module("reserve", left - 1000)  # too little is left for the solver's arrays
+    with pytest.raises(MemoryError):
+        there.solve(start, THETA)
+
+
+def test_a_million_solves_leak_no_memory(robot_module):
+    """Scratch is given back at each call."""
+    nmpc = paper.nmpc("A")
+    there = Controller(Module(robot_module), nmpc)
+    before = there.module("reserve", 8)
+    plan = None
+    for _ in range(300):
+        plan = there.solve(nmpc.task.start, THETA, plan)
+    assert there.module("reserve", 8) == before + 16
+
+
+def test_a_plant_of_the_readers_own_compiles_as_well():
+    mass = Plant(
+        dynamics=lambda state, push: ca.vertcat(state[2:], push),
+        state_names=("x [m]", "y [m]", "v_x [m/s]", "v_y [m/s]"),
+        action_names=("a_x [m/s2]", "a_y [m/s2]"),
+        lower=-np.ones(2),
+        upper=np.ones(2),
+    )
+    task = Task(
+        start=np.zeros(4),
+        target=np.array([4.0, 2.0, 0.0, 0.0]),
+        lower=np.full(4, -9.0),
+        upper=np.full(4, 9.0),
+        obstacles=(Obstacle(2.0, 0.5),),
+        weights=np.array([1.0, 1.0, 0.1, 0.1]),
+    )
+    nmpc = Nmpc(mass, task)
+    theta = np.array([1, 1, 0.1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.1, 0.001])
+    there = Controller(Module(browser.module(mass, task)), nmpc)
+    state, plan, theirs = task.start, None, None
+    for _ in range(20):
+        plan, theirs = nmpc.solve(state, theta, plan), there.solve(state, theta, theirs)
+        assert differs(theirs, plan) < TOLERANCE
+        assert there.cost(state, plan.action) == pytest.approx(task.stage_cost(state, plan.action))
+        np.testing.assert_allclose(there.step(state, plan.action), mass.step(state, plan.action))
+        state = mass.step(state, plan.action)
+
+
+def test_what_a_host_does_not_have_is_refused_by_name():
+    with pytest.raises(link.CannotLink, match="tanh"):
+        from_texts({"one": "import math\n" + FREE.format("math.tanh(x)")})
+
+
+def test_what_numba_cannot_compile_is_refused_with_its_reason():
+    with pytest.raises(RuntimeError, match="nowhere"):
+        from_texts({"one": FREE.format("nowhere(x)")})
