@@ -44,6 +44,7 @@ from typing import IO, Any
 
 import click
 import enrich
+import live
 import nbformat
 import papermill
 import yaml
@@ -281,6 +282,7 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
     for path in source.glob("book/*.md"):
         path.write_text(enrich.page(path.read_text(), output))
     for path, notebook in read.items():
+        live.share(notebook, path, source / "book/_static/live")
         download = path.name if path in executed else ""
         nbformat.write(enrich.notebook(notebook, download), source / path)
 
