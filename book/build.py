@@ -12,10 +12,11 @@ Each build has its own place, in the last column, and six steps, each a function
               the machine to itself. A build without `book/published` ends here, too
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
-              the published ones end the build
+              the published ones end the build, and so do verdicts, as `claims.agreement` says
 4. `execute`  the chapters of the mirror with papermill, two at a time, into PLACE/executed
 5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says
-6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html
+6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
+              repaired for all readers, as `accessible` says
 
 PLACE/html is removed first and put there last: it exists only if everything went well.
 """
@@ -25,6 +26,7 @@ import os
 # One thread a process, kernels included, and before NumPy or torch is imported.
 os.environ |= {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 os.environ |= {"PYDEVD_DISABLE_FILE_VALIDATION": "1", "NO_COLOR": "1"}
+os.environ["NMPCRL_FIGURES_FOR_PAGE"] = "1"  # narrow, too, for telephones: `pictures`
 
 import difflib
 import logging
@@ -34,7 +36,7 @@ import subprocess
 import sys
 import time
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from importlib.resources import as_file, files
@@ -42,11 +44,13 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import IO, Any
 
+import accessible
 import click
 import enrich
 import live
 import nbformat
 import papermill
+import pictures
 import yaml
 from papermill.cli import _resolve_type as papermill_value
 from papermill.exceptions import PapermillExecutionError
@@ -184,7 +188,7 @@ def mirror(place: Path, announcement: str) -> Path:
 
 
 def require_published() -> None:
-    """End the build, before any work, if there is nothing that its runs could be held against."""
+    """End the build, before any work, if there is nothing to compare its runs with."""
     from nmpcrl.claims import published  # only here: a refusal should not wait for it
 
     try:
@@ -196,7 +200,7 @@ def require_published() -> None:
 def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     """Run what is not stored yet; the bars are the store's."""
     from nmpcrl.analysis.summaries import fetch_summaries
-    from nmpcrl.claims import published
+    from nmpcrl.claims import agreement, published
     from nmpcrl.study import Experiment
     from nmpcrl.study.provenance import warn_of_changes
     from nmpcrl.study.setup import compile_ahead
@@ -205,12 +209,32 @@ def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     warn_of_changes()  # no page is a place for this notice, nor for that of the compiler
     compile_ahead((*experiments, *summaries) or (Experiment(),))
     fetch_all(experiments, progress=True)
-    contradictions = published.compare(fetch_summaries(summaries), published.load())
+    made, known = fetch_summaries(summaries), published.load()
+    contradictions = published.compare(made, known)
     if len(contradictions):
         raise Failure(
             "Runs that were trained here contradict the published ones:\n"
             f"{contradictions.to_string(index=False)}"
         )
+    refuse_verdicts(agreement.of_runs(made, known))
+
+
+def measure(calls: tuple[Callable[[], Any], ...]) -> None:
+    """What is to be done with the machine to itself; times have their verdicts, too."""
+    from nmpcrl.bench import summary
+    from nmpcrl.claims import agreement, published
+
+    for call in calls:
+        measured = call()
+        if isinstance(measured, dict) and "learners" in measured:
+            refuse_verdicts(agreement.of_times(summary.learners(measured), published.load()))
+
+
+def refuse_verdicts(contradictions: tuple[str, ...]) -> None:
+    """End the build if a verdict that was found here contradicts the published one."""
+    if contradictions:
+        listed = "\n".join(contradictions)
+        raise Failure(f"Verdicts that were found here contradict the published ones:\n{listed}")
 
 
 def execute(notebook: Path, target: Path, log: Path, given: Given) -> tuple[float, str]:
@@ -279,12 +303,16 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
     def output(page: str, tag: str) -> str:
         return enrich.output(read[Path("book") / page], tag)
 
+    (source / "book" / pictures.FOLDER).mkdir(exist_ok=True)
     for path in source.glob("book/*.md"):
         path.write_text(enrich.page(path.read_text(), output))
     for path, notebook in read.items():
         live.share(notebook, path, source / "book/_static/live")
         download = path.name if path in executed else ""
-        nbformat.write(enrich.notebook(notebook, download), source / path)
+        dressed = enrich.notebook(notebook, download)
+        for name, data in pictures.placed(dressed).items():
+            (source / "book" / pictures.FOLDER / name).write_bytes(data)
+        nbformat.write(dressed, source / path)
 
 
 def render(place: Path, strict: bool) -> None:
@@ -303,8 +331,9 @@ def render(place: Path, strict: bool) -> None:
     if result.returncode:
         raise Failure(f"Jupyter Book refused the pages (all of it: {shown(log)}):\n{warnings(log)}")
     for path in (place / "executed").glob("*.ipynb"):
-        notebook = enrich.download(nbformat.read(path, 4))
+        notebook = pictures.plain(enrich.download(nbformat.read(path, 4)))
         nbformat.write(notebook, work / "_build/html/book" / path.name)
+    accessible.site(work / "_build/html")
     (work / "_build/html").rename(place / "html")
     title = yaml.safe_load((ROOT / "_config.yml").read_text())["title"]
     (place / "html/index.html").write_text(INDEX.format(title=title, page=pages()[0]))
@@ -351,8 +380,7 @@ def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool)
         mirror(place, announcement)
         wanted = {n: tuple(dict.fromkeys(one for need in needs for one in need[n])) for n in NEEDS}
         train(wanted["experiments"], wanted["summaries"])
-        for call in wanted["beforehand"]:
-            call()
+        measure(wanted["beforehand"])
         execute_all(place, jobs)
         dress(place / "src", jobs)
         render(place, strict)

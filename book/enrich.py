@@ -52,11 +52,13 @@ def text(markdown: str) -> str:
 
 
 def page(markdown: str, outputs: Callable[[str, str], str]) -> str:
-    """A page of Markdown; `outputs` gives what a notebook's cell with a tag displayed, as HTML."""
+    """A page of Markdown; `outputs` gives what a notebook's cell with a tag displayed."""
 
     def shown(found: re.Match[str]) -> str:
-        html = outputs(found["page"], found["tag"])
-        return f'<div class="cell_output docutils container">\n{html}\n</div>' if html else ""
+        output = outputs(found["page"], found["tag"])
+        if not output.startswith("<"):  # a paragraph
+            return output
+        return f'<div class="cell_output docutils container">\n{output}\n</div>'
 
     return text(OUTPUT.sub(shown, ENTRIES.sub("```{bibliography}\n```\n", markdown)))
 
@@ -84,9 +86,10 @@ def download(executed: Any) -> Any:
 
 
 def output(source: Any, tag: str) -> str:
-    """The HTML that the cell with a tag displayed, or nothing if it was not executed."""
+    """What the cell with a tag displayed, HTML or Markdown; nothing if it was not executed."""
     (cell,) = (cell for cell in source.cells if tag in _tags(cell))
-    return "".join(one.data.get("text/html", "") for one in cell.outputs if "data" in one)
+    shown = [one.data for one in cell.outputs if "data" in one]
+    return "\n\n".join(one.get("text/html") or one.get("text/markdown", "") for one in shown)
 
 
 def calls_prose(code: str) -> bool:

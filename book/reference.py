@@ -39,7 +39,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     sys.path.insert(0, str((HERE.parent / "nmpcrl").resolve().parent))
     app.connect("source-read", each_module)
     app.connect("autodoc-process-signature", as_written)
-    app.connect("autodoc-skip-member", without_aliases)
+    app.connect("autodoc-skip-member", without_others)
     app.connect("autodoc-process-docstring", completed, priority=400)  # before napoleon's
     app.connect("doctree-read", number_rows)
     app.connect("missing-reference", known_or_plain)
@@ -138,6 +138,8 @@ def completed(
     if what == "module":  # its further paragraphs are for who reads the source
         lines[:] = lines[: lines.index("")] if "" in lines else lines
     if what == "class":
+        if not _ours(thing.__init__):
+            lines[:] = inspect.cleandoc(thing.__doc__ or "").splitlines()
         fields = [f"    {field}" for field in _fields(thing)]
         lines += ["", "Fields:", *fields, ""] if fields else []
         members = [f"    {member}" for member in _members(thing)]
@@ -145,11 +147,19 @@ def completed(
     lines[:] = linked("\n".join(lines)).split("\n")
 
 
-def without_aliases(
+def without_others(
     app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: Any
 ) -> bool | None:
-    """Leave out the properties by which a named tuple gives its fields: they are in the list."""
-    return True if type(thing).__name__ == "_tuplegetter" else None
+    """Leave out what other libraries put into a class of ours.
+
+    That includes the properties by which a named tuple gives its fields: they are in the list.
+    """
+    return True if type(thing).__name__ == "_tuplegetter" or not _ours(thing) else None
+
+
+def _ours(thing: Any) -> bool:
+    """Whether the library defines it, or nothing says where it comes from."""
+    return (getattr(thing, "__module__", None) or "nmpcrl").startswith("nmpcrl")
 
 
 def linked(docstring: str) -> str:

@@ -1,1 +1,1 @@
-"""From numbers to verdicts: what the paper claims, what became of it, and what that hangs on."""
+"""From numbers to verdicts: what the paper claims, what became of it, and what that depends on."""

@@ -14,7 +14,7 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis.statistics import rate
-from nmpcrl.claims.halves import counted, halves, reversals, sentence
+from nmpcrl.claims.halves import confirmations, counted, halves, reversals, sentence
 from nmpcrl.claims.rule import Claim, Observations, Paths, Verdict, arms, read, settle
 
 # One row a cell of layout, decay and seed, one column an arm; nan is unknown.
@@ -30,6 +30,7 @@ class RunClaim(Claim):
     threshold: float  # where yes ends
     evidence: Callable[[pd.DataFrame, Paths], str]  # what the numbers are, in sentences
     besides: Measure | None = None  # counts that have to be 0; the weaker question forgives them
+    halves: Callable[[pd.DataFrame, Paths], str] | None = None  # and for each learner
     unit: str = "pairs"  # what is asked, in the plural
     nothing: float = 0.0  # the number of a run in which nothing is to be seen
     short: str = ""  # statement for the head of a column
@@ -52,7 +53,8 @@ class RunClaim(Claim):
         if self.besides:
             weaker, counts = answers, _long(self.besides(*found))
             answers = weaker & _known(counts == 0, counts)
-        return settle(self, answers, self.evidence(*found), weaker=weaker, unit=self.unit)
+        verdict = settle(self, answers, self.evidence(*found), weaker=weaker, unit=self.unit)
+        return replace(verdict, halves=self.halves(*found) if self.halves else "")
 
     def at_borders(self, values: Values, borders: Iterable[float]) -> pd.DataFrame:
         """What would become of the claim at other borders than its own, which stays where it is.
@@ -109,8 +111,12 @@ class Contrast(RunClaim):
         verdict, (first, second) = super().judge(observed), self.learners
         borders = {self.wrong: self.threshold, self.worst: np.finfo(float).max}
         found = halves((first, second), self.measure(observed.runs, observed.paths), borders)
-        evidence = f"{verdict.evidence} {counted(found)}".strip()
-        return replace(verdict, evidence=evidence, reverse=tuple(map(sentence, reversals(found))))
+        return replace(
+            verdict,
+            halves=counted(found),
+            as_claimed=tuple(map(sentence, confirmations(found))),
+            reverse=tuple(map(sentence, reversals(found))),
+        )
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """See `RunClaim.yes`."""

@@ -1,21 +1,22 @@
-"""What a claim about two learners says of each, and where the runs say the reverse.
+"""What a claim about two learners says of each, and where the runs go with it or against it.
 
 "DES diverges and RDES does not" joins two statements, and one share of pairs cannot tell which of
-them fails. So both are counted, in each reading of the decay and in each layout. Only the pairs in
-which one of the two went wrong and the other did not tell the learners apart. Where the interval of
-the share of these that go against the claim lies above `rule.MAJORITY`, what was seen is the
-reverse of the claim. That rule is the one for a majority, and was fixed with it; that it is asked
-of single cells as well was decided after the study had been seen, and with a dozen cells a claim an
-interval is not corrected for being the most striking of them.
+them fails. So both are counted, in each reading of the decay and in each layout. Only pairs that
+differ, in which one of the two went wrong and the other did not, tell the learners apart. Where the
+interval of the share of these that go with the claim lies above `rule.MAJORITY`, what was seen is
+as claimed, and where that of those that go against it does, it is the reverse of the claim. That
+rule is the one for a majority, and was fixed with it; that it is asked of single cells as well was
+decided after the study had been seen, and with a dozen cells a claim an interval is not corrected
+for being the most striking of them.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 
 import pandas as pd
 
-from nmpcrl.analysis.statistics import Estimate, rate
+from nmpcrl.analysis.statistics import rate
 from nmpcrl.claims.rule import MAJORITY
 
 WHOLE = "all"  # in the place of a layout
@@ -35,14 +36,14 @@ class Halves:
     apart: int  # pairs in which only one of them did
 
     @property
-    def share(self) -> Estimate | None:
-        """Of the pairs that tell the two apart, how many go against the claim."""
-        return rate(self.against, self.apart) if self.apart else None
-
-    @property
     def reversed(self) -> bool:
         """Whether this is the reverse of what is claimed."""
-        return self.share is not None and self.share.low > MAJORITY
+        return _most(self.against, self.apart)
+
+    @property
+    def as_claimed(self) -> bool:
+        """Whether the two differ in the way that is claimed."""
+        return _most(self.apart - self.against, self.apart)
 
     def __add__(self, other: "Halves") -> "Halves":
         """Two cells of one reading together."""
@@ -100,13 +101,26 @@ def _count(
 
 def reversals(found: list[Halves]) -> Iterator[Halves]:
     """Where the reverse of the claim was seen: in a whole reading, else its layouts together."""
+    return _clear(found, lambda one: one.reversed)
+
+
+def confirmations(found: list[Halves]) -> Iterator[Halves]:
+    """Where the two were seen to differ as claimed, likewise."""
+    return _clear(found, lambda one: one.as_claimed)
+
+
+def _clear(found: list[Halves], clear: Callable[[Halves], bool]) -> Iterator[Halves]:
     for _, group in groupby(found, key=lambda one: (one.wrong, one.decay)):
         reading, *layouts = group
-        against = [one for one in layouts if one.reversed]
-        if reading.reversed:
+        some = [one for one in layouts if clear(one)]
+        if clear(reading):
             yield reading
-        elif against:
-            yield sum(against[1:], against[0])
+        elif some:
+            yield sum(some[1:], some[0])
+
+
+def _most(some: int, of: int) -> bool:
+    return of > 0 and rate(some, of).low > MAJORITY
 
 
 def counted(found: Iterable[Halves]) -> str:
@@ -128,16 +142,19 @@ def _counted(readings: list[Halves]) -> str:
 
 
 def sentence(found: Halves) -> str:
-    """The reverse of a claim, with its counts and its interval."""
+    """How the two differ where that is clear, with the counts and the interval."""
     first, second = found.learners
+    one, other = found.counts
+    seen, going = "as claimed", found.apart - found.against
+    if found.reversed:
+        first, second, one, other = second, first, other, one
+        seen, going = "the reverse was seen", found.against
     several = "s" if len(found.layouts) > 1 else ""
     where = (
         "" if found.layouts == (WHOLE,) else f", in layout{several} {' and '.join(found.layouts)}"
     )
     return (
-        f"With noise that decays per {found.decay}{where}, the reverse was seen: {second}"
-        f" {found.wrong} in {found.counts[1]} of {found.pairs} runs and {first} in"
-        f" {found.counts[0]}. Of the"
-        f" {found.apart} pairs that tell the two apart, {found.against} go against the claim:"
-        f" {found.share:.0%}."
+        f"With noise that decays per {found.decay}{where}, {seen}: {first} {found.wrong} in"
+        f" {one} of {found.pairs} runs and {second} in {other} ({going} of {found.apart} pairs that"
+        f" differ: {rate(going, found.apart):.0%})."
     )

@@ -1,4 +1,4 @@
-"""What we add to the paper: learners that it does not have, held against those that it has.
+"""What we add to the paper: learners that it does not have, compared with those that it has.
 
 Decided as the paper's claims are, by the thresholds of `paper_claims` and the rule of `rule`, and
 fixed with them before they were put to the study. A claim is judged wherever its learner was run.
@@ -129,7 +129,8 @@ OWN_CLAIMS: dict[str, RunClaim] = {
             question="Does Q-learning end at no higher cost than ES with the same layout, decay"
             " and seed?",
             border=f"higher by at most {SAME_COST:.0%}",
-            would_change="Exploration late in training: without it, a is what the policy says.",
+            would_change="Exploration late in training: without it, a is the input that the policy"
+            " chooses.",
             threshold=SAME_COST,
             **compared(("QL", "ES")),
         ),

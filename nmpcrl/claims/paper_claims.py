@@ -87,7 +87,7 @@ def training_cost_ratio(runs: pd.DataFrame) -> pd.Series:
 
 
 def divergence(runs: pd.DataFrame) -> pd.Series:
-    """Which runs diverged (see `DIVERGED`); missing where there is nothing to hold them against."""
+    """Which runs diverged (see `DIVERGED`); missing where there is nothing to compare them with."""
     ratio = training_cost_ratio(runs)
     return (ratio > DIVERGED).astype("boolean").where(ratio.notna())
 
@@ -296,6 +296,23 @@ def _c7_evidence(runs: pd.DataFrame, paths: Paths) -> str:
     )
 
 
+def _c7_halves(runs: pd.DataFrame, paths: Paths) -> str:
+    kept = BY_RUNS["C7"].answers(_largest_overlap(runs, paths))
+    every = pd.concat(arms(runs, *PAPER), keys=PAPER, names=["learner"])
+    states = _inside(every, "eval_inside").sum(axis=1).groupby(level="learner", sort=False).sum()
+    inside = ", ".join(f"{count:.0f} of {name}" for name, count in states.items())
+    return (
+        f"Without noise, the constraints held in {_by_learner(kept)}; states in an obstacle:"
+        f" {inside}."
+    )
+
+
+def _by_learner(answers: pd.Series) -> str:
+    """In how many runs of each learner the answer is yes."""
+    groups = answers.groupby(level="learner", sort=False)
+    return ", ".join(f"{_of(group)} runs of {name}" for name, group in groups) or "no run"
+
+
 def _inside(runs: pd.DataFrame, name: str) -> pd.DataFrame:
     """How many states lay in an obstacle, one column a size."""
     return runs[[f"{name}_{size}" for size in SIZES]]
@@ -325,6 +342,11 @@ def _c9_evidence(runs: pd.DataFrame, _: Paths) -> str:
         f" {stuck} end more than {ARRIVED} away from the target, and in {failed} runs one of the"
         " last three failed or training was stopped; they count."
     )
+
+
+def _c9_halves(runs: pd.DataFrame, paths: Paths) -> str:
+    better = BY_RUNS["C9"].answers(_cost_reductions(runs, paths))
+    return f"It holds in {_by_learner(better)}."
 
 
 def _of(holds: pd.Series) -> str:
@@ -428,8 +450,8 @@ CLAIMS: dict[str, Claim] = {
             measured="root mean square errors on held-out pairs of state and theta, with over"
             " without",
             border=f"at most {MORE_ACCURATE}",
-            would_change="How far theta moves: where it hardly does, there is nothing to tell the"
-            " network.",
+            would_change="How far theta moves: where it hardly does, the network gains nothing from"
+            " it.",
             learners=("RDES",),
             measure=_relative_error,
             threshold=MORE_ACCURATE,
@@ -454,6 +476,7 @@ CLAIMS: dict[str, Claim] = {
             threshold=TOUCH,
             besides=_states_inside,
             evidence=_c7_evidence,
+            halves=_c7_halves,
             unit="runs",
             label="largest Ξ without noise",
             linear_to=TOUCH,
@@ -488,6 +511,7 @@ CLAIMS: dict[str, Claim] = {
             measure=_cost_reductions,
             threshold=BETTER,
             evidence=_c9_evidence,
+            halves=_c9_halves,
             unit="runs",
             label="fall of noise-free cost",
             linear_to=0.1,
@@ -519,6 +543,11 @@ def judge(
     """
     observed = Observations(runs, paths, timings, tuple(assumptions))
     return tuple(claim.judge(observed) for claim in CLAIMS.values())
+
+
+def judge_times(timings: pd.DataFrame) -> tuple[Verdict, ...]:
+    """The claims that times alone decide, as `judge` has them."""
+    return tuple(claim.judge(Observations(timings=timings)) for claim in BY_TIME.values())
 
 
 def judge_runs(runs: pd.DataFrame, paths: Paths) -> tuple[Verdict, ...]:

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import pandas as pd
+
 from nmpcrl.analysis import summary
 from nmpcrl.analysis.gradient_td import dropped_curvature
 from nmpcrl.analysis.summary import RunSummary
@@ -10,8 +12,8 @@ from nmpcrl.bench.processes import time_learners_afresh
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import audit
 from nmpcrl.claims.own_claims import judge_own
-from nmpcrl.claims.paper_claims import BY_TIME, judge
-from nmpcrl.claims.rule import UNDECIDABLE, Observations, Verdict
+from nmpcrl.claims.paper_claims import judge, judge_times
+from nmpcrl.claims.rule import UNDECIDABLE, Verdict
 from nmpcrl.study.design import MAIN_TABLE
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.store import fetch_all
@@ -28,7 +30,8 @@ def publish_study(
         runs: all of `design.whole_study`.
         variants: the part of the study that each belongs to.
     """
-    return published.publish(runs, variants, verdicts(runs, variants))
+    timings = time_learners_afresh()
+    return published.publish(runs, variants, verdicts(runs, variants, timings), timings)
 
 
 def publish_timing() -> tuple[Verdict, ...]:
@@ -40,15 +43,17 @@ def publish_timing() -> tuple[Verdict, ...]:
     Returns:
         The verdicts.
     """
-    observed = Observations(timings=time_learners_afresh())
-    judged = tuple(claim.judge(observed) for claim in BY_TIME.values())
+    timings = time_learners_afresh()
+    judged = judge_times(timings)
     if UNDECIDABLE not in {verdict.outcome for verdict in judged}:
-        published.republish(judged)
+        published.republish(judged, timings)
     return judged
 
 
 def verdicts(
-    runs: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
+    runs: Mapping[Experiment, RunSummary],
+    variants: Mapping[Experiment, str],
+    timings: pd.DataFrame,
 ) -> tuple[Verdict, ...]:
     """The verdicts on the paper's claims and on our own."""
     table = summary.table(runs)
@@ -59,7 +64,7 @@ def verdicts(
     claimed = judge(
         main,
         paths={e: one.states for e, one in runs.items()},
-        timings=time_learners_afresh(),
+        timings=timings,
         assumptions=audit(study, dropped_curvature(study[AUDITED])),
     )
     return (*claimed, *judge_own(added))

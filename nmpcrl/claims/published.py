@@ -4,7 +4,8 @@
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
 - `verdicts.json`: what became of each claim;
-- `about.json`: code, libraries and machine.
+- `timings.csv`: of `time_learners`, on which the verdicts on time rest;
+- `about.json`: code, libraries and machine, and when the thresholds were fixed.
 """
 
 import json
@@ -22,8 +23,12 @@ import pandas as pd
 
 import nmpcrl
 from nmpcrl.analysis.summary import RunSummary, experiment_of, row
+from nmpcrl.bench.learners import ratio
+from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism, failure_modes
-from nmpcrl.claims.rule import UNDECIDABLE, Outcome, Verdict
+from nmpcrl.claims.prespecified import from_git
+from nmpcrl.claims.rule import Outcome, Verdict
+from nmpcrl.study import design
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.machine import fingerprint
@@ -31,7 +36,7 @@ from nmpcrl.study.parameters import Refusal, shortened
 from nmpcrl.study.provenance import EPOCHS, environment, hash_of, summary_key
 from nmpcrl.study.records import Column
 
-FILES = ("runs.csv", "curves.npz", "verdicts.json", "about.json")
+FILES = ("runs.csv", "curves.npz", "verdicts.json", "timings.csv", "about.json")
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
 # Columns of `failure_modes`, and what may be in them; the frozen arms have none.
@@ -68,7 +73,26 @@ class Published:
     variants: Mapping[Experiment, str] = field(default_factory=dict)  # the part each belongs to
     rows: Mapping[Experiment, dict[str, Any]] = field(default_factory=dict)  # of `runs.csv`
     verdicts: tuple[Verdict, ...] = ()
+    timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
     about: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def main(self) -> pd.DataFrame:
+        """The rows of the main table."""
+        parts = self.variants.items()
+        return pd.DataFrame([self.rows[e] for e, part in parts if part == design.MAIN_TABLE])
+
+    def verdict(self, claim: str) -> Verdict:
+        """What became of a claim.
+
+        Raises:
+            KeyError: no verdict on it is published.
+        """
+        return {one.claim: one for one in self.verdicts}[claim]
+
+    def ratio(self, solver: str, learner: str) -> Ratio:
+        """Time of a learner's step over that of one of ES, as `bench.learners.ratio` has it."""
+        return ratio(self.timings, solver, learner)
 
 
 def place() -> Path:
@@ -81,6 +105,7 @@ def publish(
     summaries: Mapping[Experiment, RunSummary],
     variants: Mapping[Experiment, str],
     verdicts: Sequence[Verdict],
+    timings: pd.DataFrame | None = None,
 ) -> Path:
     """Write all files anew; the same content gives the same bytes, but for the date.
 
@@ -88,6 +113,7 @@ def publish(
         summaries: the runs.
         variants: the part of the study that each belongs to.
         verdicts: on the claims.
+        timings: of `time_learners`, if there were any taken.
 
     Returns:
         Where they are.
@@ -100,7 +126,7 @@ def publish(
     runs.to_csv(folder / "runs.csv", index=False)
     curves: dict[str, Any] = _curves(list(summaries.values()))
     np.savez_compressed(folder / "curves.npz", **curves)
-    write_json(folder / "verdicts.json", [asdict(verdict) for verdict in verdicts], indent=1)
+    _write(folder, verdicts, pd.DataFrame() if timings is None else timings)
     about = {
         "date": datetime.now(UTC).date().isoformat(),
         "epochs": EPOCHS,
@@ -113,8 +139,12 @@ def publish(
     return folder
 
 
-def republish(verdicts: Iterable[Verdict]) -> Path:
+def republish(verdicts: Iterable[Verdict], timings: pd.DataFrame | None = None) -> Path:
     """Put these in the place of the published verdicts on the same claims; the runs stay.
+
+    Args:
+        verdicts: on claims of which a verdict is published.
+        timings: of `time_learners`, in the place of the published ones, if they were taken anew.
 
     Returns:
         Where they are.
@@ -129,7 +159,7 @@ def republish(verdicts: Iterable[Verdict]) -> Path:
         if verdict.claim not in kept:
             raise KeyError(f"no verdict on {verdict.claim} is published in {folder}")
         kept[verdict.claim] = verdict
-    write_json(folder / "verdicts.json", [asdict(verdict) for verdict in kept.values()], indent=1)
+    _write(folder, kept.values(), found.timings if timings is None else timings)
     _seal(folder, found.about)
     return folder
 
@@ -186,6 +216,7 @@ def _read(folder: Path) -> Published:
         {e: one["variant"] for e, one in rows.items()},
         rows,
         tuple(_verdict(one) for one in verdicts),
+        _timings(folder / "timings.csv"),
         about,
     )
 
@@ -205,20 +236,6 @@ def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.
     wrong += _out_of_range(others, published)
     names = [*CELL, "seed", "what", "here", "published"]
     return pd.DataFrame([one for one in wrong if one], columns=names)
-
-
-def contradicted(verdicts: Iterable[Verdict], published: Published) -> tuple[str, ...]:
-    """Which of these verdicts differ from the published ones, a sentence each.
-
-    What is not decidable, here or there, contradicts nothing.
-    """
-    known = {verdict.claim: verdict.outcome for verdict in published.verdicts}
-    pairs = [(one, known.get(one.claim, UNDECIDABLE)) for one in verdicts]
-    return tuple(
-        f"{one.claim} is {one.outcome} here, and {there} as published"
-        for one, there in pairs
-        if UNDECIDABLE not in (one.outcome, there) and one.outcome != there
-    )
 
 
 def comparable(runs: Iterable[Experiment], published: Published) -> set[Experiment]:
@@ -281,8 +298,13 @@ def _sums(folder: Path) -> dict[str, str]:
 
 
 def _seal(folder: Path, about: Mapping[str, Any]) -> None:
-    """Write about.json, by which the other files and itself are known again."""
-    sealed = {**about, "files": _sums(folder)}
+    """Write about.json, by which the other files and itself are known again.
+
+    It says when the thresholds were fixed, too: what git says, else what was known.
+    """
+    known = from_git()
+    since = {"fixed": known.facts} if known else {}
+    sealed = {**about, **since, "files": _sums(folder)}
     write_json(folder / "about.json", sealed | {"seal": _sealed(sealed)}, indent=1)
     _load.cache_clear()
 
@@ -328,6 +350,17 @@ def _summary_of(summary: dict[str, Any], curves: Mapping[str, Column], i: int) -
     )
 
 
+def _write(folder: Path, verdicts: Iterable[Verdict], timings: pd.DataFrame) -> None:
+    """The files that need no run."""
+    write_json(folder / "verdicts.json", [asdict(verdict) for verdict in verdicts], indent=1)
+    timings.to_csv(folder / "timings.csv", index=False)
+
+
+def _timings(path: Path) -> pd.DataFrame:
+    """As they were written; no rows where no time was taken."""
+    return pd.read_csv(path) if path.read_text().strip() else pd.DataFrame()
+
+
 def _verdict(stored: dict[str, Any]) -> Verdict:
     """A verdict as JSON has it, with its tuples again."""
     interval = stored["interval"] and tuple(stored["interval"])
@@ -337,4 +370,5 @@ def _verdict(stored: dict[str, Any]) -> Verdict:
         for name in ("by_layout", "by_decay")
     }
     parts |= {"outcome": Outcome(stored["outcome"]), "interval": interval, "counts": counts}
-    return Verdict(**stored | parts | {"reverse": tuple(stored.get("reverse", ()))})
+    parts |= {name: tuple(stored.get(name, ())) for name in ("as_claimed", "reverse")}
+    return Verdict(**stored | parts)

@@ -17,7 +17,7 @@ Wilson's everywhere, over all layouts too, where a bootstrap would be sure of wh
 runs; `statistics.rate` says why it is not too narrow there.
 
 What is missing (a run that was not made, or is shorter than the paper's, or has no frozen arm to be
-held against) is no answer: a verdict stands if it is the same whatever the missing ones would say.
+compared with) is excluded; if it could change the verdict, the claim is undecidable.
 """
 
 from abc import ABC, abstractmethod
@@ -38,7 +38,7 @@ MAJORITY = 0.5
 NEARLY_ALL = 0.9
 NEARLY_NONE = 0.1
 
-CELL = ["layout", "decay", "seed"]  # what two runs share that are held against each other
+CELL = ["layout", "decay", "seed"]  # what two runs share that are compared
 
 Paths: TypeAlias = Mapping[Experiment, Column]  # the states of each run's last rollout
 
@@ -70,7 +70,9 @@ class Verdict:
     by_decay: dict[str, Outcome] = field(default_factory=dict)  # and in each reading of the decay
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
     ratio: float | None = None  # of times, where the claim is about time
-    reverse: tuple[str, ...] = ()  # where the reverse of the claim was seen, in sentences
+    halves: str = ""  # what a claim on several learners comes to for each, in sentences
+    as_claimed: tuple[str, ...] = ()  # where the learners clearly differ as claimed, likewise
+    reverse: tuple[str, ...] = ()  # and where they clearly differ the other way round
     said: str = ""  # the outcome in the claim's own words, where it has any
 
     @property

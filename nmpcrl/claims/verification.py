@@ -1,6 +1,6 @@
 """Do runs still have the numbers that are known of them, bit for bit, after an edit of the code?
 
-`relock` trains some runs afresh, of every part of the study, and holds each against what the code
+`relock` trains some runs afresh, of every part of the study, and compares each with what the code
 of the lock made of it: the published run, where that was made on such a machine with such versions,
 or else the one that is stored here.
 """
@@ -54,7 +54,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
     """Show that no bit of `count` fresh runs has changed, and write the lock anew.
 
     Raises:
-        CannotRelock: a bit has changed, a run failed, or too few can be held against anything.
+        CannotRelock: a bit has changed, a run failed, or too few can be compared with anything.
     """
     drawn = sample(known, count)
     exact = comparable(drawn, known)
@@ -62,8 +62,9 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
     before |= {e: row(one) for e, one in _stored_by_lock(drawn) if e not in exact}
     if len(before) < len(drawn):
         raise CannotRelock(
-            f"only {len(before)} of {len(drawn)} runs can be held against what the code of the lock"
-            f" made on such a machine: with that code, `nmpcrl verify --sample {count}` makes them"
+            f"only {len(before)} of {len(drawn)} runs can be compared with what the code of"
+            " the lock made on such a machine: with that code,"
+            f" `nmpcrl verify --sample {count}` makes them"
         )
     fresh = _trained_afresh(drawn, workers)
     wrong = [found for e in drawn if (found := unequal(e, row(fresh[e]), before[e]))]
@@ -74,7 +75,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
             f" {layout}, decay per {decay}, seed {seed}: {what} is {now!r} and was {then}; if that"
             " is meant, raise the epoch of the room in nmpcrl/study/provenance.py"
         )
-    for experiment, made in fresh.items():  # what the next edit is held against
+    for experiment, made in fresh.items():  # what the next edit is compared with
         summaries.keep(experiment, made)
     return Relocked(provenance.relock(), len(exact), len(drawn) - len(exact))
 

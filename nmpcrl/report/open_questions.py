@@ -23,12 +23,14 @@ QUESTIONS = (
         ("P",),
     ),
     Question(
-        "Which activation, first weights, scaling, buffer and number of fits a step has the"
+        "Which activation, initial weights, scaling, buffer and number of fits a step has the"
         " network, and does $\\boldsymbol{\\theta}$ wait for the first fit?",
         ("H", "G"),
     ),
     Question("Does DES differ from RDES in the network's inputs only?", ("I",)),
-    Question("Is the state space $[-3, 9]^2$, and is it as hard as it is written?", ("A", "M")),
+    Question(
+        "Is the state space $[-3, 9]^2$, and are its bounds hard, as they are written?", ("A", "M")
+    ),
     Question("Is $\\beta$ meant to be smaller than $\\alpha$?", ("J",)),
     Question(
         "Is the first input free in the value that is learned, and are noisy actions clipped?",
@@ -64,7 +66,7 @@ def _decided(
 ) -> str:
     claims = sorted({claim for letter in question.departures for claim in decides.get(letter, ())})
     if claims:
-        return f"The answer would decide {listed(claims)}."
+        return f"The answer decides {listed(claims)} here."
     if set(question.departures) & set(varied):
-        return "No verdict depended on it in what was run."
+        return "No verdict depends on it in what was run."
     return "It was not varied here."

@@ -11,6 +11,7 @@ from typing import Any
 from IPython.display import Markdown, display
 
 import nmpcrl
+from nmpcrl.claims.rule import Outcome, read
 
 ROOT = Path(nmpcrl.__file__).parents[1]
 
@@ -36,6 +37,20 @@ def filled(template: str, **numbers: Any) -> str:
     if unused := set(numbers) - wanted:
         raise NameError(f"{min(unused)} is given, and there is no {{{min(unused)}}} in: {text}")
     return PLACEHOLDER.sub(lambda found: format(numbers[found[1]], found[2] or ""), text)
+
+
+def share(value: float, digits: int = 0) -> str:
+    """A share as a sentence has it: "2.4%", "none", or "less than 0.1%" where that rounds to 0."""
+    least = 10.0 ** -(digits + 2)
+    if 0 < value < least:
+        return f"less than {least:.{digits}%}"
+    return f"{value:.{digits}%}" if value else "none"
+
+
+def held(yes: int, of: int) -> str:
+    """Whether an expectation held, by the rule for claims, as the end of a sentence."""
+    ends = ("held", "held in part", "did not hold", "cannot be decided")
+    return dict(zip(Outcome, ends, strict=True))[read(int(yes), int(of))]
 
 
 def source(shown: Any, title: str = "") -> None:

@@ -20,7 +20,7 @@ from nmpcrl.claims.rule import (
     Outcome,
     Verdict,
 )
-from nmpcrl.report.text import SURE, departure_link, listed
+from nmpcrl.report.text import SURE, clear, departure_link, listed
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 
@@ -52,21 +52,25 @@ def claim_table(claims: Iterable[Claim], caption: str) -> str:
     return _table(caption, ("Claim", "What is asked and measured", "Threshold and test"), rows)
 
 
-def verdict_table(verdicts: Iterable[Verdict], scope: str) -> str:
+def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verdict] = ()) -> str:
     """One row a claim, in HTML: what the paper says, and what became of it here.
 
     Args:
         verdicts: of `judge`.
         scope: what they rest on, a sentence for the caption.
+        beside: what other runs say of the same claims, for a column of their own.
     """
+    others = {v.claim: v for v in beside}
     rows = (
         (
-            f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}{_reverse(v)}",
-            f"{_badge(v.words, BADGES[v.outcome])}{_share(v)}",
+            f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}{_differ(v)}",
+            _outcome(v),
+            *([_outcome(others[v.claim])] if others else []),
         )
         for v in verdicts
     )
-    return _table(scope, ("The paper claims", "Here"), rows)
+    header = ("The paper claims", "Published", "Runs of this page")
+    return _table(scope, header if others else ("The paper claims", "Here"), rows)
 
 
 def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
@@ -94,7 +98,7 @@ def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
 
 
 def target_table(targets: Iterable[Target], caption: str) -> str:
-    """One row a figure to reach, in HTML: what was measured, and whether that is enough."""
+    """One row a target, in HTML: what was measured, and whether that is enough."""
     rows = (
         (_text(t.what), _text(t.to_reach), f"{_badge(*MET[t.reached])}<br>{_text(t.measured)}")
         for t in targets
@@ -135,7 +139,7 @@ def evidence(verdicts: Iterable[Verdict]) -> str:
     """One item a claim, in Markdown: verdict, evidence, and where it would change."""
     return "\n\n".join(
         f"- **{v.claim}: {v.statement}**\n\n"
-        f"  {_badge(v.words, BADGES[v.outcome])} {v.evidence}\n\n"
+        f"  {_badge(v.words, BADGES[v.outcome])} {f'{v.evidence} {v.halves}'.strip()}\n\n"
         f"  *Where it would change.* {_linked(v.would_change)}"
         for v in verdicts
     )
@@ -241,9 +245,14 @@ def _in_two_lines(ratio: Ratio) -> str:
     return f'{value}<br><span style="white-space: nowrap">{interval}</span>'
 
 
-def _reverse(verdict: Verdict) -> str:
-    """Below a claim, in a paragraph each: where the runs say the reverse of it."""
-    return "".join(f"<br><em>{_text(one)}</em>" for one in verdict.reverse)
+def _outcome(verdict: Verdict) -> str:
+    """What became of a claim, and the number on which that rests."""
+    return f"{_badge(verdict.words, BADGES[verdict.outcome])}{_share(verdict)}"
+
+
+def _differ(verdict: Verdict) -> str:
+    """Below a claim, in a line each: where two learners clearly differ, and which way round."""
+    return "".join(f"<br><em>{_text(one)}</em>" for one in clear(verdict))
 
 
 def _letter(letter: str) -> str:

@@ -4,8 +4,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import pandas as pd
 
+from nmpcrl.claims.prespecified import Fixed
 from nmpcrl.claims.published import Published
-from nmpcrl.claims.rule import UNDECIDABLE, Outcome, Verdict
+from nmpcrl.claims.rule import PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import design
 from nmpcrl.study.departures import DEPARTURES
 
@@ -13,6 +14,8 @@ NOTHING = (
     "Nothing is published in this copy yet; `nmpcrl study --publish` trains the study, judges it"
     " and publishes it."
 )
+WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+SHOWN = 10  # letters of a commit's hash
 SURE = 0.01  # of Fisher's test: what chance explains as rarely is called more than chance
 LAYOUT, DECAY = "B", "C"  # the departures that the main table itself reads in several ways
 
@@ -35,23 +38,122 @@ def compute_effort(found: Published) -> str:
     )
 
 
-def outcomes(verdicts: Sequence[Verdict]) -> str:
-    """How many claims had each outcome, and which."""
+def answer(verdicts: Sequence[Verdict]) -> str:
+    """Whether the paper reproduces, in a sentence: how many claims had each outcome, and which."""
     if not verdicts:
         return NOTHING
-    ordered = sorted(verdicts, key=lambda v: list(Outcome).index(v.outcome))
-    counted = []
-    for words in dict.fromkeys(v.words for v in ordered):
-        names = [v.claim for v in verdicts if v.words == words]
-        where = "where " if words.startswith("the ") else ""
-        counted.append(f"{len(names)} {where}{words} ({listed(names)})")
-    return f"Of {len(verdicts)} claims: {listed(counted)}."
+    decided = {v.outcome for v in verdicts} - {UNDECIDABLE}
+    head = "in part" if decided & {REPRODUCED, PARTLY} else "no" if decided else "not decidable"
+    if decided == {REPRODUCED}:
+        head = "yes"
+    counted = [_counted(group) for group in _by_words(verdicts)]
+    return f"Does it reproduce? **{head.capitalize()}:** of {_all(verdicts)}, {listed(counted)}."
+
+
+def _by_words(verdicts: Sequence[Verdict]) -> list[list[Verdict]]:
+    """The verdicts that a page words alike, together, in the order of the outcomes."""
+    ordered = sorted(verdicts, key=lambda v: (bool(v.said), list(Outcome).index(v.outcome)))
+    words = dict.fromkeys(v.words for v in ordered)
+    return [[v for v in verdicts if v.words == one] for one in words]
+
+
+def _counted(group: Sequence[Verdict]) -> str:
+    words, count = group[0].words, number(len(group))
+    names = listed(v.claim for v in group)
+    if words.startswith("the "):
+        return f"for {count} {words} ({names})"
+    return f"{count} {'is' if len(group) == 1 else 'are'} {words} ({names})"
+
+
+def _all(verdicts: Sequence[Verdict]) -> str:
+    return f"the paper's {number(len(verdicts))} claim{'s' if len(verdicts) > 1 else ''}"
+
+
+def number(count: int) -> str:
+    """A small number as a word."""
+    return WORDS[count] if count < len(WORDS) else f"{count:,}"
+
+
+def legend(verdicts: Iterable[Verdict]) -> str:
+    """What the numbers of a table of verdicts mean."""
+    c7 = next((v for v in verdicts if v.claim == "C7"), None)
+    asked_twice = (
+        " C7 is asked twice: its percentage counts the runs that kept every constraint in"
+        f" training, too. {c7.halves}"
+        if c7 and c7.halves
+        else ""
+    )
+    return (
+        "A percentage is the share of runs, or of pairs of runs, in which the claim held, with its"
+        " 95 % interval. Where a claim is about time, the number is the ratio of the times of a"
+        " step, with its 95 % interval. A claim without a number rests on no sample. A pair of"
+        f" runs differs if one of its learners went wrong and the other did not.{asked_twice}"
+    )
+
+
+def fixed(found: Fixed | None) -> str:
+    """In which commit the thresholds were fixed, and how to check it."""
+    if found is None:
+        return (
+            "In which commit the thresholds were fixed cannot be said here: they are not those of"
+            " the published study, or nothing is published."
+        )
+    first, then = found.thresholds, found.published
+    return (
+        f"The thresholds and the rule were fixed in commit `{first.hash[:SHOWN]}` ({first.date}"
+        f" UTC), and none of their numbers has changed since. The runs of the study were published"
+        f" after it, in commit `{then.hash[:SHOWN]}` ({then.date} UTC). In the repository,"
+        f" `git show {first.hash[:SHOWN]}` shows the thresholds, and"
+        f" `git log {first.hash[:SHOWN]}..{then.hash[:SHOWN]}` what came between."
+    )
+
+
+def agreement(found: Sequence[Verdict], known: Iterable[Verdict], mark: str) -> str:
+    """Whether the verdicts of a page's own runs are the published ones.
+
+    Args:
+        found: the page's own.
+        known: the published ones.
+        mark: what the page's own rest on, "180 runs trained for this page, 540 published".
+    """
+    there = {v.claim: v for v in known}
+    undecided = [v.claim for v in found if v.outcome == UNDECIDABLE]
+    other = [
+        f"{v.claim} {v.words}"
+        for v in found
+        if v.outcome not in (UNDECIDABLE, there[v.claim].outcome)
+    ]
+    same = len(found) - len(undecided) - len(other)
+    parts = [f"the published outcome for {number(same)} of {number(len(found))} claims"]
+    parts += [f"another one for {number(len(other))} ({listed(other)})"] * bool(other)
+    parts += [f"none for {number(len(undecided))} ({listed(undecided)})"] * bool(undecided)
+    return f"Judged alone, the runs of this page ({mark}) give {listed(parts)}."
+
+
+def halves(verdicts: Iterable[Verdict]) -> str:
+    """One item a claim that joins statements or learners: each by itself, and what is clear."""
+    return "\n".join(
+        "\n".join([f"- **{v.claim}.** {v.halves}", *(f"  - {one}" for one in clear(v))])
+        for v in verdicts
+        if v.halves
+    )
+
+
+def clear(verdict: Verdict) -> tuple[str, ...]:
+    """Where two learners clearly differ, as claimed or the other way round."""
+    return (*verdict.as_claimed, *verdict.reverse)
+
+
+def confirmations(verdicts: Iterable[Verdict]) -> str:
+    """Where two learners clearly differ as claimed."""
+    found = [f"{v.claim}: {' '.join(v.as_claimed)}" for v in verdicts if v.as_claimed]
+    return " ".join(found) or "nowhere do two learners clearly differ so."
 
 
 def reversals(verdicts: Iterable[Verdict]) -> str:
     """Where the runs say the reverse of a claim."""
     found = [f"{v.claim}: {' '.join(v.reverse)}" for v in verdicts if v.reverse]
-    return " ".join(found) or "Nowhere was the reverse of a claim seen."
+    return " ".join(found) or "nowhere was it seen."
 
 
 def by_layout_and_decay(verdicts: Iterable[Verdict]) -> str:

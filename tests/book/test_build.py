@@ -109,7 +109,8 @@ def test_values_are_read_as_papermill_reads_them():
 def small(tmp_path):
     """A copy of the driver with a book of one page and one chapter."""
     shutil.copytree(ROOT / "book/_static", tmp_path / "book/_static")
-    for name in ("_config.yml", "book/build.py", "book/enrich.py", "book/references.bib"):
+    driver = ("build.py", "enrich.py", "accessible.py")
+    for name in ("_config.yml", "book/references.bib", *(f"book/{one}" for one in driver)):
         shutil.copy2(ROOT / name, tmp_path / name)
     (tmp_path / "nmpcrl").symlink_to(ROOT / "nmpcrl")
     toc = {
@@ -227,3 +228,24 @@ def test_the_chapter_that_judges_times_asks_only_for_theirs_beforehand():
     (call,) = needs["beforehand"]
     assert (call.func.__name__, call.args) == ("read_or_measure", ("smoke",))
     assert call.keywords == {"only": ["learning steps"], "calm": True}
+
+
+def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):
+    """Of times, right after they were measured; what measures no times says nothing."""
+    from nmpcrl.bench import summary
+    from nmpcrl.claims import agreement, published
+
+    monkeypatch.setattr(published, "load", published.Published)
+    monkeypatch.setattr(summary, "learners", lambda measured: measured["learners"])
+    monkeypatch.setattr(agreement, "of_times", lambda timings, known: (timings,))
+    build.measure((lambda: None, lambda: {"solves": {}}))
+    with pytest.raises(build.Failure, match="contradict the published ones:\nC3 is so"):
+        build.measure((lambda: {"learners": "C3 is so here"},))
+
+
+def test_verdicts_of_runs_are_held_against_the_published_ones_before_a_chapter_runs(monkeypatch):
+    from nmpcrl.claims import agreement
+
+    monkeypatch.setattr(agreement, "of_runs", lambda fresh, known: ("C1 is so here",))
+    with pytest.raises(build.Failure, match="C1 is so here"):
+        build.train((), ())

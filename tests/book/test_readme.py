@@ -5,6 +5,7 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import published
@@ -48,6 +49,33 @@ def test_the_numbers_of_runs_are_those_of_the_published_study():
     assert set(re.findall(r"(\d+) runs", README)) == {str(parts["main"]), str(sum(varied))}
     assert f"in {len(varied)} ways" in README
     assert re.search(rf"`make book` trains\s{len(design.fresh())} afresh", README)
+
+
+def test_the_halves_of_c1_are_those_of_the_published_verdict():
+    said = re.search(
+        r"per step, DES diverged in (\d+) of (\d+) and RDES in (\d+); per episode, in (\d+) and"
+        r" (\d+)\.",
+        README.replace("\n", " "),
+    )
+    des, of, rdes, des_episode, rdes_episode = said.groups()
+    halves = published.load().verdict("C1").halves
+    assert f"per step in {des} of {of} runs of DES and {rdes} of RDES" in halves
+    assert f"per episode in {des_episode} of {of} runs of DES and {rdes_episode} of RDES" in halves
+
+
+def test_the_commit_of_the_thresholds_is_the_published_one():
+    (commit,) = re.findall(r"fixed in commit `(\w+)`", README)
+    assert published.load().about["fixed"]["thresholds"]["hash"].startswith(commit)
+
+
+@pytest.mark.parametrize("page", ["README.md", "book/intro.md"])
+def test_the_picture_is_described_by_its_finding_with_its_own_numbers(page):
+    (said,) = re.findall(
+        r"!\[([^]]+)\]\((?:book/)?_static/closed_loop\.svg\)", (ROOT / page).read_text()
+    )
+    picture = (ROOT / "book/_static/closed_loop.svg").read_text()
+    (title,) = re.findall(r"<!-- (Plans of [^>]*) -->", picture)
+    assert re.findall(r"[\d.]+ m", said) == re.findall(r"[\d.]+ m", title) != []
 
 
 def test_published_verdicts_on_time_are_what_their_intervals_say():

@@ -472,7 +472,7 @@ def test_a_run_is_judged_from_its_records_as_from_the_table(short):
         ((), {"frozen": 1}, False),
         (("ES",), {"frozen": 1}, True),  # the frozen arm's other episodes are the reference
         (("ES",), {"frozen": 3}, False),  # the frozen arm did worse
-        ((), {"frozen": 3, "ES": 3}, pd.NA),  # nothing to hold it against
+        ((), {"frozen": 3, "ES": 3}, pd.NA),  # nothing to compare it with
     ],
 )
 def test_a_run_is_judged_alike_where_its_frozen_arm_lost_late_episodes(dear, lost, expected):

@@ -22,9 +22,10 @@ def timings(width: float) -> pd.DataFrame:
 )
 def test_verdicts_on_time_are_published_if_all_are_decided(monkeypatch, width, outcomes):
     kept = []
-    monkeypatch.setattr(publish, "time_learners_afresh", lambda: timings(width))
-    monkeypatch.setattr(publish.published, "republish", kept.append)
+    taken = timings(width)
+    monkeypatch.setattr(publish, "time_learners_afresh", lambda: taken)
+    monkeypatch.setattr(publish.published, "republish", lambda *both: kept.append(both))
     judged = publish.publish_timing()
     assert [verdict.claim for verdict in judged] == ["C3", "C4"]
     assert [verdict.outcome for verdict in judged] == outcomes
-    assert kept == ([judged] if UNDECIDABLE not in outcomes else [])
+    assert kept == ([(judged, taken)] if UNDECIDABLE not in outcomes else [])

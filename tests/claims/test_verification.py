@@ -95,7 +95,7 @@ def test_the_lock_is_written_where_no_bit_has_changed(known, lock, edited):
     done = relock(known, 4)
     assert (done.published, done.stored) == (0, 4)
     assert json.loads(lock.read_text())["sources"] == {"learning/updates.py": "edited"}
-    for experiment in sample(known, 4):  # the next edit is held against these
+    for experiment in sample(known, 4):  # the next edit is compared with these
         assert summaries.load(experiment).facts["sources"] == "edited"
 
 

@@ -1,11 +1,53 @@
 """What is asked of every figure."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
+from legibility import flaws
 from matplotlib.figure import Figure
 
+from nmpcrl.report.figures import sheet
+
 COUNTED = ("episode", "episodes trained", "noise-free RL cost", "relative")  # have no unit
+
+
+@pytest.fixture(scope="session")
+def seen() -> set[str]:
+    """The functions whose figures were looked at."""
+    return set()
+
+
+@pytest.fixture(autouse=True)
+def legible(seen, monkeypatch) -> Iterator[None]:
+    """Whatever the first test of a function draws can be read, on a wide sheet and a narrow one."""
+    drawn: list[Figure] = []
+    draw_on = sheet._drawn_on
+
+    def noted(on: sheet.Sheet, draw: Callable[[], Figure]) -> Figure:
+        figure = draw_on(on, draw=draw)
+        name = draw.func.__qualname__
+        if name not in seen:
+            seen.add(name)
+            drawn.append(figure)
+        return figure
+
+    monkeypatch.setattr(sheet, "_drawn_on", noted)
+    yield
+    for figure in drawn:
+        assert not flaws(figure)
+        if isinstance(figure, sheet.Drawn):
+            assert not flaws(figure.again(sheet.NARROW))
+
+
+@pytest.fixture(scope="session")
+def source_of() -> Callable[[Figure], str]:
+    """Where a figure says that its runs come from."""
+
+    def said(figure: Figure) -> str:
+        title = figure.legends[0].get_title().get_text() if figure.legends else ""
+        return " ".join((title or figure.get_supxlabel()).split())
+
+    return said
 
 
 @pytest.fixture(scope="session")

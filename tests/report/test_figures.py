@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 FIGURES = Path(__file__).resolve().parents[2] / "nmpcrl/report/figures"
-SHARED = ("style", "axes", "panels")  # each may use those before it
+SHARED = ("sheet", "style", "axes", "panels")  # each may use those before it
 PACKAGE = "nmpcrl.report.figures."
 
 

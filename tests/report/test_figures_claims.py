@@ -24,10 +24,10 @@ RUN_CLAIMS = {
     "C5": (figures.same_policy, "RDES and GES end in the same policy in 16 of 16 pairs"),
     "C6": (
         figures.held_out,
-        "given θ, the network errs at most 0.8 times as much in 16 of 16 runs",
+        "with θ as an input, the network's error is at most 0.8 times as large in 16 of 16 runs",
     ),
     "C7": (figures.violations, "all constraints held in 64 of 64 runs"),
-    "C9": (figures.gains, "learning saves 1% of the cost or more in 32 of 32 runs"),
+    "C9": (figures.gains, "learning reduces the cost by 1% or more in 32 of 32 runs"),
 }
 TIMES = pd.DataFrame(
     {
@@ -198,9 +198,9 @@ def test_a_claim_whose_learners_were_not_run_can_be_drawn(claim, made_up):
     assert title(drawn(claim, only)).startswith(f"{claim} not decidable here")
 
 
-def test_a_figure_says_where_its_runs_come_from(made_up):
+def test_a_figure_says_where_its_runs_come_from(made_up, source_of):
     found = made_up(source=lambda e: "fresh" if e.layout == "A" else "published")
-    mark = drawn("C1", found).get_supxlabel()
+    mark = source_of(drawn("C1", found))
     assert mark == "16 runs trained for this page, 16 runs published"
 
 

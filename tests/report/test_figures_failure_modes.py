@@ -26,7 +26,7 @@ def widths(axis) -> dict[tuple[int, int], float]:
     return {(i % learners, i // learners): width for i, width in enumerate(bars)}
 
 
-def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up):
+def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up, source_of):
     found = made_up(unlike)
     figure = failure_modes.reasons(found)
     assert figure.get_suptitle() == "32 of 80 runs went wrong: 16 overshoot, 16 none of these"
@@ -38,7 +38,7 @@ def test_bars_count_the_runs_of_each_learner_by_mechanism_and_by_ending(made_up)
     for parts in (signs, ends):
         for row in range(len(learners)):
             assert sum(parts[row, part] for part in range(6)) == 16
-    assert figure.get_supxlabel() == found.mark
+    assert source_of(figure) == found.mark
 
 
 def test_a_study_in_which_all_went_well_says_so(made_up):

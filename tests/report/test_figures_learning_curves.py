@@ -204,9 +204,9 @@ def test_every_layout_has_its_map(made_up):
         lambda found, _: rollouts.maps(found),
     ],
 )
-def test_a_figure_says_where_its_runs_come_from_and_is_closed(draw, made_up):
+def test_a_figure_says_where_its_runs_come_from_and_is_closed(draw, made_up, source_of):
     found = made_up(source=lambda e: "fresh" if e.seed == 0 else "published", layouts=("A",))
-    mark = draw(found, "A").get_supxlabel()
+    mark = source_of(draw(found, "A"))
     assert "6 runs trained for this page, 18 runs published" in mark
     assert not plt.get_fignums()
 

@@ -16,7 +16,7 @@ def test_the_searches_are_named_without_overlap_and_summed_up():
         for name, end in (("A", 90.0), ("B", 95.0), ("C", 95.1))
     }
     figure = policy_search.searches(found)
-    assert figure.get_suptitle() == "The search takes 5% to 10% off the cost"
+    assert figure.get_suptitle() == "The search reduces the cost by 5% to 10%"
     heights = {text.get_text().strip(): text.xy[1] for text in figure.axes[0].texts}
     assert set(heights) == set(found)
     gaps = np.diff(sorted(heights.values()))

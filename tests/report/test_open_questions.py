@@ -1,4 +1,4 @@
-"""The questions: every one is about departures that exist, and says what hangs on it."""
+"""The questions: every one is about departures that exist, and says what depends on it."""
 
 import re
 
@@ -31,9 +31,9 @@ def test_they_are_numbered_and_linked():
 @pytest.mark.parametrize(
     ("decides", "varied", "said"),
     [
-        ({"H": ("C6", "C1")}, {"H"}, "would decide C1 and C6"),
-        ({"G": ("C1",), "H": ("C1",)}, {"H", "G"}, "would decide C1."),
-        ({}, {"G"}, "No verdict depended on it"),
+        ({"H": ("C6", "C1")}, {"H"}, "The answer decides C1 and C6 here."),
+        ({"G": ("C1",), "H": ("C1",)}, {"H", "G"}, "The answer decides C1 here."),
+        ({}, {"G"}, "No verdict depends on it"),
         ({}, set(), "It was not varied"),
     ],
 )

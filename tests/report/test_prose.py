@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from nmpcrl.learning import updates
 from nmpcrl.learning.learners import Learner
 from nmpcrl.report import prose
-from nmpcrl.report.prose import PLACEHOLDER, filled, folded, listing, say, source
+from nmpcrl.report.prose import PLACEHOLDER, filled, folded, held, listing, say, share, source
 
 LATEX = (
     r"$\mathbf{s}$, $\boldsymbol{\theta}_{init}$, $\frac{a}{b}$, $x^{ref}$, $\sqrt[3]{x}$,"
@@ -24,6 +24,35 @@ def test_a_number_is_written_as_its_placeholder_says():
     assert filled("{n} runs cost {cost:.2f}, {share:+.1%}", n=3, cost=2.0, share=0.1) == (
         "3 runs cost 2.00, +10.0%"
     )
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "said"),
+    [
+        (0.0, 0, "none"),
+        (0.004, 0, "less than 1%"),
+        (0.004, 1, "0.4%"),
+        (0.0004, 1, "less than 0.1%"),
+        (0.126, 0, "13%"),
+        (1.0, 1, "100.0%"),
+        (-0.5, 0, "-50%"),
+    ],
+)
+def test_a_share_that_is_not_nothing_is_not_written_as_0(value, digits, said):
+    assert share(value, digits) == said
+
+
+@pytest.mark.parametrize(
+    ("yes", "of", "said"),
+    [
+        (6, 6, "held"),
+        (20, 40, "held in part"),
+        (20, 480, "did not hold"),
+        (2, 2, "cannot be decided"),
+    ],
+)
+def test_an_expectation_held_by_the_rule_for_claims(yes, of, said):
+    assert held(yes, of) == said
 
 
 def test_the_braces_of_latex_are_no_placeholders():

@@ -44,6 +44,19 @@ def test_a_verdict_shows_its_share_and_interval_where_it_has_one():
     assert [row[1] for row in judged[1:]] == [f"{PARTLY}|75% [50%, 88%]", NOT]
 
 
+def test_where_two_learners_clearly_differ_is_said_below_the_claim_whichever_way_round():
+    one = replace(verdict(PARTLY), as_claimed=("So it was.",), reverse=("Not so.",))
+    _, (claim, _) = cells(tables.verdict_table([one], "All of it."))
+    assert claim.endswith("|So it was.|Not so.")
+
+
+def test_the_verdicts_of_other_runs_have_a_column_of_their_own():
+    known, own = verdict(NOT), verdict(PARTLY, share=0.75, interval=(0.5, 0.875))
+    header, row = cells(tables.verdict_table([known], "All of it.", [own]))
+    assert header == ["The paper claims", "Published", "Runs of this page"]
+    assert row[1:] == [NOT, f"{PARTLY}|75% [50%, 88%]"]
+
+
 def test_a_timing_shows_each_ratio_with_its_interval_and_a_dash_for_no_number():
     numbers = dict.fromkeys(tables.TIMES, 1.2345) | {"ms_per_fit": np.nan}
     ratio = {"ratio": 0.6349, "ratio_low": 0.6251, "ratio_high": 0.641, "waited": 0.2}

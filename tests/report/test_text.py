@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims.own_claims import OWN_CLAIMS
+from nmpcrl.claims.prespecified import Commit, Fixed
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.robustness import COLUMNS
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
@@ -65,7 +66,7 @@ def test_the_effort_names_runs_hours_machine_and_versions():
 
 
 def test_where_nothing_is_published_the_page_says_so_and_what_to_do():
-    for said in (text.compute_effort(Published()), text.outcomes(())):
+    for said in (text.compute_effort(Published()), text.answer(())):
         assert "Nothing is published" in said
         assert "`nmpcrl study --publish`" in said
     assert text.by_layout_and_decay(()) == text.verdicts_changed(table()) == ""
@@ -75,9 +76,64 @@ def test_where_nothing_is_published_the_page_says_so_and_what_to_do():
 
 def test_the_outcomes_are_counted_and_each_claim_is_named_once():
     judged = [verdict("C1", REPRODUCED), verdict("C2", NOT), verdict("C3", REPRODUCED)]
-    said = text.outcomes(judged)
-    assert said == "Of 3 claims: 2 reproduced (C1 and C3) and 1 not reproduced (C2)."
+    said = text.answer(judged)
+    assert said == (
+        "Does it reproduce? **In part:** of the paper's three claims, two are reproduced (C1 and"
+        " C3) and one is not reproduced (C2)."
+    )
     assert UNDECIDABLE not in said
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "head"),
+    [
+        ((REPRODUCED, REPRODUCED), "Yes"),
+        ((REPRODUCED, UNDECIDABLE), "Yes"),
+        ((REPRODUCED, NOT), "In part"),
+        ((PARTLY, PARTLY), "In part"),
+        ((NOT, NOT), "No"),
+        ((NOT, UNDECIDABLE), "No"),
+        ((UNDECIDABLE,), "Not decidable"),
+    ],
+)
+def test_the_answer_is_what_the_decided_claims_say(outcomes, head):
+    judged = [verdict(f"C{i}", one) for i, one in enumerate(outcomes)]
+    assert f"**{head}:**" in text.answer(judged)
+
+
+def test_the_legend_says_what_c7s_percentage_leaves_out_where_c7_is_shown():
+    c7 = replace(verdict("C7", PARTLY), halves="Without noise, it held in 3 of 4 runs of ES.")
+    assert text.legend([c7]).endswith(f"in training, too. {c7.halves}")
+    assert "C7" not in text.legend([verdict("C1", PARTLY)])
+
+
+def test_the_commit_that_fixed_the_thresholds_is_named_with_its_date_and_how_to_see_it():
+    found = Fixed(Commit("a" * 40, "2026-01-01 10:00"), Commit("b" * 40, "2026-01-02 11:00"))
+    said = text.fixed(found)
+    for part in ("`aaaaaaaaaa` (2026-01-01 10:00 UTC)", "`bbbbbbbbbb` (2026-01-02 11:00 UTC)"):
+        assert part in said
+    assert "`git show aaaaaaaaaa`" in said
+    assert "cannot be said" in text.fixed(None)
+
+
+def test_a_page_says_for_which_claims_its_own_runs_agree():
+    known = [verdict("C1", PARTLY), verdict("C2", NOT), verdict("C3", NOT)]
+    assert text.agreement(known, known, "4 published").endswith(
+        "(4 published) give the published outcome for three of three claims."
+    )
+    own = [verdict("C1", PARTLY), verdict("C2", REPRODUCED), verdict("C3", UNDECIDABLE)]
+    assert text.agreement(own, known, "4 fresh").endswith(
+        "give the published outcome for one of three claims, another one for one (C2 reproduced)"
+        " and none for one (C3)."
+    )
+
+
+def test_the_parts_of_a_claim_are_listed_with_what_is_clear():
+    judged = [
+        verdict("C1", PARTLY),
+        replace(verdict("C2", NOT), halves="Both.", as_claimed=("So.",), reverse=("Not so.",)),
+    ]
+    assert text.halves(judged) == "- **C2.** Both.\n  - So.\n  - Not so."
 
 
 @pytest.mark.parametrize(
@@ -111,7 +167,10 @@ def test_variants_that_change_a_verdict_are_counted_once():
 def test_where_the_reverse_of_a_claim_was_seen_is_said_with_its_name():
     judged = [verdict("C1", PARTLY), replace(verdict("C2", NOT), reverse=("So.", "And so."))]
     assert text.reversals(judged) == "C2: So. And so."
-    assert text.reversals(judged[:1]) == "Nowhere was the reverse of a claim seen."
+    assert text.reversals(judged[:1]) == "nowhere was it seen."
+    judged = [verdict("C1", PARTLY), replace(verdict("C2", NOT), as_claimed=("So.",))]
+    assert text.confirmations(judged) == "C2: So."
+    assert text.confirmations(judged[:1]).startswith("nowhere")
 
 
 def test_claims_of_our_own_are_confirmed_or_not_and_never_called_reproduced():
@@ -133,9 +192,9 @@ def test_a_claim_with_words_of_its_own_is_counted_apart():
         replace(verdict("C8", NOT), said="the guarantee does not apply"),
         verdict("C9", PARTLY),
     ]
-    assert text.outcomes(judged) == (
-        "Of 3 claims: 1 partly reproduced (C9), 1 not reproduced (C2) and 1 where the guarantee"
-        " does not apply (C8)."
+    assert text.answer(judged).endswith(
+        "one is partly reproduced (C9), one is not reproduced (C2) and for one the guarantee does"
+        " not apply (C8)."
     )
 
 

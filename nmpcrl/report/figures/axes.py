@@ -16,45 +16,60 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from nmpcrl import Vector
 from nmpcrl.control import Task
-from nmpcrl.report.figures.style import DECAY_TITLES, INK, LOOKS, hatched, line, subplots, thin
+from nmpcrl.report.figures.sheet import fitting, sheet
+from nmpcrl.report.figures.style import (
+    BAND,
+    DECAY_TITLES,
+    INK,
+    LOOKS,
+    hatched,
+    line,
+    subplots,
+    thin,
+)
 
+NARROW_ROW = 0.7  # of a row of maps on a narrow sheet, over one on a wide sheet
 DEEP = 1e4  # what is less than this part of a threshold is drawn as much
 LEAST = 1.5  # high over low of an axis that has hardly anything to show
 FEW = 20  # high over low of an axis on which powers of ten are too few
-COLUMNS = 3  # maps side by side
+MAPS = {False: 3, True: 2}  # side by side: on a wide sheet, on a narrow one
 
 
 def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
     """Obstacles, the circle Xi = 0 around each, start and target; equal scales."""
     x, y, clearance = task.discs
     for place in zip(x, y, clearance / 2, strict=True):
-        axes.add_patch(Circle(place[:2], place[2] - task.robot_diameter / 2, color="#CFCFCF"))
+        disc = {"fc": "#CFCFCF", "ec": "#8A8A8A", "lw": 0.8}
+        axes.add_patch(Circle(place[:2], place[2] - task.robot_diameter / 2, **disc))
         axes.add_patch(Circle(place[:2], place[2], fill=False, ec="#8A8A8A", ls="--", lw=0.8))
     axes.plot(*task.start[:2], "o", color=INK, ms=5)
     axes.plot(*task.target[:2], "*", color=INK, ms=9)
     if labels:
-        for point, name in ((task.start, "start"), (task.target, "target")):
-            axes.annotate(
-                name, tuple(point[:2]), (0, 7), textcoords="offset points", ha="center", va="bottom"
-            )
+        above: dict[str, Any] = {"xytext": (0, 7), "textcoords": "offset points", "va": "bottom"}
+        axes.annotate("start", tuple(task.start[:2]), ha="left", **above)
+        axes.annotate("target", tuple(task.target[:2]), ha="center", **above)
     axes.set_aspect("equal")
 
 
-def map_grid(names: Sequence[str], row: float, rest: float) -> tuple[Figure, dict[str, Axes], Any]:
+def map_grid(
+    names: Sequence[str], row: float, rest: float, **options: Any
+) -> tuple[Figure, dict[str, Axes], Any]:
     """A map for each name, to one scale; what is left over in the last row is hidden.
 
     Args:
         names: of the layouts.
         row: height of a row of maps [inches].
         rest: height of what stands above and below them [inches].
+        options: of `subplots`.
 
     Returns:
         The figure, the map of each name, and all maps row by row.
     """
-    columns = min(COLUMNS, len(names))
+    columns = min(MAPS[sheet().narrow], len(names))
     rows = -(-len(names) // columns)
-    options = {"squeeze": False, "sharex": True, "sharey": True}
-    figure, grid = subplots(rows, columns, row * rows + rest, **options)
+    tall = NARROW_ROW * row * rows + rest + 0.5
+    options = {"squeeze": False, "sharex": True, "sharey": True, "tall": tall} | options
+    figure, grid = subplots(rows, columns, row * rows + rest, across=columns, **options)
     for axes in grid.flat[len(names) :]:
         axes.set_visible(False)
     return figure, dict(zip(names, grid.flat, strict=False)), grid
@@ -93,10 +108,10 @@ def logarithmic(axis: Axes, which: str, values: Vector, border: float) -> Callab
     start, middle, stop = high * room ** np.array([1, 2, 3])
     axis.set(**{f"{which}scale": "log", f"{which}lim": (low / room, stop)})
     if which == "x":
-        axis.axvspan(start, stop, color="0.93", zorder=0)
+        axis.axvspan(start, stop, **BAND)
         axis.text(middle, 0.01, "∞", transform=axis.get_xaxis_transform(), ha="center")
     else:
-        axis.axhspan(start, stop, color="0.93", zorder=0)
+        axis.axhspan(start, stop, **BAND)
         axis.text(0.01, middle, "∞", transform=axis.get_yaxis_transform(), va="center")
     ticks = {"x": axis.xaxis, "y": axis.yaxis}[which]
     if high / low < FEW:
@@ -110,11 +125,18 @@ def jitter(count: int, width: float) -> Vector:
     return np.linspace(-width, width, count) if count > 1 else np.zeros(count)
 
 
+def below(
+    figure: Figure, handles: Sequence[Any], labels: Sequence[str] | None = None, **look: Any
+) -> None:
+    """A legend below all panels, in as many columns as there is room for."""
+    names = [str(handle.get_label()) for handle in handles] if labels is None else [*labels]
+    shown: dict[str, Any] = {"ncols": fitting(names), "alignment": "left", **look}
+    figure.legend(handles, names, loc="outside lower left", **shown)
+
+
 def legend(figure: Figure, learners: Iterable[str], *others: Line2D) -> None:
     """One entry a learner, below all panels."""
-    handles = [Line2D([], [], label=name, **line(name)) for name in learners]
-    handles += others
-    figure.legend(handles=handles, loc="outside lower left", ncols=len(handles))
+    below(figure, [*(Line2D([], [], label=name, **line(name)) for name in learners), *others])
 
 
 def one_entry_each(

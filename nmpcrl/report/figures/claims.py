@@ -1,10 +1,9 @@
-"""One figure a claim: what was measured in each run, and what share says yes.
+"""One figure a claim: what was measured in each run, and in what share it holds.
 
 Every figure takes the claim's `Verdict`, and its title is the outcome and what it rests on. No run
 is dropped: what was cut short is drawn in the grey strip marked ∞.
 """
 
-import textwrap
 from collections.abc import Iterable
 from typing import Any
 
@@ -24,9 +23,11 @@ from nmpcrl.claims import paper_claims
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.rule import Assumption, Verdict
-from nmpcrl.report.figures.axes import jitter, label_panel, logarithmic
+from nmpcrl.report.figures.axes import below, jitter, label_panel, logarithmic
 from nmpcrl.report.figures.panels import part, shares, strips
 from nmpcrl.report.figures.style import (
+    AT_ONE,
+    BAND,
     INK,
     LOOKS,
     STEP_PARTS,
@@ -41,18 +42,18 @@ from nmpcrl.report.figures.style import (
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.records import Column, Records, Stopped
 
-LINE = 80  # characters of a title
 SOLVER_NAMES = {"riccati": "riccati", "fatrop": "fatrop", "ipopt": "Ipopt"}
+ROOM = 12  # over the largest count, for the sums that stand above
 LAGS = 30  # steps
 ABOVE: dict[str, Any] = {
     "xycoords": ("data", "axes fraction"),
     "ha": "center",
     "va": "top",
     "rotation": 90,
-    "fontsize": "xx-small",
+    "fontsize": "small",
 }
 PROFILED = (-0.5, 0.15)  # shares of the cost saved
-SIZE_MARKS = {"small": ("o", "0.6"), "medium": ("^", "0.35"), "large": ("s", "black")}
+SIZE_MARKS = {"small": ("o", "0.55"), "medium": ("^", "0.3"), "large": ("s", "black")}
 
 
 @page
@@ -75,7 +76,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     claim = paper_claims.BY_TIME[verdict.claim]
     solvers = list(timings.solver.unique())
     figure, axis = subplots(height=1.1 + 0.55 * len(solvers))
-    axis.axvspan(*claim.claimed, color="0.9", zorder=0, label="as claimed")
+    axis.axvspan(*claim.claimed, **BAND)
     for row, solver in enumerate(solvers):
         per_learner = timings[timings.solver == solver].set_index("learner")
         for y, name in ((row - 0.2, "ES"), (row + 0.2, learner)):
@@ -87,15 +88,15 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
     axis.margins(x=0.12)
     axis.set_xlabel("time of a step / time of a step of ES")
     handles = [Rectangle((0, 0), 1, 1, **hatched(*look)) for look in STEP_PARTS.values()]
-    handles.append(Rectangle((0, 0), 1, 1, color="0.9"))
+    handles.append(Rectangle((0, 0), 1, 1, **BAND))
     names = [*STEP_PARTS, "as claimed"]
-    figure.legend(handles, names, loc="outside lower left", ncols=len(names), fontsize="small")
+    below(figure, handles, names)
     solver = SOLVER_NAMES[paper_claims.SOLVER]
     if paper_claims.SOLVER not in solvers:
         return _titled(figure, verdict, f"no time was taken with {solver}")
     value = ratio(timings, paper_claims.SOLVER, learner)
     finding = f"with {solver}, a step of {learner} takes {value} of one of ES"
-    return marked(_titled(figure, verdict, finding), "measured on the machine that made this page")
+    return marked(_titled(figure, verdict, finding), "the published measurement")
 
 
 @page
@@ -118,7 +119,8 @@ def same_policy(found: Evidence, verdict: Verdict) -> Figure:
 def held_out(found: Evidence, verdict: Verdict) -> Figure:
     """C6: the network's error on held-out pairs with theta as an input, over that without."""
     figure, panel, drawn = _measured(found, verdict)
-    finding = f"given θ, the network errs at most {paper_claims.MORE_ACCURATE} times as much"
+    limit = paper_claims.MORE_ACCURATE
+    finding = f"with θ as an input, the network's error is at most {limit} times as large"
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
@@ -132,15 +134,15 @@ def violations(found: Evidence, verdict: Verdict) -> Figure:
         _counts(axis, drawn.runs, column)
         axis.set_xlabel(title)
         axis.tick_params(labelleft=axis is axes[0])
-    axes[0].set_ylabel("states in an obstacle, of a run")
+    axes[0].set_ylabel("states of a run\nin an obstacle")
     top = max(axis.get_ylim()[1] for axis in axes[:-1])
     for axis in axes[:-1]:
-        axis.set_ylim(-0.5, 2 * top)
+        axis.set_ylim(-0.5, ROOM * top)
     sizes = zip(SIZE_MARKS.values(), ("Ξ up to 0.01", "up to 0.1", "above"), strict=True)
     handles = [
         Line2D([], [], label=name, **dots("frozen", marker=m, color=c)) for (m, c), name in sizes
     ]
-    figure.legend(handles=handles, loc="outside lower left", ncols=3, fontsize="small")
+    below(figure, handles)
     return _finished(figure, axes[-1], verdict, "all constraints held", "runs", drawn)
 
 
@@ -154,12 +156,12 @@ def theorem(
     steps = np.arange(1, min(LAGS, delta.size // 2) + 1)
     lags.bar(steps, [np.corrcoef(delta[:-k], delta[k:])[0, 1] for k in steps], color=INK)
     independent = 2 / np.sqrt(delta.size)
-    lags.axhspan(-independent, independent, color="0.8")
+    lags.axhspan(-independent, independent, **BAND)
     lags.axhline(0, color=INK, linewidth=0.8)
     lags.set(xlabel="steps between two TD errors", ylabel="correlation")
     lags.set_title("grey: if drawn independently", **SUBTITLE)
     dropped.semilogy(curvature.episode + 1, curvature.ratio, ".", color=LOOKS["GES"].color)
-    dropped.axhline(1, color="0.6", linewidth=1)
+    dropped.axhline(1, **AT_ONE)
     label_panel(dropped)
     dropped.set_ylabel("dropped term / printed direction")
     listed = tuple(assumptions)
@@ -173,7 +175,7 @@ def theorem(
 def gains(found: Evidence, verdict: Verdict) -> Figure:
     """C9: noise-free cost at the end over that at the start, of RDES and GES."""
     figure, panel, drawn = _measured(found, verdict, left=True)
-    finding = f"learning saves {paper_claims.BETTER:.0%} of the cost or more"
+    finding = f"learning reduces the cost by {paper_claims.BETTER:.0%} or more"
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
@@ -192,11 +194,13 @@ def learners(found: Evidence) -> Figure:
         middles.plot(placed(mean.value), row, look.marker, color=look.color, mec="black")
         _profile(profile, 1 - costs[name][0], name)
     middles.set_yticks(range(len(means)), means)
-    middles.axvline(1, color="0.6", linewidth=0.9)
+    middles.axvline(1, **AT_ONE)
     middles.set(xlabel="noise-free cost, end / start", ylim=(len(means) - 0.5, -0.5))
-    profile.set(xlabel="at least so much of the cost saved", ylabel="share of runs", ylim=(0, 1))
+    profile.set(
+        xlabel="reduction of the noise-free cost, at least", ylabel="share of runs", ylim=(0, 1)
+    )
     profile.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-    profile.legend(fontsize="small", loc="lower left")
+    below(figure, *profile.get_legend_handles_labels())
     best = min(means, key=lambda name: means[name].value)
     title = f"{best} ends lowest, at {means[best]:.3f} of the start's cost (interquartile mean)"
     return marked(headed(figure, title), found.mark)
@@ -205,7 +209,7 @@ def learners(found: Evidence) -> Figure:
 def _panels(measured: int = 1) -> tuple[Figure, Column]:
     """Room for what was measured, and a narrower panel for the share of yes."""
     widths = (2.6 / measured,) * measured + (1,)
-    return subplots(1, measured + 1, 3.7, width_ratios=widths)
+    return subplots(1, measured + 1, 3.7, width_ratios=widths, tall=1.3 + 2.3 * (measured + 1))
 
 
 def _measured(
@@ -240,7 +244,7 @@ def _scatter(axis: Axes, pairs: pd.DataFrame, decay: str) -> None:
     across = logarithmic(axis, "x", pairs.path.to_numpy(float), paper_claims.SAME_PATH)
     up = logarithmic(axis, "y", pairs.cost.to_numpy(float), paper_claims.SAME_COST)
     for one in pairs[pairs.decay == decay].dropna(subset="cost").itertuples():
-        letter = dots("GES", marker=f"${one.layout}$", markersize=5.5, alpha=0.8)
+        letter = dots("GES", marker=f"${one.layout}$", markersize=5.5)
         axis.plot(across(one.path), up(one.cost), **letter)
     axis.set_xlabel("robots apart [m]")
 
@@ -254,7 +258,7 @@ def _counts(axis: Axes, runs: pd.DataFrame, column: str) -> None:
         ):
             counts = runs[f"{column}_{size}"][runs.learner == name].to_numpy(float)
             x = i + offset + jitter(counts.size, 0.1)
-            axis.plot(x, counts, marker, color=color, markersize=2.5, alpha=0.6)
+            axis.plot(x, counts, marker, color=color, markersize=2.5)
             axis.annotate(f"{counts.sum():.0f}", (i + offset, 0.99), **ABOVE)
     axis.set_yscale("symlog", linthresh=1)
     axis.set_xticks(range(len(names)), names)
@@ -304,4 +308,4 @@ def _finished(
 
 def _titled(figure: Figure, verdict: Verdict, finding: str) -> Figure:
     title = f"{verdict.claim} {verdict.words}: {finding}"
-    return headed(figure, textwrap.fill(title, LINE))
+    return headed(figure, title)

@@ -12,6 +12,8 @@ from matplotlib.ticker import PercentFormatter
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, marked, page, subplots
 
+TALL = 2.3  # inches of a row of panels on a narrow sheet
+
 
 @page
 def by_layout(
@@ -36,15 +38,20 @@ def by_layout(
         seen: the lowest and the highest that is drawn.
     """
     layouts = list(runs.layout.unique())
-    options = {"sharey": True, "squeeze": False}
+    options: dict[str, Any] = {
+        "sharey": True,
+        "squeeze": False,
+        "across": 3,
+        "tall": TALL * -(-len(layouts) // 3) + 0.9,
+    }
     figure, grid = subplots(1, len(layouts), 3.3, **options)
     for axes, layout in zip(grid[0], layouts, strict=True):
         for x, learner in enumerate(learners):
             here = (runs.layout == layout) & (runs.learner == learner) & values.notna()
             _strip(axes, x, learner, runs[here], values[here].clip(*seen))
         axes.axhline(0, **LIMIT)
-        axes.set_title(layout, fontsize=9.5)
-        axes.set_xticks(range(len(learners)), learners, rotation=90, fontsize=8)
+        axes.set_title(layout, fontsize="medium")
+        axes.set_xticks(range(len(learners)), learners, rotation=90, fontsize="small")
         axes.set_xlim(-0.6, len(learners) - 0.4)
     grid[0, 0].set(ylabel=label, ylim=(seen[0], seen[1]))
     grid[0, 0].yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
@@ -59,7 +66,7 @@ def _strip(axes: Axes, x: int, learner: str, runs: pd.DataFrame, values: pd.Seri
         face = look.color if decay == "step" else "none"
         place = x + shift + np.linspace(-0.1, 0.1, len(some))
         style: dict[str, Any] = {"color": look.color, "markerfacecolor": face, "markersize": 3.5}
-        axes.plot(place, some, look.marker, linestyle="", alpha=0.8, **style)
+        axes.plot(place, some, look.marker, linestyle="", **style)
     if len(values):
         middle = interquartile_mean(values.to_numpy(), list(runs.layout))
         axes.plot([x - 0.35, x + 0.35], [middle.value] * 2, color="black", linewidth=1.6)

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,14 +11,14 @@ from matplotlib.patches import Circle
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
 from nmpcrl.learning.rollout import Rollout
-from nmpcrl.report.figures.axes import draw_task
-from nmpcrl.report.figures.style import INK, SYMBOLS, TEAL, WINE, headed, page, subplots
+from nmpcrl.report.figures.axes import below, draw_task, map_grid
+from nmpcrl.report.figures.style import INK, SYMBOLS, TEAL, WINE, headed, page, shades, subplots
 
 
 @page
 def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figure:
     """The closed-loop trajectory without noise, and some of the plans behind it."""
-    figure, axes = subplots(height=3.7)
+    figure, axes = subplots(height=3.7, tall=2.7)
     draw_task(axes, task)
     axes.plot(*rollout.states[:, :2].T, color=INK, lw=1.0, label="trajectory without noise")
     for i, plan in enumerate(plans):
@@ -32,7 +31,7 @@ def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figu
         xlabel="x [m]",
         ylabel="y [m]",
     )
-    axes.legend(loc="lower left", ncols=2)
+    below(figure, *axes.get_legend_handles_labels())
     axes.margins(0.04)
     return figure
 
@@ -47,7 +46,7 @@ def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) ->
         plans: those behind its first actions, in order; each ends within the rollout.
     """
     figure, axes = subplots(height=3.6)
-    draw_task(axes, task)
+    draw_task(axes, task, labels=False)
     path, horizon = rollout.states[:, :2], len(plans[0].inputs)
     ends = [np.array([p.states[-1, :2], path[i + horizon]]) for i, p in enumerate(plans)]
     apart = [float(np.linalg.norm(planned - reached)) for planned, reached in ends]
@@ -66,7 +65,7 @@ def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) ->
     axes.set_title(
         f"A plan of {horizon} steps ends up to {apart[farthest]:.2f} m from where the robot then is"
     )
-    figure.legend(loc="outside lower center", ncols=3)
+    below(figure, axes.get_legend_handles_labels()[0])
     return figure
 
 
@@ -84,8 +83,8 @@ def action_values(
         policy: the action of V(s), shape (2,).
     """
     figure, axes = subplots(height=3.6)
-    shades = plt.get_cmap("cividis")(np.linspace(0.75, 0.0, len(speeds)))
-    for speed, column, shade in zip(speeds, values.T, shades, strict=True):
+    palest_first = shades(len(speeds))[::-1]
+    for speed, column, shade in zip(speeds, values.T, palest_first, strict=True):
         axes.plot(turn_rates, column, ".-", color=shade, label=f"Q at {speed:g} m/s")
     axes.axhline(value, color=WINE, ls="--", lw=1.2, label="V(s)")
     axes.plot(policy[1], value, "D", color=WINE, ms=7, label="the policy's action")
@@ -98,7 +97,7 @@ def action_values(
         ylabel="value [cost]",
     )
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    below(figure, handles, labels)
     return figure
 
 
@@ -113,15 +112,16 @@ def theta_effects(
         middle: the closed loop of theta_init.
         others: name of the parameter -> how it was changed -> closed loop; two changes each.
     """
-    figure, grid = subplots(3, 3, height=5.0, sharex=True, sharey=True)
-    for axes, (name, changes) in zip(grid.flat, others.items(), strict=False):
+    figure, maps, grid = map_grid(list(others), 1.5, 0.5)
+    for name, changes in others.items():
+        axes = maps[name]
         draw_task(axes, task, labels=False)
         _trajectory(axes, middle, INK, ":")
         for (change, rollout), side in zip(changes.items(), _SIDES, strict=False):
             _trajectory(axes, rollout, side["color"], side["line"])
             cost = f"{rollout.cost:.0f}" if np.isfinite(rollout.cost) else "fails"
             where = {"x": side["x"], "y": 0.03, "ha": side["ha"], "color": side["color"]}
-            axes.text(s=f"{change}: {cost}", transform=axes.transAxes, fontsize=9.5, **where)
+            axes.text(s=f"{change}: {cost}", transform=axes.transAxes, fontsize="small", **where)
         axes.set_title(f"${SYMBOLS[name]}$", fontsize=12)
     bottom, top = grid[0, 0].get_ylim()
     grid[0, 0].set_ylim(bottom - 1, top)
@@ -140,7 +140,7 @@ def theta_effects(
 @page
 def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) -> Figure:
     """The trajectory in the box of departure A, and in the box as the paper prints it."""
-    figure, axes = subplots(height=3.7)
+    figure, axes = subplots(height=3.9, tall=2.9)
     draw_task(axes, task)
     axes.add_patch(Circle(tuple(task.target[:2]), task.near, fill=False, ec=INK, ls=":", lw=1))
     axes.annotate(
@@ -165,7 +165,7 @@ def printed_box(task: Task, repaired: Rollout, printed: Rollout, wall: float) ->
         ylabel="y [m]",
     )
     axes.margins(0.04)
-    axes.legend(loc="lower left", fontsize=8.5)
+    below(figure, *axes.get_legend_handles_labels())
     return figure
 
 

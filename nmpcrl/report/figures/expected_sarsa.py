@@ -1,16 +1,16 @@
 """Figures of Expected Sarsa: theta, its largest steps, and the cost with noise and without."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis.metrics import by_episode, noise_free_cost, training_cost
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.figures.axes import logarithmic_if_wide
+from nmpcrl.report.figures.axes import below, logarithmic_if_wide
 from nmpcrl.report.figures.style import (
     DECAY_TITLES,
     INK,
     LOOKS,
+    QUIET,
     SUBTITLE,
     SYMBOLS,
     TEAL,
@@ -18,6 +18,7 @@ from nmpcrl.report.figures.style import (
     headed,
     most_moved,
     page,
+    shades,
     subplots,
 )
 from nmpcrl.report.run import thetas
@@ -36,13 +37,12 @@ def theta_paths(runs: Runs[Records]) -> Figure:
     figure, panels = subplots(1, len(decays), height=3.8, sharey=True, squeeze=False)
     change = np.max([np.ptp(thetas(records), axis=0) for records in runs.values()], axis=0)
     moving = np.flatnonzero(change > 0.02)
-    shades = plt.get_cmap("cividis")(np.linspace(0.0, 0.8, len(moving)))
     lines = ["-", "--", "-.", ":"]
     for axes, decay in zip(panels[0], decays, strict=True):
         for run, records in enumerate(runs.select(decay=decay).values()):
             values = thetas(records)
-            axes.plot(values, color="#BBBBBB", lw=0.7)
-            for i, (component, shade) in enumerate(zip(moving, shades, strict=True)):
+            axes.plot(values, color=QUIET, lw=0.7)
+            for i, (component, shade) in enumerate(zip(moving, shades(len(moving)), strict=True)):
                 axes.plot(
                     values[:, component],
                     color=shade,
@@ -53,7 +53,7 @@ def theta_paths(runs: Runs[Records]) -> Figure:
         axes.set_xlabel("episode")
     panels[0, 0].set_ylabel("component of θ (no unit)")
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=max(1, len(labels)))
+    below(figure, handles, labels)
     return headed(figure, most_moved(change))
 
 

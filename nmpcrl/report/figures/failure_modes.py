@@ -23,10 +23,14 @@ from nmpcrl.claims.failure_modes import (
 )
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.axes import FEW, plain, stacked
+from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import (
+    BAND,
     LIMIT,
     LOOKS,
     SUBTITLE,
+    TEAL,
+    WINE,
     hatched,
     headed,
     marked,
@@ -37,12 +41,9 @@ from nmpcrl.study import paper
 from nmpcrl.study.records import Column
 
 GOOD = "0.92"  # the grey of what went well
-PATTERNS = (  # colour and hatching of what did not, in order
-    ("#D55E00", ""),
-    ("#0072B2", "////"),
-    ("#E69F00", "\\\\\\\\"),
-    ("#56B4E9", "...."),
-    ("0.55", ""),
+PATTERNS = (  # colour and hatching of what did not: of mechanisms, and of endings
+    (("#5C0F3A", ""), (WINE, "//"), ("#A0487A", "--"), ("#BC6F9A", "\\\\"), (WINE, "xx")),
+    (("#0B4744", ""), (TEAL, "||"), ("#3D8F8A", "++"), ("#0B4744", "x"), (TEAL, "-")),
 )
 BELOW: dict[str, Any] = {"bbox_to_anchor": (0.5, 0), "borderaxespad": 3.2, "ncols": 2}
 STOPPED = "stopped in training"
@@ -57,15 +58,15 @@ def reasons(found: Evidence) -> Figure:
     figure, axes = subplots(1, 2, 1.5 + 0.32 * moved.learner.nunique(), sharey=True)
     ends = moved.ending.mask(moved.wrong == Failure.STOPPED, STOPPED)
     kinds = (moved.mechanism, (*MECHANISMS, WELL)), (ends, (STOPPED, *ENDINGS[1:], ENDINGS[0]))
-    for axis, (said, names) in zip(axes, kinds, strict=True):
-        counts = pd.crosstab(moved.learner, said)
+    for axis, (kind, names), patterns in zip(axes, kinds, PATTERNS, strict=True):
+        counts = pd.crosstab(moved.learner, kind)
         counts = counts.reindex(moved.learner.unique(), columns=list(names), fill_value=0)
-        looks = dict(zip(names, (*PATTERNS[: len(names) - 1], (GOOD, "")), strict=True))
+        looks = dict(zip(names, (*patterns[: len(names) - 1], (GOOD, "")), strict=True))
         _numbered(axis, counts, looks)
         handles = [Rectangle((0, 0), 1, 1, **hatched(*look)) for look in looks.values()]
         axis.legend(handles, names, loc="upper center", **BELOW)
         axis.set_xlabel("runs")
-    axes[0].set_title("what was at work when the cost rose", **SUBTITLE)
+    axes[0].set_title("mechanism when the cost rose", **SUBTITLE)
     axes[1].set_title("how the last rollout ended", **SUBTITLE)
     axes[0].invert_yaxis()
     wrong = moved.mechanism[moved.mechanism != WELL].value_counts()
@@ -86,7 +87,9 @@ def traced(examples: Mapping[str, RunSummary], first_rollouts: Mapping[str, Colu
         figure, axis = subplots(height=0.6)
         axis.set_axis_off()
         return headed(figure, "No run went wrong")
-    figure, axes = subplots(4, len(examples), 6.2, sharex="col", squeeze=False)
+    side = min(2, len(examples)) if sheet().narrow else len(examples)
+    options: dict[str, Any] = {"sharex": "col", "squeeze": False, "across": side}
+    figure, axes = subplots(4, len(examples), 6.2, **options)
     for column, (name, run) in zip(axes.T, examples.items(), strict=True):
         _trace(column, run, first_rollouts[name])
         e = run.name
@@ -98,9 +101,10 @@ def traced(examples: Mapping[str, RunSummary], first_rollouts: Mapping[str, Colu
         "share of the\nnetwork in δ",
         r"$\theta_c$",
     )
-    for axis, label in zip(axes[:, 0], labels, strict=True):
-        axis.set_ylabel(label)
-    figure.align_ylabels(axes[:, 0])
+    for row, label in zip(axes[:, ::side], labels, strict=True):
+        for axis in row:
+            axis.set_ylabel(label)
+    figure.align_ylabels(axes[:, ::side].ravel())
     names = ", ".join(examples)
     mark = f"{len(examples)} runs trained here; grey: the episodes in which the cost rose"
     return marked(headed(figure, f"One run of each kind: {names}"), mark)
@@ -128,7 +132,7 @@ def _trace(column: Column, run: RunSummary, first_rollout: Column) -> None:
     column[3].set_ylim(max(low, SEEN[0]), min(high, SEEN[1]))
     limits = (1.0, OVERSHOOT, OVER_PREDICTED, closes_at(task, first_rollout[:, :2]))
     for axis, limit in zip(column, limits, strict=True):
-        axis.axvspan(window.start, window.stop, color="0.9", zorder=0)
+        axis.axvspan(window.start, window.stop, **BAND)
         axis.axhline(limit, **LIMIT)
         axis.xaxis.set_major_locator(MaxNLocator(3, integer=True))
 
@@ -139,4 +143,4 @@ def _numbered(axis: Axes, counts: pd.DataFrame, looks: Mapping[str, tuple[str, s
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
     for name, bars in stacked(axis, counts, looks, 0.7).items():
         labels = [str(n) if n > enough else "" for n in counts[name]]
-        axis.bar_label(bars, labels, label_type="center", fontsize="x-small", bbox=box)
+        axis.bar_label(bars, labels, label_type="center", fontsize="small", bbox=box)

@@ -1,6 +1,7 @@
 """Figs. 1 and 2 of the paper for the few runs that a chapter trains, one line a run."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -39,7 +40,7 @@ def _curves(runs: Runs[Records], learners: tuple[str, ...]) -> Figure:
     One column a reading of the decay, one line a seed.
     """
     decays, shown = runs.values_of("decay"), (*learners, "frozen")
-    options = {"sharex": True, "sharey": "row", "squeeze": False}
+    options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
     figure, axes = subplots(2, len(decays), 5.0, **options)
     for (above, below), decay in zip(axes.T, decays, strict=True):
         for learner in shown:
@@ -49,7 +50,7 @@ def _curves(runs: Runs[Records], learners: tuple[str, ...]) -> Figure:
                 below.plot(*metrics.noise_free_cost(records), **thin(learner))
         label_panel(above, decay, xlabel="")
         label_panel(below)
-    axes[0, 0].set_ylabel("cost of a training episode [-]")
+    axes[0, 0].set_ylabel("cost of a\ntraining episode [-]")
     axes[1, 0].set_ylabel("cost without noise [-]")
     low, high = axes[1, 0].get_ylim()
     initial = metrics.initial_cost(next(iter(runs.values())))

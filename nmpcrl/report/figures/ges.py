@@ -1,5 +1,7 @@
 """Figures of GES: gradient TD in the place of the semi-gradient."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -8,8 +10,8 @@ from nmpcrl.analysis.gradient_td import Curvature, directions
 from nmpcrl.analysis.two_state import Chain, follow, spectral_radius
 from nmpcrl.learning.learners import gradient_td, semi_gradient
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.figures.axes import label_panel, one_entry_each
-from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS, headed, page, subplots, thin
+from nmpcrl.report.figures.axes import below, label_panel, one_entry_each
+from nmpcrl.report.figures.style import AT_ONE, DECAY_TITLES, LOOKS, headed, page, subplots, thin
 from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
@@ -27,13 +29,13 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
         label = rf"gradient TD, $\beta = {ratio:g}\alpha$"
         left.semilogy(path, line, color=LOOKS["GES"].color, label=label)
     left.set(xlabel="update", ylabel=r"$|\theta|$ [-]", ylim=(1e-3, 1e4))
-    figure.legend(loc="outside lower center", ncols=4, fontsize="small")
+    below(figure, *left.get_legend_handles_labels())
     grid = np.geomspace(0.05, 20, 2000)
     radius = np.array(
         [spectral_radius(chain, gradient_td(alpha, r * alpha, chain.gamma)) for r in grid]
     )
     right.semilogx(grid, radius, color=LOOKS["GES"].color)
-    right.axhline(1, color="0.6", linewidth=1)
+    right.axhline(1, **AT_ONE)
     right.axvline(paper.BETA / paper.ALPHA, color="0.35", linewidth=1, linestyle=":")
     right.annotate(" Table I", (paper.BETA / paper.ALPHA, radius.max()), color="0.35", va="top")
     right.set(xlabel=r"$\beta / \alpha$ [-]", ylabel="spectral radius [-]")
@@ -63,12 +65,20 @@ def overshoots(runs: Runs[Records], learners: tuple[str, ...] = ("ES", "GES")) -
     axes[0, 0].set_ylim(0, None)
     axes[0, 0].set_ylabel(r"largest $\alpha\,\Vert\phi\Vert^2$ [-]")
     one_entry_each(axes[0, -1], learners)
-    shares = [
-        f"{np.median([metrics.overshooting(r) for r in mine.values()]):.1%} of the steps of {name}"
+    shares = {
+        name: float(np.median([metrics.overshooting(records) for records in mine.values()]))
         for name in learners
         if (mine := runs.select(learner=name))
-    ]
-    return headed(figure, f"Steps above 2: {' and '.join(shares)} (medians)")
+    }
+    return headed(figure, f"In the median run, {_above(shares)}")
+
+
+def _above(shares: Mapping[str, float]) -> str:
+    """What share of the steps of each learner is above 2, in words."""
+    if not any(shares.values()):
+        return f"no step of {' or '.join(shares)} is above {OVERSHOOT:g}"
+    listed = [f"{share:.1%} of the steps of {name}" for name, share in shares.items()]
+    return f"{' and '.join(listed)} are above {OVERSHOOT:g}"
 
 
 @page
@@ -85,7 +95,7 @@ def corrections(runs: Runs[Records]) -> Figure:
     for decay in runs.values_of("decay"):
         line = "-" if decay == "step" else ":"
         axes.plot([], [], color=LOOKS["GES"].color, linestyle=line, label=DECAY_TITLES[decay])
-    axes.axhline(1, color="0.6", linewidth=1)
+    axes.axhline(1, **AT_ONE)
     label_panel(axes)
     axes.set(ylabel="correction / semi-gradient [-]", ylim=(0, None))
     axes.legend()
@@ -98,9 +108,9 @@ def curvatures(measured: tuple[Curvature, ...]) -> Figure:
     """Size of the dropped term beside the printed direction, at sampled steps of GES."""
     figure, axes = subplots(height=2.6)
     for run in measured:
-        axes.semilogy(run.episode + 1, run.ratio, ".", color=LOOKS["GES"].color, alpha=0.5)
+        axes.semilogy(run.episode + 1, run.ratio, ".", color=LOOKS["GES"].color)
     every = np.concatenate([run.ratio for run in measured])
-    axes.axhline(1, color="0.6", linewidth=1)
+    axes.axhline(1, **AT_ONE)
     label_panel(axes)
     axes.set(ylabel="dropped / printed [-]")
     axes.set_title(f"The dropped term is {np.median(every):.1%} of the printed one (median)")

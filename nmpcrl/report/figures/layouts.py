@@ -20,10 +20,12 @@ from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.rule import NEARLY_ALL, NEARLY_NONE
 from nmpcrl.control import Task
-from nmpcrl.report.figures.axes import draw_task, map_grid, plain
+from nmpcrl.report.figures.axes import below, draw_task, map_grid, plain
 from nmpcrl.report.figures.style import (
+    AT_ONE,
     LIMIT,
     LOOKS,
+    SUBTITLE,
     TEAL,
     WINE,
     headed,
@@ -62,10 +64,10 @@ def layouts(rollouts: Mapping[str, Matrix]) -> Figure:
             if width < NARROW:
                 _gap(axes, task, sides, shut=width <= 0)
         kind = "closing" if narrowest <= 0 else "open"
-        axes.set_title(f"{name}: {kind}, {narrowest:+.2f} m", fontsize=9)
+        axes.set_title(f"{name}: {kind}, {narrowest:+.2f} m", **SUBTITLE)
     grid[0, 0].set_ylim(-3.0, 6.0)
-    figure.supxlabel("x [m]", fontsize=9)
-    figure.supylabel("y [m]", fontsize=9)
+    figure.supxlabel("x [m]", fontsize="medium")
+    figure.supylabel("y [m]", fontsize="medium")
     count = f"{closing} of {len(rollouts)} layouts"
     finding = rf"In {count}, a gap of the first rollout is closed at $\theta_c$ = {margin:g}"
     return headed(figure, finding)
@@ -75,7 +77,7 @@ def layouts(rollouts: Mapping[str, Matrix]) -> Figure:
 def theta_c(found: Evidence) -> Figure:
     """theta_c over training, a column a layout and a row a reading of the decay."""
     names, decays = (found.summaries.values_of(field) for field in ("layout", "decay"))
-    options = {"sharex": True, "sharey": True, "squeeze": False}
+    options: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False, "across": 3}
     figure, grid = subplots(len(decays), len(names), 1.9 * len(decays) + 0.9, **options)
     margin = paper.task().margin
     ends: list[float] = []
@@ -89,13 +91,13 @@ def theta_c(found: Evidence) -> Figure:
                 axes.axhline(shut, color=CLOSED, linewidth=0.9, linestyle=":")
         row[0].set(ylabel=rf"$\theta_c$, decay per {decay}", ylim=SEEN)
     for axes, name in zip(grid[0], names, strict=True):
-        axes.set_title(name, fontsize=9.5)
+        axes.set_title(name, fontsize="medium")
     for axes in grid[-1]:
         axes.set_xlabel("episode")
     handles = [Line2D([], [], label=name, **LOOKS[name].line) for name in LEARNING]
     handles.append(Line2D([], [], label="$d_o$", **LIMIT))
     handles.append(Line2D([], [], label="a gap closes", color=CLOSED, linestyle=":"))
-    figure.legend(handles=handles, loc="outside lower left", ncols=3, fontsize="small")
+    below(figure, handles)
     beyond = np.array(ends) - margin
     near, past = int((np.abs(beyond) <= NEAR).sum()), int((beyond > NEAR).sum())
     finding = (
@@ -113,8 +115,9 @@ def borders(values: Mapping[str, Values], mark: str) -> Figure:
         values: of each claim's measure, over the main table.
         mark: where the runs come from.
     """
-    figure, grid = subplots(2, 3, 4.6, sharey=True)
-    for axes, (claim, measured) in zip(grid.flat, values.items(), strict=True):
+    figure, panels, grid = map_grid(list(values), 2.1, 0.4, sharex=False, tall=5.6)
+    for claim, measured in values.items():
+        axes = panels[claim]
         asked = BY_RUNS[claim]
         first, last = asked.borders[[0, -1]]
         curve = asked.at_borders(measured, np.sort([*asked.borders, asked.threshold]))
@@ -122,14 +125,14 @@ def borders(values: Mapping[str, Values], mark: str) -> Figure:
         axes.fill_between(curve.border, curve.low, curve.high, color="0.85", linewidth=0)
         axes.axvline(asked.threshold, **LIMIT)
         for share in (NEARLY_NONE, NEARLY_ALL):
-            axes.axhline(share, color="0.7", linewidth=0.7)
+            axes.axhline(share, **AT_ONE)
         axes.set(xscale="log" if first > 0 else "linear", ylim=(-0.03, 1.03))
         if 0 < last < FEW * first:
             plain(axes.xaxis)
-        axes.set_xlabel(asked.label, fontsize=8)
+        axes.set_xlabel(asked.label, fontsize="small")
         low, high = same_verdict(curve, asked.threshold)
         kept = f"same {low:.2g} to {high:.2g}" if len(curve) else "not decidable"
-        axes.set_title(f"{claim}: {kept}", fontsize=9)
+        axes.set_title(f"{claim}: {kept}", **(SUBTITLE | {"fontsize": "small"}))
     for row in grid:
         row[0].set_ylabel("share of yes")
     stay = sum(BY_RUNS[claim].steady(measured) for claim, measured in values.items())
@@ -162,7 +165,7 @@ def _ways_of_theta_c(axes: Axes, runs: Mapping[Any, RunSummary]) -> list[float]:
         if run.name.learner in LEARNING:
             values: Vector = run.evaluations["theta"][:, -1]
             line = LOOKS[run.name.learner].line
-            axes.plot(run.evaluations["episode"], values, **line, alpha=0.5, linewidth=0.9)
+            axes.plot(run.evaluations["episode"], values, **line, linewidth=0.7)
             ends.append(float(values[-1]))
     return ends
 

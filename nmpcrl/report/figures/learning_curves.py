@@ -6,6 +6,7 @@ quartiles, and leaves its panel through the upper edge.
 """
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -50,7 +51,7 @@ def by_layout(found: Evidence, learners: tuple[str, ...], verdict: Verdict) -> F
     """Cost without noise in every layout, a row a reading, and what the claim came to there."""
     drawn = part(found, learners)
     layouts, decays = found.summaries.values_of("layout"), found.summaries.values_of("decay")
-    options = {"sharex": True, "sharey": True, "squeeze": False}
+    options: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False, "across": 3}
     figure, axes = subplots(len(decays), len(layouts), 1.6 * len(decays) + 1.1, **options)
     for column, layout in zip(axes.T, layouts, strict=True):
         for axis, decay in zip(column, decays, strict=True):
@@ -85,7 +86,7 @@ def judged(summary: RunSummary) -> tuple[Vector, Vector]:
 def _learning_curves(drawn: Evidence, title: str) -> Figure:
     """Cost of each training episode above, without noise below; a column a reading."""
     learners, decays = drawn.summaries.values_of("learner"), drawn.summaries.values_of("decay")
-    options = {"sharex": True, "sharey": "row", "squeeze": False}
+    options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
     figure, axes = subplots(2, len(decays), 5.4, **options)
     for (above, below), decay in zip(axes.T, decays, strict=True):
         runs = drawn.summaries.select(decay=decay)

@@ -10,7 +10,7 @@ from nmpcrl.claims import rule
 from nmpcrl.claims.by_runs import Values
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.rule import Verdict
-from nmpcrl.report.figures.axes import jitter, logarithmic
+from nmpcrl.report.figures.axes import below, jitter, logarithmic
 from nmpcrl.report.figures.style import INK, LIMIT, LOOKS, dots, headed, line, marked
 from nmpcrl.study.records import Column
 
@@ -62,7 +62,9 @@ def strips(axis: Axes, values: Values, border: float) -> None:
     for decay, face in zip(decays, (LOOKS["frozen"].color, "white"), strict=False):
         look = dots("frozen", marker="o", mfc=face)
         kinds.append(Line2D([], [], label=f"noise per {decay}", **look))
-    axis.figure.legend(handles=kinds, loc="outside lower left", ncols=4, fontsize="small")
+    figure = axis.figure
+    assert isinstance(figure, Figure)
+    below(figure, kinds)
 
 
 def shares(axis: Axes, verdict: Verdict) -> None:

@@ -6,13 +6,14 @@ Nowhere else in the book has a learner another look than `style.LOOKS` gives it.
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
 from nmpcrl.claims.paper_claims import diverged, path_distance, unstable
-from nmpcrl.report.figures.axes import label_panel
+from nmpcrl.report.figures.axes import below, label_panel
 from nmpcrl.report.figures.style import DECAY_TITLES, LIMIT, SUBTITLE, headed, page, subplots
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
@@ -107,7 +108,7 @@ def _against_time(
 ) -> tuple[Figure, Column]:
     """States (part 0) or actions (part 1) of the last rollouts: a row a component."""
     decays, period = kept.values_of("decay") or ("step",), paper.nmpc().plant.period
-    options = {"sharex": True, "sharey": "row", "squeeze": False}
+    options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
     figure, grid = subplots(len(components), len(decays), height, **options)
     for column, decay in zip(grid.T, decays, strict=True):
         for learner, (color, line) in LEARNED.items():
@@ -138,7 +139,7 @@ def _legend(figure: Figure, looks: Looks) -> None:
     """One entry a learner, below all panels."""
     axes = figure.axes[0]
     lines = [axes.plot([], [], color=color, ls=line)[0] for color, line in looks.values()]
-    figure.legend(lines, list(looks), loc="outside lower left", ncols=len(looks))
+    below(figure, lines, list(looks))
 
 
 def _counted(runs: Runs[Records], learners: tuple[str, ...], measure: Measure) -> str:

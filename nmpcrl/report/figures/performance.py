@@ -10,8 +10,19 @@ from matplotlib.ticker import FuncFormatter
 
 from nmpcrl.bench import summary
 from nmpcrl.bench.summary import Bench
-from nmpcrl.report.figures.axes import stacked
-from nmpcrl.report.figures.style import INK, LOOKS, STEP_PARTS, SUBTITLE, headed, page, subplots
+from nmpcrl.report.figures.axes import below, stacked
+from nmpcrl.report.figures.style import (
+    AT_ONE,
+    INK,
+    LIMIT,
+    LOOKS,
+    QUIET,
+    STEP_PARTS,
+    SUBTITLE,
+    headed,
+    page,
+    subplots,
+)
 from nmpcrl.study import paper
 
 LABELS = {
@@ -33,7 +44,7 @@ def solve_times(bench: Bench) -> Figure:
     for panel, loop in zip(axes[0], loops, strict=True):
         for row, (solver, one) in enumerate(table.loc[loop].iterrows()):
             marker = MARKERS[str(solver)]
-            panel.plot([one["median"], one.p95], [row, row], color=INK, linewidth=3.5, alpha=0.35)
+            panel.plot([one["median"], one.p95], [row, row], color=INK, linewidth=3.5, alpha=0.6)
             panel.plot(one["max"], row, "|", color=INK, markersize=8)
             panel.plot(one["median"], row, marker, color=INK)
             if one.times > 1:
@@ -62,7 +73,7 @@ def learning_steps(bench: Bench) -> Figure:
         panel.set_title(LABELS[solver], **SUBTITLE)
         panel.set_xlabel("ms a step")
     axes[0, 0].invert_yaxis()
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    below(figure, *axes[0, 0].get_legend_handles_labels())
     shares = {}
     for solver in (solvers[0], solvers[-1]):
         rdes = _parts(table[table.solver == solver]).loc["RDES"]
@@ -121,7 +132,7 @@ def _draw_workers(axes: Axes, bench: Bench) -> None:
         return
     ideal = table.seconds[0] * table.workers[0] / table.workers
     names = [str(workers) for workers in table.workers]
-    axes.bar(names, table.seconds, 0.6, color="0.65")
+    axes.bar(names, table.seconds, 0.6, color=QUIET)
     for name, seconds in zip(names, ideal, strict=True):
         axes.hlines(seconds, int(name == names[-1]) - 0.4, int(name == names[-1]) + 0.4, INK)
     axes.set(xlabel="workers", ylabel=f"{table.runs[0]} runs of ES [s]")
@@ -137,7 +148,7 @@ def scaling(bench: Bench) -> Figure:
         times = summary.scaling(bench, varied).iteration
         slope, fixed = np.polyfit(times.index, times, 1, w=1 / times)
         ends = np.array([0, times.index[-1]])
-        panel.plot(ends, fixed + slope * ends, color="0.6", linestyle="--", label="straight line")
+        panel.plot(ends, fixed + slope * ends, color=QUIET, linestyle="--", label="straight line")
         panel.plot(times.index, times, "o", color=INK, label="measured")
         panel.set(xlabel=parts, xlim=(0, None), ylim=(0, None))
         low, high = summary.marginal(bench, varied)
@@ -156,8 +167,8 @@ def saving(bench: Bench) -> Figure:
     theirs = 1e3 * summary.PAPER_SOLVE
     times = np.geomspace(0.6 * measured.solve.min(), 2.5 * theirs, 300)
     axes.plot(times, model.ratio(times), color=LOOKS["RDES"].color, label="computed")
-    axes.axhline(0.5, color="0.5", linewidth=0.9, linestyle=(0, (2, 2)))
-    axes.axhline(1.0, color="0.5", linewidth=0.9)
+    axes.axhline(0.5, **LIMIT)
+    axes.axhline(1.0, **AT_ONE)
     for solver, one in measured.iterrows():
         _mark(axes, str(solver), one.solve, one.ratio, filled=True)
     for solver in ("ipopt MX", "rebuilt"):
@@ -165,9 +176,9 @@ def saving(bench: Bench) -> Figure:
     axes.plot(theirs, 0.5, "*", color=INK, markersize=11, zorder=3)
     axes.annotate("the paper", (theirs, 0.5), (0, -14), ha="center", **SMALL)
     if model.break_even > 0:
-        axes.axvline(model.break_even, color="0.5", linewidth=0.9, linestyle="--")
+        axes.axvline(model.break_even, **AT_ONE, linestyle="--")
         text = f" break-even:\n {model.break_even:.2f} ms"
-        place = (model.break_even, 0.97)
+        place = (model.break_even, 0.8)
         axes.annotate(text, place, xycoords=("data", "axes fraction"), va="top", fontsize="small")
     axes.set(xscale="log", xlabel="time of one solve [ms]", ylabel="step of RDES / step of ES")
     axes.set(ylim=(0, 1.1 * max(measured.ratio.max(), model.ratio(times[0]))))
@@ -180,7 +191,7 @@ PLACES = {  # of a name, from its point
     "fatrop": ((-4, 7), "right"),
     "ipopt": ((4, 7), "left"),
     "ipopt MX": ((0, -15), "right"),
-    "rebuilt": ((0, -15), "center"),
+    "rebuilt": ((0, -26), "center"),
 }
 SMALL: dict[str, Any] = {"textcoords": "offset points", "fontsize": "small"}
 
@@ -190,7 +201,8 @@ def _mark(axes: Axes, solver: str, solve: float, ratio: float, *, filled: bool) 
     face = INK if filled else "white"
     axes.plot(solve, ratio, MARKERS[solver], color=INK, markerfacecolor=face, zorder=3)
     place, side = PLACES[solver]
-    axes.annotate(LABELS[solver], (solve, ratio), place, ha=side, **SMALL)
+    name = LABELS[solver].replace(" each ", "\neach ")
+    axes.annotate(name, (solve, ratio), place, ha=side, **SMALL)
 
 
 def _found(ratios: pd.Series, model: summary.Saving) -> str:

@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from nmpcrl import Matrix
 from nmpcrl.analysis.policy_search import Found
 from nmpcrl.analysis.trajectory import describe
-from nmpcrl.report.figures.axes import draw_task, map_grid
+from nmpcrl.report.figures.axes import below, draw_task, map_grid
 from nmpcrl.report.figures.style import LOOKS, TEAL, WINE, headed, page, subplots
 from nmpcrl.study import paper
 
@@ -32,16 +32,16 @@ NAMES = {
 def searches(found: Mapping[str, Found]) -> Figure:
     """The lowest noise-free cost so far over the rollouts of each search, by layout."""
     figure, axes = subplots(height=3.0)
-    shades = np.linspace(0.0, 0.7, len(found))
+    greys = np.linspace(0.0, 0.55, len(found))
     ends = {layout: one.cost / one.initial for layout, one in found.items()}
-    for one, shade in zip(found.values(), shades, strict=True):
+    for one, shade in zip(found.values(), greys, strict=True):
         share = np.array([*one.best, one.cost]) / one.initial
         axes.step([*one.rollouts, one.made], share, where="post", color=str(shade), linewidth=1.2)
     for layout, y in _spaced(ends, 0.06 * (1 - min(ends.values()))).items():
         axes.annotate(f"  {layout}", (max(one.made for one in found.values()), y), va="center")
     axes.set(xlabel="rollouts without noise", ylabel="lowest cost / first", xscale="log")
     gains = [one.gain for one in found.values()]
-    return headed(figure, f"The search takes {min(gains):.0%} to {max(gains):.0%} off the cost")
+    return headed(figure, f"The search reduces the cost by {min(gains):.0%} to {max(gains):.0%}")
 
 
 @page
@@ -60,13 +60,13 @@ def trajectories(rollouts: Mapping[str, Mapping[str, Matrix]]) -> Figure:
             if not _arrives(states, name):
                 place = states[np.isfinite(states).all(axis=1)][-1, :2]
                 axes.plot(*place, "X", color=WAYS[way]["color"], markersize=6)
-        axes.set_title(name, fontsize=9.5)
+        axes.set_title(name, fontsize="medium")
     grid[0, 0].set_ylim(-3.0, 6.0)
-    figure.supylabel("y [m]", fontsize=9)
+    figure.supylabel("y [m]", fontsize="medium")
     for axes in grid[-1]:
         axes.set_xlabel("x [m]")
     handles = [Line2D([], [], label=NAMES[way], **look) for way, look in WAYS.items()]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    below(figure, handles)
     arrived = {
         way: sum(_arrives(ways[way], name) for name, ways in rollouts.items()) for way in WAYS
     }

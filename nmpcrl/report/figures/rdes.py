@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.imitation import Imitation
 from nmpcrl.report.figures.axes import label_panel, one_entry_each
-from nmpcrl.report.figures.style import LOOKS, headed, page, subplots, thin
+from nmpcrl.report.figures.style import AT_ONE, LOOKS, headed, page, subplots, thin
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
@@ -23,7 +23,7 @@ def literal_and_gated(literal: Records, gated: Records) -> Figure:
         axes.annotate(f" {name}", (theta_x.size - 1, theta_x[-1]), va="center")
     fits = np.flatnonzero(np.isfinite(gated.steps["next_value"]))
     if fits.size:
-        axes.axvline(fits[0], color="0.6", linewidth=1)
+        axes.axvline(fits[0], **AT_ONE)
         place = {"xycoords": ("data", "axes fraction"), "ha": "right", "color": "0.35"}
         axes.annotate("first fit ", (fits[0], 0.75), **place)
     lowest = literal.steps["theta"][: fits[0] if fits.size else None, 0].min()
@@ -48,7 +48,7 @@ def online_errors(runs: Runs[Records], learners: tuple[str, ...] = ("DES", "RDES
                 known = error[np.isfinite(error)]
                 last[learner].extend(known[known.size // 2 :])
         label_panel(panel, decay)
-    axes[0, 0].set_ylabel("error of the next value [cost]")
+    axes[0, 0].set_ylabel("error of the\nnext value [cost]")
     one_entry_each(axes[0, -1], learners)
     means = " and ".join(f"{np.median(last[name]):.0f} ({name})" for name in learners)
     return headed(figure, f"In the second half of training, the next value is off by {means}")
@@ -72,7 +72,7 @@ def held_out_errors(imitations: Iterable[Imitation]) -> Figure:
     )
     ratios = np.array([run.ratio for run in imitations])
     helped, all_runs = int((ratios < 1).sum()), len(ratios)
-    title = f"Given θ, the network errs less in {helped} of {all_runs} runs"
+    title = f"With θ as an input, the error is smaller in {helped} of {all_runs} runs"
     axes.set_title(f"{title} (median ratio {np.median(ratios):.2f})")
     return figure
 

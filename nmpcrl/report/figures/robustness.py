@@ -19,6 +19,7 @@ from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import WHOLE, groups
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report.figures.axes import plain
+from nmpcrl.report.figures.sheet import in_words, sheet
 from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, marked, page, subplots
 from nmpcrl.report.tables import WORDS
 from nmpcrl.study.experiment import Experiment
@@ -30,12 +31,16 @@ FILLS = {  # with the colour of the word; the darker, the more is left of the cl
     UNDECIDABLE: ("white", "0.45"),
 }
 SYMBOLS = {"c_epsilon": r"$c_\epsilon$", "alpha x": "α ×", "beta x": "β ×"}
+ABREAST = 3  # claims side by side on a narrow sheet
+LETTERS = -2.15  # where the letters of the departures stand, in widths of a cell
+FOLD = {False: 13, True: 10}  # characters of a line above a column, wide and narrow
+SMALL: dict[str, Any] = {"va": "center", "fontsize": "small"}
 MOST_COST = 1.5  # of theta_init's, that is drawn
 
 
 @page
 def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
-    """What becomes of each claim in each row; a frame where it is not what it is held against.
+    """What becomes of each claim in each row, framed where it is not what it is compared with.
 
     Args:
         judged: of `robustness_map`.
@@ -44,18 +49,24 @@ def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
     claims, rows = list(judged.claim.unique()), list(judged.variant.unique())
     letters = dict(zip(judged.variant, judged.departure, strict=True))
     height = dict(zip(rows, _heights([letters[row] for row in rows]), strict=True))
-    figure, axes = subplots(height=0.22 * max(height.values(), default=0) + 1.4)
-    for cell in judged.to_dict("records"):
-        _cell(axes, claims.index(cell["claim"]), height[cell["variant"]], cell)
-    for row, y in height.items():
-        axes.text(-0.1, y, named(row), ha="right", va="center", fontsize=8)
-        axes.text(-2.3, y, letters[row], ha="center", va="center", fontsize=8)
-    axes.text(-2.3, -0.8, "departure", ha="center", va="bottom", fontsize=7.5)
-    for i, claim in enumerate(claims):
-        head = f"{claim}\n{BY_RUNS[claim].short}"
-        axes.text(i + 0.5, -0.8, head, ha="center", va="bottom", fontsize=7.5)
-    axes.set(xlim=(-2.5, len(claims)), ylim=(max(height.values(), default=0) + 0.7, -3.0))
-    axes.set_axis_off()
+    last = max(height.values(), default=0.0)
+    side = max(1, ABREAST if sheet().narrow else len(claims))
+    parts = [claims[i : i + side] for i in range(0, len(claims), side)] or [[]]
+    tall = len(parts) * (0.2 * last + 1.0) + 0.6
+    figure, panels = subplots(len(parts), 1, 0.22 * last + 1.5, squeeze=False, tall=tall)
+    for axes, part in zip(panels.flat, parts, strict=True):
+        for cell in judged[judged.claim.isin(part)].to_dict("records"):
+            _cell(axes, part.index(cell["claim"]), height[cell["variant"]], cell)
+        for row, y in height.items():
+            axes.text(-0.1, y, named(row), ha="right", **SMALL)
+            if height[row] == min(height[one] for one in rows if letters[one] == letters[row]):
+                axes.text(LETTERS, y, letters[row], ha="left", **SMALL)
+        axes.text(LETTERS, -0.8, "departure", ha="left", **(SMALL | {"va": "bottom"}))
+        for i, claim in enumerate(part):
+            head = f"{claim}\n{_folded(BY_RUNS[claim].short, FOLD[sheet().narrow])}"
+            axes.text(i + 0.5, -0.8, head, ha="center", **(SMALL | {"va": "bottom"}))
+        axes.set(xlim=(LETTERS, side), ylim=(last + 0.7, -5.2))
+        axes.set_axis_off()
     return marked(headed(figure, _changed(judged)), mark)
 
 
@@ -71,9 +82,7 @@ def clearest_changes(cells: pd.DataFrame, found: Evidence) -> Figure:
         figure, axes = subplots(height=0.6)
         axes.set_axis_off()
         return headed(figure, "No verdict changes in what was run here")
-    figure, grid = subplots(
-        len(cells), 2, 2.5 * len(cells) + 0.3, squeeze=False, width_ratios=(1, 1)
-    )
+    figure, grid = subplots(len(cells), 2, 2.5 * len(cells) + 0.3, squeeze=False, rowwise=True)
     for (left, right), cell in zip(grid, cells.to_dict("records"), strict=True):
         here, base = groups(found.runs, cell["variant"])
         claim, where = BY_RUNS[cell["claim"]], paths(found)
@@ -81,10 +90,12 @@ def clearest_changes(cells: pd.DataFrame, found: Evidence) -> Figure:
         _strips(left, claim, *values)
         learners = [name for name in LOOKS if any(name in arm.split() for arm in values[0])]
         _costs(right, found.summaries, here, base, learners)
-        left.set_title(f"{cell['claim']}: {cell['outcome']}; was: {cell['base']}", fontsize=9)
-        right.set_title(f"{named(cell['variant'])} (bands: without it)", fontsize=9)
+        left.set_title(
+            f"{cell['claim']}: {cell['outcome']}; was: {cell['base']}", fontsize="medium"
+        )
+        right.set_title(f"{named(cell['variant'])} (bands: without it)", fontsize="medium")
     listed = ", ".join(f"{row.claim} by {named(row.variant)}" for row in cells.itertuples())
-    return marked(headed(figure, f"What moves verdicts most: {listed}"), found.mark)
+    return marked(headed(figure, f"The clearest changes of a verdict: {listed}"), found.mark)
 
 
 def named(row: str) -> str:
@@ -101,18 +112,30 @@ def _heights(letters: list[str]) -> list[float]:
     return result
 
 
+def _folded(text: str, most: int) -> str:
+    """A text on lines of so many characters, if its words let it."""
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if len(in_words(longer)) <= most:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return "\n".join(filter(None, lines))
+
+
 def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
     """Colour, word and share of yes; framed, and with what it was before, if it changes."""
     fill, ink = FILLS[cell["outcome"]]
     place, size = (column + 0.03, y - 0.46), (0.94, 0.92)
-    axes.add_patch(Rectangle(place, *size, facecolor=fill, edgecolor="0.8", linewidth=0.5))
+    axes.add_patch(Rectangle(place, *size, facecolor=fill, edgecolor="0.5", linewidth=0.5))
     text = WORDS[cell["outcome"]]
     if cell["changes"]:
-        text = f"{WORDS[cell['base']]} → {text}"
+        text = f"→ {text}" if sheet().narrow else f"{WORDS[cell['base']]} → {text}"
         axes.add_patch(Rectangle(place, *size, fill=False, edgecolor="black", linewidth=1.8))
     elif 0 < cell["share"] < 1:
         text += f" {cell['share']:.0%}"
-    axes.text(column + 0.5, y, text, ha="center", va="center", color=ink, fontsize=7.5)
+    axes.text(column + 0.5, y, text, ha="center", va="center", color=ink, fontsize="small")
 
 
 def _changed(judged: pd.DataFrame) -> str:
@@ -137,7 +160,6 @@ def _strips(axes: Axes, claim: RunClaim, here: Values, base: Values) -> None:
                 "color": look.color,
                 "markerfacecolor": face,
                 "markersize": 4,
-                "alpha": 0.8,
             }
             axes.plot(x, numbers, look.marker, linestyle="", **style)
     axes.axhline(claim.threshold, **LIMIT)
@@ -148,7 +170,7 @@ def _strips(axes: Axes, claim: RunClaim, here: Values, base: Values) -> None:
         axes.set_yscale("log")
         plain(axes.yaxis)
     axes.set_xticks(range(len(here.columns)), list(here))
-    axes.set_ylabel(claim.label, fontsize=8)
+    axes.set_ylabel(claim.label, fontsize="small")
 
 
 def _costs(
@@ -165,11 +187,11 @@ def _costs(
         quartiles = np.percentile(costs, (25, 75), axis=0)
         axes.fill_between(episode, *quartiles, color=look.color, alpha=0.2, linewidth=0)
         episode, costs = _curves(summaries, here[here.learner == name])
-        lines = axes.plot(episode, costs.T, **look.line, linewidth=1.0, alpha=0.8)
+        lines = axes.plot(episode, costs.T, **look.line, linewidth=1.0)
         lines[0].set_label(name)
     low, high = axes.get_ylim()
     axes.set(xlabel="episode", ylabel="noise-free cost / first", ylim=(low, min(high, MOST_COST)))
-    axes.legend(fontsize=7.5)
+    axes.legend(fontsize="small")
 
 
 def _curves(

@@ -4,6 +4,7 @@ A run that had to be stopped left no policy: it is counted, and not drawn.
 """
 
 from collections import Counter
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -70,7 +71,7 @@ def paths(found: Evidence, layout: str) -> Figure:
     """
     drawn = part(found, SHOWN, layout)
     finished, decays = _finished(drawn), drawn.summaries.values_of("decay")
-    figure, axes = subplots(1, len(decays), 3.5, sharey=True, squeeze=False)
+    figure, axes = subplots(1, len(decays), 3.8, sharey=True, squeeze=False)
     for axis, decay in zip(axes[0], decays, strict=True):
         _map(axis, paper.task(layout), finished.summaries.select(decay=decay))
         axis.set_title(DECAY_TITLES[decay], **SUBTITLE)
@@ -103,7 +104,7 @@ def _against_time(
 ) -> tuple[Figure, Column]:
     """`states` or `actions` of the last rollouts: a row a component, a column a reading."""
     decays, period = drawn.summaries.values_of("decay"), paper.nmpc().plant.period
-    options = {"sharex": True, "sharey": "row", "squeeze": False}
+    options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
     figure, axes = subplots(len(components), max(1, len(decays)), height, **options)
     for column, decay in zip(axes.T, decays, strict=False):
         for learner in SHOWN:
@@ -127,7 +128,7 @@ def _map(axis: Axes, task: Task, runs: Runs[RunSummary], *, names: bool = True) 
         look = LOOKS[learner]
         for summary in runs.select(learner=learner).values():
             known = summary.states[np.isfinite(summary.states).all(axis=1)]
-            axis.plot(known[:, 0], known[:, 1], **look.line, linewidth=0.9, alpha=0.7)
+            axis.plot(known[:, 0], known[:, 1], **look.line, linewidth=0.8)
             axis.plot(*known[-1, :2], look.marker, color=look.color, markersize=3.5)
     axis.set(xlim=(task.lower[0], task.upper[0]), ylim=(-3, 6))
 

@@ -12,18 +12,20 @@ from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.figures.axes import draw_task, logarithmic_if_wide
+from nmpcrl.report.figures.sheet import WIDE as PAPER
 from nmpcrl.report.figures.style import (
     DECAY_TITLES,
     INK,
     LIMIT,
     LOOKS,
+    QUIET,
     SUBTITLE,
     SYMBOLS,
-    WIDTH,
     headed,
     marked,
     most_moved,
     page,
+    shades,
 )
 from nmpcrl.report.run import finding, thetas
 from nmpcrl.study import paper
@@ -49,7 +51,7 @@ def run_page(records: Records, frozen: Records | None = None) -> Figure:
     """
     options: dict[str, Any] = {"layout": "constrained", "height_ratios": ROWS}
     figure, panels = plt.subplot_mosaic(
-        [list(row) for row in PANELS], figsize=(WIDTH, HEIGHT), **options
+        [list(row) for row in PANELS], figsize=(PAPER.width, HEIGHT), **options
     )
     plt.close(figure)
     _map(panels["map"], records)
@@ -101,9 +103,8 @@ def _theta(axes: Axes, records: Records) -> None:
     change = np.nan_to_num(np.ptp(values, axis=0))
     order = np.argsort(-change, kind="stable")
     named = [i for i in order[:NAMED] if change[i] > MOVES * change.max()]
-    axes.plot(values[:, [i for i in order if i not in named]], color="#BBBBBB", lw=0.7)
-    shades = plt.get_cmap("cividis")(np.linspace(0.0, 0.8, len(named)))
-    for i, shade, line in zip(named, shades, ("-", "--", "-.", ":"), strict=False):
+    axes.plot(values[:, [i for i in order if i not in named]], color=QUIET, lw=0.7)
+    for i, shade, line in zip(named, shades(len(named)), ("-", "--", "-.", ":"), strict=False):
         name = f"${SYMBOLS[paper.THETA_NAMES[i]]}$"
         axes.plot(values[:, i], color=shade, linestyle=line, label=name)
     axes.set_title(most_moved(change) if named else "θ does not move", **SUBTITLE)

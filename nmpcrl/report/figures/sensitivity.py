@@ -28,9 +28,9 @@ def one_variable(theta: Vector, values: Vector, at: float, slope: float) -> Figu
     near = np.array([at - 0.6, at + 0.6])
     axes.plot(near, np.interp(at, theta, values) + slope * (near - at), color=WINE, lw=2.2)
     axes.plot(at, np.interp(at, theta, values), "D", color=WINE, label=f"slope {slope:g}")
-    axes.axvline(1, color=TEAL, ls="-.", lw=1, label="the constraint lets go")
+    axes.axvline(1, color=TEAL, ls="-.", lw=1, label="the constraint becomes inactive")
     axes.set(
-        title="The value falls until the constraint lets go",
+        title="The value falls until the constraint becomes inactive",
         xlabel=r"$\theta$ (no unit)",
         ylabel="optimal value (no unit)",
     )

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.bench.scaling import exponents
+from nmpcrl.report.figures.axes import below
 from nmpcrl.report.figures.style import INK, TEAL, WINE, headed, page, subplots
 
 STARTS = {"cold": (INK, "o-"), "shifted": (TEAL, "s--"), "same state": (WINE, "D-.")}
@@ -30,7 +31,7 @@ def row_prices(
         prices: mu -> lam / W, shape (k,).
     """
     figure, (left, right) = subplots(1, 2, height=3.3)
-    shades = ("#C9A0B4", "#AA5D84", WINE)
+    shades = ("#BC6F9A", "#A0487A", WINE)
     for (mu, penalty), shade, line in zip(penalties.items(), shades, (":", "--", "-"), strict=True):
         left.plot(h, penalty, color=shade, ls=line)
         right.plot(h, prices[mu], color=shade, ls=line, label=f"μ = {mu:g}")
@@ -43,7 +44,7 @@ def row_prices(
         xlabel="$h$ (no unit)",
         ylabel=r"$\lambda / W$ (no unit)",
     )
-    figure.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    below(figure, *right.get_legend_handles_labels())
     return figure
 
 
@@ -57,11 +58,11 @@ def sparsity(by_kind: Matrix, by_stage: Matrix, folded: Matrix, step: int) -> Fi
         folded: the latter without slacks and the multipliers of their constraints, shape (l, l).
         step: how many unknowns the recursion eliminates at once.
     """
-    figure, panels = subplots(1, 3, height=3.1)
+    figure, panels = subplots(1, 3, height=3.1, tall=7.6)
     titles = (f"{len(by_kind)} unknowns", "stage by stage", f"{len(folded)}, rows folded away")
     for axes, matrix, title in zip(panels, (by_kind, by_stage, folded), titles, strict=True):
         axes.spy(matrix, markersize=max(0.3, 190 / len(matrix)), color=INK, marker="s", mew=0)
-        axes.set_title(title, fontsize=9.5, fontweight="normal")
+        axes.set_title(title, fontsize="medium", fontweight="normal")
         axes.set(xticks=[], yticks=[], xlabel=f"bandwidth {bandwidth(matrix)} [unknowns]")
         axes.spines[["top", "right"]].set_visible(True)
     corner = len(folded) - step - 0.5
@@ -126,7 +127,7 @@ def convergence(traces: Mapping[str, pd.DataFrame], tolerance: float) -> Figure:
     right.set(xlabel="iteration (no unit)", ylabel="relative (no unit)")
     right.set_title("Distance to the final value")
     counts = ", ".join(f"{name} {len(iterates) - 1}" for name, iterates in traces.items())
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    below(figure, *left.get_legend_handles_labels())
     return headed(figure, f"Iterations: {counts}")
 
 
@@ -145,7 +146,7 @@ def horizons(timings: pd.DataFrame) -> Figure:
     right.set(title="An iteration", ylabel="time [µs]")
     first = next(name for name in SOLVER_LOOKS if name in set(timings.solver))
     solve, iteration = (exponents(timings, column)[first] for column in columns)
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    below(figure, *left.get_legend_handles_labels())
     orders = f"a solve grows like $N^{{{solve:.2f}}}$, an iteration like $N^{{{iteration:.2f}}}$"
     return headed(figure, f"With {first} {orders}")
 

@@ -1,42 +1,21 @@
 """What all figures share: the look of each learner, of a line and of a page."""
 
-from collections.abc import Callable
+import re
 from dataclasses import dataclass
-from functools import wraps
-from typing import Any, ParamSpec
+from textwrap import fill
+from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 
 from nmpcrl import Vector
+from nmpcrl.report.figures.sheet import page as page
+from nmpcrl.report.figures.sheet import sheet
+from nmpcrl.report.figures.sheet import subplots as subplots
 from nmpcrl.study.paper import THETA_NAMES
-
-WIDTH = 7.0  # inches; the book shows figures as wide as its text
-
-PAGE: dict[Any, Any] = {
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titleweight": "bold",
-    "figure.dpi": 150,
-    "font.size": 9.5,
-    "legend.frameon": False,
-    "lines.linewidth": 1.6,
-}
-
-Parameters = ParamSpec("Parameters")
-
-
-def page(draw: Callable[Parameters, Figure]) -> Callable[Parameters, Figure]:
-    """Let a function draw with the look of `PAGE`."""
-
-    @wraps(draw)
-    def drawn(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Figure:
-        with plt.rc_context(PAGE):
-            return draw(*args, **kwargs)
-
-    return drawn
 
 
 @dataclass(frozen=True)
@@ -58,14 +37,19 @@ LOOKS = {
     "DES": Look("#000000", "--", "s"),
     "RDES": Look("#009E73", "-.", "^"),
     "GES": Look("#D55E00", (0, (5, 1)), "D"),
-    "TDC": Look("#CC79A7", (0, (4, 1, 1, 1, 1, 1)), "v"),
-    "QL": Look("#56B4E9", (0, (8, 3)), "P"),
+    "TDC": Look("#BC6299", (0, (4, 1, 1, 1, 1, 1)), "v"),
+    "QL": Look("#2A8FC7", (0, (8, 3)), "P"),
     "frozen": Look("#8A8A8A", ":", "x"),
-    "matched": Look("#E69F00", (0, (2, 1)), "<"),
+    "matched": Look("#B37A00", (0, (2, 1)), "<"),
     "random": Look("#8C5A2B", (0, (1, 1)), ">"),
 }
 
 INK, TEAL, WINE = "0.25", "#1B7F79", "#882255"  # none of them is a learner's
+AT_ONE: dict[str, Any] = {"color": "0.5", "linewidth": 0.9}  # what a ratio is compared to
+BAND: dict[str, Any] = {"facecolor": "0.92", "edgecolor": "0.5", "linewidth": 0.6, "zorder": 0}
+MARKS = {False: 110, True: 54}  # characters of a line on a wide sheet, on a narrow one
+QUIET = "0.55"  # the grey of what only stands behind
+PALE = 0.8  # of a grey that is too pale to be seen on white
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
 SUBTITLE: dict[str, Any] = {"loc": "left", "fontsize": "medium", "fontweight": "normal"}
 DECAY_TITLES = {"step": "noise decays per step", "episode": "noise decays per episode"}
@@ -81,10 +65,15 @@ SYMBOLS = {  # of paper.THETA_NAMES, between dollar signs
     "c": r"\theta_c",
 }
 STEP_PARTS = {  # of a learning step: colour and hatching
-    "solves": ("#0072B2", ""),
-    "network": ("#E69F00", "//"),
-    "the rest": ("0.8", ""),
+    "solves": ("0.2", ""),
+    "network": ("0.42", "//"),
+    "the rest": ("0.56", "..."),
 }
+
+
+def shades(count: int) -> list[str]:
+    """Colours of lines that are in an order, from dark to pale; all can be seen on white."""
+    return [to_hex(color) for color in colormaps["cividis"](np.linspace(0.0, 0.6, count))]
 
 
 def line(learner: str) -> dict[str, Any]:
@@ -94,7 +83,7 @@ def line(learner: str) -> dict[str, Any]:
 
 def thin(learner: str) -> dict[str, Any]:
     """How one of several lines of a learner is drawn."""
-    return {**LOOKS[learner].line, "linewidth": 1.2, "markersize": 3.5, "alpha": 0.85}
+    return {**LOOKS[learner].line, "linewidth": 1.2, "markersize": 3.5}
 
 
 def dots(learner: str, **others: Any) -> dict[str, Any]:
@@ -105,32 +94,28 @@ def dots(learner: str, **others: Any) -> dict[str, Any]:
 
 
 def hatched(color: str, hatch: str) -> dict[str, Any]:
-    """How a part of a bar is drawn."""
-    return {"facecolor": color, "hatch": hatch, "edgecolor": "white", "linewidth": 0.5}
+    """How a part of a bar is drawn: a pale one has an outline."""
+    edge = "0.5" if min(to_rgb(color)) > PALE else "white"
+    return {"facecolor": color, "hatch": hatch, "edgecolor": edge, "linewidth": 0.5}
 
 
 def headed(figure: Figure, finding: str) -> Figure:
-    """The figure with the finding above all panels."""
-    figure.suptitle(finding, x=0.01, ha="left", fontsize=10.5, fontweight="bold")
+    """The figure with the finding above all panels, on as many lines as it takes."""
+    unbroken = re.sub(r"\$.*?\$", lambda math: math[0].replace(" ", "{}"), finding)
+    look: dict[str, Any] = {"ha": "left", "fontsize": 10.5, "fontweight": "bold", "wrap": True}
+    figure.suptitle(unbroken, x=0.01, **look)
     return figure
 
 
 def marked(figure: Figure, mark: str) -> Figure:
-    """The figure with a line below that says where its runs come from."""
-    figure.supxlabel(mark, x=0.99, ha="right", fontsize="x-small", color="0.35")
+    """The figure with a line that says where its runs come from: below, or above its legend."""
+    if figure.legends:
+        legend = figure.legends[0]
+        legend.set_title(fill(mark, MARKS[sheet().narrow]), prop=FontProperties(size="small"))
+        legend.get_title().set_color("0.35")
+        return figure
+    figure.supxlabel(mark, x=0.99, ha="right", fontsize="small", color="0.35", wrap=True)
     return figure
-
-
-def subplots(
-    rows: int = 1, columns: int = 1, height: float = 3.2, **options: Any
-) -> tuple[Figure, Any]:
-    """A figure of the page's width and its axes; closed, so that a notebook shows it once."""
-    with plt.rc_context(PAGE):
-        figure, axes = plt.subplots(
-            rows, columns, figsize=(WIDTH, height), layout="constrained", **options
-        )
-    plt.close(figure)
-    return figure, axes
 
 
 def most_moved(change: Vector) -> str:

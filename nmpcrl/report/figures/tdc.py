@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.learning.updates import OVERSHOOT
+from nmpcrl.report.figures.axes import below
 from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, page, subplots
 from nmpcrl.study.records import LAST, Stopped
 
@@ -66,7 +67,7 @@ def parts_of_tdc(runs: Mapping[str, RunSummary]) -> Figure:
         right.plot(np.arange(1, len(size) + 1), size, **look)
     left.set(xlabel="episode", ylabel="noise-free cost / first")
     right.set(xlabel="episode", ylabel="size of w", yscale="log")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=len(runs))
+    below(figure, *left.get_legend_handles_labels())
     moved = {name: _end(runs[name]) - _end(runs["TDC"]) for name in WITHOUT}
     most = max(moved, key=lambda name: abs(moved[name]))
     side = "lower" if moved[most] < 0 else "higher"

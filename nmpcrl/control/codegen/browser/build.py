@@ -12,6 +12,7 @@ from nmpcrl.control.codegen import folder
 from nmpcrl.control.codegen.browser import emit, ir, link
 
 PAGES = 64  # of 64 KiB: 40 planned inputs among 16 obstacles need a fifth of them
+SEAL = 64  # bytes of `_seal`
 
 
 def from_texts(texts: Mapping[str, str], pages: int = PAGES) -> bytes:
@@ -37,7 +38,7 @@ def from_texts(texts: Mapping[str, str], pages: int = PAGES) -> bytes:
 def _keep(module: bytes, place: Path) -> None:
     """Write it behind its hash, whole or not at all."""
     with tempfile.NamedTemporaryFile(dir=place.parent, prefix=".draft", delete=False) as draft:
-        draft.write(hashlib.sha256(module).digest() + module)
+        draft.write(_seal(module) + module)
     Path(draft.name).replace(place)
 
 
@@ -47,8 +48,13 @@ def _kept(called: str) -> bytes | None:
         content = (folder.private(folder.chosen()) / called).read_bytes()
     except OSError:
         return None
-    seal, module = content[:32], content[32:]
-    return module if hashlib.sha256(module).digest() == seal else None
+    seal, module = content[:SEAL], content[SEAL:]
+    return module if _seal(module) == seal else None
+
+
+def _seal(module: bytes) -> bytes:
+    """What stands before a kept module, so that damage is noticed."""
+    return hashlib.sha256(module).hexdigest().encode()
 
 
 def _own() -> list[str]:

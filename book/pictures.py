@@ -1,0 +1,79 @@
+"""Figures on a page: files beside it, and the `<picture>` that chooses among them.
+
+A figure of `nmpcrl.report.figures.sheet` displays a PNG, for every notebook editor. In a build it
+displays more, for the page alone: its finding, an SVG of it, and one that a telephone has room for.
+"""
+
+from base64 import b64decode
+from collections.abc import Iterator
+from html import escape
+from typing import Any
+
+from nmpcrl.report.figures.sheet import MIME
+
+FOLDER = "_static/figures"
+NARROW = "screen and (max-width: 720px)"  # where the letters of a wide figure are too small
+PICTURE = """\
+<a href="{wide}"><picture>
+<source media="{media}" srcset="{narrow}" width="{narrow_width}" height="{narrow_height}">
+<source srcset="{wide}">
+<img src="{png}" alt="{alt}" width="{width}" height="{height}">
+</picture></a>"""
+
+
+def placed(notebook: Any) -> dict[str, bytes]:
+    """Show each figure of an executed notebook as a picture; the files that it takes, by name.
+
+    A figure without a narrow version, or whose notebook was not executed for a page, stays.
+    """
+    files: dict[str, bytes] = {}
+    for cell, data in _figures(notebook):
+        shown, settings = data.pop(MIME), cell.metadata["mystnb"]
+        if "narrow" in shown:
+            name = settings["figure"]["name"].removeprefix("fig:")
+            wide, narrow = shown["wide"], shown["narrow"]
+            png = _kept(files, name, {"png": data["image/png"]})
+            data["text/html"] = PICTURE.format(
+                png=png,
+                wide=_kept(files, name, wide) or png,
+                narrow=_kept(files, f"{name}-narrow", narrow),
+                media=NARROW,
+                alt=escape(alternative(shown["finding"], settings["image"]["alt"])),
+                width=wide["width"],
+                height=wide["height"],
+                narrow_width=narrow["width"],
+                narrow_height=narrow["height"],
+            )
+    return files
+
+
+def plain(notebook: Any) -> Any:
+    """A notebook without what only its page shows."""
+    for _, data in _figures(notebook):
+        del data[MIME]
+    return notebook
+
+
+def alternative(finding: str, form: str) -> str:
+    """What a figure found, and then what it looks like."""
+    end = "" if finding.endswith((".", "!", "?")) else "."
+    return f"{finding}{end} {form}" if finding else form
+
+
+def _figures(notebook: Any) -> Iterator[tuple[Any, Any]]:
+    """The cells that display a figure for a page, and what they display."""
+    for cell in notebook.cells:
+        for output in cell.get("outputs", []):
+            if MIME in output.get("data", {}):
+                yield cell, output.data
+
+
+def _kept(files: dict[str, bytes], name: str, figure: dict[str, Any]) -> str:
+    """Add a figure's file, an SVG if there is one; where a page finds it."""
+    if "svg" in figure:
+        files[f"{name}.svg"] = figure["svg"].encode()
+        return f"../{FOLDER}/{name}.svg"
+    if "png" in figure:
+        files[f"{name}.png"] = b64decode(figure["png"])
+        return f"../{FOLDER}/{name}.png"
+    return ""
