@@ -15,7 +15,7 @@ from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 
 CHAPTER = "book/01_mdp_and_nmpc.html"
-STATIC = "article figure img"
+STATIC = "article figure img[alt*='from start to target']"
 FRAMES = """() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => done(document.querySelector("figure.live").shown))))"""
 MOVES = """() => {
@@ -327,7 +327,7 @@ def test_a_loop_that_ends_early_says_so(opened):
 @pytest.mark.book
 def test_without_javascript_there_is_the_picture_alone(opened):
     tab = opened(java_script_enabled=False)
-    assert tab.page.locator(STATIC).nth(1).is_visible()
+    assert tab.page.locator(STATIC).is_visible()
     assert not tab.page.locator("figure.live").is_visible()
 
 
@@ -337,14 +337,14 @@ def test_without_webassembly_there_are_the_picture_and_a_sentence(opened):
     tab.page.wait_for_selector("figure.live p")
     assert "does not run WebAssembly" in tab.page.locator("figure.live").inner_text()
     assert tab.page.locator("figure.live svg").count() == 0
-    assert tab.page.locator(STATIC).nth(1).is_visible()
+    assert tab.page.locator(STATIC).is_visible()
     assert tab.errors == []
 
 
 @pytest.mark.book
 def test_on_paper_there_is_the_picture_alone(tab):
     tab.page.emulate_media(media="print")
-    assert tab.page.locator(STATIC).nth(1).is_visible()
+    assert tab.page.locator(STATIC).is_visible()
     assert not tab.page.locator("figure.live").is_visible()
 
 

@@ -182,9 +182,10 @@
       due = true;
     };
 
+    set(figure, { "aria-label": words.map });
     add(figure, "p", { class: "title" }, words.title);
     add(figure, "p", { class: "hint" }, words.hint);
-    const map = plane(figure, data.view, words.map);
+    const map = plane(figure, data.view, words.handles);
     background(map, data);
     const parts = [
       obstacles(map, data, read, move),
@@ -203,7 +204,7 @@
       if (found.plan) found.parts = shares(given, found.plan);
       tell(found.failed ? [[words.failed(found.states.length)]] : words.results(found));
       for (const draw of parts) draw(given, found);
-      figure.shown = { given, found };
+      figure.shown = { given, found }; // for whoever asks; tests do
     }
     show();
   }

@@ -7,7 +7,8 @@
 
   const controller = {
     none: "This browser does not run WebAssembly, so the figure stays as it is printed above.",
-    map: "Map with the robot, its plan, its closed loop and the obstacles",
+    map: "Map of the robot, its plan, its closed loop and the obstacles, which can be moved",
+    handles: "What can be moved on the map",
     title: "Try it: the controller of this chapter, solved in your browser.",
     hint: "Drag the robot, the tip of its arrow or an obstacle; or click one and then its new place; "
       + "or reach it with Tab and press the arrow keys, with Shift for larger steps.",
