@@ -27,14 +27,14 @@ def share(notebook: Any, page: Path, folder: Path) -> None:
         folder: of the files; they are copied to `STATIC`.
 
     Raises:
-        ValueError: two figures have different files under one name.
+        ValueError: a file of this name is there and is another one.
     """
     place = os.path.relpath(STATIC, page.parent)
 
     def linked(found: re.Match[str]) -> str:
         path = folder / found["name"]
         if path.exists() and path.read_text("utf-8").strip() != found["text"]:
-            raise ValueError(f"two live figures have different files called {path.name}")
+            raise ValueError(f"a live figure has another {path.name} than the one that pages share")
         path.write_text(found["text"], "utf-8")
         return LINKS[found["kind"]].format(f"{place}/{path.name}")
 

@@ -1,7 +1,8 @@
 """Figures that a reader moves: the solver as WebAssembly, a problem, and the scripts that draw.
 
 What a cell displays is whole: it works wherever a notebook's output runs scripts. `book/live.py`
-puts the scripts into files that the pages share. Without scripts there is nothing to see.
+puts the scripts into files that the pages share. Without scripts a page shows nothing of it, and a
+notebook that is not trusted, which leaves `hidden` out, its sentence.
 """
 
 import json
@@ -27,6 +28,7 @@ ARGUMENTS = (
 LONGEST = 20  # steps planned: a longer plan has several minima
 WALL, AROUND = 0.5, 1.5  # of the map, beyond a wall and beyond an obstacle's circle [m]
 FIGURE = """<figure class="live" data-figure="controller" hidden>
+<p>This figure is live once the notebook is trusted, or its cells are run.</p>
 <script type="application/json">{}</script>
 </figure>"""
 COMPILED = 'window.nmpcrl = { ...window.nmpcrl, module: "%s" };'

@@ -76,6 +76,10 @@ def test_the_output_is_whole_and_loads_nothing(shown):
     assert b64decode(re.search(r'module: "([^"]+)"', shown)[1]) == b"abc"
 
 
+def test_without_scripts_it_is_hidden_and_a_notebook_that_shows_it_says_why(shown):
+    assert re.match(r'<figure class="live" data-figure="controller" hidden>\n<p>.* trusted', shown)
+
+
 def test_without_a_compiler_there_is_a_sentence(nmpc, monkeypatch):
     def refuse(*_):
         raise CannotCompile("numba is not installed")

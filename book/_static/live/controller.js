@@ -165,6 +165,7 @@
 
   async function start(figure) {
     figure.hidden = false;
+    figure.querySelector("p").remove();
     const data = JSON.parse(figure.querySelector("script").textContent);
     let rollout;
     try {

@@ -26,7 +26,7 @@
       viewBox: `${left} ${-bottom - height} ${width} ${height}`, role: "group", "aria-label": label,
     });
     const ground = add(svg, "g", { transform: "scale(1 -1)" });
-    let chosen = null; // what a click on the ground moves
+    let chosen = null; // what has the focus, which a click on the ground moves
 
     const inside = ([x, y]) => [
       Math.min(Math.max(x, left), left + width),
@@ -37,8 +37,12 @@
         .matrixTransform(ground.getScreenCTM().inverse());
       return inside([x, y]);
     };
+    const onGround = (event) => !event.target.closest(".handle");
+    svg.addEventListener("mousedown", (event) => { // or the focus would be lost
+      if (onGround(event)) event.preventDefault();
+    });
     svg.addEventListener("click", (event) => {
-      if (chosen && !event.target.closest(".handle")) chosen.to(under(event));
+      if (chosen && onGround(event)) chosen.to(under(event));
     });
     new ResizeObserver(() => { // letters and targets of a finger keep their size in pixels
       if (svg.clientWidth) svg.style.setProperty("--px", width / svg.clientWidth);
@@ -60,6 +64,7 @@
       let grip = null; // from the pointer to the middle
       let middle = [0, 0];
       group.addEventListener("focus", () => { chosen = { to }; });
+      group.addEventListener("blur", () => { chosen = null; });
       group.addEventListener("pointerdown", (event) => {
         const [x, y] = under(event);
         grip = [middle[0] - x, middle[1] - y];
