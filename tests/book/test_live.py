@@ -8,7 +8,9 @@ import live
 import nbformat
 import numpy as np
 import pytest
+import whole
 from axe_playwright_python.sync_playwright import Axe
+from bs4 import BeautifulSoup
 
 from nmpcrl.control import Obstacle
 from nmpcrl.learning.rollout import evaluate
@@ -349,6 +351,14 @@ def test_on_paper_there_is_the_picture_alone(tab):
     tab.page.emulate_media(media="print")
     assert tab.page.locator(STATIC).is_visible()
     assert not tab.page.locator("figure.live").is_visible()
+
+
+@pytest.mark.book
+def test_the_book_as_one_document_leaves_live_figures_out(site):
+    document = whole.document(site, site.parent / "pdf/book.html", "")
+    assert "live.controller(nmpc" in BeautifulSoup(document, "html.parser").get_text()
+    assert "_static/live/" not in document
+    assert 'class="live"' not in document
 
 
 @pytest.mark.book
