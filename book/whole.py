@@ -231,6 +231,8 @@ def adapt(one: Page, site: Path, target: Path, names: Collection[str]) -> None:
         token.unwrap()
     for formula in article.select(".math"):
         voice(formula)
+    for picture in article.find_all("picture"):
+        choose(picture)
     for image in article.find_all("img"):
         path = (site / one.name).parent / unquote(image["src"])
         image["src"] = os.path.relpath(path, target.parent)
@@ -244,6 +246,15 @@ def adapt(one: Page, site: Path, target: Path, names: Collection[str]) -> None:
             link.unwrap()
     for heading in article.find_all(re.compile("^h[1-6]$")):
         heading.name = f"h{min(int(heading.name[1]) + one.level - 1, 6)}"
+
+
+def choose(picture: Element) -> None:
+    """Of what a browser may choose from, what is for paper: the source for any screen, if any."""
+    image = picture.img
+    assert image
+    for source in picture.find_all("source", media=False):
+        image["src"] = source["srcset"]
+    picture.replace_with(image)
 
 
 def rename(element: Element, page: str, seen: set[str]) -> None:

@@ -72,6 +72,8 @@ PAGE = """<html><head>
 <h1>{number}<span class="math">\\(Q\\)</span> is &lt; 1<a class="headerlink" href="#top">#</a></h1>
 <p id="twice"><a href="other.html#twice">See</a> <a href="other.ipynb">the notebook</a></p>
 <p id="twice"><img src="../_images/a.png" alt="A"></p>
+<picture><source media="screen and (max-width: 720px)" srcset="../b-narrow.svg">
+<source srcset="../b.svg"><img src="../b.png" alt="B"></picture>
 <details><summary>Solution</summary>It is so.</details>
 <section id="first"><h2>First</h2></section></section></article></body></html>"""
 TOC = """root: book/one
@@ -111,7 +113,11 @@ def test_what_is_only_for_the_screen_is_not_in_the_document(joined):
     assert not joined.select(".headerlink, a[href$='.ipynb']")
     assert joined.details.has_attr("open")
     assert [one["src"] for one in joined.select("script[src]")] == ["../html/_static/mathjax.js"]
-    assert joined.article.img["src"] == "../html/_images/a.png"
+    assert [one["src"] for one in joined.select("section#book-one img")] == [
+        "../html/_images/a.png",
+        "../html/b.svg",
+    ]
+    assert not joined.select("picture, source")
 
 
 def test_headings_go_down_within_a_part_and_keep_their_words(joined):

@@ -23,10 +23,12 @@ STUDY = {
 
 
 @pytest.fixture
-def small(monkeypatch):
-    """A study of six short runs, judged by nobody."""
+def small(monkeypatch, measured):
+    """A study of six short runs, judged by nobody, and times that nobody measured."""
+    times = pd.DataFrame(measured["learners"])
     monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
-    monkeypatch.setattr(publish, "verdicts", lambda runs, variants: ())
+    monkeypatch.setattr(publish, "verdicts", lambda *_: ())
+    monkeypatch.setattr(publish, "time_learners_afresh", lambda: times)
 
 
 @pytest.fixture

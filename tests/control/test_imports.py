@@ -1,4 +1,4 @@
-"""Within control imports run one way: nmpc -> solvers -> the problem -> codegen."""
+"""Within control imports run one way: nmpc, browser -> solvers -> the problem -> codegen."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,7 @@ FLOORS = (  # each may import from those before it, and from its own
     ("codegen",),
     ("plant", "task", "ocp", "sensitivity", "solution"),
     ("solvers",),
-    ("nmpc",),
+    ("nmpc", "browser"),
 )
 MODULES = [path for path in sorted(ROOT.rglob("*.py")) if path != ROOT / "__init__.py"]
 

@@ -524,11 +524,11 @@ def test_only_who_has_the_key_of_a_cluster_is_let_in(certificate, dask, tmp_path
     assert set(study) == set(TEN[:2])
 
     monkeypatch.setattr(cluster, "ANSWER", 2.0)
-    assert "or only with certificates" in refusal(address.replace("tls", "tcp"))
+    assert "or needs certificates" in refusal(address.replace("tls", "tcp"))
     (making,) = [text for text in blocks("bash") if "openssl" in text]
     subprocess.run(["bash", "-ec", making], cwd=tmp_path, check=True, capture_output=True)
     (tmp_path / "tls.toml").write_text(WHOLE)
-    assert "not with these certificates" in refusal(address, security=tmp_path / "tls.toml")
+    assert "or refuses these certificates" in refusal(address, security=tmp_path / "tls.toml")
 
 
 def test_without_dask_it_is_said_what_to_install(monkeypatch):
