@@ -14,7 +14,8 @@ Each build has its own place, in the last column, and six steps, each a function
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
               the published ones end the build, and so do verdicts, as `claims.agreement` says
 4. `execute`  the chapters of the mirror with papermill, two at a time, into PLACE/executed
-5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says
+5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says, and the
+              scripts of live figures, as `live` says
 6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
               repaired for all readers, as `accessible` says
 
@@ -47,6 +48,7 @@ from typing import IO, Any
 import accessible
 import click
 import enrich
+import live
 import nbformat
 import papermill
 import pictures
@@ -306,6 +308,7 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
     for path in source.glob("book/*.md"):
         path.write_text(enrich.page(path.read_text(), output))
     for path, notebook in read.items():
+        live.share(notebook, path, source / "book/_static/live")
         download = path.name if path in executed else ""
         dressed = enrich.notebook(notebook, download)
         for name, data in pictures.placed(dressed).items():

@@ -57,7 +57,9 @@ licence (CC BY 4.0), the code is under the MIT licence."""
 CITED = """A literate reproduction of {authors}, <cite>{title}</cite>, {number}."""
 ALT = "The robot's trajectory around four obstacles, and some of the short plans behind it."
 
-SCREEN = "script, style, button, iframe, form, .headerlink, .download"  # nothing for paper
+SCREEN = (  # nothing for paper
+    "script, style, link, button, iframe, form, figure.live, .headerlink, .download"
+)
 COLOURLESS = ".highlight .n, .highlight .p, .highlight .w"  # half of all elements, each with a tag
 REFERRING = ("for", "headers", "aria-labelledby", "aria-describedby", "aria-controls")
 

@@ -109,7 +109,7 @@ def test_values_are_read_as_papermill_reads_them():
 def small(tmp_path):
     """A copy of the driver with a book of one page and one chapter."""
     shutil.copytree(ROOT / "book/_static", tmp_path / "book/_static")
-    driver = ("build.py", "enrich.py", "accessible.py", "pictures.py", "reference.py")
+    driver = ("build.py", "enrich.py", "accessible.py", "live.py", "pictures.py", "reference.py")
     for name in ("_config.yml", "book/references.bib", *(f"book/{one}" for one in driver)):
         shutil.copy2(ROOT / name, tmp_path / name)
     (tmp_path / "nmpcrl").symlink_to(ROOT / "nmpcrl")

@@ -1,0 +1,69 @@
+// Every word that a reader of a live figure sees or hears.
+(() => {
+  "use strict";
+
+  // A number with so many digits, with a minus sign that is one; none before a zero.
+  const fixed = (number, digits) => number.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "\u2212");
+
+  const controller = {
+    none: "This browser does not run WebAssembly, so the figure stays as it is printed above.",
+    map: "Map of the robot, its plan, its closed loop and the obstacles, which can be moved",
+    handles: "What can be moved on the map",
+    title: "Try it: the controller of this chapter, solved in your browser.",
+    hint: "Drag the robot, the tip of its arrow or an obstacle; or click one and then its new place; "
+      + "or reach it with Tab and press the arrow keys, with Shift for larger steps.",
+    legend: (steps) => `Thin line: closed loop of ${steps} steps, without noise. `
+      + "Thick line: first plan, a dot for each step. Dotted line: closed loop before any change.",
+    // A name of `symbols` stands for its symbol.
+    questions: [
+      "What does", "c", "do to the distance from the obstacles? What does the robot miss with a smaller",
+      "horizon", "?",
+    ],
+    reset: "Reset",
+    robot: "Robot, start",
+    heading: "Robot, heading",
+    obstacle: (number) => `Obstacle ${number}`,
+    target: "target",
+    tick: (metres, last) => fixed(metres, 0) + (last ? " m" : ""),
+    place: (x, y) => `x ${fixed(x, 2)} m, y ${fixed(y, 2)} m`,
+    angle: (radians) => `${fixed((radians * 180) / Math.PI, 0)} degrees`,
+    number: (name, value) => fixed(value, name === "horizon" ? 0 : 3),
+    groups: {
+      "On the way": ["x", "y", "heading"],
+      Inputs: ["v", "nu"],
+      "At the end": ["x_f", "y_f", "heading_f"],
+      "Constraint, horizon": ["c", "horizon"],
+    },
+    symbols: { // letter, its subscript, and the subscript's own
+      x: ["θ", "x"], y: ["θ", "y"], heading: ["θ", "φ"], v: ["θ", "v"], nu: ["θ", "ν"],
+      x_f: ["θ", "x", "f"], y_f: ["θ", "y", "f"], heading_f: ["θ", "φ", "f"], c: ["θ", "c"], horizon: ["N"],
+    },
+    sliders: {
+      x: "theta x, weight of the distance in x at each planned step",
+      y: "theta y, weight of the distance in y at each planned step",
+      heading: "theta phi, weight of the heading at each planned step",
+      v: "theta v, weight of the speed",
+      nu: "theta nu, weight of the turn rate",
+      x_f: "theta x f, weight of the distance in x at the end of the plan",
+      y_f: "theta y f, weight of the distance in y at the end of the plan",
+      heading_f: "theta phi f, weight of the heading at the end of the plan",
+      c: "theta c, tightens the obstacle constraint",
+      horizon: "N, steps planned",
+    },
+    // Lines of words and numbers in turn.
+    results: ({ plan, parts, cost }) => [
+      [
+        "Value V of the plan:", fixed(plan.value, 1), "= on the way", fixed(parts.stages, 1),
+        "+ inputs", fixed(parts.inputs, 1), "+ at the end", fixed(parts.end, 1),
+        "+ slacks", fixed(parts.slacks, 1),
+      ],
+      [
+        "First action:", `${fixed(plan.action[0], 2)} m/s, ${fixed(plan.action[1], 2)} rad/s`,
+        "; largest slack:", fixed(plan.slack, 3), "; cost of the closed loop:", fixed(cost, 1),
+      ],
+    ],
+    failed: (step) => `The solver found no plan at step ${step}; the closed loop ends there.`,
+  };
+
+  window.nmpcrl = { ...window.nmpcrl, words: { controller } };
+})();

@@ -1,0 +1,44 @@
+"""Live figures on the pages: what each displays whole becomes files that the pages share.
+
+A figure's cell displays its scripts and its style inline, each as `report.live.FILE` has it, so
+that it also works in a notebook. A page links to one copy of each in _static/live; most of these
+are in the source tree, and the compiled module is written there.
+"""
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+INLINE = re.compile(
+    r'<(?P<kind>script|style) data-file="(?P<name>[\w.]+)">\n(?P<text>.*?)\n</(?P=kind)>',
+    flags=re.S,
+)
+STATIC = "_static/live"  # on the site
+LINKS = {"script": '<script src="{}"></script>', "style": '<link rel="stylesheet" href="{}">'}
+
+
+def share(notebook: Any, page: Path, folder: Path) -> None:
+    """Replace what a notebook's outputs hold inline by links from its page to files.
+
+    Args:
+        notebook: executed.
+        page: its path, from the root of the site.
+        folder: of the files; they are copied to `STATIC`.
+
+    Raises:
+        ValueError: a file of this name is there and is another one.
+    """
+    place = os.path.relpath(STATIC, page.parent)
+
+    def linked(found: re.Match[str]) -> str:
+        path = folder / found["name"]
+        if path.exists() and path.read_text("utf-8").strip() != found["text"]:
+            raise ValueError(f"a live figure has another {path.name} than the one that pages share")
+        path.write_text(found["text"], "utf-8")
+        return LINKS[found["kind"]].format(f"{place}/{path.name}")
+
+    for cell in notebook.cells:
+        for output in cell.get("outputs", []):
+            if "text/html" in output.get("data", {}):
+                output.data["text/html"] = INLINE.sub(linked, output.data["text/html"])

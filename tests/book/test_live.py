@@ -1,0 +1,393 @@
+"""The live figures: what the driver does for them, and what a reader can do with them."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import live
+import nbformat
+import numpy as np
+import pytest
+import whole
+from axe_playwright_python.sync_playwright import Axe
+from bs4 import BeautifulSoup
+
+from nmpcrl.control import Obstacle
+from nmpcrl.learning.rollout import evaluate
+from nmpcrl.study import paper
+
+CHAPTER = "book/01_mdp_and_nmpc.html"
+STATIC = "article figure img[alt*='from start to target']"
+FRAMES = """() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
+    () => done(document.querySelector("figure.live").shown))))"""
+MOVES = """() => {
+  window.changes = 0
+  const figure = document.querySelector("figure.live"), options = {subtree: true, childList: true, attributes: true}
+  new MutationObserver(all => window.changes += all.length).observe(figure, options)
+}"""  # noqa: E501
+MOST = 200_000  # bytes that a chapter's live figures may add
+FAILS_AT_20 = """
+  const real = WebAssembly.instantiate
+  WebAssembly.instantiate = async (...given) => {
+    const { instance } = await real(...given)
+    let calls = 0
+    const solve = (...given) => ++calls > 150 ? 1 : instance.exports.nmpc_solve(...given)
+    return { instance: { exports: { ...instance.exports, nmpc_solve: solve } } }
+  }"""  # the first closed loop, which stays as a dotted line, takes 130 of them
+
+
+def figure_of(*texts: str) -> nbformat.NotebookNode:
+    """A notebook whose only cell displayed these files inline."""
+    names = ("live.css", "solver.js")
+    kinds = ("style", "script")
+    inline = [
+        f'<{kind} data-file="{name}">\n{text}\n</{kind}>'
+        for kind, name, text in zip(kinds, names, texts, strict=True)
+    ]
+    output = nbformat.v4.new_output("display_data", {"text/html": "\n".join(inline)})
+    return nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("x", outputs=[output])])
+
+
+def test_what_is_inline_becomes_a_link_to_a_file(tmp_path):
+    notebook = figure_of("p { margin: 0 }", 'run("\\d")')
+    live.share(notebook, Path("book/01.ipynb"), tmp_path)
+    assert notebook.cells[0].outputs[0].data["text/html"] == (
+        '<link rel="stylesheet" href="../_static/live/live.css">\n'
+        '<script src="../_static/live/solver.js"></script>'
+    )
+    assert (tmp_path / "solver.js").read_text() == 'run("\\d")'
+
+
+def test_two_pages_share_a_file_only_if_it_is_the_same(tmp_path):
+    for _ in range(2):
+        live.share(figure_of("a", "b"), Path("book/01.ipynb"), tmp_path)
+    with pytest.raises(ValueError, match=r"another solver\.js than the one"):
+        live.share(figure_of("a", "c"), Path("book/02.ipynb"), tmp_path)
+
+
+class Tab:
+    """A chapter's page, and what a reader does on it."""
+
+    def __init__(self, page, site):
+        self.page, self.errors, self.requests = page, [], []
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on(
+            "console", lambda said: self.errors.append(said.text) if said.type == "error" else 0
+        )
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.goto((site / CHAPTER).resolve().as_uri())
+
+    def shown(self) -> dict:
+        """What was asked and found, once it is drawn."""
+        return self.page.evaluate(FRAMES)
+
+    def handle(self, name):
+        return self.page.get_by_role("slider", name=name, exact=True)
+
+    def middle(self, name) -> np.ndarray:
+        """Where a handle is on the screen."""
+        box = self.handle(name).locator(".reach").bounding_box()
+        return np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+
+    def see(self) -> None:
+        self.page.locator("figure.live svg").evaluate(
+            "map => map.scrollIntoView({block: 'center'})"
+        )
+
+    def drag(self, name, by) -> None:
+        """Drag a handle by so many pixels, in ten steps."""
+        self.see()
+        place = self.middle(name)
+        self.page.mouse.move(*place)
+        self.page.mouse.down()
+        self.page.mouse.move(*(place + by), steps=10)
+        self.page.mouse.up()
+
+    def press(self, name, *keys) -> None:
+        self.handle(name).focus()
+        for key in keys:
+            self.page.keyboard.press(key)
+
+
+@pytest.fixture
+def opened(site, browser):
+    """Opens the chapter as a reader with these settings would."""
+    contexts = []
+
+    def with_settings(script="", **settings):
+        contexts.append(browser.new_context(**settings))
+        page = contexts[-1].new_page()
+        if script:
+            page.add_init_script(script)
+        return Tab(page, site)
+
+    yield with_settings
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture
+def tab(opened):
+    """The chapter on a large screen."""
+    tab = opened(viewport={"width": 1400, "height": 1000})
+    tab.page.wait_for_selector("figure.live .results")
+    yield tab
+    assert tab.errors == []
+    assert [url for url in tab.requests if not url.startswith(("file:", "data:"))] == []
+
+
+def in_python(given: dict):
+    """The plan and the closed loop of what a page was asked."""
+    task = replace(
+        paper.task("A"),
+        start=np.array(given["start"]),
+        obstacles=tuple(Obstacle(x, y) for x, y, _ in given["discs"]),
+    )
+    nmpc = paper.controller(task, horizon=given["horizon"])
+    theta = np.array(given["theta"])
+    return nmpc.solve(task.start, theta), evaluate(nmpc, theta, paper.STEPS)
+
+
+def assert_equal_to_python(shown: dict) -> None:
+    found = shown["found"]
+    plan, rollout = in_python(shown["given"])
+    assert not found["failed"]
+    assert found["plan"]["value"] == pytest.approx(plan.value, rel=1e-9)
+    assert found["cost"] == pytest.approx(rollout.cost, rel=1e-6)
+    np.testing.assert_allclose(found["plan"]["action"], plan.action, atol=1e-6)
+    np.testing.assert_allclose(found["plan"]["states"], plan.states, atol=1e-6)
+    assert found["plan"]["slack"] == pytest.approx(plan.slacks.max(), abs=1e-6)
+    np.testing.assert_allclose(found["states"], rollout.states, atol=1e-4)
+    slack = (
+        paper.SLACK_WEIGHT * paper.GAMMA ** np.arange(len(plan.slacks)) @ plan.slacks.sum(axis=1)
+    )
+    assert found["parts"]["slacks"] == pytest.approx(slack, abs=1e-6 * plan.value)
+    assert sum(found["parts"].values()) == pytest.approx(plan.value)
+
+
+@pytest.mark.book
+def test_the_page_finds_what_python_finds(tab):
+    shown = tab.shown()
+    assert shown["given"]["theta"] == list(paper.THETA_INIT)
+    assert_equal_to_python(shown)
+
+
+@pytest.mark.book
+def test_it_finds_what_python_finds_after_every_kind_of_change(tab):
+    tab.drag("Obstacle 2", (20, -35))
+    tab.drag("Robot, start", (60, 90))
+    tab.drag("Robot, heading", (-20, 30))
+    tab.press(
+        "theta x, weight of the distance in x at each planned step", "ArrowRight", "ArrowRight"
+    )
+    tab.press("theta c, tightens the obstacle constraint", *["ArrowRight"] * 7)
+    tab.press("N, steps planned", "ArrowRight", "ArrowRight", "ArrowRight")
+    shown = tab.shown()
+    given = shown["given"]
+    assert given["horizon"] == 13
+    assert given["theta"][0] == pytest.approx(1.1)
+    assert given["theta"][8] == pytest.approx(0.071)
+    assert_equal_to_python(shown)
+
+
+@pytest.mark.book
+def test_an_obstacle_follows_the_mouse_and_the_trajectory_avoids_it(tab):
+    before, place = tab.shown(), tab.middle("Obstacle 1")
+    tab.drag("Obstacle 1", (40, 30))
+    after = tab.shown()
+    tab.see()
+    assert tab.page.evaluate("document.activeElement.ariaLabel") == "Obstacle 1"
+    assert after["given"]["discs"][1:] == before["given"]["discs"][1:]
+    (x, y, _), (old_x, old_y, _) = after["given"]["discs"][0], before["given"]["discs"][0]
+    assert x > old_x
+    assert y < old_y
+    assert (tab.middle("Obstacle 1") - place)[0] == pytest.approx(40, abs=1)
+    assert after["found"]["states"] != before["found"]["states"]
+    away = np.linalg.norm(np.array(after["found"]["states"])[:, :2] - [x, y], axis=1)
+    assert away.min() > 1.2
+
+
+@pytest.mark.book
+def test_a_finger_drags_as_the_mouse_does(opened):
+    tab = opened(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    tab.page.wait_for_selector("figure.live .results")
+    tab.see()
+    before = tab.shown()["given"]["discs"][2]
+    x, y = tab.middle("Obstacle 3")
+    send = tab.page.context.new_cdp_session(tab.page).send
+    for kind, points in (
+        ("touchStart", [{"x": x, "y": y}]),
+        ("touchMove", [{"x": x, "y": y + 15}]),
+        ("touchMove", [{"x": x, "y": y + 30}]),
+        ("touchEnd", []),
+    ):
+        send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    after = tab.shown()["given"]["discs"][2]
+    assert after[1] < before[1] - 0.9
+    assert after[0] == pytest.approx(before[0], abs=0.05)
+
+
+@pytest.mark.book
+def test_the_keyboard_reaches_and_moves_every_handle(tab):
+    tab.handle("Obstacle 1").focus()
+    names = []
+    for _ in range(6):
+        names.append(tab.page.evaluate("document.activeElement.ariaLabel"))
+        tab.page.keyboard.press("ArrowUp")
+        tab.page.keyboard.press("Tab")
+    assert names == [*(f"Obstacle {k}" for k in range(1, 5)), "Robot, start", "Robot, heading"]
+    shown, task = tab.shown(), paper.task("A")
+    centres = [[one.x, one.y + 0.1] for one in task.obstacles]
+    np.testing.assert_allclose([disc[:2] for disc in shown["given"]["discs"]], centres)
+    np.testing.assert_allclose(shown["given"]["start"], task.start + [0, 0.1, np.pi / 36])
+    assert_equal_to_python(shown)
+
+
+@pytest.mark.book
+def test_shift_makes_larger_steps_and_the_page_does_not_scroll(tab):
+    tab.see()
+    scrolled = tab.page.evaluate("scrollY")
+    tab.press("Obstacle 4", "ArrowLeft", "Shift+ArrowDown")
+    x, y, _ = tab.shown()["given"]["discs"][3]
+    assert [x, y] == pytest.approx([6.9, -0.2])
+    assert tab.page.evaluate("scrollY") == scrolled
+    assert tab.handle("Obstacle 4").get_attribute("aria-valuetext") == "x 6.90 m, y \u22120.20 m"
+
+
+@pytest.mark.book
+def test_a_click_moves_what_was_clicked_before(tab):
+    tab.see()
+    tab.page.mouse.click(*tab.middle("Obstacle 2"))
+    goal = tab.middle("Obstacle 2") + [0, 90]
+    tab.page.mouse.click(*goal)
+    moved = tab.shown()
+    np.testing.assert_allclose(tab.middle("Obstacle 2"), goal, atol=1)
+    tab.page.get_by_role("button", name="Reset").focus()
+    tab.page.mouse.click(*(goal + [0, 20]))  # now nothing is chosen
+    assert tab.shown() == moved
+
+
+@pytest.mark.book
+def test_nothing_leaves_the_map_and_the_robot_stays_in_its_box(tab):
+    tab.press("Robot, start", *["Shift+ArrowLeft"] * 4)
+    tab.press("Obstacle 3", *["Shift+ArrowUp"] * 20)
+    given = tab.shown()["given"]
+    data = json.loads(tab.page.locator("figure.live script[type]").text_content())
+    assert given["start"][0] == paper.LOWER[0]
+    assert given["discs"][2][1] == pytest.approx(data["view"][1] + data["view"][3])
+
+
+@pytest.mark.book
+@pytest.mark.parametrize("k", range(9))
+def test_each_slider_moves_its_own_component_of_theta(tab, k):
+    slider = tab.page.locator("figure.live input[type=range]").nth(k)
+    slider.focus()
+    tab.page.keyboard.press("ArrowRight")
+    moved = np.array(tab.shown()["given"]["theta"]) - paper.THETA_INIT
+    assert np.flatnonzero(moved).tolist() == [k]
+    assert moved[k] > 0
+
+
+@pytest.mark.book
+def test_reset_restores_the_beginning_in_every_digit(tab):
+    before = tab.shown()
+    tab.drag("Robot, start", (30, 60))
+    tab.press("N, steps planned", "ArrowLeft")
+    assert tab.shown() != before
+    tab.page.get_by_role("button", name="Reset").click()
+    assert tab.shown() == before
+
+
+@pytest.mark.book
+def test_a_screen_reader_is_told_the_results_once_nothing_changes(tab):
+    status = tab.page.locator("figure.live [role=status]")
+    tab.press("Obstacle 2", "Shift+ArrowUp")
+    found = tab.shown()["found"]
+    assert status.get_attribute("aria-busy") == "true"
+    tab.page.wait_for_selector("figure.live [role=status][aria-busy=false]")
+    for number in (found["plan"]["value"], found["cost"], found["parts"]["stages"]):
+        assert f"{number:.1f}" in status.inner_text()
+
+
+@pytest.mark.book
+def test_nothing_moves_by_itself(tab):
+    tab.page.wait_for_selector("figure.live [role=status][aria-busy=false]")
+    tab.page.evaluate(MOVES)
+    tab.page.wait_for_timeout(400)
+    assert tab.page.evaluate("window.changes") == 0
+    tab.press("Obstacle 2", "ArrowUp")
+    tab.shown()
+    assert tab.page.evaluate("window.changes") > 0
+
+
+@pytest.mark.book
+def test_a_loop_that_ends_early_says_so(opened):
+    tab = opened(script=FAILS_AT_20)
+    tab.page.wait_for_selector("figure.live .results")
+    said = "The solver found no plan at step 20; the closed loop ends there."
+    assert tab.page.locator("figure.live [role=status]").inner_text().strip() == said
+    assert len(tab.shown()["found"]["states"]) == 20
+
+
+@pytest.mark.book
+def test_without_javascript_there_is_the_picture_alone(opened):
+    tab = opened(java_script_enabled=False)
+    assert tab.page.locator(STATIC).is_visible()
+    assert not tab.page.locator("figure.live").is_visible()
+
+
+@pytest.mark.book
+def test_without_webassembly_there_are_the_picture_and_a_sentence(opened):
+    tab = opened(script="delete window.WebAssembly")
+    tab.page.wait_for_selector("figure.live p")
+    assert "does not run WebAssembly" in tab.page.locator("figure.live").inner_text()
+    assert tab.page.locator("figure.live svg").count() == 0
+    assert tab.page.locator(STATIC).is_visible()
+    assert tab.errors == []
+
+
+@pytest.mark.book
+def test_on_paper_there_is_the_picture_alone(tab):
+    tab.page.emulate_media(media="print")
+    assert tab.page.locator(STATIC).is_visible()
+    assert not tab.page.locator("figure.live").is_visible()
+
+
+@pytest.mark.book
+def test_the_book_as_one_document_leaves_live_figures_out(site):
+    document = whole.document(site, site.parent / "pdf/book.html", "")
+    assert "live.controller(nmpc" in BeautifulSoup(document, "html.parser").get_text()
+    assert "_static/live/" not in document
+    assert 'class="live"' not in document
+
+
+@pytest.mark.book
+@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing(opened, width, theme):
+    tab = opened(
+        viewport={"width": width, "height": 900}, color_scheme=theme, reduced_motion="reduce"
+    )
+    tab.page.wait_for_selector("figure.live [role=status][aria-busy=false]")
+    assert tab.page.evaluate("document.documentElement.dataset.theme") == theme
+    found = Axe().run(tab.page, context="figure.live")
+    assert found.response["passes"]
+    assert found.response["violations"] == []
+    assert tab.page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.book
+def test_a_finger_can_hit_every_handle_and_slider_on_a_telephone(opened):
+    tab = opened(viewport={"width": 390, "height": 844})
+    tab.page.wait_for_selector("figure.live .results")
+    tab.shown()
+    for target in tab.page.locator("figure.live :is(.reach, input, button)").all():
+        box = target.bounding_box()
+        assert min(box["width"], box["height"]) >= 24
+
+
+@pytest.mark.book
+def test_only_a_page_with_a_live_figure_loads_scripts_for_it_and_they_are_light(site):
+    loaded = {path.name for path in site.glob("book/*.html") if "_static/live/" in path.read_text()}
+    assert loaded == {Path(CHAPTER).name}
+    assert sum(path.stat().st_size for path in site.glob("_static/live/*")) <= MOST

@@ -1,0 +1,90 @@
+"""What a live figure displays: the library's own problem, whole scripts, and words if it cannot."""
+
+import json
+import re
+from base64 import b64decode
+
+import numpy as np
+import pytest
+
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.report import live
+from nmpcrl.study import paper
+
+THETA = np.array(paper.THETA_INIT)
+
+
+@pytest.fixture(scope="module")
+def nmpc():
+    return paper.nmpc("C", horizon=7)
+
+
+@pytest.fixture
+def shown(nmpc, monkeypatch) -> str:
+    """The figure's HTML, with a module of three bytes."""
+    monkeypatch.setattr(live.browser, "module", lambda plant, task: b"abc")
+    return live.controller(nmpc, THETA, 130).data
+
+
+@pytest.fixture
+def data(shown) -> dict:
+    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
+
+
+def test_the_problem_is_the_one_that_the_controller_solves(nmpc, data):
+    problem, (target, lower, upper, discs, sides, discount, weight, soft, tie) = (
+        data["problem"],
+        nmpc._free._solver._problem,
+    )
+    assert problem["target"] == target.tolist()
+    assert [problem["lower"], problem["upper"]] == [lower.tolist(), upper.tolist()]
+    assert problem["discs"] == discs.tolist()
+    assert problem["sides"] == sides.tolist()
+    assert problem["discount"][:8] == discount.tolist()
+    assert [problem["slack_weight"], problem["soft_box"], problem["tie"]] == [weight, soft, tie]
+
+
+def test_it_begins_with_the_chapters_parameters(nmpc, data):
+    assert data["start"] == nmpc.task.start.tolist()
+    assert data["theta"] == list(paper.THETA_INIT)
+    assert data["horizon"] == 7
+
+
+def test_each_slider_has_a_step_at_its_first_value(data):
+    first = dict(zip(data["names"], data["theta"], strict=True)) | {"horizon": data["horizon"]}
+    assert set(data["ranges"]) == set(first)
+    for name, (least, most, step) in data["ranges"].items():
+        assert least < first[name] < most
+        steps = (first[name] - least) / step
+        assert steps == pytest.approx(round(steps), abs=1e-9)
+
+
+def test_the_map_shows_the_start_the_target_and_every_circle(nmpc, data):
+    x, y, width, height = data["view"]
+    low, high = np.array([x, y]), np.array([x + width, y + height])
+    for place in (nmpc.task.start[:2], nmpc.task.target[:2]):
+        assert (low < place).all()
+        assert (place < high).all()
+    for *centre, clearance in data["problem"]["discs"]:
+        assert (low < np.array(centre)).all()
+        assert (np.array(centre) + clearance / 2 < high).all()
+
+
+def test_the_output_is_whole_and_loads_nothing(shown):
+    assert re.findall(r'data-file="([^"]+)"', shown) == [live.STYLE, "module.js", *live.SCRIPTS]
+    assert not re.search(r"\b(src|href)=|https?://(?!www\.w3\.org/2000/svg)", shown)
+    assert b64decode(re.search(r'module: "([^"]+)"', shown)[1]) == b"abc"
+
+
+def test_without_scripts_it_is_hidden_and_a_notebook_that_shows_it_says_why(shown):
+    assert re.match(r'<figure class="live" data-figure="controller" hidden>\n<p>.* trusted', shown)
+
+
+def test_without_a_compiler_there_is_a_sentence(nmpc, monkeypatch):
+    def refuse(*_):
+        raise CannotCompile("numba is not installed")
+
+    monkeypatch.setattr(live.browser, "module", refuse)
+    assert live.controller(nmpc, THETA, 130).data == (
+        "<p>There is no live figure here: numba is not installed.</p>"
+    )
