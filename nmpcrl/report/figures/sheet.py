@@ -173,7 +173,7 @@ def subplots(
 
 
 def in_words(title: str) -> str:
-    r"""A title without LaTeX, to be read aloud: "$\theta_x$ moves" is "theta_x moves"."""
+    """A title without LaTeX, to be read aloud: theta_x and a dollar at either end is "theta_x"."""
     return " ".join(re.sub(r"\$(.*?)\$", lambda found: _spoken(found[1]), title).split())
 
 
