@@ -14,11 +14,16 @@ ROBOT = "nmpcrl.control:differential_drive"
 
 @click.command()
 @click.option(
-    "--plant", default=ROBOT, metavar="MODULE:NAME", help="Of a Plant.", show_default=True
+    "--plant",
+    "of_plant",
+    default=ROBOT,
+    metavar="MODULE:NAME",
+    help="Of a Plant.",
+    show_default=True,
 )
-@click.option("--task", metavar="MODULE:NAME", help="Of a Task; by default the paper's.")
+@click.option("--task", "of_task", metavar="MODULE:NAME", help="Of a Task; by default the paper's.")
 @click.option("--out", type=NewFile(), default="nmpc.wasm", show_default=True)
-def wasm(plant: str, task: str | None, out: Path) -> None:
+def wasm(of_plant: str, of_task: str | None, out: Path) -> None:
     """Compile the solver and the update rules to WebAssembly.
 
     The module runs in any browser, in Node and in engines such as wasmtime; target, obstacles,
@@ -35,12 +40,12 @@ def wasm(plant: str, task: str | None, out: Path) -> None:
     from nmpcrl.learning import browser
     from nmpcrl.study import paper
 
-    moved = named(plant, Plant)
-    asked = paper.task() if task is None else named(task, Task)
-    if asked.start.size != moved.n:
-        raise click.ClickException(f"the task has {asked.start.size} states, the plant {moved.n}")
+    plant = named(of_plant, Plant)
+    task = paper.task() if of_task is None else named(of_task, Task)
+    if task.start.size != plant.n:
+        raise click.ClickException(f"the task has {task.start.size} states, the plant {plant.n}")
     try:
-        module = browser.module(moved, asked)
+        module = browser.module(plant, task)
     except (CannotCompile, RuntimeError) as error:
         raise click.ClickException(str(error)) from None
     out.write_bytes(module)

@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 
 DISCS, LONGEST = {discs}, {longest}
+WARM_LIMIT, COLD_LIMIT = {warm}, {cold}
 RANDOM_INPUTS = np.array({inputs})
 
 
@@ -61,5 +62,11 @@ def _charge(plant: Plant, task: Task) -> str:
     names = ["state", "action", "target", "discs"]
     function = ca.Function("charge", [state, action, target, discs], [cost], names, ["cost"])
     inputs = [riccati.random_inputs(plant, seed, LONGEST) for seed in range(riccati.PERTURBED)]
-    header = HEADER.format(discs=DISCS, longest=LONGEST, inputs=np.array(inputs).tolist())
+    header = HEADER.format(
+        discs=DISCS,
+        longest=LONGEST,
+        warm=riccati.WARM_LIMIT,
+        cold=riccati.COLD_LIMIT,
+        inputs=np.array(inputs).tolist(),
+    )
     return header + source(function)

@@ -53,6 +53,13 @@ def held(yes: int, of: int) -> str:
     return dict(zip(Outcome, ends, strict=True))[read(int(yes), int(of))]
 
 
+def scientific(value: float) -> str:
+    """A small or large number for a formula: 3e-7 is `3 \\cdot 10^{-7}`."""
+    digits, _, exponent = f"{value:e}".partition("e")
+    power = f"10^{{{int(exponent)}}}"
+    return power if float(digits) == 1 else rf"{float(digits):g} \cdot {power}"
+
+
 def source(shown: Any, title: str = "") -> None:
     """Display where the library defines `shown`, as `listing` does; with a title it is folded."""
     text = listing(shown)

@@ -11,7 +11,17 @@ from hypothesis import strategies as st
 from nmpcrl.learning import updates
 from nmpcrl.learning.learners import Learner
 from nmpcrl.report import prose
-from nmpcrl.report.prose import PLACEHOLDER, filled, folded, held, listing, say, share, source
+from nmpcrl.report.prose import (
+    PLACEHOLDER,
+    filled,
+    folded,
+    held,
+    listing,
+    say,
+    scientific,
+    share,
+    source,
+)
 
 LATEX = (
     r"$\mathbf{s}$, $\boldsymbol{\theta}_{init}$, $\frac{a}{b}$, $x^{ref}$, $\sqrt[3]{x}$,"
@@ -147,3 +157,12 @@ def test_source_with_a_title_is_folded_behind_it(shown):
     assert shown(source, updates.td_error, "the error") == folded(
         listing(updates.td_error), "the error"
     )
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(1e-7, "10^{-7}"), (3e-7, r"3 \cdot 10^{-7}"), (1.5e-7, r"1.5 \cdot 10^{-7}")],
+)
+def test_a_small_number_stands_in_a_formula_as_a_power_of_ten(value, shown):
+    assert scientific(value) == shown
+    assert filled(r"$\alpha = {alpha}$", alpha=scientific(value)) == rf"$\alpha = {shown}$"

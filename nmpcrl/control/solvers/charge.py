@@ -9,6 +9,7 @@ import numpy as np
 
 DISCS = 16  # obstacles at most
 LONGEST = 40  # horizon at most
+WARM_LIMIT, COLD_LIMIT = 0, 0  # iterations, as `riccati` has them
 RANDOM_INPUTS = np.zeros((0, 0, 0))  # of the last starts, (starts, LONGEST, inputs)
 
 

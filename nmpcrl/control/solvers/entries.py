@@ -10,7 +10,7 @@ solution's numbers are z, lam and nu in the order of `Ocp`, and then the gradien
 import numpy as np
 from numba import carray, float64, int32, njit, types
 
-from .charge import DISCS, LONGEST, RANDOM_INPUTS, charge
+from .charge import COLD_LIMIT, DISCS, LONGEST, RANDOM_INPUTS, WARM_LIMIT, charge
 from .codes import End, Start
 from .hessian import hessian_times
 from .kernel import options, solve
@@ -20,7 +20,6 @@ COLD, SHIFTED, NEAR, SAME = map(int, Start)
 SOLVED, UNKNOWN = int(End.SOLVED), -1
 WARM, NEARER, STANDING, RANDOM = range(4)  # the starts in their order; random ones to the end
 ELSEWHERE = (1e9, 1e9, 1.0)  # a disc that costs nothing
-WARM_LIMIT, COLD_LIMIT = 40, 200  # as in `InteriorPoint`
 
 address = types.CPointer(float64)
 PROBLEM = (

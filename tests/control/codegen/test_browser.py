@@ -169,7 +169,7 @@ def test_the_largest_problem_fits_and_a_host_that_reserves_too_much_is_told(robo
         there.solve(start, THETA)
 
 
-def test_a_million_solves_leak_no_memory(robot_module):
+def test_solves_leak_no_memory(robot_module):
     """Scratch is given back at each call."""
     nmpc = paper.nmpc("A")
     there = Controller(Module(robot_module), nmpc)

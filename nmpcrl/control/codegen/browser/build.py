@@ -11,7 +11,7 @@ from pathlib import Path
 from nmpcrl.control.codegen import folder
 from nmpcrl.control.codegen.browser import emit, ir, link
 
-PAGES = 64  # of 64 KiB: 40 planned inputs among 16 obstacles need a fifth of them
+PAGES = 64  # of 64 KiB; a solve with 40 planned inputs among 16 obstacles takes three of them
 SEAL = 64  # bytes of `_seal`
 
 
@@ -38,8 +38,13 @@ def from_texts(texts: Mapping[str, str], pages: int = PAGES) -> bytes:
 def _keep(module: bytes, place: Path) -> None:
     """Write it behind its hash, whole or not at all."""
     with tempfile.NamedTemporaryFile(dir=place.parent, prefix=".draft", delete=False) as draft:
-        draft.write(_seal(module) + module)
-    Path(draft.name).replace(place)
+        path = Path(draft.name)
+    try:
+        path.write_bytes(_seal(module) + module)
+        path.replace(place)
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
 
 
 def _kept(called: str) -> bytes | None:
