@@ -1,6 +1,6 @@
 """Live figures on the pages: what each displays whole becomes files that the pages share.
 
-A figure's cell displays its scripts and its style inline, each as `report.live.FILE` has it, so
+A figure's cell displays its scripts and its style inline, each as `report.live.frame` has it, so
 that it also works in a notebook. A page links to one copy of each in _static/live; most of these
 are in the source tree, and the compiled module is written there.
 """

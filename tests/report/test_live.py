@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.learning import browser
 from nmpcrl.report import live
+from nmpcrl.report.live import closed_loop, frame
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -22,7 +24,7 @@ def nmpc():
 @pytest.fixture
 def shown(nmpc, monkeypatch) -> str:
     """The figure's HTML, with a module of three bytes."""
-    monkeypatch.setattr(live.browser, "module", lambda plant, task: b"abc")
+    monkeypatch.setattr(browser, "module", lambda plant, task: b"abc")
     return live.controller(nmpc, THETA, 130).data
 
 
@@ -71,7 +73,11 @@ def test_the_map_shows_the_start_the_target_and_every_circle(nmpc, data):
 
 
 def test_the_output_is_whole_and_loads_nothing(shown):
-    assert re.findall(r'data-file="([^"]+)"', shown) == [live.STYLE, "module.js", *live.SCRIPTS]
+    assert re.findall(r'data-file="([^"]+)"', shown) == [
+        frame.STYLE,
+        frame.MODULE,
+        *closed_loop.SCRIPTS,
+    ]
     assert not re.search(r"\b(src|href)=|https?://(?!www\.w3\.org/2000/svg)", shown)
     assert b64decode(re.search(r'module: "([^"]+)"', shown)[1]) == b"abc"
 
@@ -84,7 +90,7 @@ def test_without_a_compiler_there_is_a_sentence(nmpc, monkeypatch):
     def refuse(*_):
         raise CannotCompile("numba is not installed")
 
-    monkeypatch.setattr(live.browser, "module", refuse)
+    monkeypatch.setattr(browser, "module", refuse)
     assert live.controller(nmpc, THETA, 130).data == (
         "<p>There is no live figure here: numba is not installed.</p>"
     )

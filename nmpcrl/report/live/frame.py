@@ -1,0 +1,50 @@
+"""The frame of every live figure: what it is given, its style, its module and its scripts."""
+
+import json
+from base64 import b64encode
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from IPython.display import HTML
+
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.report.prose import ROOT
+
+STYLE, MODULE = "live.css", "module.js"
+FOLDER = ROOT / "book/_static/live"
+FIGURE = """<figure class="live" data-figure="{}" hidden>
+<p>This figure is live once the notebook is trusted, or its cells are run.</p>
+<script type="application/json">{}</script>
+</figure>"""
+COMPILED = 'window.nmpcrl = { ...window.nmpcrl, module: "%s" };'
+FILE = '<{kind} data-file="{name}">\n{text}\n</{kind}>'
+
+
+def figure(
+    name: str, data: Mapping[str, Any], scripts: Iterable[str], module: bytes | None = None
+) -> HTML:
+    """A live figure.
+
+    Args:
+        name: by which its script finds it.
+        data: what its script is given.
+        scripts: of the folder of live figures, in the order in which they are needed.
+        module: WebAssembly, if it solves; `nmpcrl.module` of a page is this.
+    """
+    shown = [FIGURE.format(name, json.dumps(data)), *files(scripts, module)]
+    return HTML("\n".join(shown))  # type: ignore[no-untyped-call]
+
+
+def absent(error: CannotCompile) -> HTML:
+    """What stands there where nothing can be compiled."""
+    return HTML(f"<p>There is no live figure here: {error}.</p>")  # type: ignore[no-untyped-call]
+
+
+def files(scripts: Iterable[str], module: bytes | None) -> list[str]:
+    """Style, module and scripts in the order in which they are needed, each with its name."""
+    texts = {STYLE: (FOLDER / STYLE).read_text("utf-8")}
+    if module is not None:
+        texts[MODULE] = COMPILED % b64encode(module).decode()
+    texts |= {name: (FOLDER / name).read_text("utf-8") for name in scripts}
+    kinds = {name: "style" if name == STYLE else "script" for name in texts}
+    return [FILE.format(kind=kinds[name], name=name, text=texts[name].strip()) for name in texts]

@@ -1,0 +1,64 @@
+"""What the solver of a live figure is given, and how it is shown: sliders and a map."""
+
+from typing import Any
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.control import Nmpc, Task
+from nmpcrl.control.ocp import transcribe
+from nmpcrl.control.solvers.riccati import Riccati
+from nmpcrl.study import paper
+
+ARGUMENTS = (
+    "target", "lower", "upper", "discs", "sides", "discount", "slack_weight", "soft_box", "tie",
+)  # fmt: skip
+LONGEST = 20  # steps planned: a longer plan has several minima
+WALL, AROUND = 0.5, 1.5  # of the map, beyond a wall and beyond an obstacle's circle [m]
+
+
+def problem_of(nmpc: Nmpc) -> dict[str, Any]:
+    """What the module is given of a problem, under the names of `solvers.entries`; u_0 is free.
+
+    Raises:
+        CannotCompile: as `Riccati.prepare`.
+    """
+    options = {"fix_action": False, "ties_active": nmpc.ties_active}
+    ocp = transcribe(nmpc.plant, nmpc.task, LONGEST, nmpc.gamma, nmpc.slack_weight, **options)
+    solver = Riccati()
+    values = zip(ARGUMENTS, solver.prepare(ocp)._problem, strict=True)
+    plain = {name: np.asarray(value).tolist() for name, value in values}
+    return plain | {"tolerance": solver.tolerance, "theta": 2 * nmpc.plant.n + nmpc.plant.m + 1}
+
+
+def ranges(theta: Vector) -> dict[str, tuple[float, float, float]]:
+    """Least, most and step of each slider; the initial theta is one of its steps."""
+    *weights, c = theta.tolist()
+    found = {
+        name: (0.0, 4 * weight, weight / 20)
+        for name, weight in zip(paper.THETA_NAMES, weights, strict=False)
+    }
+    found["c"] = (round(c - 0.2, 6), round(c + 0.5, 6), 0.01)
+    return found | {"horizon": (1, LONGEST, 1)}
+
+
+def surroundings(task: Task) -> dict[str, Any]:
+    """What a map draws besides trajectories: its part of the plane, the box, and sizes [m]."""
+    return {
+        "box": [task.lower[:2].tolist(), task.upper[:2].tolist()],
+        "view": view(task),
+        "radii": [one.diameter / 2 for one in task.obstacles],
+        "robot": task.robot_diameter / 2,
+    }
+
+
+def view(task: Task) -> list[float]:
+    """The part of the plane that the map shows: least x and y, width and height [m]."""
+    x, y, clearance = task.discs
+    centres, reach = np.column_stack([x, y]), clearance[:, None] / 2 + AROUND
+    ends = np.array([task.start[:2], task.target[:2]])
+    low = np.vstack([centres - reach, ends - AROUND]).min(axis=0)
+    high = np.vstack([centres + reach, ends + AROUND]).max(axis=0)
+    low = np.maximum(low, task.lower[:2] - WALL)
+    high = np.minimum(high, task.upper[:2] + WALL)
+    return [*low.tolist(), *(high - low).tolist()]
