@@ -141,7 +141,7 @@
       return found;
     }
 
-    return { solve, rollout, step, cost, hessianTimes, rules: rules(wasm, room) };
+    return { problem, solve, rollout, step, cost, hessianTimes, rules: rules(wasm, room) };
   }
 
   // The update rules, as nmpcrl/learning/rules.py describes them: vectors in, vectors out.

@@ -1,0 +1,144 @@
+// Algorithm 1 in this page, as nmpcrl/learning/training.py has it, on the compiled solver and update rules.
+//
+// `settings`: { learner, alpha, beta, decay, decayRate, episodes, steps, theta, w, thetaSet, evaluateEvery,
+// start, target, discs, horizon }; `noise` holds epsilon, shape (episodes, steps, m).
+(function learning() {
+  "use strict";
+
+  const ABSURD = 1e6; // no theta or w beyond this
+  const PATIENCE = 10; // so many episodes in a row that a failed solve ended are a divergence
+
+  // ---- The learners: a rule takes { theta, w }, delta, the solution in s and that in s+
+
+  const semiGradient = ({ rules }, { alpha }) => ({ theta, w }, delta, { features }) => ({
+    theta: rules.semiGradient(theta, delta, features, alpha), w,
+  });
+
+  const gradientTd = ({ rules, problem }, { alpha, beta }) => ({ theta, w }, delta, solution, successor) => ({
+    theta: rules.gradientTd(
+      theta, w, delta, solution.features, successor.features, alpha, problem.discount[1],
+    ),
+    w: rules.auxiliary(w, delta, solution.features, beta),
+  });
+
+  function exactGradientTd(nmpc, settings) {
+    const printed = gradientTd(nmpc, settings), { rules } = nmpc, { alpha, thetaSet } = settings;
+    return (weights, delta, solution, successor, given) => {
+      const { theta, w } = printed(weights, delta, solution, successor);
+      const product = nmpc.hessianTimes(given, solution, weights.w);
+      if (!product) return null; // no strict minimum: Python then uses dense algebra
+      const h = rules.curvature(delta, solution.features, weights.w, product);
+      return { theta: rules.project(theta.map((each, k) => each - alpha * h[k]), ...thetaSet), w };
+    };
+  }
+
+  const LEARNERS = {
+    ES: { rule: semiGradient },
+    GES: { rule: gradientTd },
+    TDC: { rule: exactGradientTd },
+    QL: { rule: semiGradient, constrained: true },
+    frozen: { rule: null }, // values no successor
+  };
+
+  // ---- Exploration
+
+  const COUNTS = { step: (episode, t, steps) => episode * steps + t, episode: (episode) => episode };
+
+  // Noise that decays is added to the policy, and what leaves the action space is clipped.
+  function explorer({ problem: { lower, upper } }, { decay, decayRate, steps }, noise) {
+    const m = lower.length, count = COUNTS[decay];
+    return (policy, episode, t) => {
+      const scale = decayRate ** count(episode, t, steps), at = (episode * steps + t) * m;
+      return policy.map((u, i) => Math.min(Math.max(u + scale * noise[at + i], lower[i]), upper[i]));
+    };
+  }
+
+  // ---- Training
+
+  const squared = (vector) => vector.reduce((sum, each) => sum + each * each, 0);
+  const small = (vector) => vector.reduce((sum, each) => sum + Math.abs(each), 0) <= ABSURD;
+  const absurd = ({ theta, w }) => !(small(theta) && small(w));
+
+  // The steps of one episode; the last one says so if a solve failed.
+  function* steps(nmpc, settings, explore, episode, weights) {
+    const { rule, constrained = false } = LEARNERS[settings.learner], gamma = nmpc.problem.discount[1];
+    const move = rule?.(nmpc, settings);
+    const given = { discs: settings.discs, target: settings.target, horizon: settings.horizon };
+    let state = settings.start, warm = null;
+    for (let time = 0; time < settings.steps; time++) {
+      const here = { ...given, state, theta: weights.theta };
+      const step = { episode, time, state, ...weights, action: null, cost: NaN, value: NaN, delta: NaN, phi2: NaN };
+      const plan = nmpc.solve(here, { warm });
+      if (!plan) return yield { ...step, failed: true };
+      step.action = explore(plan.action, episode, time);
+      step.cost = nmpc.cost(given, state, step.action);
+      state = nmpc.step(state, step.action);
+      const solution = constrained ? nmpc.solve(here, { warm: plan, action: step.action }) : plan;
+      if (!solution) return yield { ...step, failed: true };
+      step.value = solution.value;
+      step.phi2 = squared(solution.features);
+      warm = solution;
+      if (move) {
+        const successor = nmpc.solve({ ...here, state }, { warm: solution });
+        if (!successor) return yield { ...step, failed: true };
+        step.delta = nmpc.rules.tdError(step.cost, gamma, solution.value, successor.value);
+        const moved = move(weights, step.delta, solution, successor, here);
+        if (!moved) return yield { ...step, failed: true };
+        weights = moved;
+        warm = successor;
+      }
+      yield { ...step, ...weights, failed: false };
+    }
+  }
+
+  // Algorithm 1, step by step: { episode, time, state, action, cost, value, delta, phi2, theta, w, failed,
+  // diverged }, theta and w after the step. What is diverged is the last.
+  function* train(nmpc, settings, noise) {
+    const explore = explorer(nmpc, settings, noise);
+    let weights = { theta: settings.theta, w: settings.w }, failures = 0;
+    for (let episode = 0; episode < settings.episodes; episode++) {
+      let failed = false;
+      for (const step of steps(nmpc, settings, explore, episode, weights)) {
+        ({ failed } = step);
+        weights = { theta: step.theta, w: step.w };
+        const diverged = absurd(weights) || (failed && failures + 1 === PATIENCE);
+        yield { ...step, diverged };
+        if (diverged) return;
+      }
+      failures = failed ? failures + 1 : 0;
+    }
+  }
+
+  // A run, as nmpcrl/study/run.py has it: what each episode did, and before them what theta does at first.
+  // { episode, cost, alphaPhi2 (the largest), theta, diverged, judged: { cost, states } or null }
+  function* run(nmpc, settings, noise) {
+    const judge = (theta) => {
+      const { start, target, discs, horizon } = settings;
+      const { states, cost, failed } = nmpc.rollout({ start, target, discs, horizon, theta }, settings.steps);
+      return { states, cost: failed ? Infinity : cost };
+    };
+    const { theta, episodes, alpha } = settings;
+    yield { episode: 0, cost: NaN, alphaPhi2: NaN, theta, diverged: false, judged: judge(theta) };
+    let cost = 0, phi2 = 0;
+    for (const step of train(nmpc, settings, noise)) {
+      cost += step.cost;
+      phi2 = Math.max(phi2, step.phi2 || 0);
+      if (!step.failed && !step.diverged && step.time < settings.steps - 1) continue;
+      const episode = step.episode + 1;
+      const due = episode % settings.evaluateEvery === 0 || episode === episodes;
+      const judged = due && !absurd(step) ? judge(step.theta) : null;
+      yield { episode, cost, alphaPhi2: alpha * phi2, theta: step.theta, diverged: step.diverged, judged };
+      cost = phi2 = 0;
+    }
+  }
+
+  // As nmpcrl/study/records.py has it: the mean of the last rollouts, of which theta's first is never one.
+  function finalCost(costs, last) {
+    const learned = costs.slice(1).slice(-last);
+    return learned.length ? learned.reduce((sum, each) => sum + each, 0) / learned.length : Infinity;
+  }
+
+  self.nmpcrl = {
+    ...self.nmpcrl, train, run, finalCost, sources: [...(self.nmpcrl?.sources ?? []), learning],
+  };
+})();
