@@ -11,21 +11,19 @@ import pytest
 import whole
 from axe_playwright_python.sync_playwright import Axe
 from bs4 import BeautifulSoup
+from live_page import CHAPTERS, MOST, loaded
 
 from nmpcrl.control import Obstacle
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 
-CHAPTER = "book/01_mdp_and_nmpc.html"
+FIGURE = "controller"
 STATIC = "article figure img[alt*='from start to target']"
-FRAMES = """() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
-    () => done(document.querySelector("figure.live").shown))))"""
 MOVES = """() => {
   window.changes = 0
   const figure = document.querySelector("figure.live"), options = {subtree: true, childList: true, attributes: true}
   new MutationObserver(all => window.changes += all.length).observe(figure, options)
 }"""  # noqa: E501
-MOST = 200_000  # bytes that a chapter's live figures may add
 FAILS_AT_20 = """
   const real = WebAssembly.instantiate
   WebAssembly.instantiate = async (...given) => {
@@ -63,77 +61,6 @@ def test_two_pages_share_a_file_only_if_it_is_the_same(tmp_path):
         live.share(figure_of("a", "b"), Path("book/01.ipynb"), tmp_path)
     with pytest.raises(ValueError, match=r"another solver\.js than the one"):
         live.share(figure_of("a", "c"), Path("book/02.ipynb"), tmp_path)
-
-
-class Tab:
-    """A chapter's page, and what a reader does on it."""
-
-    def __init__(self, page, site):
-        self.page, self.errors, self.requests = page, [], []
-        page.on("pageerror", lambda error: self.errors.append(str(error)))
-        page.on(
-            "console", lambda said: self.errors.append(said.text) if said.type == "error" else 0
-        )
-        page.on("request", lambda request: self.requests.append(request.url))
-        page.goto((site / CHAPTER).resolve().as_uri())
-
-    def shown(self) -> dict:
-        """What was asked and found, once it is drawn."""
-        return self.page.evaluate(FRAMES)
-
-    def handle(self, name):
-        return self.page.get_by_role("slider", name=name, exact=True)
-
-    def middle(self, name) -> np.ndarray:
-        """Where a handle is on the screen."""
-        box = self.handle(name).locator(".reach").bounding_box()
-        return np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
-
-    def see(self) -> None:
-        self.page.locator("figure.live svg").evaluate(
-            "map => map.scrollIntoView({block: 'center'})"
-        )
-
-    def drag(self, name, by) -> None:
-        """Drag a handle by so many pixels, in ten steps."""
-        self.see()
-        place = self.middle(name)
-        self.page.mouse.move(*place)
-        self.page.mouse.down()
-        self.page.mouse.move(*(place + by), steps=10)
-        self.page.mouse.up()
-
-    def press(self, name, *keys) -> None:
-        self.handle(name).focus()
-        for key in keys:
-            self.page.keyboard.press(key)
-
-
-@pytest.fixture
-def opened(site, browser):
-    """Opens the chapter as a reader with these settings would."""
-    contexts = []
-
-    def with_settings(script="", **settings):
-        contexts.append(browser.new_context(**settings))
-        page = contexts[-1].new_page()
-        if script:
-            page.add_init_script(script)
-        return Tab(page, site)
-
-    yield with_settings
-    for context in contexts:
-        context.close()
-
-
-@pytest.fixture
-def tab(opened):
-    """The chapter on a large screen."""
-    tab = opened(viewport={"width": 1400, "height": 1000})
-    tab.page.wait_for_selector("figure.live .results")
-    yield tab
-    assert tab.errors == []
-    assert [url for url in tab.requests if not url.startswith(("file:", "data:"))] == []
 
 
 def in_python(given: dict):
@@ -209,8 +136,8 @@ def test_an_obstacle_follows_the_mouse_and_the_trajectory_avoids_it(tab):
 
 @pytest.mark.book
 def test_a_finger_drags_as_the_mouse_does(opened):
-    tab = opened(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
-    tab.page.wait_for_selector("figure.live .results")
+    tab = opened(FIGURE, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    tab.begun()
     tab.see()
     before = tab.shown()["given"]["discs"][2]
     x, y = tab.middle("Obstacle 3")
@@ -272,7 +199,7 @@ def test_nothing_leaves_the_map_and_the_robot_stays_in_its_box(tab):
     tab.press("Robot, start", *["Shift+ArrowLeft"] * 4)
     tab.press("Obstacle 3", *["Shift+ArrowUp"] * 20)
     given = tab.shown()["given"]
-    data = json.loads(tab.page.locator("figure.live script[type]").text_content())
+    data = json.loads(tab.figure.locator("script[type]").text_content())
     assert given["start"][0] == paper.LOWER[0]
     assert given["discs"][2][1] == pytest.approx(data["view"][1] + data["view"][3])
 
@@ -280,7 +207,7 @@ def test_nothing_leaves_the_map_and_the_robot_stays_in_its_box(tab):
 @pytest.mark.book
 @pytest.mark.parametrize("k", range(9))
 def test_each_slider_moves_its_own_component_of_theta(tab, k):
-    slider = tab.page.locator("figure.live input[type=range]").nth(k)
+    slider = tab.figure.locator("input[type=range]").nth(k)
     slider.focus()
     tab.page.keyboard.press("ArrowRight")
     moved = np.array(tab.shown()["given"]["theta"]) - paper.THETA_INIT
@@ -294,24 +221,24 @@ def test_reset_restores_the_beginning_in_every_digit(tab):
     tab.drag("Robot, start", (30, 60))
     tab.press("N, steps planned", "ArrowLeft")
     assert tab.shown() != before
-    tab.page.get_by_role("button", name="Reset").click()
+    tab.click("Reset")
     assert tab.shown() == before
 
 
 @pytest.mark.book
 def test_a_screen_reader_is_told_the_results_once_nothing_changes(tab):
-    status = tab.page.locator("figure.live [role=status]")
+    status = tab.figure.locator("[role=status]")
     tab.press("Obstacle 2", "Shift+ArrowUp")
     found = tab.shown()["found"]
     assert status.get_attribute("aria-busy") == "true"
-    tab.page.wait_for_selector("figure.live [role=status][aria-busy=false]")
+    tab.quiet()
     for number in (found["plan"]["value"], found["cost"], found["parts"]["stages"]):
         assert f"{number:.1f}" in status.inner_text()
 
 
 @pytest.mark.book
 def test_nothing_moves_by_itself(tab):
-    tab.page.wait_for_selector("figure.live [role=status][aria-busy=false]")
+    tab.quiet()
     tab.page.evaluate(MOVES)
     tab.page.wait_for_timeout(400)
     assert tab.page.evaluate("window.changes") == 0
@@ -322,26 +249,26 @@ def test_nothing_moves_by_itself(tab):
 
 @pytest.mark.book
 def test_a_loop_that_ends_early_says_so(opened):
-    tab = opened(script=FAILS_AT_20)
-    tab.page.wait_for_selector("figure.live .results")
+    tab = opened(FIGURE, script=FAILS_AT_20)
+    tab.begun()
     said = "The solver found no plan at step 20; the closed loop ends there."
-    assert tab.page.locator("figure.live [role=status]").inner_text().strip() == said
+    assert tab.figure.locator("[role=status]").inner_text().strip() == said
     assert len(tab.shown()["found"]["states"]) == 20
 
 
 @pytest.mark.book
 def test_without_javascript_there_is_the_picture_alone(opened):
-    tab = opened(java_script_enabled=False)
+    tab = opened(FIGURE, java_script_enabled=False)
     assert tab.page.locator(STATIC).is_visible()
-    assert not tab.page.locator("figure.live").is_visible()
+    assert not tab.figure.is_visible()
 
 
 @pytest.mark.book
 def test_without_webassembly_there_are_the_picture_and_a_sentence(opened):
-    tab = opened(script="delete window.WebAssembly")
+    tab = opened(FIGURE, script="delete window.WebAssembly")
     tab.page.wait_for_selector("figure.live p")
-    assert "does not run WebAssembly" in tab.page.locator("figure.live").inner_text()
-    assert tab.page.locator("figure.live svg").count() == 0
+    assert "does not run WebAssembly" in tab.figure.inner_text()
+    assert tab.figure.locator("svg").count() == 0
     assert tab.page.locator(STATIC).is_visible()
     assert tab.errors == []
 
@@ -350,7 +277,7 @@ def test_without_webassembly_there_are_the_picture_and_a_sentence(opened):
 def test_on_paper_there_is_the_picture_alone(tab):
     tab.page.emulate_media(media="print")
     assert tab.page.locator(STATIC).is_visible()
-    assert not tab.page.locator("figure.live").is_visible()
+    assert not tab.figure.is_visible()
 
 
 @pytest.mark.book
@@ -366,9 +293,12 @@ def test_the_book_as_one_document_leaves_live_figures_out(site):
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_axe_finds_nothing(opened, width, theme):
     tab = opened(
-        viewport={"width": width, "height": 900}, color_scheme=theme, reduced_motion="reduce"
+        FIGURE,
+        viewport={"width": width, "height": 900},
+        color_scheme=theme,
+        reduced_motion="reduce",
     )
-    tab.page.wait_for_selector("figure.live [role=status][aria-busy=false]")
+    tab.quiet()
     assert tab.page.evaluate("document.documentElement.dataset.theme") == theme
     found = Axe().run(tab.page, context="figure.live")
     assert found.response["passes"]
@@ -378,16 +308,21 @@ def test_axe_finds_nothing(opened, width, theme):
 
 @pytest.mark.book
 def test_a_finger_can_hit_every_handle_and_slider_on_a_telephone(opened):
-    tab = opened(viewport={"width": 390, "height": 844})
-    tab.page.wait_for_selector("figure.live .results")
+    tab = opened(FIGURE, viewport={"width": 390, "height": 844})
+    tab.begun()
     tab.shown()
-    for target in tab.page.locator("figure.live :is(.reach, input, button)").all():
+    for target in tab.figure.locator(":is(.reach, input, button)").all():
         box = target.bounding_box()
         assert min(box["width"], box["height"]) >= 24
 
 
 @pytest.mark.book
-def test_only_a_page_with_a_live_figure_loads_scripts_for_it_and_they_are_light(site):
-    loaded = {path.name for path in site.glob("book/*.html") if "_static/live/" in path.read_text()}
-    assert loaded == {Path(CHAPTER).name}
-    assert sum(path.stat().st_size for path in site.glob("_static/live/*")) <= MOST
+def test_only_a_page_with_a_live_figure_loads_scripts_for_it(site):
+    pages = {path.stem for path in site.glob("book/*.html") if "_static/live/" in path.read_text()}
+    assert pages == set(CHAPTERS.values())
+
+
+@pytest.mark.book
+def test_what_a_chapters_live_figures_load_is_light(site):
+    for figure in CHAPTERS:
+        assert loaded(site, figure) <= MOST

@@ -1,39 +1,19 @@
-// Every word that a reader of a live figure sees or hears.
+// Every word that a reader of a live figure sees or hears: `parts` are those of several, the rest one figure's.
 (() => {
   "use strict";
 
   // A number with so many digits, with a minus sign that is one; none before a zero.
   const fixed = (number, digits) => number.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "\u2212");
 
-  const controller = {
+  const parts = {
+    fixed,
     none: "This browser does not run WebAssembly, so the figure stays as it is printed above.",
-    map: "Map of the robot, its plan, its closed loop and the obstacles, which can be moved",
-    handles: "What can be moved on the map",
-    title: "Try it: the controller of this chapter, solved in your browser.",
-    hint: "Drag the robot, the tip of its arrow or an obstacle; or click one and then its new place; "
-      + "or reach it with Tab and press the arrow keys, with Shift for larger steps.",
-    legend: (steps) => `Thin line: closed loop of ${steps} steps, without noise. `
-      + "Thick line: first plan, a dot for each step. Dotted line: closed loop before any change.",
-    // A name of `symbols` stands for its symbol.
-    questions: [
-      "What does", "c", "do to the distance from the obstacles? What does the robot miss with a smaller",
-      "horizon", "?",
-    ],
-    reset: "Reset",
     robot: "Robot, start",
     heading: "Robot, heading",
     obstacle: (number) => `Obstacle ${number}`,
-    target: "target",
     tick: (metres, last) => fixed(metres, 0) + (last ? " m" : ""),
     place: (x, y) => `x ${fixed(x, 2)} m, y ${fixed(y, 2)} m`,
     angle: (radians) => `${fixed((radians * 180) / Math.PI, 0)} degrees`,
-    number: (name, value) => fixed(value, name === "horizon" ? 0 : 3),
-    groups: {
-      "On the way": ["x", "y", "heading"],
-      Inputs: ["v", "nu"],
-      "At the end": ["x_f", "y_f", "heading_f"],
-      "Constraint, horizon": ["c", "horizon"],
-    },
     symbols: { // letter, its subscript, and the subscript's own
       x: ["θ", "x"], y: ["θ", "y"], heading: ["θ", "φ"], v: ["θ", "v"], nu: ["θ", "ν"],
       x_f: ["θ", "x", "f"], y_f: ["θ", "y", "f"], heading_f: ["θ", "φ", "f"], c: ["θ", "c"], horizon: ["N"],
@@ -48,7 +28,30 @@
       y_f: "theta y f, weight of the distance in y at the end of the plan",
       heading_f: "theta phi f, weight of the heading at the end of the plan",
       c: "theta c, tightens the obstacle constraint",
-      horizon: "N, steps planned",
+    },
+  };
+
+  const controller = {
+    map: "Map of the robot, its plan, its closed loop and the obstacles, which can be moved",
+    handles: "What can be moved on the map",
+    title: "Try it: the controller of this chapter, solved in your browser.",
+    hint: "Drag the robot, the tip of its arrow or an obstacle; or click one and then its new place; "
+      + "or reach it with Tab and press the arrow keys, with Shift for larger steps.",
+    legend: (steps) => `Thin line: closed loop of ${steps} steps, without noise. `
+      + "Thick line: first plan, a dot for each step. Dotted line: closed loop before any change.",
+    // A name of `symbols` stands for its symbol.
+    questions: [
+      "What does", "c", "do to the distance from the obstacles? What does the robot miss with a smaller",
+      "horizon", "?",
+    ],
+    reset: "Reset",
+    target: "target",
+    horizon: "N, steps planned",
+    groups: {
+      "On the way": ["x", "y", "heading"],
+      Inputs: ["v", "nu"],
+      "At the end": ["x_f", "y_f", "heading_f"],
+      "Constraint, horizon": ["c", "horizon"],
     },
     // Lines of words and numbers in turn.
     results: ({ plan, parts, cost }) => [
@@ -65,5 +68,5 @@
     failed: (step) => `The solver found no plan at step ${step}; the closed loop ends there.`,
   };
 
-  window.nmpcrl = { ...window.nmpcrl, words: { controller } };
+  window.nmpcrl = { ...window.nmpcrl, words: { parts, controller } };
 })();

@@ -10,7 +10,7 @@ from nmpcrl.report.live import frame
 from nmpcrl.report.live.problem import problem_of, ranges, surroundings
 from nmpcrl.study import paper
 
-SCRIPTS = ("solver.js", "words.js", "plane.js", "controller.js")
+SCRIPTS = (*frame.PARTS, "controller.js")
 
 
 def controller(nmpc: Nmpc, theta: Vector, steps: int) -> HTML:

@@ -11,6 +11,7 @@ from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.report.prose import ROOT
 
 STYLE, MODULE = "live.css", "module.js"
+PARTS = ("solver.js", "words.js", "plane.js", "parts.js")  # of every figure that solves
 FOLDER = ROOT / "book/_static/live"
 FIGURE = """<figure class="live" data-figure="{}" hidden>
 <p>This figure is live once the notebook is trusted, or its cells are run.</p>

@@ -1,0 +1,75 @@
+"""A chapter's page with a live figure, and what a reader does on it."""
+
+import numpy as np
+
+CHAPTERS = {"controller": "01_mdp_and_nmpc"}  # of each live figure
+FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
+    () => done(figure.shown))))"""
+MOST = 200_000  # bytes that a chapter's live figures may add
+
+
+class Tab:
+    """The page of a live figure, and what a reader does there."""
+
+    def __init__(self, page, site, figure):
+        self.page, self.errors, self.requests = page, [], []
+        self.figure = page.locator(f"figure.live[data-figure={figure}]")
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on(
+            "console", lambda said: self.errors.append(said.text) if said.type == "error" else 0
+        )
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.goto((site / f"book/{CHAPTERS[figure]}.html").resolve().as_uri())
+
+    def begun(self) -> "Tab":
+        """This page, once the figure shows results."""
+        self.figure.locator(".results").wait_for(state="attached")
+        return self
+
+    def quiet(self) -> "Tab":
+        """This page, once nothing has changed for a while."""
+        self.figure.locator("[role=status][aria-busy=false]").wait_for()
+        return self
+
+    def shown(self) -> dict:
+        """What was asked and found, once it is drawn."""
+        return self.figure.evaluate(FRAMES)
+
+    def handle(self, name):
+        return self.figure.get_by_role("slider", name=name, exact=True)
+
+    def middle(self, name) -> np.ndarray:
+        """Where a handle is on the screen."""
+        box = self.handle(name).locator(".reach").bounding_box()
+        return np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+
+    def see(self) -> None:
+        self.figure.locator("svg").first.evaluate("map => map.scrollIntoView({block: 'center'})")
+
+    def drag(self, name, by) -> None:
+        """Drag a handle by so many pixels, in ten steps."""
+        self.see()
+        place = self.middle(name)
+        self.page.mouse.move(*place)
+        self.page.mouse.down()
+        self.page.mouse.move(*(place + by), steps=10)
+        self.page.mouse.up()
+
+    def press(self, name, *keys) -> None:
+        self.handle(name).focus()
+        for key in keys:
+            self.page.keyboard.press(key)
+
+    def click(self, button) -> None:
+        self.figure.get_by_role("button", name=button, exact=True).click()
+
+    def external(self) -> list[str]:
+        """What the page has asked other places for."""
+        return [url for url in self.requests if not url.startswith(("file:", "data:"))]
+
+
+def loaded(site, figure) -> int:
+    """The bytes of everything that the live figures of a figure's chapter load."""
+    text = (site / f"book/{CHAPTERS[figure]}.html").read_text()
+    files = site.glob("_static/live/*")
+    return sum(path.stat().st_size for path in files if f"_static/live/{path.name}" in text)
