@@ -11,7 +11,7 @@ from numba import carray, cfunc, types
 from wasmtime import _bindings as c
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc
+from nmpcrl.control import Nmpc, Riccati
 
 # wasmtime hands a function one array of 16 bytes a value, for its arguments and its result.
 CALLED = types.intp(types.voidptr, types.voidptr, types.CPointer(types.float64), types.uint64)
@@ -103,7 +103,7 @@ class Controller:
 
     def __init__(self, module: Module, nmpc: Nmpc) -> None:
         self.module, self.nmpc = module, nmpc
-        target, lower, upper, discs, sides, discount, *rest = nmpc._free._solver._problem
+        target, lower, upper, discs, sides, discount, *rest = Riccati().prepare(nmpc.ocp).problem
         self.horizon, self.discs = len(discount) - 1, len(discs)
         arrays = [module.put(each) for each in (target, lower, upper, discs, sides, discount)]
         self._target, self._discs = arrays[0], arrays[3]
