@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import struct
 from functools import cache
 from typing import Any
 
@@ -11,10 +12,12 @@ from numba import carray, cfunc, types
 from wasmtime import _bindings as c
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc
+from nmpcrl.control import Nmpc, Riccati
 
 # wasmtime hands a function one array of 16 bytes a value, for its arguments and its result.
 CALLED = types.intp(types.voidptr, types.voidptr, types.CPointer(types.float64), types.uint64)
+SIZE = 8  # bytes of a number
+DOUBLES = ctypes.POINTER(ctypes.c_double)
 NO_FINALIZER = ctypes.cast(None, ctypes.CFUNCTYPE(None, ctypes.c_void_p))
 
 
@@ -46,15 +49,53 @@ def compiled(data: bytes) -> tuple[wasmtime.Engine, wasmtime.Module]:
     return engine, wasmtime.Module(engine, data)
 
 
+class Function:
+    """A function of an instance: its numbers are packed and taken as one array, 16 bytes each."""
+
+    def __init__(self, store: wasmtime.Store, function: wasmtime.Func) -> None:
+        kind = function.type(store)
+        self._given, self._found = layout(kind.params), layout(kind.results)
+        self._values = (c.wasmtime_val_raw_t * max(len(kind.params), 1))()
+        self._function, self._store = function, store  # neither may go before this does
+        self._where = (store._context(), ctypes.byref(function._func), self._values)
+
+    def __call__(self, *arguments: float) -> Any:
+        """Its result, or None; the number of arguments is checked, their ranges are too.
+
+        Raises:
+            struct.error: there are too many arguments or too few, or one is none for its place.
+            wasmtime.Trap: the call was ended.
+        """
+        self._given.pack_into(self._values, 0, *arguments)
+        trap = ctypes.POINTER(c.wasm_trap_t)()
+        error = c.wasmtime_func_call_unchecked(*self._where, len(self._values), ctypes.byref(trap))
+        if error:
+            raise wasmtime.WasmtimeError._from_ptr(error)
+        if trap:
+            raise wasmtime.Trap._from_ptr(trap)
+        return next(iter(self._found.unpack_from(self._values)), None)
+
+
+def layout(kinds: list[wasmtime.ValType]) -> struct.Struct:
+    """How numbers of these types stand in an array."""
+    return struct.Struct("<" + "".join({"i32": "i12x", "f64": "d8x"}[str(one)] for one in kinds))
+
+
 class Module:
     """An instance of a module; its functions are called by name, arrays are put and read."""
 
     def __init__(self, data: bytes) -> None:
         engine, module = compiled(data)
-        self._store = wasmtime.Store(engine)
+        store = wasmtime.Store(engine)
         self.imports = sorted(one.name for one in module.imports)
-        given = [self._given(one.name, one.type) for one in module.imports]
-        self._exports = wasmtime.Instance(self._store, module, given).exports(self._store)
+        given = [self._given(store, one.name, one.type) for one in module.imports]
+        exports = dict(wasmtime.Instance(store, module, given).exports(store))
+        memory = exports.pop("memory")  # never grows, so its numbers stay where they are
+        count = memory.data_len(store) // SIZE
+        self._numbers = np.ctypeslib.as_array(
+            ctypes.cast(memory.data_ptr(store), DOUBLES), (count,)
+        )
+        self._functions = {name: Function(store, one) for name, one in exports.items()}
 
     def __call__(self, name: str, *arguments: float) -> Any:
         """Call a function.
@@ -63,37 +104,32 @@ class Module:
             MemoryError, ValueError, RuntimeError: the call was ended, and why.
         """
         try:
-            return self._exports[name](self._store, *arguments)
+            return self._functions[name](*arguments)
         except wasmtime.Trap as error:
-            why = self._exports["why"](self._store)
+            why = self._functions["why"]()
             raise {1: MemoryError, 2: ValueError}.get(why, RuntimeError)(why) from error
 
     def put(self, numbers: Any) -> int:
         """Reserve room for an array and write it there; its address."""
-        array = np.ascontiguousarray(numbers, float)
-        address = self("reserve", max(array.nbytes, 8))
+        array = np.ravel(np.asarray(numbers, float))
+        address = self("reserve", max(array.nbytes, SIZE))
         self.write(address, array)
         return address
 
     def write(self, address: int, numbers: Any) -> None:
-        array = np.ascontiguousarray(numbers, float)
-        ctypes.memmove(self._begin + address, array.ctypes.data, array.nbytes)
+        first = address // SIZE
+        self._numbers[first : first + len(numbers)] = numbers
 
     def read(self, address: int, count: int) -> Vector:
-        out = np.empty(count)
-        ctypes.memmove(out.ctypes.data, self._begin + address, out.nbytes)
-        return out
+        first = address // SIZE
+        return self._numbers[first : first + count].copy()
 
-    @property
-    def _begin(self) -> int:
-        memory = self._exports["memory"].data_ptr(self._store)
-        return ctypes.addressof(memory.contents)
-
-    def _given(self, name: str, kind: wasmtime.FuncType) -> wasmtime.Func:
+    @staticmethod
+    def _given(store: wasmtime.Store, name: str, kind: wasmtime.FuncType) -> wasmtime.Func:
         function, code = c.wasmtime_func_t(), machine_code(name)
         callback = ctypes.cast(code.address, c.wasmtime_func_unchecked_callback_t)
         c.wasmtime_func_new_unchecked(
-            self._store._context(), kind.ptr(), callback, None, NO_FINALIZER, ctypes.byref(function)
+            store._context(), kind.ptr(), callback, None, NO_FINALIZER, ctypes.byref(function)
         )
         return wasmtime.Func._from_raw(function)
 
@@ -103,7 +139,7 @@ class Controller:
 
     def __init__(self, module: Module, nmpc: Nmpc) -> None:
         self.module, self.nmpc = module, nmpc
-        target, lower, upper, discs, sides, discount, *rest = nmpc._free._solver._problem
+        target, lower, upper, discs, sides, discount, *rest = Riccati().prepare(nmpc.ocp).problem
         self.horizon, self.discs = len(discount) - 1, len(discs)
         arrays = [module.put(each) for each in (target, lower, upper, discs, sides, discount)]
         self._target, self._discs = arrays[0], arrays[3]

@@ -6,6 +6,7 @@ A page is opened once, from disk, with all that is folded open.
 import functools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import build
@@ -43,6 +44,26 @@ THIN = """() => {
   document.body.normalize();
 }"""
 
+# After the first view, text of one look stands for all text that has it: the same element and class
+# in the same, in the same colour and size, above the same backgrounds.
+FIRST_OF_EACH_LOOK = """() => {
+  const beneath = new Map([[null, ""]]), seen = new Set();
+  for (const one of document.querySelectorAll("*")) {
+    const style = getComputedStyle(one), parent = one.parentElement;
+    const own = [style.backgroundColor, style.backgroundImage, style.opacity, style.position];
+    const plain = own.join() === "rgba(0, 0, 0, 0),none,1,static";
+    beneath.set(one, beneath.get(parent) + (plain ? "" : own.join()));
+    delete one.dataset.first;
+    const said = [...one.childNodes].some(node => node.nodeType === 3 && node.data.trim());
+    if (!said || !one.checkVisibility({ visibilityProperty: true })) continue;
+    const look = [one.localName, one.className, parent.localName, parent.className, style.color,
+      style.fontSize, style.fontWeight, style.textShadow, beneath.get(one)].join();
+    if (!seen.has(look)) one.dataset.first = "";
+    seen.add(look);
+  }
+  axe.configure({ rules: [{ id: "color-contrast", selector: "[data-first]" }] });
+}"""
+
 # Elements of the article wider than their place, but not what is only heard (MathML) or drawn.
 WIDE = """[...document.querySelectorAll(".bd-article *")]
   .filter(one => one.clientWidth > 1 && one.scrollWidth > one.clientWidth + 1)
@@ -75,6 +96,7 @@ class Visit:
     """What was found on a page: the beginnings of elements, but where something else is said."""
 
     findings: list[str] = field(default_factory=list)  # of axe, a sentence each
+    themes: list[str | None] = field(default_factory=list)  # in the order of `VIEWS`
     widths: dict[int, int] = field(default_factory=dict)  # of the page by that of the screen [px]
     cut: list[str] = field(default_factory=list)  # is wider than its place and cannot scroll
     silent: list[str] = field(default_factory=list)  # scrolls without focus, name or shadow
@@ -94,34 +116,35 @@ def opened(browser: Any, address: str, width: int) -> Any:
 
 @pytest.fixture(scope="session")
 def visit(site, browser):
-    """Open a page once a session, and look at it in every width and theme."""
-    axe = Axe().axe_script
+    """Open a page of the site once a session, and look at it in every width and theme."""
+    return functools.cache(lambda page: look_at(browser, site / f"{page}.html"))
 
-    @functools.cache
-    def look_at(page: str) -> Visit:
-        seen = Visit()
-        tab = opened(browser, (site / f"{page}.html").resolve().as_uri(), TELEPHONES[0])
-        tab.evaluate(OPEN)
-        for width in TELEPHONES:
-            tab.set_viewport_size({"width": width, "height": 900})
-            tab.evaluate(SETTLED)
-            seen.widths[width] = tab.evaluate("document.documentElement.scrollWidth")
-            seen.cut += tab.evaluate(CUT)
-            seen.silent += tab.evaluate(SILENT)
-        seen.stops, seen.small = tab.evaluate(STOPS), tab.evaluate(SMALL)
-        tab.evaluate(THIN)
-        tab.evaluate(axe)
-        for (width, theme), rules in VIEWS.items():
-            tab.set_viewport_size({"width": width, "height": 900})
-            tab.emulate_media(color_scheme=theme)
-            tab.evaluate(SETTLED)
-            assert tab.evaluate("document.documentElement.dataset.theme") == theme
-            found = tab.evaluate("rules => axe.run(rules)", rules)
-            seen.findings += [f"{width} {theme}: {one}" for one in sentences(found)]
-        tab.close()
-        return seen
 
-    return look_at
+def look_at(browser: Any, path: Path) -> Visit:
+    """What is found on a page."""
+    seen = Visit()
+    tab = opened(browser, path.resolve().as_uri(), TELEPHONES[0])
+    tab.evaluate(OPEN)
+    for width in TELEPHONES:
+        tab.set_viewport_size({"width": width, "height": 900})
+        tab.evaluate(SETTLED)
+        seen.widths[width] = tab.evaluate("document.documentElement.scrollWidth")
+        seen.cut += tab.evaluate(CUT)
+        seen.silent += tab.evaluate(SILENT)
+    seen.stops, seen.small = tab.evaluate(STOPS), tab.evaluate(SMALL)
+    tab.evaluate(THIN)
+    tab.evaluate(Axe().axe_script)
+    for number, ((width, theme), rules) in enumerate(VIEWS.items()):
+        tab.set_viewport_size({"width": width, "height": 900})
+        tab.emulate_media(color_scheme=theme)
+        tab.evaluate(SETTLED)
+        seen.themes.append(tab.evaluate("document.documentElement.dataset.theme"))
+        if number:
+            tab.evaluate(FIRST_OF_EACH_LOOK)
+        found = tab.evaluate("rules => axe.run(rules)", rules)
+        seen.findings += [f"{width} {theme}: {one}" for one in sentences(found)]
+    tab.close()
+    return seen
 
 
 def sentences(found: dict[str, Any]) -> Iterator[str]:
@@ -133,7 +156,33 @@ def sentences(found: dict[str, Any]) -> Iterator[str]:
 
 @each_page
 def test_axe_finds_nothing(visit, page):
+    assert visit(page).themes == [theme for _, theme in VIEWS]
     assert visit(page).findings == []
+
+
+FAINT = """<!doctype html><html lang="en" data-theme="light"><head><title>Faint</title><style>
+body { background: #fff; color: #000 }
+a { color: inherit }
+@media (prefers-color-scheme: dark) { body { background: #000; color: #fff } }
+@media WHERE { .other { color: #888; background: #999 } }
+</style></head><body><main><h1>Words</h1>
+<p>one</p><p>two</p><p style="color: inherit">three</p><p class="other">four</p><p>five</p>
+<p><a href="#a">six</a></p><ul><li class="other">seven</li><li class="other">eight</li></ul>
+</main></body></html>"""
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("width", "where"), [(1400, "min-width: 900px"), (390, "width: 390px")])
+def test_axe_finds_what_is_faint_in_one_width_and_theme_alone(
+    browser, tmp_path, width, where, theme
+):
+    """Once among the whole text, else once for each look."""
+    page = tmp_path / "faint.html"
+    page.write_text(FAINT.replace("WHERE", f"({where}) and (prefers-color-scheme: {theme})"))
+    found = [one for one in look_at(browser, page).findings if "color-contrast" in one]
+    whole = (width, theme) == next(iter(VIEWS))
+    assert len(found) == (3 if whole else 2)
+    assert all(one.startswith(f"{width} {theme}: ") for one in found)
 
 
 @each_page

@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
@@ -13,7 +14,7 @@ import build
 import enrich
 import nbformat
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from papermill.cli import papermill
 
@@ -231,8 +232,21 @@ def asked(draw):
     return name, values
 
 
+@pytest.fixture
+def read_once(monkeypatch):
+    """Notebooks that nobody writes are read, by nbformat and by papermill, once."""
+    monkeypatch.setattr(build.nbformat, "read", cache(nbformat.read))
+    monkeypatch.setattr(build, "parameters", cache(build.parameters))
+
+
 @pytest.mark.slow
-@settings(derandomize=True, deadline=None, max_examples=1500)
+@pytest.mark.usefixtures("read_once")
+@settings(
+    derandomize=True,
+    deadline=None,
+    max_examples=1500,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(asked())
 def test_whatever_a_chapter_is_given_it_takes_little_or_refuses_in_a_sentence(drawn):
     name, values = drawn

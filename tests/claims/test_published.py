@@ -43,6 +43,15 @@ VERDICTS = (
 )
 
 
+@pytest.fixture(scope="module", autouse=True)
+def git_is_asked_once():
+    """What the history says stays the same; asking it takes longer than all else here."""
+    known = published.from_git()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(published, "from_git", lambda: known)
+        yield
+
+
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch) -> Path:
     """What is published here is this test's own."""

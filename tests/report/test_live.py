@@ -7,6 +7,7 @@ from base64 import b64decode
 import numpy as np
 import pytest
 
+from nmpcrl.control import Riccati
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
@@ -36,7 +37,7 @@ def data(shown) -> dict:
 def test_the_problem_is_the_one_that_the_controller_solves(nmpc, data):
     problem, (target, lower, upper, discs, sides, discount, weight, soft, tie) = (
         data["problem"],
-        nmpc._free._solver._problem,
+        Riccati().prepare(nmpc.ocp).problem,
     )
     assert problem["target"] == target.tolist()
     assert [problem["lower"], problem["upper"]] == [lower.tolist(), upper.tolist()]

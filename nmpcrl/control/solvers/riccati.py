@@ -100,7 +100,7 @@ class InteriorPoint:
             for sign, limit in ((-1.0, task.lower), (1.0, task.upper))
             for state in np.flatnonzero(np.isfinite(limit))
         ]
-        self._problem = (
+        self.problem = (  # the first arguments of `kernel.solve`, u_0 free or fixed
             task.target,
             np.maximum(plant.lower, -UNBOUNDED),
             np.minimum(plant.upper, UNBOUNDED),
@@ -123,7 +123,7 @@ class InteriorPoint:
     ) -> Solution:
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         given = action[0] if action else self._no_action
-        arguments = (*self._problem, state, theta, given, self._fixed)
+        arguments = (*self.problem, state, theta, given, self._fixed)
         for restarts, (start, point, limit) in enumerate(self._starts(state, warm_start)):
             out = np.empty(self._size)
             value, iterations, end, violation, error = self._code.solve(
@@ -155,7 +155,7 @@ class InteriorPoint:
         """The Hessian of the value in theta, times a vector (d,); None at no strict minimum."""
         action = solution.action if self._fixed else self._no_action
         out = np.empty(vector.size)
-        arguments = (*self._problem, solution.state, solution.theta, action, self._fixed)
+        arguments = (*self.problem, solution.state, solution.theta, action, self._fixed)
         formed = self._code.hessian_times(*arguments, solution.point, vector, out)
         return out if formed else None
 

@@ -26,7 +26,7 @@ def problem_of(nmpc: Nmpc) -> dict[str, Any]:
     options = {"fix_action": False, "ties_active": nmpc.ties_active}
     ocp = transcribe(nmpc.plant, nmpc.task, LONGEST, nmpc.gamma, nmpc.slack_weight, **options)
     solver = Riccati()
-    values = zip(ARGUMENTS, solver.prepare(ocp)._problem, strict=True)
+    values = zip(ARGUMENTS, solver.prepare(ocp).problem, strict=True)
     plain = {name: np.asarray(value).tolist() for name, value in values}
     return plain | {"tolerance": solver.tolerance, "theta": 2 * nmpc.plant.n + nmpc.plant.m + 1}
 
