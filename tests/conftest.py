@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 
 from nmpcrl.analysis.summary import RunSummary, table
@@ -53,6 +54,13 @@ def stores_in_a_folder_of_its_own(nobodys) -> Iterator[None]:
     """A test that stores runs says where; otherwise it would read what another has stored."""
     yield
     assert not nobodys.exists(), "set NMPCRL_RUNS to a folder of this test's own"
+
+
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory) -> Path:
+    """A folder that the workers of a session have in common."""
+    own = tmp_path_factory.getbasetemp()
+    return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
 
 
 @pytest.fixture
@@ -103,9 +111,10 @@ def jupyter_lab() -> str:
 
 
 @pytest.fixture(scope="session")
-def robot_module() -> bytes:
+def robot_module(shared) -> bytes:
     """The robot's controller and the update rules as WebAssembly; a minute to make, once."""
-    return in_browser.module(differential_drive(), paper.task("A"))
+    with FileLock(shared / "robot_module.lock"):  # the others find it where modules are kept
+        return in_browser.module(differential_drive(), paper.task("A"))
 
 
 LOOPS = ("without noise", "with noise")

@@ -1,9 +1,29 @@
-"""Live figures as a reader finds them."""
+"""Pages of the built book, and live figures as a reader finds them."""
 
+import functools
+import json
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 
 import pytest
+from filelock import FileLock
 from live_page import Tab
+from visits import Visit, look_at
+
+
+@pytest.fixture(scope="session")
+def visit(site, browser, shared) -> Callable[[str], Visit]:
+    """Open a page of the site, once for all tests and workers, and look at it in every way."""
+
+    @functools.cache
+    def seen(page: str) -> Visit:
+        kept = shared / f"{page.replace('/', '-')}.json"
+        with FileLock(kept.with_suffix(".lock")):
+            if not kept.exists():
+                kept.write_text(json.dumps(asdict(look_at(browser, site / f"{page}.html"))))
+            return Visit(**json.loads(kept.read_text()))
+
+    return seen
 
 
 @pytest.fixture

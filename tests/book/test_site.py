@@ -4,7 +4,6 @@ import functools
 import http.server
 import re
 import threading
-from dataclasses import dataclass, field
 from urllib.parse import unquote, urldefrag, urlsplit
 
 import build
@@ -25,8 +24,6 @@ LOADED = {  # what a browser fetches by itself
     "source": "src",
     "link": "href",
 }
-
-UNREADABLE = "[data-mjx-error], mjx-container mtext[mathcolor=red]"  # errors, unknown macros
 
 each_page = pytest.mark.parametrize("page", PAGES)
 
@@ -83,44 +80,6 @@ def test_nothing_on_a_page_or_in_its_styles_names_another_host(site, html, page)
         assert not urlsplit(element.get(LOADED[element.name], "")).netloc
     for sheet in site.rglob("*.css"):
         assert not re.search(r"(url\(|@import)\s*['\"]?(https?:)?//", sheet.read_text()), sheet
-
-
-@dataclass
-class Visit:
-    """What a browser saw of a page."""
-
-    requests: list[str] = field(default_factory=list)
-    errors: list[str] = field(default_factory=list)
-    formulas: int = 0  # that the page holds
-    typeset: int = 0  # of them, by MathJax
-    broken: list[str] = field(default_factory=list)  # those that MathJax could not read
-    width: int = 0  # of the page on a telephone [px]
-
-
-@pytest.fixture(scope="session")
-def visit(site, browser):
-    """Open a page from disk, once a session, and note what happens."""
-
-    @functools.cache
-    def open_page(page: str) -> Visit:
-        seen = Visit()
-        tab = browser.new_page(viewport={"width": 390, "height": 844})
-        tab.on("request", lambda request: seen.requests.append(request.url))
-        tab.on("pageerror", lambda error: seen.errors.append(str(error)))
-        tab.on("requestfailed", lambda request: seen.errors.append(f"failed: {request.url}"))
-        tab.on(
-            "console", lambda said: seen.errors.append(said.text) if said.type == "error" else None
-        )
-        tab.goto((site / f"{page}.html").resolve().as_uri())
-        tab.evaluate("window.MathJax?.startup?.promise")
-        seen.formulas = tab.locator("article .math").count()
-        seen.typeset = tab.locator("article .math:has(mjx-container)").count()
-        seen.broken = tab.locator(UNREADABLE).evaluate_all("all => all.map(one => one.outerHTML)")
-        seen.width = tab.evaluate("document.documentElement.scrollWidth")
-        tab.close()
-        return seen
-
-    return open_page
 
 
 @each_page

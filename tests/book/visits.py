@@ -1,0 +1,163 @@
+"""A page of the built book, opened once from disk, and all that a browser finds on it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from axe_playwright_python.sync_playwright import Axe
+
+WCAG = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
+BRIEF = {"resultTypes": ["violations"], "preload": False}  # preloading would request the styles
+EVERYTHING = {"runOnly": WCAG, "rules": {"target-size": {"enabled": True}}} | BRIEF
+COLOURS = {"runOnly": ["color-contrast", "link-in-text-block"]} | BRIEF
+VIEWS = {  # every rule in both widths, and those of colours in both themes, too
+    (1400, "light"): EVERYTHING,
+    (1400, "dark"): COLOURS,
+    (390, "dark"): EVERYTHING,
+    (390, "light"): COLOURS,
+}
+TELEPHONES = (390, 320)  # [px]
+UNREADABLE = "[data-mjx-error], mjx-container mtext[mathcolor=red]"  # errors, unknown macros
+
+TYPESET = "window.MathJax?.startup?.promise"
+WIDTH = "document.documentElement.scrollWidth"
+OPEN = "document.querySelectorAll('details').forEach(box => (box.open = true))"
+SETTLED = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+STILL = "*, ::before, ::after { transition: none !important; animation: none !important; }"
+
+# A page repeats formulas and words of code by the thousand: the first of each kind stands for all.
+THIN = """() => {
+  const seen = new Set();
+  for (const one of document.querySelectorAll("pre span[class], mjx-container")) {
+    const kind = one.className + one.getAttribute("display");
+    if (!seen.has(kind)) seen.add(kind);
+    else if (one.matches("span")) one.replaceWith(...one.childNodes);
+    else one.querySelectorAll("svg > *, math > *").forEach(part => part.remove());
+  }
+  document.body.normalize();
+}"""
+
+# After the first view, text of one look stands for all text that has it: the same element and class
+# in the same, in the same colour and size, above the same backgrounds.
+FIRST_OF_EACH_LOOK = """() => {
+  const beneath = new Map([[null, ""]]), seen = new Set();
+  for (const one of document.querySelectorAll("*")) {
+    const style = getComputedStyle(one), parent = one.parentElement;
+    const own = [style.backgroundColor, style.backgroundImage, style.opacity, style.position];
+    const plain = own.join() === "rgba(0, 0, 0, 0),none,1,static";
+    beneath.set(one, beneath.get(parent) + (plain ? "" : own.join()));
+    delete one.dataset.first;
+    const said = [...one.childNodes].some(node => node.nodeType === 3 && node.data.trim());
+    if (!said || !one.checkVisibility({ visibilityProperty: true })) continue;
+    const look = [one.localName, one.className, parent.localName, parent.className, style.color,
+      style.fontSize, style.fontWeight, style.textShadow, beneath.get(one)].join();
+    if (!seen.has(look)) one.dataset.first = "";
+    seen.add(look);
+  }
+  axe.configure({ rules: [{ id: "color-contrast", selector: "[data-first]" }] });
+}"""
+
+# Elements of the article wider than their place, but not what is only heard (MathML) or drawn.
+WIDE = """[...document.querySelectorAll(".bd-article *")]
+  .filter(one => one.clientWidth > 1 && one.scrollWidth > one.clientWidth + 1)
+  .filter(one => !one.closest("mjx-assistive-mml, svg"))
+  .map(one => [one, getComputedStyle(one)])"""
+
+CUT = f"""() => {WIDE}
+  .filter(([one, style]) => ["hidden", "clip"].includes(style.overflowX))
+  .map(([one]) => one.outerHTML.slice(0, 200))"""
+
+SILENT = f"""() => {WIDE}
+  .filter(([one, style]) => ["auto", "scroll"].includes(style.overflowX) && !one.matches("a"))
+  .filter(([one, style]) => one.tabIndex || !one.role || !one.ariaLabel
+    || !style.boxShadow.includes("inset"))
+  .map(([one]) => one.outerHTML.slice(0, 200))"""
+
+STOPS = """() => [...document.querySelectorAll(".math, .math *")]
+  .filter(one => one.tabIndex === 0 && !one.matches("[data-more], a"))
+  .map(one => one.outerHTML.slice(0, 200))"""
+
+SMALL = """() => [...document.querySelectorAll(".bd-article :is(summary, button, .download a)")]
+  .filter(one => Math.min(one.offsetWidth, one.offsetHeight) < 24)
+  .map(one => one.outerHTML.slice(0, 200))"""
+
+
+@dataclass
+class Visit:
+    """What was found on a page: the beginnings of elements, but where something else is said."""
+
+    requests: list[str] = field(default_factory=list)  # addresses
+    errors: list[str] = field(default_factory=list)  # as the console has them
+    formulas: int = 0  # that the page holds
+    typeset: int = 0  # of them, by MathJax
+    broken: list[str] = field(default_factory=list)  # those that MathJax could not read
+    width: int = 0  # of the page on a telephone, as it opens [px]
+    findings: list[str] = field(default_factory=list)  # of axe, a sentence each
+    themes: list[str | None] = field(default_factory=list)  # in the order of `VIEWS`
+    widths: list[int] = field(default_factory=list)  # of the page on `TELEPHONES`, all open [px]
+    cut: list[str] = field(default_factory=list)  # is wider than its place and cannot scroll
+    silent: list[str] = field(default_factory=list)  # scrolls without focus, name or shadow
+    stops: list[str] = field(default_factory=list)  # a formula that takes the focus for nothing
+    small: list[str] = field(default_factory=list)  # ours, and a finger may miss it
+
+
+def opened(browser: Any, address: str, width: int) -> Any:
+    """A page that does not move, with its formulas."""
+    size = {"width": width, "height": 900}
+    tab = browser.new_page(viewport=size, color_scheme="light", reduced_motion="reduce")
+    tab.goto(address)
+    tab.add_style_tag(content=STILL)
+    tab.evaluate(TYPESET)
+    return tab
+
+
+def look_at(browser: Any, path: Path) -> Visit:
+    """What is found on a page: as it opens, with all open on telephones, and by axe."""
+    seen = Visit()
+    tab = browser.new_page(viewport={"width": TELEPHONES[0], "height": 900})
+    tab.on("request", lambda request: seen.requests.append(request.url))
+    tab.on("pageerror", lambda error: seen.errors.append(str(error)))
+    tab.on("requestfailed", lambda request: seen.errors.append(f"failed: {request.url}"))
+    tab.on("console", lambda said: seen.errors.append(said.text) if said.type == "error" else None)
+    tab.goto(path.resolve().as_uri())
+    tab.evaluate(TYPESET)
+    seen.formulas = tab.locator("article .math").count()
+    seen.typeset = tab.locator("article .math:has(mjx-container)").count()
+    seen.broken = tab.locator(UNREADABLE).evaluate_all("all => all.map(one => one.outerHTML)")
+    seen.width = tab.evaluate(WIDTH)
+    tab.emulate_media(reduced_motion="reduce")
+    tab.add_style_tag(content=STILL)
+    tab.evaluate(OPEN)
+    for width in TELEPHONES:
+        tab.set_viewport_size({"width": width, "height": 900})
+        tab.evaluate(SETTLED)
+        seen.widths.append(tab.evaluate(WIDTH))
+        seen.cut += tab.evaluate(CUT)
+        seen.silent += tab.evaluate(SILENT)
+    seen.stops, seen.small = tab.evaluate(STOPS), tab.evaluate(SMALL)
+    judge(tab, seen)
+    tab.close()
+    return seen
+
+
+def judge(tab: Any, seen: Visit) -> None:
+    """Let axe look at a page in every width and theme."""
+    tab.evaluate(THIN)
+    tab.evaluate(Axe().axe_script)
+    for number, ((width, theme), rules) in enumerate(VIEWS.items()):
+        tab.set_viewport_size({"width": width, "height": 900})
+        tab.emulate_media(color_scheme=theme)
+        tab.evaluate(SETTLED)
+        seen.themes.append(tab.evaluate("document.documentElement.dataset.theme"))
+        if number:
+            tab.evaluate(FIRST_OF_EACH_LOOK)
+        found = tab.evaluate("rules => axe.run(rules)", rules)
+        seen.findings += [f"{width} {theme}: {one}" for one in sentences(found)]
+
+
+def sentences(found: dict[str, Any]) -> Iterator[str]:
+    """What axe found, a sentence for each element."""
+    for rule in found["violations"]:
+        for node in rule["nodes"]:
+            yield f"{rule['id']} at {node['target']}: {node['failureSummary']}"
