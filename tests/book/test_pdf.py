@@ -1,5 +1,6 @@
 """The book on paper: one PDF with an outline and tags, and pages that print whole."""
 
+import json
 import re
 from io import BytesIO
 
@@ -10,6 +11,7 @@ import whole
 import yaml
 from bs4 import BeautifulSoup
 from click.testing import CliRunner
+from filelock import FileLock
 from pypdf import PdfReader
 
 
@@ -159,9 +161,13 @@ def book(printed) -> PdfReader:
 
 
 @pytest.fixture(scope="module")
-def texts(book) -> list[str]:
-    """What can be read on each page, beyond its margins."""
-    return [page.extract_text() for page in book.pages]
+def texts(book, shared) -> list[str]:
+    """What can be read on each page, beyond its margins; read once for all workers."""
+    kept = shared / "printed.json"
+    with FileLock(kept.with_suffix(".lock")):
+        if not kept.exists():
+            kept.write_text(json.dumps([page.extract_text() for page in book.pages]))
+        return json.loads(kept.read_text())
 
 
 @pytest.fixture(scope="module")

@@ -34,13 +34,21 @@ def html(site):
     return functools.cache(lambda path: BeautifulSoup((site / path).read_text(), "html.parser"))
 
 
+@pytest.fixture(scope="session")
+def anchors(html):
+    """All that a link can lead to on a page, by path."""
+    return functools.cache(
+        lambda path: {one.get(a) for one in html(path).find_all() for a in ("id", "name")}
+    )
+
+
 @each_page
 def test_every_entry_of_the_table_of_contents_is_a_page_with_a_heading(html, page):
     assert html(f"{page}.html").find("h1")
 
 
 @each_page
-def test_no_image_link_or_anchor_leads_nowhere(site, html, page):
+def test_no_image_link_or_anchor_leads_nowhere(site, html, anchors, page):
     here = site / f"{page}.html"
     for element in html(f"{page}.html").find_all(["a", *LOADED]):
         address = element.get(LOADED.get(element.name, "href"), "")
@@ -50,8 +58,8 @@ def test_no_image_link_or_anchor_leads_nowhere(site, html, page):
         target = (here.parent / unquote(urlsplit(path).path)).resolve() if path else here
         assert target.exists(), address
         if anchor and target.suffix == ".html":
-            ids = html(str(target.relative_to(site.resolve())))
-            assert ids.find(id=unquote(anchor)) or ids.find(attrs={"name": anchor}), address
+            there = anchors(str(target.relative_to(site.resolve())))
+            assert there & {unquote(anchor), anchor}, address
 
 
 @each_page
@@ -75,9 +83,12 @@ def test_every_image_has_alt_text(html, page):
 
 
 @each_page
-def test_nothing_on_a_page_or_in_its_styles_names_another_host(site, html, page):
+def test_nothing_on_a_page_names_another_host(html, page):
     for element in html(f"{page}.html").find_all(list(LOADED)):
         assert not urlsplit(element.get(LOADED[element.name], "")).netloc
+
+
+def test_no_style_names_another_host(site):
     for sheet in site.rglob("*.css"):
         assert not re.search(r"(url\(|@import)\s*['\"]?(https?:)?//", sheet.read_text()), sheet
 
