@@ -26,13 +26,25 @@ def visit(site, browser, shared) -> Callable[[str], Visit]:
     return seen
 
 
+MATHJAX = "**/tex-svg-full.js*"
+AS_TYPED = """document.head.insertAdjacentHTML(
+    "beforeend", "<style>.math { overflow: hidden }</style>")"""
+
+
 @pytest.fixture
 def opened(site, browser) -> Iterator[Callable[..., Tab]]:
-    """Opens the page of a live figure as a reader with these settings would."""
+    """Opens the page of a live figure as a reader with these settings would.
+
+    Its formulas are not typeset unless that is asked for: it takes as long as most tests.
+    """
     contexts = []
 
-    def with_settings(figure, script="", **settings):
+    def with_settings(figure, script="", *, formulas=False, **settings):
         contexts.append(browser.new_context(**settings))
+        if not formulas:
+            contexts[-1].route(
+                MATHJAX, lambda asked: asked.fulfill(content_type="text/javascript", body=AS_TYPED)
+            )
         page = contexts[-1].new_page()
         if script:
             page.add_init_script(script)

@@ -294,6 +294,7 @@ def test_the_book_as_one_document_leaves_live_figures_out(site):
 def test_axe_finds_nothing(opened, width, theme):
     tab = opened(
         FIGURE,
+        formulas=True,
         viewport={"width": width, "height": 900},
         color_scheme=theme,
         reduced_motion="reduce",
