@@ -6,5 +6,6 @@ notebook that is not trusted, which leaves `hidden` out, its sentence.
 """
 
 from nmpcrl.report.live.closed_loop import controller
+from nmpcrl.report.live.published_runs import runs
 
-__all__ = ["controller"]
+__all__ = ["controller", "runs"]
