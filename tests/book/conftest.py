@@ -11,12 +11,12 @@ def opened(site, browser) -> Iterator[Callable[..., Tab]]:
     """Opens the page of a live figure as a reader with these settings would."""
     contexts = []
 
-    def with_settings(figure, script="", **settings):
+    def with_settings(figure, script="", chapter=None, **settings):
         contexts.append(browser.new_context(**settings))
         page = contexts[-1].new_page()
         if script:
             page.add_init_script(script)
-        return Tab(page, site, figure)
+        return Tab(page, site, figure, chapter)
 
     yield with_settings
     for context in contexts:

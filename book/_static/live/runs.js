@@ -12,7 +12,7 @@
   function choice(row, name, options, move) {
     const line = add(row, "label", { class: "choice" });
     add(line, "span", {}, words.choices[name]);
-    const select = add(line, "select");
+    const select = add(line, "select", { "aria-label": words.choices[name] });
     for (const value of options) add(select, "option", { value }, words.option(name, value));
     select.addEventListener("change", () => move({ [name]: name === "seed" ? Number(select.value) : select.value }));
     return (given) => { select.value = given[name]; };

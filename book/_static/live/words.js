@@ -80,7 +80,7 @@
     hint: "Choose one or two runs. Then press Play, or move the slider with the mouse or the arrow keys. The robot "
       + "follows the controller of that episode, solved in your browser.",
     target: "target",
-    choices: { first: "Learner", second: "beside", layout: "Layout", decay: "Noise decays", seed: "Seed" },
+    choices: { first: "Learner", second: "Beside it", layout: "Layout", decay: "Noise decays", seed: "Seed" },
     option: (name, value) => {
       if (name === "decay") return `per ${value}`;
       return value === "" ? "none" : named(value);

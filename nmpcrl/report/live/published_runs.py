@@ -28,7 +28,8 @@ from nmpcrl.study.records import Column
 
 SCRIPTS = (*frame.PARTS, "charts.js", "published.js", "runs.js")
 SHOWN = (MAIN_TABLE, "controls")  # parts of the study; in the others something else is changed
-FIRST = {"layout": LAYOUTS[0], "seed": SEEDS[0]}  # what a page is given
+LAYOUT, SEED = LAYOUTS[0], SEEDS[0]  # what a page is given
+CHOICES = ("first", "second", "layout", "decay", "seed")
 FILE = "runs_{}.js"
 LATER = "window.nmpcrl.packed = {{ ...window.nmpcrl.packed, {}: {} }};\n"
 DASHES = {"-": (), "--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}  # matplotlib's
@@ -37,7 +38,7 @@ WIDTH = 1.6  # of a line, of which dashes are multiples
 
 def runs(*learners: str) -> HTML:
     """Published runs of these learners beside the frozen arm; the first two to begin with."""
-    nmpc, known = paper.nmpc(FIRST["layout"]), published.load()
+    nmpc, known = paper.nmpc(LAYOUT), published.load()
     try:
         problem, module = problem_of(nmpc), browser.module(nmpc.plant, nmpc.task)
     except CannotCompile as error:
@@ -45,13 +46,13 @@ def runs(*learners: str) -> HTML:
     tasks = {layout: paper.task(layout) for layout in LAYOUTS}
     data = {
         "looks": {name: _look(name) for name in (*learners, "frozen")},
-        "chosen": {"first": learners[0], "second": learners[1], "decay": "step", **FIRST},
+        "chosen": dict(zip(CHOICES, (*learners[:2], LAYOUT, "step", SEED), strict=True)),
         "layouts": {name: problem_of(paper.nmpc(name))["discs"] for name in tasks},
         "decays": list(DECAY_TITLES),
         "seeds": SEEDS,
         "episodes": _episodes(known),
         "names": paper.THETA_NAMES,
-        "given": packed(known, learners=(*learners, "frozen"), **FIRST),
+        "given": packed(known, LAYOUT, SEED, (*learners, "frozen")),
         "start": nmpc.task.start.tolist(),
         "horizon": nmpc.horizon,
         "steps": paper.STEPS,
