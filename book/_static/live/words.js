@@ -88,7 +88,7 @@
     slider: "Episode, a step of ten",
     play: "Play",
     pause: "Pause",
-    after: (episode) => `after episode ${episode}`,
+    after: (episode) => `episode ${episode}`,
     charts: { training: "Cost of a training episode, with noise", costs: "Cost without noise" },
     theta: (name) => `${parts.sliders[name]}, over the episodes`,
     cost: (number) => fixed(number, 0),
@@ -102,7 +102,7 @@
       if (!Number.isFinite(judged)) return [`${name} this run was stopped before episode ${episode}.`];
       if (failed) after.push(`; the solver found no plan at step ${states.length}`);
       if (!episode) return [`${name} before training`, "", ...after];
-      return [`${name} episode ${episode}`, Number.isFinite(training) ? fixed(training, 1) : "cut short", ...after];
+      return [`${name} cost of episode ${episode}`, Number.isFinite(training) ? fixed(training, 1) : "cut short", ...after];
     }),
     legend: (steps) => `Map: ${steps} steps without noise; dashed circles are the obstacles' safety distance. `
       + "Lines run over the episodes, and end where a run was stopped. The axis of the training cost ends at the "
