@@ -1,10 +1,9 @@
-"""A Firefox as its distribution ships it, driven by WebDriver BiDi, which it speaks itself.
+"""A Firefox as its distribution ships it, which speaks WebDriver BiDi itself.
 
-Playwright drives only a Firefox of its own making. Here a page is opened, asked, and used with
-pointer, wheel and keys; https://w3c.github.io/webdriver-bidi describes the commands.
+Playwright takes only a Firefox of its own making. Here a page is opened, asked, and used with
+pointer and keys; https://w3c.github.io/webdriver-bidi describes the commands.
 """
 
-import asyncio
 import json
 import re
 import shutil
@@ -13,15 +12,12 @@ import threading
 from base64 import b64decode
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import count
 from pathlib import Path
 from typing import Any
 
-from tornado.websocket import WebSocketClosedError, websocket_connect
+from bidi import Refused, Socket, connected
 
 COMMANDS = ("firefox-esr", "firefox")
-PATIENCE = 60  # until an answer comes [s]
-LARGEST = 64 * 2**20  # of an answer, such as a picture [bytes]
 LISTENING = re.compile(r"WebDriver BiDi listening on (ws://\S+)")
 EVENTS = ("log.entryAdded", "network.beforeRequestSent")
 KEYS = {
@@ -41,25 +37,15 @@ QUIET = {  # nothing of its own: no updates, no experiments, no pages at its sta
 }
 
 
-class Refused(Exception):
-    """Firefox did not do what it was asked."""
-
-
 def installed() -> str | None:
     """Where a Firefox is."""
     return next(filter(None, map(shutil.which, COMMANDS)), None)
 
 
 @contextmanager
-def firefox(profile: Path, **preferences: Any) -> Iterator["Firefox"]:
-    """A headless Firefox that nobody has used yet.
-
-    Args:
-        profile: an empty folder, which becomes its profile.
-        **preferences: of about:config, with a double underscore for each dot.
-    """
-    asked = {name.replace("__", "."): value for name, value in preferences.items()}
-    lines = [f"user_pref({json.dumps(k)}, {json.dumps(v)});" for k, v in (QUIET | asked).items()]
+def firefox(profile: Path) -> Iterator["Firefox"]:
+    """A headless Firefox that nobody has used yet; an empty folder becomes its profile."""
+    lines = [f"user_pref({json.dumps(k)}, {json.dumps(v)});" for k, v in QUIET.items()]
     (profile / "user.js").write_text("\n".join(lines))
     command = [installed(), "--headless", "--no-remote", "--remote-debugging-port=0"]
     with subprocess.Popen(
@@ -69,70 +55,14 @@ def firefox(profile: Path, **preferences: Any) -> Iterator["Firefox"]:
         text=True,
     ) as process:
         try:
-            address = next(filter(None, map(LISTENING.search, process.stderr)))[1]
+            found = next(filter(None, map(LISTENING.search, process.stderr)), None)
+            if found is None:
+                raise Refused("Firefox ended before it listened")
             threading.Thread(target=process.stderr.read, daemon=True).start()  # or its pipe fills
-            with connected(address) as socket:
+            with connected(found[1]) as socket:
                 yield Firefox(socket)
         finally:
             process.terminate()
-
-
-@contextmanager
-def connected(address: str) -> Iterator["Socket"]:
-    """A connection, in a thread of its own: playwright occupies the loop of this one."""
-    loop = asyncio.new_event_loop()
-    thread = threading.Thread(target=loop.run_forever, daemon=True)
-    thread.start()
-    socket = Socket(loop)
-    try:
-        socket.wait(socket.open(f"{address}/session"))
-        yield socket
-    finally:
-        socket.wait(socket.close())
-        loop.call_soon_threadsafe(loop.stop)
-        thread.join()
-        loop.close()
-
-
-class Socket:
-    """Commands and their answers, and the events that come in between."""
-
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        self.loop, self.numbers, self.answers, self.events = loop, count(), {}, []
-
-    def wait(self, coroutine) -> Any:
-        return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(PATIENCE)
-
-    async def open(self, url: str) -> None:
-        self.connection = await websocket_connect(url, max_message_size=LARGEST)
-        self.reading = self.loop.create_task(self.read())
-
-    async def close(self) -> None:
-        self.connection.close()
-        await self.reading
-
-    async def read(self) -> None:
-        while text := await self.connection.read_message():
-            message = json.loads(text)
-            if message["type"] == "event":
-                self.events.append(message)
-            else:
-                self.answers.pop(message["id"]).set_result(message)
-        for answer in self.answers.values():
-            answer.set_exception(WebSocketClosedError())
-
-    async def send(self, message: dict) -> dict:
-        answer = self.answers[message["id"]] = self.loop.create_future()
-        await self.connection.write_message(json.dumps(message))
-        return await answer
-
-    def __call__(self, method: str, **parameters: Any) -> dict:
-        """Do one command, and give its result."""
-        message = {"id": next(self.numbers), "method": method, "params": parameters}
-        answer = self.wait(self.send(message))
-        if answer["type"] == "error":
-            raise Refused(f"{method}: {answer['error']}: {answer['message']}")
-        return answer["result"]
 
 
 class Firefox:
