@@ -2,7 +2,12 @@
 
 import numpy as np
 
-CHAPTERS = {"controller": "01_mdp_and_nmpc", "runs": "05_results"}  # of each live figure
+CHAPTERS = {  # of each live figure
+    "controller": "01_mdp_and_nmpc",
+    "chain": "04_ges",
+    "learners": "04_ges",
+    "runs": "05_results",
+}
 ALSO = ("03_rdes", "07_beyond")  # have the figure of runs, too
 FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => done(figure.shown))))"""

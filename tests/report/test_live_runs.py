@@ -98,7 +98,7 @@ def test_it_begins_with_the_first_two_learners(data):
 def test_a_learner_has_the_look_of_the_printed_figures(data):
     assert data["looks"]["RDES"]["color"] == LOOKS["RDES"].color
     assert data["looks"]["DES"] == {"color": "var(--ink)", "dashes": "5.92 2.56"}
-    assert published_runs._look("GES")["dashes"] == "8 1.6"
+    assert published_runs.look("GES")["dashes"] == "8 1.6"
 
 
 def test_the_map_shows_every_layout(data):

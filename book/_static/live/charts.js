@@ -18,9 +18,9 @@
     }).join("");
   }
 
-  // A line in the colour and the dashes of a learner.
-  function trace(parent, name, attributes, { color, dashes }) {
-    const line = add(parent, name, { class: "learner", "stroke-dasharray": dashes, ...attributes });
+  // A line in the colour and the dashes of a learner; pale if it stands behind.
+  function trace(parent, name, attributes, { color, dashes, pale = false }) {
+    const line = add(parent, name, { class: pale ? "learner pale" : "learner", "stroke-dasharray": dashes, ...attributes });
     line.style.setProperty("--learner", color);
   }
 
@@ -48,7 +48,7 @@
       const at = x / last;
       set(cursor, { x1: at, x2: at });
       dots.replaceChildren();
-      for (const { places, look } of shown) {
+      for (const { places, look } of shown.filter((one) => !one.look.pale)) {
         const place = places.find((one) => one[0] === at);
         if (place) trace(dots, "path", { d: path([place, place]) }, { ...look, dashes: "" });
       }
@@ -56,5 +56,12 @@
     return { title, draw, point };
   }
 
-  window.nmpcrl = { ...window.nmpcrl, chart, trace };
+  // What a line of a look is called.
+  function key(parent, text, look) {
+    const item = add(parent, "span");
+    trace(add(item, "svg", { viewBox: "0 0 34 4", "aria-hidden": true }), "path", { d: "M0 2H34" }, look);
+    item.append(text);
+  }
+
+  window.nmpcrl = { ...window.nmpcrl, chart, trace, key };
 })();

@@ -7,7 +7,6 @@ trajectories are in neither: the page solves them again.
 import json
 from base64 import b64encode
 from collections.abc import Collection
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS
 from nmpcrl.report.live import frame
+from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.problem import problem_of, surroundings, view
 from nmpcrl.study import paper
 from nmpcrl.study.design import LAYOUTS, MAIN_TABLE, SEEDS
@@ -32,8 +32,6 @@ LAYOUT, SEED = LAYOUTS[0], SEEDS[0]  # what a page is given
 CHOICES = ("first", "second", "layout", "decay", "seed")
 FILE = "runs_{}.js"
 LATER = "window.nmpcrl.packed = {{ ...window.nmpcrl.packed, {}: {} }};\n"
-DASHES = {"-": (), "--": (3.7, 1.6), "-.": (6.4, 1.6, 1.0, 1.6), ":": (1.0, 1.65)}  # matplotlib's
-WIDTH = 1.6  # of a line, of which dashes are multiples
 
 
 def runs(*learners: str) -> HTML:
@@ -45,7 +43,7 @@ def runs(*learners: str) -> HTML:
         return frame.absent(error)
     tasks = {layout: paper.task(layout) for layout in LAYOUTS}
     data = {
-        "looks": {name: _look(name) for name in (*learners, "frozen")},
+        "looks": {name: look(name) for name in (*learners, "frozen")},
         "chosen": dict(zip(CHOICES, (*learners[:2], LAYOUT, "step", SEED), strict=True)),
         "layouts": {name: problem_of(paper.nmpc(name))["discs"] for name in tasks},
         "decays": list(DECAY_TITLES),
@@ -107,15 +105,6 @@ def _episodes(known: Published) -> list[int]:
     """After which episodes a run that was not stopped was judged."""
     after = known.summaries[Experiment("frozen")].evaluations["episode"]
     return [int(episode) for episode in after]
-
-
-def _look(learner: str) -> dict[str, str]:
-    """Colour and dashes; black follows the theme of the page."""
-    look = asdict(LOOKS[learner])
-    style = look["linestyle"]
-    dashes = DASHES[style] if isinstance(style, str) else style[1]
-    color = "var(--ink)" if look["color"] == "#000000" else look["color"]
-    return {"color": color, "dashes": " ".join(f"{WIDTH * each:g}" for each in dashes)}
 
 
 def _union(views: list[list[float]]) -> list[float]:
