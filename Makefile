@@ -41,7 +41,7 @@ study: .venv/ready  ## Train the whole study, or what is missing of it: hours, a
 bench: .venv/ready  ## Measure how long solves, steps and runs take, and print what is reached
 	@$(BIN)/python -m nmpcrl bench
 
-test: .venv/ready  ## All tests but the next; those of the site need a built book and a Chromium
+test: .venv/ready  ## All tests but the next; those of the site need a built book, a Chromium and a Firefox
 	@$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal -m "not lab"
 
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium

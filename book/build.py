@@ -305,6 +305,7 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
         return enrich.output(read[Path("book") / page], tag)
 
     (source / "book" / pictures.FOLDER).mkdir(exist_ok=True)
+    live.add_runs(read.values(), source / "book/_static/live")
     for path in source.glob("book/*.md"):
         path.write_text(enrich.page(path.read_text(), output))
     for path, notebook in read.items():

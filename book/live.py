@@ -7,14 +7,18 @@ are in the source tree, and the compiled module is written there.
 
 import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
+
+from nmpcrl.report.live import published_runs
 
 INLINE = re.compile(
     r'<(?P<kind>script|style) data-file="(?P<name>[\w.]+)">\n(?P<text>.*?)\n</(?P=kind)>',
     flags=re.S,
 )
 STATIC = "_static/live"  # on the site
+ASKS = 'data-figure="runs"'  # this figure loads runs that its page was not given
 LINKS = {"script": '<script src="{}"></script>', "style": '<link rel="stylesheet" href="{}">'}
 
 
@@ -42,3 +46,16 @@ def share(notebook: Any, page: Path, folder: Path) -> None:
         for output in cell.get("outputs", []):
             if "text/html" in output.get("data", {}):
                 output.data["text/html"] = INLINE.sub(linked, output.data["text/html"])
+
+
+def add_runs(notebooks: Iterable[Any], folder: Path) -> None:
+    """Write the files with all published runs if one of the notebooks has a figure that asks."""
+    if any(ASKS in html for notebook in notebooks for html in shown(notebook)):
+        for name, text in published_runs.scripts().items():
+            (folder / name).write_text(text, "utf-8")
+
+
+def shown(notebook: Any) -> list[str]:
+    """The HTML of a notebook's outputs."""
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    return [html for output in outputs if (html := output.get("data", {}).get("text/html"))]

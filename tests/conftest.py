@@ -102,6 +102,17 @@ def browser():
 
 
 @pytest.fixture(scope="session")
+def distributed_firefox(tmp_path_factory):
+    """A headless Firefox of the distribution."""
+    import firefox
+
+    if firefox.installed() is None:
+        missing(f"none of {', '.join(firefox.COMMANDS)} is installed")
+    with firefox.firefox(tmp_path_factory.mktemp("profile")) as started:
+        yield started
+
+
+@pytest.fixture(scope="session")
 def jupyter_lab() -> str:
     """The command of the JupyterLab that `make lab` installs."""
     path = ROOT / ".venv-lab/bin/jupyter"

@@ -12,14 +12,16 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 import nbformat
+import numpy as np
 import pytest
 
 from nmpcrl.commands import main
+from nmpcrl.study import paper
 from nmpcrl.study.provenance import changed, sources
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text()
-CELLS = re.findall(r"^\| an? (\w+) \| (.*?) \| ?(.*?) ?\|$", TEXT, flags=re.M)
+CELLS = re.findall(r"^\| an? ([\w ]+) \| (.*?) \| ?(.*?) ?\|$", TEXT, flags=re.M)
 FILES = {name: re.findall(r"`([^`]+)`", files) for name, files, _ in CELLS}
 LOCK = {name: lock for name, _, lock in CELLS}
 COPIED = ("nmpcrl", "book", "_toc.yml", "tests/test_architecture.py", "tests/book")
@@ -216,6 +218,54 @@ def ends(runs: Runs[Records]) -> Figure:
             "| `solver` |", "| `08_again` | `layout`, `horizon` |\n| `solver` |"
         ),
     },
+    "live figure": {
+        "nmpcrl/report/live/worth.py": added('''"""A live figure of what the start is worth."""
+
+from IPython.display import HTML
+
+from nmpcrl import Vector
+from nmpcrl.control import Nmpc
+from nmpcrl.learning import browser
+from nmpcrl.report.live import frame
+from nmpcrl.report.live.problem import problem_of
+
+
+def worth(nmpc: Nmpc, theta: Vector) -> HTML:
+    """V at the start."""
+    asked = {"state": nmpc.task.start.tolist(), "theta": theta.tolist()}
+    data = {"asked": asked, "problem": problem_of(nmpc)}
+    module = browser.module(nmpc.plant, nmpc.task)
+    return frame.figure("worth", data, (*frame.PARTS, "worth.js"), module)
+'''),
+        "nmpcrl/report/live/__init__.py": both(
+            imported("from nmpcrl.report.live.worth import worth"),
+            replaced("__all__ = [", '__all__ = [\n    "worth",\n    '),
+        ),
+        "book/_static/live/worth.js": added("""// The live figure of what the start is worth.
+(() => {
+  "use strict";
+
+  const { parts: shared, words: { worth: words } } = window.nmpcrl;
+
+  shared.begin("worth", (figure, { asked, problem: { discs } }, nmpc) => {
+    shared.heading(figure, words);
+    const plan = nmpc.solve({ ...asked, discs, horizon: 10 });
+    shared.results(figure)(words.results(plan));
+  });
+})();
+"""),
+        "book/_static/live/words.js": replaced(
+            "  window.nmpcrl = { ...window.nmpcrl, words: {",
+            """  const worth = {
+    map: "V at the start", title: "Try it.", hint: "Look.",
+    results: ({ value }) => [["V =", fixed(value, 6)]],
+  };
+
+  window.nmpcrl = { ...window.nmpcrl, words: { worth,""",
+        ),
+        "book/03_rdes.ipynb": shown("from nmpcrl.report import live\n\nlive.worth(nmpc, theta)"),
+        "tests/book/live_page.py": entered("CHAPTERS", '    "worth": "03_rdes",\n'),
+    },
 }
 
 PROBES = {  # what is to work then, by row; run in the copy, in one process
@@ -267,6 +317,7 @@ assert table([summarise(records)]).largest_reduction.tolist() == [cost[0] - cost
 from click.testing import CliRunner
 
 from nmpcrl.commands import main
+from nmpcrl.study import paper
 from nmpcrl.study import design
 
 found = CliRunner().invoke(main, ["study", "--part", "N = 8", "--dry-run"])
@@ -302,6 +353,19 @@ import build
 assert build.ROOT.samefile(".")
 assert "08_again" in build.notebooks()
 assert build.ask(build.known("08_again"), {"layout": "D"}).keys() == set(build.NEEDS)
+""",
+    "live figure": """
+from pathlib import Path
+
+import numpy as np
+
+from nmpcrl.report import live
+from nmpcrl.study import paper
+
+nmpc, theta = paper.nmpc("A"), np.array(paper.THETA_INIT)
+names = {"nmpc": nmpc, "theta": theta}
+exec("from nmpcrl.report import live\\n\\nfigure = live.worth(nmpc, theta)", names)
+Path("worth.html").write_text('<meta charset="utf-8">' + names["figure"].data, "utf-8")
 """,
 }
 OWN_TESTS = (  # of the project, in the copy
@@ -395,6 +459,18 @@ def test_a_thing_is_added_in_the_files_of_its_row_and_in_no_other(name):
 @pytest.mark.parametrize("name", PROBES)
 def test_what_was_added_works(failures, name):
     assert name not in failures, failures[name]
+
+
+@pytest.mark.slow
+@pytest.mark.book
+def test_the_live_figure_that_was_added_solves_in_a_browser(scratch, failures, browser):
+    assert "live figure" not in failures
+    page = browser.new_page()
+    page.goto((scratch / "worth.html").as_uri())
+    said = page.locator("figure.live .results p").inner_text()
+    value = paper.nmpc("A").solve(paper.START, np.array(paper.THETA_INIT)).value
+    assert said == f"V = {value:.6f}"
+    page.close()
 
 
 @pytest.mark.slow

@@ -39,7 +39,7 @@ def opened(site, browser) -> Iterator[Callable[..., Tab]]:
     """
     contexts = []
 
-    def with_settings(figure, script="", *, formulas=False, **settings):
+    def with_settings(figure, script="", *, chapter=None, formulas=False, **settings):
         contexts.append(browser.new_context(**settings))
         if not formulas:
             contexts[-1].route(
@@ -48,7 +48,7 @@ def opened(site, browser) -> Iterator[Callable[..., Tab]]:
         page = contexts[-1].new_page()
         if script:
             page.add_init_script(script)
-        return Tab(page, site, figure)
+        return Tab(page, site, figure, chapter)
 
     yield with_settings
     for context in contexts:

@@ -2,7 +2,13 @@
 
 import numpy as np
 
-CHAPTERS = {"controller": "01_mdp_and_nmpc"}  # of each live figure
+CHAPTERS = {  # of each live figure
+    "controller": "01_mdp_and_nmpc",
+    "chain": "04_ges",
+    "learners": "04_ges",
+    "runs": "05_results",
+}
+ALSO = ("03_rdes", "07_beyond")  # have the figure of runs, too
 FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => done(figure.shown))))"""
 MOST = 200_000  # bytes that a chapter's live figures may add
@@ -11,7 +17,7 @@ MOST = 200_000  # bytes that a chapter's live figures may add
 class Tab:
     """The page of a live figure, and what a reader does there."""
 
-    def __init__(self, page, site, figure):
+    def __init__(self, page, site, figure, chapter=None):
         self.page, self.errors, self.requests = page, [], []
         self.figure = page.locator(f"figure.live[data-figure={figure}]")
         page.on("pageerror", lambda error: self.errors.append(str(error)))
@@ -19,7 +25,7 @@ class Tab:
             "console", lambda said: self.errors.append(said.text) if said.type == "error" else 0
         )
         page.on("request", lambda request: self.requests.append(request.url))
-        page.goto((site / f"book/{CHAPTERS[figure]}.html").resolve().as_uri())
+        page.goto((site / f"book/{chapter or CHAPTERS[figure]}.html").resolve().as_uri())
 
     def begun(self) -> "Tab":
         """This page, once the figure shows results."""

@@ -1,7 +1,6 @@
 """The live figures: what the driver does for them, and what a reader can do with them."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import live
@@ -11,10 +10,9 @@ import pytest
 import whole
 from axe_playwright_python.sync_playwright import Axe
 from bs4 import BeautifulSoup
-from live_page import CHAPTERS, MOST, loaded
+from live_page import ALSO, CHAPTERS, MOST, loaded
+from live_python import assert_equal_to_python
 
-from nmpcrl.control import Obstacle
-from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 
 FIGURE = "controller"
@@ -61,35 +59,6 @@ def test_two_pages_share_a_file_only_if_it_is_the_same(tmp_path):
         live.share(figure_of("a", "b"), Path("book/01.ipynb"), tmp_path)
     with pytest.raises(ValueError, match=r"another solver\.js than the one"):
         live.share(figure_of("a", "c"), Path("book/02.ipynb"), tmp_path)
-
-
-def in_python(given: dict):
-    """The plan and the closed loop of what a page was asked."""
-    task = replace(
-        paper.task("A"),
-        start=np.array(given["start"]),
-        obstacles=tuple(Obstacle(x, y) for x, y, _ in given["discs"]),
-    )
-    nmpc = paper.controller(task, horizon=given["horizon"])
-    theta = np.array(given["theta"])
-    return nmpc.solve(task.start, theta), evaluate(nmpc, theta, paper.STEPS)
-
-
-def assert_equal_to_python(shown: dict) -> None:
-    found = shown["found"]
-    plan, rollout = in_python(shown["given"])
-    assert not found["failed"]
-    assert found["plan"]["value"] == pytest.approx(plan.value, rel=1e-9)
-    assert found["cost"] == pytest.approx(rollout.cost, rel=1e-6)
-    np.testing.assert_allclose(found["plan"]["action"], plan.action, atol=1e-6)
-    np.testing.assert_allclose(found["plan"]["states"], plan.states, atol=1e-6)
-    assert found["plan"]["slack"] == pytest.approx(plan.slacks.max(), abs=1e-6)
-    np.testing.assert_allclose(found["states"], rollout.states, atol=1e-4)
-    slack = (
-        paper.SLACK_WEIGHT * paper.GAMMA ** np.arange(len(plan.slacks)) @ plan.slacks.sum(axis=1)
-    )
-    assert found["parts"]["slacks"] == pytest.approx(slack, abs=1e-6 * plan.value)
-    assert sum(found["parts"].values()) == pytest.approx(plan.value)
 
 
 @pytest.mark.book
@@ -320,7 +289,7 @@ def test_a_finger_can_hit_every_handle_and_slider_on_a_telephone(opened):
 @pytest.mark.book
 def test_only_a_page_with_a_live_figure_loads_scripts_for_it(site):
     pages = {path.stem for path in site.glob("book/*.html") if "_static/live/" in path.read_text()}
-    assert pages == set(CHAPTERS.values())
+    assert pages == {*CHAPTERS.values(), *ALSO}
 
 
 @pytest.mark.book

@@ -2,8 +2,21 @@
 (() => {
   "use strict";
 
+  const POWERS = "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"; // digits as exponents
+
   // A number with so many digits, with a minus sign that is one; none before a zero.
   const fixed = (number, digits) => number.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "\u2212");
+
+  const power = (exponent) => `10${`${exponent}`.replace("-", "\u207b").replace(/\d/g, (digit) => POWERS[digit])}`;
+
+  // A number of any size, with three digits.
+  function sized(number) {
+    const size = Math.abs(number);
+    if (!Number.isFinite(number)) return "out of range";
+    if (size === 0 || (size >= 0.01 && size < 10000)) return fixed(number, size >= 100 ? 1 : 3);
+    const [digits, exponent] = number.toExponential(2).split("e");
+    return `${digits.replace("-", "\u2212")}\u00a0\u00b7\u00a0${power(Number(exponent))}`;
+  }
 
   const parts = {
     fixed,
@@ -17,6 +30,7 @@
     symbols: { // letter, its subscript, and the subscript's own
       x: ["θ", "x"], y: ["θ", "y"], heading: ["θ", "φ"], v: ["θ", "v"], nu: ["θ", "ν"],
       x_f: ["θ", "x", "f"], y_f: ["θ", "y", "f"], heading_f: ["θ", "φ", "f"], c: ["θ", "c"], horizon: ["N"],
+      alpha: ["α"], beta: ["β"], gamma: ["γ"],
     },
     sliders: {
       x: "theta x, weight of the distance in x at each planned step",
@@ -68,5 +82,135 @@
     failed: (step) => `The solver found no plan at step ${step}; the closed loop ends there.`,
   };
 
-  window.nmpcrl = { ...window.nmpcrl, words: { parts, controller } };
+  const learners = {
+    frozen: "frozen arm", random: "random directions", matched: "matched steps", QL: "Q-learning",
+  };
+
+  const named = (learner) => learners[learner] ?? learner;
+
+  const runs = {
+    map: "Published runs: their trajectories, costs and parameters, episode by episode",
+    title: "Try it: follow published runs from the first episode to the last.",
+    hint: "Choose one or two runs. Then press Play, or move the slider with the mouse or the arrow keys. The robot "
+      + "follows the controller of that episode, solved in your browser.",
+    target: "target",
+    choices: { first: "Learner", second: "Beside it", layout: "Layout", decay: "Noise decays", seed: "Seed" },
+    option: (name, value) => {
+      if (name === "decay") return `per ${value}`;
+      return value === "" ? "none" : named(value);
+    },
+    slider: "Episode, a step of ten",
+    play: "Play",
+    pause: "Pause",
+    after: (episode) => `episode ${episode}`,
+    charts: { training: "Cost of a training episode, with noise", costs: "Cost without noise" },
+    theta: (name) => `${parts.sliders[name]}, over the episodes`,
+    cost: (number) => fixed(number, 0),
+    weight: (number) => (Math.abs(number) < 1000 ? fixed(number, Math.abs(number) < 1 ? 3 : 2) : number.toExponential(1)),
+    missing: (learner, { layout, decay, seed }) => (
+      `There is no run of ${named(learner)} in layout ${layout} with noise that decays per ${decay} and seed ${seed}.`
+    ),
+    absent: "The runs of this layout could not be loaded.",
+    results: (found, episode) => found.map(({ learner, training, judged, failed, states }) => {
+      const name = `${named(learner)}:`, after = ["; without noise", fixed(judged, 1)];
+      if (!Number.isFinite(judged)) return [`${name} this run was stopped before episode ${episode}.`];
+      if (failed) after.push(`; the solver found no plan at step ${states.length}`);
+      if (!episode) return [`${name} before training`, "", ...after];
+      return [`${name} cost of episode ${episode}`, Number.isFinite(training) ? fixed(training, 1) : "cut short", ...after];
+    }),
+    legend: (steps) => `Map: ${steps} steps without noise; dashed circles are the obstacles' safety distance. `
+      + "Lines run over the episodes, and end where a run was stopped. The axis of the training cost ends at the "
+      + "highest of the frozen arm, that of the cost without noise at 1.3 times the cost at the start; a line that "
+      + "leaves its axis goes on beyond it.",
+  };
+
+  const player = { play: "Play", pause: "Pause", step: "Step" };
+
+  const chain = {
+    map: "The chain of two states, whose step sizes and discount can be moved",
+    title: "Try it: the chain, updated in your browser by the functions that train the robot.",
+    hint: "Move the sliders with the mouse or the arrow keys. Press Step for one update, or Play for all.",
+    states: {
+      legend: "Updates are made",
+      first: "in the first state only (off-policy)",
+      both: "in both states in turn (on-policy)",
+    },
+    sliders: {
+      alpha: "alpha, step size of theta",
+      beta: "beta, step size of w",
+      gamma: "gamma, discount",
+    },
+    number: (value) => fixed(value, 2),
+    slider: "Updates made",
+    after: (updates) => `after ${updates} update${updates === 1 ? "" : "s"}`,
+    charts: {
+      theta: "|θ| over the updates:",
+      error: "Gradient TD, in absolute value:",
+    },
+    power,
+    keys: { ES: "semi-gradient", GES: "gradient TD", delta: "TD error δ", predicted: "prediction wφ" },
+    legend: "Logarithmic axes: a dip is a change of sign; a line that leaves an axis goes on beyond it. "
+      + "Pale: what is still to come.",
+    question: "How small may β be before gradient TD diverges, too? And what changes with updates in both states?",
+    reset: "Reset",
+    results: ({ ES, GES }, { alpha, beta, at }) => [
+      [
+        "Semi-gradient: θ =", sized(ES[at].theta), "; value of the state that is updated next", sized(ES[at].value),
+        "; its target", sized(ES[at].target), "; δ =", sized(ES[at].delta),
+      ],
+      [
+        "Gradient TD: θ =", sized(GES[at].theta), "; w =", sized(GES[at].w), "; value", sized(GES[at].value),
+        "; target", sized(GES[at].target), "; δ =", sized(GES[at].delta),
+        "; predicted: wφ =", sized(GES[at].predicted),
+      ],
+      [
+        `After ${ES.length - 1} updates, with β / α =`, fixed(beta / alpha, 2), "; θ of the semi-gradient",
+        sized(ES.at(-1).theta), "; of gradient TD", sized(GES.at(-1).theta),
+      ],
+    ],
+  };
+
+  const pair = {
+    map: "Map with the trajectories of the policies that ES and GES have learned, and the obstacles",
+    title: "Try it: ES and GES learn side by side from the same noise, in your browser.",
+    hint: "Press Train, and Stop when you like; or go on by one episode or one step of both. "
+      + "Whatever you choose anew, training begins again.",
+    choices: { decay: "Noise decays", seed: "Seed" },
+    option: (value) => (typeof value === "number" ? String(value) : `per ${value}`),
+    alpha: "alpha, step size of theta",
+    size: sized,
+    buttons: { train: "Train", stop: "Stop", wholeEpisode: "One episode", step: "One step", reset: "Reset" },
+    progress: "Episodes done",
+    done: (episode, all) => `episode ${episode} of ${all}`,
+    names: { ES: "ES", GES: "GES", frozen: "frozen arm" },
+    gauge: (name) => `${name}: largest alpha times squared norm of phi of the episode`,
+    gauged: (number, overshoot) => {
+      if (!Number.isFinite(number)) return "no step yet";
+      return number > overshoot ? `${fixed(number, 2)}, overshoots` : fixed(number, 2);
+    },
+    gauges: (overshoot) => `Largest α‖φ‖² of the episode so far; the mark is at ${overshoot}:`,
+    weights: "θ now; the mark is at its first value:",
+    weight: (number) => (Math.abs(number) < 100 ? fixed(number, 3) : sized(number)),
+    charts: {
+      costs: ({ every }) => `Cost without noise, every ${every} episodes`,
+      gauges: ({ overshoot }) => `Largest α‖φ‖² of each episode; dotted: ${overshoot}`,
+    },
+    cost: (number) => fixed(number, 0),
+    target: "target",
+    legend: ({ steps }) => `The map shows ${steps} steps without noise; circles are the robot in training. `
+      + "The axis of the cost ends at 1.3 times the cost of the frozen arm or before; a line that leaves an axis goes on.",
+    result: ({ learner, episode, step, costs, diverged }) => {
+      const { cost, episode: judged } = costs.at(-1), first = costs[0].cost;
+      const where = step ? `episode ${step.episode + 1}, step ${step.time + 1}` : "not begun";
+      const after = judged ? `after ${judged} episodes` : "before training";
+      const change = fixed(100 * (1 - cost / first), 1);
+      const texts = [
+        `${learner}:`, where, `; cost without noise ${after}`, fixed(cost, 1),
+        "; reduction from the frozen arm's", `${change}\u00a0%`,
+      ];
+      return diverged ? [...texts, `; diverged in episode ${episode}`] : texts;
+    },
+  };
+
+  window.nmpcrl = { ...window.nmpcrl, words: { parts, controller, runs, player, chain, learners: pair } };
 })();

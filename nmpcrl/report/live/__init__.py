@@ -6,5 +6,8 @@ notebook that is not trusted, which leaves `hidden` out, its sentence.
 """
 
 from nmpcrl.report.live.closed_loop import controller
+from nmpcrl.report.live.published_runs import runs
+from nmpcrl.report.live.two_learners import learners
+from nmpcrl.report.live.two_states import chain
 
-__all__ = ["controller"]
+__all__ = ["chain", "controller", "learners", "runs"]

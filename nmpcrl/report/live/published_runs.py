@@ -1,0 +1,114 @@
+"""The live figure of chapters 3, 5 and 7: published runs, episode by episode.
+
+A page is given one seed in one layout; `scripts` are the files that it loads for all others. The
+trajectories are in neither: the page solves them again.
+"""
+
+import json
+from base64 import b64encode
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from IPython.display import HTML
+
+from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.claims import published
+from nmpcrl.claims.published import Published
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.learning import browser
+from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS
+from nmpcrl.report.live import frame
+from nmpcrl.report.live.looks import look
+from nmpcrl.report.live.problem import problem_of, surroundings, view
+from nmpcrl.study import paper
+from nmpcrl.study.design import LAYOUTS, MAIN_TABLE, SEEDS
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.records import Column
+
+SCRIPTS = (*frame.PARTS, "charts.js", "published.js", "runs.js")
+SHOWN = (MAIN_TABLE, "controls")  # parts of the study; in the others something else is changed
+LAYOUT, SEED = LAYOUTS[0], SEEDS[0]  # what a page is given
+CHOICES = ("first", "second", "layout", "decay", "seed")
+FILE = "runs_{}.js"
+LATER = "window.nmpcrl.packed = {{ ...window.nmpcrl.packed, {}: {} }};\n"
+
+
+def runs(*learners: str) -> HTML:
+    """Published runs of these learners beside the frozen arm; the first two to begin with."""
+    nmpc, known = paper.nmpc(LAYOUT), published.load()
+    try:
+        problem, module = problem_of(nmpc), browser.module(nmpc.plant, nmpc.task)
+    except CannotCompile as error:
+        return frame.absent(error)
+    tasks = {layout: paper.task(layout) for layout in LAYOUTS}
+    data = {
+        "looks": {name: look(name) for name in (*learners, "frozen")},
+        "chosen": dict(zip(CHOICES, (*learners[:2], LAYOUT, "step", SEED), strict=True)),
+        "layouts": {name: problem_of(paper.nmpc(name))["discs"] for name in tasks},
+        "decays": list(DECAY_TITLES),
+        "seeds": SEEDS,
+        "episodes": _episodes(known),
+        "names": paper.THETA_NAMES,
+        "given": packed(known, LAYOUT, SEED, (*learners, "frozen")),
+        "start": nmpc.task.start.tolist(),
+        "horizon": nmpc.horizon,
+        "steps": paper.STEPS,
+        "problem": problem,
+        **surroundings(nmpc.task),
+        "view": _union([view(task) for task in tasks.values()]),
+    }
+    return frame.figure("runs", data, SCRIPTS, module)
+
+
+def scripts() -> dict[str, str]:
+    """The files with all runs of a layout, by their names."""
+    known = published.load()
+    return {
+        FILE.format(layout): LATER.format(layout, json.dumps(packed(known, layout=layout)))
+        for layout in LAYOUTS
+    }
+
+
+def packed(
+    known: Published, layout: str, seed: int | None = None, learners: Collection[str] = tuple(LOOKS)
+) -> dict[str, Any]:
+    """Some runs as JSON takes them.
+
+    Returns:
+        The name of each run, and of all runs in turn, single precision in base 64: the training
+        cost by episode, the cost without noise by evaluation, and theta by evaluation.
+    """
+    chosen = {
+        _name(e): _numbers(summary, len(_episodes(known)))
+        for e, summary in known.summaries.items()
+        if known.variants[e] in SHOWN and e.layout == layout and e.learner in learners
+        and seed in (None, e.seed)
+    }  # fmt: skip
+    numbers = np.stack(list(chosen.values())).astype("<f4")
+    return {"runs": list(chosen), "numbers": b64encode(numbers.tobytes()).decode()}
+
+
+def _name(e: Experiment) -> str:
+    return f"{e.learner} {e.decay} {e.seed}"
+
+
+def _numbers(summary: RunSummary, count: int) -> Column:
+    """One row; nan where a run was stopped before."""
+    judged = np.full((count, 1 + len(paper.THETA_INIT)), np.nan)
+    found = summary.evaluations
+    judged[: len(found["cost"])] = np.column_stack([found["cost"], found["theta"]])
+    return np.concatenate([summary.episodes["cost"], judged[:, 0], judged[:, 1:].ravel()])
+
+
+def _episodes(known: Published) -> list[int]:
+    """After which episodes a run that was not stopped was judged."""
+    after = known.summaries[Experiment("frozen")].evaluations["episode"]
+    return [int(episode) for episode in after]
+
+
+def _union(views: list[list[float]]) -> list[float]:
+    """The part of the plane that holds all of these."""
+    low = np.min([one[:2] for one in views], axis=0)
+    high = np.max([np.add(one[:2], one[2:]) for one in views], axis=0)
+    return [*low.tolist(), *(high - low).tolist()]

@@ -1,0 +1,78 @@
+"""Chapter 4's live figure of the robot: ES and GES learn from the same noise, step by step."""
+
+from dataclasses import replace
+from math import log10
+from typing import Any
+
+from IPython.display import HTML
+
+from nmpcrl.control import Nmpc
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.learning import browser
+from nmpcrl.learning.updates import OVERSHOOT
+from nmpcrl.report.live import frame
+from nmpcrl.report.live.looks import look
+from nmpcrl.report.live.noise import widths
+from nmpcrl.report.live.problem import problem_of, surroundings
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.setup import DECAYS, controller_of
+
+SCRIPTS = (
+    *frame.PARTS, "charts.js", "random.js", "learning.js", "slices.js", "side_by_side.js",
+    "learners.js",
+)  # fmt: skip
+LEARNERS = ("ES", "GES")
+SEEDS = 20  # offered
+WIDE = 1.0  # of alpha's slider, to either side, in powers of ten
+
+
+def learners(experiment: Experiment) -> HTML:
+    """ES and GES side by side on the robot, trained in the page as `study.run` does.
+
+    Args:
+        experiment: what both are given; its learner is not read.
+    """
+    nmpc = controller_of(experiment).nmpc
+    try:
+        problem, module = problem_of(nmpc), browser.module(nmpc.plant, nmpc.task)
+    except CannotCompile as error:
+        return frame.absent(error)
+    data = {
+        "given": {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")},
+        "decays": list(DECAYS),
+        "seeds": [*range(SEEDS)],
+        "alphas": around(experiment.alpha),
+        "settings": {learner: settings(experiment, learner, nmpc) for learner in LEARNERS},
+        "noise": {"deviation": paper.NOISE, "widths": widths()},
+        "overshoot": OVERSHOOT,
+        "names": paper.THETA_NAMES,
+        "looks": {name: look(name) for name in (*LEARNERS, "frozen")},
+        "problem": problem,
+        **surroundings(nmpc.task),
+    }
+    return frame.figure("learners", data, SCRIPTS, module)
+
+
+def settings(experiment: Experiment, learner: str, nmpc: Nmpc) -> dict[str, Any]:
+    """What `learning.js` is given, without what the page can move."""
+    own = replace(experiment, learner=learner)
+    return {
+        "learner": learner,
+        "beta": own.beta,
+        "decayRate": own.decay_rate,
+        "episodes": own.episodes,
+        "steps": own.steps,
+        "evaluateEvery": own.evaluate_every,
+        "theta": list(own.theta),
+        "w": [paper.W_INIT] * len(own.theta),
+        "start": nmpc.task.start.tolist(),
+        "target": nmpc.task.target.tolist(),
+        "discs": [list(disc) for disc in zip(*nmpc.task.discs, strict=True)],
+        "horizon": own.horizon,
+    }
+
+
+def around(alpha: float) -> tuple[float, float, float]:
+    """The range of a slider of powers of ten, at which alpha is one of the steps."""
+    middle = round(log10(alpha), 6)
+    return middle - WIDE, middle + WIDE, WIDE / 10

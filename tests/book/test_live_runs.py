@@ -1,0 +1,245 @@
+"""The figure of published runs: what a reader chooses, moves and plays, with published numbers."""
+
+import live
+import nbformat
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from live_page import MOST, Tab
+
+from nmpcrl.claims import published
+from nmpcrl.study import Experiment
+
+FIGURE = "runs"
+CHAPTERS = ("03_rdes", "05_results", "07_beyond")
+SAME = 1e-6  # relative: theta is published in single precision, which moves the cost by 1e-7
+SLIDER = "Episode, a step of ten"
+HOLDS = "figure => figure.shown.given.at"
+
+LOSES_C = """
+  const real = Element.prototype.setAttribute
+  Element.prototype.setAttribute = function (name, value) {
+    real.call(this, name, String(value).replace("runs_C", "nowhere"))
+  }"""
+
+
+@pytest.fixture(scope="module")
+def known():
+    return published.load()
+
+
+def choose(tab: Tab, **values: str) -> dict:
+    """Choose in the selects, by their labels, and wait for the runs."""
+    for label, value in values.items():
+        tab.figure.get_by_label(label.replace("_", " "), exact=True).select_option(value)
+    layout, seed = values.get("Layout"), values.get("Seed")
+    tab.page.wait_for_function(
+        """([layout, seed]) => {
+          const { given } = document.querySelector("figure.live[data-figure=runs]").shown;
+          return (!layout || given.layout === layout) && (!seed || given.seed === Number(seed));
+        }""",
+        arg=[layout, seed],
+    )
+    return tab.shown()
+
+
+def assert_equal_to_published(shown: dict, known) -> None:
+    given = shown["given"]
+    for one in shown["found"]:
+        cell = {name: given[name] for name in ("layout", "decay", "seed")}
+        run = known.summaries[Experiment(one["learner"], **cell)]
+        at, training = given["at"], run.episodes["cost"]
+        np.testing.assert_array_equal(one["run"]["training"], training)
+        assert one["judged"] == run.evaluations["cost"][at]
+        assert one["theta"] == run.evaluations["theta"][at].tolist()
+        assert one["cost"] == pytest.approx(one["judged"], rel=SAME)
+        assert not one["failed"]
+
+
+def notebook_of(*outputs: str) -> nbformat.NotebookNode:
+    shown = [nbformat.v4.new_output("display_data", {"text/html": html}) for html in outputs]
+    return nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell("x", outputs=shown)])
+
+
+def test_the_files_of_runs_are_written_if_a_figure_asks_for_them(tmp_path):
+    live.add_runs([notebook_of("<p>none</p>"), notebook_of()], tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    live.add_runs([notebook_of('<figure data-figure="runs">')], tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"runs_{k}.js" for k in "ABCDEF"]
+
+
+@pytest.mark.book
+def test_it_begins_with_published_numbers_and_has_loaded_no_further_runs(tab, known):
+    shown = tab.shown()
+    assert shown["given"]["at"] == 30
+    assert [one["learner"] for one in shown["found"]] == ["ES", "DES", "frozen"]
+    assert_equal_to_published(shown, known)
+    assert not [url for url in tab.requests if "runs_" in url]
+
+
+@pytest.mark.book
+def test_every_choice_shows_its_published_run_whose_trajectory_the_page_solves(tab, known):
+    chosen = {"Learner": "GES", "Beside_it": "TDC", "Layout": "D", "Noise_decays": "episode"}
+    shown = choose(tab, **chosen, Seed="7")
+    assert [one["learner"] for one in shown["found"]] == ["GES", "TDC", "frozen"]
+    assert_equal_to_published(shown, known)
+    for one in shown["found"]:
+        run = known.summaries[Experiment(one["learner"], layout="D", decay="episode", seed=7)]
+        np.testing.assert_allclose(one["states"], run.states, atol=1e-3)
+    said = tab.figure.locator("[role=status]").inner_text()
+    for one in shown["found"]:
+        assert f"{one['judged']:.1f}" in said
+        assert f"{one['training']:.1f}" in said
+    assert [url.rpartition("/")[2] for url in tab.requests if "runs_" in url] == ["runs_D.js"]
+
+
+@pytest.mark.book
+def test_keys_move_through_the_episodes(tab, known):
+    tab.press(SLIDER, "ArrowLeft", "ArrowLeft")
+    shown = tab.shown()
+    assert shown["given"]["at"] == 28
+    assert tab.handle(SLIDER).get_attribute("aria-valuetext") == "episode 280"
+    assert_equal_to_published(shown, known)
+    tab.press(SLIDER, "Home")
+    shown = tab.shown()
+    es, des, frozen = (one["states"] for one in shown["found"])
+    assert es == des == frozen
+    assert "before training" in tab.figure.locator("[role=status]").inner_text()
+    x = tab.figure.locator(".cursor").first.get_attribute("x1")
+    assert float(x) == 0
+
+
+@pytest.mark.book
+def test_a_click_on_the_slider_moves_there(tab):
+    tab.handle(SLIDER).scroll_into_view_if_needed()
+    box = tab.handle(SLIDER).bounding_box()
+    tab.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    assert tab.shown()["given"]["at"] == 15
+
+
+@pytest.mark.book
+def test_play_goes_from_the_first_episode_on_until_it_is_paused(tab):
+    tab.click("Play")
+    tab.page.wait_for_function(f"({HOLDS})(document.querySelector('[data-figure=runs]')) === 3")
+    tab.click("Pause")
+    held = tab.shown()["given"]["at"]
+    assert 3 <= held < 30
+    tab.page.wait_for_timeout(900)
+    assert tab.shown()["given"]["at"] == held
+    tab.press(SLIDER, "End", "ArrowLeft")
+    tab.click("Play")
+    tab.page.wait_for_function(f"({HOLDS})(document.querySelector('[data-figure=runs]')) === 30")
+    assert tab.figure.get_by_role("button", name="Play", exact=True).count() == 1
+
+
+@pytest.mark.book
+def test_the_slider_takes_over_from_play(tab):
+    tab.press(SLIDER, "Home")
+    tab.click("Play")
+    tab.press(SLIDER, "End", "ArrowLeft")
+    tab.page.wait_for_timeout(900)
+    assert tab.shown()["given"]["at"] == 29
+
+
+@pytest.mark.book
+@pytest.mark.parametrize("motion", ["no-preference", "reduce"])
+def test_nothing_moves_by_itself(opened, motion):
+    tab = opened(FIGURE, reduced_motion=motion).begun().quiet()
+    before = tab.figure.evaluate("figure => figure.innerHTML")
+    tab.page.wait_for_timeout(900)
+    assert tab.figure.evaluate("figure => figure.innerHTML") == before
+
+
+@pytest.mark.book
+def test_one_run_may_be_shown_alone_beside_the_frozen_arm(tab):
+    shown = choose(tab, Beside_it="")
+    assert [one["learner"] for one in shown["found"]] == ["ES", "frozen"]
+    assert tab.figure.locator("polyline.learner").count() == 2
+    assert tab.figure.locator(".key span").all_inner_texts() == ["ES", "frozen arm"]
+
+
+@pytest.mark.book
+def test_a_run_that_was_stopped_ends_where_it_was(tab, known):
+    e = Experiment("DES", layout="A", decay="step", seed=1)
+    count = len(known.summaries[e].evaluations["cost"])
+    shown = choose(tab, Seed="1")
+    assert shown["found"][1]["states"] == []
+    said = "DES: this run was stopped before episode 300."
+    assert said in tab.figure.locator("[role=status]").inner_text()
+    tab.press(SLIDER, *["ArrowLeft"] * (31 - count))
+    shown = tab.shown()
+    assert shown["given"]["at"] == count - 1
+    assert_equal_to_published(shown, known)
+
+
+@pytest.mark.book
+def test_a_layout_whose_runs_cannot_be_loaded_says_so(opened):
+    tab = opened(FIGURE, script=LOSES_C)
+    tab.begun().figure.get_by_label("Layout", exact=True).select_option("C")
+    tab.figure.get_by_text("could not be loaded").wait_for()
+
+
+@pytest.mark.book
+def test_a_run_that_was_not_made_is_named(opened):
+    tab = opened(FIGURE, chapter="07_beyond").begun()
+    shown = choose(tab, Learner="QL", Layout="B")
+    assert [one["learner"] for one in shown["found"]] == ["TDC", "frozen"]
+    assert "There is no run of Q-learning in layout B" in tab.figure.inner_text()
+
+
+@pytest.mark.book
+def test_a_notebook_has_one_seed_in_one_layout_and_asks_for_nothing(browser, site, tmp_path):
+    notebook = nbformat.read(site / "book/05_results.ipynb", 4)
+    (html,) = [text for text in live.shown(notebook) if live.ASKS in text]
+    page = browser.new_page()
+    requests = []
+    page.on("request", lambda request: requests.append(request.url))
+    (tmp_path / "output.html").write_text(f"<!DOCTYPE html><meta charset='utf-8'>{html}")
+    page.goto((tmp_path / "output.html").as_uri())
+    page.locator("figure.live .results b").first.wait_for()
+    assert page.get_by_label("Layout").locator("option").all_inner_texts() == ["A"]
+    assert page.get_by_label("Seed").locator("option").all_inner_texts() == ["0"]
+    page.get_by_label("Noise decays").select_option("episode")
+    page.wait_for_function("document.querySelector('figure.live').shown.given.decay === 'episode'")
+    assert len(requests) == 1
+    page.close()
+
+
+@pytest.mark.book
+@pytest.mark.parametrize("chapter", CHAPTERS)
+def test_what_a_page_loads_at_first_is_light(site, chapter):
+    text = (site / f"book/{chapter}.html").read_text()
+    files = [path for path in site.glob("_static/live/*") if f"_static/live/{path.name}" in text]
+    given = len(text.partition('data-figure="runs"')[2].partition("</figure>")[0])
+    assert sum(path.stat().st_size for path in files) + given <= MOST
+    assert not [path.name for path in files if path.name.startswith("runs_")]
+
+
+@pytest.mark.book
+def test_without_javascript_or_on_paper_it_is_not_there(opened, tab):
+    assert not opened(FIGURE, java_script_enabled=False).figure.is_visible()
+    tab.page.emulate_media(media="print")
+    assert not tab.figure.is_visible()
+
+
+@pytest.mark.book
+def test_without_webassembly_there_is_a_sentence(opened):
+    tab = opened(FIGURE, script="delete window.WebAssembly")
+    tab.figure.get_by_text("does not run WebAssembly").wait_for()
+    assert tab.figure.locator("svg").count() == 0
+    assert tab.errors == []
+
+
+@pytest.mark.book
+@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing(opened, width, theme):
+    settings = {"viewport": {"width": width, "height": 900}, "color_scheme": theme}
+    tab = opened(FIGURE, **settings, reduced_motion="reduce").begun().quiet()
+    assert tab.page.evaluate("document.documentElement.dataset.theme") == theme
+    found = Axe().run(tab.page, context="figure.live[data-figure=runs]")
+    assert found.response["passes"]
+    assert found.response["violations"] == []
+    assert tab.page.evaluate("document.documentElement.scrollWidth") <= width
+    for target in tab.figure.locator("select, input, button").all():
+        assert min(target.bounding_box()[side] for side in ("width", "height")) >= 24

@@ -1,0 +1,98 @@
+"""What chapter 4's live figures are given: the chain and the experiment that Python has."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from nmpcrl.analysis import two_state
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.learning import browser
+from nmpcrl.learning.rollout import Persistent
+from nmpcrl.report import live
+from nmpcrl.report.figures.style import LOOKS
+from nmpcrl.report.live import two_learners, two_states
+from nmpcrl.report.live.looks import look
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.setup import prepare
+
+EXPERIMENT = Experiment(layout="C", alpha=3e-8, decay="episode", seed=4, episodes=20, horizon=7)
+FIGURES = {
+    "chain": (lambda: live.chain(0.1, 0.4, 0.97), two_states.SCRIPTS),
+    "learners": (lambda: live.learners(EXPERIMENT), two_learners.SCRIPTS),
+}
+
+
+@pytest.fixture(autouse=True)
+def module_of_three_bytes(monkeypatch):
+    monkeypatch.setattr(browser, "module", lambda plant, task: b"abc")
+
+
+def data_of(figure: str) -> dict:
+    html = FIGURES[figure][0]().data
+    return json.loads(re.search(r'application/json">(.*)</script>', html)[1])
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_the_output_is_whole_and_loads_nothing(figure):
+    make, scripts = FIGURES[figure]
+    html = make().data
+    assert re.findall(r'data-file="([^"]+)"', html) == ["live.css", "module.js", *scripts]
+    assert not re.search(r"\b(src|href)=|https?://(?!www\.w3\.org/2000/svg)", html)
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_without_a_compiler_there_is_a_sentence(figure, monkeypatch):
+    def refuse(*_):
+        raise CannotCompile("numba is not installed")
+
+    monkeypatch.setattr(browser, "module", refuse)
+    said = "<p>There is no live figure here: numba is not installed.</p>"
+    assert FIGURES[figure][0]().data == said
+
+
+def test_the_chain_is_that_of_the_analysis():
+    data = data_of("chain")
+    chain = two_state.Chain(gamma=0.97)
+    for state in (two_state.FIRST, two_state.SECOND):
+        phi, phi_next = data["phi"][state][0], data["phi_next"][state][0]
+        delta = data["cost"] + 0.97 * phi_next * data["theta"] - phi * data["theta"]
+        assert delta == pytest.approx(chain.delta(np.array([data["theta"]]), state))
+
+
+def test_each_slider_of_the_chain_has_a_step_at_its_first_value():
+    data = data_of("chain")
+    for name, (least, most, step) in data["ranges"].items():
+        assert least < data["given"][name] <= most
+        steps = (data["given"][name] - least) / step
+        assert steps == pytest.approx(round(steps), abs=1e-9)
+
+
+def test_both_learners_begin_as_the_experiment_does():
+    data = data_of("learners")
+    assert data["given"] == {"alpha": 3e-8, "decay": "episode", "seed": 4}
+    nmpc = paper.nmpc("C", horizon=7)
+    _, weights, explore = prepare(EXPERIMENT, Persistent(nmpc))
+    for learner, settings in data["settings"].items():
+        assert settings["learner"] == learner
+        assert settings["theta"] == weights.theta.tolist()
+        assert settings["w"] == weights.w.tolist()
+        assert [settings["episodes"], settings["steps"]] == list(explore.noise.shape[:2])
+        assert settings["discs"] == np.column_stack(nmpc.task.discs).tolist()
+        assert settings["horizon"] == 7
+        assert settings["beta"] == paper.BETA
+
+
+@pytest.mark.parametrize("alpha", [1e-7, 3e-9, 2.5e-6])
+def test_alphas_slider_has_a_step_at_the_chapters_alpha(alpha):
+    least, most, step = two_learners.around(alpha)
+    assert 10 ** (least + 10 * step) == pytest.approx(alpha, rel=1e-5)
+    assert most - least == pytest.approx(20 * step)
+
+
+@pytest.mark.parametrize("learner", LOOKS)
+def test_a_learner_looks_as_in_every_figure(learner):
+    found, known = look(learner), LOOKS[learner]
+    assert found["color"] in (known.color, "var(--ink)")
+    assert bool(found["dashes"]) == (known.linestyle != "-")

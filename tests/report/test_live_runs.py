@@ -1,0 +1,122 @@
+"""What the figure of published runs is given: their very numbers, which lead to the same costs."""
+
+import json
+import re
+from base64 import b64decode
+
+import numpy as np
+import pytest
+
+from nmpcrl.claims import published
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.learning import browser
+from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.report import live
+from nmpcrl.report.figures.style import LOOKS
+from nmpcrl.report.live import frame, published_runs
+from nmpcrl.study import Experiment, design, paper
+
+SAME = 1e-6  # relative: theta is published in single precision, which moves the cost by 1e-7
+
+
+@pytest.fixture(scope="module")
+def known():
+    return published.load()
+
+
+@pytest.fixture
+def shown(monkeypatch) -> str:
+    """The figure's HTML, with a module of three bytes."""
+    monkeypatch.setattr(browser, "module", lambda plant, task: b"abc")
+    return live.runs("DES", "RDES").data
+
+
+@pytest.fixture
+def data(shown) -> dict:
+    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
+
+
+def unpacked(packed: dict) -> dict:
+    """Training costs, costs without noise, and theta, by learner, decay and seed."""
+    rows = np.frombuffer(b64decode(packed["numbers"]), "<f4").reshape(len(packed["runs"]), -1)
+    parts = [np.split(row, [300, 331]) for row in rows]
+    named = [(learner, decay, int(seed)) for learner, decay, seed in map(str.split, packed["runs"])]
+    return {
+        name: (training, costs, theta.reshape(31, 9))
+        for name, (training, costs, theta) in zip(named, parts, strict=True)
+    }
+
+
+def assert_published(unpacked: dict, layout: str, known) -> None:
+    for (learner, decay, seed), (training, costs, theta) in unpacked.items():
+        one = known.summaries[Experiment(learner, layout=layout, decay=decay, seed=seed)]
+        count = len(one.evaluations["cost"])
+        np.testing.assert_array_equal(training, one.episodes["cost"])
+        np.testing.assert_array_equal(costs[:count], one.evaluations["cost"])
+        np.testing.assert_array_equal(theta[:count], one.evaluations["theta"])
+        assert np.isnan(costs[count:]).all()
+        assert np.isnan(theta[count:]).all()
+
+
+def test_a_page_is_given_one_seed_of_its_learners_and_of_the_frozen_arm(data, known):
+    given = unpacked(data["given"])
+    assert set(given) == {
+        (learner, decay, 0)
+        for learner in ("DES", "RDES", "frozen")
+        for decay in ("step", "episode")
+    }
+    assert_published(given, "A", known)
+
+
+def test_each_layout_has_a_file_with_every_run_of_the_main_table_and_the_controls(known):
+    files = published_runs.scripts()
+    assert list(files) == [f"runs_{layout}.js" for layout in design.LAYOUTS]
+    for layout, text in zip(design.LAYOUTS, files.values(), strict=True):
+        runs = unpacked(json.loads(re.search(rf"{layout}: (.*) }};", text)[1]))
+        parts = (*design.main_table(), *design.controls())
+        assert set(runs) == {(e.learner, e.decay, e.seed) for e in parts if e.layout == layout}
+        assert_published(runs, layout, known)
+    assert sum(map(len, files.values())) < 4e6
+
+
+@pytest.mark.parametrize("learner", ["ES", "DES", "RDES", "GES", "TDC", "QL"])
+def test_the_published_theta_leads_to_the_published_cost(learner, known):
+    e = Experiment(learner, layout="D", decay="episode", seed=1)
+    found, controller = known.summaries[e].evaluations, Persistent(paper.nmpc(e.layout))
+    for theta, cost in zip(found["theta"][::10], found["cost"][::10], strict=True):
+        rollout = evaluate(controller, theta.astype(float), paper.STEPS)
+        assert rollout.cost == pytest.approx(cost, rel=SAME)
+
+
+def test_it_begins_with_the_first_two_learners(data):
+    wanted = {"first": "DES", "second": "RDES", "layout": "A", "decay": "step", "seed": 0}
+    assert data["chosen"] == wanted
+    assert data["episodes"] == list(range(0, 301, 10))
+    assert list(data["layouts"]) == list(design.LAYOUTS)
+
+
+def test_a_learner_has_the_look_of_the_printed_figures(data):
+    assert data["looks"]["RDES"]["color"] == LOOKS["RDES"].color
+    assert data["looks"]["DES"] == {"color": "var(--ink)", "dashes": "5.92 2.56"}
+    assert published_runs.look("GES")["dashes"] == "8 1.6"
+
+
+def test_the_map_shows_every_layout(data):
+    x, y, width, height = data["view"]
+    for discs in data["layouts"].values():
+        for *centre, clearance in discs:
+            assert (np.array(centre) - clearance / 2 > [x, y]).all()
+            assert (np.array(centre) + clearance / 2 < [x + width, y + height]).all()
+
+
+def test_the_output_is_whole(shown):
+    files = re.findall(r'data-file="([^"]+)"', shown)
+    assert files == [frame.STYLE, frame.MODULE, *published_runs.SCRIPTS]
+
+
+def test_without_a_compiler_there_is_a_sentence(monkeypatch):
+    def refuse(*_):
+        raise CannotCompile("numba is not installed")
+
+    monkeypatch.setattr(browser, "module", refuse)
+    assert "numba is not installed" in live.runs("ES", "GES").data
