@@ -59,7 +59,9 @@ class Experiment:
     learner: str = option("ES", OneOf(LEARNERS), "What learns.")
     seed: int = option(0, Whole(0, LARGEST_SEED), "Of the noise and of the network.")
     episodes: int = option(paper.EPISODES, Whole(1, MOST_EPISODES), "Of training.")
-    layout: str = option("A", Layout(paper.LAYOUTS), "Of the obstacles.")
+    layout: str | tuple[tuple[float, float], ...] = option(  # centres are kept as text
+        "A", Layout(paper.LAYOUTS), "Of the obstacles."
+    )
     decay: str = option("step", OneOf(DECAYS), "What k of Eq. (5) counts.")  # departure C
     decay_rate: float = option(
         paper.DECAY_RATE, Number.above_zero(1), "c_epsilon, by which exploration decays."

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import sha256
 from math import tau
 from typing import Any
@@ -88,11 +89,11 @@ class Pose:
         x, y, heading = (each.text.removeprefix("a number ") for each in self._each)
         return f"3 numbers: x {x}, y {y} and a heading {heading}"
 
-    @property
+    @cached_property
     def _each(self) -> list[Number]:
-        lower, upper = np.maximum(self.lower, -MOST_HEADING), np.minimum(self.upper, MOST_HEADING)
+        turn = max(self.lower[2], -MOST_HEADING), min(self.upper[2], MOST_HEADING)
         walls = zip(self.lower[:2], self.upper[:2], strict=True)
-        return [*(Number.within(*wall) for wall in walls), Number.within(lower[2], upper[2])]
+        return [*(Number.within(*wall) for wall in walls), Number.within(*turn)]
 
     def check(self, name: str, value: Any) -> tuple[float, ...]:
         """See `Allowed`."""
@@ -105,9 +106,10 @@ class Pose:
             raise refused(name, value, self.text) from None
 
 
-def short_name(layout: str) -> str:
-    """A layout's name, or one made from its centres, short enough for a table or a file."""
-    return f"drawn-{sha256(layout.encode()).hexdigest()[:6]}" if "," in layout else layout
+def short_name(layout: str | Centres) -> str:
+    """The name of an experiment's layout, short enough for a table or a file."""
+    word = str(layout)
+    return f"drawn-{sha256(word.encode()).hexdigest()[:6]}" if "," in word else word
 
 
 def are_centres(value: Any) -> bool:
