@@ -39,6 +39,7 @@ study: .venv/ready  ## Train the whole study, or what is missing of it: hours, a
 	@$(BIN)/python -m nmpcrl study
 
 bench: .venv/ready  ## Measure how long solves, steps and runs take, and print what is reached
+	@if [ -d _build/html ]; then $(BIN)/python -m nmpcrl bench --live > /dev/null; fi
 	@$(BIN)/python -m nmpcrl bench
 
 test: .venv/ready  ## All tests but the next; those of the site need a built book, a Chromium and a Firefox

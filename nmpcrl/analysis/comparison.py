@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.paper import THETA_NAMES
 from nmpcrl.study.records import Column, Records
 
@@ -28,14 +29,16 @@ class Comparison:
     @property
     def warning(self) -> str:
         """Why the costs of the two mean different things, or ""."""
-        apart = [name for name in ("layout", "steps", "box") if name in self.fields]
+        apart = [
+            name for name in ("layout", "start", "target", "steps", "box") if name in self.fields
+        ]
         return f"the costs are not comparable: other {' and '.join(apart)}" * bool(apart)
 
 
 def compare(a: Records, b: Records) -> Comparison:
     """Compare two runs, as far as both go."""
-    names = dict.fromkeys([*a.experiment, *b.experiment])
-    pairs = {name: (a.experiment.get(name), b.experiment.get(name)) for name in names}
+    first, second = vars(Experiment(**a.experiment)), vars(Experiment(**b.experiment))
+    pairs = {name: (value, second[name]) for name, value in first.items()}
     return Comparison(
         {name: pair for name, pair in pairs.items() if pair[0] != pair[1]},
         tuple(_differing(a, b)),

@@ -8,7 +8,9 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.control import SolverError
 from nmpcrl.study import paper
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Records
+from nmpcrl.study.setup import controller_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +83,7 @@ def dropped_curvature(records: Records, *, samples: int = 200) -> Curvature:
         samples: how many steps to look at; those at which the Hessian does not exist are left out.
     """
     steps, gamma = records.steps, paper.GAMMA
-    nmpc = paper.nmpc(records.experiment["layout"], horizon=records.experiment["horizon"])
+    nmpc = controller_of(Experiment(**records.experiment)).nmpc
     known = np.flatnonzero(np.isfinite(steps["delta"]))[1:]
     rows = []
     for k in known[np.linspace(0, len(known) - 1, min(samples, len(known)), dtype=int)]:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
 NAMES = ("learner", "layout", "decay", "seed", "episodes")  # of a row: without them it names no run
+VECTORS = {"theta", "start", "target"}  # fields that a row holds as text
 IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
 
 
@@ -146,7 +147,7 @@ def summarise(records: Records) -> RunSummary:
 def row(summary: RunSummary) -> dict[str, Any]:
     """One flat row: the experiment's fields, then what became of it."""
     experiment, episodes, evaluations = summary.experiment, summary.episodes, summary.evaluations
-    named = experiment | {"theta": " ".join(f"{value!r}" for value in experiment["theta"])}
+    named = {name: _as_text(value) for name, value in experiment.items()}
     late = slice(-min(LATE, max(1, experiment["episodes"] // 2)), None)
     cost = evaluations["cost"]
     columns = {
@@ -200,9 +201,14 @@ def experiment_of(row: Mapping[str, Any]) -> Experiment:
     if nameless := missing & set(NAMES):
         raise LookupError(f"there is no column {min(nameless)}")
     named = {one.name: row[one.name] for one in fields(Experiment) if one.name not in missing}
-    if "theta" in named:
-        named["theta"] = tuple(float(value) for value in named["theta"].split())
+    for name in VECTORS & named.keys():
+        named[name] = tuple(float(value) for value in named[name].split())
     return Experiment(**named)
+
+
+def _as_text(value: Any) -> Any:
+    """A field as a table holds it: a vector's numbers between blanks."""
+    return " ".join(map(repr, value)) if isinstance(value, tuple | list) else value
 
 
 def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> "pd.DataFrame":

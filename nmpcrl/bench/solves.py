@@ -117,7 +117,7 @@ def parts(episodes: int) -> Columns:
 
     Measured in the closed loop without noise, for so many episodes.
     """
-    (nmpc, compiled), network = _watched(), _network()
+    (nmpc, compiled), network = watched(), _network()
     spent: dict[str, list[float]] = {}
     for _ in range(episodes):
         for state, solution, seconds in closed_loop(
@@ -142,11 +142,11 @@ def _time(spent: dict[str, list[float]], name: str, call: Callable[[], Any]) -> 
     spent.setdefault(name, []).append(time.perf_counter() - began)
 
 
-def _watched() -> tuple[Nmpc, list[float]]:
+def watched() -> tuple[Nmpc, list[float]]:
     """A controller that has solved once, and a list to which it adds its machine code's times."""
     seconds: list[float] = []
 
-    def watched(plant: Plant) -> Code:
+    def timing(plant: Plant) -> Code:
         code = machine_code(plant)
 
         def timed(*arguments: Any) -> Any:
@@ -157,7 +157,7 @@ def _watched() -> tuple[Nmpc, list[float]]:
 
         return code._replace(solve=timed)
 
-    nmpc = paper.nmpc(solver=Riccati(code=watched))
+    nmpc = paper.nmpc(solver=Riccati(code=timing))
     nmpc.solve(nmpc.task.start, THETA)
     return nmpc, seconds
 

@@ -1,6 +1,6 @@
 """The targets of the benchmark, a row each, with what was measured."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +51,12 @@ def targets(bench: Bench) -> list[Target]:
 
 def rows(bench: Bench) -> list[tuple[str, str, str, str]]:
     """`targets` as a table of texts, its header first."""
-    texts = [(t.what, t.to_reach, t.measured, t.outcome) for t in targets(bench)]
+    return table_of(targets(bench))
+
+
+def table_of(listed: Iterable[Target]) -> list[tuple[str, str, str, str]]:
+    """Targets as a table of texts, its header first."""
+    texts = [(t.what, t.to_reach, t.measured, t.outcome) for t in listed]
     return [("what", "target", "measured", "outcome"), *texts]
 
 

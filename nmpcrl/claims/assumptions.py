@@ -13,7 +13,6 @@ from nmpcrl.claims.rule import (
     Observations,
     Verdict,
 )
-from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
@@ -37,7 +36,7 @@ def audit(study: Runs[Records], curvature: Curvature) -> tuple[Assumption, ...]:
     """The assumptions of the convergence theorem of nonlinear TDC, beside what is run."""
     ges = study.select(learner="GES")
     experiment = next(iter(ges))
-    task = paper.task(experiment.layout)
+    task = experiment.task
     kinks = float(np.mean([metrics.boundary_share(r, task) for r in ges.values()]))
     memory = float(np.median([metrics.memory(r) for r in ges.values()]))
     dropped = float(np.median(curvature.ratio))

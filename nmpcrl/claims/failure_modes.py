@@ -92,7 +92,7 @@ def failure_modes(
     for run, share, wrong in zip(listed, shares, went_wrong(runs), strict=True):
         if run.name.learner == "frozen":
             continue
-        task = paper.task(run.name.layout, box=run.name.box)
+        task = run.name.task
         first_rollout = named[frozen_arm(run.name)].states
         rows.append(
             {

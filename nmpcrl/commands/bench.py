@@ -13,6 +13,7 @@ PROBLEMS = 100_000  # of a sweep
 @click.option("--smoke", "length", flag_value="smoke", help="Only check that it works.")
 @click.option("--again", is_flag=True, help="Measure even if a benchmark is stored.")
 @click.option("--publish", is_flag=True, help="Only time the learners, and publish C3 and C4.")
+@click.option("--live", is_flag=True, help="Only measure the live figures of the built book.")
 @click.option(
     "--sweep",
     metavar="[N]",
@@ -21,20 +22,24 @@ PROBLEMS = 100_000  # of a sweep
     type=int,
     help=f"Solve N drawn problems, {PROBLEMS:,} by default, and count the outcomes.",
 )
-def bench(length: str, again: bool, publish: bool, sweep: int | None) -> None:
+def bench(length: str, again: bool, publish: bool, live: bool, sweep: int | None) -> None:
     """Measure how long solves, steps and runs take.
 
-    The times are compared with targets, and stored with the runs.
+    The times are compared with targets, and stored with the runs. What --live measured
+    last is printed as well.
 
     \b
     Example:
       nmpcrl bench --short
+      nmpcrl bench --live
       nmpcrl bench --sweep 1000
     """
     if sweep is not None:
         _sweep(sweep)
     elif publish:
         _publish_timing()
+    elif live:
+        _print_live()
     else:
         _print_times(length, again=again)
 
@@ -49,17 +54,34 @@ def _sweep(problems: int) -> None:
 
 def _print_times(length: str, *, again: bool) -> None:
     """Print a row for each target, and where the benchmark is stored."""
-    from nmpcrl.bench import suite, targets
+    from nmpcrl.bench import live, suite, targets
+    from nmpcrl.bench.live_targets import live_targets
 
     measured = suite.measure(length) if again else suite.read_or_measure(length)
     rows = targets.rows(measured)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        click.echo(" | ".join(map(str.ljust, row, widths)))
+    _print_table(rows)
     about = measured["about"]
     took = f"{about['length']}, {about['date']}, {about['seconds']:.0f} s"
     others = f"other programs used up to {about['others']:.0%} of the cores"
     click.echo(f"{suite.path()}: {took}; {others}")
+    if found := live.stored():
+        _print_table(targets.table_of(live_targets(found)))
+        click.echo(f"{live.path()}: {found.get('date', 'of an unknown date')}")
+
+
+def _print_live() -> None:
+    """Measure the live figures, and print a row for each of their targets."""
+    from nmpcrl.bench import live, targets
+    from nmpcrl.bench.live_targets import live_targets
+
+    _print_table(targets.table_of(live_targets(live.measure())))
+    click.echo(f"{live.path()}: stored")
+
+
+def _print_table(rows: list[tuple[str, str, str, str]]) -> None:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        click.echo(" | ".join(map(str.ljust, row, widths)))
 
 
 def _publish_timing() -> None:

@@ -65,6 +65,6 @@ def _print_differences(found: "Comparison") -> None:
 
 def _word(value: object) -> str:
     """A field's value in a table."""
-    if isinstance(value, list):
+    if isinstance(value, tuple):
         return ",".join(f"{one:g}" for one in value)
     return f"{value:g}" if isinstance(value, float) else str(value)

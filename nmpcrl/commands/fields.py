@@ -8,6 +8,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+LISTS = ("--theta", "--layout", "--start", "--target")  # options whose value is many numbers
 ALIASES = {"gated": " /--literal"}  # a second name of what switches a field off
 
 
@@ -96,24 +97,23 @@ def _options(make: Callable[["Field[Any]"], click.Option]) -> tuple[click.Option
 
 
 def joined(args: list[str]) -> list[str]:
-    """Numbers that stand after `--theta`, each a word, as one word."""
+    """Numbers that stand after one of `LISTS`, words with and without commas, as one word."""
     result: list[str] = []
     collecting = False
     for word in args:
-        if collecting and _is_number(word):
+        if collecting and _are_numbers(word):
             result[-1] += f",{word}"
         else:
-            collecting = bool(result) and result[-1] == "--theta" and _is_number(word)
+            collecting = bool(result) and result[-1] in LISTS and _are_numbers(word)
             result.append(word)
     return result
 
 
-def _is_number(word: str) -> bool:
+def _are_numbers(word: str) -> bool:
     try:
-        float(word)
+        return [float(one) for one in word.split(",")] != []
     except ValueError:
         return False
-    return True
 
 
 def _flags(one: "Field[Any]") -> list[str]:

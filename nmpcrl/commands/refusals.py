@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 SAID = (  # errors whose message is a sentence for the reader, and where they are defined
-    ("nmpcrl.study.parameters", "ParameterError"),
+    ("nmpcrl.study.parameters", "Refusal"),
     ("nmpcrl.study.records", "DamagedRecords"),
     ("nmpcrl.study.place", "StoreError"),
     ("nmpcrl.study.cluster", "NoCluster"),

@@ -39,9 +39,11 @@ class Row:
 
     def words(self) -> list[str]:
         """The line of the table."""
+        from nmpcrl.study.geometry import short_name
+
         return [
             self.path.stem,
-            *(str(self.fields[name]) for name in SHOWN),
+            *(short_name(str(self.fields[name])) for name in SHOWN),
             f"{self.facts['final_cost']:.1f}",
             f"{self.facts['seconds'] / 60:.1f}",
             size(self.bytes),

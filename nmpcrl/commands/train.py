@@ -20,6 +20,7 @@ def train(yes: bool, **fields: Any) -> None:
     \b
     Example:
       nmpcrl train --learner RDES --layout B --episodes 50 --no-gated
+      nmpcrl train --layout "0.5,2.2 3,0.5" --target 8,4,1.57
     """
     from nmpcrl.report.run import verdict
     from nmpcrl.study import Experiment
@@ -65,9 +66,10 @@ def _other(experiment: "Experiment") -> str:
     """A stored run to compare this one with; without one, a placeholder for its name."""
     from nmpcrl.commands.names import names
     from nmpcrl.study.experiment import frozen_arm
+    from nmpcrl.study.geometry import short_name
     from nmpcrl.study.store import path_of
 
     own, arm = path_of(experiment).stem, path_of(frozen_arm(experiment)).stem
     stored = [name for name in names() if name != own]
-    alike = [name for name in stored if f"-{experiment.layout}-" in name]
+    alike = [name for name in stored if f"-{short_name(experiment.layout)}-" in name]
     return arm if arm in stored else next(iter(alike), "RUN")

@@ -49,7 +49,8 @@ def wasm(of_plant: str, of_task: str | None, out: Path) -> None:
     except (CannotCompile, RuntimeError) as error:
         raise click.ClickException(str(error)) from None
     out.write_bytes(module)
-    click.echo(f"{out}: {len(module) / 1000:.0f} kB; its host gives it {', '.join(FUNCTIONS)}.")
+    name, size = click.format_filename(out), len(module) / 1000
+    click.echo(f"{name}: {size:.0f} kB; its host gives it {', '.join(FUNCTIONS)}.")
 
 
 def named(name: str, kind: type) -> Any:

@@ -4,7 +4,7 @@ import numpy as np
 
 from nmpcrl import Matrix
 from nmpcrl.analysis import metrics
-from nmpcrl.study import paper
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Records, StepStatus, Stopped
 
 SAME = f"{0:.1%}"  # how a change is shown that is less than half of the last digit
@@ -24,7 +24,7 @@ def verdict(records: Records) -> str:
 
 def figures(records: Records) -> dict[str, str]:
     """What a rollout without noise shows, ready to print."""
-    task = paper.task(records.experiment["layout"])
+    task = Experiment(**records.experiment).task
     states, actions = metrics.final_rollout(records)
     overlap = task.overlap(states).max(axis=-1)
     theta = ", ".join(f"{value:.4g}" for value in records.evaluations["theta"][-1])

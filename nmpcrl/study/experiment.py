@@ -4,9 +4,12 @@ from collections.abc import Collection
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any
 
-from nmpcrl.control import solvers
+import numpy as np
+
+from nmpcrl.control import Task, solvers
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.study import paper
+from nmpcrl.study.geometry import Layout, Pose, short_name
 from nmpcrl.study.parameters import (
     LARGEST_SEED,
     Allowed,
@@ -30,6 +33,7 @@ MOST_EPISODES = 100_000  # 333 times the paper's: exploration has long ended
 MOST_STEPS = 10_000  # 77 times the paper's; the robot arrives within 92
 MOST_STAGES = 500  # of a plan: four times an episode; gamma^500 is 2e-7
 
+WITHIN = Pose(paper.LOWER, paper.UPPER)  # the box
 STEP_SIZE = Number.above_zero(ABSURD)  # with more, theta leaves the numbers in one step
 
 
@@ -55,7 +59,9 @@ class Experiment:
     learner: str = option("ES", OneOf(LEARNERS), "What learns.")
     seed: int = option(0, Whole(0, LARGEST_SEED), "Of the noise and of the network.")
     episodes: int = option(paper.EPISODES, Whole(1, MOST_EPISODES), "Of training.")
-    layout: str = option("A", OneOf(paper.LAYOUTS), "Of the obstacles.")
+    layout: str | tuple[tuple[float, float], ...] = option(  # centres are kept as text
+        "A", Layout(paper.LAYOUTS), "Of the obstacles."
+    )
     decay: str = option("step", OneOf(DECAYS), "What k of Eq. (5) counts.")  # departure C
     decay_rate: float = option(
         paper.DECAY_RATE, Number.above_zero(1), "c_epsilon, by which exploration decays."
@@ -88,6 +94,8 @@ class Experiment:
         "The controller's parameters at the start.",
     )
     steps: int = option(paper.STEPS, Whole(1, MOST_STEPS), "Of an episode.")
+    start: tuple[float, ...] = option(paper.START, WITHIN, "Where an episode begins.")
+    target: tuple[float, ...] = option(paper.TARGET, WITHIN, "Where the robot is to go.")
     horizon: int = option(paper.HORIZON, Whole(1, MOST_STAGES), "N, the inputs of a plan.")
     solver: str = option("riccati", OneOf(solvers.SOLVERS), "What solves Eq. (2).")
     tolerance: float = option(
@@ -103,11 +111,20 @@ class Experiment:
         for one in fields(self):
             value = one.metadata["allowed"].check(one.name, getattr(self, one.name))
             object.__setattr__(self, one.name, value)
+        if self.box == "printed" and any(np.greater(self.start, paper.PRINTED_UPPER)):
+            raise ParameterError(
+                f"start = {self.start} lies outside the box as printed, box = 'printed'"
+            )
         if self.values_actions and not self.clipped:
             raise ParameterError(
                 f"clipped = False leaves actions that {self.learner} with constrained ="
                 f" {self.constrained} cannot value: they are outside the OCP's bounds"
             )
+
+    @property
+    def task(self) -> Task:
+        """Where the robot starts, where it is to go, and what it avoids."""
+        return paper.task(self.layout, box=self.box, start=self.start, target=self.target)
 
     @property
     def values_actions(self) -> bool:
@@ -124,7 +141,8 @@ class Experiment:
         return self.learner not in one.metadata.get("read_by", LEARNERS)
 
     def __str__(self) -> str:
-        return f"{self.learner} in layout {self.layout}, decay per {self.decay}, seed {self.seed}"
+        place = f"layout {short_name(self.layout)}"
+        return f"{self.learner} in {place}, decay per {self.decay}, seed {self.seed}"
 
 
 def frozen_arm(experiment: Experiment) -> Experiment:

@@ -1,15 +1,17 @@
 """Every number of the paper: Table I and the task. Where it is silent or contradicts itself, see
 `DEPARTURES`."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from nmpcrl.control import Nmpc, Obstacle, Task, differential_drive
 from nmpcrl.control.solvers import Solver
+from nmpcrl.study.geometry import Centres, Layout
+from nmpcrl.study.parameters import OneOf
 
-__all__ = ["LAYOUTS", "controller", "nmpc", "task", "task_among"]
+__all__ = ["LAYOUTS", "centres_of", "controller", "nmpc", "task", "task_among"]
 
 ALPHA = 1e-7  # step size of theta
 BETA = 1e-8  # step size of w  # departure J
@@ -36,7 +38,7 @@ PRINTED_LOWER = (-9.0, -9.0, -np.inf)  # the box as printed excludes the target 
 PRINTED_UPPER = (3.0, 3.0, np.inf)
 BOXES = ("hard", "soft", "printed")  # departures A and M
 
-LAYOUTS = {  # centres of the four obstacles [m]; the paper shows none  # departure B
+LAYOUTS: dict[str, Centres] = {  # of the four obstacles [m]; the paper shows none  # departure B
     "A": ((0.5, 2.2), (3.0, 0.5), (5.5, 2.8), (7.0, 0.3)),
     # The others are drawn and screened by `layouts.drawn`; the gaps of the last three close.
     "B": ((-0.3, 3.2), (2.9, 4.3), (3.2, 0.5), (6.9, 0.8)),
@@ -47,22 +49,40 @@ LAYOUTS = {  # centres of the four obstacles [m]; the paper shows none  # depart
 }
 
 
-def task(layout: str = "A", *, box: str = BOXES[0]) -> Task:
-    """The robot's task among the four obstacles of a named layout, in one of `BOXES`."""
-    if layout not in LAYOUTS:
-        raise ValueError(f"layout = {layout!r} must be one of {', '.join(LAYOUTS)}")
-    if box not in BOXES:
-        raise ValueError(f"box = {box!r} must be one of {', '.join(BOXES)}")
-    return task_among(LAYOUTS[layout], printed_box=box == "printed", soft_box=box == "soft")
+def centres_of(layout: str | Centres) -> Centres:
+    """Where the obstacles of a layout stand [m]: of a name in `LAYOUTS`, or of centres."""
+    return Layout(LAYOUTS).centres(layout)
+
+
+def task(
+    layout: str | Centres = "A",
+    *,
+    box: str = BOXES[0],
+    start: Sequence[float] = START,
+    target: Sequence[float] = TARGET,
+) -> Task:
+    """The robot's task among the obstacles of a layout, in one of `BOXES`."""
+    return task_among(
+        centres_of(layout),
+        printed_box=OneOf(BOXES).check("box", box) == "printed",
+        soft_box=box == "soft",
+        start=start,
+        target=target,
+    )
 
 
 def task_among(
-    centres: Iterable[tuple[float, float]], *, printed_box: bool = False, soft_box: bool = False
+    centres: Iterable[tuple[float, float]],
+    *,
+    printed_box: bool = False,
+    soft_box: bool = False,
+    start: Sequence[float] = START,
+    target: Sequence[float] = TARGET,
 ) -> Task:
     """The robot's task among obstacles with these centres [m]."""
     return Task(
-        start=np.array(START),
-        target=np.array(TARGET),
+        start=np.array(start),
+        target=np.array(target),
         lower=np.array(PRINTED_LOWER if printed_box else LOWER),
         upper=np.array(PRINTED_UPPER if printed_box else UPPER),
         obstacles=tuple(Obstacle(x, y) for x, y in centres),
@@ -72,17 +92,17 @@ def task_among(
 
 
 def nmpc(
-    layout: str = "A",
+    layout: str | Centres = "A",
     *,
     horizon: int = HORIZON,
     solver: Solver | str = "riccati",
     box: str = BOXES[0],
     **options: Any,
 ) -> Nmpc:
-    """The paper's controller, Eq. (2) with Table I, among the obstacles of a named layout.
+    """The paper's controller, Eq. (2) with Table I, among the obstacles of a layout.
 
     Args:
-        layout: a name in `LAYOUTS`.
+        layout: a name in `LAYOUTS`, or the centres of obstacles [m].
         horizon: N, the number of planned inputs.
         solver: as `Nmpc` takes it.
         box: one of `BOXES`.

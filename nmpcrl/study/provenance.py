@@ -17,6 +17,7 @@ either the epoch of its room is raised, so that all runs are trained anew, or
 import ast
 import hashlib
 import json
+import math
 import os
 import platform
 import sys
@@ -64,6 +65,8 @@ ORIGINAL: dict[str, Any] = {
     "beta_tdc": 1.5e-7,
     "theta": (1.0, 1.0, 0.05, 0.05, 0.05, 1.0, 1.0, 0.1, 0.001),
     "steps": 130,
+    "start": (-2.5, 1.5, 0.0),
+    "target": (8.5, 2.0, math.pi / 2),
     "horizon": 10,
     "solver": "riccati",
     "tolerance": 1e-8,
@@ -106,7 +109,7 @@ def identity(experiment: Experiment) -> dict[str, Any]:
 def resolved(experiment: Experiment) -> dict[str, Any]:
     """The fields as its learner reads them, with the centres of the obstacles for the layout."""
     fields = dict(vars(experiment.canonical))
-    return {"obstacles": paper.LAYOUTS[fields.pop("layout")]} | fields
+    return {"obstacles": paper.centres_of(fields.pop("layout"))} | fields
 
 
 def versions(experiment: Experiment | None = None) -> dict[str, str]:

@@ -48,11 +48,10 @@ Factory = Callable[["Experiment", Persistent, Generators], Learner]
 
 def controller_of(experiment: "Experiment") -> Persistent:
     """The controller whose theta is learned."""
-    nmpc = paper.nmpc(
-        experiment.layout,
+    nmpc = paper.controller(
+        experiment.task,
         horizon=experiment.horizon,
         solver=SOLVERS[experiment.solver](tolerance=experiment.tolerance),
-        box=experiment.box,
         ties_active=experiment.ties_active,
     )
     return Persistent(nmpc)
@@ -60,7 +59,9 @@ def controller_of(experiment: "Experiment") -> Persistent:
 
 def compile_ahead(experiments: Iterable["Experiment"]) -> None:
     """Compile what the runs will call, so that their processes find it done."""
-    kinds = {(e.layout, e.box, e.solver, e.learner == "TDC"): e for e in experiments}
+    kinds = {
+        (e.layout, e.start, e.target, e.box, e.solver, e.learner == "TDC"): e for e in experiments
+    }
     for experiment in kinds.values():
         controller = controller_of(experiment)
         nmpc, theta = controller.nmpc, np.array(paper.THETA_INIT)

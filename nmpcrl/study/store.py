@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.geometry import short_name
 from nmpcrl.study.place import StoreError, check_folder, folder, keep, refusal, say, set_aside
 from nmpcrl.study.provenance import ORIGINAL, identity, key, provenance, warn_of_changes
 from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
@@ -310,4 +311,4 @@ def path_of(experiment: Experiment) -> Path:
 def name_of(experiment: Experiment) -> str:
     """The run's name for people; the key says the rest."""
     e = experiment
-    return f"{e.learner}-{e.layout}-{e.decay}-seed{e.seed}-{e.episodes}ep"
+    return f"{e.learner}-{short_name(e.layout)}-{e.decay}-seed{e.seed}-{e.episodes}ep"

@@ -8,9 +8,11 @@ from typing import Any
 
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment
+from nmpcrl.study.geometry import Centres, are_centres
 from nmpcrl.study.parameters import Allowed, ParameterError, Several, is_list, shown
 from nmpcrl.study.setup import DECAYS
 
+VECTORS = ("theta", "start", "target")  # fields of which a list is one value
 MOST_RUNS = 10_000  # of a sweep: more than five times the whole study
 FIELDS: dict[str, Allowed] = {field.name: field.metadata["allowed"] for field in fields(Experiment)}
 AXES: dict[str, Allowed] = {f"{name}s": Several(one, name) for name, one in FIELDS.items()}
@@ -19,7 +21,8 @@ AXES: dict[str, Allowed] = {f"{name}s": Several(one, name) for name, one in FIEL
 def sweep(**axes: Any) -> tuple[Experiment, ...]:
     """Every combination of field values; a list or tuple is an axis, anything else is fixed.
 
-    `sweep(learner=("ES", "GES"), seed=[0, 1], episodes=20)` names four runs. `theta` is one value.
+    `sweep(learner=("ES", "GES"), seed=[0, 1], episodes=20)` names four runs. A list of
+    numbers is one `theta`, `start` or `target`; a list of pairs is one `layout`, by its centres.
 
     Raises:
         ParameterError: a value is not what it may be, an axis is empty, repeats itself or names
@@ -44,7 +47,8 @@ def _values(name: str, given: Any) -> tuple[Any, ...]:
     if name not in FIELDS:
         raise ParameterError(f"{name!r} is not a parameter; there are {', '.join(FIELDS)}")
     text = isinstance(given, str) and given.strip().startswith("[")
-    if (text or is_list(given)) and name != "theta":
+    one = name in VECTORS or (name == "layout" and are_centres(given))
+    if (text or is_list(given)) and not one:
         values: tuple[Any, ...] = AXES[f"{name}s"].check(f"{name}s", given)
         return values
     return (FIELDS[name].check(name, given),)
@@ -53,7 +57,7 @@ def _values(name: str, given: Any) -> tuple[Any, ...]:
 def paper_runs(
     episodes: int = paper.EPISODES,
     seeds: Sequence[int] = (0, 1),
-    layout: str = "A",
+    layout: str | Centres = "A",
     **others: Any,
 ) -> tuple[Experiment, ...]:
     """The runs that a chapter shows: the paper's learners, both readings of the decay, some seeds.

@@ -13,6 +13,7 @@ from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.rule import Verdict
 from nmpcrl.study import Experiment, cluster, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
+from nmpcrl.study.sweeps import FIELDS
 
 WHOLE = len(design.whole_study())
 SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
@@ -73,7 +74,7 @@ def test_training_again_reads_the_stored_run(command, tmp_path, monkeypatch):
     [
         (("--learner", "SARSA"), f"learner = 'SARSA' must be one of {', '.join(LEARNERS)}"),
         (("--episodes", "0"), "episodes = 0 must be a whole number from 1 to 100000"),
-        (("--layout", "Z"), f"layout = 'Z' must be one of {', '.join(paper.LAYOUTS)}"),
+        (("--layout", "Z"), f"layout = 'Z' must be {FIELDS['layout'].text}"),
         (("--alpha", "-1"), "alpha = -1.0 must be a number in (0, 1e+06]"),
         (("--decay", "k"), "decay = 'k' must be one of step, episode"),
     ],

@@ -6,7 +6,7 @@ import click
 import pytest
 
 from nmpcrl.analysis import summaries
-from nmpcrl.bench import suite, sweep
+from nmpcrl.bench import live, suite, sweep
 from nmpcrl.claims import publish, published, verification
 from nmpcrl.commands import main
 from nmpcrl.study import Experiment, Records, cluster, run, store
@@ -46,7 +46,12 @@ def fast(command, monkeypatch, tmp_path):
     monkeypatch.setattr(verification, "relock", refuse)
     monkeypatch.setattr(published, "load", lambda: published.Published(rows={SHORT: {}}))
     monkeypatch.setattr(verification, "sample", lambda *_: [SHORT])
-    for place, name in ((suite, "measure"), (suite, "read_or_measure"), (sweep, "sweep")):
+    for place, name in (
+        (suite, "measure"),
+        (suite, "read_or_measure"),
+        (sweep, "sweep"),
+        (live, "measure"),
+    ):
         monkeypatch.setattr(place, name, refuse)
     monkeypatch.setattr(
         "nmpcrl.report.figures.run.run_page", lambda *_: refuse()
@@ -91,5 +96,13 @@ def test_no_command_line_ends_in_a_traceback(fast):
 
 
 def test_the_stand_ins_stand_where_the_commands_look(fast):
-    for line in ("train", "study", "verify --sample 1", "bench", "bench --sweep 5", "show ES"):
+    for line in (
+        "train",
+        "study",
+        "verify --sample 1",
+        "bench",
+        "bench --sweep 5",
+        "bench --live",
+        "show ES",
+    ):
         assert "not here" in fast(*line.split()).output, line

@@ -11,13 +11,16 @@ from nmpcrl.commands.tables import columns, counted, duration, size
 from nmpcrl.study import Experiment, fetch_all, store, sweep
 from nmpcrl.study.records import Records
 
+DRAWN = ((0.5, 2.2), (3.0, 0.5))
 SHORT = {"episodes": 2, "steps": 5, "evaluate_every": 1}
-STORED = sweep(learner=("ES", "GES", "frozen"), seed=(0, 1), **SHORT)
+STORED = sweep(learner=("ES", "GES", "frozen"), seed=(0, 1), **SHORT) + sweep(
+    layout=DRAWN, target=(6, 6, 0), **SHORT
+)
 
 
 @pytest.fixture(scope="module")
 def command(tmp_path_factory):
-    """The command on a folder with six runs, which no test here changes."""
+    """The command on a folder with seven runs, which no test here changes."""
     from concurrent.futures import ThreadPoolExecutor
 
     folder = tmp_path_factory.mktemp("runs")
@@ -49,6 +52,9 @@ def names(**fields) -> set[str]:
         (("--learner", "GES"), {"learner": "GES"}),
         (("--learner", "ES", "--seed", "1"), {"learner": "ES", "seed": 1}),
         (("--clipped", "--seed", "0"), {"seed": 0}),
+        (("--layout", "0.5,2.2 3,0.5"), {"layout": "0.5,2.2 3,0.5"}),
+        (("--target", "6,6,0"), {"target": (6, 6, 0)}),
+        (("--layout", "A", "--layout", "0.5 2.2 3 0.5"), {}),
         (("--theta", "1,1,0.05,0.05,0.05,1,1,0.1,0.001", "--seed", "0"), {"seed": 0}),
     ],
 )
@@ -67,7 +73,7 @@ def test_where_nothing_is_picked_it_says_so(command):
     assert said.output.startswith("No run in ")
 
 
-@pytest.mark.parametrize("column", ["cost", "size", "seed", "learner", "run", "theta", "beta_tdc"])
+@pytest.mark.parametrize("column", ["cost", "size", "seed", "layout", "run", "theta", "target"])
 def test_any_column_and_any_field_sorts(command, column):
     rows = json.loads(command("runs", "--sort", column, "--json").stdout)
     measured = {
@@ -98,11 +104,11 @@ def test_what_no_run_can_be_is_refused(command, words, said):
 def test_the_table_ends_with_what_it_adds_up_to(command):
     last = command("runs").stdout.splitlines()[-1]
     whole = sum(store.path_of(e).stat().st_size for e in STORED)
-    assert last.startswith(f"6 runs, {size(whole)}, ")
+    assert last.startswith(f"{len(STORED)} runs, {size(whole)}, ")
 
 
 def test_json_has_what_the_help_says_and_no_infinity(command, tmp_path, monkeypatch):
-    (row,) = json.loads(command("runs", "--learner", "ES", "--seed", "0", "--json").stdout)
+    (row,) = json.loads(command("runs", "--learner", "GES", "--seed", "0", "--json").stdout)
     assert set(row) == {"run", "path", "bytes", "experiment", "facts"}
     assert Experiment(**row["experiment"]) in STORED
     assert {"stopped", "final_cost", "seconds", "solver"} <= set(row["facts"])

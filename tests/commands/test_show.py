@@ -21,6 +21,7 @@ RUNS = {
     "one episode": Experiment(episodes=1, **SHORT),
     "diverged": Experiment(episodes=3, alpha=1e-2, **SHORT),
     "other layout": Experiment(episodes=3, layout="B", **SHORT),
+    "drawn": Experiment(episodes=3, layout=((0.5, 2.2), (3, 7)), target=(6, 8, 0), **SHORT),
 }
 
 

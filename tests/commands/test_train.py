@@ -15,6 +15,8 @@ THETA = "1,1,0.05,0.05,0.05,1,1,0.1,0.002"
 OTHERS = {  # another value than the default, as one types it
     "learner": ("RDES", "RDES"),
     "layout": ("B", "B"),
+    "start": ("0,1,2", (0.0, 1.0, 2.0)),
+    "target": ("0 -1 2", (0.0, -1.0, 2.0)),
     "decay": ("episode", "episode"),
     "network": ("tanh", "tanh"),
     "box": ("soft", "soft"),
@@ -90,6 +92,15 @@ def test_theta_is_nine_numbers_however_they_are_separated(command, asked, words)
     assert asked == [Experiment(seed=3, theta=OTHERS["theta"][1])]
 
 
+@pytest.mark.parametrize(
+    "words",
+    [("0.5,2.2 -3,0.5",), ("0.5,2.2", "-3,0.5"), ("0.5", "2.2", "-3", "0.5"), ("0.5,2.2,-3,0.5",)],
+)
+def test_a_layout_is_a_name_or_centres_however_they_are_separated(command, asked, words):
+    command("train", "--layout", *words, "--start", "-1", "0", "1", "--seed", "3")
+    assert asked == [Experiment(seed=3, layout=((0.5, 2.2), (-3, 0.5)), start=(-1, 0, 1))]
+
+
 def test_negative_numbers_of_a_vector_are_no_options():
     assert joined(["--theta", "1", "-2", "3", "--seed", "-4"]) == [
         "--theta",
@@ -97,6 +108,7 @@ def test_negative_numbers_of_a_vector_are_no_options():
         "--seed",
         "-4",
     ]
+    assert joined(["--layout", "D", "3"]) == ["--layout", "D", "3"]
 
 
 @pytest.mark.parametrize(
@@ -104,6 +116,8 @@ def test_negative_numbers_of_a_vector_are_no_options():
     [
         (("--theta", "1,2"), "theta = (1.0, 2.0) must be 9 numbers of size at most 1e+06"),
         (("--theta", "1,x"), "'1,x' is not a list of numbers"),
+        (("--layout", "1,2 3"), "layout = '1,2 3' must be one of A, B"),
+        (("--start", "1,2"), "start = (1.0, 2.0) must be 3 numbers: x in [-3, 9]"),
         (("--seed", "x"), "'x' is not a valid int"),
         (("--alpha", "nan"), "alpha = nan must be a number in (0, 1e+06]"),
         (("--no-clipped", "--constrained"), "clipped = False leaves actions"),

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from nmpcrl.study import Experiment, ParameterError, chapter
+from nmpcrl.study.sweeps import FIELDS
 
 PARAMETERS = {"episodes": 300, "seeds": [0, 1], "layout": "A", "budget": "checked elsewhere"}
 
@@ -30,6 +31,7 @@ def refusal(**declared) -> str:
 
 def test_what_is_allowed_passes_outside_of_a_notebook_too():
     chapter.check(**PARAMETERS)
+    chapter.check(**PARAMETERS | {"layout": [[0.5, 2.2], [3, 0.5]]})
 
 
 @pytest.mark.parametrize(
@@ -37,7 +39,7 @@ def test_what_is_allowed_passes_outside_of_a_notebook_too():
     [
         ("episodes", 10**8, "episodes = 100000000 must be a whole number from 1 to 100000"),
         ("episodes", "300", "episodes = '300' must be a whole number from 1 to 100000"),
-        ("layout", ["A"], "layout = ['A'] must be one of A, B, C, D, E, F"),
+        ("layout", ["A"], f"layout = ['A'] must be {FIELDS['layout'].text}"),
         ("seeds", 3, "seeds = 3 must be a list, such as [3]"),
         ("seeds", [-1], "seed = -1 must be a whole number from 0 to 2147483647"),
     ],
@@ -72,6 +74,7 @@ def test_a_name_like_no_other_is_refused_without_a_suggestion(session):
 def test_what_a_reader_or_papermill_sets_besides_is_no_parameter(session, cells):
     session(*cells)
     chapter.check(**PARAMETERS)
+    chapter.check(**PARAMETERS | {"layout": [[0.5, 2.2], [3, 0.5]]})
 
 
 def test_days_of_training_are_refused(monkeypatch):

@@ -1,6 +1,7 @@
 """An experiment names one run: what it refuses, that it repeats, and what its records say."""
 
 import dataclasses
+from dataclasses import replace
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -13,13 +14,15 @@ from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.control.codegen import jit
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, ParameterError, paper, paper_runs, run, sweep
-from nmpcrl.study.experiment import PAPER
+from nmpcrl.study.experiment import PAPER, frozen_arm
 from nmpcrl.study.provenance import key
-from nmpcrl.study.records import StepStatus
+from nmpcrl.study.records import Records, StepStatus
 from nmpcrl.study.setup import DECAYS, LEARNERS, prepare
 
 RUN = import_module("nmpcrl.study.run")  # the module; its name in the package is the function
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
+DRAWN = ((0.5, 2.2), (3.0, 0.5))
+MOVED = ("layout", "start", "target")  # fields that say where things stand
 SHORT = {"episodes": 2, "steps": 70, "evaluate_every": 2}  # the networks are ready after 128 steps
 
 
@@ -54,6 +57,19 @@ REFUSED = [
     ("layout", None, "must be one of A"),
     ("layout", "Z", "must be one of A"),
     ("layout", 1, "must be one of A"),
+    ("layout", [], "or 1 to 16 centres x,y within 100 m of 0"),
+    ("layout", ((0, 0, 0),), "or 1 to 16 centres x,y within 100 m of 0"),
+    ("layout", ((0, 101),), "or 1 to 16 centres x,y within 100 m of 0"),
+    ("layout", ((0, np.nan),), "or 1 to 16 centres x,y within 100 m of 0"),
+    ("layout", (("0", "1"),), "or 1 to 16 centres x,y within 100 m of 0"),
+    ("layout", (0, 1), "or 1 to 16 centres x,y within 100 m of 0"),
+    ("layout", "0,1 2", "or 1 to 16 centres x,y within 100 m of 0"),
+    ("start", (9.1, 0, 0), "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
+    ("start", (0, 0), "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
+    ("start", "0,0,0", "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
+    ("target", (0, -3.5, 0), "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
+    ("target", (0, 0, 6.3), "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
+    ("target", None, "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
     ("learner", "SARSA", f"must be one of {', '.join(LEARNERS)}"),
     ("learner", "es", f"must be one of {', '.join(LEARNERS)}"),
     ("decay", "year", "must be one of step, episode"),
@@ -147,6 +163,12 @@ def test_whatever_a_field_is_given_it_is_taken_or_refused_by_name(name, value):
     assert refusal.startswith(f"{name} = ")
 
 
+def test_a_start_outside_the_printed_box_is_refused_in_that_box_alone():
+    assert Experiment(start=(5.0, 0.0, 0.0)).task.start[0] == 5
+    message = message_of(Experiment, start=(5.0, 0.0, 0.0), box="printed")
+    assert message.startswith("start = (5.0, 0.0, 0.0) lies outside the box as printed")
+
+
 @pytest.mark.parametrize("valued", [{"constrained": True}, {"learner": "QL"}])
 def test_actions_out_of_bounds_cannot_be_valued(valued):
     assert message_of(Experiment, clipped=False, **valued).startswith("clipped = False ")
@@ -204,12 +226,52 @@ def test_theta_is_one_value_of_a_sweep_not_an_axis():
     assert message_of(sweep, theta="[2.0]").startswith("theta = '[2.0]' must be 9 numbers")
 
 
+@pytest.mark.parametrize("one", [DRAWN, np.array(DRAWN), "0.5,2.2 3,0.5"])
+def test_a_layout_by_its_centres_is_one_value_of_a_sweep(one):
+    assert {e.layout for e in sweep(layout=one, seed=[0, 1])} == {"0.5,2.2 3,0.5"}
+    assert [e.layout for e in sweep(layout=["A", DRAWN])] == ["A", "0.5,2.2 3,0.5"]
+    (only,) = sweep(start=[0, 1, 2], target=(1.0, 1.0, 0.0))
+    assert (only.start, only.target) == ((0, 1, 2), (1, 1, 0))
+
+
 def test_the_study_of_a_chapter_is_five_learners_two_decays_and_the_seeds():
     experiments = paper_runs(episodes=7, seeds=[4, 5])
     assert len(experiments) == len(set(experiments)) == 5 * 2 * 2
     assert {e.learner for e in experiments} == {*PAPER, "frozen"}
     assert {e.decay for e in experiments} == set(DECAYS)
     assert {(e.seed, e.episodes, e.layout) for e in experiments} == {(4, 7, "A"), (5, 7, "A")}
+
+
+def test_the_centres_of_a_named_layout_are_that_layout():
+    for name, centres in paper.LAYOUTS.items():
+        drawn = Experiment(layout=[list(centre) for centre in centres])
+        assert drawn == Experiment(layout=name)
+        assert drawn.layout == name
+        assert key(drawn) == key(Experiment(layout=name))
+    backwards = Experiment(layout=paper.LAYOUTS["A"][::-1])
+    assert key(backwards) != key(Experiment())  # sums are made in their order
+
+
+def test_an_experiment_has_the_task_that_it_names():
+    one = Experiment(layout=DRAWN, start=(0, 1, 2), target=(5, 5, 1), box="soft")
+    np.testing.assert_array_equal(one.task.discs[:2], np.transpose(DRAWN))
+    np.testing.assert_array_equal(one.task.start, (0, 1, 2))
+    np.testing.assert_array_equal(one.task.target, (5, 5, 1))
+    assert one.task.soft_box
+    assert str(one).startswith("ES in layout drawn-")
+    assert frozen_arm(one) == replace(one, learner="frozen")
+    apart = [Experiment(), *(replace(one, **{name: getattr(Experiment(), name)}) for name in MOVED)]
+    assert len({key(e) for e in (one, *apart)}) == 5
+
+
+def test_a_run_among_drawn_obstacles_begins_and_ends_where_it_is_to(tmp_path):
+    fields = {"layout": DRAWN, "start": (0, 0, 0), "target": (2, 4, 1.5)}
+    records = run(Experiment(learner="frozen", episodes=1, **fields))
+    np.testing.assert_array_equal(records.evaluations["states"][0, 0], (0, 0, 0))
+    assert Experiment(**fields).task.distance(records.evaluations["states"][-1, -1]) < 0.5
+    records.save(tmp_path / "run.npz")
+    again = Records.load(tmp_path / "run.npz")
+    assert Experiment(**again.experiment) == Experiment("frozen", episodes=1, **fields)
 
 
 def test_an_experiment_is_a_value():
@@ -383,7 +445,7 @@ def test_progress_is_told_after_every_episode():
 
 
 def faulty(fails):
-    """What `paper.nmpc` may be replaced by: a controller that fails where `fails(call)` says so."""
+    """What may replace `paper.controller`: a controller that fails where `fails(call)` says so."""
 
     class Faulty(Nmpc):
         calls = 0
@@ -394,15 +456,12 @@ def faulty(fails):
                 raise SolverError(f"call {self.calls - 1} failed", state, theta)
             return super().solve(state, theta, warm_start, action)
 
-    def nmpc(layout, *, box, **options):
-        return Faulty(differential_drive(), paper.task(layout, box=box), **options)
-
-    return nmpc
+    return lambda task, **options: Faulty(differential_drive(), task, **options)
 
 
 def test_failures_and_restarts_are_recorded(monkeypatch):
     # six calls evaluate; then the second step restarts, and the fourth fails twice
-    monkeypatch.setattr(paper, "nmpc", faulty(lambda call: call in (6 + 1, 6 + 4, 6 + 5)))
+    monkeypatch.setattr(paper, "controller", faulty(lambda call: call in (6 + 1, 6 + 4, 6 + 5)))
     records = run(Experiment(learner="frozen", episodes=2, steps=6))
     s = records.steps
     np.testing.assert_array_equal(s["episode"], [0] * 4 + [1] * 6)
@@ -429,7 +488,7 @@ def test_a_steps_restarts_add_up_and_its_worst_violation_counts(monkeypatch):
             )
 
     monkeypatch.setattr(
-        paper, "nmpc", lambda layout, **_: Reporting(differential_drive(), paper.task(layout))
+        paper, "controller", lambda task, **_: Reporting(differential_drive(), task)
     )
     s = run(Experiment(learner="ES", episodes=1, steps=3)).steps
     np.testing.assert_array_equal(s["restarts"], [1, 4, 0])
@@ -438,7 +497,7 @@ def test_a_steps_restarts_add_up_and_its_worst_violation_counts(monkeypatch):
 
 
 def test_a_run_that_fails_ten_times_in_a_row_says_why_it_stopped(monkeypatch):
-    monkeypatch.setattr(paper, "nmpc", faulty(lambda call: True))
+    monkeypatch.setattr(paper, "controller", faulty(lambda call: True))
     records = run(Experiment(learner="ES", episodes=20, steps=6, evaluate_every=4))
     assert records.facts["stopped"].startswith("diverged: 10 episodes in a row")
     np.testing.assert_array_equal(records.steps["episode"], np.arange(10))

@@ -112,7 +112,7 @@ def traced(examples: Mapping[str, RunSummary], first_rollouts: Mapping[str, Colu
 
 def _trace(column: Column, run: RunSummary, first_rollout: Column) -> None:
     """The four panels of one run."""
-    task = paper.task(run.name.layout, box=run.name.box)
+    task = run.name.task
     window, color = rise(run), LOOKS[run.name.learner].color
     shown = slice(max(0, window.start - AROUND), window.stop + AROUND)
     episodes = np.arange(1, run.experiment["episodes"] + 1)[shown]

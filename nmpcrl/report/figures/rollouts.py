@@ -146,7 +146,7 @@ def _finished(found: Evidence) -> Evidence:
 def _endings(summaries: list[RunSummary]) -> str:
     """How many rollouts end in which way, the most common first."""
     ends = Counter(
-        ending(one.states, paper.task(one.name.layout))
+        ending(one.states, one.name.task)
         if one.facts["stopped"] == Stopped.FINISHED
         else "stopped in training"
         for one in summaries

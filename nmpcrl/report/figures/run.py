@@ -29,10 +29,12 @@ from nmpcrl.report.figures.style import (
 )
 from nmpcrl.report.run import finding, thetas
 from nmpcrl.study import paper
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records
 
 HEIGHT = 8.8  # inches
+EXTENT = (-2.6, 5.4)  # of the map [m], where nothing stands beyond
 PANELS = (("map", "map"), ("theta", "step"), ("noisy", "noise-free"))
 ROWS = (1.25, 1, 1)  # relative heights
 NAMED = 4  # components of theta that are named, those that move most; the others are grey
@@ -69,7 +71,7 @@ def write(figure: Figure, file: IO[bytes], kind: str) -> None:
 
 def _map(axes: Axes, records: Records) -> None:
     """Where theta_init and the last theta lead the robot, without noise."""
-    task, episode = paper.task(records.experiment["layout"]), records.evaluations["episode"]
+    task, episode = Experiment(**records.experiment).task, records.evaluations["episode"]
     draw_task(axes, task)
     look = LOOKS[records.experiment["learner"]]
     for row, style in ((0, FIRST), (-1, {**look.line, "linewidth": 1.8})):
@@ -78,7 +80,9 @@ def _map(axes: Axes, records: Records) -> None:
         if row == 0 or len(episode) > 1:
             axes.plot(path[:, 0], path[:, 1], label=label, **style)
             axes.plot(*path[-1:, :2].T, look.marker, color=style["color"], markersize=4)
-    axes.set(xlim=(task.lower[0] - 0.5, task.upper[0]), ylim=(-2.6, 5.4))
+    y = [task.start[1], task.target[1], *task.discs[1]]
+    low, high = min(EXTENT[0], min(y) - 0.6), max(EXTENT[1], max(y) + 0.6)
+    axes.set(xlim=(task.lower[0] - 0.5, task.upper[0]), ylim=(low, high))
     axes.set(xlabel="x [m]", ylabel="y [m]")
     axes.legend(loc="lower left")
     axes.set_title(f"Without noise, {_ending(records)}", **SUBTITLE)
@@ -86,7 +90,7 @@ def _map(axes: Axes, records: Records) -> None:
 
 def _ending(records: Records) -> str:
     """How the last rollout without noise ends."""
-    task = paper.task(records.experiment["layout"])
+    task = Experiment(**records.experiment).task
     states, _ = metrics.final_rollout(records)
     path = _known(states)
     if len(path) < len(states):

@@ -1,0 +1,125 @@
+"""The same run as a command and as code: both are executed, and give its numbers."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nmpcrl.commands import main
+from nmpcrl.commands.fields import joined
+from nmpcrl.report.continuing import TEMPLATES, changed, code, command
+from nmpcrl.study import Experiment, Records, run
+from nmpcrl.study.provenance import key
+from nmpcrl.study.setup import NETWORKS
+from nmpcrl.study.store import path_of
+
+ROOT = Path(__file__).resolve().parents[2]
+SHORT = {"episodes": 2, "steps": 20, "evaluate_every": 1}
+RUNS = {
+    "drawn": Experiment(
+        "GES",
+        seed=3,
+        layout=((0.5, 2.2), (-1, 0.5)),
+        start=(-1, -1, 0.5),
+        target=(6, 6, 0),
+        **SHORT,
+    ),
+    "named": Experiment("TDC", layout="D", projected=False, theta=(0.9,) * 9, **SHORT),
+    "a network": Experiment("RDES", network="small buffer", gated=False, decay_rate=0.5, **SHORT),
+}
+
+
+def typed(text: str) -> list[str]:
+    """A command's words as a shell makes them, with this Python's own `nmpcrl`."""
+    program = f'"{sys.executable}" -m nmpcrl'
+    return ["sh", "-c", re.sub("^nmpcrl", lambda _: program, text)]
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_the_command_trains_the_run_in_a_shell(name, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    done = subprocess.run(typed(command(RUNS[name])), cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    stored = Records.load(path_of(RUNS[name]))
+    assert key(Experiment(**stored.experiment)) == key(RUNS[name])
+    np.testing.assert_array_equal(stored.steps["theta"], run(RUNS[name]).steps["theta"])
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_the_code_trains_the_run_and_prints_its_last_cost_and_theta(name):
+    done = subprocess.run(
+        [sys.executable, "-c", code(RUNS[name])],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"NMPCRL_WARNED": "1"},
+    )
+    assert done.returncode == 0, done.stderr
+    stopped, cost, *theta = done.stdout.splitlines()
+    records = run(RUNS[name])
+    assert stopped == records.facts["stopped"]
+    assert float(cost) == records.facts["final_cost"]
+    assert " ".join(theta) == " ".join(str(records.steps["theta"][-1]).splitlines())
+
+
+numbers = st.floats(-3, 9)
+poses = st.tuples(numbers, numbers, st.floats(-3, 3))
+experiments = st.builds(
+    Experiment,
+    learner=st.sampled_from(["ES", "RDES", "GES", "TDC", "frozen"]),
+    layout=st.sampled_from("AF") | st.lists(st.tuples(numbers, numbers), min_size=1, max_size=16),
+    start=poses,
+    target=poses,
+    alpha=st.floats(1e-12, 1e-3),
+    gated=st.booleans(),
+    clipped=st.booleans(),
+    network=st.sampled_from([*NETWORKS]),
+    theta=st.tuples(*[st.floats(-10, 10)] * 9),
+)
+
+
+@settings(deadline=None)
+@given(experiments)
+def test_the_code_names_the_run_whatever_its_fields_are(experiment):
+    names: dict = {}
+    exec(code(experiment).partition("records")[0], names)
+    assert names["experiment"] == experiment.canonical
+    assert len(code(Experiment()).splitlines()) <= 8
+
+
+@settings(deadline=None)
+@given(experiments)
+def test_the_options_name_the_run_whatever_its_fields_are(experiment):
+    _, name, *words = shlex.split(command(experiment).replace("\\\n", ""))
+    with main.commands[name].make_context(name, joined(words)) as context:
+        given = {one.name: context.params[one.name] for one in fields(Experiment)}
+    assert Experiment(**given) == experiment.canonical
+
+
+def test_only_what_differs_and_is_read_is_named():
+    assert command(Experiment()) == "nmpcrl train"
+    assert "Experiment()" in code(Experiment())
+    assert changed(Experiment("ES", beta=1.0, zeta=0.5)) == {}
+    assert changed(Experiment("GES", beta=1.0, zeta=0.5)) == {"learner": "GES", "beta": 1.0}
+    assert '--layout "0.5,2.2 -1,0.5"' in command(RUNS["drawn"])
+    assert '    network="small buffer",\n' in code(RUNS["a network"])
+    assert "--no-gated" in command(RUNS["a network"])
+
+
+def test_each_template_has_the_places_that_are_documented():
+    found = {name: set(re.findall(r"\{(\w+)\}", text)) for name, text in TEMPLATES.items()}
+    assert found == {
+        "command": {"options"},
+        "option": {"name", "value"},
+        "switch": {"name"},
+        "code": {"fields"},
+        "field": {"name", "value"},
+    }
