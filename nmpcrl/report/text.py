@@ -1,6 +1,7 @@
 """The sentences of the one-page summary that rest on numbers: Markdown, from what is published."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import isnan
 
 import pandas as pd
 
@@ -256,6 +257,28 @@ def departure_link(words: str, letter: str) -> str:
 def disagree(outcomes: Iterable[str]) -> bool:
     """Whether there are two different ones among those that are decided."""
     return len(set(outcomes) - {UNDECIDABLE}) > 1
+
+
+def mean_and_pairs(best: str, other: str, wins: float) -> str:
+    """How a rank by the mean goes with the share of pairs of runs that the best learner wins.
+
+    Args:
+        best: ends at the lowest mean cost.
+        other: is compared with it.
+        wins: probability that a run of `best` costs less than one of `other`; nan if not known.
+    """
+    if isnan(wins):
+        return ""
+    said = (
+        f"In the same layout a run of {best} costs less than one of {other} with a probability of"
+        f" {wins:.2f}"
+    )
+    if wins > 0.5:
+        return f"{said}."
+    return (
+        f"Yet {said[:1].lower()}{said[1:]}: in a mean, a run that gets stuck weighs more than many"
+        " that cost a little less ([Chapter 7](07_beyond.ipynb))."
+    )
 
 
 def turns(verdict: Verdict) -> bool:

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -199,6 +200,21 @@ def test_where_two_learners_clearly_differ_is_said_with_the_claim_and_the_readin
         " decays per episode."
     )
     assert text.differences(judged[:1]) == "Nowhere do two learners of a claim clearly differ."
+
+
+@pytest.mark.parametrize(
+    ("wins", "said"),
+    [
+        (np.nan, ""),
+        (0.7, "In the same layout a run of TDC costs less than one of GES with a probability of"
+         " 0.70."),
+        (0.35, "Yet in the same layout a run of TDC costs less than one of GES with a probability"
+         " of 0.35: in a mean, a run that gets stuck weighs more than many that cost a little less"
+         " ([Chapter 7](07_beyond.ipynb))."),
+    ],
+)  # fmt: skip
+def test_a_rank_by_the_mean_is_put_beside_the_pairs_that_are_won(wins, said):
+    assert text.mean_and_pairs("TDC", "GES", wins) == said
 
 
 def test_a_claim_that_turns_round_with_the_reading_of_the_decay_depends_on_it():
