@@ -88,6 +88,18 @@ SMALL = """() => [...document.querySelectorAll(".bd-article :is(summary, button,
   .filter(one => Math.min(one.offsetWidth, one.offsetHeight) < 24)
   .map(one => one.outerHTML.slice(0, 200))"""
 
+NAMELESS = """() => [...document.querySelectorAll(".bd-article .scrolls[data-more]")].flatMap(box => {
+  if (box.querySelector("th[rowspan]")) return [];  // names in two columns
+  box.scrollLeft = box.scrollWidth;
+  const { left } = box.getBoundingClientRect();
+  const away = [...box.querySelectorAll("tbody tr > th:first-child")].filter(one => {
+    const name = one.getBoundingClientRect();
+    return Math.abs(name.left - left) > 2 || name.width > box.clientWidth / 2;
+  });
+  box.scrollLeft = 0;
+  return away.map(one => one.outerHTML.slice(0, 200));
+})"""  # noqa: E501
+
 each_page = pytest.mark.parametrize("page", PAGES)
 
 
@@ -100,6 +112,7 @@ class Visit:
     widths: dict[int, int] = field(default_factory=dict)  # of the page by that of the screen [px]
     cut: list[str] = field(default_factory=list)  # is wider than its place and cannot scroll
     silent: list[str] = field(default_factory=list)  # scrolls without focus, name or shadow
+    nameless: list[str] = field(default_factory=list)  # a row's name that scrolls away or hides it
     stops: list[str] = field(default_factory=list)  # a formula that takes the focus for nothing
     small: list[str] = field(default_factory=list)  # ours, and a finger may miss it
 
@@ -131,6 +144,7 @@ def look_at(browser: Any, path: Path) -> Visit:
         seen.widths[width] = tab.evaluate("document.documentElement.scrollWidth")
         seen.cut += tab.evaluate(CUT)
         seen.silent += tab.evaluate(SILENT)
+        seen.nameless += tab.evaluate(NAMELESS)
     seen.stops, seen.small = tab.evaluate(STOPS), tab.evaluate(SMALL)
     tab.evaluate(THIN)
     tab.evaluate(Axe().axe_script)
@@ -198,6 +212,11 @@ def test_nothing_is_cut_off(visit, page):
 @each_page
 def test_what_scrolls_has_the_focus_a_name_and_a_shadow(visit, page):
     assert visit(page).silent == []
+
+
+@each_page
+def test_the_names_of_rows_stay_in_sight_while_a_table_scrolls(visit, page):
+    assert visit(page).nameless == []
 
 
 @each_page
