@@ -192,7 +192,7 @@ def _costs(
     low, high = axes.get_ylim()
     axes.set(ylabel="noise-free cost / first", ylim=(low, min(high, MOST_COST)))
     over_episodes(axes)
-    axes.legend(fontsize="small")
+    axes.legend(fontsize="small", frameon=True, framealpha=0.9, edgecolor="none")  # on the lines
 
 
 def _curves(
