@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.claims import published
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.prespecified import Commit, Fixed
 from nmpcrl.claims.published import Published
@@ -215,6 +216,12 @@ def test_where_two_learners_clearly_differ_is_said_with_the_claim_and_the_readin
 )  # fmt: skip
 def test_a_rank_by_the_mean_is_put_beside_the_pairs_that_are_won(wins, said):
     assert text.mean_and_pairs("TDC", "GES", wins) == said
+
+
+def test_the_first_claim_of_the_published_study_depends_on_the_reading_of_the_decay():
+    claims = [v for v in published.load().verdicts if v.claim == "C1"]
+    assert text.depends_on(claims, table())["C"] == ("C1",)
+    assert "It matters to C1 ([departure C]" in text.open_gaps(text.depends_on(claims, table()))
 
 
 def test_a_claim_that_turns_round_with_the_reading_of_the_decay_depends_on_it():
