@@ -181,10 +181,10 @@ def differ(verdict: Verdict) -> str:
 
 def differences(verdicts: Iterable[Verdict]) -> str:
     """Of which claims two learners clearly differ, and which way round, in a sentence."""
-    found = [f"{v.claim}: {differ(v)}" for v in verdicts if differ(v)]
+    found = [f"{v.claim} ({differ(v)})" for v in verdicts if differ(v)]
     if not found:
         return "Nowhere do two learners of a claim clearly differ."
-    return f"Where two learners of a claim clearly differ: {'; '.join(found)}."
+    return f"Where two learners of a claim clearly differ: {listed(found)}."
 
 
 def by_layout_and_decay(verdicts: Iterable[Verdict]) -> str:

@@ -196,9 +196,9 @@ def test_where_two_learners_clearly_differ_is_said_with_the_claim_and_the_readin
         replace(verdict("C3", NOT), as_claimed=claimed, reverse=reverse),
     ]
     assert text.differences(judged) == (
-        "Where two learners of a claim clearly differ: C2: the reverse with noise that decays per"
-        " episode; C3: as claimed with noise that decays per step, the reverse with noise that"
-        " decays per episode."
+        "Where two learners of a claim clearly differ: C2 (the reverse with noise that decays per"
+        " episode) and C3 (as claimed with noise that decays per step, the reverse with noise that"
+        " decays per episode)."
     )
     assert text.differences(judged[:1]) == "Nowhere do two learners of a claim clearly differ."
 
