@@ -307,7 +307,8 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
     (source / "book" / pictures.FOLDER).mkdir(exist_ok=True)
     live.add_runs(read.values(), source / "book/_static/live")
     for path in source.glob("book/*.md"):
-        path.write_text(enrich.page(path.read_text(), output))
+        text = pictures.beside(path.read_text(), path.parent)
+        path.write_text(enrich.page(text, output))
     for path, notebook in read.items():
         live.share(notebook, path, source / "book/_static/live")
         download = path.name if path in executed else ""

@@ -94,10 +94,19 @@ def output(source: Any, tag: str) -> str:
 
 def calls_prose(code: str) -> bool:
     """Whether a cell only shows paragraphs or source: what it imports does not count."""
-    kept = [
-        node for node in ast.parse(code).body if not isinstance(node, ast.Import | ast.ImportFrom)
-    ]
-    return bool(kept) and all(_calls(node) in PROSE for node in kept)
+    called = _called(code)
+    return bool(called) and set(called) <= set(PROSE)
+
+
+def says(code: str) -> bool:
+    """Whether a cell only shows prose and says a paragraph: editors hide its call, too."""
+    return calls_prose(code) and "say" in _called(code)
+
+
+def _called(code: str) -> list[str]:
+    """What each statement of a cell calls and no more, without its imports."""
+    nodes = ast.parse(code).body
+    return [_calls(node) for node in nodes if not isinstance(node, ast.Import | ast.ImportFrom)]
 
 
 def _calls(node: ast.stmt) -> str:

@@ -4,15 +4,18 @@ A figure of `nmpcrl.report.figures.sheet` displays a PNG, for every notebook edi
 displays more, for the page alone: its finding, an SVG of it, and one that a telephone has room for.
 """
 
+import re
 from base64 import b64decode
 from collections.abc import Iterator
 from html import escape
+from pathlib import Path
 from typing import Any
 
 from nmpcrl.report.figures.sheet import MIME
 
 FOLDER = "_static/figures"
 NARROW = "screen and (max-width: 720px)"  # where the letters of a wide figure are too small
+IMAGE = re.compile(r"!\[(?P<alt>[^]]+)\]\(_static/(?P<name>\w+)\.svg\)")
 PICTURE = """\
 <a href="{wide}"><picture>
 <source media="{media}" srcset="{narrow}" width="{narrow_width}" height="{narrow_height}">
@@ -47,6 +50,34 @@ def placed(notebook: Any) -> dict[str, bytes]:
     return files
 
 
+def beside(markdown: str, folder: Path) -> str:
+    """A page of Markdown in which an image shows its narrow version, if it has one, on telephones.
+
+    Args:
+        markdown: the page.
+        folder: of the page; NAME.svg has NAME_narrow.svg beside it.
+    """
+
+    def shown(found: re.Match[str]) -> str:
+        wide, narrow = (f"_static/{found['name']}{part}.svg" for part in ("", "_narrow"))
+        if not (folder / narrow).exists():
+            return found[0]
+        (width, height), narrow_size = (_size(folder / path) for path in (wide, narrow))
+        return PICTURE.format(
+            png=f"../{wide}",
+            wide=f"../{wide}",
+            narrow=f"../{narrow}",
+            media=NARROW,
+            alt=escape(found["alt"]),
+            width=width,
+            height=height,
+            narrow_width=narrow_size[0],
+            narrow_height=narrow_size[1],
+        )
+
+    return IMAGE.sub(shown, markdown)
+
+
 def plain(notebook: Any) -> Any:
     """A notebook without what only its page shows."""
     for _, data in _figures(notebook):
@@ -66,6 +97,13 @@ def _figures(notebook: Any) -> Iterator[tuple[Any, Any]]:
         for output in cell.get("outputs", []):
             if MIME in output.get("data", {}):
                 yield cell, output.data
+
+
+def _size(svg: Path) -> tuple[int, int]:
+    """Width and height of a picture in a browser's pixels, of which three are four points."""
+    points = re.findall(r' (?:width|height)="([\d.]+)pt"', svg.read_text())[:2]
+    width, height = (round(float(one) * 96 / 72) for one in points)
+    return width, height
 
 
 def _kept(files: dict[str, bytes], name: str, figure: dict[str, Any]) -> str:

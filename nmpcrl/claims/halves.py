@@ -10,6 +10,7 @@ decided after the study had been seen, and with a dozen cells a claim an interva
 for being the most striking of them.
 """
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby
@@ -158,3 +159,9 @@ def sentence(found: Halves) -> str:
         f" {one} of {found.pairs} runs and {second} in {other} ({going} of {found.apart} pairs that"
         f" differ: {rate(going, found.apart):.0%})."
     )
+
+
+def readings(sentences: Iterable[str]) -> tuple[str, ...]:
+    """The readings of the decay of which sentences of `sentence` are, each once."""
+    named = (re.match(r"With noise that decays per (\w+)", one) for one in sentences)
+    return tuple(dict.fromkeys(found[1] for found in named if found))

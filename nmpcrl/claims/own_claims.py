@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from nmpcrl.analysis.statistics import probability_of_improvement
+from nmpcrl.analysis.statistics import Estimate, probability_of_improvement
 from nmpcrl.claims.by_runs import AtMost, RunClaim, Values
 from nmpcrl.claims.paper_claims import BETTER, SAME_COST, cost_difference, cost_reduction
 from nmpcrl.claims.rule import (
@@ -70,17 +70,27 @@ def _evidence(learners: tuple[str, str], runs: pd.DataFrame, _: Paths) -> str:
     if not whole.any():
         return f"{learners[0]} and {learners[1]} were not run together."
     one, other = first[whole], second[whole]
-    better = probability_of_improvement(
-        one.final_cost.to_numpy(float),
-        other.final_cost.to_numpy(float),
-        list(one.index.get_level_values("layout")),
-    )
+    better = _costs_less(one, other)
     medians = [shown(median(cost_reduction(arm)), "+.1%") for arm in (one, other)]
     return (
         f"A run of {learners[0]} costs less than one of {learners[1]} with probability"
         f" {better:.2f}; the noise-free cost was reduced by {medians[0]} and {medians[1]}"
         " (medians)."
     )
+
+
+def costs_less(runs: pd.DataFrame, first: str, second: str) -> Estimate:
+    """Probability that a run of the first learner costs less than one of the second in its layout.
+
+    Every pair counts alike: one that got stuck loses, by however much, no more than once.
+    """
+    return _costs_less(*arms(runs, first, second))
+
+
+def _costs_less(first: pd.DataFrame, second: pd.DataFrame) -> Estimate:
+    layouts = list(first.index.get_level_values("layout"))
+    one, other = (arm.final_cost.to_numpy(float) for arm in (first, second))
+    return probability_of_improvement(one, other, layouts)
 
 
 def _pairs(learners: tuple[str, str], runs: pd.DataFrame) -> tuple[pd.DataFrame, ...]:

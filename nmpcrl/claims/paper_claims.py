@@ -307,6 +307,19 @@ def _c7_halves(runs: pd.DataFrame, paths: Paths) -> str:
     )
 
 
+def kept_without_noise(runs: pd.DataFrame) -> pd.DataFrame:
+    """The runs that C7's weaker question is put to, a row a run, by learner.
+
+    Returns:
+        Columns kept (whether its rollouts without noise kept the constraints) and stopped (whether
+        training had to be stopped: then only the rollouts up to there are asked).
+    """
+    every = pd.concat(arms(runs, *PAPER), keys=PAPER, names=["learner"])
+    kept = BY_RUNS["C7"].answers(_largest_overlap(runs, {})).dropna().astype(bool)
+    stopped = was_stopped(every).reorder_levels(kept.index.names)
+    return pd.DataFrame({"kept": kept, "stopped": stopped.reindex(kept.index)})
+
+
 def _by_learner(answers: pd.Series) -> str:
     """In how many runs of each learner the answer is yes."""
     groups = answers.groupby(level="learner", sort=False)

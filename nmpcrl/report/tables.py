@@ -10,6 +10,7 @@ import pandas as pd
 from nmpcrl.bench.learners import COMPARED
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.bench.targets import Target
+from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.rule import (
     NOT,
     PARTLY,
@@ -20,15 +21,16 @@ from nmpcrl.claims.rule import (
     Outcome,
     Verdict,
 )
-from nmpcrl.report.text import SURE, clear, departure_link, listed
+from nmpcrl.report.text import SURE, departure_link, differ, listed
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 
-BADGES = {
+BADGES: dict[str, str] = {  # by what is said of a claim, or by its outcome
     REPRODUCED: "verdict-reproduced",
     PARTLY: "verdict-partly",
     NOT: "verdict-not-reproduced",
     UNDECIDABLE: "verdict-undecidable",
+    CLAIMS["C8"].words[NOT]: "verdict-not-applicable",  # refutes nothing: no colour of a no
 }
 WORDS = {REPRODUCED: "yes", PARTLY: "partly", NOT: "no", UNDECIDABLE: "open"}  # in narrow cells
 MET = {
@@ -125,21 +127,21 @@ def timing_table(timings: pd.DataFrame) -> str:
     """
     rows = (
         (
-            *(_text(row[name]) for name in ("solver", "learner")),
+            _text(f"{row['learner']} with {row['solver']}"),
             *("–" if pd.isna(row[name]) else f"{row[name]:.3g}" for name in TIMES),
             _in_two_lines(Ratio(*(row[name] for name in COMPARED))),
         )
         for row in timings.to_dict("records")
     )
-    header = ("solver", "learner", *TIMES.values(), "ratio")
-    return _table("Times of a learning step.", header, rows)
+    header = ("step of", *TIMES.values(), "ratio")
+    return _table("Times of a learning step.", header, rows, headed=True)
 
 
 def evidence(verdicts: Iterable[Verdict]) -> str:
     """One item a claim, in Markdown: verdict, evidence, and where it would change."""
     return "\n\n".join(
         f"- **{v.claim}: {v.statement}**\n\n"
-        f"  {_badge(v.words, BADGES[v.outcome])} {f'{v.evidence} {v.halves}'.strip()}\n\n"
+        f"  {_labelled(v)} {f'{v.evidence} {v.halves}'.strip()}\n\n"
         f"  *Where it would change.* {_linked(v.would_change)}"
         for v in verdicts
     )
@@ -247,12 +249,18 @@ def _in_two_lines(ratio: Ratio) -> str:
 
 def _outcome(verdict: Verdict) -> str:
     """What became of a claim, and the number on which that rests."""
-    return f"{_badge(verdict.words, BADGES[verdict.outcome])}{_share(verdict)}"
+    return f"{_labelled(verdict)}{_share(verdict)}"
+
+
+def _labelled(verdict: Verdict) -> str:
+    """What is said of a claim, in the colour of those words or else of its outcome."""
+    return _badge(verdict.words, BADGES.get(verdict.words, BADGES[verdict.outcome]))
 
 
 def _differ(verdict: Verdict) -> str:
-    """Below a claim, in a line each: where two learners clearly differ, and which way round."""
-    return "".join(f"<br><em>{_text(one)}</em>" for one in clear(verdict))
+    """Below a claim, in a line: where two learners clearly differ, and which way round."""
+    said = differ(verdict)
+    return f"<br><em>Its two learners clearly differ: {_text(said)}.</em>" if said else ""
 
 
 def _letter(letter: str) -> str:

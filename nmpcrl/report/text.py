@@ -1,9 +1,12 @@
 """The sentences of the one-page summary that rest on numbers: Markdown, from what is published."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from math import isnan
 
 import pandas as pd
 
+from nmpcrl.claims.halves import readings
+from nmpcrl.claims.paper_claims import kept_without_noise
 from nmpcrl.claims.prespecified import Fixed
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.rule import PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
@@ -74,20 +77,21 @@ def number(count: int) -> str:
     return WORDS[count] if count < len(WORDS) else f"{count:,}"
 
 
-def legend(verdicts: Iterable[Verdict]) -> str:
-    """What the numbers of a table of verdicts mean."""
-    c7 = next((v for v in verdicts if v.claim == "C7"), None)
-    asked_twice = (
-        " C7 is asked twice: its percentage counts the runs that kept every constraint in"
-        f" training, too. {c7.halves}"
-        if c7 and c7.halves
-        else ""
-    )
+def legend(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
+    """What the numbers of a table of verdicts mean; `runs` are those that were judged."""
+    asked_twice = ""
+    if any(v.claim == "C7" and v.halves for v in verdicts):
+        asked = kept_without_noise(runs)
+        stopped = (asked.kept & asked.stopped).sum()
+        asked_twice = (
+            " C7 is asked twice: its percentage counts the runs that kept every constraint in"
+            f" training, too. Without noise, {asked.kept.sum()} of {len(asked)} runs kept them,"
+            f" {stopped} of which had to be stopped in training."
+        )
     return (
         "A percentage is the share of runs, or of pairs of runs, in which the claim held, with its"
         " 95 % interval. Where a claim is about time, the number is the ratio of the times of a"
-        " step, with its 95 % interval. A claim without a number rests on no sample. A pair of"
-        f" runs differs if one of its learners went wrong and the other did not.{asked_twice}"
+        f" step, with its 95 % interval. A claim without a number rests on no sample.{asked_twice}"
     )
 
 
@@ -130,12 +134,32 @@ def agreement(found: Sequence[Verdict], known: Iterable[Verdict], mark: str) -> 
     return f"Judged alone, the runs of this page ({mark}) give {listed(parts)}."
 
 
-def halves(verdicts: Iterable[Verdict]) -> str:
-    """One item a claim that joins statements or learners: each by itself, and what is clear."""
+def halves(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
+    """One item a claim that joins statements or learners: each by itself, and what is clear.
+
+    Args:
+        verdicts: on the claims.
+        runs: those that were judged; of C7, some were stopped.
+    """
     return "\n".join(
-        "\n".join([f"- **{v.claim}.** {v.halves}", *(f"  - {one}" for one in clear(v))])
+        "\n".join([f"- **{v.claim}.** {v.halves}", *(f"  - {one}" for one in _beside(v, runs))])
         for v in verdicts
         if v.halves
+    )
+
+
+def _beside(verdict: Verdict, runs: pd.DataFrame) -> tuple[str, ...]:
+    return (stopped_early(runs),) if verdict.claim == "C7" else clear(verdict)
+
+
+def stopped_early(runs: pd.DataFrame) -> str:
+    """How many runs count as keeping C7's constraints that were stopped in training."""
+    asked = kept_without_noise(runs)
+    counts = (asked.kept & asked.stopped).groupby(level="learner", sort=False).sum()
+    parts = listed(f"{count} of {name}" for name, count in counts.items() if count)
+    return (
+        f"Of those that kept them, {parts} had to be stopped in training: of these, the rollouts"
+        " up to then are asked."
     )
 
 
@@ -144,16 +168,23 @@ def clear(verdict: Verdict) -> tuple[str, ...]:
     return (*verdict.as_claimed, *verdict.reverse)
 
 
-def confirmations(verdicts: Iterable[Verdict]) -> str:
-    """Where two learners clearly differ as claimed."""
-    found = [f"{v.claim}: {' '.join(v.as_claimed)}" for v in verdicts if v.as_claimed]
-    return " ".join(found) or "nowhere do two learners clearly differ so."
+def differ(verdict: Verdict) -> str:
+    """In which readings of the decay `clear` holds, in a few words; nothing if in none."""
+    parts = {"as claimed": readings(verdict.as_claimed), "the reverse": readings(verdict.reverse)}
+    listing = (
+        f"{way} with noise that decays {listed(f'per {one}' for one in decays)}"
+        for way, decays in parts.items()
+        if decays
+    )
+    return ", ".join(listing)
 
 
-def reversals(verdicts: Iterable[Verdict]) -> str:
-    """Where the runs say the reverse of a claim."""
-    found = [f"{v.claim}: {' '.join(v.reverse)}" for v in verdicts if v.reverse]
-    return " ".join(found) or "nowhere was it seen."
+def differences(verdicts: Iterable[Verdict]) -> str:
+    """Of which claims two learners clearly differ, and which way round, in a sentence."""
+    found = [f"{v.claim} ({differ(v)})" for v in verdicts if differ(v)]
+    if not found:
+        return "Nowhere do two learners of a claim clearly differ."
+    return f"Where two learners of a claim clearly differ: {listed(found)}."
 
 
 def by_layout_and_decay(verdicts: Iterable[Verdict]) -> str:
@@ -163,9 +194,14 @@ def by_layout_and_decay(verdicts: Iterable[Verdict]) -> str:
     decays = [v.claim for v in asked if disagree(v.by_decay.values())]
     if not asked:
         return ""
+    turned = [v.claim for v in asked if turns(v)]
+    beside = (
+        f" The learners of {listed(turned)} clearly differ as claimed in one reading of the decay,"
+        " and the other way round in the other."
+    )
     return (
         f"Verdicts that are not the same in every layout: {listed(layouts)}; in both readings of"
-        f" the decay: {listed(decays)}."
+        f" the decay: {listed(decays)}.{beside if turned else ''}"
     )
 
 
@@ -188,7 +224,7 @@ def depends_on(verdicts: Iterable[Verdict], judged: pd.DataFrame) -> dict[str, t
     for verdict in verdicts:
         if disagree(verdict.by_layout.values()):
             found[LAYOUT].add(verdict.claim)
-        if disagree(verdict.by_decay.values()):
+        if disagree(verdict.by_decay.values()) or turns(verdict):
             found[DECAY].add(verdict.claim)
     for variant, claim in _changed(judged)[["variant", "claim"]].itertuples(index=False):
         letter = design.VARIANTS[variant].departure
@@ -221,6 +257,37 @@ def departure_link(words: str, letter: str) -> str:
 def disagree(outcomes: Iterable[str]) -> bool:
     """Whether there are two different ones among those that are decided."""
     return len(set(outcomes) - {UNDECIDABLE}) > 1
+
+
+def mean_and_pairs(best: str, other: str, wins: float) -> str:
+    """How a rank by the mean goes with the share of pairs of runs that the best learner wins.
+
+    Args:
+        best: ends at the lowest mean cost.
+        other: is compared with it.
+        wins: probability that a run of `best` costs less than one of `other`; nan if not known.
+    """
+    if isnan(wins):
+        return ""
+    said = (
+        f"In the same layout a run of {best} costs less than one of {other} with a probability of"
+        f" {wins:.2f}"
+    )
+    if wins > 0.5:
+        return f"{said}."
+    return (
+        f"Yet {said[:1].lower()}{said[1:]}: in a mean, a run that gets stuck weighs more than many"
+        " that cost a little less ([Chapter 7](07_beyond.ipynb))."
+    )
+
+
+def turns(verdict: Verdict) -> bool:
+    """Whether learners clearly differ as claimed in one reading of the decay and not in another.
+
+    A verdict on both together is then about neither.
+    """
+    claimed, reverse = readings(verdict.as_claimed), readings(verdict.reverse)
+    return any(one != other for one in claimed for other in reverse)
 
 
 def listed(names: Iterable[object]) -> str:

@@ -9,6 +9,7 @@ from nmpcrl.bench import learners, summary
 from nmpcrl.bench.summary import Bench, Saving
 from nmpcrl.bench.targets import Target
 
+CLOSE = 0.01  # ratios of times that differ by less are called the same
 NOTICED = 0.005  # a share below this is shown as 0 %
 
 
@@ -52,6 +53,29 @@ def break_even(model: Saving) -> str:
     if model.break_even <= 0:
         return "With these times the network saves time, however fast the solver is."
     return f"The network saves time only where a solve takes more than {model.break_even:.2f} ms."
+
+
+def model_beside_measured(model: Saving, measured: pd.DataFrame, ratio: float) -> str:
+    """From which time of a solve on the model is below a ratio, and whether the slowest solver is.
+
+    Args:
+        model: of the times of RDES and ES.
+        measured: of `summary.measured_ratios`.
+        ratio: of RDES to ES, above 1/2.
+    """
+    solver, slowest = max(measured.iterrows(), key=lambda row: row[1].solve)
+    expected = float(model.ratio(slowest.solve))
+    apart = slowest.ratio - expected
+    side = "higher" if apart > 0 else "lower"
+    where = (
+        f"With {solver}, whose solves in RDES take {slowest.solve:.2f} ms, the model gives"
+        f" {expected:.2f} and the measurement {slowest.ratio:.2f}"
+    )
+    end = f", which is {side} for the reasons below." if abs(apart) > CLOSE else ", so they agree."
+    return (
+        f"By the model, the ratio is below {ratio} where a solve takes more than"
+        f" {model.solve_at(ratio):.1f} ms. {where}{end}"
+    )
 
 
 def rdes_to_es(bench: Bench, solver: str) -> str:

@@ -61,6 +61,16 @@ class Tab:
         self.page.mouse.move(*(place + by), steps=10)
         self.page.mouse.up()
 
+    def swipe(self, start, by, steps=2) -> None:
+        """Move a finger from a place on the screen by so many pixels."""
+        send = self.page.context.new_cdp_session(self.page).send
+        places = [np.array(start) + np.array(by) * k / steps for k in range(steps + 1)]
+        for k, (x, y) in enumerate(places):
+            kind = "touchMove" if k else "touchStart"
+            point = {"x": float(x), "y": float(y)}
+            send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [point]})
+        send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+
     def press(self, name, *keys) -> None:
         self.handle(name).focus()
         for key in keys:

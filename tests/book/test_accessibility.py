@@ -59,6 +59,11 @@ def test_what_scrolls_has_the_focus_a_name_and_a_shadow(visit, page):
 
 
 @each_page
+def test_the_names_of_rows_stay_in_sight_while_a_table_scrolls(visit, page):
+    assert visit(page).nameless == []
+
+
+@each_page
 def test_a_formula_takes_the_focus_only_to_scroll(visit, page):
     assert visit(page).stops == []
 

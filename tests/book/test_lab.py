@@ -12,6 +12,7 @@ from time import sleep
 from typing import Any
 
 import build
+import enrich
 import nbformat
 import pytest
 
@@ -185,6 +186,18 @@ def test_chapter_2_shows_the_td_error_of_its_parameters(opened):
     item = opened("executed", "02_expected_sarsa").locator("li", has_text="its target")
     assert delta > 0
     assert item.inner_text().endswith(f"{delta:.2f}. The value is below its target.")
+
+
+@each_state
+def test_an_editor_shows_a_paragraph_without_the_call_that_says_it(opened, folder, state):
+    cells = nbformat.read(folder / state / "02_expected_sarsa.ipynb", 4).cells
+    shown = opened(state, "02_expected_sarsa").locator(".jp-Notebook .jp-Cell")
+    code = [k for k, cell in enumerate(cells) if cell.cell_type == "code"]
+    for k in code:
+        assert shown.nth(k).locator(".jp-InputArea-editor").count() == (
+            not enrich.says(cells[k].source)
+        )
+    assert any(enrich.says(cells[k].source) for k in code)
 
 
 def test_a_link_to_another_chapter_leads_to_its_file(opened):

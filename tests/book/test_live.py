@@ -22,6 +22,11 @@ MOVES = """() => {
   const figure = document.querySelector("figure.live"), options = {subtree: true, childList: true, attributes: true}
   new MutationObserver(all => window.changes += all.length).observe(figure, options)
 }"""  # noqa: E501
+COVERED = """slider => {
+  const { x, y, width, height } = slider.getBoundingClientRect()
+  const hits = [0.05, 0.5, 0.95].map(share => document.elementFromPoint(x + share * width, y + height / 2))
+  return hits.filter(hit => hit !== slider).map(hit => hit?.outerHTML.slice(0, 80))
+}"""  # noqa: E501
 FAILS_AT_20 = """
   const real = WebAssembly.instantiate
   WebAssembly.instantiate = async (...given) => {
@@ -109,18 +114,37 @@ def test_a_finger_drags_as_the_mouse_does(opened):
     tab.begun()
     tab.see()
     before = tab.shown()["given"]["discs"][2]
-    x, y = tab.middle("Obstacle 3")
-    send = tab.page.context.new_cdp_session(tab.page).send
-    for kind, points in (
-        ("touchStart", [{"x": x, "y": y}]),
-        ("touchMove", [{"x": x, "y": y + 15}]),
-        ("touchMove", [{"x": x, "y": y + 30}]),
-        ("touchEnd", []),
-    ):
-        send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    tab.swipe(tab.middle("Obstacle 3"), (0, 30))
     after = tab.shown()["given"]["discs"][2]
     assert after[1] < before[1] - 0.9
     assert after[0] == pytest.approx(before[0], abs=0.05)
+
+
+@pytest.mark.book
+@pytest.mark.parametrize(("by", "moves"), [((0, -160), False), ((3, 160), False), ((-45, 2), True)])
+def test_a_swipe_from_a_slider_scrolls_the_page_or_moves_the_slider(opened, by, moves):
+    tab = opened(FIGURE, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    slider = tab.begun().figure.locator("input[type=range]").nth(5)
+    slider.evaluate("one => one.scrollIntoView({block: 'center'})")
+    before, scrolled = tab.shown(), tab.page.evaluate("scrollY")
+    box = slider.bounding_box()
+    track = (box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2)  # off the thumb
+    tab.swipe(track, by, steps=8)
+    tab.page.wait_for_timeout(300)  # a browser scrolls on for a while
+    after = tab.shown()
+    assert (after["given"]["theta"][5] != before["given"]["theta"][5]) == moves
+    assert (after["given"] == before["given"]) != moves
+    assert (abs(tab.page.evaluate("scrollY") - scrolled) > 50) != moves
+
+
+@pytest.mark.book
+def test_nothing_lies_on_the_sliders_on_a_telephone(opened):
+    tab = opened(FIGURE, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    for slider in tab.begun().figure.locator("input[type=range]").all():
+        for height in (400, 762):  # scroll up, to where the theme has its button
+            slider.evaluate("(one, y) => scrollBy(0, one.getBoundingClientRect().y - y)", height)
+            tab.page.wait_for_timeout(100)
+        assert slider.evaluate(COVERED) == []
 
 
 @pytest.mark.book

@@ -85,6 +85,23 @@ def test_every_departure_has_a_section_that_renders_it():
     assert re.findall(r"tables\.departure\(\\\"([A-Z])\\\"\)", text) == list(DEPARTURES)
 
 
+def test_letters_with_two_meanings_are_listed_with_where_each_is_meant():
+    twice = NOTATION.partition("## Letters with two meanings\n")[2].partition("\n## ")[0]
+    rows = dict(re.findall(r"^\| (\$.*?) \| (.*) \|$", twice, flags=re.M))
+    for letter in (r"$Q$", r"$V$", r"$\Gamma$", r"$L$", r"$\boldsymbol{\eta}$"):
+        assert letter in rows
+    for letter, meanings in rows.items():
+        assert meanings.count(" | ") == 1, letter
+
+
+def test_a_line_of_the_ocp_that_chapter_1_explains_is_marked_in_the_equation():
+    chapter = (ROOT / "book/01_mdp_and_nmpc.ipynb").read_text()
+    explained = set(re.findall(r"\((2[b-f])\)(?! *\})", chapter.partition("Line by line")[2]))
+    assert explained >= {"2b", "2c", "2d", "2e", "2f"}
+    marked = set(re.findall(r"\\\\text\{\((2[a-z])\)\}", chapter))
+    assert marked == {"2b", "2c", "2d", "2e", "2f"}  # the first line is (2a)
+
+
 def test_the_parameters_of_the_chapters_are_those_that_they_declare():
     pages = r"\d\d_\w+|solver|performance|paper_and_book"
     rows = re.findall(rf"^\| `({pages})` \| (.*) \|$", REPRODUCE, flags=re.M)

@@ -102,6 +102,14 @@ def test_prose_with_numbers_and_shown_source_have_cells_of_their_own(name):
             assert enrich.calls_prose(cell.source), cell.source
 
 
+@each_notebook
+def test_an_editor_hides_the_call_that_says_a_paragraph_and_no_other_code(name):
+    hidden = {"jupyter": {"source_hidden": True}}
+    for cell in code(name):
+        shown = {key: cell.metadata[key] for key in ("jupyter",) if key in cell.metadata}
+        assert shown == (hidden if enrich.says(cell.source) else {}), cell.source
+
+
 PAGE_ONLY = {  # what only the page would know, and a notebook editor shows as it is written
     "a role": r"\{[\w:.-]+\}`",
     "a directive": r"^ *(```+|:::+)\{",

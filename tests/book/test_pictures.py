@@ -1,6 +1,8 @@
 """A figure's page has files of it for every screen, and an alternative text with its finding."""
 
+import re
 from base64 import b64encode
+from pathlib import Path
 
 import pictures
 import pytest
@@ -71,3 +73,23 @@ def test_a_figure_that_has_one_size_stays_an_image():
 def test_a_notebook_to_take_away_has_what_editors_show():
     one = pictures.plain(notebook({"svg": SVG}, {"svg": SVG}))
     assert set(one.cells[1].outputs[0].data) == {"image/png"}
+
+
+BOOK = Path(__file__).resolve().parents[2] / "book"
+INTRO = (BOOK / "intro.md").read_text()
+
+
+def test_the_introductions_picture_has_a_narrow_version_with_the_same_finding_for_telephones():
+    shown = pictures.beside(INTRO, BOOK)
+    (narrow,) = re.findall(rf'media="{re.escape(pictures.NARROW)}" srcset="../([^"]+)"', shown)
+    (wide,) = re.findall(r'<img src="../([^"]+)" alt="Short plans make', shown)
+    for picture in (wide, narrow):
+        words = re.findall("<!-- (.*) -->", (BOOK / picture).read_text())
+        assert "Plans of at most 1.2 m make a trajectory of 11.4 m" in " ".join(words)
+    assert 'width="672" height="355"' in shown
+    (width,) = re.findall(r'width="(\d+)" height="\d+">\n<source srcset', shown)
+    assert int(width) <= 390
+
+
+def test_an_image_without_a_narrow_version_stays(tmp_path):
+    assert pictures.beside(INTRO, tmp_path) == INTRO

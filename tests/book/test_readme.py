@@ -87,6 +87,12 @@ def test_published_verdicts_on_time_are_what_their_intervals_say():
         assert verdict.outcome == decide(ratio, claim.claimed, claim.near)[0] != UNDECIDABLE
 
 
+def test_the_seconds_of_a_run_are_those_of_the_published_steps():
+    timings = published.load().timings.set_index(["solver", "learner"]).hours
+    seconds = [f"{3600 * timings['riccati', learner]:.0f}" for learner in ("ES", "RDES")]
+    assert re.findall(r"about (\d+) seconds for ES and (\d+) for RDES", README) == [tuple(seconds)]
+
+
 def test_the_example_trains_a_plant_of_the_readers_own_as_the_text_says(capsys):
     (example,) = re.findall(r"^```python\n(.*?)^```$", README, flags=re.M | re.S)
     names: dict = {}

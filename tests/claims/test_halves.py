@@ -4,7 +4,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.claims.halves import WHOLE, confirmations, counted, halves, reversals, sentence
+from nmpcrl.claims.halves import (
+    WHOLE,
+    confirmations,
+    counted,
+    halves,
+    readings,
+    reversals,
+    sentence,
+)
 
 LEARNERS = ("DES", "RDES")
 BORDERS = {"diverged": 1.5, "had to be stopped": np.finfo(float).max}
@@ -91,3 +99,10 @@ def test_a_reversal_of_a_whole_reading_is_said_of_all_layouts():
     assert sentence(one).startswith(
         "With noise that decays per step, the reverse was seen: RDES diverged in 9"
     )
+
+
+def test_the_readings_of_the_decay_are_found_again_in_the_sentences():
+    cells = {"step_A": [(1, 2)] * 9, "episode_A": [(2, 1)] * 9, "episode_B": [(1, 2)] * 9}
+    found = list(reversals(halves(LEARNERS, values(**cells), {"diverged": 1.5, "failed": 1.6})))
+    assert readings(map(sentence, found)) == ("step", "episode")
+    assert readings(["Nothing of the kind."]) == ()

@@ -545,6 +545,12 @@ def test_an_addition_is_judged_where_its_learner_was_run():
     assert verdict.by_layout == {"B": NOT}
 
 
+def test_a_run_costs_less_with_the_probability_that_counts_every_pair_alike():
+    runs = study(of("TDC", final_cost=900.0))
+    assert own_claims.costs_less(runs, "TDC", "GES").value == 1
+    assert own_claims.costs_less(runs, "GES", "TDC").value == 0
+
+
 def test_the_evidence_of_an_addition_has_the_probability_of_improvement():
     runs = study(of("TDC", final_cost=900.0))
     evidence = verdict_on("B1", runs).evidence

@@ -27,6 +27,7 @@ def flaws(figure: Figure) -> list[str]:
         *(f"{_name(text)} leaves the canvas" for text in _placed(figure) if _outside(text, figure)),
         *(f"{_name(one)} lies on {_name(other)}" for one, other in _on_each_other(figure)),
         *(f"{color} is pale" for axes in figure.axes for color in _pale(axes)),
+        *(f"episode {tick:g} is none" for axes in figure.axes for tick in _halves(axes)),
     ]
 
 
@@ -36,6 +37,13 @@ def contrast(color: object, alpha: float | None = None) -> float:
     seen = 1 + red_green_blue[3] * (np.array(red_green_blue[:3]) - 1)
     linear = np.where(seen <= 0.04045, seen / 12.92, ((seen + 0.055) / 1.055) ** 2.4)
     return float(1.05 / (linear @ (0.2126, 0.7152, 0.0722) + 0.05))
+
+
+def _halves(axes: Axes) -> list[float]:
+    """Ticks between two episodes."""
+    names = [one.get_xlabel() for one in axes.get_shared_x_axes().get_siblings(axes)]
+    ticks = axes.get_xticks() if any("episode" in name for name in names) else []
+    return [tick for tick in ticks if not float(tick).is_integer()]
 
 
 def _name(text: Text) -> str:

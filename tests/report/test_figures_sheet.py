@@ -240,13 +240,15 @@ def test_what_cannot_be_read_is_found():
     axes.text(0.1, 0.1, "one label")
     axes.text(0.1, 0.1, "another label")
     axes.text(5.0, 0.2, "far away").set_in_layout(False)
-    axes.set(xlim=(0, 1), ylim=(0, 1))
+    axes.set(xlim=(0, 1), ylim=(0, 1), xlabel="episode")
+    axes.set_xticks([0, 0.5])
     found = " / ".join(flaws(figure))
     assert "'tiny' is small" in found
     assert "'one label' lies on 'another label'" in found
     assert "'far away' leaves the canvas" in found
     assert "#dddddd is pale" in found
-    assert found.count("/") == 3
+    assert "episode 0.5 is none" in found
+    assert found.count("/") == 4
 
 
 def test_single_runs_may_be_faint_behind_their_median():

@@ -35,7 +35,16 @@ def cells(table: str) -> list[list[str]]:
 def test_a_verdict_has_a_badge_of_its_own_and_says_it_in_words(outcome):
     table = tables.verdict_table([verdict(outcome)], "All of it.")
     assert f'<span class="{tables.BADGES[outcome]}">{outcome}</span>' in table
-    assert len(set(tables.BADGES.values())) == len(OUTCOMES)
+    assert len(set(tables.BADGES.values())) == len(tables.BADGES)
+
+
+def test_a_guarantee_that_does_not_apply_has_not_the_badge_of_what_is_not_reproduced():
+    words = CLAIMS["C8"].words[NOT]
+    c8 = replace(verdict(NOT), claim="C8", said=words)
+    badge = f'<span class="verdict-not-applicable">{words}</span>'
+    assert badge in tables.verdict_table([c8], "All of it.")
+    assert badge in tables.evidence([c8])
+    assert tables.BADGES[NOT] in tables.verdict_table([replace(c8, said="not confirmed")], "All.")
 
 
 def test_a_verdict_shows_its_share_and_interval_where_it_has_one():
@@ -45,9 +54,14 @@ def test_a_verdict_shows_its_share_and_interval_where_it_has_one():
 
 
 def test_where_two_learners_clearly_differ_is_said_below_the_claim_whichever_way_round():
-    one = replace(verdict(PARTLY), as_claimed=("So it was.",), reverse=("Not so.",))
+    per = "With noise that decays per {}, {}: one of 9 and the other of 9 (9 of 9 pairs).".format
+    claimed = tuple(per("step", f"as claimed, {how},") for how in ("once", "again"))
+    one = replace(verdict(PARTLY), as_claimed=claimed, reverse=(per("episode", "the reverse"),))
     _, (claim, _) = cells(tables.verdict_table([one], "All of it."))
-    assert claim.endswith("|So it was.|Not so.")
+    assert claim.endswith(
+        "|Its two learners clearly differ: as claimed with noise that decays per step, the reverse"
+        " with noise that decays per episode."
+    )
 
 
 def test_the_verdicts_of_other_runs_have_a_column_of_their_own():
@@ -61,10 +75,11 @@ def test_a_timing_shows_each_ratio_with_its_interval_and_a_dash_for_no_number():
     numbers = dict.fromkeys(tables.TIMES, 1.2345) | {"ms_per_fit": np.nan}
     ratio = {"ratio": 0.6349, "ratio_low": 0.6251, "ratio_high": 0.641, "waited": 0.2}
     timings = pd.DataFrame([{"solver": "ipopt", "learner": "RDES", **numbers, **ratio}])
-    header, row = cells(tables.timing_table(timings))
+    shown = tables.timing_table(timings)
+    assert '<th scope="row"' in shown  # stays in sight where the table scrolls
+    header, row = cells(shown)
     assert dict(zip(header, row, strict=True)) == {
-        "solver": "ipopt",
-        "learner": "RDES",
+        "step of": "RDES with ipopt",
         **dict.fromkeys(tables.TIMES.values(), "1.23"),
         "ms per fit": "–",
         "ratio": "0.63|[0.63, 0.64]",

@@ -3,9 +3,11 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.claims import published
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.prespecified import Commit, Fixed
 from nmpcrl.claims.published import Published
@@ -101,10 +103,25 @@ def test_the_answer_is_what_the_decided_claims_say(outcomes, head):
     assert f"**{head}:**" in text.answer(judged)
 
 
-def test_the_legend_says_what_c7s_percentage_leaves_out_where_c7_is_shown():
+def test_the_legend_says_what_c7s_percentage_leaves_out_where_c7_is_shown(made_up):
     c7 = replace(verdict("C7", PARTLY), halves="Without noise, it held in 3 of 4 runs of ES.")
-    assert text.legend([c7]).endswith(f"in training, too. {c7.halves}")
-    assert "C7" not in text.legend([verdict("C1", PARTLY)])
+    said = text.legend([c7], some_stopped(made_up))
+    assert said.endswith(
+        " Without noise, 14 of 16 runs kept them, 3 of which had to be stopped in training."
+    )
+    assert "C7" not in text.legend([verdict("C1", PARTLY)], pd.DataFrame())
+
+
+def some_stopped(made_up) -> pd.DataFrame:
+    """Of 16 runs, four of RDES and one of DES are stopped; two of RDES enter an obstacle."""
+
+    def unlike(e: Experiment) -> dict:
+        stopped = e.learner == "RDES" or (e.learner, e.seed, e.decay) == ("DES", 0, "step")
+        return {"reached": 40} if stopped else {}
+
+    runs = made_up(unlike, layouts=("A",), seeds=(0, 1)).runs
+    runs.loc[(runs.learner == "RDES") & (runs.seed == 1), "eval_worst_overlap"] = 0.2
+    return runs
 
 
 def test_the_commit_that_fixed_the_thresholds_is_named_with_its_date_and_how_to_see_it():
@@ -128,12 +145,16 @@ def test_a_page_says_for_which_claims_its_own_runs_agree():
     )
 
 
-def test_the_parts_of_a_claim_are_listed_with_what_is_clear():
+def test_the_parts_of_a_claim_are_listed_with_what_is_clear(made_up):
     judged = [
         verdict("C1", PARTLY),
         replace(verdict("C2", NOT), halves="Both.", as_claimed=("So.",), reverse=("Not so.",)),
     ]
-    assert text.halves(judged) == "- **C2.** Both.\n  - So.\n  - Not so."
+    assert text.halves(judged, pd.DataFrame()) == "- **C2.** Both.\n  - So.\n  - Not so."
+    kept = text.halves([replace(judged[0], claim="C7", halves="Each.")], some_stopped(made_up))
+    assert kept.startswith(
+        "- **C7.** Each.\n  - Of those that kept them, 1 of DES and 2 of RDES had"
+    )
 
 
 @pytest.mark.parametrize(
@@ -164,13 +185,54 @@ def test_variants_that_change_a_verdict_are_counted_once():
     assert ", 0 of them" in text.verdicts_changed(table(*rows).assign(p=[0.3, 0.01, 0.001]))
 
 
-def test_where_the_reverse_of_a_claim_was_seen_is_said_with_its_name():
-    judged = [verdict("C1", PARTLY), replace(verdict("C2", NOT), reverse=("So.", "And so."))]
-    assert text.reversals(judged) == "C2: So. And so."
-    assert text.reversals(judged[:1]) == "nowhere was it seen."
-    judged = [verdict("C1", PARTLY), replace(verdict("C2", NOT), as_claimed=("So.",))]
-    assert text.confirmations(judged) == "C2: So."
-    assert text.confirmations(judged[:1]).startswith("nowhere")
+PER = "With noise that decays per {}, so it was."
+
+
+def test_where_two_learners_clearly_differ_is_said_with_the_claim_and_the_readings():
+    claimed, reverse = ((PER.format(one),) for one in ("step", "episode"))
+    judged = [
+        verdict("C1", PARTLY),
+        replace(verdict("C2", NOT), reverse=reverse),
+        replace(verdict("C3", NOT), as_claimed=claimed, reverse=reverse),
+    ]
+    assert text.differences(judged) == (
+        "Where two learners of a claim clearly differ: C2 (the reverse with noise that decays per"
+        " episode) and C3 (as claimed with noise that decays per step, the reverse with noise that"
+        " decays per episode)."
+    )
+    assert text.differences(judged[:1]) == "Nowhere do two learners of a claim clearly differ."
+
+
+@pytest.mark.parametrize(
+    ("wins", "said"),
+    [
+        (np.nan, ""),
+        (0.7, "In the same layout a run of TDC costs less than one of GES with a probability of"
+         " 0.70."),
+        (0.35, "Yet in the same layout a run of TDC costs less than one of GES with a probability"
+         " of 0.35: in a mean, a run that gets stuck weighs more than many that cost a little less"
+         " ([Chapter 7](07_beyond.ipynb))."),
+    ],
+)  # fmt: skip
+def test_a_rank_by_the_mean_is_put_beside_the_pairs_that_are_won(wins, said):
+    assert text.mean_and_pairs("TDC", "GES", wins) == said
+
+
+def test_the_first_claim_of_the_published_study_depends_on_the_reading_of_the_decay():
+    claims = [v for v in published.load().verdicts if v.claim == "C1"]
+    assert text.depends_on(claims, table())["C"] == ("C1",)
+    assert "It matters to C1 ([departure C]" in text.open_gaps(text.depends_on(claims, table()))
+
+
+def test_a_claim_that_turns_round_with_the_reading_of_the_decay_depends_on_it():
+    claimed, reverse = ((PER.format(one),) for one in ("step", "episode"))
+    same = verdict("C1", PARTLY, "pp", "pp")
+    turned = replace(same, as_claimed=claimed, reverse=reverse)
+    assert text.depends_on([turned], table()) == {"C": ("C1",)}
+    assert "learners of C1 clearly differ as claimed in one" in text.by_layout_and_decay([turned])
+    for one in (same, replace(same, as_claimed=claimed, reverse=claimed)):
+        assert text.depends_on([one], table()) == {}
+        assert "clearly differ" not in text.by_layout_and_decay([one])
 
 
 def test_claims_of_our_own_are_confirmed_or_not_and_never_called_reproduced():

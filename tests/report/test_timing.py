@@ -56,6 +56,23 @@ def test_a_ratio_has_its_interval_or_says_why_not(measured):
 
 
 @pytest.mark.parametrize(
+    ("ratio", "end"),
+    [
+        (0.63, "0.63, which is higher for the reasons below."),
+        (0.50, "0.50, which is lower for the reasons below."),
+        (0.555, "0.56, so they agree."),
+    ],
+)
+def test_the_models_ratio_stands_beside_the_one_that_was_measured(ratio, end):
+    measured = pd.DataFrame({"solve": [0.1, 2.0], "ratio": [9.0, ratio]}, ["fatrop", "ipopt"])
+    said = timing.model_beside_measured(Saving(0.2, 0.0, 0.0), measured, 0.55)
+    assert said == (
+        "By the model, the ratio is below 0.55 where a solve takes more than 2.0 ms. With ipopt,"
+        f" whose solves in RDES take 2.00 ms, the model gives 0.55 and the measurement {end}"
+    )
+
+
+@pytest.mark.parametrize(
     ("outcomes", "sentence"),
     [
         ([True, True], "All 2 targets are reached."),

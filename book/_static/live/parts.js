@@ -122,13 +122,27 @@
     subscripts.reduce((above, text) => add(above, "sub", {}, text), whole);
   }
 
+  // A finger that scrolls the page may begin on a slider, and leaves it as it was: the browser cancels its pointer.
+  function keptWhileScrolling(input, moved) {
+    let before = input.value;
+    input.addEventListener("pointerdown", () => {
+      before = input.value;
+    });
+    input.addEventListener("pointercancel", () => {
+      input.value = before;
+      moved();
+    });
+  }
+
   // A line of a group: a symbol, a range and its number. `given` is moved by `write(number)`.
   function slider(group, { name, label, range: [min, max, step], text }, { read, write }) {
     const line = add(group, "label");
     symbol(line, name);
     const input = add(line, "input", { type: "range", min, max, step, "aria-label": label });
     const value = add(line, "span", { class: "value" });
-    input.addEventListener("input", () => write(Number(input.value)));
+    const moved = () => write(Number(input.value));
+    input.addEventListener("input", moved);
+    keptWhileScrolling(input, moved);
     return (given) => {
       const number = read(given);
       input.value = number;

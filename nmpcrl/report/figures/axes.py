@@ -32,6 +32,7 @@ NARROW_ROW = 0.7  # of a row of maps on a narrow sheet, over one on a wide sheet
 DEEP = 1e4  # what is less than this part of a threshold is drawn as much
 LEAST = 1.5  # high over low of an axis that has hardly anything to show
 FEW = 20  # high over low of an axis on which powers of ten are too few
+WHOLE = {"steps": [1, 2, 2.5, 5, 10], "integer": True, "min_n_ticks": 1}  # of a MaxNLocator
 MAPS = {False: 3, True: 2}  # side by side: on a wide sheet, on a narrow one
 
 
@@ -78,7 +79,13 @@ def map_grid(
 def label_panel(axes: Axes, decay: str = "", xlabel: str = "episode") -> None:
     """Which reading of the decay a panel shows, and whole episodes below."""
     axes.set_title(DECAY_TITLES.get(decay, ""), fontsize="medium", fontweight="normal")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    axes.set_xlabel(xlabel)
+
+
+def over_episodes(axes: Axes, xlabel: str = "episode") -> None:
+    """Name the axis below, on which there is no half of an episode."""
+    axes.xaxis.set_major_locator(MaxNLocator("auto", **WHOLE))
     axes.set_xlabel(xlabel)
 
 

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from nmpcrl.analysis.metrics import by_episode, noise_free_cost, training_cost
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.figures.axes import below, logarithmic_if_wide
+from nmpcrl.report.figures.axes import below, logarithmic_if_wide, over_episodes
 from nmpcrl.report.figures.style import (
     DECAY_TITLES,
     INK,
@@ -50,7 +50,7 @@ def theta_paths(runs: Runs[Records]) -> Figure:
                     label=f"${SYMBOLS[THETA_NAMES[component]]}$" if run == 0 else None,
                 )
         axes.set_title(DECAY_TITLES[decay], **SUBTITLE)
-        axes.set_xlabel("episode")
+        over_episodes(axes)
     panels[0, 0].set_ylabel("component of θ (no unit)")
     handles, labels = panels[0, 0].get_legend_handles_labels()
     below(figure, handles, labels)
@@ -81,9 +81,9 @@ def overshoot(runs: Runs[Records]) -> Figure:
     side = "passes 2: such a step overshoots" if worst > OVERSHOOT else "stays below 2"
     axes.set(
         title=f"The largest step of an episode {side}",
-        xlabel="episode",
         ylabel=r"largest $\alpha\,\|\phi\|^2$ (no unit)",
     )
+    over_episodes(axes)
     if worst > 10:
         axes.set_yscale("log")
     else:
@@ -106,7 +106,7 @@ def two_costs(runs: Runs[Records]) -> Figure:
             column[0].plot(np.arange(1, len(cost) + 1), cost, label=label, lw=1.2, **look.line)
             column[1].plot(*noise_free_cost(records), label=label, **look.line)
         column[0].set_title(DECAY_TITLES[decay], **SUBTITLE)
-        column[1].set_xlabel("episodes trained")
+        over_episodes(column[1], "episodes trained")
     grid[0, 0].set_ylabel("with noise [cost]")
     grid[1, 0].set_ylabel("without noise [cost]")
     for row in grid:

@@ -22,7 +22,7 @@ from nmpcrl.claims.failure_modes import (
     rise,
 )
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.figures.axes import FEW, plain, stacked
+from nmpcrl.report.figures.axes import FEW, over_episodes, plain, stacked
 from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import (
     BAND,
@@ -94,7 +94,7 @@ def traced(examples: Mapping[str, RunSummary], first_rollouts: Mapping[str, Colu
         _trace(column, run, first_rollouts[name])
         e = run.name
         column[0].set_title(f"{name}\n{e.learner}, {e.layout}, per {e.decay}", **SUBTITLE)
-        column[-1].set_xlabel("episode")
+        over_episodes(column[-1])
     labels = (
         "cost, noise-free\n/ at the start",
         r"largest $\alpha\,\Vert\phi\Vert^2$",

@@ -20,7 +20,7 @@ from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.rule import NEARLY_ALL, NEARLY_NONE
 from nmpcrl.control import Task
-from nmpcrl.report.figures.axes import below, draw_task, map_grid, plain
+from nmpcrl.report.figures.axes import below, draw_task, map_grid, over_episodes, plain
 from nmpcrl.report.figures.style import (
     AT_ONE,
     LIMIT,
@@ -93,7 +93,7 @@ def theta_c(found: Evidence) -> Figure:
     for axes, name in zip(grid[0], names, strict=True):
         axes.set_title(name, fontsize="medium")
     for axes in grid[-1]:
-        axes.set_xlabel("episode")
+        over_episodes(axes)
     handles = [Line2D([], [], label=name, **LOOKS[name].line) for name in LEARNING]
     handles.append(Line2D([], [], label="$d_o$", **LIMIT))
     handles.append(Line2D([], [], label="a gap closes", color=CLOSED, linestyle=":"))

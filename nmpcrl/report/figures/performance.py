@@ -10,7 +10,7 @@ from matplotlib.ticker import FuncFormatter
 
 from nmpcrl.bench import summary
 from nmpcrl.bench.summary import Bench
-from nmpcrl.report.figures.axes import below, stacked
+from nmpcrl.report.figures.axes import below, over_episodes, stacked
 from nmpcrl.report.figures.style import (
     AT_ONE,
     INK,
@@ -105,7 +105,8 @@ def whole_runs(bench: Bench) -> Figure:
     for name in runs.index:
         one = episodes[episodes.learner == name]
         lines.plot(one.episode, one.memory / 1e6, label=name, **LOOKS[name].line)
-    lines.set(xlabel="episode", ylabel="memory [MB]", ylim=(0, 1.4 * runs.memory.max()))
+    lines.set(ylabel="memory [MB]", ylim=(0, 1.4 * runs.memory.max()))
+    over_episodes(lines)
     lines.set_title("memory", **SUBTITLE)
     lines.legend(ncols=2, fontsize="small", loc="lower center")
     _draw_workers(workers, bench)

@@ -51,7 +51,8 @@ def online_errors(runs: Runs[Records], learners: tuple[str, ...] = ("DES", "RDES
     axes[0, 0].set_ylabel("error of the\nnext value [cost]")
     one_entry_each(axes[0, -1], learners)
     means = " and ".join(f"{np.median(last[name]):.0f} ({name})" for name in learners)
-    return headed(figure, f"In the second half of training, the next value is off by {means}")
+    title = f"In the second half of training, the next value is off by {means}"
+    return headed(figure, f"{title}: medians of the root mean square of an episode")
 
 
 @page

@@ -18,7 +18,7 @@ from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import WHOLE, groups
 from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.report.figures.axes import plain
+from nmpcrl.report.figures.axes import over_episodes, plain
 from nmpcrl.report.figures.sheet import in_words, sheet
 from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, marked, page, subplots
 from nmpcrl.report.tables import WORDS
@@ -190,8 +190,9 @@ def _costs(
         lines = axes.plot(episode, costs.T, **look.line, linewidth=1.0)
         lines[0].set_label(name)
     low, high = axes.get_ylim()
-    axes.set(xlabel="episode", ylabel="noise-free cost / first", ylim=(low, min(high, MOST_COST)))
-    axes.legend(fontsize="small")
+    axes.set(ylabel="noise-free cost / first", ylim=(low, min(high, MOST_COST)))
+    over_episodes(axes)
+    axes.legend(fontsize="small", frameon=True, framealpha=0.9, edgecolor="none")  # on the lines
 
 
 def _curves(

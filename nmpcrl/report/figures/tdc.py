@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.figures.axes import below
+from nmpcrl.report.figures.axes import below, over_episodes
 from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, page, subplots
 from nmpcrl.study.records import LAST, Stopped
 
@@ -47,7 +47,8 @@ def step_of_w(runs: Mapping[float, RunSummary]) -> Figure:
             first = f"With {label}, it passes {OVERSHOOT:g} in episode {over[0] + 1}"
             lost = " and w is lost" if run.facts["stopped"] != Stopped.FINISHED else ""
     axes.axhline(OVERSHOOT, **LIMIT)
-    axes.set(xlabel="episode", ylabel=r"largest $\beta\,\|\phi\|^2$", ylim=(0, 1.5 * OVERSHOOT))
+    axes.set(ylabel=r"largest $\beta\,\|\phi\|^2$", ylim=(0, 1.5 * OVERSHOOT))
+    over_episodes(axes)
     axes.legend(loc="lower right")
     return headed(figure, f"{first}{lost}" if first else f"It stays below {OVERSHOOT:g}")
 
@@ -65,8 +66,10 @@ def parts_of_tdc(runs: Mapping[str, RunSummary]) -> Figure:
         judged, size = run.evaluations, np.linalg.norm(run.episodes["w"], axis=1)
         left.plot(judged["episode"], judged["cost"] / judged["cost"][0], label=name, **look)
         right.plot(np.arange(1, len(size) + 1), size, **look)
-    left.set(xlabel="episode", ylabel="noise-free cost / first")
-    right.set(xlabel="episode", ylabel="size of w", yscale="log")
+    left.set(ylabel="noise-free cost / first")
+    right.set(ylabel="size of w", yscale="log")
+    for axes in (left, right):
+        over_episodes(axes)
     below(figure, *left.get_legend_handles_labels())
     moved = {name: _end(runs[name]) - _end(runs["TDC"]) for name in WITHOUT}
     most = max(moved, key=lambda name: abs(moved[name]))
