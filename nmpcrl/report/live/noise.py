@@ -1,5 +1,7 @@
 """numpy's normal noise for other hosts: the widths of its ziggurat, asked of numpy itself."""
 
+from typing import Any
+
 import numpy as np
 
 STRIPS = 256
@@ -21,7 +23,7 @@ def drawn(bits: int) -> float:
     generator = np.random.PCG64()
     increment = 1
     before = (bits - increment) * pow(MULTIPLIER, -1, ALL) % ALL  # then the state is `bits`
-    state = {"state": before, "inc": increment}
+    state: Any = {"state": before, "inc": increment}
     generator.state = {
         "bit_generator": "PCG64",
         "state": state,
