@@ -4,6 +4,9 @@ import numpy as np
 
 CHAPTERS = {  # of each live figure
     "controller": "01_mdp_and_nmpc",
+    "gradient": "02_expected_sarsa",
+    "kink": "02_expected_sarsa",
+    "update": "02_expected_sarsa",
     "chain": "04_ges",
     "learners": "04_ges",
     "runs": "05_results",

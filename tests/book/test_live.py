@@ -8,20 +8,12 @@ import nbformat
 import numpy as np
 import pytest
 import whole
-from axe_playwright_python.sync_playwright import Axe
 from bs4 import BeautifulSoup
-from live_page import ALSO, CHAPTERS, MOST, loaded
 from live_python import assert_equal_to_python
 
 from nmpcrl.study import paper
 
 FIGURE = "controller"
-STATIC = "article figure img[alt*='from start to target']"
-MOVES = """() => {
-  window.changes = 0
-  const figure = document.querySelector("figure.live"), options = {subtree: true, childList: true, attributes: true}
-  new MutationObserver(all => window.changes += all.length).observe(figure, options)
-}"""  # noqa: E501
 COVERED = """slider => {
   const { x, y, width, height } = slider.getBoundingClientRect()
   const hits = [0.05, 0.5, 0.95].map(share => document.elementFromPoint(x + share * width, y + height / 2))
@@ -230,17 +222,6 @@ def test_a_screen_reader_is_told_the_results_once_nothing_changes(tab):
 
 
 @pytest.mark.book
-def test_nothing_moves_by_itself(tab):
-    tab.quiet()
-    tab.page.evaluate(MOVES)
-    tab.page.wait_for_timeout(400)
-    assert tab.page.evaluate("window.changes") == 0
-    tab.press("Obstacle 2", "ArrowUp")
-    tab.shown()
-    assert tab.page.evaluate("window.changes") > 0
-
-
-@pytest.mark.book
 def test_a_loop_that_ends_early_says_so(opened):
     tab = opened(FIGURE, script=FAILS_AT_20)
     tab.begun()
@@ -250,73 +231,8 @@ def test_a_loop_that_ends_early_says_so(opened):
 
 
 @pytest.mark.book
-def test_without_javascript_there_is_the_picture_alone(opened):
-    tab = opened(FIGURE, java_script_enabled=False)
-    assert tab.page.locator(STATIC).is_visible()
-    assert not tab.figure.is_visible()
-
-
-@pytest.mark.book
-def test_without_webassembly_there_are_the_picture_and_a_sentence(opened):
-    tab = opened(FIGURE, script="delete window.WebAssembly")
-    tab.page.wait_for_selector("figure.live p")
-    assert "does not run WebAssembly" in tab.figure.inner_text()
-    assert tab.figure.locator("svg").count() == 0
-    assert tab.page.locator(STATIC).is_visible()
-    assert tab.errors == []
-
-
-@pytest.mark.book
-def test_on_paper_there_is_the_picture_alone(tab):
-    tab.page.emulate_media(media="print")
-    assert tab.page.locator(STATIC).is_visible()
-    assert not tab.figure.is_visible()
-
-
-@pytest.mark.book
 def test_the_book_as_one_document_leaves_live_figures_out(site):
     document = whole.document(site, site.parent / "pdf/book.html", "")
     assert "live.controller(nmpc" in BeautifulSoup(document, "html.parser").get_text()
     assert "_static/live/" not in document
     assert 'class="live"' not in document
-
-
-@pytest.mark.book
-@pytest.mark.parametrize("width", [390, 1400])
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_axe_finds_nothing(opened, width, theme):
-    tab = opened(
-        FIGURE,
-        formulas=True,
-        viewport={"width": width, "height": 900},
-        color_scheme=theme,
-        reduced_motion="reduce",
-    )
-    tab.quiet()
-    assert tab.page.evaluate("document.documentElement.dataset.theme") == theme
-    found = Axe().run(tab.page, context="figure.live")
-    assert found.response["passes"]
-    assert found.response["violations"] == []
-    assert tab.page.evaluate("document.documentElement.scrollWidth") <= width
-
-
-@pytest.mark.book
-def test_a_finger_can_hit_every_handle_and_slider_on_a_telephone(opened):
-    tab = opened(FIGURE, viewport={"width": 390, "height": 844})
-    tab.begun()
-    tab.shown()
-    for target in tab.figure.locator(":is(.reach, input, button)").all():
-        box = target.bounding_box()
-        assert min(box["width"], box["height"]) >= 24
-
-
-@pytest.mark.book
-def test_only_a_page_with_a_live_figure_loads_scripts_for_it(site):
-    pages = {path.stem for path in site.glob("book/*.html") if "_static/live/" in path.read_text()}
-    assert pages == {*CHAPTERS.values(), *ALSO}
-
-
-@pytest.mark.book
-def test_what_a_chapters_live_figures_load_is_light(site):
-    for figure in CHAPTERS:
-        assert loaded(site, figure) <= MOST

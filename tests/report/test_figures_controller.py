@@ -151,6 +151,13 @@ def test_the_kink_figure_names_the_jump(assert_readable, texts):
     assert "jumps by 100.0" in texts(figure)
 
 
+def test_the_share_figure_names_the_share_of_the_update_in_the_text(assert_readable, texts):
+    pulls = np.linspace(0.1, 3, 30)
+    figure = sensitivity.shares_closed(pulls, 2 * pulls, taken=0.4)
+    assert_readable(figure)
+    assert "With α‖φ‖² = 0.40 an update closes 0.80" in texts(figure)
+
+
 def test_theta_paths_name_the_component_that_moves_most(assert_readable, texts):
     figure = expected_sarsa.theta_paths(study().select(learner="ES"))
     assert_readable(figure)

@@ -11,7 +11,7 @@ from nmpcrl.control import Riccati
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
-from nmpcrl.report.live import closed_loop, frame
+from nmpcrl.report.live import frame
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -23,14 +23,24 @@ def nmpc():
 
 
 @pytest.fixture
-def shown(nmpc, monkeypatch) -> str:
-    """The figure's HTML, with a module of three bytes."""
+def small(monkeypatch) -> None:
+    """A module of three bytes."""
     monkeypatch.setattr(browser, "module", lambda plant, task: b"abc")
+
+
+@pytest.fixture
+def shown(nmpc, small) -> str:
+    """The figure's HTML."""
     return live.controller(nmpc, THETA, 130).data
 
 
 @pytest.fixture
 def data(shown) -> dict:
+    return given(shown)
+
+
+def given(shown: str) -> dict:
+    """What the script is given."""
     return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
 
 
@@ -77,7 +87,7 @@ def test_the_output_is_whole_and_loads_nothing(shown):
     assert re.findall(r'data-file="([^"]+)"', shown) == [
         frame.STYLE,
         frame.MODULE,
-        *closed_loop.SCRIPTS,
+        *frame.scripts_of("controller"),
     ]
     assert not re.search(r"\b(src|href)=|https?://(?!www\.w3\.org/2000/svg)", shown)
     assert b64decode(re.search(r'module: "([^"]+)"', shown)[1]) == b"abc"
@@ -95,3 +105,33 @@ def test_without_a_compiler_there_is_a_sentence(nmpc, monkeypatch):
     assert live.controller(nmpc, THETA, 130).data == (
         "<p>There is no live figure here: numba is not installed.</p>"
     )
+
+
+SLIDING = np.array([4.4, 1.9, 0.1])  # near obstacle 3 of layout C, not on it
+
+
+def test_the_gradient_begins_in_the_middle_of_its_steps(nmpc, small):
+    data = given(live.gradient(nmpc, SLIDING, THETA, np.array([1e-6, 1e-4, 1e-2])).data)
+    assert data["steps"][data["step"]] == 1e-4
+    assert data["start"] == SLIDING.tolist()
+
+
+def test_the_kinks_boundaries_are_where_the_slack_begins(nmpc, small):
+    data = given(live.kink(nmpc, SLIDING, THETA).data)
+    x, y, _ = nmpc.task.discs
+    for k, radius in enumerate(data["boundaries"]):
+        on_it = np.array([x[k] + radius * np.cos(1.0), y[k] + radius * np.sin(1.0), 0.0])
+        assert nmpc.task.overlap(on_it)[k] == pytest.approx(-THETA[8])
+
+
+def test_the_kinks_map_shows_the_nearest_obstacle_whole(nmpc, small):
+    x, y, width, height = given(live.kink(nmpc, SLIDING, THETA).data)["view"]
+    k = np.argmax(nmpc.task.overlap(SLIDING))
+    centre_x, centre_y, clearance = (each[k] for each in nmpc.task.discs)
+    assert x < centre_x - clearance / 2 < centre_x + clearance / 2 < x + width
+    assert y < centre_y - clearance / 2 < centre_y + clearance / 2 < y + height
+
+
+def test_the_update_is_given_the_chapters_alpha_and_discount(nmpc, small):
+    data = given(live.update(nmpc, THETA, 3e-7).data)
+    assert [data["alpha"], data["gamma"], data["overshoot"]] == [3e-7, nmpc.gamma, 2]

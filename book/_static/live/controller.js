@@ -2,8 +2,8 @@
 (() => {
   "use strict";
 
-  const { add, set, plane, parts: shared, words: { controller: words, parts: { symbols } } } = window.nmpcrl;
-  const { points, symbol } = shared;
+  const { add, set, plane, parts: shared, words: { controller: words } } = window.nmpcrl;
+  const { points } = shared;
 
   // The parts of V. It is quadratic in each weight, so a weight's part is half its product with its feature.
   function shares({ theta }, { value, features }) {
@@ -13,20 +13,10 @@
     return { ...parts, slacks: value - parts.stages - parts.inputs - parts.end };
   }
 
-  function trajectories(map, { problem: { target: [x, y] } }, before) {
+  function closedLoop(map, before) {
     add(map.ground, "polyline", { class: "before", points: points(before.states) });
-    const loop = add(map.ground, "polyline", { class: "loop" });
-    const plan = add(map.ground, "polyline", { class: "plan" });
-    const dots = add(map.ground, "g", { class: "dots" });
-    add(map.ground, "circle", { class: "target", cx: x, cy: y });
-    map.write(words.target, x, y, { class: "name" });
-    return (_, found) => {
-      const planned = found.plan?.states ?? [];
-      set(loop, { points: points(found.states) });
-      set(plan, { points: points(planned) });
-      dots.replaceChildren();
-      for (const [cx, cy] of planned) add(dots, "circle", { cx, cy });
-    };
+    const line = add(map.ground, "polyline", { class: "loop" });
+    return (_, { states }) => set(line, { points: points(states) });
   }
 
   function horizon(group, { ranges: { horizon: range } }, move) {
@@ -51,11 +41,7 @@
 
   function questions(parent, reset) {
     const last = add(parent, "div", { class: "last" });
-    const line = add(last, "p");
-    for (const text of words.questions) {
-      if (text in symbols) symbol(line, text);
-      else line.append(text === "?" ? text : ` ${text} `);
-    }
+    shared.write(add(last, "p"), words.questions);
     shared.button(last, words.reset, reset);
   }
 
@@ -69,7 +55,8 @@
       shared.obstacles(map, data, read, move),
       shared.robot(map, data, read, move),
       shared.arrow(map, read, move),
-      trajectories(map, data, rollout(begin, data.steps)),
+      closedLoop(map, rollout(begin, data.steps)),
+      shared.planned(map, data),
     ];
     add(figure, "p", { class: "legend" }, words.legend(data.steps));
     const tell = shared.results(figure);

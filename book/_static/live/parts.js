@@ -116,6 +116,27 @@
     };
   }
 
+  // Obstacles that stay where they are, each with a circle of its radius in `around`.
+  function discs(map, { problem, radii }, around) {
+    problem.discs.forEach(([cx, cy], k) => {
+      add(map.ground, "circle", { class: "disc", cx, cy, r: radii[k] });
+      add(map.ground, "circle", { class: "safety", cx, cy, r: around[k] });
+    });
+  }
+
+  function planned(map, { problem: { target: [x, y] } }) {
+    const line = add(map.ground, "polyline", { class: "plan" });
+    const dots = add(map.ground, "g", { class: "dots" });
+    add(map.ground, "circle", { class: "target", cx: x, cy: y });
+    map.write(words.target, x, y, { class: "name" });
+    return (_, { plan }) => {
+      const states = plan?.states ?? [];
+      set(line, { points: points(states) });
+      dots.replaceChildren();
+      for (const [cx, cy] of states) add(dots, "circle", { cx, cy });
+    };
+  }
+
   function symbol(parent, name) {
     const [letter, ...subscripts] = words.symbols[name];
     const whole = add(parent, "span", { class: "symbol" }, letter);
@@ -132,6 +153,11 @@
       input.value = before;
       moved();
     });
+  }
+
+  // A text in which {c} stands for the symbol of c.
+  function write(parent, text) {
+    text.split(/[{}]/).forEach((piece, k) => (k % 2 ? symbol(parent, piece) : parent.append(piece)));
   }
 
   // A line of a group: a symbol, a range and its number. `given` is moved by `write(number)`.
@@ -172,8 +198,7 @@
         const line = add(all, "p");
         texts.forEach((text, k) => {
           line.append(k && !text.startsWith(";") ? " " : "");
-          if (k % 2) add(line, "b", {}, text);
-          else line.append(text);
+          write(k % 2 ? add(line, "b") : line, text);
         });
       }
       clearTimeout(quiet);
@@ -186,6 +211,7 @@
   }
 
   window.nmpcrl.parts = {
-    clamp, points, begin, state, heading, background, obstacles, robot, arrow, symbol, slider, weight, results, button,
+    clamp, points, begin, state, heading, background, discs, obstacles, robot, arrow, planned, symbol, write, slider, weight,
+    results, button,
   };
 })();

@@ -1,4 +1,5 @@
 // Every word that a reader of a live figure sees or hears: `parts` are those of several, the rest one figure's.
+// In results, and where it says so, {c} stands for the symbol of c.
 (() => {
   "use strict";
 
@@ -18,9 +19,17 @@
     return `${digits.replace("-", "\u2212")}\u00a0\u00b7\u00a0${power(Number(exponent))}`;
   }
 
+  // A power of ten, perhaps with a factor in front.
+  function scientific(number) {
+    const exponent = Math.floor(Math.log10(number) + 1e-9), factor = fixed(number / 10 ** exponent, 1);
+    return (factor === "1.0" ? "" : `${factor} · `) + power(exponent);
+  }
+
   const parts = {
     fixed,
+    scientific,
     none: "This browser does not run WebAssembly, so the figure stays as it is printed above.",
+    target: "target",
     robot: "Robot, start",
     heading: "Robot, heading",
     obstacle: (number) => `Obstacle ${number}`,
@@ -30,7 +39,7 @@
     symbols: { // letter, its subscript, and the subscript's own
       x: ["θ", "x"], y: ["θ", "y"], heading: ["θ", "φ"], v: ["θ", "v"], nu: ["θ", "ν"],
       x_f: ["θ", "x", "f"], y_f: ["θ", "y", "f"], heading_f: ["θ", "φ", "f"], c: ["θ", "c"], horizon: ["N"],
-      alpha: ["α"], beta: ["β"], gamma: ["γ"],
+      alpha: ["α"], beta: ["β"], gamma: ["γ"], epsilon_v: ["ε", "v"], epsilon_nu: ["ε", "ν"], h: ["h"], walk: ["d"],
     },
     sliders: {
       x: "theta x, weight of the distance in x at each planned step",
@@ -53,13 +62,9 @@
       + "or reach it with Tab and press the arrow keys, with Shift for larger steps.",
     legend: (steps) => `Thin line: closed loop of ${steps} steps, without noise. `
       + "Thick line: first plan, a dot for each step. Dotted line: closed loop before any change.",
-    // A name of `symbols` stands for its symbol.
-    questions: [
-      "What does", "c", "do to the distance from the obstacles? What does the robot miss with a smaller",
-      "horizon", "?",
-    ],
+    // With symbols.
+    questions: "What does {c} do to the distance from the obstacles? What does the robot miss with a smaller {horizon}?",
     reset: "Reset",
-    target: "target",
     horizon: "N, steps planned",
     groups: {
       "On the way": ["x", "y", "heading"],
@@ -212,5 +217,101 @@
     },
   };
 
-  window.nmpcrl = { ...window.nmpcrl, words: { parts, controller, runs, player, chain, learners: pair } };
+  const gradient = {
+    map: "Map of the robot, its plan and the obstacles, the gradient of the value, and finite differences",
+    handles: "What can be moved on the map",
+    title: "Try it: the envelope gradient and finite differences, computed in your browser.",
+    hint: "Drag the robot, the tip of its arrow or an obstacle, or reach it with Tab and press the arrow keys; "
+      + "move a component of θ, or the step h of the differences.",
+    legend: "Filled bar: envelope gradient. Striped bar: central differences with step h. "
+      + "The bars are logarithmic, from 0.01 to 10 000; the numbers are in this order.",
+    lines: "Solid line: central differences. Dashed line: forward differences. Dots: the step h.",
+    curves: "Distance of finite differences to the envelope gradient, relative, against their step",
+    across: "step h (no unit)",
+    step: "h, step of the finite differences",
+    reset: "Reset",
+    pair: ({ envelope, difference }) => `${fixed(envelope, 3)} | ${fixed(difference, 3)}`,
+    results: ({ chosen: { step, errors } }) => [
+      [
+        `Relative distance to the envelope gradient with h = ${scientific(step)}: central differences, 18 more solves,`,
+        scientific(errors.central), "; forward differences, 9 more solves,", scientific(errors.forward),
+      ],
+    ],
+    failed: "The solver found no plan here, or none beside it.",
+  };
+
+  function side(offset) {
+    const distance = fixed(1000 * Math.abs(offset), 1);
+    if (distance === "0.0") return "on";
+    return `${distance} mm ${offset < 0 ? "inside" : "outside"}`;
+  }
+
+  const kink = {
+    map: "Map of the robot, its plan and the obstacles, and the value along a walk over a boundary",
+    handles: "What can be moved on the map",
+    title: "Try it: walk the robot over an obstacle’s boundary.",
+    hint: "Drag the robot, or reach it with Tab and press the arrow keys; or walk it with the slider, straight from "
+      + "inside the nearest boundary to the outside.",
+    walk: "d, distance of the robot from the nearest boundary, negative inside",
+    across: "d, distance from the boundary [m]",
+    value: "V along the walk", // with a symbol, too
+    plots: ["The value along the walk", "The slope of the value in theta c along the walk"],
+    slope: "dV/d{c} along the walk", // with a symbol
+    reset: "Reset",
+    millimetres: (number) => `${fixed(number, 0)} mm`,
+    results: ({ plan, boundary: { number, offset }, inside, outside, jump }) => [
+      [
+        "The robot is", side(offset), `the boundary of obstacle ${number}. V =`, fixed(plan.value, 3),
+        "; dV/d{c} =", fixed(plan.features[8], 2),
+      ],
+      [
+        "Just inside the boundary dV/d{c} is", fixed(inside[0].slope, 2), "; just outside it is",
+        fixed(outside[0].slope, 2), "; the jump is", fixed(jump, 2),
+      ],
+    ],
+    failed: "The solver found no plan here, or none beside the boundary.",
+  };
+
+  const update = {
+    map: "One update of Expected Sarsa, number by number",
+    title: "Try it: one update, computed in your browser.",
+    hint: "Move the noise ε of the action and the step size α; apply the update, and go on to the next state.",
+    noise: ["epsilon v, noise of the speed", "epsilon nu, noise of the turn rate"],
+    alpha: "alpha, step size",
+    deviations: (number) => fixed(number, 2),
+    power: (exponent) => scientific(10 ** exponent),
+    // With symbols: texts and numbers in turn.
+    steps: ({ alpha }, { plan, action, cost, next, following, delta, moved, pull, again, closed }) => [
+      plan && ["Solve in s: V(s) = ", fixed(plan.value, 3)],
+      plan && ["Act: a = ", `${fixed(action[0], 3)} m/s, ${fixed(action[1], 3)} rad/s`],
+      plan && [
+        "Pay the cost ", fixed(cost, 3),
+        " and arrive in s⁺ = ", `(${fixed(next[0], 3)} m, ${fixed(next[1], 3)} m, ${fixed(next[2], 3)} rad)`,
+      ],
+      following && ["Solve in s⁺: V(s⁺) = ", fixed(following.value, 3)],
+      following && ["TD error: δ = ", fixed(delta, 3)],
+      following && [
+        `Move θ by α δ φ, with α = ${scientific(alpha)}: {x} becomes `, fixed(moved[0], 5), ", {c} ", fixed(moved[8], 5),
+      ],
+      again && ["Solve in s again, with the new θ: V(s) = ", fixed(again.value, 3)],
+    ].filter(Boolean),
+    gauge: "From the value V(s), at 0, to its target, at 1, and as far beyond, at 2: where the update leads",
+    places: ["V(s)", "target", "as far beyond", ""],
+    legend: "Triangle above the line: α‖φ‖², what the update closes to first order. Triangle below: what it does close. "
+      + "In the shaded part it ends farther from the target than it began.",
+    draw: "Draw noise",
+    next: "Apply, go on to s⁺",
+    reset: "Reset",
+    results: ({ following, pull, closed, again }, { overshoot }) => [
+      following ? ["α‖φ‖² =", fixed(pull, 3), "; the update closes", again ? fixed(closed, 3) : "?", "of the TD error."]
+        : ["The solver found no plan."],
+      ...(following && !again ? [["With the new θ the solver found no plan."]] : []),
+      ...(pull > overshoot ? [[`α‖φ‖² is above ${overshoot}: the update overshoots.`]] : []),
+    ],
+  };
+
+  window.nmpcrl = {
+    ...window.nmpcrl,
+    words: { parts, controller, gradient, kink, update, runs, player, chain, learners: pair },
+  };
 })();

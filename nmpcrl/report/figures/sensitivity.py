@@ -61,6 +61,30 @@ def gradient_errors(steps: Vector, forward: Vector, central: Vector) -> Figure:
 
 
 @page
+def shares_closed(pulls: Vector, shares: Vector, taken: float) -> Figure:
+    """How much of the TD error one update closes, against its alpha ||phi||^2.
+
+    Args:
+        pulls: alpha ||phi||^2, growing, shape (k,).
+        shares: of the TD error, found by solving again, shape (k,).
+        taken: the alpha ||phi||^2 of the update in the text.
+    """
+    figure, axes = subplots(height=3.2)
+    closed = np.interp(taken, pulls, shares)
+    axes.plot(pulls, shares, color=WINE, label="solved again with the new θ")
+    axes.plot(pulls, pulls, "--", color=TEAL, label="to first order")
+    axes.plot(taken, closed, "D", color=INK, label="the update in the text")
+    axes.axhline(1, color=INK, ls=":", lw=1)
+    axes.set(
+        title=f"With α‖φ‖² = {taken:.2f} an update closes {closed:.2f} of the TD error",
+        xlabel="α‖φ‖² (no unit)",
+        ylabel="share of the TD error\nthat is closed (no unit)",
+    )
+    axes.legend()
+    return figure
+
+
+@page
 def kink(offsets: Vector, values: Vector, edge: float, slopes: tuple[float, float]) -> Figure:
     """V against theta_c where the start crosses an obstacle's boundary.
 

@@ -2,12 +2,14 @@
 
 import json
 from base64 import b64encode
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from IPython.display import HTML
 
+from nmpcrl.control import Nmpc
 from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.learning import browser
 from nmpcrl.report.prose import ROOT
 
 STYLE, MODULE = "live.css", "module.js"
@@ -34,6 +36,26 @@ def figure(
     """
     shown = [FIGURE.format(name, json.dumps(data)), *files(scripts, module)]
     return HTML("\n".join(shown))  # type: ignore[no-untyped-call]
+
+
+def solving(name: str, nmpc: Nmpc, data: Callable[[], Mapping[str, Any]], *more: str) -> HTML:
+    """A live figure that solves; a sentence where its controller cannot be compiled.
+
+    Args:
+        name: of the figure, and of its script without .js.
+        nmpc: whose plant and task are compiled.
+        data: makes what the script is given.
+        more: scripts between `PARTS` and the figure's own.
+    """
+    try:
+        return figure(name, data(), scripts_of(name, *more), browser.module(nmpc.plant, nmpc.task))
+    except CannotCompile as error:
+        return absent(error)
+
+
+def scripts_of(name: str, *more: str) -> tuple[str, ...]:
+    """The scripts of a figure that solves, in the order in which they are needed."""
+    return (*PARTS, *more, f"{name}.js")
 
 
 def absent(error: CannotCompile) -> HTML:

@@ -14,6 +14,8 @@ ARGUMENTS = (
     "target", "lower", "upper", "discs", "sides", "discount", "slack_weight", "soft_box", "tie",
 )  # fmt: skip
 LONGEST = 20  # steps planned: a longer plan has several minima
+CLOSE = 1.2  # beside the circle of one obstacle, seen close [m]
+WIDE = 2.4  # the map of one obstacle, over its height
 WALL, AROUND = 0.5, 1.5  # of the map, beyond a wall and beyond an obstacle's circle [m]
 
 
@@ -29,6 +31,19 @@ def problem_of(nmpc: Nmpc) -> dict[str, Any]:
     values = zip(ARGUMENTS, solver.prepare(ocp).problem, strict=True)
     plain = {name: np.asarray(value).tolist() for name, value in values}
     return plain | {"tolerance": solver.tolerance, "theta": 2 * nmpc.plant.n + nmpc.plant.m + 1}
+
+
+def begin(nmpc: Nmpc, state: Vector, theta: Vector) -> dict[str, Any]:
+    """What a figure of this controller begins with, its problem and what a map draws."""
+    return {
+        "names": paper.THETA_NAMES,
+        "ranges": ranges(theta),
+        "start": state.tolist(),
+        "theta": theta.tolist(),
+        "horizon": nmpc.horizon,
+        "problem": problem_of(nmpc),
+        **surroundings(nmpc.task),
+    }
 
 
 def ranges(theta: Vector) -> dict[str, tuple[float, float, float]]:
@@ -62,3 +77,16 @@ def view(task: Task) -> list[float]:
     low = np.maximum(low, task.lower[:2] - WALL)
     high = np.minimum(high, task.upper[:2] + WALL)
     return [*low.tolist(), *(high - low).tolist()]
+
+
+def boundaries(task: Task, theta_c: float) -> list[float]:
+    """The distance from each obstacle's centre at which Xi + theta_c = 0, by Eq. (19) [m]."""
+    *_, clearance = task.discs
+    return (clearance / 2 * np.sqrt(1 + theta_c)).tolist()
+
+
+def close(task: Task, state: Vector) -> list[float]:
+    """As `view`, of the obstacle that is nearest to a state."""
+    x, y, clearance = (each[np.argmax(task.overlap(state))] for each in task.discs)
+    height = clearance + CLOSE
+    return [x - WIDE * height / 2, y - height / 2, WIDE * height, height]

@@ -1,0 +1,93 @@
+"""What holds of every live figure: its picture, its weight, and who can use it."""
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from live_page import ALSO, CHAPTERS, MOST, loaded
+
+pytestmark = pytest.mark.book
+FIRST = {chapter: figure for figure, chapter in reversed(CHAPTERS.items())}  # of each chapter
+IN_ORDER = """() => [...document.querySelectorAll("article figure img, figure.live")]
+    .map(one => one.matches("img") ? "picture" : one.dataset.figure)"""
+BEGUN = """() => [...document.querySelectorAll("figure.live")]
+    .every(one => one.querySelector("[role=status][aria-busy=false]"))"""
+each_chapter = pytest.mark.parametrize("figure", FIRST.values(), ids=FIRST)
+each_figure = pytest.mark.parametrize("figure", CHAPTERS)
+
+
+def test_only_a_page_with_a_live_figure_loads_scripts_for_it(site):
+    pages = {path.stem for path in site.glob("book/*.html") if "_static/live/" in path.read_text()}
+    assert pages == {*CHAPTERS.values(), *ALSO}
+
+
+@each_chapter
+def test_what_a_chapters_live_figures_load_is_light(site, figure):
+    assert loaded(site, figure) <= MOST
+
+
+@each_chapter
+def test_without_javascript_there_are_the_pictures_alone(opened, figure):
+    tab = opened(figure, java_script_enabled=False)
+    for live in tab.page.locator("figure.live").all():
+        assert not live.is_visible()
+    order = tab.page.evaluate(IN_ORDER)
+    for at, name in enumerate(order):
+        assert name == "picture" or order[at - 1] == "picture", f"{name} stands on no picture"
+    for picture in tab.page.locator("article figure img").all():
+        assert picture.is_visible()
+
+
+@each_chapter
+def test_without_webassembly_there_are_the_pictures_and_a_sentence(opened, figure):
+    tab = opened(figure, script="delete window.WebAssembly")
+    tab.page.wait_for_selector("figure.live p")
+    for live in tab.page.locator("figure.live").all():
+        assert "does not run WebAssembly" in live.inner_text()
+        assert live.locator("svg").count() == 0
+    assert tab.page.locator("article figure img").first.is_visible()
+    assert tab.errors == []
+
+
+@each_chapter
+def test_on_paper_there_are_the_pictures_alone(opened, figure):
+    tab = opened(figure).begun()
+    tab.page.emulate_media(media="print")
+    assert tab.page.locator("article figure img").first.is_visible()
+    for live in tab.page.locator("figure.live").all():
+        assert not live.is_visible()
+
+
+@each_chapter
+@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing(opened, figure, width, theme):
+    size = {"width": width, "height": 900}
+    tab = opened(figure, formulas=True, viewport=size, color_scheme=theme, reduced_motion="reduce")
+    tab.page.wait_for_function(BEGUN)
+    assert tab.page.evaluate("document.documentElement.dataset.theme") == theme
+    found = Axe().run(tab.page, context="figure.live")
+    assert found.response["passes"]
+    assert found.response["violations"] == []
+    assert tab.page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@each_figure
+def test_a_finger_can_hit_everything_on_a_telephone(opened, figure):
+    tab = opened(figure, viewport={"width": 390, "height": 844}).begun()
+    tab.shown()
+    for target in tab.figure.locator(":is(.reach, input, button)").all():
+        box = target.bounding_box()
+        assert min(box["width"], box["height"]) >= 24
+
+
+@each_figure
+def test_nothing_moves_by_itself(opened, figure):
+    tab = opened(figure).begun().quiet()
+    tab.figure.evaluate(
+        """figure => {
+          window.changes = 0
+          const options = {subtree: true, childList: true, attributes: true}
+          new MutationObserver(all => window.changes += all.length).observe(figure, options)
+        }"""
+    )
+    tab.page.wait_for_timeout(400)
+    assert tab.page.evaluate("window.changes") == 0
