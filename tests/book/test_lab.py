@@ -15,6 +15,7 @@ import build
 import enrich
 import nbformat
 import pytest
+from live_page import CHAPTERS, FRAMES
 
 from nmpcrl.learning import td_error
 from nmpcrl.study import paper
@@ -152,6 +153,19 @@ def opened(address, folder, browser) -> Iterator[Any]:
     tab.close()
 
 
+@pytest.fixture
+def trust(folder, jupyter_lab) -> Any:
+    """Trusts an executed notebook, as its reader may."""
+
+    def sign(name: str) -> None:
+        own = os.environ | {"JUPYTER_DATA_DIR": str(folder / "data_dir")}
+        subprocess.run(
+            [jupyter_lab, "trust", folder / f"executed/{name}.ipynb"], env=own, check=True
+        )
+
+    return sign
+
+
 def raw(part: Any) -> list[tuple[str, str]]:
     """What a notebook editor could not read in a part of its page: kinds, and where they stand."""
     shown = part.locator(SHOWN)
@@ -217,3 +231,21 @@ def test_a_link_to_an_equation_leads_there(opened):
           return 0 < top && top < innerHeight
         }"""
     )
+
+
+@pytest.mark.parametrize("name", sorted(set(CHAPTERS.values())))
+def test_live_figures_run_in_a_papermill_output_that_is_trusted(opened, trust, name):
+    figures = [figure for figure, chapter in CHAPTERS.items() if chapter == name]
+    before = opened("executed", name).locator("figure.live")
+    for words in before.all_inner_texts():
+        assert words == "This figure is live once the notebook is trusted, or its cells are run."
+    assert before.count() == len(figures)
+    trust(name)
+    tab = opened("executed", name)
+    tab.locator(".jp-Dialog-footer button").first.click()  # it asks for a kernel, and gets none
+    for figure in figures:
+        live = tab.locator(f"figure.live[data-figure={figure}]")
+        live.locator("[role=status][aria-busy=false]").wait_for()
+        begin = live.evaluate(FRAMES)["given"]
+        live.locator("input[type=range]").first.press("ArrowRight")
+        assert live.evaluate(FRAMES)["given"] != begin

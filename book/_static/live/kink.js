@@ -8,6 +8,14 @@
   const PLACES = 16; // on either side, in a plot
   const C = 8; // theta_c in theta
 
+  // Obstacles that stay where they are, each with a circle of its radius in `around`.
+  function discs(map, { problem, radii }, around) {
+    problem.discs.forEach(([cx, cy], k) => {
+      add(map.ground, "circle", { class: "disc", cx, cy, r: radii[k] });
+      add(map.ground, "circle", { class: "safety", cx, cy, r: around[k] });
+    });
+  }
+
   // The nearest boundary: the way outwards from its obstacle's centre through the robot, and where on it
   // the robot is, negative inside.
   function nearest({ start: [x, y] }, { problem, boundaries }) {
@@ -81,7 +89,7 @@
     shared.heading(figure, words);
     const map = plane(figure, data.view, words.handles);
     shared.background(map, data);
-    shared.discs(map, data, data.boundaries);
+    discs(map, data, data.boundaries);
     const parts = [shared.planned(map, data), way(map), shared.robot(map, data, read, move)];
     const tell = shared.results(figure);
     parts.push(walkSlider(figure, data, read, move));

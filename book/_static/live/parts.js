@@ -10,6 +10,8 @@
   const TURN = Math.PI / 3.6; // by an arrow key, for each metre that it would move a place [rad]
   const QUIET = 500; // after the last change, before a screen reader speaks [ms]
   const TICKS = 2; // [m]
+  const CONTROLS = "button, input, select, [tabindex]";
+  const OWN_KEYS = { "data-lm-suppress-shortcuts": true }; // or JupyterLab takes the arrow keys for its own
 
   const clamp = (number, least, most) => Math.min(Math.max(number, least), most);
   const points = (places) => places.map(([x, y]) => `${x},${y}`).join(" ");
@@ -32,6 +34,7 @@
       return;
     }
     build(figure, data, nmpc);
+    for (const control of figure.querySelectorAll(CONTROLS)) set(control, OWN_KEYS);
   }
 
   // What is given now, and what changes it; `show(given)` follows with the next frame.
@@ -114,14 +117,6 @@
       set(tip, { transform: `rotate(${(heading * 180) / Math.PI})` });
       handle.put(end, heading, words.angle(heading));
     };
-  }
-
-  // Obstacles that stay where they are, each with a circle of its radius in `around`.
-  function discs(map, { problem, radii }, around) {
-    problem.discs.forEach(([cx, cy], k) => {
-      add(map.ground, "circle", { class: "disc", cx, cy, r: radii[k] });
-      add(map.ground, "circle", { class: "safety", cx, cy, r: around[k] });
-    });
   }
 
   function planned(map, { problem: { target: [x, y] } }) {
@@ -211,7 +206,7 @@
   }
 
   window.nmpcrl.parts = {
-    clamp, points, begin, state, heading, background, discs, obstacles, robot, arrow, planned, symbol, write, slider, weight,
+    clamp, points, begin, state, heading, background, obstacles, robot, arrow, planned, symbol, write, slider, weight,
     results, button,
   };
 })();

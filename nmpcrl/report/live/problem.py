@@ -82,7 +82,7 @@ def view(task: Task) -> list[float]:
 def boundaries(task: Task, theta_c: float) -> list[float]:
     """The distance from each obstacle's centre at which Xi + theta_c = 0, by Eq. (19) [m]."""
     *_, clearance = task.discs
-    return (clearance / 2 * np.sqrt(1 + theta_c)).tolist()
+    return [float(each) / 2 * (1 + theta_c) ** 0.5 for each in clearance]
 
 
 def close(task: Task, state: Vector) -> list[float]:
