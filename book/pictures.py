@@ -63,7 +63,7 @@ def beside(markdown: str, folder: Path) -> str:
         if not (folder / narrow).exists():
             return found[0]
         (width, height), narrow_size = (_size(folder / path) for path in (wide, narrow))
-        return PICTURE.format(
+        picture = PICTURE.format(
             png=f"../{wide}",
             wide=f"../{wide}",
             narrow=f"../{narrow}",
@@ -74,6 +74,7 @@ def beside(markdown: str, folder: Path) -> str:
             narrow_width=narrow_size[0],
             narrow_height=narrow_size[1],
         )
+        return f'<div class="cell_output docutils container">\n{picture}\n</div>'  # a block: whole
 
     return IMAGE.sub(shown, markdown)
 
