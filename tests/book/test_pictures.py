@@ -82,9 +82,7 @@ INTRO = (BOOK / "intro.md").read_text()
 
 def test_the_introductions_picture_has_a_narrow_version_with_the_same_finding_for_telephones():
     shown = pictures.beside(INTRO, BOOK)
-    block = MarkdownIt().render(shown).partition("<picture>")[2].partition("</picture>")[0]
-    assert block.count("<source ") == 2  # no paragraph has torn it apart
-    assert block.count("<img ") == 1
+    assert '<p><a href="../_static' not in MarkdownIt().render(shown)  # which tears it apart
     (narrow,) = re.findall(rf'media="{re.escape(pictures.NARROW)}" srcset="../([^"]+)"', shown)
     (wide,) = re.findall(r'<img src="../([^"]+)" alt="Short plans make', shown)
     for picture in (wide, narrow):
