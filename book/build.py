@@ -13,9 +13,9 @@ Each build has its own place, in the last column, and six steps, each a function
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
               the published ones end the build, and so do verdicts, as `claims.agreement` says
-4. `execute`  the chapters of the mirror with papermill, two at a time, into PLACE/executed
-5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says, and the
-              scripts of live figures, as `live` says
+4. `execute`  the chapters with papermill, the exercises solved, two at a time, into PLACE/executed
+5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says, exercises
+              unsolved, as `questions` says, and the scripts of live figures, as `live` says
 6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
               repaired for all readers, as `accessible` says
 
@@ -52,10 +52,13 @@ import live
 import nbformat
 import papermill
 import pictures
+import questions
 import yaml
 from papermill.cli import _resolve_type as papermill_value
 from papermill.exceptions import PapermillExecutionError
 from tqdm import tqdm
+
+from nmpcrl.course import exercises
 
 logging.getLogger("papermill").setLevel(logging.ERROR)  # a page without parameters is no news
 
@@ -242,12 +245,13 @@ def execute(notebook: Path, target: Path, log: Path, given: Given) -> tuple[floa
     """Papermill one notebook; return the seconds it took and, if it failed, why in a sentence."""
     started = time.perf_counter()
     target.parent.mkdir(parents=True, exist_ok=True)
+    source = solved(notebook, target.parent.parent / "solved")
     log.parent.mkdir(parents=True, exist_ok=True)
     os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)  # the kernel's stderr, too
     problem = ""
     try:
         papermill.execute_notebook(
-            str(notebook),
+            str(source),
             str(target),
             parameters=given,
             kernel_name="python3",
@@ -258,6 +262,13 @@ def execute(notebook: Path, target: Path, log: Path, given: Given) -> tuple[floa
         traceback.print_exc()
         problem = sentence(error)
     return time.perf_counter() - started, problem
+
+
+def solved(notebook: Path, folder: Path) -> Path:
+    """Write a notebook with the answers of its solutions, so that a wrong solution ends a build."""
+    folder.mkdir(parents=True, exist_ok=True)
+    nbformat.write(exercises.solved(nbformat.read(notebook, 4)), folder / notebook.name)
+    return folder / notebook.name
 
 
 def sentence(error: Exception) -> str:
@@ -312,7 +323,7 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
     for path, notebook in read.items():
         live.share(notebook, path, source / "book/_static/live")
         download = path.name if path in executed else ""
-        dressed = enrich.notebook(notebook, download)
+        dressed = enrich.notebook(questions.placed(notebook), download)
         for name, data in pictures.placed(dressed).items():
             (source / "book" / pictures.FOLDER / name).write_bytes(data)
         nbformat.write(dressed, source / path)
@@ -334,7 +345,7 @@ def render(place: Path, strict: bool) -> None:
     if result.returncode:
         raise Failure(f"Jupyter Book refused the pages (all of it: {shown(log)}):\n{warnings(log)}")
     for path in (place / "executed").glob("*.ipynb"):
-        notebook = pictures.plain(enrich.download(nbformat.read(path, 4)))
+        notebook = pictures.plain(enrich.download(exercises.reopened(nbformat.read(path, 4))))
         nbformat.write(notebook, work / "_build/html/book" / path.name)
     accessible.site(work / "_build/html")
     (work / "_build/html").rename(place / "html")

@@ -1,0 +1,23 @@
+/* What the exercises of a page say. */
+window.nmpcrl = {
+  ...window.nmpcrl,
+  exerciseWords: {
+    answer: "Your answer",
+    formulaOf: (names) => `Your answer, a formula of ${names.join(", ")}`,
+    check: "Check",
+    reset: "Reset",
+    resetAll: "Reset all",
+    again: (name) => `${name} Reset exercise`,
+    noNumber: "That is no number.",
+    noChoice: "Choose one of them.",
+    noFormula: (why) => `That cannot be read: ${why}.`,
+    power: (large) => `Not right: it is too ${large ? "large" : "small"} by a power of ten.`,
+    size: (large) => `Not right: it is too ${large ? "large" : "small"}.`,
+    sign: "Not right: look at the sign.",
+    wrongFormula: (where, value) => `Not right: for ${where} it gives ${value}.`,
+    hint: "The next hint is open above.",
+    progress: (solved, all) => `${solved} of ${all} exercises with a place for an answer are solved on this page.`,
+    kept: "Kept in this browser only.",
+    unkept: "This browser keeps nothing: the answers are gone when the page closes.",
+  },
+};

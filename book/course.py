@@ -1,0 +1,77 @@
+"""Make the editions for a course: notebooks for students and for teachers, with their data.
+
+    python book/course.py      _build/course/student, _build/course/instructor
+
+Each folder can be handed out as it is. It holds the chapters that have exercises, the library as a
+wheel, the libraries to install with it, and the published study. Two builds give the same bytes.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import build
+import click
+import editions
+import nbformat
+
+from nmpcrl.course.exercises import exercises
+
+ROOT = build.ROOT
+EDITIONS: dict[str, Callable[..., Any]] = {
+    "student": editions.student,
+    "instructor": editions.teacher,
+}
+SINCE_1980 = "315532800"  # the earliest time that a ZIP file, so a wheel, can hold [s]
+WHEEL = ("--no-deps", "--no-build-isolation", "--no-index", "--quiet")
+PACKAGED = ("pyproject.toml", "LICENSE")
+
+
+def chapters() -> dict[str, Any]:
+    """The notebooks that have exercises, by file name, in the order of _toc.yml."""
+    read = {path.name: nbformat.read(ROOT / path, 4) for path in build.notebooks().values()}
+    return {name: notebook for name, notebook in read.items() if any(exercises(notebook))}
+
+
+def wheel(place: Path) -> Path:
+    """The library as a wheel at `place`, without a network, the same bytes every time."""
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "source"
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / "nmpcrl", source / "nmpcrl", ignore=ignored)
+        for name in PACKAGED:
+            shutil.copy2(ROOT / name, source)
+        command = [sys.executable, "-m", "pip", "wheel", *WHEEL, "-w", str(place), str(source)]
+        subprocess.run(command, check=True, env=os.environ | {"SOURCE_DATE_EPOCH": SINCE_1980})
+    (made,) = place.glob("*.whl")
+    return made
+
+
+def edition(name: str, place: Path) -> None:
+    """Write one edition to a folder, which is made anew."""
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir(parents=True)
+    library = wheel(place).name
+    sources = chapters()
+    for file, source in sources.items():
+        nbformat.write(EDITIONS[name](source, set(sources), library), place / file)
+    shutil.copy2(ROOT / "environment.txt", place)
+    shutil.copytree(ROOT / "book/published", place / "data/published")
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+def main() -> None:
+    """Write the editions to _build/course."""
+    os.chdir(ROOT)
+    for name in EDITIONS:
+        edition(name, Path("_build/course") / name)
+        click.echo(f"_build/course/{name}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,128 @@
+"""Editions of a chapter for a course: its source in, a notebook for students or teachers out.
+
+Both have a cell that says how to set up and where the data are, each exercise's line of kind, level,
+minutes and points, and parameters with which a notebook takes less than two minutes. Students get
+no solutions; teachers get the solutions in the place of the answers, a table, and a note for each
+exercise.
+"""  # noqa: E501
+
+import re
+from collections.abc import Collection
+from copy import deepcopy
+from typing import Any
+
+from nbformat.v4 import new_code_cell, new_markdown_cell
+
+from nmpcrl.course.exercises import HEAD, Exercise, exercises, solved
+
+Notebook = Any
+
+OFFLINE = {"study": "published", "length": "smoke", "budget": 200}  # parameters of every edition
+LINK = re.compile(r"\[(?P<words>[^][]+)\]\((?P<page>[\w.-]+\.(?:ipynb|md))(?:#[\w:-]+)?\)")
+INSTALL = """**Before you begin.** In the folder of these notebooks, once, in a terminal:
+
+```bash
+python -m venv .venv
+.venv/bin/pip install -r environment.txt {wheel} jupyterlab
+.venv/bin/jupyter lab
+```
+
+Put your answers where the dots are, and run the check below each. A check that fails says why in one sentence; nothing else
+depends on it. Everything runs without a network, from the folder `data`."""
+SETUP = """import os
+
+os.environ |= {"NMPCRL_PUBLISHED": "data/published", "NMPCRL_RUNS": "data/runs"}
+os.environ["NMPCRL_STRICT"] = "1"  # an exercise without an answer fails its check"""
+COLUMNS = "| exercise | kind | level | minutes | points | goal |\n|---|---|---|---|---|---|"
+
+
+def student(source: Notebook, pages: Collection[str], wheel: str) -> Notebook:
+    """A chapter without answers and solutions; a check that fails does not stop the notebook.
+
+    Args:
+        source: the chapter.
+        pages: what lies beside the edition: links elsewhere become words.
+        wheel: the file of the library there.
+    """
+    notebook = deepcopy(source)
+    for one in exercises(notebook):
+        _line(one)
+        for cell in one.parts["check"]:
+            cell.metadata |= {"editable": False, "deletable": False}
+            cell.metadata["tags"] = [*cell.metadata["tags"], "raises-exception"]
+        _drop(notebook, one.parts["solution"])
+        one.text.metadata["nmpcrl"]["exercise"].pop("mistakes", None)
+    return _edition(notebook, pages, wheel)
+
+
+def teacher(source: Notebook, pages: Collection[str], wheel: str) -> Notebook:
+    """A chapter with solutions, and notes on its exercises; arguments as for `student`."""
+    notebook = solved(source)
+    every = list(exercises(notebook))
+    for one in every:
+        _line(one)
+        note = new_markdown_cell(_note(one), id=f"{one.text.id}-note", metadata={"tags": ["note"]})
+        notebook.cells.insert(notebook.cells.index(one.text) + 1, note)
+        for cell in one.parts["answer"]:
+            del cell.metadata["nmpcrl"]
+    if every:
+        table = new_markdown_cell(_table(every), id="exercises-table", metadata={"tags": ["note"]})
+        notebook.cells.insert(1, table)
+    return _edition(notebook, pages, wheel)
+
+
+def _edition(notebook: Notebook, pages: Collection[str], wheel: str) -> Notebook:
+    """What both have in common."""
+    setup = [
+        new_markdown_cell(INSTALL.format(wheel=wheel), id="setup-text"),
+        new_code_cell(SETUP, id="setup"),
+    ]
+    notebook.cells[1:1] = setup
+    for cell in notebook.cells:
+        if "parameters" in cell.metadata.get("tags", []):
+            cell.source = _offline(cell.source)
+        if cell.cell_type == "code":
+            cell.outputs, cell.execution_count = [], None
+        cell.source = LINK.sub(
+            lambda link: link[0] if link["page"] in pages else link["words"], cell.source
+        )
+    return notebook
+
+
+def _offline(parameters: str) -> str:
+    """A cell of parameters with those of OFFLINE."""
+    for name, value in OFFLINE.items():
+        parameters = re.sub(rf"^{name} = .*$", f"{name} = {value!r}", parameters, flags=re.M)
+    return parameters.replace("'", '"')
+
+
+def _line(exercise: Exercise) -> None:
+    """Kind, level, minutes and points behind the number of an exercise."""
+    line = rf"\g<0>*{exercise.about.line}*\n\n"
+    exercise.text.source = HEAD.sub(line, exercise.text.source)
+
+
+def _drop(notebook: Notebook, cells: list[Any]) -> None:
+    ids = {cell.id for cell in cells}
+    notebook.cells = [cell for cell in notebook.cells if cell.id not in ids]
+
+
+def _note(exercise: Exercise) -> str:
+    """For whoever teaches: the goal, and what goes wrong."""
+    about = exercise.about
+    lines = [f"> **For the teacher.** Goal: {about.goal}."]
+    lines += [f"> - Common: {mistake}" for mistake in about.mistakes]
+    return "\n>\n".join(lines[:2]) + "".join(f"\n{line}" for line in lines[2:])
+
+
+def _table(every: list[Exercise]) -> str:
+    rows = [
+        f"| {one.number} | {one.about.kind} | {one.about.level} | {one.about.minutes} "
+        f"| {one.about.points} | {one.about.goal} |"
+        for one in every
+    ]
+    minutes, points = (sum(getattr(o.about, k) for o in every) for k in ("minutes", "points"))
+    total = f"Together {minutes} minutes and {points} points."
+    return "\n".join(
+        ["**For the teacher: the exercises of this chapter.**\n", COLUMNS, *rows, "", total]
+    )

@@ -1,0 +1,56 @@
+"""Exercises on the pages: a place to type an answer, and what checks it there.
+
+An executed chapter has the solutions in the place of its answers, and each check has displayed what
+the page needs to check the same answer (`nmpcrl.course.outcome.MIME`). The page shows the empty
+answer and, where it can be typed, a hidden place that `book/_static/exercises` makes usable;
+without scripts and on paper there are the question, its code and the folded solution.
+"""
+
+import json
+from typing import Any
+
+from nbformat.v4 import new_markdown_cell
+
+from nmpcrl.course.exercises import HEAD, Exercise, exercises, reopened
+from nmpcrl.course.outcome import MIME
+
+PLACE = (
+    '<div class="answer" data-exercise="{name}" data-number="{number}" hidden>'
+    '<script type="application/json">{data}</script></div>'
+)
+LINE = '<p class="exercise-line">{}</p>'
+
+
+def placed(executed: Any) -> Any:
+    """An executed notebook with empty answers and, below each that can be typed, its place."""
+    known = {one.name: check for one in exercises(executed) if (check := _checked(one))}
+    notebook = reopened(executed)
+    for one in exercises(notebook):
+        line = LINE.format(one.about.line)
+        one.text.source = HEAD.sub(rf"\g<0>{line}\n\n", one.text.source)
+        _join(notebook, one, known.get(one.name))
+    return notebook
+
+
+def _checked(exercise: Exercise) -> dict[str, Any] | None:
+    """What the check of an exercise displayed for the page."""
+    shown = (out.get("data", {}) for cell in exercise.parts["check"] for out in cell.outputs)
+    return next((data[MIME] for data in shown if MIME in data), None)
+
+
+def _join(notebook: Any, exercise: Exercise, known: dict[str, Any] | None) -> None:
+    """Answer and check become one cell, folded where the answer can be typed."""
+    if not exercise.parts["answer"]:
+        return
+    *others, last = exercise.parts["answer"] + exercise.parts["check"]
+    last.source = "\n\n".join(cell.source for cell in [*others, last])
+    dropped = {cell.id for cell in others}
+    notebook.cells = [cell for cell in notebook.cells if cell.id not in dropped]
+    if known is None:
+        return
+    last.metadata["tags"] = [*last.metadata.get("tags", []), "hide-input"]
+    data = json.dumps(known, ensure_ascii=False).replace("<", "\\u003c")
+    place = PLACE.format(name=exercise.name, number=exercise.number, data=data)
+    notebook.cells.insert(
+        notebook.cells.index(last), new_markdown_cell(place, id=f"{last.id}-page")
+    )

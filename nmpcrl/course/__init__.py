@@ -1,0 +1,7 @@
+"""The course: exercises, the checks of their answers, and the notebooks that hold them."""
+
+from nmpcrl.course.answers import choice, formula, number
+from nmpcrl.course.behaviour import function, holds
+from nmpcrl.course.outcome import Outcome, Unsolved
+
+__all__ = ["Outcome", "Unsolved", "choice", "formula", "function", "holds", "number"]

@@ -1,0 +1,150 @@
+"""Answers that can be typed: a number, a choice, a formula. The page checks them, too."""
+
+from collections.abc import Callable, Mapping
+from math import isfinite, log10
+from typing import Any
+
+import numpy as np
+
+from nmpcrl.course.formulas import FormulaError, evaluated
+from nmpcrl.course.outcome import Outcome, Unsolved, unanswered
+
+CASES = 8  # at which a formula is compared
+CLOSE = 1e-6  # relative, of two formulas
+
+
+def number(
+    answer: Any,
+    expected: float,
+    *,
+    tolerance: float = 0.005,
+    unit: str = "",
+    mistakes: Mapping[float, str] | None = None,
+) -> Outcome:
+    """A number, right within a tolerance.
+
+    Args:
+        answer: the reader's; `...` if there is none yet.
+        expected: the right one, computed from the problem.
+        tolerance: relative; absolute if 0 is expected.
+        unit: as it stands behind the number.
+        mistakes: wrong numbers that are likely, each with what to say.
+
+    Raises:
+        Unsolved: it is no number, or a wrong one.
+    """
+    if answer is ...:
+        return unanswered()
+    try:
+        value = float(answer)
+    except (TypeError, ValueError):
+        raise Unsolved(f"{answer!r} is no number.") from None
+    within = tolerance * (abs(expected) or 1)
+    said = f"Right: {expected:.4g}{unit and ' '}{unit}."
+    if abs(value - expected) <= within:
+        known = [[float(wrong), why] for wrong, why in (mistakes or {}).items()]
+        about = {"expected": float(expected), "within": within, "unit": unit}
+        return Outcome(said, {"kind": "number", "said": said, "mistakes": known} | about)
+    for wrong, why in (mistakes or {}).items():
+        if abs(value - wrong) <= tolerance * (abs(wrong) or 1):
+            raise Unsolved(why)
+    raise Unsolved(f"{value:g}{unit and ' '}{unit} is not right: {_direction(value, expected)}.")
+
+
+def _direction(value: float, expected: float) -> str:
+    """What is wrong with a number, of which no mistake is known."""
+    if not isfinite(value):
+        return "a finite number is asked for"
+    if value * expected < 0:
+        return "look at the sign"
+    if value * expected > 0 and abs(ten := log10(value / expected)) > 0.5 and _near_whole(ten):
+        return f"it is {'too large' if ten > 0 else 'too small'} by a power of ten"
+    return "it is too large" if abs(value) > abs(expected) else "it is too small"
+
+
+def _near_whole(value: float) -> bool:
+    """Whether a logarithm is that of a power of ten, nearly."""
+    return abs(value - round(value)) < 0.005
+
+
+def choice(answer: Any, right: str, why: Mapping[str, str]) -> Outcome:
+    """One letter of several.
+
+    Args:
+        answer: the reader's; `...` if there is none yet.
+        right: the letter.
+        why: each letter with what to say of it.
+
+    Raises:
+        Unsolved: it is no letter of these, or a wrong one.
+    """
+    if answer is ...:
+        return unanswered()
+    letter = answer.strip().lower() if isinstance(answer, str) else answer
+    if letter not in why:
+        *most, last = why
+        raise Unsolved(f"{answer!r} is none of {', '.join(most)} and {last}.")
+    if letter != right:
+        raise Unsolved(why[letter])
+    said = f"Right: {why[right]}"
+    return Outcome(said, {"kind": "choice", "said": said, "right": right, "why": dict(why)})
+
+
+def formula(
+    answer: Any,
+    expected: Callable[..., float],
+    variables: Mapping[str, tuple[float, float]],
+    *,
+    mistakes: Mapping[str, Callable[..., float]] | None = None,
+) -> Outcome:
+    """A formula as a text, such as "2 * gamma - 1", compared at random values of its variables.
+
+    Args:
+        answer: the reader's; `...` if there is none yet.
+        expected: the right one, a function of the variables by name.
+        variables: each with the range from which its values are drawn.
+        mistakes: what to say, each with the wrong formula of which to say it.
+
+    Raises:
+        Unsolved: it is no formula of these variables, or a wrong one.
+    """
+    if answer is ...:
+        return unanswered()
+    if not isinstance(answer, str):
+        raise Unsolved(f"Write the formula as a text between quotes, of {', '.join(variables)}.")
+    cases = _cases(np.random.default_rng(), variables)
+    try:
+        values = [evaluated(answer, case) for case in cases]
+    except FormulaError as error:
+        raise Unsolved(f"{answer!r} is no formula of {', '.join(variables)}: {error}.") from None
+    for why, wrong in (mistakes or {}).items():
+        if _same(values, wrong, cases) and not _same(values, expected, cases):
+            raise Unsolved(why)
+    if not _same(values, expected, cases):
+        case = ", ".join(f"{name} = {value:g}" for name, value in cases[0].items())
+        raise Unsolved(f"It is not right: for {case} it gives {values[0]:.4g}.")
+    return Outcome("Right.", _formula_of_page(expected, variables, mistakes or {}))
+
+
+def _cases(
+    rng: np.random.Generator, variables: Mapping[str, tuple[float, float]]
+) -> list[dict[str, float]]:
+    drawn = {name: rng.uniform(*bounds, CASES) for name, bounds in variables.items()}
+    return [{name: float(drawn[name][k]) for name in drawn} for k in range(CASES)]
+
+
+def _same(values: list[float], of: Callable[..., float], cases: list[dict[str, float]]) -> bool:
+    return bool(np.allclose(values, [of(**case) for case in cases], rtol=CLOSE, atol=1e-12))
+
+
+def _formula_of_page(
+    expected: Callable[..., float],
+    variables: Mapping[str, tuple[float, float]],
+    mistakes: Mapping[str, Callable[..., float]],
+) -> dict[str, Any]:
+    """Values at cases that are the same in every build; the formula itself is not there."""
+    cases = _cases(np.random.default_rng(0), variables)
+    values = [float(expected(**case)) for case in cases]
+    known = [[[float(wrong(**case)) for case in cases], why] for why, wrong in mistakes.items()]
+    about = {"cases": cases, "values": values, "mistakes": known}
+    return {"kind": "formula", "said": "Right.", "variables": list(variables)} | about

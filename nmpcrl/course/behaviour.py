@@ -1,0 +1,112 @@
+"""Answers that are code: a function is judged by what it does with fresh random inputs."""
+
+from collections.abc import Callable, Mapping
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+
+from nmpcrl.course.outcome import Outcome, Unsolved, unanswered
+
+Arguments = dict[str, Any]  # of one call, by name
+Draw = Callable[[np.random.Generator], Arguments]
+TIMES = 20  # cases that are drawn
+
+
+def function(
+    answer: Any,
+    expected: Callable[..., Any],
+    draw: Draw,
+    *,
+    tolerance: float = 1e-8,
+    mistakes: Mapping[str, Callable[..., Any]] | None = None,
+) -> Outcome:
+    """A function that does the same as another one.
+
+    Args:
+        answer: the reader's; one that still returns `...` is not answered yet.
+        expected: a function that is right.
+        draw: makes the arguments of a call, by name, from a random generator.
+        tolerance: relative, and absolute, too.
+        mistakes: what to say, each with the wrong function of which to say it.
+
+    Raises:
+        Unsolved: it fails, or gives something else in one of the cases.
+    """
+    if answer is ...:
+        return unanswered()
+    if not callable(answer):
+        raise Unsolved(f"A function is asked for, not {answer!r}.")
+    rng = np.random.default_rng()
+    cases = [draw(rng) for _ in range(TIMES)]
+    values = [_called(answer, case) for case in cases]
+    if all(value is ... for value in values):
+        return unanswered()
+    different = [
+        (case, value)
+        for case, value in zip(cases, values, strict=True)
+        if not agree(value, expected(**deepcopy(case)), tolerance)
+    ]
+    if not different:
+        return Outcome(f"Right: it does what it should in {TIMES} random cases.")
+    for why, wrong in (mistakes or {}).items():
+        theirs = [wrong(**deepcopy(case)) for case in cases]
+        if all(agree(*pair, tolerance) for pair in zip(values, theirs, strict=True)):
+            raise Unsolved(why)
+    case, value = different[0]
+    right = expected(**deepcopy(case))
+    raise Unsolved(
+        f"It is wrong in {len(different)} of {TIMES} random cases: "
+        f"for {described(case)} it gives {brief(value)}, and {brief(right)} is right."
+    )
+
+
+def _called(answer: Callable[..., Any], case: Arguments) -> Any:
+    """What the reader's function gives, which may change its own copy of the arguments."""
+    try:
+        return answer(**deepcopy(case))
+    except Exception as error:
+        raise Unsolved(
+            f"For {described(case)} it fails with {type(error).__name__}: {error}"
+        ) from None
+
+
+def agree(value: Any, other: Any, tolerance: float) -> bool:
+    """Whether two results are the same: numbers, arrays, or tuples of them."""
+    if isinstance(other, tuple):
+        alike = isinstance(value, tuple | list) and len(value) == len(other)
+        pairs = zip(value, other, strict=True) if alike else ()
+        return alike and all(agree(one, two, tolerance) for one, two in pairs)
+    try:
+        one, two = np.asarray(value, float), np.asarray(other, float)
+    except (TypeError, ValueError):
+        return bool(value == other)
+    return one.shape == two.shape and np.allclose(one, two, tolerance, tolerance, equal_nan=True)
+
+
+def holds(truth: Any, why: str) -> None:
+    """Refuse an answer that lacks a property.
+
+    Raises:
+        Unsolved: with the sentence.
+    """
+    if not np.all(truth):
+        raise Unsolved(why)
+
+
+def described(case: Arguments) -> str:
+    """The arguments that can be shown in a sentence."""
+    shown = {name: brief(value) for name, value in case.items()}
+    return ", ".join(f"{name} = {value}" for name, value in shown.items() if len(value) < 80)
+
+
+def brief(value: Any) -> str:
+    """A value with four digits, in one line."""
+    if isinstance(value, float | np.ndarray | list) and not isinstance(value, str):
+        try:
+            text = np.array2string(np.asarray(value, float), precision=4, separator=", ")
+        except (TypeError, ValueError):
+            text = repr(value)
+    else:
+        text = repr(value)
+    return " ".join(text.split())
