@@ -53,8 +53,10 @@
   let keeps = true;
 
   function kept() {
+    if (!keeps) return memory;
     try {
-      return JSON.parse(localStorage.getItem(KEY)) ?? {};
+      const all = Object.entries(JSON.parse(localStorage.getItem(KEY)) ?? {});
+      return Object.fromEntries(all.filter(([, state]) => typeof state?.answer === "string"));
     } catch {
       return memory;
     }
@@ -143,7 +145,7 @@
       event.preventDefault();
       const answer = field.read();
       const verdict = checks[data.kind](answer, data);
-      const misses = (kept()[name]?.misses ?? 0) + (verdict.solved ? 0 : 1);
+      const misses = (kept()[name]?.misses || 0) + (verdict.solved ? 0 : 1);
       const hint = !verdict.solved && hintsOf(place)[misses - 1];
       if (hint) hint.open = true;
       remember(name, { answer, solved: Boolean(verdict.solved), misses });

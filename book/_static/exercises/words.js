@@ -7,7 +7,6 @@ window.nmpcrl = {
     check: "Check",
     reset: "Reset",
     resetAll: "Reset all",
-    again: (name) => `${name} Reset exercise`,
     noNumber: "That is no number.",
     noChoice: "Choose one of them.",
     noFormula: (why) => `That cannot be read: ${why}.`,

@@ -1,0 +1,264 @@
+"""Exercises on a page: what the driver makes of them, and what a reader can do with them."""
+
+import json
+from pathlib import Path
+
+import pytest
+import questions
+from axe_playwright_python.sync_playwright import Axe
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+
+from nmpcrl.course import choice, formula, number
+from nmpcrl.course.exercises import solved
+from nmpcrl.course.formulas import evaluated
+
+STATIC = Path(__file__).resolve().parents[2] / "book/_static"
+ABOUT = {"kind": "by hand", "level": 1, "minutes": 5, "points": 1, "goal": "compute"}
+RIGHT = {
+    "weight": number(2.5, 2.5, unit="kg", mistakes={5.0: "That is </script> twice as much."}),
+    "reason": choice("b", "b", {"a": "Not a.", "b": "it is b.", "c": "Not c."}),
+    "path": formula("x / 2", lambda x: x / 2, {"x": (1, 2)}, mistakes={"Half.": lambda x: x}),
+}
+SCRIPTS = ("words", "formula", "exercises")
+PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head><title>Exercises</title>
+<link rel="stylesheet" href="{static}/nmpcrl.css">
+<link rel="stylesheet" href="{static}/exercises/exercises.css">{scripts}</head>
+<body><main class="bd-article"><h1>Exercises</h1>{places}</main></body></html>"""
+AROUND = """<div class="exercise">How?</div>
+<details class="folded"><summary>Hint 1 of {name}</summary><p>First.</p></details>
+<details class="folded"><summary>Hint 2 of {name}</summary><p>Second.</p></details>
+{place}<details class="folded"><summary>Solution</summary><p>So.</p></details>"""
+
+
+def executed(answer: str = "x = ...", outputs=(), **about):
+    """A notebook with one exercise, solved and run."""
+    tags = {name: {"tags": [name]} for name in ("answer", "check", "solution")}
+    text = {"tags": ["exercise"], "nmpcrl": {"exercise": ABOUT | about}}
+    source = new_notebook(
+        cells=[
+            new_markdown_cell('<a id="ex-a"></a>\n**Exercise 1.1.** How?', metadata=text),
+            new_code_cell(answer, metadata=tags["answer"]),
+            new_code_cell("check.a(x)", metadata=tags["check"]),
+            new_markdown_cell("```python\nx = 2\n```", metadata=tags["solution"]),
+        ]
+    )
+    done = solved(source)
+    done.cells[2].outputs = [new_output("execute_result", one, metadata={}) for one in outputs]
+    return done
+
+
+def test_an_answer_that_can_be_typed_gets_a_place_above_its_folded_code():
+    page = questions.placed(executed(outputs=[RIGHT["weight"]._repr_mimebundle_()]))
+    text, place, code, _ = page.cells
+    assert text.source == (
+        '<a id="ex-a"></a>\n**Exercise 1.1.** '
+        '<p class="exercise-line">By hand · level 1 of 3 · 5 minutes · 1 point</p>\n\nHow?'
+    )
+    assert code.source == "x = ...\n\ncheck.a(x)"
+    assert "hide-input" in code.metadata["tags"]
+    assert code.outputs == []
+    assert "\n" not in place.source  # a blank line would end the HTML
+    assert place.source.count("</script>") == 1
+    assert 'data-exercise="a"' in place.source
+
+
+def test_code_is_shown_empty_with_its_check():
+    page = questions.placed(executed("def x():\n    return ...", [{"text/plain": "Right."}]))
+    assert [cell.source for cell in page.cells[1:2]] == [
+        "def x():\n    return ...\n\ncheck.a(x)",
+    ]
+    assert "hide-input" not in page.cells[1].metadata["tags"]
+    assert page.cells[1].outputs == []
+
+
+def test_a_page_without_exercises_stays_as_it_is():
+    plain = new_notebook(cells=[new_code_cell("1 + 1"), new_markdown_cell("Two.")])
+    assert questions.placed(plain) == plain
+
+
+def written(folder: Path) -> str:
+    """A page with an exercise of each kind, whose scripts are those of the book."""
+    places = []
+    for k, (name, outcome) in enumerate(RIGHT.items(), 1):
+        data = json.dumps(dict(outcome.page)).replace("<", "\\u003c")
+        place = questions.PLACE.format(name=name, number=f"1.{k}", data=data)
+        places.append(AROUND.format(name=name, place=place))
+    folder_of = STATIC.as_uri()
+    scripts = [f'<script src="{folder_of}/exercises/{name}.js"></script>' for name in SCRIPTS]
+    page = PAGE.format(static=folder_of, scripts="".join(scripts), places="\n".join(places))
+    (folder / "page.html").write_text(page)
+    return (folder / "page.html").as_uri()
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    return written(tmp_path_factory.mktemp("page"))
+
+
+@pytest.fixture
+def tab(browser, address):
+    """The page, opened from disk by a reader who has not been here."""
+    context = browser.new_context(viewport={"width": 390, "height": 900})
+    page = context.new_page()
+    page.errors = []
+    page.on("pageerror", lambda error: page.errors.append(str(error)))
+    page.goto(address)
+    yield page
+    assert page.errors == []
+    context.close()
+
+
+def said(tab, name: str):
+    return tab.locator(f'[data-exercise="{name}"] .said')
+
+
+def answered(tab, name: str, answer: str) -> str:
+    """What is said of an answer that is typed and sent by the Enter key."""
+    tab.locator(f"#answer-{name}").fill("")
+    tab.locator(f"#answer-{name}").press_sequentially(answer)
+    tab.keyboard.press("Enter")
+    return said(tab, name).inner_text()
+
+
+@pytest.mark.book
+@pytest.mark.parametrize(
+    ("name", "answer", "what"),
+    [
+        ("weight", "2.5", "Right: 2.5 kg."),
+        ("weight", "2,505", "Right: 2.5 kg."),
+        ("weight", "25e-1", "Right: 2.5 kg."),
+        ("weight", "5", "That is </script> twice as much. The next hint is open above."),
+        ("weight", "-2.5", "Not right: look at the sign."),
+        ("weight", "250", "Not right: it is too large by a power of ten."),
+        ("weight", "2", "Not right: it is too small."),
+        ("weight", "much", "That is no number."),
+        ("weight", "", "That is no number."),
+        ("path", "0.5*x", "Right."),
+        ("path", "x^1/2", "Right."),
+        ("path", "x", "Half."),
+        ("path", "x+1", "Not right: for x = "),
+        ("path", "y", "y is not among its variables"),
+        ("path", "alert(1)", "alert is not among its variables"),
+        ("path", "(x", 'a ")" is missing'),
+    ],
+)
+def test_a_typed_answer_is_judged_as_the_notebook_judges_it(tab, name, answer, what):
+    assert answered(tab, name, answer).startswith(what) or what in said(tab, name).inner_text()
+    verdict = tab.locator(f'[data-exercise="{name}"]').get_attribute("data-verdict")
+    assert verdict == ("right" if what.startswith("Right") else "wrong")
+
+
+FORMULAS = (
+    "1 + 2 * 3", "-2^2", "2^-1", "2^3^2", "2**3", "(1 + 2) * 3", "6 / 3 / 2", "5 - 3 - 1", "x * -y",
+    "sqrt(x^2 + y^2)", "max(x, 2, y)", "min(x, -1)", "exp(-x) * cos(y) + sin(x)", "1.5e-3 * log(y)",
+    ".5 * x", "abs(-x)", "2 * (x + (y - 1) / 3)", "- - x", "+x",
+)  # fmt: skip
+
+
+@pytest.mark.book
+def test_the_page_reads_formulas_as_the_library_does(tab):
+    values = {"x": 1.25, "y": 0.75}
+    there = tab.evaluate(
+        "([all, values]) => all.map(one => nmpcrl.formula.value(one, values))",
+        [list(FORMULAS), values],
+    )
+    assert there == pytest.approx([evaluated(one, values) for one in FORMULAS], rel=1e-12)
+
+
+@pytest.mark.book
+def test_the_keyboard_alone_chooses_and_checks(tab):
+    tab.locator("#answer-reason-a").focus()
+    tab.keyboard.press("Space")
+    tab.keyboard.press("Enter")
+    assert said(tab, "reason").inner_text().startswith("Not a.")
+    tab.keyboard.press("ArrowDown")  # b
+    tab.keyboard.press("Tab")
+    assert tab.evaluate("document.activeElement.innerText") == "Check"
+    tab.keyboard.press("Enter")
+    assert said(tab, "reason").inner_text() == "Right: it is b."
+
+
+@pytest.mark.book
+def test_nothing_chosen_is_no_miss_of_a_letter(tab):
+    tab.locator('[data-exercise="reason"]').get_by_role("button", name="Check").click()
+    assert said(tab, "reason").inner_text().startswith("Choose one")
+
+
+@pytest.mark.book
+def test_each_miss_opens_the_next_hint_and_says_so(tab):
+    opened = "[...document.querySelectorAll('details[open] summary')].map(one => one.innerText)"
+    assert tab.evaluate(opened) == []
+    assert "next hint is open" in answered(tab, "weight", "1")
+    assert tab.evaluate(opened) == ["Hint 1 of weight"]
+    assert "next hint is open" in answered(tab, "weight", "1")
+    assert tab.evaluate(opened) == ["Hint 1 of weight", "Hint 2 of weight"]
+    assert "next hint" not in answered(tab, "weight", "1")
+
+
+@pytest.mark.book
+def test_answers_and_progress_are_kept_until_they_are_reset(tab):
+    answered(tab, "weight", "2.5")
+    answered(tab, "path", "x")
+    tab.reload()
+    assert tab.locator("#answer-weight").input_value() == "2.5"
+    assert said(tab, "weight").inner_text() == "Right: 2.5 kg."
+    assert said(tab, "path").inner_text() == "Half."
+    progress = tab.locator(".exercise-progress")
+    assert progress.inner_text().startswith("1 of 3 exercises")
+    tab.locator('[data-exercise="weight"]').get_by_role("button", name="Reset").click()
+    assert tab.locator("#answer-weight").input_value() == ""
+    assert progress.inner_text().startswith("0 of 3 exercises")
+    tab.get_by_role("button", name="Reset all").click()
+    tab.reload()
+    assert tab.locator("#answer-path").input_value() == ""
+    assert tab.evaluate("localStorage.getItem('nmpcrl.exercises')") == "{}"
+
+
+@pytest.mark.book
+@pytest.mark.parametrize("stored", ["{", "3", "[]", '{"weight": 3}', '{"weight": {}}'])
+def test_what_is_stored_may_be_spoilt(tab, stored):
+    tab.evaluate("stored => localStorage.setItem('nmpcrl.exercises', stored)", stored)
+    tab.reload()
+    assert answered(tab, "weight", "2.5") == "Right: 2.5 kg."
+
+
+@pytest.mark.book
+def test_a_browser_that_keeps_nothing_says_so(tab):
+    tab.add_init_script("Storage.prototype.setItem = () => { throw new Error('full') }")
+    tab.reload()
+    answered(tab, "weight", "2.5")
+    assert tab.locator(".exercise-progress").inner_text().startswith("1 of 3")
+    assert "keeps nothing" in tab.locator(".exercise-progress").inner_text()
+
+
+@pytest.mark.book
+def test_what_is_said_is_announced_and_every_field_has_a_name(tab):
+    assert said(tab, "weight").get_attribute("role") == "status"
+    assert tab.get_by_role("textbox", name="Your answer", exact=True).count() == 1
+    assert tab.get_by_role("textbox", name="Your answer, a formula of x").count() == 1
+    assert tab.get_by_role("group", name="Your answer").get_by_role("radio").count() == 3
+    assert tab.get_by_role("form", name="Exercise 1.2").count() == 1
+
+
+@pytest.mark.book
+@pytest.mark.parametrize("width", [390, 1400])
+def test_no_rule_of_accessibility_is_broken(tab, width):
+    tab.set_viewport_size({"width": width, "height": 900})
+    answered(tab, "weight", "5")
+    answered(tab, "path", "x / 2")
+    found = Axe().run(tab, options={"resultTypes": ["violations"], "preload": False})
+    assert [one["id"] for one in found.response["violations"]] == []
+    assert tab.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.book
+def test_without_scripts_and_on_paper_there_is_no_place_to_type(browser, address, tab):
+    without = browser.new_context(java_script_enabled=False)
+    page = without.new_page()
+    page.goto(address)
+    assert not page.locator(".answer").first.is_visible()
+    assert page.get_by_text("Solution").first.is_visible()
+    without.close()
+    tab.emulate_media(media="print")
+    assert not tab.locator(".answer").first.is_visible()
+    assert not tab.locator(".exercise-progress").is_visible()

@@ -1,0 +1,90 @@
+"""Functions that readers write are judged by what they do."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.course import Outcome, Unsolved, function, holds
+from nmpcrl.course.outcome import STRICT, UNANSWERED
+
+FORGOTTEN = "The square is forgotten."
+
+
+def squares(x):
+    return (x**2).sum()
+
+
+def check(answer) -> Outcome:
+    def draw(rng):
+        return {"x": rng.normal(size=3)}
+
+    return function(answer, squares, draw, mistakes={FORGOTTEN: lambda x: x.sum()})
+
+
+def test_a_function_that_does_the_same_is_right():
+    assert check(lambda x: x @ x).said == "Right: it does what it should in 20 random cases."
+
+
+def test_a_function_may_change_its_arguments():
+    def spoils(x):
+        x *= x
+        return x.sum()
+
+    assert check(spoils).said.startswith("Right")
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (lambda x: x.sum(), FORGOTTEN),
+        (lambda x: x @ x + 1, r"It is wrong in 20 of 20 .* for x = \[.*\] it gives .* is right"),
+        (lambda x: x, "is right"),
+        (lambda x: "nothing", "'nothing'"),
+        (lambda x: None, "gives None"),
+        (lambda x, y: x, "fails with TypeError"),
+        (lambda x: 1 / 0, "fails with ZeroDivisionError: division by zero"),
+        (3, "A function is asked for"),
+    ],
+)
+def test_a_wrong_function_is_met_with_a_sentence_that_helps(answer, said):
+    with pytest.raises(Unsolved, match=said) as raised:
+        check(answer)
+    assert "\n" not in str(raised.value)
+
+
+def test_the_inputs_are_fresh_each_time():
+    seen = []
+    for _ in range(2):
+        check(lambda x: seen.append(x.copy()) or squares(x))
+    assert len({tuple(x) for x in seen}) == 40
+
+
+@pytest.mark.parametrize("answer", [..., lambda x: ...])
+def test_a_function_that_returns_dots_is_not_answered(answer, monkeypatch):
+    assert check(answer).said == UNANSWERED
+    monkeypatch.setenv(STRICT, "1")
+    with pytest.raises(Unsolved, match="Not answered"):
+        check(answer)
+
+
+def test_tuples_are_compared_one_by_one():
+    def draw(rng):
+        return {"x": rng.normal()}
+
+    def both(x):
+        return x, np.array([x, 2 * x])
+
+    assert function(both, both, draw).said.startswith("Right")
+    with pytest.raises(Unsolved):
+        function(lambda x: (x, np.array([x, x])), both, draw)
+    with pytest.raises(Unsolved):
+        function(lambda x: x, both, draw)
+
+
+def test_a_property_holds_or_its_sentence_is_raised():
+    holds(np.array([True, True]), "never")
+    with pytest.raises(Unsolved, match="it must fall"):
+        holds([True, False], "it must fall")
+
+
+def test_a_notebook_shows_the_sentence_and_no_traceback():
+    assert Unsolved("Look at the sign.")._render_traceback_() == ["Unsolved: Look at the sign."]
