@@ -1,10 +1,10 @@
 """Editions of a chapter for a course: its source in, a notebook for students or teachers out.
 
-Both have a cell that says how to set up and where the data are, each exercise's line of kind, level,
-minutes and points, and parameters with which a notebook takes less than two minutes. Students get
-no solutions; teachers get the solutions in the place of the answers, a table, and a note for each
-exercise.
-"""  # noqa: E501
+Both have a cell that says how to set up and where the data are, a line with kind, level, minutes
+and points in each exercise, and parameters with which a notebook takes less than two minutes.
+Students get no solutions; teachers get them in the place of the answers, a table of the exercises,
+and a note in each.
+"""
 
 import re
 from collections.abc import Collection
@@ -27,12 +27,13 @@ python -m venv .venv
 .venv/bin/jupyter lab
 ```
 
-Put your answers where the dots are, and run the check below each. A check that fails says why in one sentence; nothing else
-depends on it. Everything runs without a network, from the folder `data`."""
+Put your answers where the dots are, and run the check below each. A check that fails says why in
+one sentence; nothing else depends on it. Everything runs without a network, from the folder
+`data`."""
 SETUP = """import os
 
 os.environ |= {"NMPCRL_PUBLISHED": "data/published", "NMPCRL_RUNS": "data/runs"}
-os.environ["NMPCRL_STRICT"] = "1"  # an exercise without an answer fails its check"""
+os.environ["NMPCRL_STRICT"] = "1"  # an answer that is missing or wrong fails"""
 COLUMNS = "| exercise | kind | level | minutes | points | goal |\n|---|---|---|---|---|---|"
 
 

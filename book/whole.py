@@ -58,7 +58,7 @@ CITED = """A literate reproduction of {authors}, <cite>{title}</cite>, {number}.
 ALT = "The robot's trajectory around four obstacles, and some of the short plans behind it."
 
 SCREEN = (  # nothing for paper
-    "script, style, link, button, iframe, form, figure.live, .headerlink, .download"
+    "script, style, link, button, iframe, form, figure.live, div.answer, .headerlink, .download"
 )
 COLOURLESS = ".highlight .n, .highlight .p, .highlight .w"  # half of all elements, each with a tag
 REFERRING = ("for", "headers", "aria-labelledby", "aria-describedby", "aria-controls")

@@ -18,7 +18,8 @@ ROOMS = {  # each may import those that it names, and what they may
     "bench": ("study",),
     "claims": ("analysis", "bench"),
     "report": ("claims",),
-    "commands": ("report",),
+    "course": ("claims",),
+    "commands": ("report", "course"),
 }
 DISK = {"io", "json", "os", "pathlib", "pickle", "shutil", "sqlite3", "tempfile"}
 HOMES = {  # foreign library -> where alone it may be imported

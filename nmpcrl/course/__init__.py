@@ -2,6 +2,6 @@
 
 from nmpcrl.course.answers import choice, formula, number
 from nmpcrl.course.behaviour import function, holds
-from nmpcrl.course.outcome import Outcome, Unsolved
+from nmpcrl.course.outcome import Outcome, Unsolved, exercise
 
-__all__ = ["Outcome", "Unsolved", "choice", "formula", "function", "holds", "number"]
+__all__ = ["Outcome", "Unsolved", "choice", "exercise", "formula", "function", "holds", "number"]

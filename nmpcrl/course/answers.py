@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.course.formulas import FormulaError, evaluated
-from nmpcrl.course.outcome import Outcome, Unsolved, unanswered
+from nmpcrl.course.outcome import Outcome, Unsolved, refuse_unanswered
 
 CASES = 8  # at which a formula is compared
 CLOSE = 1e-6  # relative, of two formulas
@@ -24,17 +24,16 @@ def number(
     """A number, right within a tolerance.
 
     Args:
-        answer: the reader's; `...` if there is none yet.
+        answer: the reader's; `...` if there is none.
         expected: the right one, computed from the problem.
         tolerance: relative; absolute if 0 is expected.
         unit: as it stands behind the number.
         mistakes: wrong numbers that are likely, each with what to say.
 
     Raises:
-        Unsolved: it is no number, or a wrong one.
+        Unsolved: it is missing, no number, or wrong.
     """
-    if answer is ...:
-        return unanswered()
+    refuse_unanswered(answer)
     try:
         value = float(answer)
     except (TypeError, ValueError):
@@ -71,15 +70,14 @@ def choice(answer: Any, right: str, why: Mapping[str, str]) -> Outcome:
     """One letter of several.
 
     Args:
-        answer: the reader's; `...` if there is none yet.
+        answer: the reader's; `...` if there is none.
         right: the letter.
         why: each letter with what to say of it.
 
     Raises:
-        Unsolved: it is no letter of these, or a wrong one.
+        Unsolved: it is missing, no letter of these, or wrong.
     """
-    if answer is ...:
-        return unanswered()
+    refuse_unanswered(answer)
     letter = answer.strip().lower() if isinstance(answer, str) else answer
     if letter not in why:
         *most, last = why
@@ -100,16 +98,15 @@ def formula(
     """A formula as a text, such as "2 * gamma - 1", compared at random values of its variables.
 
     Args:
-        answer: the reader's; `...` if there is none yet.
+        answer: the reader's; `...` if there is none.
         expected: the right one, a function of the variables by name.
         variables: each with the range from which its values are drawn.
         mistakes: what to say, each with the wrong formula of which to say it.
 
     Raises:
-        Unsolved: it is no formula of these variables, or a wrong one.
+        Unsolved: it is missing, no formula of these variables, or wrong.
     """
-    if answer is ...:
-        return unanswered()
+    refuse_unanswered(answer)
     if not isinstance(answer, str):
         raise Unsolved(f"Write the formula as a text between quotes, of {', '.join(variables)}.")
     cases = _cases(np.random.default_rng(), variables)

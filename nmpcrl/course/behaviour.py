@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from nmpcrl.course.outcome import Outcome, Unsolved, unanswered
+from nmpcrl.course.outcome import Outcome, Unsolved, refuse_unanswered
 
 Arguments = dict[str, Any]  # of one call, by name
 Draw = Callable[[np.random.Generator], Arguments]
@@ -33,15 +33,13 @@ def function(
     Raises:
         Unsolved: it fails, or gives something else in one of the cases.
     """
-    if answer is ...:
-        return unanswered()
+    refuse_unanswered(answer)
     if not callable(answer):
         raise Unsolved(f"A function is asked for, not {answer!r}.")
     rng = np.random.default_rng()
     cases = [draw(rng) for _ in range(TIMES)]
     values = [_called(answer, case) for case in cases]
-    if all(value is ... for value in values):
-        return unanswered()
+    refuse_unanswered(values[0])
     different = [
         (case, value)
         for case, value in zip(cases, values, strict=True)

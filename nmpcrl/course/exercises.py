@@ -3,6 +3,7 @@
 | tag | cell | holds |
 |---|---|---|
 | `exercise` | Markdown | a label `<a id="ex-..."></a>`, the bold number, the question; `About` as metadata |
+| `note` | Markdown | in the edition for teachers: the goal, and what goes wrong |
 | `hint` | Markdown | a folded `Hint 1`; one to three, from a nudge to the method |
 | `given` | code | what the exercise starts from, if anything |
 | `answer` | code | `name = ...`, or a function that returns `...` or is wrong |
@@ -24,7 +25,7 @@ Notebook = Any
 
 KINDS = ("by hand", "read", "code", "find the bug", "project")
 LEVELS = (1, 2, 3)
-PARTS = ("hint", "given", "answer", "check", "rubric", "solution")
+PARTS = ("note", "hint", "given", "answer", "check", "rubric", "solution")
 HEAD = re.compile(r'<a id="ex-(?P<name>[\w-]+)"></a>\n\*\*Exercise (?P<number>[\d.]+)\.\*\* ?')
 CODE = re.compile(r"^```python\n(.*?)\n```$", flags=re.M | re.S)
 OURS, OPEN = "nmpcrl", "unanswered"  # keys of a cell's metadata

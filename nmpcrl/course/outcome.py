@@ -1,20 +1,23 @@
-"""What a check says of an answer: it is right, it is not there yet, or it is wrong, and then why.
+"""What a check says of an answer: it is right, or it is not, and then why.
 
-A right answer is an `Outcome`, which a notebook shows as a sentence. A wrong one raises `Unsolved`.
-An exercise that nobody has answered says so and lets the chapter run to its end; in an edition for
-students, where NMPCRL_STRICT is set, it raises, too, so that it counts as unsolved.
+The functions of this room return an `Outcome` for a right answer and raise `Unsolved` for any
+other. An `exercise` of a chapter raises only in an edition for students and in a build of the book,
+where NMPCRL_STRICT is set; elsewhere it says the same, and the chapter runs to its end.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec
 
 from nmpcrl.study.parameters import Refusal
 
 MIME = "application/vnd.nmpcrl.check+json"  # of what the page is given
 STRICT = "NMPCRL_STRICT"
 UNANSWERED = "Not answered yet: put your answer where the dots are, run that cell, then this one."
+
+P = ParamSpec("P")
 
 
 class Unsolved(Refusal):
@@ -23,7 +26,7 @@ class Unsolved(Refusal):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a check returns."""
+    """What a check says."""
 
     said: str
     page: Mapping[str, Any] | None = None  # with which the page checks the same answer
@@ -33,12 +36,26 @@ class Outcome:
         return {"text/plain": self.said} | ({MIME: dict(self.page)} if self.page else {})
 
 
-def unanswered() -> Outcome:
-    """What is said where `...` still stands.
+def refuse_unanswered(answer: Any) -> None:
+    """Refuse the three dots.
 
     Raises:
-        Unsolved: in an edition for students.
+        Unsolved: nothing has been put in their place.
     """
-    if os.environ.get(STRICT):
+    if answer is ...:
         raise Unsolved(UNANSWERED)
-    return Outcome(UNANSWERED)
+
+
+def exercise(check: Callable[P, Outcome]) -> Callable[P, Outcome]:
+    """The check of an exercise, which a chapter calls: unless it has to, it does not raise."""
+
+    @wraps(check)
+    def said(*args: P.args, **kwargs: P.kwargs) -> Outcome:
+        try:
+            return check(*args, **kwargs)
+        except Unsolved as unsolved:
+            if os.environ.get(STRICT):
+                raise
+            return Outcome(str(unsolved))
+
+    return said

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from nmpcrl.course import Outcome, Unsolved, choice, formula, number
+from nmpcrl.course import Outcome, Unsolved, choice, exercise, formula, number
 from nmpcrl.course.formulas import FormulaError, evaluated
 from nmpcrl.course.outcome import MIME, STRICT, UNANSWERED
 
@@ -27,12 +27,26 @@ CHECKS = [lambda one: number(one, 1.5), lambda one: choice(one, "b", WHY), typed
 
 
 @pytest.mark.parametrize("check", CHECKS)
-def test_without_an_answer_the_notebook_goes_on_and_that_of_a_student_does_not(check, monkeypatch):
-    assert check(...).said == UNANSWERED
-    assert check(...).page is None
-    monkeypatch.setenv(STRICT, "1")
+def test_dots_are_no_answer(check):
     with pytest.raises(Unsolved, match="Not answered yet"):
         check(...)
+
+
+@pytest.mark.parametrize(("answer", "said"), [(..., UNANSWERED), (2, "2 is not right")])
+def test_a_chapter_says_what_is_wrong_and_goes_on_and_a_students_notebook_fails(
+    answer, said, monkeypatch
+):
+    @exercise
+    def check(answer) -> Outcome:
+        return number(answer, 1.5)
+
+    monkeypatch.delenv(STRICT, raising=False)
+    assert check(answer).said.startswith(said)
+    assert check(answer).page is None
+    monkeypatch.setenv(STRICT, "1")
+    with pytest.raises(Unsolved, match=said):
+        check(answer)
+    assert check(1.5).said == "Right: 1.5."
 
 
 @given(st.floats(-1e6, 1e6), st.floats(-0.9, 0.9))

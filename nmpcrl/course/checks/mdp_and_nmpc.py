@@ -5,10 +5,11 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.control import Nmpc
-from nmpcrl.course import Outcome, choice, formula, function, number
+from nmpcrl.course import Outcome, choice, exercise, formula, function, number
 from nmpcrl.study import paper
 
 
+@exercise
 def distance(answer: Any) -> Outcome:
     """Where the overlap, Eq. (1.4), is -0.21."""
     radius = 2.5 / 2
@@ -26,6 +27,7 @@ def distance(answer: Any) -> Outcome:
     )
 
 
+@exercise
 def scale(answer: Any, nmpc: Nmpc) -> Outcome:
     """How much larger the value at the start is with twice the weights, from two solves."""
     theta = np.array(paper.THETA_INIT)
@@ -43,6 +45,7 @@ def scale(answer: Any, nmpc: Nmpc) -> Outcome:
     )
 
 
+@exercise
 def reach(answer: Any) -> Outcome:
     """Steps times seconds times the top speed."""
     return formula(
@@ -56,6 +59,7 @@ def reach(answer: Any) -> Outcome:
     )
 
 
+@exercise
 def apart(answer: Any) -> Outcome:
     """Why the plan is not the closed loop although the model is exact."""
     return choice(
@@ -71,6 +75,7 @@ def apart(answer: Any) -> Outcome:
     )
 
 
+@exercise
 def penalty(answer: Any) -> Outcome:
     """Eq. (1.5), the part on obstacles, at random places between and inside them."""
     task = paper.task()
@@ -103,6 +108,7 @@ def penalty(answer: Any) -> Outcome:
     )
 
 
+@exercise
 def discounted(answer: Any) -> Outcome:
     """The sum of gamma^k times the cost of step k, from k = 0."""
 
