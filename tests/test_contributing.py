@@ -217,6 +217,9 @@ def ends(runs: Runs[Records]) -> Figure:
         "book/reproduce.md": replaced(
             "| `solver` |", "| `08_again` | `layout`, `horizon` |\n| `solver` |"
         ),
+        "nmpcrl/course/checks/again.py": added(
+            "from nmpcrl.course.checks.mdp_and_nmpc import *  # noqa: F403\n"
+        ),
     },
     "live figure": {
         "nmpcrl/report/live/worth.py": added('''"""A live figure of what the start is worth."""
