@@ -1,5 +1,6 @@
 """The driver, book/build.py: what it refuses, and what it leaves behind when a step fails."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -8,8 +9,10 @@ from pathlib import Path
 
 import build
 import nbformat
+import papermill
 import pytest
 import yaml
+from bs4 import BeautifulSoup
 from click.testing import CliRunner
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
@@ -109,8 +112,12 @@ def test_values_are_read_as_papermill_reads_them():
 def small(tmp_path):
     """A copy of the driver with a book of one page and one chapter."""
     shutil.copytree(ROOT / "book/_static", tmp_path / "book/_static")
-    driver = ("build.py", "enrich.py", "accessible.py", "live.py", "pictures.py", "reference.py")
-    for name in ("_config.yml", "book/references.bib", *(f"book/{one}" for one in driver)):
+    driver = ("build.py", "enrich.py", "accessible.py", "live.py", "pictures.py", "questions.py")
+    for name in (
+        "_config.yml",
+        "book/references.bib",
+        *(f"book/{one}" for one in (*driver, "reference.py")),
+    ):
         shutil.copy2(ROOT / name, tmp_path / name)
     (tmp_path / "nmpcrl").symlink_to(ROOT / "nmpcrl")
     toc = {
@@ -126,11 +133,16 @@ def small(tmp_path):
 
 def write(place: Path, last: str) -> None:
     """Write the small book's chapter, which ends in the cell `last`."""
+    save(place, new_code_cell(last))
+
+
+def save(place: Path, *last) -> None:
+    """Write the small book's chapter, which ends in these cells."""
     cells = [
         new_markdown_cell("# One"),
         new_code_cell("episodes = 300", metadata={"tags": ["parameters"]}),
         new_code_cell("experiments = ()"),
-        new_code_cell(last),
+        *last,
     ]
     kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
     nbformat.write(
@@ -249,3 +261,59 @@ def test_verdicts_of_runs_are_held_against_the_published_ones_before_a_chapter_r
     monkeypatch.setattr(agreement, "of_runs", lambda fresh, known: ("C1 is so here",))
     with pytest.raises(build.Failure, match="C1 is so here"):
         build.train((), ())
+
+
+def exercise(code: str) -> list:
+    """Exercise 1.1, whose solution is `code`."""
+    about = {"kind": "by hand", "level": 1, "minutes": 5, "points": 1, "goal": "compute"}
+    text = {"tags": ["exercise"], "nmpcrl": {"exercise": about}}
+    folded = f"<details><summary>Solution</summary>\n\n```python\n{code}\n```\n\n</details>"
+    check = "from nmpcrl.course.checks import mdp_and_nmpc as check\n\ncheck.distance(d)"
+    return [
+        new_markdown_cell('<a id="ex-far"></a>\n**Exercise 1.1.** How far?', metadata=text),
+        new_code_cell("d = ...", metadata={"tags": ["answer"]}),
+        new_code_cell(check, metadata={"tags": ["check"]}),
+        new_markdown_cell(folded, metadata={"tags": ["solution"]}),
+    ]
+
+
+@pytest.mark.book
+def test_a_page_has_an_empty_answer_a_place_for_it_and_the_folded_solution(small):
+    save(small, *exercise("d = 1.375"))
+    result = run(small)
+    assert result.returncode == 0, result.stderr
+    page = BeautifulSoup((small / "_build/html/book/one.html").read_text(), "html.parser").article
+    assert page.select_one(".exercise .exercise-line").text.startswith("By hand · level 1 of 3")
+    place = page.select_one("div.answer[hidden]")
+    assert json.loads(place.script.string)["expected"] == pytest.approx(1.375)
+    assert "d = ..." in page.select_one("details.hide pre").text
+    assert "d = 1.375" in page.select_one("details.solution").text
+    assert page.text.count("d = 1.375") == 1
+    offered = nbformat.read(small / "_build/html/book/one.ipynb", 4)
+    assert [cell.source for cell in offered.cells if "answer" in cell.metadata.get("tags", [])] == [
+        "d = ..."
+    ]
+    assert "Right" not in nbformat.writes(offered)
+
+
+@pytest.mark.book
+def test_a_solution_that_its_check_refuses_ends_the_build(small):
+    save(small, *exercise("d = 1.25"))
+    result = run(small)
+    assert result.returncode == 1
+    assert "Unsolved: That is where the overlap is 0" in result.stderr
+
+
+@pytest.mark.book
+@pytest.mark.parametrize("answer", ["d = ...", "d = 1.25"])
+def test_papermill_runs_a_chapter_to_its_end_whatever_the_answers_are(answer, small, monkeypatch):
+    monkeypatch.delenv("NMPCRL_STRICT", raising=False)
+    cells = exercise("d = 1.375")
+    cells[1].source = answer
+    save(small, *cells, new_code_cell("print(episodes)"))
+    papermill.execute_notebook(
+        small / "book/one.ipynb", small / "o.ipynb", {"episodes": 2}, progress_bar=False
+    )
+    *_, check, _, last = nbformat.read(small / "o.ipynb", 4).cells
+    assert not check.outputs[0].data["text/plain"].startswith("Right")
+    assert last.outputs[0].text == "2\n"
