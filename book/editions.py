@@ -19,6 +19,7 @@ Notebook = Any
 
 OFFLINE = {"study": "published", "length": "smoke", "budget": 200}  # parameters of every edition
 LINK = re.compile(r"\[(?P<words>[^][]+)\]\((?P<page>[\w.-]+\.(?:ipynb|md))(?:#[\w:-]+)?\)")
+ELSEWHERE = re.compile(r"^make .*\n|(?<=^papermill )book/", flags=re.M)  # in a box "Try"
 INSTALL = """**Before you begin.** In the folder of these notebooks, once, in a terminal:
 
 ```bash
@@ -82,6 +83,8 @@ def _edition(notebook: Notebook, pages: Collection[str], wheel: str) -> Notebook
     for cell in notebook.cells:
         if "parameters" in cell.metadata.get("tags", []):
             cell.source = _offline(cell.source)
+        if "try" in cell.metadata.get("tags", []):
+            cell.source = ELSEWHERE.sub("", cell.source)
         if cell.cell_type == "code":
             cell.outputs, cell.execution_count = [], None
         cell.source = LINK.sub(

@@ -115,6 +115,10 @@ def test_an_edition_is_a_valid_notebook_that_leads_nowhere_else(edition, name):
     parameters = next(c for c in notebook.cells if "parameters" in c.metadata.get("tags", []))
     if "study" in parameters.source:
         assert 'study = "published"' in parameters.source
+    (box,) = (cell for cell in notebook.cells if "try" in cell.metadata.get("tags", []))
+    assert f"papermill {name} out.ipynb" in box.source
+    assert "make " not in box.source
+    assert "book/" not in box.source
 
 
 @pytest.mark.slow
