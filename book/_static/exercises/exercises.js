@@ -123,6 +123,7 @@
   function exercise(place, changed) {
     const data = JSON.parse(place.querySelector("script").textContent);
     const name = place.dataset.exercise;
+    place.dataset.kind = data.kind;
     const field = fieldFor(`answer-${name}`, data);
     const said = element("p", { class: "said", role: "status" });
     const again = element("button", { type: "button" }, words.reset);
