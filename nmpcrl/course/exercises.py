@@ -56,7 +56,7 @@ class About:
 
     @property
     def line(self) -> str:
-        """What a reader sees of it: "By hand · level 1 of 3 · 5 minutes · 1 point"."""
+        """What a reader sees of it, such as "By hand · level 1 of 3 · 5 minutes · 1 point"."""
         kind = self.kind[0].upper() + self.kind[1:]
         counted = [f"{self.minutes} minute", f"{self.points} point"]
         numbers = (self.minutes, self.points)
