@@ -1,0 +1,97 @@
+"""The laboratory: a live page that places obstacles and trains, as `study.run` does."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
+from typing import Any
+
+from IPython.display import HTML
+
+from nmpcrl.control import Obstacle
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.control.solvers.charge import LONGEST
+from nmpcrl.learning import browser
+from nmpcrl.learning.updates import OVERSHOOT
+from nmpcrl.report.live import frame
+from nmpcrl.report.live.noise import widths
+from nmpcrl.report.live.problem import WALL, problem_of
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.records import LAST
+
+SCRIPTS = (
+    *frame.PARTS, "random.js", "learning.js", "trainer.js", "plot.js", "laboratory_words.js",
+    "settings.js", "laboratory_map.js", "laboratory_runs.js", "laboratory.js",
+)  # fmt: skip
+STYLES = ("laboratory.css",)
+LEARNERS = ("ES", "GES", "TDC", "QL", "frozen")  # the others need a network
+SETTINGS = (
+    "learner", "alpha", "beta", "beta_tdc", "decay", "decay_rate", "horizon", "seed", "episodes",
+)  # fmt: skip
+MOST = {"horizon": LONGEST, "episodes": 3000}  # of a page
+MOST_OBSTACLES = 8
+LOOKS = {  # colours and dashes [px] of `report.figures.style.LOOKS`
+    "ES": ("#0072B2", ""),
+    "GES": ("#D55E00", "7 2"),
+    "TDC": ("#BC6299", "6 2 2 2 2 2"),
+    "QL": ("#2A8FC7", "10 4"),
+    "frozen": ("#8A8A8A", "2 3"),
+}
+
+
+def laboratory(gallery: Iterable[Mapping[str, Any]] = ()) -> HTML:
+    """Obstacles, start and target to be moved, settings of a run, and its training as it comes.
+
+    Args:
+        gallery: finds to open, each with a `title`, a `sentence` and `settings`: some of
+            `SETTINGS`, `layout`, `start`, `target` and `theta`.
+    """
+    nmpc = paper.nmpc("A")
+    try:
+        problem = problem_of(nmpc, LONGEST)
+        module = browser.module(nmpc.plant, nmpc.task)
+    except CannotCompile as error:
+        return frame.absent(error)
+    box = [paper.LOWER[:2], paper.UPPER[:2]]
+    disc = Obstacle(0.0, 0.0).diameter
+    data = {
+        "problem": problem,
+        "fields": [setting(name) for name in SETTINGS],
+        "layout": paper.LAYOUTS["A"],
+        "start": paper.START,
+        "target": paper.TARGET,
+        "theta": paper.THETA_INIT,
+        "names": paper.THETA_NAMES,
+        "w": [paper.W_INIT] * len(paper.THETA_INIT),
+        "theta_set": paper.THETA_SET,
+        "steps": paper.STEPS,
+        "evaluate_every": default("evaluate_every"),
+        "last": LAST,
+        "overshoot": OVERSHOOT,
+        "most": MOST_OBSTACLES,
+        "radius": disc / 2,
+        "clearance": disc + nmpc.task.robot_diameter,
+        "robot": nmpc.task.robot_diameter / 2,
+        "box": box,
+        "view": [*(side - WALL for side in box[0]), *(h - l + 2 * WALL for l, h in zip(*box))],
+        "looks": LOOKS,
+        "widths": widths(),
+        "gallery": list(gallery),
+    }
+    return frame.figure("laboratory", data, SCRIPTS, module, STYLES)
+
+
+def default(name: str) -> Any:
+    """The default of a field of `Experiment`."""
+    return next(one.default for one in fields(Experiment) if one.name == name)
+
+
+def setting(name: str) -> dict[str, Any]:
+    """What a page needs to know of a field of `Experiment`: its default, and what it may be."""
+    one = next(one for one in fields(Experiment) if one.name == name)
+    allowed, read_by = one.metadata["allowed"], one.metadata.get("read_by", LEARNERS)
+    found = {"name": name, "default": one.default, "help": one.metadata["help"]}
+    found["read_by"] = [learner for learner in LEARNERS if learner in read_by]
+    if allowed.choices:
+        choices = LEARNERS if name == "learner" else allowed.choices
+        return found | {"choices": list(choices), "text": allowed.text}
+    most = MOST.get(name, allowed.most)
+    return found | {"least": allowed.least, "most": most, "whole": isinstance(one.default, int)}

@@ -1,0 +1,104 @@
+// The settings of a run: what each may be, the link that restores them, and the same run in Python.
+//
+// Settings: { learner, alpha, beta, beta_tdc, decay, decay_rate, horizon, seed, episodes, layout, start, target,
+// theta }, under the names of `Experiment`; `layout` holds centres [m], `fields` is report/live/laboratory.py's.
+(() => {
+  "use strict";
+
+  const { words: { laboratory: words } } = window.nmpcrl;
+  const POSES = ["start", "target"];
+  const TURN = 2 * Math.PI; // a heading, to either side [rad]
+
+  function defaults({ fields, layout, start, target, theta }) {
+    return { ...Object.fromEntries(fields.map((each) => [each.name, each.default])), layout, start, target, theta };
+  }
+
+  // The value that a text stands for; undefined if it may not be that.
+  function parsed(text, { choices, least, most, whole }) {
+    if (choices) return choices.includes(text) ? text : undefined;
+    const number = Number(text);
+    const fits = text.trim() !== "" && number >= least && number <= most && (!whole || Number.isInteger(number));
+    return fits ? number : undefined;
+  }
+
+  const rows = (text) => text.split(";").map((row) => row.split(",").map((word) => (word.trim() ? Number(word) : NaN)));
+
+  function within([x, y], [lower, upper]) {
+    return x >= lower[0] && x <= upper[0] && y >= lower[1] && y <= upper[1];
+  }
+
+  // The layout, a pose or theta of a link; undefined if it is none.
+  function place(name, text, { most, view: [left, bottom, width, height], box, theta }) {
+    const found = rows(text), [first] = found;
+    if (found.flat().some((number) => !Number.isFinite(number))) return undefined;
+    if (name === "layout") {
+      const map = [[left, bottom], [left + width, bottom + height]];
+      return found.length <= most && found.every((row) => row.length === 2 && within(row, map)) ? found : undefined;
+    }
+    if (name === "theta") return first.length === theta.length ? first : undefined;
+    return first.length === 3 && within(first, box) && Math.abs(first[2]) <= TURN ? first : undefined;
+  }
+
+  // What a link's fragment says; { damaged } if any of it makes no sense, null if it is no link of ours.
+  function read(fragment, data) {
+    if (!fragment.includes("=")) return null;
+    const found = defaults(data);
+    for (const part of fragment.replace(/^#/, "").split("&")) {
+      const [name, text = ""] = part.split("=").map(decoded), field = data.fields.find((each) => each.name === name);
+      const known = field || name === "layout" || name === "theta" || POSES.includes(name);
+      const value = known && (field ? parsed(text, field) : place(name, text, data));
+      if (value === undefined || !known) return { damaged: name };
+      found[name] = value;
+    }
+    return found;
+  }
+
+  function decoded(text) {
+    try {
+      return decodeURIComponent(text);
+    } catch { // a lone %
+      return text;
+    }
+  }
+
+  // The fragment of a link that restores the settings; theta only where it is not the first.
+  function written(given, data) {
+    const usual = String(given.theta) === String(data.theta);
+    const parts = data.fields.map(({ name }) => `${name}=${given[name]}`);
+    return [
+      ...parts, `layout=${given.layout.join(";")}`, ...POSES.map((name) => `${name}=${given[name]}`),
+      ...(usual ? [] : [`theta=${given.theta}`]),
+    ].join("&");
+  }
+
+  // What differs from the defaults and is read by the learner, by name.
+  function changed(given, data) {
+    const usual = defaults(data);
+    const read = ({ name, read_by: readBy }) => readBy.includes(given.learner) || name === "learner";
+    const names = [...data.fields.filter(read).map(({ name }) => name), "layout", ...POSES, "theta"];
+    return names.filter((name) => String(given[name]) !== String(usual[name]));
+  }
+
+  // The same run in Python: a command and a few lines of library code.
+  function command(given, data) {
+    const text = {
+      layout: () => `"${given.layout.join(" ")}"`, theta: () => given.theta.join(","),
+      start: () => given.start.join(","), target: () => given.target.join(","),
+    };
+    const options = changed(given, data)
+      .map((name) => `--${name.replace("_", "-")} ${text[name]?.() ?? given[name]}`);
+    return words.command(options);
+  }
+
+  function code(given, data) {
+    const tuple = (numbers) => `(${numbers.join(", ")})`;
+    const text = {
+      layout: () => `(${given.layout.map(tuple).join(", ")},)`, theta: () => tuple(given.theta),
+      start: () => tuple(given.start), target: () => tuple(given.target),
+    };
+    const literal = (value) => (typeof value === "string" ? `"${value}"` : String(value));
+    return words.code(changed(given, data).map((name) => `${name}=${text[name]?.() ?? literal(given[name])}`));
+  }
+
+  window.nmpcrl.settings = { defaults, parsed, read, written, changed, command, code };
+})();
