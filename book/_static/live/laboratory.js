@@ -8,6 +8,7 @@
     add, set, settings, laboratoryMap, laboratoryRuns, parts: shared, words: { laboratory: words },
   } = window.nmpcrl;
   const OTHERS = 3; // further seeds at a click
+  const OFTEN = 100; // between two pictures of what is being trained [ms]
   const QUIET = 400; // after the last change, before the address changes [ms]
 
   function menu(line, { name, choices }, move) {
@@ -53,14 +54,15 @@
     const end = shared.button(row, words.stop, stop);
     const bar = add(parent, "progress", { "aria-label": words.progress, value: 0 });
     const text = add(parent, "p", { class: "hint doing" });
-    return (runs, name) => {
-      const running = runs.find(({ state }) => state === "running");
+    return ({ runs, doing }, name) => {
+      const now = doing();
       const waiting = runs.filter(({ state }) => state === "waiting").length;
-      set(end, { "aria-disabled": !running });
-      bar.style.visibility = running ? "visible" : "hidden";
-      const done = running?.rows.at(-1)?.episode ?? 0, all = running?.given.episodes ?? 1;
+      set(end, { "aria-disabled": !now });
+      bar.style.visibility = now ? "visible" : "hidden";
+      const done = now?.rows.at(-1)?.episode ?? 0, all = now?.run.given.episodes ?? 1;
       set(bar, { value: done, max: all });
-      text.textContent = running ? words.training(name(running), done, all) + words.waiting(waiting) : "";
+      const what = now && (now.rows === now.run.rows ? name(now.run) : words.arm(name(now.run)));
+      text.textContent = now ? words.training(what, done, all) + words.waiting(waiting) : "";
     };
   }
 
@@ -141,9 +143,9 @@
   function build(figure, data, nmpc) {
     const { read, move } = shared.state(settings.defaults(data), show);
     const name = nameOf(data), problem = {};
-    let chosen = null, due = false;
+    let chosen = null, due = false, drawn = null;
     const runs = laboratoryRuns.queue(data, () => {
-      if (!due) requestAnimationFrame(() => { due = false; drawRuns(); });
+      if (!due) setTimeout(() => { due = false; drawRuns(); }, OFTEN);
       due = true;
     });
     const open = (given) => move({ ...given });
@@ -190,16 +192,20 @@
     function drawRuns() {
       drawList(runs.runs, chosen);
       drawPlots(runs.runs, chosen);
-      drawProgress(runs.runs, name);
-      drawPolicy(read());
+      drawProgress(runs, name);
+      if (drawn !== learnt()) drawPolicy(read());
     }
+
+    // The last theta of the chosen run that was judged.
+    const learnt = () => chosen?.rows.findLast(({ judged }) => judged)?.theta;
 
     function drawPolicy(given) {
       const where = {
         start: given.start, target: given.target, horizon: given.horizon,
         discs: given.layout.map((centre) => [...centre, data.clearance]),
       };
-      const theta = chosen?.rows.at(-1)?.theta;
+      const theta = learnt();
+      drawn = theta;
       const first = nmpc.rollout({ ...where, theta: given.theta }, data.steps);
       const last = theta ? nmpc.rollout({ ...where, theta }, data.steps) : null;
       const [color] = chosen ? data.looks[chosen.given.learner] : [""];

@@ -17,60 +17,69 @@
     };
   }
 
-  // Runs that are added train one after the other, each beside its frozen arm; `changed()` follows each episode.
+  // Runs that are added train one after the other, each followed by its frozen arm; `changed()` follows each episode.
   function queue(data, changed) {
     const arms = new Map(); // rows of the frozen arms, by what they depend on
     const runs = [];
-    let stops = [], count = 0;
+    let doing = null, count = 0; // { run, rows, stop }
 
-    function begin(settings, rows, end) {
+    function begin(run, settings, rows, end) {
       const given = { module: window.nmpcrl.module, problem: data.problem, settings, widths: data.widths };
       const row = (each) => {
         rows.push(each);
         changed();
       };
-      return trainer(given, { row, end });
-    }
-
-    function arm(settings) {
-      const same = JSON.stringify({ ...settings, learner: ARM, alpha: 0, beta: 0 });
-      if (!arms.has(same)) {
-        const rows = [];
-        arms.set(same, rows);
-        stops.push(begin({ ...settings, learner: ARM }, rows, () => {}));
-      }
-      return arms.get(same);
+      doing = { run, rows, stop: trainer(given, { row, end }) };
     }
 
     function next() {
+      doing = null;
       const run = runs.find(({ state }) => state === "waiting");
-      if (!run || runs.some(({ state }) => state === "running")) return changed();
-      run.state = "running";
-      const settings = learned(run.given, data);
-      stops = [begin(settings, run.rows, (why) => {
-        run.state = why ? "stopped" : run.rows.at(-1)?.diverged ? "diverged" : "finished";
-        run.why = why;
+      if (run) {
+        run.state = "running";
+        const settings = learned(run.given, data);
+        begin(run, settings, run.rows, (why) => {
+          run.state = why ? "stopped" : run.rows.at(-1).diverged ? "diverged" : "finished";
+          run.why = why;
+          arm(run, settings);
+        });
+      }
+      changed();
+    }
+
+    function arm(run, settings) {
+      const same = JSON.stringify({ ...settings, learner: ARM, alpha: 0, beta: 0 });
+      if (run.given.learner === ARM) arms.set(same, run.rows);
+      run.arm = arms.get(same) ?? [];
+      if (arms.has(same)) return next();
+      const rows = run.arm;
+      return begin(run, { ...settings, learner: ARM }, rows, () => {
+        arms.set(same, rows);
         next();
-      })];
-      run.arm = run.given.learner === ARM ? run.rows : arm(settings);
-      return changed();
+      });
+    }
+
+    function stop() {
+      doing?.stop();
+      doing = null;
+      for (const run of runs) if (run.state === "running" || run.state === "waiting") run.state = "stopped";
+      changed();
     }
 
     return {
       runs,
+      doing: () => doing,
       add(given) {
         runs.push({ number: ++count, given, rows: [], arm: [], state: "waiting", why: "" });
-        next();
+        if (!doing) next();
+        else changed();
       },
-      stop() {
-        for (const end of stops) end();
-        for (const run of runs) if (run.state === "running" || run.state === "waiting") run.state = "stopped";
-        for (const [same, rows] of arms) if (rows.at(-1)?.episode !== JSON.parse(same).episodes) arms.delete(same);
-        changed();
-      },
+      stop,
       remove(run) {
         runs.splice(runs.indexOf(run), 1);
-        changed();
+        if (doing?.run !== run) return changed();
+        doing.stop();
+        return next();
       },
     };
   }
@@ -104,16 +113,17 @@
         const [color, dashes] = data.looks[run.given.learner];
         return { name: `${run.number}`, color, dashes, look: run === chosen ? "chosen" : "", points: points(run.rows) };
       });
-      const arms = (points) => [...new Set(runs.map(({ arm }) => arm))].map((rows) => (
-        { look: "arm", color: data.looks[ARM][0], dashes: data.looks[ARM][1], points: points(rows) }
-      ));
-      const both = (points) => {
-        const all = [...arms(points), ...lines(points)];
+      const [grey, dots] = data.looks[ARM];
+      const arms = (points) => runs.map((run) => ({ color: grey, dashes: dots, points: points(run) }));
+      const both = (points, ofArm) => {
+        const all = [...arms(ofArm), ...lines(points)];
         const known = all.flatMap((line) => line.points.map(([, y]) => y)).filter(Number.isFinite);
         return { lines: all, x, log: wide(known) };
       };
-      draw.judged(both(judged));
-      draw.cost(both((rows) => after(rows).map(({ episode, cost }) => [episode, cost])));
+      const trained = (rows) => after(rows).map(({ episode, cost }) => [episode, cost]);
+      const level = ({ rows, given }) => judged(rows.slice(0, 1)).flatMap(([, cost]) => [[0, cost], [given.episodes, cost]]);
+      draw.judged(both(judged, level)); // without noise the frozen arm always does the same
+      draw.cost(both(trained, ({ arm }) => trained(arm)));
       draw.theta({ x, lines: chosen ? components(chosen, data, data.looks[chosen.given.learner][0]) : [] });
       const steps = lines((rows) => after(rows).map(({ episode, alphaPhi2 }) => [episode, alphaPhi2]));
       const values = steps.flatMap(({ points }) => points.map(([, y]) => y)).filter(Number.isFinite);

@@ -22,9 +22,8 @@
     reset: "Reset",
     gallery: "Six finds, to open with a click:",
     names: {
-      learner: "Learner", alpha: "α, step size of θ", beta: "β, step size of w", beta_tdc: "β, step size of w",
-      decay: "Noise decays per", decay_rate: "c, factor of the decay", horizon: "N, steps planned", seed: "Seed",
-      episodes: "Episodes",
+      learner: "Learner", alpha: "Step size α", beta: "Step size β", beta_tdc: "Step size β", decay: "Decay per",
+      decay_rate: "Decay factor c", horizon: "Horizon N", seed: "Seed", episodes: "Episodes",
     },
     learners: {
       ES: "ES: Expected Sarsa", GES: "GES: gradient Expected Sarsa", TDC: "TDC: exact gradient TD",
@@ -39,6 +38,7 @@
     seeds: (count) => `Other seeds: ${count} more runs`,
     progress: "Episodes trained",
     training: (name, done, all) => `${name}: episode ${done} of ${all}`,
+    arm: (name) => `frozen arm of ${name}`,
     waiting: (count) => (count ? `; ${plural(count, "run")} waiting` : ""),
     run: (number, { learner, seed }, others) => [`${number}: ${learner}, seed ${seed}`, ...others].join(", "),
     other: { alpha: "α", beta: "β", beta_tdc: "β", decay: "decay per", decay_rate: "c", horizon: "N", episodes: "episodes" },
@@ -78,7 +78,7 @@
       },
     },
     components: {
-      x: "θx", y: "θy", heading: "θφ", v: "θv", nu: "θν", x_f: "θxf", y_f: "θyf", heading_f: "θφf", c: "θc",
+      x: "θ_x", y: "θ_y", heading: "θ_φ", v: "θ_v", nu: "θ_ν", x_f: "θ_xf", y_f: "θ_yf", heading_f: "θ_φf", c: "θ_c",
     },
     now: ({ cost, failed, states }, who) => [
       failed
