@@ -99,11 +99,5 @@
     codeLabel: "Library code of the same run",
     copyCommand: "Copy command",
     copyCode: "Copy code",
-    command: (options) => ["nmpcrl train", ...options].join(" \\\n  "),
-    code: (fields) => [
-      "from nmpcrl.study import Experiment, run", "", "experiment = Experiment(",
-      ...fields.map((field) => `    ${field},`), ")", "records = run(experiment)",
-      'print(records.facts["final_cost"])', 'print(records.steps["theta"][-1])',
-    ].join("\n"),
   };
 })();

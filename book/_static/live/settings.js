@@ -5,7 +5,6 @@
 (() => {
   "use strict";
 
-  const { words: { laboratory: words } } = window.nmpcrl;
   const POSES = ["start", "target"];
   const TURN = 2 * Math.PI; // a heading, to either side [rad]
 
@@ -79,25 +78,25 @@
     return names.filter((name) => String(given[name]) !== String(usual[name]));
   }
 
-  // The same run in Python: a command and a few lines of library code.
+  // A template of report/continuing.py with its places filled.
+  const filled = (template, values) => template.replace(/\{(\w+)\}/g, (_, name) => values[name]);
+
+  // The same run as a command, and as a few lines of library code.
   function command(given, data) {
-    const text = {
-      layout: () => `"${given.layout.join(" ")}"`, theta: () => given.theta.join(","),
-      start: () => given.start.join(","), target: () => given.target.join(","),
-    };
-    const options = changed(given, data)
-      .map((name) => `--${name.replace("_", "-")} ${text[name]?.() ?? given[name]}`);
-    return words.command(options);
+    const quoted = (text) => (text.includes(" ") ? `"${text}"` : text);
+    const options = changed(given, data).map((name) => {
+      const value = name === "layout" ? given.layout.join(" ") : String(given[name]);
+      return filled(data.templates.option, { name: name.replaceAll("_", "-"), value: quoted(value) });
+    });
+    return filled(data.templates.command, { options: options.join("") });
   }
 
   function code(given, data) {
-    const tuple = (numbers) => `(${numbers.join(", ")})`;
-    const text = {
-      layout: () => `(${given.layout.map(tuple).join(", ")},)`, theta: () => tuple(given.theta),
-      start: () => tuple(given.start), target: () => tuple(given.target),
-    };
-    const literal = (value) => (typeof value === "string" ? `"${value}"` : String(value));
-    return words.code(changed(given, data).map((name) => `${name}=${text[name]?.() ?? literal(given[name])}`));
+    const tuple = (each) => (Array.isArray(each) ? `(${each.map(tuple).join(", ")}${each.length === 1 ? "," : ""})` : each);
+    const literal = (value) => (typeof value === "string" ? `"${value}"` : tuple(value));
+    const fields = changed(given, data)
+      .map((name) => filled(data.templates.field, { name, value: literal(given[name]) }));
+    return filled(data.templates.code, { fields: fields.join("") + (fields.length ? "\n" : "") });
   }
 
   window.nmpcrl.settings = { defaults, parsed, read, written, changed, command, code };

@@ -11,6 +11,7 @@ from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.solvers.charge import LONGEST
 from nmpcrl.learning import browser
 from nmpcrl.learning.updates import OVERSHOOT
+from nmpcrl.report.continuing import TEMPLATES
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import WALL, problem_of
@@ -74,6 +75,7 @@ def laboratory(gallery: Iterable[Mapping[str, Any]] = ()) -> HTML:
         "view": [*(side - WALL for side in box[0]), *(h - l + 2 * WALL for l, h in zip(*box))],
         "looks": LOOKS,
         "widths": widths(),
+        "templates": TEMPLATES,
         "gallery": list(gallery),
     }
     return frame.figure("laboratory", data, SCRIPTS, module, STYLES)
