@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ FINISHED = """() => {
   const { runs } = document.querySelector("figure.live").shown
   return runs.length && runs.every(run => ["finished", "diverged", "stopped"].includes(run.state))
 }"""
+GOING = """() => document.querySelector("figure.live").shown.runs[0]?.rows.length > 3"""
 ARMS = """() => document.querySelector("figure.live").shown.runs.every(run => run.arm.length)"""
 DRAWN = """([seed, count]) => {
   const { widths } = JSON.parse(document.querySelector("figure.live script").textContent)
@@ -77,7 +79,7 @@ def assert_equal_to_python(found: dict, experiment: Experiment, digits: float = 
 
 
 def test_noise_is_that_of_numpy(tab):
-    """In every bit; the far tail to the digits in which logarithms agree from one machine to another."""
+    """In every bit; the tail to the digits in which one machine's logarithm is another's."""
     for seed in (0, 1, 20_26, 2**31 - 1, *np.random.default_rng(13).integers(2**31, size=3)):
         found = np.array(tab.page.evaluate(DRAWN, [int(seed), 50_000]))
         generator = np.random.default_rng(np.random.SeedSequence(int(seed)).spawn(3)[0])
@@ -93,8 +95,8 @@ def test_twenty_episodes_of_each_learner_are_those_of_python(tab):
     experiments = [
         Experiment(learner="ES", episodes=20),
         Experiment(learner="GES", decay="episode", decay_rate=0.97, episodes=20),
-        Experiment(learner="TDC", decay="episode", decay_rate=0.97, episodes=20, seed=2),
-        Experiment(learner="QL", decay="episode", decay_rate=0.97, episodes=20, seed=2, horizon=7),
+        Experiment(learner="TDC", episodes=20),
+        Experiment(learner="QL", episodes=20),
     ]
     for one in experiments:
         choose(tab, "Learner", one.learner)
@@ -117,7 +119,8 @@ def test_a_layout_that_is_drawn_is_the_same_run_in_python(tab):
     fill(tab, Step_size_α="2e-7", Episodes=5)
     given = tab.shown()["given"]
     assert len(given["layout"]) == 5
-    for number in (*sum(given["layout"], []), *given["start"], *given["target"][:2]):
+    places = *given["layout"], given["start"], given["target"][:2]
+    for number in chain.from_iterable(places):
         assert number == round(number, 2)
     tab.click("Train")
     names = ("learner", "alpha", "layout", "start", "target", "episodes")
@@ -126,9 +129,9 @@ def test_a_layout_that_is_drawn_is_the_same_run_in_python(tab):
     shown: dict = {}
     exec(box(tab, "Library code of the same run"), shown)  # which trains
     assert shown["experiment"] == experiment
-    words = box(tab, "Command of the same run").replace("\\\n", " ")
-    wanted = continuing.command(experiment).replace("\\\n", " ")
-    assert re.sub(r"e-0", "e-", wanted).split() == words.split()
+    words = box(tab, "Command of the same run").split(" \\\n")
+    wanted = re.sub(r"(?<=e-)0|\.0\b", "", continuing.command(experiment)).split(" \\\n")
+    assert sorted(words) == sorted(wanted)
 
 
 def test_a_paste_into_a_terminal_trains_the_same_run(tab, tmp_path):
@@ -150,7 +153,7 @@ def test_the_frozen_arm_meets_the_same_noise(tab):
     tab.click("Train")
     trained(tab)
     tab.page.wait_for_function(ARMS)
-    tab.page.wait_for_function("() => document.querySelector('figure.live progress').style.visibility === 'hidden'")
+    tab.figure.locator("progress").wait_for(state="hidden")
     arm = tab.shown()["runs"][0]["arm"]
     expected = run(frozen_arm(Experiment(episodes=3, seed=4))).steps["cost"].reshape(3, -1)
     np.testing.assert_allclose([row["cost"] for row in arm[1:]], expected.sum(axis=1), rtol=1e-9)
@@ -165,12 +168,13 @@ def test_obstacles_come_and_go_by_mouse_and_by_key(tab):
     assert tab.page.evaluate("document.activeElement.ariaLabel") == "Obstacle 1"
     layout = tab.shown()["given"]["layout"]
     assert layout[:3] == [before[0], *before[2:]]
-    for button, count in (("Add an obstacle", 8), ("Remove the last one", 1)):
-        tab.figure.get_by_role("button", name=button).focus()
+    for name, count in (("Add an obstacle", 8), ("Remove the last one", 1)):
+        button = tab.figure.get_by_role("button", name=name)
+        button.focus()
         for _ in range(8):
             tab.page.keyboard.press("Enter")
         assert len(tab.shown()["given"]["layout"]) == count
-        assert tab.figure.get_by_role("button", name=button).get_attribute("aria-disabled") == "true"
+        assert button.get_attribute("aria-disabled") == "true"
     assert tab.shown()["given"]["layout"] == before[:1]
     tab.press("Obstacle 1", "Delete")
     assert tab.shown()["given"]["layout"] == before[:1]
@@ -189,7 +193,7 @@ def test_start_and_target_stay_in_the_box(tab):
 def test_training_is_stopped_and_what_it_found_stays(opened):
     tab = opened(FIGURE, script=SLOW, viewport={"width": 1400, "height": 1000}).begun()
     tab.click("Train")
-    tab.page.wait_for_function("() => document.querySelector('figure.live').shown.runs[0]?.rows.length > 3")
+    tab.page.wait_for_function(GOING)
     tab.click("Stop")
     stopped = tab.shown()["runs"][0]
     assert stopped["state"] == "stopped"
@@ -213,7 +217,6 @@ def test_runs_share_the_plots_and_can_be_removed(tab):
     assert tab.shown()["last"] is not None
     tab.click("Remove 3: GES, seed 2, episodes 2")
     tab.page.wait_for_function("() => document.querySelectorAll('.runs li').length === 3")
-    tab.page.wait_for_function("() => document.querySelectorAll('.plots svg:first-of-type text.right').length")
     assert sorted(names.all_text_contents()) == ["1", "2", "4"]
 
 

@@ -2,7 +2,7 @@
 (() => {
   "use strict";
 
-  const { add, set, plot, trainer, finalCost, parts: shared, words: { laboratory: words } } = window.nmpcrl;
+  const { add, set, plot, trainer, finalCost, parts: shared, words: { laboratory: words, parts: { symbols } } } = window.nmpcrl;
   const NAMED = 4; // components of theta that have names
   const ARM = "frozen";
 
@@ -95,7 +95,7 @@
     });
     const most = [...moved].sort((a, b) => b - a)[NAMED - 1];
     return data.names.map((name, k) => ({
-      name: moved[k] > 0 && moved[k] >= most ? words.components[name] : "",
+      name: moved[k] > 0 && moved[k] >= most ? symbols[name] : "",
       look: moved[k] > 0 && moved[k] >= most ? "" : "quiet", color,
       points: rows.map(({ episode, theta }) => [episode, theta[k]]),
     }));

@@ -77,9 +77,6 @@
         label: "Largest alpha times the squared norm of phi of each episode, for each run, and the line at 2",
       },
     },
-    components: {
-      x: "θ_x", y: "θ_y", heading: "θ_φ", v: "θ_v", nu: "θ_ν", x_f: "θ_xf", y_f: "θ_yf", heading_f: "θ_φf", c: "θ_c",
-    },
     now: ({ cost, failed, states }, who) => [
       failed
         ? [`The solver found no plan at step ${states.length}; the closed loop ends there.`]

@@ -48,7 +48,8 @@
   }
 
   // What is returned draws { lines, levels, x, log }: lines { points, name, look, color, dashes } and levels { y, name },
-  // which go across. `x` is [least, most]; with `log` the y axis is logarithmic. A `name` stands at the end of its line; what follows an underscore in it is its subscript.
+  // which go across. `x` is [least, most]; with `log` the y axis is logarithmic. A `name` stands at the end of its line; one of several parts is a letter and its
+  // subscripts.
   function plot(parent, { title, label }) {
     add(parent, "p", { class: "plot-title" }, title);
     const svg = add(parent, "svg", { class: "plot", role: "img", "aria-label": label, height: HEIGHT });
@@ -93,9 +94,9 @@
     function names(ends, right) {
       const places = apart(ends.map(({ at }) => at), HEIGHT - MARGIN.bottom);
       ends.forEach(({ name, from = right }, k) => {
-        const [letter, subscript = ""] = name.split("_");
+        const [letter, ...subscripts] = [name].flat();
         const text = add(svg, "text", { class: "right", x: Math.min(from, right) + 4, y: places[k] + 4 }, letter);
-        if (subscript) add(text, "tspan", { class: "subscript", dy: 3 }, subscript);
+        if (subscripts.length) add(text, "tspan", { class: "subscript", dy: 3 }, subscripts.join(""));
       });
     }
 

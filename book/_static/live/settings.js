@@ -1,7 +1,7 @@
 // The settings of a run: what each may be, the link that restores them, and the same run in Python.
 //
 // Settings: { learner, alpha, beta, beta_tdc, decay, decay_rate, horizon, seed, episodes, layout, start, target,
-// theta }, under the names of `Experiment`; `layout` holds centres [m], `fields` is report/live/laboratory.py's.
+// theta }, under the names of `Experiment`; `layout` holds centres [m], `fields` is report/live/training.py's.
 (() => {
   "use strict";
 
@@ -62,20 +62,20 @@
 
   // The fragment of a link that restores the settings; theta only where it is not the first.
   function written(given, data) {
-    const usual = String(given.theta) === String(data.theta);
+    const first = String(given.theta) === String(data.theta);
     const parts = data.fields.map(({ name }) => `${name}=${given[name]}`);
     return [
       ...parts, `layout=${given.layout.join(";")}`, ...POSES.map((name) => `${name}=${given[name]}`),
-      ...(usual ? [] : [`theta=${given.theta}`]),
+      ...(first ? [] : [`theta=${given.theta}`]),
     ].join("&");
   }
 
   // What differs from the defaults and is read by the learner, by name.
   function changed(given, data) {
-    const usual = defaults(data);
+    const before = defaults(data);
     const read = ({ name, read_by: readBy }) => readBy.includes(given.learner) || name === "learner";
     const names = [...data.fields.filter(read).map(({ name }) => name), "layout", ...POSES, "theta"];
-    return names.filter((name) => String(given[name]) !== String(usual[name]));
+    return names.filter((name) => String(given[name]) !== String(before[name]));
   }
 
   // A template of report/continuing.py with its places filled.

@@ -68,9 +68,7 @@ def absent(error: CannotCompile) -> HTML:
     return HTML(f"<p>There is no live figure here: {error}.</p>")  # type: ignore[no-untyped-call]
 
 
-def files(
-    scripts: Iterable[str], module: bytes | None, styles: Iterable[str] = ()
-) -> list[str]:
+def files(scripts: Iterable[str], module: bytes | None, styles: Iterable[str] = ()) -> list[str]:
     """Styles, module and scripts in the order in which they are needed, each with its name."""
     texts = {name: (FOLDER / name).read_text("utf-8") for name in (STYLE, *styles)}
     if module is not None:

@@ -51,7 +51,7 @@ def laboratory(gallery: Iterable[Mapping[str, Any]] = ()) -> HTML:
         module = browser.module(nmpc.plant, nmpc.task)
     except CannotCompile as error:
         return frame.absent(error)
-    box = [paper.LOWER[:2], paper.UPPER[:2]]
+    (left, bottom), (right, top) = box = [paper.LOWER[:2], paper.UPPER[:2]]
     disc = Obstacle(0.0, 0.0).diameter
     data = {
         "problem": problem,
@@ -72,7 +72,7 @@ def laboratory(gallery: Iterable[Mapping[str, Any]] = ()) -> HTML:
         "clearance": disc + nmpc.task.robot_diameter,
         "robot": nmpc.task.robot_diameter / 2,
         "box": box,
-        "view": [*(side - WALL for side in box[0]), *(h - l + 2 * WALL for l, h in zip(*box))],
+        "view": [left - WALL, bottom - WALL, right - left + 2 * WALL, top - bottom + 2 * WALL],
         "looks": LOOKS,
         "widths": widths(),
         "templates": TEMPLATES,
