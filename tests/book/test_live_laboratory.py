@@ -1,5 +1,6 @@
 """The laboratory, with real pointer and key events: what it trains is what Python trains."""
 
+import json
 import re
 import subprocess
 import sys
@@ -42,6 +43,11 @@ def fill(tab, **fields) -> None:
 
 def choose(tab, name, value) -> None:
     tab.figure.get_by_label(name, exact=True).select_option(value)
+
+
+def data_of(tab) -> dict:
+    """What the page is given."""
+    return json.loads(tab.figure.locator("script").first.text_content())
 
 
 def trained(tab) -> list[dict]:
@@ -268,6 +274,22 @@ def test_a_number_that_makes_no_sense_is_refused_beside_its_field(tab):
     fill(tab, Horizon_N="12")
     assert tab.shown()["given"]["horizon"] == 12
     assert "please" not in tab.quiet().figure.inner_text()
+
+
+def test_a_find_opens_with_a_click(tab):
+    fill(tab, Episodes=1)
+    tab.click("Train")
+    trained(tab)
+    buttons = tab.figure.locator(".gallery button")
+    assert buttons.count() == 6
+    for name in buttons.all_inner_texts():
+        tab.click(name)
+        find = next(one for one in data_of(tab)["gallery"] if one["title"] == name)
+        assert tab.shown()["given"] == find["settings"]
+        assert tab.figure.locator(".sentence").inner_text() == find["sentence"]
+        assert tab.shown()["last"] is None
+        tab.click("Reset")
+    assert tab.shown()["given"]["layout"] == [list(one) for one in paper.LAYOUTS["A"]]
 
 
 def test_the_link_is_copied(opened):

@@ -10,15 +10,18 @@ from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
 from nmpcrl.report.figures.style import LOOKS
+from nmpcrl.report.finds import Find
 from nmpcrl.report.live import frame, noise, training
 from nmpcrl.study import Experiment, ParameterError, paper
+
+FIND = Find("One", "See.", {}, Experiment(seed=3), Experiment(seed=3))
 
 
 @pytest.fixture(scope="module")
 def shown() -> str:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(browser, "module", lambda plant, task: b"abc")
-        return live.laboratory([{"title": "One", "sentence": "See.", "settings": {}}]).data
+        return live.laboratory([FIND]).data
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +85,13 @@ def test_the_widths_of_the_strips_make_numpys_normal_numbers(data):
         place = int(bits.integers(2**51))
         drawn = noise.drawn(int(strip) | int(negative) << 8 | place << 9)
         assert drawn == (1 - 2 * int(negative)) * place * widths[strip]
+
+
+def test_a_find_is_a_title_a_sentence_and_settings(data):
+    (find,) = data["gallery"]
+    assert (find["title"], find["sentence"], find["settings"]["seed"]) == ("One", "See.", 3)
+    names = {field["name"] for field in data["fields"]}
+    assert set(find["settings"]) == names | {"layout", "start", "target", "theta"}
 
 
 def test_all_its_files_are_there_once(shown):

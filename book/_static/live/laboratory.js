@@ -103,7 +103,7 @@
   function gallery(parent, data, open) {
     if (!data.gallery.length) return;
     add(parent, "p", { class: "plot-title" }, words.gallery);
-    const row = add(parent, "div", { class: "buttons" }), sentence = add(parent, "p", { class: "sentence" });
+    const row = add(parent, "div", { class: "buttons gallery" }), sentence = add(parent, "p", { class: "sentence", role: "status" });
     for (const find of data.gallery) {
       shared.button(row, find.title, () => {
         sentence.textContent = find.sentence;
@@ -148,19 +148,24 @@
       if (!due) setTimeout(() => { due = false; drawRuns(); }, OFTEN);
       due = true;
     });
-    const open = (given) => move({ ...given });
-    const choose = (run) => {
+    const change = (part) => {
+      problem.lines = [];
+      move(part);
+    };
+    const open = (given, run = null) => { // a find, a link, the beginning; or a run, to follow
+      for (const input of figure.querySelectorAll("[aria-invalid=true]")) set(input, { "aria-invalid": false });
       chosen = run;
-      open(run.given);
+      change(given);
       drawRuns();
     };
+    const choose = (run) => open(run.given, run);
 
     shared.heading(figure, words);
     const top = add(figure, "div", { class: "laboratory" });
-    const drawMap = laboratoryMap(top, data, read, move, () => open(settings.defaults(data)));
+    const drawMap = laboratoryMap(top, data, read, change, () => open(settings.defaults(data)));
     const side = add(top, "div", { class: "side" });
     const tell = (lines) => say(lines);
-    const drawForm = form(side, data, move, tell);
+    const drawForm = form(side, data, change, tell);
     const drawProgress = trainingButtons(side, {
       train: () => train([read().seed]),
       seeds: () => train(Array.from({ length: OTHERS }, (_, k) => read().seed + k + 1)),

@@ -1,6 +1,6 @@
 """The laboratory: a live page that places obstacles and trains, as `study.run` does."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any
 
@@ -12,6 +12,7 @@ from nmpcrl.control.solvers.charge import LONGEST
 from nmpcrl.learning import browser
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.continuing import TEMPLATES
+from nmpcrl.report.finds import Find
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import WALL, problem_of
@@ -38,12 +39,11 @@ LOOKS = {  # colours and dashes [px] of `report.figures.style.LOOKS`
 }
 
 
-def laboratory(gallery: Iterable[Mapping[str, Any]] = ()) -> HTML:
+def laboratory(gallery: Iterable[Find] = ()) -> HTML:
     """Obstacles, start and target to be moved, settings of a run, and its training as it comes.
 
     Args:
-        gallery: finds to open, each with a `title`, a `sentence` and `settings`: some of
-            `SETTINGS`, `layout`, `start`, `target` and `theta`.
+        gallery: what opens with a click.
     """
     nmpc = paper.nmpc("A")
     try:
@@ -76,7 +76,10 @@ def laboratory(gallery: Iterable[Mapping[str, Any]] = ()) -> HTML:
         "looks": LOOKS,
         "widths": widths(),
         "templates": TEMPLATES,
-        "gallery": list(gallery),
+        "gallery": [
+            {"title": one.title, "sentence": one.sentence, "settings": one.settings}
+            for one in gallery
+        ],
     }
     return frame.figure("laboratory", data, SCRIPTS, module, STYLES)
 
