@@ -84,6 +84,13 @@ def assert_equal_to_python(found: dict, experiment: Experiment, digits: float = 
     np.testing.assert_allclose(found_largest, largest, rtol=100 * digits)
 
 
+def assert_command(tab, experiment: Experiment) -> None:
+    """The page's command is the library's, but for the order and digits of its options."""
+    words = box(tab, "Command of the same run").split(" \\\n")
+    wanted = re.sub(r"(?<=e-)0|\.0\b", "", continuing.command(experiment)).split(" \\\n")
+    assert sorted(words) == sorted(wanted)
+
+
 def test_noise_is_that_of_numpy(tab):
     """In every bit; the tail to the digits in which one machine's logarithm is another's."""
     for seed in (0, 1, 20_26, 2**31 - 1, *np.random.default_rng(13).integers(2**31, size=3)):
@@ -135,9 +142,7 @@ def test_a_layout_that_is_drawn_is_the_same_run_in_python(tab):
     shown: dict = {}
     exec(box(tab, "Library code of the same run"), shown)  # which trains
     assert shown["experiment"] == experiment
-    words = box(tab, "Command of the same run").split(" \\\n")
-    wanted = re.sub(r"(?<=e-)0|\.0\b", "", continuing.command(experiment)).split(" \\\n")
-    assert sorted(words) == sorted(wanted)
+    assert_command(tab, experiment)
 
 
 def test_a_paste_into_a_terminal_trains_the_same_run(tab, tmp_path):
@@ -288,6 +293,7 @@ def test_a_find_opens_with_a_click(tab):
         assert tab.shown()["given"] == find["settings"]
         assert tab.figure.locator(".sentence").inner_text() == find["sentence"]
         assert tab.shown()["last"] is None
+        assert_command(tab, Experiment(**find["settings"]))
         tab.click("Reset")
     assert tab.shown()["given"]["layout"] == [list(one) for one in paper.LAYOUTS["A"]]
 

@@ -34,7 +34,7 @@ def test_its_settings_begin_as_an_experiment_does(data):
     for field in data["fields"]:
         assert field["default"] == getattr(experiment, field["name"])
     assert (data["start"], data["target"]) == (list(paper.START), list(paper.TARGET))
-    assert [tuple(centre) for centre in data["layout"]] == list(paper.LAYOUTS["A"])
+    assert data["layouts"] == json.loads(json.dumps(paper.LAYOUTS))
     assert data["evaluate_every"] == experiment.evaluate_every
 
 

@@ -96,7 +96,7 @@
     return (given) => {
       address(`${location.href.split("#")[0]}#${settings.written(given, data)}`);
       command(settings.command(given, data));
-      code(settings.code(given, data));
+      code(settings.code(given, data).trimEnd());
     };
   }
 
@@ -136,8 +136,9 @@
   const nameOf = (data) => ({ number: count, given }) => {
     const changed = settings.changed(given, data).filter((name) => name !== "learner" && name !== "seed");
     const short = changed.filter((name) => words.other[name]).map((name) => `${words.other[name]} ${given[name]}`);
-    const elsewhere = changed.some((name) => !words.other[name]) ? [words.elsewhere] : [];
-    return words.run(count, given, [...short, ...elsewhere]);
+    const place = changed.filter((name) => !words.other[name]), letter = settings.named(given, data);
+    const where = place.length === 1 && place[0] === "layout" && letter ? words.layout(letter) : words.elsewhere;
+    return words.run(count, given, [...short, ...(place.length ? [where] : [])]);
   };
 
   function build(figure, data, nmpc) {

@@ -8,7 +8,8 @@
   const POSES = ["start", "target"];
   const TURN = 2 * Math.PI; // a heading, to either side [rad]
 
-  function defaults({ fields, layout, start, target, theta }) {
+  function defaults({ fields, layouts, start, target, theta }) {
+    const layout = layouts.A;
     return { ...Object.fromEntries(fields.map((each) => [each.name, each.default])), layout, start, target, theta };
   }
 
@@ -81,11 +82,16 @@
   // A template of report/continuing.py with its places filled.
   const filled = (template, values) => template.replace(/\{(\w+)\}/g, (_, name) => values[name]);
 
+  // The name of a layout that has one.
+  const named = ({ layout }, { layouts }) => (
+    Object.keys(layouts).find((name) => String(layouts[name]) === String(layout))
+  );
+
   // The same run as a command, and as a few lines of library code.
   function command(given, data) {
     const quoted = (text) => (text.includes(" ") ? `"${text}"` : text);
     const options = changed(given, data).map((name) => {
-      const value = name === "layout" ? given.layout.join(" ") : String(given[name]);
+      const value = name === "layout" ? named(given, data) ?? given.layout.join(" ") : String(given[name]);
       return filled(data.templates.option, { name: name.replaceAll("_", "-"), value: quoted(value) });
     });
     return filled(data.templates.command, { options: options.join("") });
@@ -95,9 +101,10 @@
     const tuple = (each) => (Array.isArray(each) ? `(${each.map(tuple).join(", ")}${each.length === 1 ? "," : ""})` : each);
     const literal = (value) => (typeof value === "string" ? `"${value}"` : tuple(value));
     const fields = changed(given, data)
-      .map((name) => filled(data.templates.field, { name, value: literal(given[name]) }));
+      .map((name) => [name, (name === "layout" && named(given, data)) || given[name]])
+      .map(([name, value]) => filled(data.templates.field, { name, value: literal(value) }));
     return filled(data.templates.code, { fields: fields.join("") + (fields.length ? "\n" : "") });
   }
 
-  window.nmpcrl.settings = { defaults, parsed, read, written, changed, command, code };
+  window.nmpcrl.settings = { defaults, parsed, read, written, changed, named, command, code };
 })();

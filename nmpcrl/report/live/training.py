@@ -56,7 +56,7 @@ def laboratory(gallery: Iterable[Find] = ()) -> HTML:
     data = {
         "problem": problem,
         "fields": [setting(name) for name in SETTINGS],
-        "layout": paper.LAYOUTS["A"],
+        "layouts": paper.LAYOUTS,
         "start": paper.START,
         "target": paper.TARGET,
         "theta": paper.THETA_INIT,
