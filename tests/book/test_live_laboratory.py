@@ -26,6 +26,11 @@ DRAWN = """([seed, count]) => {
   const { widths } = JSON.parse(document.querySelector("figure.live script").textContent)
   return Array.from(window.nmpcrl.normal(seed, count, widths))
 }"""
+DAMAGED = (
+    "learner=DES", "alpha=", "alpha=0", "alpha=%", "seed=1.5", "horizon=41", "colour=red",
+    "theta=1,2", "layout=1,2;3", "layout=1,2,3", "layout=" + ";".join(["0,0"] * 9), "start=0,0",
+    "target=8.5,20,0",
+)  # fmt: skip
 SLOW = """
   const post = Worker.prototype.postMessage
   Worker.prototype.postMessage = function (given) {
@@ -93,12 +98,12 @@ def assert_command(tab, experiment: Experiment) -> None:
 
 def test_noise_is_that_of_numpy(tab):
     """In every bit; the tail to the digits in which one machine's logarithm is another's."""
-    for seed in (0, 1, 20_26, 2**31 - 1, *np.random.default_rng(13).integers(2**31, size=3)):
-        found = np.array(tab.page.evaluate(DRAWN, [int(seed), 50_000]))
+    for seed in (0, 7, 2**31 - 1, np.random.default_rng().integers(2**31)):
+        found = np.array(tab.page.evaluate(DRAWN, [int(seed), 20_000]))
         generator = np.random.default_rng(np.random.SeedSequence(int(seed)).spawn(3)[0])
-        expected = generator.normal(scale=1.0, size=50_000)
+        expected = generator.normal(scale=1.0, size=20_000)
         tail = np.abs(expected) > 3.6541
-        assert tail.sum() > 3
+        assert tail.any()
         assert (found == expected)[~tail].all()
         np.testing.assert_allclose(found, expected, rtol=1e-15)
 
@@ -255,20 +260,15 @@ def test_a_link_restores_everything_and_the_browsers_arrows_lead_back(tab, opene
     assert tab.shown()["given"] == given
 
 
-@pytest.mark.parametrize(
-    "fragment",
-    ["learner=DES", "alpha=", "alpha=0", "seed=1.5", "layout=1,2;3", "layout=1,2,3", "start=0,0",
-     "target=8.5,20,0", "layout=" + ";".join(["0,0"] * 9), "horizon=41", "colour=red", "theta=1,2",
-     "alpha=%"],
-)  # fmt: skip
-def test_a_damaged_link_gets_a_sentence_and_the_defaults(opened, fragment):
-    tab = opened(FIGURE).begun()
-    tab.page.evaluate("text => { location.hash = text }", f"seed=3&{fragment}")
-    said = tab.figure.get_by_text("This link is damaged")
-    said.wait_for()
-    assert fragment.split("=")[0] in said.inner_text()
-    assert tab.shown()["given"]["seed"] == 0
-    assert tab.errors == []
+def test_a_damaged_link_gets_a_sentence_and_the_defaults(tab):
+    said = tab.figure.locator(".results")
+    for fragment in DAMAGED:
+        tab.page.evaluate("text => { location.hash = text }", f"seed=3&{fragment}")
+        said.get_by_text(f"damaged at “{fragment.split('=')[0]}”").wait_for()
+        assert tab.shown()["given"]["seed"] == 0
+        tab.page.evaluate("location.hash = ''")
+        tab.press("Obstacle 1", "ArrowUp", "ArrowDown")
+        said.get_by_text("damaged").wait_for(state="hidden")
 
 
 def test_a_number_that_makes_no_sense_is_refused_beside_its_field(tab):
