@@ -14,6 +14,7 @@ from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.continuing import TEMPLATES
 from nmpcrl.report.finds import Find
 from nmpcrl.report.live import frame
+from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import WALL, problem_of
 from nmpcrl.study import Experiment, paper
@@ -30,13 +31,6 @@ SETTINGS = (
 )  # fmt: skip
 MOST = {"horizon": LONGEST, "episodes": 3000}  # of a page
 MOST_OBSTACLES = 8
-LOOKS = {  # colours and dashes [px] of `report.figures.style.LOOKS`
-    "ES": ("#0072B2", ""),
-    "GES": ("#D55E00", "7 2"),
-    "TDC": ("#BC6299", "6 2 2 2 2 2"),
-    "QL": ("#2A8FC7", "10 4"),
-    "frozen": ("#8A8A8A", "2 3"),
-}
 
 
 def laboratory(gallery: Iterable[Find] = ()) -> HTML:
@@ -73,7 +67,7 @@ def laboratory(gallery: Iterable[Find] = ()) -> HTML:
         "robot": nmpc.task.robot_diameter / 2,
         "box": box,
         "view": [left - WALL, bottom - WALL, right - left + 2 * WALL, top - bottom + 2 * WALL],
-        "looks": LOOKS,
+        "looks": {learner: [*look(learner).values()] for learner in LEARNERS},
         "widths": widths(),
         "templates": TEMPLATES,
         "gallery": [
