@@ -47,9 +47,9 @@
     return moved;
   }
 
-  // What is returned draws { lines, levels, x, log }: lines { points, name, look, color, dashes } and levels { y, name },
-  // which go across. `x` is [least, most]; with `log` the y axis is logarithmic. A `name` stands at the end of its line; one of several parts is a letter and its
-  // subscripts.
+  // What is returned draws { lines, levels, x, log }: lines { points, name, look, color, dashes } and levels
+  // { y, name }, which go across. `x` is [least, most]; with `log` the y axis is logarithmic. A `name` stands at the
+  // end of its line; one of several parts is a letter and its subscripts.
   function plot(parent, { title, label }) {
     add(parent, "p", { class: "plot-title" }, title);
     const svg = add(parent, "svg", { class: "plot", role: "img", "aria-label": label, height: HEIGHT });
