@@ -10,6 +10,7 @@ CHAPTERS = {  # of each live figure
     "chain": "04_ges",
     "learners": "04_ges",
     "runs": "05_results",
+    "laboratory": "laboratory",
 }
 ALSO = ("03_rdes", "07_beyond")  # have the figure of runs, too
 FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
@@ -84,7 +85,7 @@ class Tab:
 
     def external(self) -> list[str]:
         """What the page has asked other places for."""
-        return [url for url in self.requests if not url.startswith(("file:", "data:"))]
+        return [url for url in self.requests if not url.startswith(("file:", "data:", "blob:"))]
 
 
 def loaded(site, figure) -> int:

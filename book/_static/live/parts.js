@@ -97,14 +97,14 @@
     return ({ start: [x, y] }) => handle.put([x, y], x, words.place(x, y));
   }
 
-  function arrow(map, read, move) {
+  function arrow(map, read, move, label = words.heading) {
     const turn = (angle) => {
       const heading = Math.atan2(Math.sin(angle), Math.cos(angle)); // the same, within half a turn
       move({ start: read().start.with(2, heading) });
     };
     const shaft = add(map.ground, "line", { class: "shaft" });
     const handle = map.handle({
-      label: words.heading,
+      label,
       kind: "heading",
       range: [-Math.PI, Math.PI],
       to: ([x, y]) => turn(Math.atan2(y - read().start[1], x - read().start[0])),
@@ -202,7 +202,9 @@
   }
 
   function button(parent, text, press) {
-    add(parent, "button", { type: "button" }, text).addEventListener("click", press);
+    const element = add(parent, "button", { type: "button" }, text);
+    element.addEventListener("click", press);
+    return element;
   }
 
   window.nmpcrl.parts = {

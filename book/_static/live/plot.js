@@ -35,17 +35,21 @@
     return [least - room, most + room];
   }
 
-  // Places of texts, moved apart so that none covers another.
-  function apart(places) {
+  // Places of texts, moved apart so that none covers another, and up again from below the last place.
+  function apart(places, last) {
     const order = places.map((_, k) => k).sort((a, b) => places[a] - places[b]), moved = [...places];
     order.forEach((k, i) => {
       if (i) moved[k] = Math.max(moved[k], moved[order[i - 1]] + LINE);
     });
+    order.reverse().forEach((k, i) => {
+      moved[k] = Math.min(moved[k], i ? moved[order[i - 1]] - LINE : last);
+    });
     return moved;
   }
 
-  // `show({ lines, levels, x, log })` draws lines { points, name, look, color } and levels { y, name }, which go
-  // across. `x` is [least, most]; with `log` the y axis is logarithmic. A `name` stands at the end of its line.
+  // What is returned draws { lines, levels, x, log }: lines { points, name, look, color, dashes } and levels
+  // { y, name }, which go across. `x` is [least, most]; with `log` the y axis is logarithmic. A `name` stands at the
+  // end of its line; one of several parts is a letter and its subscripts.
   function plot(parent, { title, label }) {
     add(parent, "p", { class: "plot-title" }, title);
     const svg = add(parent, "svg", { class: "plot", role: "img", "aria-label": label, height: HEIGHT });
@@ -88,10 +92,11 @@
     }
 
     function names(ends, right) {
-      const places = apart(ends.map(({ at }) => at));
+      const places = apart(ends.map(({ at }) => at), HEIGHT - MARGIN.bottom);
       ends.forEach(({ name, from = right }, k) => {
-        const x = Math.min(from, right) + 4;
-        add(svg, "text", { class: "right", x, y: places[k] + 4 }, name);
+        const [letter, ...subscripts] = [name].flat();
+        const text = add(svg, "text", { class: "right", x: Math.min(from, right) + 4, y: places[k] + 4 }, letter);
+        if (subscripts.length) add(text, "tspan", { class: "subscript", dy: 3 }, subscripts.join(""));
       });
     }
 

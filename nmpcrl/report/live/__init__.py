@@ -8,7 +8,17 @@ notebook that is not trusted, which leaves `hidden` out, its sentence.
 from nmpcrl.report.live.closed_loop import controller
 from nmpcrl.report.live.expected_sarsa import gradient, kink, update
 from nmpcrl.report.live.published_runs import runs
+from nmpcrl.report.live.training import laboratory
 from nmpcrl.report.live.two_learners import learners
 from nmpcrl.report.live.two_states import chain
 
-__all__ = ["chain", "controller", "gradient", "kink", "learners", "runs", "update"]
+__all__ = [
+    "chain",
+    "controller",
+    "gradient",
+    "kink",
+    "laboratory",
+    "learners",
+    "runs",
+    "update",
+]

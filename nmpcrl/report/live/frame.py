@@ -24,7 +24,11 @@ FILE = '<{kind} data-file="{name}">\n{text}\n</{kind}>'
 
 
 def figure(
-    name: str, data: Mapping[str, Any], scripts: Iterable[str], module: bytes | None = None
+    name: str,
+    data: Mapping[str, Any],
+    scripts: Iterable[str],
+    module: bytes | None = None,
+    styles: Iterable[str] = (),
 ) -> HTML:
     """A live figure.
 
@@ -33,8 +37,9 @@ def figure(
         data: what its script is given.
         scripts: of the folder of live figures, in the order in which they are needed.
         module: WebAssembly, if it solves; `nmpcrl.module` of a page is this.
+        styles: besides that of every live figure.
     """
-    shown = [FIGURE.format(name, json.dumps(data)), *files(scripts, module)]
+    shown = [FIGURE.format(name, json.dumps(data)), *files(scripts, module, styles)]
     return HTML("\n".join(shown))  # type: ignore[no-untyped-call]
 
 
@@ -63,11 +68,11 @@ def absent(error: CannotCompile) -> HTML:
     return HTML(f"<p>There is no live figure here: {error}.</p>")  # type: ignore[no-untyped-call]
 
 
-def files(scripts: Iterable[str], module: bytes | None) -> list[str]:
-    """Style, module and scripts in the order in which they are needed, each with its name."""
-    texts = {STYLE: (FOLDER / STYLE).read_text("utf-8")}
+def files(scripts: Iterable[str], module: bytes | None, styles: Iterable[str] = ()) -> list[str]:
+    """Styles, module and scripts in the order in which they are needed, each with its name."""
+    texts = {name: (FOLDER / name).read_text("utf-8") for name in (STYLE, *styles)}
     if module is not None:
         texts[MODULE] = COMPILED % b64encode(module).decode()
     texts |= {name: (FOLDER / name).read_text("utf-8") for name in scripts}
-    kinds = {name: "style" if name == STYLE else "script" for name in texts}
+    kinds = {name: "style" if name.endswith(".css") else "script" for name in texts}
     return [FILE.format(kind=kinds[name], name=name, text=texts[name].strip()) for name in texts]

@@ -20,14 +20,9 @@ def widths() -> list[float]:
 
 def drawn(bits: int) -> float:
     """The normal number that numpy makes of 64 bits, and of more if these are not enough."""
-    generator = np.random.PCG64()
-    increment = 1
+    generator, increment = np.random.PCG64(), 1
     before = (bits - increment) * pow(MULTIPLIER, -1, ALL) % ALL  # then the state is `bits`
-    state: Any = {"state": before, "inc": increment}
-    generator.state = {
-        "bit_generator": "PCG64",
-        "state": state,
-        "has_uint32": 0,
-        "uinteger": 0,
-    }
+    state: Any = generator.state
+    state["state"] = {"state": before, "inc": increment}
+    generator.state = state
     return float(np.random.Generator(generator).standard_normal())

@@ -19,14 +19,18 @@ WIDE = 2.4  # the map of one obstacle, over its height
 WALL, AROUND = 0.5, 1.5  # of the map, beyond a wall and beyond an obstacle's circle [m]
 
 
-def problem_of(nmpc: Nmpc) -> dict[str, Any]:
+def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
     """What the module is given of a problem, under the names of `solvers.entries`; u_0 is free.
+
+    Args:
+        nmpc: the problem.
+        longest: the longest horizon that is asked for.
 
     Raises:
         CannotCompile: as `Riccati.prepare`.
     """
     options = {"fix_action": False, "ties_active": nmpc.ties_active}
-    ocp = transcribe(nmpc.plant, nmpc.task, LONGEST, nmpc.gamma, nmpc.slack_weight, **options)
+    ocp = transcribe(nmpc.plant, nmpc.task, longest, nmpc.gamma, nmpc.slack_weight, **options)
     solver = Riccati()
     values = zip(ARGUMENTS, solver.prepare(ocp).problem, strict=True)
     plain = {name: np.asarray(value).tolist() for name, value in values}

@@ -1,0 +1,179 @@
+// The laboratory's runs: a queue that trains one after the other, their list, and four plots.
+(() => {
+  "use strict";
+
+  const { add, set, plot, trainer, finalCost, parts: shared, words: { laboratory: words, parts: { symbols } } } = window.nmpcrl;
+  const NAMED = 4; // components of theta that have names
+  const ARM = "frozen";
+
+  // What the page is given to a run as `learning` takes it.
+  function learned(given, data) {
+    return {
+      learner: given.learner, alpha: given.alpha, beta: given.learner === "TDC" ? given.beta_tdc : given.beta,
+      decay: given.decay, decayRate: given.decay_rate, episodes: given.episodes, seed: given.seed,
+      steps: data.steps, theta: given.theta, w: data.w, thetaSet: data.theta_set, evaluateEvery: data.evaluate_every,
+      start: given.start, target: given.target, horizon: given.horizon,
+      discs: given.layout.map((centre) => [...centre, data.clearance]),
+    };
+  }
+
+  // Runs that are added train one after the other, each followed by its frozen arm; `changed()` follows each episode.
+  function queue(data, changed) {
+    const arms = new Map(); // rows of the frozen arms, by what they depend on
+    const runs = [];
+    let doing = null, count = 0; // { run, rows, stop }
+
+    function begin(run, settings, rows, end) {
+      const given = { module: window.nmpcrl.module, problem: data.problem, settings, widths: data.widths };
+      const row = (each) => {
+        rows.push(each);
+        changed();
+      };
+      doing = { run, rows, stop: trainer(given, { row, end }) };
+    }
+
+    function next() {
+      doing = null;
+      const run = runs.find(({ state }) => state === "waiting");
+      if (run) {
+        run.state = "running";
+        const settings = learned(run.given, data);
+        begin(run, settings, run.rows, (why) => {
+          run.state = why ? "stopped" : run.rows.at(-1).diverged ? "diverged" : "finished";
+          run.why = why;
+          arm(run, settings);
+        });
+      }
+      changed();
+    }
+
+    function arm(run, settings) {
+      const same = JSON.stringify({ ...settings, learner: ARM, alpha: 0, beta: 0 });
+      if (run.given.learner === ARM) arms.set(same, run.rows);
+      run.arm = arms.get(same) ?? [];
+      if (arms.has(same)) return next();
+      const rows = run.arm;
+      return begin(run, { ...settings, learner: ARM }, rows, () => {
+        arms.set(same, rows);
+        next();
+      });
+    }
+
+    function stop() {
+      doing?.stop();
+      doing = null;
+      for (const run of runs) if (run.state === "running" || run.state === "waiting") run.state = "stopped";
+      changed();
+    }
+
+    return {
+      runs,
+      doing: () => doing,
+      add(given) {
+        runs.push({ number: ++count, given, rows: [], arm: [], state: "waiting", why: "" });
+        if (!doing) next();
+        else changed();
+      },
+      stop,
+      remove(run) {
+        runs.splice(runs.indexOf(run), 1);
+        if (doing?.run !== run) return changed();
+        doing.stop();
+        return next();
+      },
+    };
+  }
+
+  const judged = (rows) => rows.filter((row) => row.judged).map(({ episode, judged: { cost } }) => [episode, cost]);
+  const after = (rows) => rows.filter(({ episode }) => episode);
+
+  // The four that move most have names.
+  function components({ rows }, data, color) {
+    const moved = data.names.map((_, k) => {
+      const values = rows.map(({ theta }) => theta[k]);
+      return Math.max(...values) - Math.min(...values);
+    });
+    const most = [...moved].sort((a, b) => b - a)[NAMED - 1];
+    return data.names.map((name, k) => ({
+      name: moved[k] > 0 && moved[k] >= most ? symbols[name] : "",
+      look: moved[k] > 0 && moved[k] >= most ? "" : "quiet", color,
+      points: rows.map(({ episode, theta }) => [episode, theta[k]]),
+    }));
+  }
+
+  function plots(parent, data) {
+    const grid = add(parent, "div", { class: "plots" });
+    const draw = Object.fromEntries(["judged", "cost", "theta", "step"].map((name) => (
+      [name, plot(add(grid, "div"), words.plots[name])]
+    )));
+    const wide = (values) => Math.max(...values) > 20 * Math.min(...values.filter((value) => value > 0));
+    return (runs, chosen) => {
+      const x = [0, Math.max(...runs.map(({ given }) => given.episodes), 1)];
+      const lines = (points) => runs.map((run) => {
+        const [color, dashes] = data.looks[run.given.learner];
+        return { name: `${run.number}`, color, dashes, look: run === chosen ? "chosen" : "", points: points(run.rows) };
+      });
+      const [grey, dots] = data.looks[ARM];
+      const arms = (points) => runs.map((run) => ({ color: grey, dashes: dots, points: points(run) }));
+      const both = (points, ofArm) => {
+        const all = [...arms(ofArm), ...lines(points)];
+        const known = all.flatMap((line) => line.points.map(([, y]) => y)).filter(Number.isFinite);
+        return { lines: all, x, log: wide(known) };
+      };
+      const trained = (rows) => after(rows).map(({ episode, cost }) => [episode, cost]);
+      const level = ({ rows, given }) => judged(rows.slice(0, 1)).flatMap(([, cost]) => [[0, cost], [given.episodes, cost]]);
+      draw.judged(both(judged, level)); // without noise the frozen arm always does the same
+      draw.cost(both(trained, ({ arm }) => trained(arm)));
+      draw.theta({ x, lines: chosen ? components(chosen, data, data.looks[chosen.given.learner][0]) : [] });
+      const steps = lines((rows) => after(rows).map(({ episode, alphaPhi2 }) => [episode, alphaPhi2]));
+      const values = steps.flatMap(({ points }) => points.map(([, y]) => y)).filter(Number.isFinite);
+      draw.step({ x, lines: steps, levels: [{ y: data.overshoot, name: "2" }], log: wide([...values, data.overshoot]) });
+    };
+  }
+
+  // How a run has done: its costs without noise at the start and at the end.
+  function verdict({ rows, state, why }, data) {
+    const costs = judged(rows).map(([, cost]) => cost), ended = words.ends[state] || why;
+    const end = state === "finished" ? finalCost(costs, data.last) : null;
+    return [...(costs.length ? [words.cost(costs[0], end)] : []), ...(ended ? [ended] : [])].join("; ");
+  }
+
+  // A line a run: chosen by its radio button, removed by its button.
+  function list(parent, data, { choose, remove, name }) {
+    const all = add(parent, "ul", { class: "runs", "aria-label": words.runs });
+    const nothing = add(parent, "p", { class: "hint" }, words.none);
+    const items = new Map();
+
+    function item(run) {
+      const line = add(all, "li");
+      const label = add(line, "label");
+      const input = add(label, "input", { type: "radio", name: "nmpcrl-run" });
+      const swatch = add(label, "span", { class: "swatch" });
+      const [color] = data.looks[run.given.learner];
+      swatch.style.setProperty("--look", color);
+      add(label, "span", {}, name(run));
+      const found = add(line, "span", { class: "found" });
+      input.addEventListener("change", () => choose(run));
+      const button = shared.button(line, words.removeShort, () => remove(run));
+      set(button, { "aria-label": words.removeRun(name(run)) });
+      return { line, input, found };
+    }
+
+    return (runs, chosen) => {
+      nothing.hidden = runs.length > 0;
+      for (const [run, { line }] of items) {
+        if (runs.includes(run)) continue;
+        line.remove();
+        items.delete(run);
+      }
+      for (const run of runs) {
+        if (!items.has(run)) items.set(run, item(run));
+        const { input, found } = items.get(run), text = verdict(run, data);
+        input.checked = run === chosen;
+        if (found.textContent !== text) found.textContent = text;
+      }
+    };
+  }
+
+  window.nmpcrl = { ...window.nmpcrl, laboratoryRuns: { queue, plots, list } };
+})();

@@ -1,0 +1,96 @@
+"""The laboratory: a live page that places obstacles and trains, as `study.run` does."""
+
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import Any
+
+from IPython.display import HTML
+
+from nmpcrl.control import Obstacle
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.control.solvers.charge import LONGEST
+from nmpcrl.learning import browser
+from nmpcrl.learning.updates import OVERSHOOT
+from nmpcrl.report.continuing import TEMPLATES
+from nmpcrl.report.finds import Find
+from nmpcrl.report.live import frame
+from nmpcrl.report.live.looks import look
+from nmpcrl.report.live.noise import widths
+from nmpcrl.report.live.problem import WALL, problem_of
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.records import LAST
+
+SCRIPTS = (
+    *frame.PARTS, "random.js", "learning.js", "trainer.js", "plot.js", "laboratory_words.js",
+    "settings.js", "laboratory_map.js", "laboratory_runs.js", "laboratory.js",
+)  # fmt: skip
+STYLES = ("laboratory.css",)
+LEARNERS = ("ES", "GES", "TDC", "QL", "frozen")  # the others need a network
+SETTINGS = (
+    "learner", "alpha", "beta", "beta_tdc", "decay", "decay_rate", "horizon", "seed", "episodes",
+)  # fmt: skip
+MOST = {"horizon": LONGEST, "episodes": 3000}  # of a page
+MOST_OBSTACLES = 8
+
+
+def laboratory(gallery: Iterable[Find] = ()) -> HTML:
+    """Obstacles, start and target to be moved, settings of a run, and its training as it comes.
+
+    Args:
+        gallery: what opens with a click.
+    """
+    nmpc = paper.nmpc("A")
+    try:
+        problem = problem_of(nmpc, LONGEST)
+        module = browser.module(nmpc.plant, nmpc.task)
+    except CannotCompile as error:
+        return frame.absent(error)
+    (left, bottom), (right, top) = box = [paper.LOWER[:2], paper.UPPER[:2]]
+    disc = Obstacle(0.0, 0.0).diameter
+    data = {
+        "problem": problem,
+        "fields": [setting(name) for name in SETTINGS],
+        "layouts": paper.LAYOUTS,
+        "start": paper.START,
+        "target": paper.TARGET,
+        "theta": paper.THETA_INIT,
+        "names": paper.THETA_NAMES,
+        "w": [paper.W_INIT] * len(paper.THETA_INIT),
+        "theta_set": paper.THETA_SET,
+        "steps": paper.STEPS,
+        "evaluate_every": default("evaluate_every"),
+        "last": LAST,
+        "overshoot": OVERSHOOT,
+        "most": MOST_OBSTACLES,
+        "radius": disc / 2,
+        "clearance": disc + nmpc.task.robot_diameter,
+        "robot": nmpc.task.robot_diameter / 2,
+        "box": box,
+        "view": [left - WALL, bottom - WALL, right - left + 2 * WALL, top - bottom + 2 * WALL],
+        "looks": {learner: [*look(learner).values()] for learner in LEARNERS},
+        "widths": widths(),
+        "templates": TEMPLATES,
+        "gallery": [
+            {"title": one.title, "sentence": one.sentence, "settings": one.settings}
+            for one in gallery
+        ],
+    }
+    return frame.figure("laboratory", data, SCRIPTS, module, STYLES)
+
+
+def default(name: str) -> Any:
+    """The default of a field of `Experiment`."""
+    return next(one.default for one in fields(Experiment) if one.name == name)
+
+
+def setting(name: str) -> dict[str, Any]:
+    """What a page needs to know of a field of `Experiment`: its default, and what it may be."""
+    one = next(one for one in fields(Experiment) if one.name == name)
+    allowed, read_by = one.metadata["allowed"], one.metadata.get("read_by", LEARNERS)
+    found = {"name": name, "default": one.default, "help": one.metadata["help"]}
+    found["read_by"] = [learner for learner in LEARNERS if learner in read_by]
+    if allowed.choices:
+        choices = LEARNERS if name == "learner" else allowed.choices
+        return found | {"choices": list(choices), "text": allowed.text}
+    most = MOST.get(name, allowed.most)
+    return found | {"least": allowed.least, "most": most, "whole": isinstance(one.default, int)}

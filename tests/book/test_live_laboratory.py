@@ -1,0 +1,342 @@
+"""The laboratory, with real pointer and key events: what it trains is what Python trains."""
+
+import json
+import re
+import subprocess
+import sys
+from itertools import chain
+
+import numpy as np
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+from nmpcrl.report import continuing
+from nmpcrl.study import Experiment, paper, run
+from nmpcrl.study.experiment import frozen_arm
+
+FIGURE = "laboratory"
+pytestmark = pytest.mark.book
+FINISHED = """() => {
+  const { runs } = document.querySelector("figure.live").shown
+  return runs.length && runs.every(run => ["finished", "diverged", "stopped"].includes(run.state))
+}"""
+GOING = """() => document.querySelector("figure.live").shown.runs[0]?.rows.length > 3"""
+ARMS = """() => document.querySelector("figure.live").shown.runs.every(run => run.arm.length)"""
+DRAWN = """([seed, count]) => {
+  const { widths } = JSON.parse(document.querySelector("figure.live script").textContent)
+  return Array.from(window.nmpcrl.normal(seed, count, widths))
+}"""
+DAMAGED = (
+    "learner=DES", "alpha=", "alpha=0", "alpha=%", "seed=1.5", "horizon=41", "colour=red",
+    "theta=1,2", "layout=1,2;3", "layout=1,2,3", "layout=" + ";".join(["0,0"] * 9), "start=0,0",
+    "target=8.5,20,0",
+)  # fmt: skip
+SLOW = """
+  const post = Worker.prototype.postMessage
+  Worker.prototype.postMessage = function (given) {
+    post.call(this, { ...given, settings: { ...given.settings, episodes: 3000 } })
+  }"""  # a run that is still going on when it is stopped
+
+
+def fill(tab, **fields) -> None:
+    """Write into fields and leave them."""
+    for name, text in fields.items():
+        field = tab.figure.get_by_label(name.replace("_", " "), exact=True).locator("visible=true")
+        field.fill(str(text))
+        field.press("Tab")
+
+
+def choose(tab, name, value) -> None:
+    tab.figure.get_by_label(name, exact=True).select_option(value)
+
+
+def data_of(tab) -> dict:
+    """What the page is given."""
+    return json.loads(tab.figure.locator("script").first.text_content())
+
+
+def trained(tab) -> list[dict]:
+    """The runs, once all that was asked for is trained."""
+    tab.page.wait_for_function(FINISHED)
+    return tab.shown()["runs"]
+
+
+def box(tab, label) -> str:
+    """A text to take along."""
+    return tab.figure.get_by_label(label, exact=True).input_value()
+
+
+def settled(tab, old="") -> str:
+    """The address, once it has another fragment."""
+    tab.page.wait_for_function("old => location.hash !== old", arg=old)
+    return tab.page.evaluate("location.hash")
+
+
+def assert_equal_to_python(found: dict, experiment: Experiment, digits: float = 1e-9) -> None:
+    """theta after every episode, and both costs."""
+    expected, rows = run(experiment), found["rows"]
+    steps, judged = expected.steps, expected.evaluations
+    last = np.flatnonzero(np.append(np.diff(steps["episode"]), 1))
+    theta = np.array([row["theta"] for row in rows[1:]])
+    assert theta.shape == (experiment.episodes, 9)
+    assert np.abs(theta - steps["theta"][last]).max() < digits * np.abs(steps["theta"]).max()
+    costs = [row["judged"]["cost"] for row in rows if row["judged"]]
+    np.testing.assert_allclose(costs, judged["cost"], rtol=10 * digits)
+    noisy = np.add.reduceat(steps["cost"], np.append(0, last[:-1] + 1))
+    np.testing.assert_allclose([row["cost"] for row in rows[1:]], noisy, rtol=10 * digits)
+    largest = np.maximum.reduceat(steps["alpha_phi2"], np.append(0, last[:-1] + 1))
+    found_largest = [row["alphaPhi2"] for row in rows[1:]]
+    np.testing.assert_allclose(found_largest, largest, rtol=100 * digits)
+
+
+def assert_command(tab, experiment: Experiment) -> None:
+    """The page's command is the library's, but for the order and digits of its options."""
+    words = box(tab, "Command of the same run").split(" \\\n")
+    wanted = re.sub(r"(?<=e-)0|\.0\b", "", continuing.command(experiment)).split(" \\\n")
+    assert sorted(words) == sorted(wanted)
+
+
+def test_noise_is_that_of_numpy(tab):
+    """In every bit; the tail to the digits in which one machine's logarithm is another's."""
+    for seed in (0, 7, 2**31 - 1, np.random.default_rng().integers(2**31)):
+        found = np.array(tab.page.evaluate(DRAWN, [int(seed), 20_000]))
+        generator = np.random.default_rng(np.random.SeedSequence(int(seed)).spawn(3)[0])
+        expected = generator.normal(scale=1.0, size=20_000)
+        tail = np.abs(expected) > 3.6541
+        assert tail.any()
+        assert (found == expected)[~tail].all()
+        np.testing.assert_allclose(found, expected, rtol=1e-15)
+
+
+def test_twenty_episodes_of_each_learner_are_those_of_python(tab):
+    fill(tab, Episodes=20)
+    experiments = [
+        Experiment(learner="ES", episodes=20),
+        Experiment(learner="GES", decay="episode", decay_rate=0.97, episodes=20),
+        Experiment(learner="TDC", episodes=20),
+        Experiment(learner="QL", episodes=20),
+    ]
+    for one in experiments:
+        choose(tab, "Learner", one.learner)
+        choose(tab, "Decay per", one.decay)
+        fill(tab, Seed=one.seed, Decay_factor_c=one.decay_rate, Horizon_N=one.horizon)
+        tab.click("Train")
+    for found, one in zip(trained(tab), experiments, strict=True):
+        assert_equal_to_python(found, one, 1e-9 if one.learner in ("ES", "GES") else 1e-8)
+        text = tab.figure.get_by_role("listitem").nth(found["number"] - 1).inner_text()
+        assert f"noise-free cost {run(one).facts['final_cost']:.1f}" in text
+
+
+def test_a_layout_that_is_drawn_is_the_same_run_in_python(tab):
+    tab.drag("Obstacle 2", (15, -30))
+    tab.click("Add an obstacle")
+    tab.drag("Target", (-40, -20))
+    tab.press("Robot, start", "ArrowUp", "ArrowUp", "ArrowRight")
+    tab.press("Target, heading", "ArrowRight")
+    choose(tab, "Learner", "GES")
+    fill(tab, Step_size_α="2e-7", Episodes=5)
+    given = tab.shown()["given"]
+    assert len(given["layout"]) == 5
+    places = *given["layout"], given["start"], given["target"][:2]
+    for number in chain.from_iterable(places):
+        assert number == round(number, 2)
+    tab.click("Train")
+    names = ("learner", "alpha", "layout", "start", "target", "episodes")
+    experiment = Experiment(**{name: given[name] for name in names})
+    assert_equal_to_python(trained(tab)[0], experiment)
+    shown: dict = {}
+    exec(box(tab, "Library code of the same run"), shown)  # which trains
+    assert shown["experiment"] == experiment
+    assert_command(tab, experiment)
+
+
+def test_a_paste_into_a_terminal_trains_the_same_run(tab, tmp_path):
+    tab.press("Obstacle 4", "Shift+ArrowUp")
+    fill(tab, Episodes=2, Seed=5)
+    tab.click("Train")
+    cost = trained(tab)[0]["rows"][-1]["judged"]["cost"]
+    words = box(tab, "Command of the same run").replace("nmpcrl", f"{sys.executable} -m nmpcrl")
+    environment = {"NMPCRL_RUNS": str(tmp_path), "NMPCRL_WARNED": "1"}
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        said = subprocess.run(words, shell=True, capture_output=True, text=True, check=True)
+    assert f"noise-free cost {cost:.1f}" in said.stdout + said.stderr
+
+
+def test_the_frozen_arm_meets_the_same_noise(tab):
+    fill(tab, Episodes=3, Seed=4)
+    tab.click("Train")
+    trained(tab)
+    tab.page.wait_for_function(ARMS)
+    tab.figure.locator("progress").wait_for(state="hidden")
+    arm = tab.shown()["runs"][0]["arm"]
+    expected = run(frozen_arm(Experiment(episodes=3, seed=4))).steps["cost"].reshape(3, -1)
+    np.testing.assert_allclose([row["cost"] for row in arm[1:]], expected.sum(axis=1), rtol=1e-9)
+
+
+def test_obstacles_come_and_go_by_mouse_and_by_key(tab):
+    before = tab.shown()["given"]["layout"]
+    tab.click("Add an obstacle")
+    tab.drag("Obstacle 5", (-30, 40))
+    assert tab.shown()["given"]["layout"][:4] == before
+    tab.press("Obstacle 2", "Delete")
+    assert tab.page.evaluate("document.activeElement.ariaLabel") == "Obstacle 1"
+    layout = tab.shown()["given"]["layout"]
+    assert layout[:3] == [before[0], *before[2:]]
+    for name, count in (("Add an obstacle", 8), ("Remove the last one", 1)):
+        button = tab.figure.get_by_role("button", name=name)
+        button.focus()
+        for _ in range(8):
+            tab.page.keyboard.press("Enter")
+        assert len(tab.shown()["given"]["layout"]) == count
+        assert button.get_attribute("aria-disabled") == "true"
+    assert tab.shown()["given"]["layout"] == before[:1]
+    tab.press("Obstacle 1", "Delete")
+    assert tab.shown()["given"]["layout"] == before[:1]
+    tab.click("Reset")
+    assert tab.shown()["given"]["layout"] == before
+
+
+def test_start_and_target_stay_in_the_box(tab):
+    tab.press("Robot, start", *["Shift+ArrowLeft"] * 4)
+    tab.press("Target", *["Shift+ArrowRight"] * 4)
+    given = tab.shown()["given"]
+    assert given["start"][0] == paper.LOWER[0]
+    assert given["target"][0] == paper.UPPER[0]
+
+
+def test_training_is_stopped_and_what_it_found_stays(opened):
+    tab = opened(FIGURE, script=SLOW, viewport={"width": 1400, "height": 1000}).begun()
+    tab.click("Train")
+    tab.page.wait_for_function(GOING)
+    tab.click("Stop")
+    stopped = tab.shown()["runs"][0]
+    assert stopped["state"] == "stopped"
+    tab.page.wait_for_timeout(300)
+    assert len(tab.shown()["runs"][0]["rows"]) == len(stopped["rows"])
+    assert "stopped" in tab.figure.get_by_role("listitem").inner_text()
+
+
+def test_runs_share_the_plots_and_can_be_removed(tab):
+    fill(tab, Episodes=2)
+    tab.click("Train")
+    choose(tab, "Learner", "GES")
+    tab.click("Other seeds: 3 more runs")
+    runs = trained(tab)
+    tab.quiet()
+    assert [one["given"]["seed"] for one in runs] == [0, 1, 2, 3]
+    names = tab.figure.locator(".plots svg").first.locator("text.right")
+    assert sorted(names.all_text_contents()) == ["1", "2", "3", "4"]
+    tab.figure.get_by_role("radio", name="3: GES, seed 2").check()
+    assert tab.shown()["given"]["seed"] == 2
+    assert tab.shown()["last"] is not None
+    tab.click("Remove 3: GES, seed 2, episodes 2")
+    tab.page.wait_for_function("() => document.querySelectorAll('.runs li').length === 3")
+    assert sorted(names.all_text_contents()) == ["1", "2", "4"]
+
+
+def test_a_link_restores_everything_and_the_browsers_arrows_lead_back(tab, opened):
+    tab.press("Obstacle 1", "Shift+ArrowDown")
+    first = settled(tab)
+    choose(tab, "Learner", "TDC")
+    fill(tab, Seed=9, Step_size_β="3e-7")
+    tab.press("Target, heading", "ArrowLeft")
+    settled(tab, first)
+    tab.page.wait_for_timeout(600)
+    link, given = box(tab, "A link to these settings"), tab.shown()["given"]
+    assert link == tab.page.url
+    other = opened(FIGURE).begun()
+    other.page.goto("about:blank")
+    other.page.goto(link)
+    other.begun()
+    assert other.shown()["given"] == given
+    tab.page.go_back()
+    tab.page.wait_for_function("first => location.hash === first", arg=first)
+    back = tab.shown()["given"]
+    assert [back["learner"], back["seed"], back["layout"]] == ["ES", 0, given["layout"]]
+    tab.page.go_forward()
+    tab.page.wait_for_function("first => location.hash !== first", arg=first)
+    assert tab.shown()["given"] == given
+
+
+def test_a_damaged_link_gets_a_sentence_and_the_defaults(tab):
+    said = tab.figure.locator(".results")
+    for fragment in DAMAGED:
+        tab.page.evaluate("text => { location.hash = text }", f"seed=3&{fragment}")
+        said.get_by_text(f"damaged at “{fragment.split('=')[0]}”").wait_for()
+        assert tab.shown()["given"]["seed"] == 0
+        tab.page.evaluate("location.hash = ''")
+        tab.press("Obstacle 1", "ArrowUp", "ArrowDown")
+        said.get_by_text("damaged").wait_for(state="hidden")
+
+
+def test_a_number_that_makes_no_sense_is_refused_beside_its_field(tab):
+    fill(tab, Horizon_N="41")
+    assert "Horizon N: a whole number from 1 to 40, please." in tab.quiet().figure.inner_text()
+    assert tab.figure.get_by_label("Horizon N").get_attribute("aria-invalid") == "true"
+    assert tab.shown()["given"]["horizon"] == paper.HORIZON
+    fill(tab, Horizon_N="12")
+    assert tab.shown()["given"]["horizon"] == 12
+    assert "please" not in tab.quiet().figure.inner_text()
+
+
+def test_a_find_opens_with_a_click(tab):
+    fill(tab, Episodes=1)
+    tab.click("Train")
+    trained(tab)
+    buttons = tab.figure.locator(".gallery button")
+    assert buttons.count() == 6
+    for name in buttons.all_inner_texts():
+        tab.click(name)
+        find = next(one for one in data_of(tab)["gallery"] if one["title"] == name)
+        assert tab.shown()["given"] == find["settings"]
+        assert tab.figure.locator(".sentence").inner_text() == find["sentence"]
+        assert tab.shown()["last"] is None
+        assert_command(tab, Experiment(**find["settings"]))
+        tab.click("Reset")
+    assert tab.shown()["given"]["layout"] == [list(one) for one in paper.LAYOUTS["A"]]
+
+
+def test_the_link_is_copied(opened):
+    tab = opened(FIGURE, permissions=["clipboard-read", "clipboard-write"]).begun()
+    tab.click("Copy code")
+    tab.figure.get_by_text("Copied.").wait_for()
+    copied = tab.page.evaluate("navigator.clipboard.readText()")
+    assert copied == box(tab, "Library code of the same run")
+    assert copied.startswith("from nmpcrl.study import Experiment, run")
+
+
+def test_without_javascript_there_are_the_picture_and_the_text(opened):
+    tab = opened(FIGURE, java_script_enabled=False)
+    assert tab.page.locator("article figure img[alt*='Five panels']").is_visible()
+    assert not tab.figure.is_visible()
+    assert "from a terminal" in tab.page.locator("article").inner_text()
+
+
+def test_without_webassembly_there_is_a_sentence(opened):
+    tab = opened(FIGURE, script="delete window.WebAssembly")
+    tab.figure.locator("p").wait_for()
+    assert "does not run WebAssembly" in tab.figure.inner_text()
+    assert tab.errors == []
+
+
+@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing(opened, width, theme):
+    tab = opened(
+        FIGURE,
+        viewport={"width": width, "height": 900},
+        color_scheme=theme,
+        reduced_motion="reduce",
+    ).begun()
+    fill(tab, Episodes=1)
+    tab.click("Train")
+    trained(tab)
+    found = Axe().run(tab.quiet().page, context="figure.live")
+    assert found.response["passes"]
+    assert found.response["violations"] == []
+    assert tab.page.evaluate("document.documentElement.scrollWidth") <= width
+    for target in tab.figure.locator(":is(.reach, input, select, button):visible").all():
+        size = target.bounding_box()
+        assert min(size["width"], size["height"]) >= 24

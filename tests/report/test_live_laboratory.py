@@ -1,0 +1,113 @@
+"""What the laboratory is given: the library's own settings, looks and noise."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.learning import browser
+from nmpcrl.report import live
+from nmpcrl.report.figures.style import LOOKS
+from nmpcrl.report.finds import Find
+from nmpcrl.report.live import frame, noise, training
+from nmpcrl.study import Experiment, ParameterError, paper
+
+FIND = Find("One", "See.", {}, Experiment(seed=3), Experiment(seed=3))
+
+
+@pytest.fixture(scope="module")
+def shown() -> str:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(browser, "module", lambda plant, task: b"abc")
+        return live.laboratory([FIND]).data
+
+
+@pytest.fixture(scope="module")
+def data(shown) -> dict:
+    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
+
+
+def test_its_settings_begin_as_an_experiment_does(data):
+    experiment = Experiment()
+    for field in data["fields"]:
+        assert field["default"] == getattr(experiment, field["name"])
+    assert (data["start"], data["target"]) == (list(paper.START), list(paper.TARGET))
+    assert data["layouts"] == json.loads(json.dumps(paper.LAYOUTS))
+    assert data["evaluate_every"] == experiment.evaluate_every
+
+
+def test_whatever_it_allows_an_experiment_takes(data):
+    """And what is beyond is refused, but where a page is narrower than the library."""
+    for field in data["fields"]:
+        name = field["name"]
+        if "choices" in field:
+            assert all(Experiment(**{name: one}) for one in field["choices"])
+            continue
+        kind = int if field["whole"] else float
+        assert Experiment(**{name: kind(field["least"])})
+        assert Experiment(**{name: kind(field["most"])})
+        with pytest.raises(ParameterError):
+            Experiment(**{name: kind(field["least"]) - 1})
+        if name not in training.MOST:
+            with pytest.raises(ParameterError):
+                Experiment(**{name: kind(field["most"]) * 2})
+
+
+def test_a_setting_is_shown_for_the_learners_that_read_it(data):
+    read_by = {field["name"]: field["read_by"] for field in data["fields"]}
+    assert read_by["alpha"] == ["ES", "GES", "TDC", "QL"]
+    assert (read_by["beta"], read_by["beta_tdc"]) == (["GES"], ["TDC"])
+    assert read_by["seed"] == list(training.LEARNERS)
+
+
+def test_learners_have_their_colours(data):
+    assert set(data["looks"]) == set(training.LEARNERS)
+    for learner, (colour, dashes) in data["looks"].items():
+        assert colour == LOOKS[learner].color
+        assert bool(dashes) == (LOOKS[learner].linestyle != "-")
+
+
+def test_the_longest_horizon_has_a_discount_for_every_stage(data):
+    most = next(field["most"] for field in data["fields"] if field["name"] == "horizon")
+    discount = data["problem"]["discount"]
+    assert discount == (paper.GAMMA ** np.arange(most + 1.0)).tolist()
+
+
+def test_the_widths_of_the_strips_make_numpys_normal_numbers(data):
+    """Within a strip a number is 52 bits times its width, with a sign."""
+    widths = data["widths"]
+    assert len(widths) == noise.STRIPS
+    bits, rng = np.random.default_rng(3), np.random.default_rng(4)
+    for _ in range(200):
+        strip, negative = rng.choice([0, *range(2, 256)]), rng.integers(2)
+        place = int(bits.integers(2**51))
+        drawn = noise.drawn(int(strip) | int(negative) << 8 | place << 9)
+        assert drawn == (1 - 2 * int(negative)) * place * widths[strip]
+
+
+def test_a_find_is_a_title_a_sentence_and_settings(data):
+    (find,) = data["gallery"]
+    assert (find["title"], find["sentence"], find["settings"]["seed"]) == ("One", "See.", 3)
+    names = {field["name"] for field in data["fields"]}
+    assert set(find["settings"]) == names | {"layout", "start", "target", "theta"}
+
+
+def test_all_its_files_are_there_once(shown):
+    names = re.findall(r'data-file="([^"]+)"', shown)
+    assert names == [
+        frame.STYLE,
+        *training.STYLES,
+        frame.MODULE,
+        *training.SCRIPTS,
+    ]
+    assert re.findall(r'<(\w+) data-file="[\w.]+css"', shown) == ["style", "style"]
+
+
+def test_without_a_compiler_there_is_a_sentence(monkeypatch):
+    def refuse(*_):
+        raise CannotCompile("numba is not installed")
+
+    monkeypatch.setattr(browser, "module", refuse)
+    assert "There is no live figure here" in live.laboratory().data
