@@ -147,7 +147,7 @@ def summarise(records: Records) -> RunSummary:
 def row(summary: RunSummary) -> dict[str, Any]:
     """One flat row: the experiment's fields, then what became of it."""
     experiment, episodes, evaluations = summary.experiment, summary.episodes, summary.evaluations
-    named = {name: _as_text(value) for name, value in experiment.items()}
+    named = {name: as_text(value) for name, value in experiment.items()}
     late = slice(-min(LATE, max(1, experiment["episodes"] // 2)), None)
     cost = evaluations["cost"]
     columns = {
@@ -206,7 +206,7 @@ def experiment_of(row: Mapping[str, Any]) -> Experiment:
     return Experiment(**named)
 
 
-def _as_text(value: Any) -> Any:
+def as_text(value: Any) -> Any:
     """A field as a table holds it: a vector's numbers between blanks."""
     return " ".join(map(repr, value)) if isinstance(value, tuple | list) else value
 

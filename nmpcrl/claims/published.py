@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 import nmpcrl
-from nmpcrl.analysis.summary import RunSummary, experiment_of, row
+from nmpcrl.analysis.summary import RunSummary, as_text, experiment_of, row
 from nmpcrl.bench.learners import ratio
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism, failure_modes
@@ -37,6 +37,7 @@ from nmpcrl.study.provenance import EPOCHS, environment, hash_of, summary_key
 from nmpcrl.study.records import Column
 
 FILES = ("runs.csv", "curves.npz", "verdicts.json", "timings.csv", "about.json")
+DEFAULTS = {one.name: as_text(one.default) for one in fields(Experiment)}  # for older tables
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
 # Columns of `failure_modes`, and what may be in them; the frozen arms have none.
@@ -205,7 +206,7 @@ def _read(folder: Path) -> Published:
     for name, known in WORDS.items():
         if unknown := set(runs[name]) - known:
             raise ValueError(f"no {name} is called {', '.join(sorted(unknown))}")
-    rows = {experiment_of(one): one for one in runs.to_dict("records")}
+    rows = {experiment_of(one): DEFAULTS | one for one in runs.to_dict("records")}
     with (folder / "curves.npz").open("rb") as whole, np.load(whole, allow_pickle=False) as file:
         curves = {name: file[name] for name in file.files}
     if {len(rows)} != {len(column) for column in curves.values()}:

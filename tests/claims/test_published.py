@@ -271,13 +271,23 @@ def test_a_table_without_a_column_is_said_in_a_sentence(known, folder):
     assert_refused(folder)
 
 
-def test_a_column_that_an_older_table_lacks_takes_the_fields_default(known, summaries, folder):
-    runs = pd.read_csv(folder / "runs.csv").drop(columns=["projected", "evaluate_every"])
+def without(folder, columns) -> Published:
+    """What is published, as it was before these columns came."""
+    runs = pd.read_csv(folder / "runs.csv").drop(columns=columns)
     runs.to_csv(folder / "runs.csv", index=False)
-    about = json.loads((folder / "about.json").read_text())
-    published._seal(folder, about)
-    default = Experiment().evaluate_every
-    assert list(load().rows) == [replace(e, evaluate_every=default) for e in summaries]
+    published._seal(folder, json.loads((folder / "about.json").read_text()))
+    return load()
+
+
+def test_a_column_that_an_older_table_lacks_takes_the_fields_default(known, summaries, folder):
+    found, default = without(folder, ["projected", "evaluate_every"]), Experiment().evaluate_every
+    assert list(found.rows) == [replace(e, evaluate_every=default) for e in summaries]
+
+
+def test_runs_do_not_contradict_an_older_table(known, summaries, folder, elsewhere):
+    found = without(folder, ["start", "target"])
+    elsewhere()
+    assert compare(summaries, found).empty
 
 
 @pytest.mark.parametrize(("name", "word"), [("runs.csv", "stuck"), ("verdicts.json", "partly")])
