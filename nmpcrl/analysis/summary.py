@@ -40,6 +40,14 @@ VECTORS = {"theta", "start", "target"}  # fields that a row holds as text
 IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
 
 
+def as_text(value: Any) -> Any:
+    """A field as a table holds it: a vector's numbers between blanks."""
+    return " ".join(map(repr, value)) if isinstance(value, tuple | list) else value
+
+
+DEFAULTS = {one.name: as_text(one.default) for one in fields(Experiment)}  # if a run is older
+
+
 @dataclass(frozen=True, eq=False)
 class RunSummary:
     """One run, in short.
@@ -147,7 +155,7 @@ def summarise(records: Records) -> RunSummary:
 def row(summary: RunSummary) -> dict[str, Any]:
     """One flat row: the experiment's fields, then what became of it."""
     experiment, episodes, evaluations = summary.experiment, summary.episodes, summary.evaluations
-    named = {name: as_text(value) for name, value in experiment.items()}
+    named = DEFAULTS | {name: as_text(value) for name, value in experiment.items()}
     late = slice(-min(LATE, max(1, experiment["episodes"] // 2)), None)
     cost = evaluations["cost"]
     columns = {
@@ -204,11 +212,6 @@ def experiment_of(row: Mapping[str, Any]) -> Experiment:
     for name in VECTORS & named.keys():
         named[name] = tuple(float(value) for value in named[name].split())
     return Experiment(**named)
-
-
-def as_text(value: Any) -> Any:
-    """A field as a table holds it: a vector's numbers between blanks."""
-    return " ".join(map(repr, value)) if isinstance(value, tuple | list) else value
 
 
 def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> "pd.DataFrame":

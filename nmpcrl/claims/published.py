@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 import nmpcrl
-from nmpcrl.analysis.summary import RunSummary, as_text, experiment_of, row
+from nmpcrl.analysis.summary import DEFAULTS, RunSummary, experiment_of, row
 from nmpcrl.bench.learners import ratio
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism, failure_modes
@@ -37,7 +37,6 @@ from nmpcrl.study.provenance import EPOCHS, environment, hash_of, summary_key
 from nmpcrl.study.records import Column
 
 FILES = ("runs.csv", "curves.npz", "verdicts.json", "timings.csv", "about.json")
-DEFAULTS = {one.name: as_text(one.default) for one in fields(Experiment)}  # for older tables
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
 # Columns of `failure_modes`, and what may be in them; the frozen arms have none.

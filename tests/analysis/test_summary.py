@@ -138,3 +138,8 @@ def test_the_tidy_table_has_a_row_an_episode(short):
     assert len(frame) == 4
     np.testing.assert_array_equal(frame["theta_c"], short.episodes["theta"][:, -1])
     assert set(frame.learner) == {"RDES"}
+
+
+def test_a_field_that_is_younger_than_a_run_has_its_default_in_the_row(short):
+    older = {name: value for name, value in short.experiment.items() if name != "start"}
+    assert row(replace(short, experiment=older)) == row(short)
