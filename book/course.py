@@ -61,7 +61,8 @@ def edition(name: str, place: Path) -> None:
     for file, source in sources.items():
         nbformat.write(EDITIONS[name](source, set(sources), library), place / file)
     shutil.copy2(ROOT / "environment.txt", place)
-    shutil.copytree(ROOT / "book/published", place / "data/published")
+    for data in ("published", "_static/live"):
+        shutil.copytree(ROOT / "book" / data, place / "data" / Path(data).name)
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})

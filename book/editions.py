@@ -33,7 +33,8 @@ one sentence; nothing else depends on it. Everything runs without a network, fro
 `data`."""
 SETUP = """import os
 
-os.environ |= {"NMPCRL_PUBLISHED": "data/published", "NMPCRL_RUNS": "data/runs"}
+folders = {"PUBLISHED": "published", "RUNS": "runs", "LIVE": "live"}
+os.environ |= {f"NMPCRL_{name}": f"data/{folder}" for name, folder in folders.items()}
 os.environ["NMPCRL_STRICT"] = "1"  # an answer that is missing or wrong fails"""
 COLUMNS = "| exercise | kind | level | minutes | points | goal |\n|---|---|---|---|---|---|"
 

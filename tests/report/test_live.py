@@ -135,3 +135,10 @@ def test_the_kinks_map_shows_the_nearest_obstacle_whole(nmpc, small):
 def test_the_update_is_given_the_chapters_alpha_and_discount(nmpc, small):
     data = given(live.update(nmpc, THETA, 3e-7).data)
     assert [data["alpha"], data["gamma"], data["overshoot"]] == [3e-7, nmpc.gamma, 2]
+
+
+def test_without_its_scripts_there_is_a_sentence(nmpc, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_LIVE", str(tmp_path / "nowhere"))
+    shown = live.controller(nmpc, THETA, 130).data
+    assert shown.startswith("<p>There is no live figure here: its scripts are not in ")
+    assert "NMPCRL_LIVE" in shown

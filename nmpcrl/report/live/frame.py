@@ -1,8 +1,10 @@
 """The frame of every live figure: what it is given, its style, its module and its scripts."""
 
 import json
+import os
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 from IPython.display import HTML
@@ -14,7 +16,6 @@ from nmpcrl.report.prose import ROOT
 
 STYLE, MODULE = "live.css", "module.js"
 PARTS = ("solver.js", "words.js", "plane.js", "parts.js")  # of every figure that solves
-FOLDER = ROOT / "book/_static/live"
 FIGURE = """<figure class="live" data-figure="{}" hidden>
 <p>This figure is live once the notebook is trusted, or its cells are run.</p>
 <script type="application/json">{}</script>
@@ -30,7 +31,7 @@ def figure(
     module: bytes | None = None,
     styles: Iterable[str] = (),
 ) -> HTML:
-    """A live figure.
+    """A live figure; a sentence where its scripts are not to be had.
 
     Args:
         name: by which its script finds it.
@@ -39,6 +40,8 @@ def figure(
         module: WebAssembly, if it solves; `nmpcrl.module` of a page is this.
         styles: besides that of every live figure.
     """
+    if not folder().is_dir():
+        return absent(f"its scripts are not in {folder()}, and NMPCRL_LIVE may say where they are")
     shown = [FIGURE.format(name, json.dumps(data)), *files(scripts, module, styles)]
     return HTML("\n".join(shown))  # type: ignore[no-untyped-call]
 
@@ -63,16 +66,21 @@ def scripts_of(name: str, *more: str) -> tuple[str, ...]:
     return (*PARTS, *more, f"{name}.js")
 
 
-def absent(error: CannotCompile) -> HTML:
-    """What stands there where nothing can be compiled."""
-    return HTML(f"<p>There is no live figure here: {error}.</p>")  # type: ignore[no-untyped-call]
+def folder() -> Path:
+    """Where the scripts are, or what the environment variable NMPCRL_LIVE says."""
+    return Path(os.environ.get("NMPCRL_LIVE") or ROOT / "book/_static/live")
+
+
+def absent(why: object) -> HTML:
+    """What stands in the place of a figure."""
+    return HTML(f"<p>There is no live figure here: {why}.</p>")  # type: ignore[no-untyped-call]
 
 
 def files(scripts: Iterable[str], module: bytes | None, styles: Iterable[str] = ()) -> list[str]:
     """Styles, module and scripts in the order in which they are needed, each with its name."""
-    texts = {name: (FOLDER / name).read_text("utf-8") for name in (STYLE, *styles)}
+    texts = {name: (folder() / name).read_text("utf-8") for name in (STYLE, *styles)}
     if module is not None:
         texts[MODULE] = COMPILED % b64encode(module).decode()
-    texts |= {name: (FOLDER / name).read_text("utf-8") for name in scripts}
+    texts |= {name: (folder() / name).read_text("utf-8") for name in scripts}
     kinds = {name: "style" if name.endswith(".css") else "script" for name in texts}
     return [FILE.format(kind=kinds[name], name=name, text=texts[name].strip()) for name in texts]
