@@ -247,7 +247,7 @@ def scope(answers: pd.Series) -> str:
     levels = [name for name in answers.index.names if name != "learner"]
     counts = [
         (answers.index.unique(name).size, *NAMED.get(name, (str(name), "")))
-        for name in [name for name in CELL if name in levels] or levels
+        for name in (CELL if {*CELL} <= {*levels} else levels)
     ]
     parts = [f"{n} {name}{'' if n == 1 else 's'}{rest}" for n, name, rest in counts]
     return f"({', '.join(parts)}.)"

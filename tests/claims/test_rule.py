@@ -131,7 +131,7 @@ def test_a_study_with_other_levels_than_ours_is_judged_as_a_whole():
     assert verdict.outcome == REPRODUCED
     assert verdict.by_layout == verdict.by_decay == {}
     assert verdict.counts == {"all": (12, 12)}
-    assert verdict.evidence.endswith("It holds in 12 of 12 runs: 100%. (2 ratios, 6 seeds.)")
+    assert verdict.evidence.endswith("runs: 100% [76%, 100%]. (2 ratios, 6 seeds.)")
 
 
 def test_a_verdict_is_given_overall_in_each_layout_and_in_each_reading():
