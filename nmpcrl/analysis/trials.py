@@ -74,7 +74,8 @@ def summarise(costs: pd.DataFrame, baseline: str) -> pd.DataFrame:
         baseline: the learner with which the others are compared.
 
     Returns:
-        One row a learner, with two `Estimate`s: columns "interquartile mean" and "P(costs less)".
+        One row a learner and an `Estimate` in each column: "interquartile mean" and
+        "P(costs less)".
     """
     strata = ["all"] * len(costs)
     return pd.DataFrame(
