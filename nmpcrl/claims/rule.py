@@ -39,6 +39,7 @@ NEARLY_ALL = 0.9
 NEARLY_NONE = 0.1
 
 CELL = ["layout", "decay", "seed"]  # what two runs share that are compared
+NAMED = {"decay": ("reading", " of the decay")}  # a level that a sentence calls otherwise
 
 Paths: TypeAlias = Mapping[Experiment, Column]  # the states of each run's last rollout
 
@@ -242,14 +243,19 @@ def _arm(runs: pd.DataFrame, learner: str) -> pd.DataFrame:
 
 
 def scope(answers: pd.Series) -> str:
-    """What the answers cover."""
-    counts = {name: answers.index.unique(name).size for name in CELL}
-    names = {"layout": "layout", "decay": "reading", "seed": "seed"}
-    parts = [f"{n} {names[name]}{'' if n == 1 else 's'}" for name, n in counts.items()]
-    return f"({parts[0]}, {parts[1]} of the decay, {parts[2]}.)"
+    """What the answers cover: layouts, readings and seeds, or what another study has for levels."""
+    levels = [name for name in answers.index.names if name != "learner"]
+    counts = [
+        (answers.index.unique(name).size, *NAMED.get(name, (str(name), "")))
+        for name in (CELL if {*CELL} <= {*levels} else levels)
+    ]
+    parts = [f"{n} {name}{'' if n == 1 else 's'}{rest}" for n, name, rest in counts]
+    return f"({', '.join(parts)}.)"
 
 
 def _groups(answers: pd.Series, level: str) -> dict[str, pd.Series]:
+    if level not in answers.index.names:
+        return {}
     labels = answers.index.get_level_values(level)
     return {name: answers[labels == name] for name in labels.unique()}
 

@@ -15,6 +15,7 @@ import build
 import enrich
 import nbformat
 import pytest
+import test_api
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from papermill.cli import papermill
@@ -29,10 +30,12 @@ ROOT = Path(__file__).resolve().parents[2]
 PATHS = sorted((ROOT / "book").glob("*.ipynb"))
 NOTEBOOKS = {path.stem: nbformat.read(path, as_version=4) for path in PATHS}
 CHAPTERS = [name for name in NOTEBOOKS if re.match(r"\d\d_|solver", name)]
-GIVEN = [*CHAPTERS, "paper_and_book", "performance"]  # which have parameters
+OWN = [name for name in NOTEBOOKS if name.startswith("your_")]  # a reader's own robot, learner ...
+GIVEN = [*CHAPTERS, *OWN, "paper_and_book", "performance"]  # which have parameters
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)
+each_own = pytest.mark.parametrize("name", OWN)
 each_given = pytest.mark.parametrize("name", GIVEN)
 
 
@@ -392,7 +395,7 @@ def chapter_and_parameters(words: list[str]) -> tuple[str, dict]:
     return named["CHAPTER"], build.values(given["pairs"], given["raw"], given["texts"])
 
 
-@each_chapter
+@pytest.mark.parametrize("name", [*CHAPTERS, *OWN])
 def test_the_commands_of_the_try_box_are_accepted(name, monkeypatch):
     monkeypatch.chdir(ROOT)
     lines = commands(name)
@@ -401,3 +404,50 @@ def test_the_commands_of_the_try_box_are_accepted(name, monkeypatch):
         chapter, given = chapter_and_parameters(words)
         build.refuse_unknown(build.known(chapter), given)
         build.ask(build.known(chapter), given)
+
+
+def imports(name: str) -> set[str]:
+    """What a notebook imports: modules, and names with the module that they come from."""
+    found = set()
+    for cell in code(name):
+        for node in ast.walk(ast.parse(cell.source)):
+            if isinstance(node, ast.Import):
+                found |= {one.name for one in node.names}
+            if isinstance(node, ast.ImportFrom):
+                found |= {f"{node.module}.{one.name}" for one in node.names}
+    return found
+
+
+@each_own
+def test_a_notebook_of_ones_own_uses_public_names_only(name):
+    ours = {one for one in imports(name) if one.startswith("nmpcrl")}
+    modules = {one for one in test_api.LISTED if one.startswith("nmpcrl")}
+    homes = {one.rpartition(".")[0] for one in modules}
+    assert ours - modules - homes == set()
+    known = {"numpy", "pandas", "casadi", "io.StringIO", "IPython.display.HTML"}
+    assert imports(name) - ours <= known
+
+
+@each_own
+def test_a_notebook_of_ones_own_says_what_it_takes_and_ends_with_the_readers_turn(name):
+    opening, goals, *_, closing, box = NOTEBOOKS[name].cells
+    assert re.search(r"^It takes about \d+ minutes\. It needs ", opening.source, flags=re.M)
+    assert re.search(r"\?", opening.source)
+    assert "goals" in tags(goals)
+    turn = closing.source.partition("## Now yours\n")[2]
+    assert len(re.findall(r"^- ", turn, flags=re.M)) >= 3
+    assert "try" in tags(box)
+
+
+@pytest.mark.slow
+@each_own
+def test_a_notebook_of_ones_own_runs_with_few_episodes_and_one_seed(name, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    few = {"episodes": 2, "seeds": [3]}
+    given = {one: few[one] for one in NOTEBOOKS[name].metadata.nmpcrl.parameters if one in few}
+    command = [sys.executable, "-m", "papermill", f"book/{name}.ipynb", str(tmp_path / "o.ipynb")]
+    done = subprocess.run(
+        [*command, "-y", str(given)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "runs").exists()  # nothing of it belongs to the study

@@ -124,6 +124,16 @@ def test_the_interval_covers_whatever_the_missing_may_say(yes, no, missing):
 # What a verdict says
 
 
+def test_a_study_with_other_levels_than_ours_is_judged_as_a_whole():
+    index = pd.MultiIndex.from_product([("end",), (0.5, 1.0), range(6)])
+    asked = pd.Series(True, index.set_names(["learner", "ratio", "seed"]), dtype="boolean")
+    verdict = settle(CLAIM, asked, "Numbers.", unit="runs")
+    assert verdict.outcome == REPRODUCED
+    assert verdict.by_layout == verdict.by_decay == {}
+    assert verdict.counts == {"all": (12, 12)}
+    assert verdict.evidence.endswith("runs: 100% [76%, 100%]. (2 ratios, 6 seeds.)")
+
+
 def test_a_verdict_is_given_overall_in_each_layout_and_in_each_reading():
     asked = pd.concat(
         [answers(A=[True] * 10, B=[False] * 10), answers(A=[True] * 10).rename({"step": "episode"})]
