@@ -89,7 +89,10 @@ def _unit(number: int, unit: Unit) -> str:
     said = "\n".join(f"- **{name}:** {text}" for name, text in lines.items() if text)
     rest = UNIT - unit.total
     free = f", {rest} left for questions" if rest else ""
-    return f"### {number}. {unit.title}\n\n{said}\n\n*{unit.total} of {UNIT} minutes{free}.*"
+    return (
+        f"::::{{admonition}} {number}. {unit.title}\n:class: dropdown\n\n"
+        f"{said}\n\n*{unit.total} of {UNIT} minutes{free}.*\n::::"
+    )
 
 
 def _linked(sections: Any) -> str:
