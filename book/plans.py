@@ -101,7 +101,7 @@ def _sections(wanted: dict[str, Any]) -> tuple[Section, ...]:
     """The sections of a unit; "all" means each one of a chapter.
 
     Raises:
-        UnknownSection: one of them is not there.
+        Unknown: one of them is not there.
     """
     known = chapters()
     return tuple(

@@ -26,8 +26,8 @@ LIVE = re.compile(r"\blive\.\w+\(")
 NOT_READ = ("Exercises", "What we saw")  # counted by themselves, or repeated
 
 
-class UnknownSection(ValueError):
-    """The syllabus names a section that its chapter does not have."""
+class Unknown(ValueError):
+    """The syllabus names what is not there, or lacks a chapter; the message says which."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,17 @@ class Chapter:
     exercises: tuple[Exercise, ...]
 
     @property
+    def needs(self) -> tuple[Section, ...]:
+        """The sections of other chapters that it needs."""
+        wanted = declared_of(self.page)["needs"].items()
+        return tuple(chapters()[page].section(one) for page, titles in wanted for one in titles)
+
+    @property
+    def alone(self) -> tuple[Section, ...]:
+        """Those of its sections that need nothing."""
+        return tuple(map(self.section, declared_of(self.page).get("alone", ())))
+
+    @property
     def link(self) -> str:
         return f"[Chapter {self.number}]({self.page}.ipynb)"
 
@@ -83,7 +94,7 @@ class Chapter:
         for one in self.sections:
             if one.title == title:
                 return one
-        raise UnknownSection(f"{self.page} has no section {title!r}")
+        raise Unknown(f"{self.page} has no section {title!r}")
 
 
 def minutes(sections: tuple[Section, ...] | list[Section]) -> int:
@@ -120,6 +131,18 @@ def chapters() -> dict[str, Chapter]:
 def declared() -> dict[str, Any]:
     """What `syllabus.yml` says."""
     found: dict[str, Any] = yaml.safe_load((BOOK / "syllabus.yml").read_text())
+    return found
+
+
+def declared_of(page: str) -> dict[str, Any]:
+    """What `syllabus.yml` says of a chapter.
+
+    Raises:
+        Unknown: nothing.
+    """
+    found: dict[str, Any] | None = declared()["chapters"].get(page)
+    if found is None:
+        raise Unknown(f"book/syllabus.yml does not say what {page} needs")
     return found
 
 

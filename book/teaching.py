@@ -13,7 +13,7 @@ import yaml
 from nbformat.v4 import new_markdown_cell
 from plans import LIVE, PACE, UNIT, Unit, plan
 from self_test import self_test
-from syllabus import BOOK, FIGURE, FORMULA, WORDS, Chapter, chapters, declared, label
+from syllabus import BOOK, FIGURE, FORMULA, WORDS, Chapter, chapters, declared, declared_of, label
 
 PART = re.compile(r"<!-- syllabus: (?P<name>[\w-]+) ?(?P<of>[\w-]*) -->")
 HEADING = re.compile(r"^## +(?P<title>.+)$", flags=re.M)
@@ -40,10 +40,10 @@ def head(chapter: Chapter) -> str:
     times = [f"Reading {chapter.reading} min"]
     times += [f"exercises {chapter.solving} min"] if chapter.solving else []
     times += [f"project {chapter.project} min"] if chapter.project else []
-    pages = declared()["needs"][chapter.page]
+    pages = dict.fromkeys(one.page for one in chapter.needs)
     needs = listed([chapters()[page].link for page in pages])
-    needs = needs or "what the [self-test](teach.md) asks"
-    alone = [chapter.section(one).link for one in declared()["alone"].get(chapter.page, ())]
+    needs = needs or "what the [self-test](#teach-self-test) asks"
+    alone = [one.link for one in chapter.alone]
     also = f"; {listed(alone)} need{'s' * (len(alone) == 1)} nothing before" if alone else ""
     return f"{{.chapter-head}}\n{', '.join(times)}; needs: {needs}{also}."
 
@@ -125,22 +125,22 @@ def needs() -> str:
 
 
 def _needs(chapter: Chapter) -> str:
-    known = chapters()
-    wanted = declared()["needs"][chapter.page].items()
+    pages = dict.fromkeys(one.page for one in chapter.needs)
     sections = (
-        f"from {known[page].link}, {listed([known[page].section(one).link for one in titles])}"
-        for page, titles in wanted
+        f"from {chapters()[page].link}, "
+        + listed([one.link for one in chapter.needs if one.page == page])
+        for page in pages
     )
     line = f"- {chapter.link} needs {'; '.join(sections) or 'no other chapter'}."
-    alone = [chapter.section(one).link for one in declared()["alone"].get(chapter.page, ())]
-    return line + f" Its sections {listed(alone)} need nothing before." * bool(alone)
+    alone = listed([one.link for one in chapter.alone])
+    return line + f" Its sections {alone} need nothing before." * bool(alone)
 
 
 def drawn() -> str:
     """The graph of chapters."""
-    short = declared()["short"]
-    names = {page: (str(chapters()[page].number), title) for page, title in short.items()}
-    edges = {page: list(wanted) for page, wanted in declared()["needs"].items()}
+    said = declared()["chapters"]
+    names = {page: (str(chapters()[page].number), one["short"]) for page, one in said.items()}
+    edges = {page: list(declared_of(page)["needs"]) for page in chapters()}
     return graph.svg(names, edges)
 
 
