@@ -10,7 +10,6 @@ from typing import Any
 
 import graph
 import yaml
-from nbformat.v4 import new_markdown_cell
 from plans import LIVE, PACE, UNIT, Unit, plan
 from self_test import self_test
 from syllabus import BOOK, FIGURE, FORMULA, WORDS, Chapter, chapters, declared, declared_of, label
@@ -32,7 +31,8 @@ def headed(notebook: Any, page: str) -> None:
                 lambda found: f"({label(page, found['title'])})=\n{found[0]}", cell.source
             )
     if page in chapters():
-        notebook.cells.insert(1, new_markdown_cell(head(chapters()[page]), id="head"))
+        first, _, rest = notebook.cells[0].source.partition("\n")
+        notebook.cells[0].source = f"{first}\n\n{head(chapters()[page])}\n{rest}"
 
 
 def head(chapter: Chapter) -> str:

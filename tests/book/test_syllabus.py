@@ -74,10 +74,11 @@ def test_a_chapter_says_at_its_head_what_it_takes_and_needs(page):
 def test_the_head_follows_the_title_and_each_section_gets_its_label():
     cells = [new_markdown_cell("text\n\n## States, actions, costs\n\nmore"), new_code_cell("## no")]
     page = notebook(*cells)
+    page.cells[0].source += "\n\nWhy?"
     teaching.headed(page, "01_mdp_and_nmpc")
-    title, head, text, code = page.cells
-    assert title.source == "# What?"
-    assert head.source.startswith("{.chapter-head}\nReading ")
+    title, text, code = page.cells
+    assert title.source.startswith("# What?\n\n{.chapter-head}\nReading ")
+    assert title.source.endswith(".\n\nWhy?")
     assert "(section-mdp-and-nmpc-states-actions-costs)=\n## States, actions, costs" in text.source
     assert code.source == "## no"
 
@@ -119,6 +120,16 @@ def test_the_plans_are_as_long_as_they_say():
     text = (BOOK / "teach.md").read_text()
     assert f"Ten units of {plans.UNIT} minutes" in text
     assert f"Six units of {plans.UNIT} minutes" in text
+
+
+def test_the_seminar_takes_what_the_page_and_the_plans_say():
+    _, _, seminar = (BOOK / "teach.md").read_text().partition("## A seminar")
+    steps = [int(n) for n in re.findall(r"^\| (\d+) \|", seminar, flags=re.M)]
+    assert sum(steps) == plans.UNIT
+    for name in PLANS:
+        (unit,) = (one for one in plans.plan(name) if one.title.startswith("Seminar"))
+        assert unit.discussion[0] == sum(steps[3:])
+    assert f"and {sum(steps[3:])} minutes remain" in seminar
 
 
 @each_plan
