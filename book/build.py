@@ -15,7 +15,8 @@ Each build has its own place, in the last column, and six steps, each a function
               the published ones end the build, and so do verdicts, as `claims.agreement` says
 4. `execute`  the chapters with papermill, the exercises solved, two at a time, into PLACE/executed
 5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says, exercises
-              unsolved, as `questions` says, and the scripts of live figures, as `live` says
+              unsolved, as `questions` says, the scripts of live figures, as `live` says, and
+              minutes and plans, as `teaching` says
 6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
               repaired for all readers, as `accessible` says
 
@@ -54,6 +55,7 @@ import nbformat
 import papermill
 import pictures
 import questions
+import teaching
 import yaml
 from papermill.cli import _resolve_type as papermill_value
 from papermill.exceptions import PapermillExecutionError
@@ -320,11 +322,12 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
     live.add_runs(read.values(), source / "book/_static/live")
     for path in source.glob("book/*.md"):
         text = pictures.beside(path.read_text(), path.parent)
-        path.write_text(enrich.page(text, output))
+        path.write_text(teaching.filled(enrich.page(text, output)))
     for path, notebook in read.items():
         live.share(notebook, path, source / "book/_static/live")
         download = path.name if path in executed else ""
         dressed = enrich.notebook(questions.placed(notebook), download)
+        teaching.headed(dressed, path.stem)
         for name, data in pictures.placed(dressed).items():
             (source / "book" / pictures.FOLDER / name).write_bytes(data)
         nbformat.write(dressed, source / path)

@@ -34,7 +34,7 @@ def entered(name: str, entry: str) -> Edit:
     """Put an entry first in the dictionary of this name."""
 
     def edit(path: Path) -> None:
-        opened = rf"^{name}\b.*{{(?: *#.*)?\n"
+        opened = rf"^{name}\b.*[{{:](?: *#.*)?\n"
         text, count = re.subn(opened, rf"\g<0>{entry}", path.read_text(), count=1, flags=re.M)
         assert count, f"there is no {name} in {path}"
         path.write_text(text)
@@ -214,6 +214,7 @@ def ends(runs: Runs[Records]) -> Figure:
     "chapter": {
         "book/08_again.ipynb": copied("01_mdp_and_nmpc"),
         "_toc.yml": replaced("book/07_beyond\n", "book/07_beyond\n      - file: book/08_again\n"),
+        "book/syllabus.yml": entered("chapters", "  08_again: {short: Again, needs: {}}\n"),
         "book/reproduce.md": replaced(
             "| `solver` |", "| `08_again` | `layout`, `horizon` |\n| `solver` |"
         ),
@@ -352,9 +353,11 @@ assert "theta ends in 1 places" in names["figure"].get_suptitle()
 """,
     "chapter": """
 import build
+import teaching
 
 assert build.ROOT.samefile(".")
 assert "08_again" in build.notebooks()
+assert "Again" in teaching.filled("<!-- syllabus: graph -->")
 assert build.ask(build.known("08_again"), {"layout": "D"}).keys() == set(build.NEEDS)
 """,
     "live figure": """

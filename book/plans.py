@@ -1,0 +1,116 @@
+"""Plans for a course: the units that `syllabus.yml` declares, with minutes and exercises.
+
+Sections take longer to teach than to read. What is left of a unit goes to the exercises of its
+chapters in their order; those that do not fit are homework after the chapter's last unit.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from syllabus import Chapter, Section, chapters, declared, minutes
+
+from nmpcrl.course.exercises import Exercise
+
+UNIT = 90  # minutes
+PACE = 1.5  # minutes of a lecture for one of reading
+LIVE = 10  # minutes with a live figure
+
+
+@dataclass(frozen=True, eq=False)
+class Unit:
+    """What is taught at a stretch."""
+
+    title: str
+    goals: tuple[str, ...]
+    sections: tuple[Section, ...]
+    exercises: tuple[Exercise, ...]
+    discussion: tuple[int, str]  # minutes, and what about
+    homework: tuple[Exercise, ...]
+    besides: str  # other homework
+    left_out: tuple[Section, ...]  # of the chapters that end here
+
+    @property
+    def live(self) -> tuple[Section, ...]:
+        """The sections with a live figure."""
+        return tuple(one for one in self.sections if one.live)
+
+    @property
+    def minutes(self) -> dict[str, int]:
+        """Minutes by what they are spent on."""
+        return {
+            "lecture": math.ceil(PACE * minutes(self.sections)),
+            "live figures": LIVE * sum(one.live for one in self.sections),
+            "exercises": sum(one.about.minutes for one in self.exercises),
+            "discussion": self.discussion[0],
+        }
+
+    @property
+    def total(self) -> int:
+        return sum(self.minutes.values())
+
+
+def plan(name: str) -> list[Unit]:
+    """The units of a plan in their order."""
+    return list(_units(declared()["plans"][name]))
+
+
+def _units(units: list[dict[str, Any]]) -> Iterator[Unit]:
+    taught = [_sections(unit["sections"]) for unit in units]
+    covered = {one.label for sections in taught for one in sections}
+    last = {page: k for k, unit in enumerate(units) for page in unit["sections"]}
+    waiting = {page: _to_solve(chapters()[page]) for page in last}
+    for k, (unit, sections) in enumerate(zip(units, taught, strict=True)):
+        ending = [page for page in unit["sections"] if last[page] == k]
+        discussion = unit.get("discussion", {"minutes": 0, "about": ""})
+        begun = Unit(
+            title=unit["title"],
+            goals=tuple(unit["goals"]),
+            sections=sections,
+            exercises=(),
+            discussion=(discussion["minutes"], discussion["about"]),
+            homework=(),
+            besides=unit.get("homework", ""),
+            left_out=tuple(
+                one
+                for page in ending
+                for one in chapters()[page].sections
+                if one.label not in covered
+            ),
+        )
+        yield _filled(begun, list(unit["sections"]), ending, waiting)
+
+
+def _filled(
+    unit: Unit, pages: list[str], ending: list[str], waiting: dict[str, list[Exercise]]
+) -> Unit:
+    """The unit with the exercises that fit, which wait no longer, and with its homework."""
+    solved, room = [], UNIT - unit.total
+    for page in pages:
+        for one in tuple(waiting[page]):
+            if one.about.minutes <= room:
+                waiting[page].remove(one)
+                solved.append(one)
+                room -= one.about.minutes
+    later = [one for page in ending for one in waiting[page]]
+    return Unit(**(vars(unit) | {"exercises": tuple(solved), "homework": tuple(later)}))
+
+
+def _sections(wanted: dict[str, Any]) -> tuple[Section, ...]:
+    """The sections of a unit; "all" means each one of a chapter.
+
+    Raises:
+        Unknown: one of them is not there.
+    """
+    known = chapters()
+    return tuple(
+        one
+        for page, titles in wanted.items()
+        for one in (known[page].sections if titles == "all" else map(known[page].section, titles))
+    )
+
+
+def _to_solve(chapter: Chapter) -> list[Exercise]:
+    """The exercises of a chapter without its project."""
+    return [one for one in chapter.exercises if one.about.kind != "project"]

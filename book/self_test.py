@@ -1,0 +1,58 @@
+"""The questions of `syllabus.yml`: each with a place for its answer, and a folded answer.
+
+The place is that of an exercise, so `book/_static/exercises` checks it. Without scripts and on
+paper there are the question, its choices, and the answer.
+"""
+
+import json
+import re
+from typing import Any
+
+from questions import PLACE
+from syllabus import chapters, declared
+
+QUESTION = """\
+::::{{div}} exercise question
+**{number}.** {asks}
+
+{choices}
+::::
+
+{place}
+
+::::{{admonition}} Answer to {number}
+:class: dropdown
+
+**{right}**: {why} Read: {read}.
+::::"""
+
+
+def self_test() -> str:
+    """All questions, as MyST."""
+    return "\n\n".join(question(k, one) for k, one in enumerate(declared()["self-test"], 1))
+
+
+def question(number: int, asked: dict[str, Any]) -> str:
+    """One question, as MyST."""
+    right, choices = asked["right"], asked["choices"]
+    why = {letter: sentence for letter, (_, sentence) in choices.items()}
+    data = {"kind": "choice", "said": f"Right: {why[right]}", "right": right, "why": why}
+    given = json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")
+    return QUESTION.format(
+        number=number,
+        asks=asked["asks"],
+        choices="\n".join(f"- **{key}.** {text}" for key, (text, _) in choices.items()),
+        place=PLACE.format(name=f"self-test-{number}", number=number, data=given),
+        right=right,
+        why=why[right],
+        read=to_read(asked["read"]),
+    )
+
+
+def to_read(text: str) -> str:
+    """A link as it is, a citation, or "page: section" as links to both."""
+    page, _, title = text.partition(": ")
+    if page not in chapters():
+        return re.sub(r"\[[^]]+\]\(references\.md#(\w+)\)", r"{cite:t}`\1`", text)
+    chapter = chapters()[page]
+    return f"{chapter.link}, {chapter.section(title).link}"
