@@ -172,7 +172,11 @@ def search(answer: Any) -> Outcome:
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
         start = rng.uniform(2, 3, rng.integers(3, 10))
-        return {"start": start, "rounds": int(rng.integers(5, 15)), "seed": int(rng.integers(1e6))}
+        return {
+            "start": start,
+            "rounds": int(rng.integers(5, 15)),
+            "seed": int(rng.integers(10**6)),
+        }
 
     def behaviour(start: Vector, rounds: int, seed: int) -> tuple[bool, ...]:
         seen: list[tuple[float, ...]] = []

@@ -164,8 +164,8 @@ def residual(answer: Any) -> Outcome:
         complementary = np.abs(multipliers * g).max() < 1e-9 or not complementarity
         return bool(stationary and g.max() <= 0 and signed and complementary)
 
-    def without(**kept: bool) -> Any:
-        return lambda **given: optimal(**given, **kept)
+    def without(**dropped: Any) -> Any:
+        return lambda **given: optimal(**given, **dropped)
 
     return function(
         lambda **given: bool(abs(answer(**given)) < 1e-6),
