@@ -1,11 +1,19 @@
 """The exercises of Chapter 7."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from nmpcrl.course import Outcome, exercise, number
-from nmpcrl.learning.updates import OVERSHOOT, curvature_correction
+from nmpcrl import Vector
+from nmpcrl.course import Outcome, choice, exercise, formula, function, number
+from nmpcrl.learning.updates import (
+    OVERSHOOT,
+    auxiliary_step,
+    curvature_correction,
+    gradient_td_step,
+)
 
 
 @exercise
@@ -21,6 +29,7 @@ def correction(answer: Any) -> Outcome:
             0.2: "phi w is not small here: delta - phi w stands in the first factor.",
             1.2: "The Hessian is multiplied by w.",
             0.24: "The Hessian of theta^2 x in theta is 2 x, whatever theta is.",
+            0.06: "The second derivative of theta^2 x is 2 x, not x.",
         },
     )
 
@@ -52,5 +61,149 @@ def share(answer: Any) -> Outcome:
         mistakes={
             (initial - final) / initial: "That is the share of the cost, not of what is possible.",
             (final - best) / (initial - best): "That is what is left to gain.",
+        },
+    )
+
+
+@exercise
+def kappa(answer: Any) -> Outcome:
+    """The concave function of Eq. (7.1) at kappa times its maximiser, over its maximum."""
+    return formula(
+        answer,
+        lambda kappa: 2 * kappa - kappa**2,
+        {"kappa": (0, 2)},
+        mistakes={
+            "The second term has w squared.": lambda kappa: kappa,
+            "That is of the first term; J is half as large at its maximum.": (
+                lambda kappa: kappa - kappa**2 / 2
+            ),
+            "That is the share of the second term alone.": lambda kappa: kappa**2,
+            "That is what is lost.": lambda kappa: (1 - kappa) ** 2,
+        },
+    )
+
+
+@exercise
+def matched(answer: Any) -> Outcome:
+    """What a control with the same lengths and other directions rules out."""
+    return choice(
+        answer,
+        "b",
+        {
+            "a": "The control does not descend that error, and would do as well.",
+            "b": "the direction was not needed, since the control lacks it and does as well.",
+            "c": "Different directions may end at the same cost.",
+            "d": "The control takes shorter steps where GES does, and not everywhere.",
+        },
+    )
+
+
+@exercise
+def tdc(answer: Any) -> Outcome:
+    """One update of exact TDC with random features and a random symmetric Hessian."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        vectors = dict(zip(("theta", "w", "phi", "phi_next"), rng.normal(size=(4, 3)), strict=True))
+        half = rng.normal(size=(3, 3))
+        numbers = {"delta": float(rng.normal()), "gamma": float(rng.uniform(0.5, 1))}
+        steps = {"alpha": float(rng.uniform(0.1, 1)), "beta": float(rng.uniform(0.1, 1))}
+        return {**vectors, **numbers, **steps, "hessian": half + half.T}
+
+    def step(
+        theta: Vector,
+        w: Vector,
+        delta: float,
+        phi: Vector,
+        phi_next: Vector,
+        *,
+        hessian: Vector,
+        alpha: float,
+        beta: float,
+        gamma: float,
+        sign: float = -1.0,
+        early: bool = False,
+    ) -> tuple[Vector, Vector]:
+        after = auxiliary_step(w, delta, phi, beta)
+        used = after if early else w
+        h = curvature_correction(delta, phi, used, hessian @ used)
+        moved = gradient_td_step(theta, used, delta, phi, phi_next, alpha=alpha, gamma=gamma)
+        return moved + sign * alpha * h, after
+
+    return function(
+        answer,
+        step,
+        draw,
+        mistakes={
+            "h is subtracted, as Eq. (7.2) has it.": lambda **given: step(**given, sign=1.0),
+            "That is GES: h is missing.": lambda **given: step(**given, sign=0.0),
+            "theta has to move with the old w.": lambda **given: step(**given, early=True),
+        },
+    )
+
+
+@exercise
+def product(answer: Any) -> Outcome:
+    """Gradients of random quartics, and vectors of any length, zero among them."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        half = rng.normal(size=(4, 4))
+        length = rng.choice([0.0, 0.2, 1.0, 5.0])
+        return {
+            "features": partial(_features, half + half.T, rng.normal(size=4)),
+            "theta": rng.normal(size=4),
+            "w": length * rng.normal(size=4),
+        }
+
+    def right(features: Callable[[Vector], Vector], theta: Vector, w: Vector) -> Any:
+        ahead, behind = (features(theta + size * w) for size in (1e-5, -1e-5))
+        return (ahead - behind) / 2e-5
+
+    return function(answer, right, draw, tolerance=1e-4)
+
+
+def _features(matrix: Vector, cubic: Vector, theta: Vector) -> Vector:
+    """The gradient of a quartic; it bends differently in each component."""
+    return matrix @ theta + cubic * theta**3
+
+
+@exercise
+def search(answer: Any) -> Outcome:
+    """Fresh draws in every round, the same ones for the same seed, and never a worse result."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        start = rng.uniform(2, 3, rng.integers(3, 10))
+        return {
+            "start": start,
+            "rounds": int(rng.integers(5, 15)),
+            "seed": int(rng.integers(10**6)),
+        }
+
+    def behaviour(start: Vector, rounds: int, seed: int) -> tuple[bool, ...]:
+        seen: list[tuple[float, ...]] = []
+
+        def flat(theta: Vector) -> float:
+            seen.append(tuple(theta))
+            return float(not np.array_equal(theta, start))
+
+        def bowl(theta: Vector) -> float:
+            return float(theta @ theta)
+
+        answer(flat, start, rounds, seed)
+        ends = [answer(bowl, start, rounds, one) for one in (seed, seed, seed + 1)]
+        return (
+            len(set(seen)) > 8 * (rounds - 1),
+            bool(np.array_equal(ends[0], ends[1]) and not np.array_equal(ends[0], ends[2])),
+            max(map(bowl, ends)) <= bowl(start),
+        )
+
+    return function(
+        behaviour,
+        lambda **_: (True, True, True),
+        draw,
+        mistakes={
+            "Every round draws the same steps.": lambda **_: (False, True, True),
+            "The same seed has to give the same result, and another seed another one.": (
+                lambda **_: (True, False, True)
+            ),
         },
     )

@@ -3,24 +3,13 @@
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from nmpcrl import Vector
 from nmpcrl.bench import learners
 from nmpcrl.claims import rule
-from nmpcrl.course import Outcome, exercise, number
+from nmpcrl.course import Outcome, choice, exercise, function, number
 from nmpcrl.study import paper
-
-
-@exercise
-def half(answer: Any) -> Outcome:
-    """The s / f with (s + f) / 2s = 0.55."""
-    return number(
-        answer,
-        1 / (2 * 0.55 - 1),
-        mistakes={
-            1 / 0.55: "RDES solves once a step, and ES twice: (s + f) / 2s.",
-            0.1: "That is f / s; how many times longer than the fit is the solve?",
-        },
-    )
 
 
 @exercise
@@ -34,6 +23,25 @@ def enough(answer: Any) -> Outcome:
             3: "With 3 of 3 the lower end is 3 / 6.84, below one half.",
             2: "With 2 of 2 the lower end is 2 / 5.84, far below one half.",
             5: "That is enough, and it is not the least number.",
+        },
+    )
+
+
+@exercise
+def missing(answer: Any) -> Outcome:
+    """The most of twenty that may be missing if the others say yes."""
+    asked = 20
+    reproduced = [
+        gone for gone in range(asked) if rule.read(asked - gone, asked) == rule.REPRODUCED
+    ]
+    return number(
+        answer,
+        max(reproduced),
+        tolerance=1e-3,
+        mistakes={
+            0: "A few may be missing: what if all of these had said no?",
+            5: "The interval of 15 of 20 lies above one half, but 15 of 20 is not nine tenths.",
+            16: "Four yes suffice if four are asked. Here twenty are, and 16 might say no.",
         },
     )
 
@@ -67,5 +75,86 @@ def step(answer: Any) -> Outcome:
             seconds / 60: "An hour has 3600 seconds.",
             2 * seconds: "Table II gives 18 hours for ES and 9 for RDES.",
             seconds * paper.STEPS: "That is the time of an episode; how long is a step?",
+        },
+    )
+
+
+@exercise
+def fall(answer: Any) -> Outcome:
+    """What a training cost, a frozen arm's and a rollout without noise say together."""
+    return choice(
+        answer,
+        "c",
+        {
+            "a": "The frozen arm learned nothing, and its cost fell by more.",
+            "b": "Noise does not cost two policies the same, so the difference is not theirs.",
+            "c": "the rollout without noise is about the policy alone, and the frozen arm shows "
+            "what decaying noise does.",
+            "d": "The third number has no noise in it.",
+        },
+    )
+
+
+@exercise
+def drawdown(answer: Any) -> Outcome:
+    """The largest rise above the lowest cost so far, of random curves, some with failures."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        costs = np.round(4000 * np.exp(rng.normal(0, 0.2, rng.integers(4, 8))))
+        if rng.random() < 0.2:
+            costs[rng.integers(1, costs.size)] = np.nan
+        return {"costs": costs}
+
+    def rise(costs: Vector) -> Any:
+        return max(float(late - min(costs[: k + 1])) for k, late in enumerate(costs)) / costs[0]
+
+    def right(costs: Vector) -> Any:
+        return rise(np.where(np.isnan(costs), np.inf, costs))
+
+    return function(
+        answer,
+        right,
+        draw,
+        mistakes={
+            "A failed rollout must not be left out: it is the worst that can happen.": (
+                lambda costs: rise(costs[~np.isnan(costs)])
+            ),
+            "That is the range, which charges a run for improving, too.": (
+                lambda costs: np.ptp(np.nan_to_num(costs, nan=np.inf)) / costs[0]
+            ),
+        },
+    )
+
+
+@exercise
+def pairs(answer: Any) -> Outcome:
+    """Ratios of runs and their frozen arms, in tables of different order."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        cells = pd.MultiIndex.from_product([list("ABC"), range(4)], names=["layout", "seed"])
+        base = pd.Series(rng.uniform(2000, 6000, len(cells)), cells, name="cost")
+        runs = (base * rng.uniform(0.8, 2, len(cells))).rename("cost")
+        shuffled = (one.sample(frac=1, random_state=rng).reset_index() for one in (runs, base))
+        return dict(zip(("runs", "frozen"), shuffled, strict=True))
+
+    def ratios(runs: pd.DataFrame, frozen: pd.DataFrame) -> Any:
+        arm = frozen.set_index(["layout", "seed"]).cost
+        own = zip(runs.layout, runs.seed, runs.cost, strict=True)
+        return np.array([cost / arm[layout, seed] for layout, seed, cost in own])
+
+    return function(
+        answer,
+        ratios,
+        draw,
+        mistakes={
+            "Rows are paired by their position: shuffle one table and look at the result.": (
+                lambda runs, frozen: runs.cost.to_numpy() / frozen.cost.to_numpy()
+            ),
+            "Both tables are sorted, and so is the result: its order is not that of the runs.": (
+                lambda runs, frozen: ratios(runs.sort_values(["layout", "seed"]), frozen)
+            ),
+            "That is the mean of all frozen arms; each run has its own.": (
+                lambda runs, frozen: runs.cost.to_numpy() / frozen.cost.mean()
+            ),
         },
     )

@@ -2,8 +2,11 @@
 
 from typing import Any
 
+import numpy as np
+
+from nmpcrl import Vector
 from nmpcrl.control import Nmpc
-from nmpcrl.course import Outcome, exercise, number
+from nmpcrl.course import Outcome, choice, exercise, formula, function, number
 
 
 @exercise
@@ -51,5 +54,130 @@ def dense(answer: Any, nmpc: Nmpc) -> Outcome:
         mistakes={
             2.0: "That is the factor of the recursion, which does the same work at every stage.",
             4.0: "So much more room the matrix takes; the work grows faster.",
+        },
+    )
+
+
+@exercise
+def exact(answer: Any) -> Outcome:
+    """The minimiser of x^2 + W max(0, 3 - x)."""
+    return formula(
+        answer,
+        lambda W: min(W / 2, 3.0),
+        {"W": (1, 12)},
+        mistakes={
+            "For a small W it pays to violate the constraint.": lambda W: 3.0,
+            "For a large W that lies beyond 3, where nothing is charged any more.": lambda W: W / 2,
+            "That is how much of the constraint is violated.": lambda W: max(3 - W / 2, 0.0),
+        },
+    )
+
+
+@exercise
+def values(answer: Any) -> Outcome:
+    """What two small residuals at two values say."""
+    return choice(
+        answer,
+        "c",
+        {
+            "a": "Its residual says that it found an optimum; which one, no solver promises.",
+            "b": "A convex problem has one optimal value; this one has obstacles.",
+            "c": "KKT conditions are local, and an obstacle can be passed on two sides.",
+            "d": "It is the lower of two; a third start may find a lower one still.",
+        },
+    )
+
+
+@exercise
+def riccati(answer: Any) -> Outcome:
+    """The first gain of random problems, beside a dense solve of the whole plan."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        n, m = rng.integers(2, 4), rng.integers(1, 3)
+        halves = [rng.normal(size=(size, size)) for size in (n, m, n)]
+        Q, R, V = (half @ half.T + np.eye(len(half)) for half in halves)
+        A, B = rng.normal(size=(n, n)) / n, rng.normal(size=(n, m))
+        return {"A": A, "B": B, "Q": Q, "R": R, "V": V, "stages": int(rng.integers(2, 7))}
+
+    return function(
+        answer,
+        _first_gain_by_one_solve,
+        draw,
+        mistakes={
+            "That is the gain of the last stage, which the recursion visits first.": (
+                lambda **given: _first_gain_by_one_solve(**given | {"stages": 1})
+            ),
+            "The minus sign is missing.": lambda **given: -_first_gain_by_one_solve(**given),
+        },
+    )
+
+
+def _first_gain_by_one_solve(
+    A: Vector, B: Vector, Q: Vector, R: Vector, V: Vector, stages: int
+) -> Vector:
+    """The gain of the first of all inputs, which are solved for at once."""
+    n, m = B.shape
+    powers = [np.linalg.matrix_power(A, k) for k in range(stages + 1)]
+    free = np.vstack(powers[1:])  # states by the first state
+    forced = np.zeros((n * stages, m * stages))  # states by the inputs
+    for row in range(stages):
+        for column in range(row + 1):
+            block = powers[row - column] @ B
+            forced[row * n : (row + 1) * n, column * m : (column + 1) * m] = block
+    weights = np.kron(np.eye(stages), Q)
+    weights[-n:, -n:] = V
+    hessian = np.kron(np.eye(stages), R) + forced.T @ weights @ forced
+    plan: Vector = -np.linalg.solve(hessian, forced.T @ weights @ free)
+    return plan[:m]
+
+
+@exercise
+def residual(answer: Any) -> Outcome:
+    """Points that satisfy all KKT conditions, and points that miss one of them."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        jacobian, active = rng.normal(size=(4, 3)), np.array([True, True, False, False])
+        g = np.where(active, 0.0, -rng.uniform(0.5, 2, 4))
+        multipliers = np.where(active, rng.uniform(0.5, 2, 4), 0.0)
+        broken = rng.choice(["nothing", "complementarity", "sign", "feasibility", "gradient"])
+        if broken == "complementarity":
+            multipliers[2] = rng.uniform(0.5, 2)
+        if broken == "sign":
+            multipliers[0] *= -1
+        if broken == "feasibility":
+            g[0] = rng.uniform(0.5, 2)
+            multipliers[0] = 0.0
+        gradient = -jacobian.T @ multipliers + (broken == "gradient")
+        return {"gradient": gradient, "jacobian": jacobian, "g": g, "multipliers": multipliers}
+
+    def optimal(
+        gradient: Vector,
+        jacobian: Vector,
+        g: Vector,
+        multipliers: Vector,
+        *,
+        sign: bool = True,
+        complementarity: bool = True,
+    ) -> bool:
+        stationary = np.abs(gradient + jacobian.T @ multipliers).max() < 1e-9
+        signed = multipliers.min() >= 0 or not sign
+        complementary = np.abs(multipliers * g).max() < 1e-9 or not complementarity
+        return bool(stationary and g.max() <= 0 and signed and complementary)
+
+    def without(**dropped: Any) -> Any:
+        return lambda **given: optimal(**given, **dropped)
+
+    return function(
+        lambda **given: bool(abs(answer(**given)) < 1e-6),
+        optimal,
+        draw,
+        mistakes={
+            "It is 0 where an inactive constraint has a multiplier, and where one is negative.": (
+                without(sign=False, complementarity=False)
+            ),
+            "It is 0 where a constraint far from active has a multiplier.": (
+                without(complementarity=False)
+            ),
+            "It is 0 where a multiplier is negative.": without(sign=False),
         },
     )
