@@ -2,8 +2,11 @@
 
 from typing import Any
 
+import numpy as np
+
 from nmpcrl import Vector
-from nmpcrl.course import Outcome, exercise, number
+from nmpcrl.control import Nmpc
+from nmpcrl.course import Outcome, choice, exercise, function, number
 from nmpcrl.study import paper
 
 
@@ -53,5 +56,104 @@ def solves(answer: Any) -> Outcome:
             2 * paper.STEPS: "That is with the envelope theorem; differences need more solves.",
             2 * components * paper.STEPS: "The values of s and of the next state are needed, too.",
             (2 + components) * paper.STEPS: "Central differences take two solves a component.",
+        },
+    )
+
+
+@exercise
+def kink(answer: Any) -> Outcome:
+    """Why central differences are off by half of omega in some states, and exact in others."""
+    return choice(
+        answer,
+        "c",
+        {
+            "a": "The solver's tolerance would show in every state, and not as the same number.",
+            "b": "A missing factor would be missing in the other states, too.",
+            "c": "one slope is the library's, the other is larger by omega, and their mean is "
+            "larger by half of it.",
+            "d": "With curvature the error would shrink with the step; here it does not.",
+        },
+    )
+
+
+@exercise
+def weights_gradient(answer: Any, nmpc: Nmpc) -> Outcome:
+    """All of phi but phi_c, for plans of the NMPC; right is what CasADi differentiated."""
+    solved: dict[bytes, Vector] = {}
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        state = rng.uniform([0.0, 0.5, 0.0], [6.0, 3.0, 1.5])
+        theta = np.array(paper.THETA_INIT) * rng.uniform(0.7, 1.4, len(paper.THETA_INIT))
+        plan = nmpc.solve(state, theta)
+        solved[theta.tobytes()] = plan.features[:-1]
+        arrays = {"theta": theta, "states": plan.states, "inputs": plan.inputs}
+        return arrays | {"target": nmpc.task.target, "gamma": nmpc.gamma}
+
+    def right(theta: Vector, **_: Any) -> Vector:
+        return solved[theta.tobytes()]
+
+    def undiscounted(gamma: float, **case: Any) -> Vector:
+        return _by_hand(gamma=1.0, **case)
+
+    def end_undiscounted(gamma: float, states: Vector, **case: Any) -> Vector:
+        scale = np.append(np.ones(5), np.full(3, gamma ** (1 - len(states))))
+        return scale * _by_hand(gamma=gamma, states=states, **case)
+
+    return function(
+        answer,
+        right,
+        draw,
+        tolerance=1e-6,
+        mistakes={
+            "The weights are squares of theta: the derivative of a square has a factor of 2.": (
+                lambda **case: _by_hand(**case) / 2
+            ),
+            "That is the derivative in the squares of theta; by the chain rule, each component "
+            "is still to be multiplied by 2 theta.": (
+                lambda theta, **case: _by_hand(theta=np.full(9, 0.5), **case)
+            ),
+            "The costs of later stages are discounted.": undiscounted,
+            "The terminal cost is discounted, too, by gamma to the power of N.": end_undiscounted,
+        },
+    )
+
+
+def _by_hand(theta: Vector, states: Vector, inputs: Vector, target: Vector, gamma: float) -> Vector:
+    """The derivative of Eq. (2a) in the first eight components of theta."""
+    discount, squares = gamma ** np.arange(len(states)), (states - target) ** 2
+    stages = discount[:-1] @ np.hstack([squares[:-1], inputs**2])
+    result: Vector = 2 * theta[:8] * np.append(stages, discount[-1] * squares[-1])
+    return result
+
+
+@exercise
+def saved(answer: Any) -> Outcome:
+    """The late training cost of a run beside that of its frozen arm at the same time."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        episodes = rng.integers(60, 120)
+        noise = np.exp(-np.arange(episodes) / rng.uniform(10, 40))
+        frozen = rng.uniform(3000, 5000) * (1 + noise) + rng.normal(0, 50, episodes)
+        learned = np.linspace(1, rng.uniform(0.7, 1.1), episodes)
+        return {"training": frozen * learned, "frozen": frozen}
+
+    return function(
+        answer,
+        lambda training, frozen: 1 - training[-20:].mean() / frozen[-20:].mean(),
+        draw,
+        mistakes={
+            "A frozen arm with itself still saves something: compare the last episodes of both "
+            "runs, in which the noise is the same.": (
+                lambda training, frozen: 1 - training[-20:].mean() / training[:20].mean()
+            ),
+            "The first episodes of the frozen arm have more noise than the last ones of the run: "
+            "compare both at the same time.": (
+                lambda training, frozen: 1 - training[-20:].mean() / frozen[:20].mean()
+            ),
+            "Over all episodes most of the cost is from before anything was learned: take the "
+            "last 20.": lambda training, frozen: 1 - training.mean() / frozen.mean(),
+            "That is the share which is left; what was saved is the rest.": (
+                lambda training, frozen: training[-20:].mean() / frozen[-20:].mean()
+            ),
         },
     )

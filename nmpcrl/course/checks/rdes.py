@@ -2,38 +2,47 @@
 
 from typing import Any
 
-from nmpcrl.course import Outcome, exercise, number
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.course import Outcome, choice, exercise, formula, function, number
 from nmpcrl.study import paper
 
 
 @exercise
-def weights(answer: Any) -> Outcome:
-    """How many more the first layer has with theta as an input."""
-    neurons, more = 64, len(paper.THETA_INIT)
+def floor(answer: Any) -> Outcome:
+    """The standard deviation of one example at 1000 and three at 1400."""
+    values = np.array([1000.0, 1400.0, 1400.0, 1400.0])
+    errors = values - values.mean()
     return number(
         answer,
-        more * neurons,
-        tolerance=1e-4,
+        float(np.sqrt(np.mean(errors**2))),
         mistakes={
-            more: "Each of these inputs is connected to every neuron of the first layer.",
-            (more + 1) * neurons: "The biases belong to the neurons, and those are as many.",
-            (more + 5) * neurons: "Those are all weights of the inputs: how many are new?",
+            float(np.mean(errors**2)): "That is the mean square: take its root.",
+            float(np.abs(errors).mean()): "That is the mean of the absolute errors.",
+            200.0: "The examples are not as many of each kind: the best prediction is not 1200.",
+            0.0: "Both values belong to the same input, and one prediction cannot be both.",
+            float(values.mean()): "That is the best prediction; by how much is it wrong?",
         },
     )
 
 
 @exercise
 def astray(answer: Any) -> Outcome:
-    """alpha times gamma times the error times phi_x."""
+    """alpha times gamma times the error times phi_x, once in each step of an episode."""
     error, phi = 20.0, 1800.0
     step = paper.ALPHA * paper.GAMMA * error * phi
+    whole = paper.STEPS * step
     return number(
         answer,
-        step,
+        whole,
         tolerance=0.02,
         mistakes={
-            step / paper.GAMMA: "The prediction enters the TD error with a factor of gamma.",
-            paper.GAMMA * error: "That is how far off the TD error is; the step follows from it.",
+            whole / paper.GAMMA: "The prediction enters the TD error with a factor of gamma.",
+            step: "That is one step; the error keeps its sign for an episode of 130.",
+            float(np.sqrt(paper.STEPS)) * step: "So errors add up that scatter about zero; these "
+            "all have the same sign.",
+            paper.GAMMA * error: "That is how far off a TD error is; the step follows from it.",
         },
     )
 
@@ -47,5 +56,114 @@ def share(answer: Any) -> Outcome:
         mistakes={
             1.2: "A step of RDES has a solve as well: one solve and a fit, against two solves.",
             0.1: "A step of ES takes two solves, so 0.6 of it is 1.2 solves.",
+        },
+    )
+
+
+@exercise
+def tail(answer: Any) -> Outcome:
+    """The TD error with (V - L) / gamma for the next value: V and gamma cancel."""
+    return formula(
+        answer,
+        lambda ell, L, V, gamma: ell - L,
+        {"ell": (5, 50), "L": (5, 50), "V": (500, 1500), "gamma": (0.9, 0.99)},
+        mistakes={
+            "V counts the plan from now on: what remains of it after the first stage is "
+            "discounted once, so divide by gamma.": (
+                lambda ell, L, V, gamma: ell + gamma * (V - L) - V
+            ),
+            "That is the next value; put it into the TD error.": (
+                lambda ell, L, V, gamma: (V - L) / gamma
+            ),
+            "Look at the sign: the TD error is the target minus the value.": (
+                lambda ell, L, V, gamma: L - ell
+            ),
+        },
+    )
+
+
+@exercise
+def split(answer: Any) -> Outcome:
+    """Which held-out steps are as far from the examples as those met while learning."""
+    return choice(
+        answer,
+        "c",
+        {
+            "a": "The steps before and after a held-out one have almost its state, and the same "
+            "theta to four digits: the network has seen the answer.",
+            "b": "The network has been fitted to the episodes before and after, and only has to "
+            "interpolate in theta.",
+            "c": "there, as in learning, theta is newer than in every example.",
+            "d": "That is the first answer once more, with another choice of steps.",
+        },
+    )
+
+
+@exercise
+def systematic(answer: Any) -> Outcome:
+    """The absolute mean of the known errors over their root mean square."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        error = rng.normal(rng.uniform(-20, 20), rng.uniform(1, 20), rng.integers(20, 130))
+        error[rng.choice(len(error), 5, replace=False)] = np.nan
+        return {"error": error}
+
+    def ratio(error: Vector) -> float:
+        known = error[np.isfinite(error)]
+        return float(abs(known.mean()) / np.sqrt(np.mean(known**2)))
+
+    return function(
+        answer,
+        ratio,
+        draw,
+        mistakes={
+            "One unknown error makes everything unknown: leave those out that are nan.": (
+                lambda error: np.nan
+            ),
+            "The mean has a sign, and a share has none: take its absolute value.": (
+                lambda error: np.nanmean(error) / np.sqrt(np.nanmean(error**2))
+            ),
+            "An error that is always the same has no deviation, and should give 1: divide by the "
+            "root of the mean square.": lambda error: abs(np.nanmean(error)) / np.nanstd(error),
+            "The mean of absolute values does not know whether errors cancel: take the absolute "
+            "value of the mean.": (
+                lambda error: np.nanmean(np.abs(error)) / np.sqrt(np.nanmean(error**2))
+            ),
+        },
+    )
+
+
+@exercise
+def examples(answer: Any) -> Outcome:
+    """Inputs of the network with the theta that each value was solved with."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        steps, first = int(rng.integers(3, 9)), rng.uniform(0.5, 1.5, 2)
+        thetas = first + rng.normal(0, 0.01, (steps, 2)).cumsum(axis=0)
+        pairs, values = rng.normal(size=(steps, 3)), rng.uniform(900, 1100, steps)
+        return {"pairs": pairs, "values": values, "thetas": thetas, "first": first}
+
+    def joined(pairs: Matrix, values: Vector, theta: Matrix) -> tuple[Matrix, Vector]:
+        return np.hstack([pairs, theta]), values
+
+    def right(pairs: Matrix, values: Vector, thetas: Matrix, first: Vector) -> Any:
+        return joined(pairs, values, np.vstack([first, thetas[:-1]]))
+
+    return function(
+        answer,
+        right,
+        draw,
+        mistakes={
+            "The theta in a row is the one that its step moved; the value was solved before "
+            "that.": lambda pairs, values, thetas, first: joined(pairs, values, thetas),
+            "The first value was solved with `first`, and not with the last theta.": (
+                lambda pairs, values, thetas, first: joined(pairs, values, np.roll(thetas, 1, 0))
+            ),
+            "That is one step further in the wrong direction.": (
+                lambda pairs, values, thetas, first: joined(pairs, values, np.roll(thetas, -1, 0))
+            ),
+            "The pairs are right, and an example was lost: the first one has `first`.": (
+                lambda pairs, values, thetas, first: joined(pairs[1:], values[1:], thetas[:-1])
+            ),
         },
     )
