@@ -87,11 +87,11 @@
     failed: (step) => `The solver found no plan at step ${step}; the closed loop ends there.`,
   };
 
-  const learners = {
+  const names = {
     frozen: "frozen arm", random: "random directions", matched: "matched steps", QL: "Q-learning",
   };
 
-  const named = (learner) => learners[learner] ?? learner;
+  const named = (learner) => names[learner] ?? learner;
 
   const runs = {
     map: "Published runs: their trajectories, costs and parameters, episode by episode",
@@ -175,7 +175,7 @@
     ],
   };
 
-  const pair = {
+  const learners = {
     map: "Map with the trajectories of the policies that ES and GES have learned, and the obstacles",
     title: "Try it: ES and GES learn side by side from the same noise, in your browser.",
     hint: "Press Train, and Stop when you like; or go on by one episode or one step of both. "
@@ -310,8 +310,5 @@
     ],
   };
 
-  window.nmpcrl = {
-    ...window.nmpcrl,
-    words: { parts, controller, gradient, kink, update, runs, player, chain, learners: pair },
-  };
+  window.nmpcrl = { ...window.nmpcrl, words: { parts, controller, gradient, kink, update, runs, player, chain, learners } };
 })();
