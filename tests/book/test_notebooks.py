@@ -20,7 +20,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from papermill.cli import papermill
 
-from nmpcrl.course.exercises import exercises
+from nmpcrl.course.exercises import KINDS, exercises
 from nmpcrl.study import chapter, paper
 from nmpcrl.study.chapter import INJECTED
 from nmpcrl.study.experiment import MAIN
@@ -35,6 +35,7 @@ GIVEN = [*CHAPTERS, *OWN, "paper_and_book", "performance"]  # which have paramet
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)
+each_exercised = pytest.mark.parametrize("name", [*CHAPTERS, "performance"])
 each_own = pytest.mark.parametrize("name", OWN)
 each_given = pytest.mark.parametrize("name", GIVEN)
 
@@ -320,14 +321,15 @@ def test_a_chapter_names_its_learning_goals(name):
     assert goals.source.startswith("**Learning goals.** After this chapter you can\n\n- ")
 
 
-@each_chapter
+@each_exercised
 def test_a_chapter_has_exercises_that_say_what_they_are(name):
     found = [one.text for one in exercises(NOTEBOOKS[name])]
     assert found == tagged(name, "exercise")
-    assert len(found) >= 3
+    assert len(found) >= 5
+    assert {one.about.kind for one in exercises(NOTEBOOKS[name])} == set(KINDS)
 
 
-@each_chapter
+@each_exercised
 def test_an_exercise_has_hints_an_empty_answer_a_check_and_one_folded_solution(name):
     for one in exercises(NOTEBOOKS[name]):
         folded = {"hint": "Hint {}", "rubric": "Rubric", "solution": "Solution"}
@@ -345,7 +347,7 @@ def is_project(exercise) -> bool:
     return exercise.about.kind == "project"
 
 
-@each_chapter
+@each_exercised
 def test_an_answer_is_empty_and_its_check_is_one_call_of_the_course(name):
     checks = import_module("nmpcrl.course.checks." + re.sub(r"^\d\d_", "", name))
     for one in exercises(NOTEBOOKS[name]):
@@ -358,7 +360,7 @@ def test_an_answer_is_empty_and_its_check_is_one_call_of_the_course(name):
             assert one.about.kind == "find the bug" or "..." in cell.source, one.number
 
 
-@each_chapter
+@each_exercised
 def test_the_points_of_a_rubric_are_those_of_its_project(name):
     for one in filter(is_project, exercises(NOTEBOOKS[name])):
         (rubric,) = one.parts["rubric"]
@@ -366,7 +368,7 @@ def test_the_points_of_a_rubric_are_those_of_its_project(name):
         assert sum(points) == one.about.points, one.number
 
 
-@each_chapter
+@each_exercised
 def test_the_code_of_a_solution_has_the_form_of_all_code(name, tmp_path):
     for one in exercises(NOTEBOOKS[name]):
         for k, code in enumerate(one.answers):
