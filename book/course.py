@@ -1,9 +1,11 @@
-"""Make the editions for a course: notebooks for students and for teachers, with their data.
+"""Make the editions for a course: notebooks for students and for teachers, with their data; slides.
 
-    python book/course.py      _build/course/student, _build/course/instructor
+    python book/course.py      _build/course/student, _build/course/instructor, _build/course/slides
 
-Each folder can be handed out as it is. It holds the chapters that have exercises, the library as a
-wheel, the libraries to install with it, and the published study. Two builds give the same bytes.
+Each folder can be handed out as it is. The first two hold the chapters that have exercises, the
+library as a wheel, the libraries to install with it, and the published study; the slides, which
+show what the last `make book` computed, are also PDFs if there is a Chromium. Two builds give the
+same bytes, but for PDFs.
 """
 
 import os
@@ -19,6 +21,7 @@ import build
 import click
 import editions
 import nbformat
+import slides
 
 from nmpcrl.course.exercises import exercises
 
@@ -72,6 +75,11 @@ def main() -> None:
     for name in EDITIONS:
         edition(name, Path("_build/course") / name)
         click.echo(f"_build/course/{name}")
+    try:
+        slides.printed(slides.make(chapters(), slides.EXECUTED, Path("_build/course/slides")))
+        click.echo("_build/course/slides")
+    except build.Failure as reason:  # the notebooks need neither
+        click.echo(f"_build/course/slides is not whole. {reason.message}")
 
 
 if __name__ == "__main__":

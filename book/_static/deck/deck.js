@@ -1,0 +1,44 @@
+// A deck: formulas are typeset, slides that are too full get smaller letters, then it begins.
+"use strict";
+
+window.MathJax = {
+  options: { menuOptions: { settings: { inTabOrder: false } } },
+  startup: { pageReady: () => MathJax.startup.defaultPageReady().then(begin) },
+};
+
+const SIZE = { width: 1280, height: 720 };
+const SMALLEST = 0.5; // of the letters of a slide
+
+const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+document.documentElement.dataset.theme = dark ? "dark" : "light"; // for live figures
+
+async function begin() {
+  if (location.search.includes("print-pdf")) {
+    document.querySelectorAll("section:has(.live-figure)").forEach((slide) => slide.remove());
+  }
+  await Promise.all([...document.images].map((image) => image.decode().catch(() => {})));
+  document.querySelectorAll(".slides > section").forEach(fit);
+  await Reveal.initialize({
+    ...SIZE,
+    margin: 0,
+    center: false,
+    hash: true,
+    slideNumber: "c/t",
+    transition: "none",
+    pdfSeparateFragments: false,
+    pdfMaxPagesPerSlide: 1,
+    keyboardCondition: () => !document.activeElement.closest(".live-figure"),
+    keyboard: { 78: () => Reveal.configure({ showNotes: !Reveal.getConfig().showNotes }) }, // N
+    plugins: [RevealNotes],
+  });
+  document.documentElement.dataset.ready = "";
+}
+
+function fit(slide) {
+  const tooFull = () => slide.scrollHeight > SIZE.height || slide.scrollWidth > SIZE.width;
+  Object.assign(slide.style, { display: "block", width: `${SIZE.width}px` });
+  for (let size = 1; tooFull() && size > SMALLEST; size -= 0.05) {
+    slide.style.fontSize = `${size}em`;
+  }
+  slide.style.display = slide.style.width = "";
+}

@@ -1,0 +1,116 @@
+"""A deck for each chapter that has exercises, from its own cells: part of `make course`.
+
+It shows figures, numbers and equations as the last build of the book has them, and needs no
+network: reveal.js and MathJax are copied from the packages sphinx-revealjs and
+sphinx-mathjax-offline. Keys: arrows move, S opens the speaker's window, N shows the notes here,
+and `?print-pdf` prints.
+"""
+
+import shutil
+from collections.abc import Iterable
+from html import escape
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import build
+import deck
+import nbformat
+import pdf
+from deck import FILES
+
+EXECUTED = Path("_build/executed")
+PACKAGES = {  # where its files are, and which of them a deck takes
+    "sphinx_revealjs": (
+        "_static/revealjs",
+        ("dist/reveal.css", "dist/reveal.js", "plugin/notes/notes.js", "LICENSE"),
+    ),
+    "sphinx-mathjax-offline": ("static/mathjax", ("tex-svg-full.js",)),
+}
+OWN = ("deck.css", "deck.js")
+LANDSCAPE: Any = {"width": 1280, "height": 720}  # [px]
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<link rel="stylesheet" href="{files}/reveal.css">
+<link rel="stylesheet" href="{files}/deck.css">
+<noscript><style>.reveal .slides > section {{ display: block; position: static }}</style></noscript>
+</head>
+<body>
+<main class="reveal"><div class="slides">
+{slides}
+</div></main>
+<script src="{files}/reveal.js"></script>
+<script src="{files}/notes.js"></script>
+<script src="{files}/deck.js"></script>
+<script src="{files}/tex-svg-full.js"></script>
+</body>
+</html>
+"""
+
+
+def make(chapters: dict[str, Any], executed: Path, place: Path) -> list[Path]:
+    """Write a deck for each of these sources to a folder, which is made anew; the decks.
+
+    Raises:
+        build.Failure: a chapter was not executed, or a package is not installed.
+    """
+    shutil.rmtree(place, ignore_errors=True)
+    (place / FILES).mkdir(parents=True)
+    for package, (folder, names) in PACKAGES.items():
+        copy(package, folder, names, place / FILES)
+    for name in OWN:
+        shutil.copyfile(build.ROOT / "book/_static/deck" / name, place / FILES / name)
+    return [write(name, source, executed, place) for name, source in chapters.items()]
+
+
+def write(name: str, source: Any, executed: Path, place: Path) -> Path:
+    """Write one deck and the files that it alone needs, or the live figures share."""
+    if not (executed / name).exists():
+        raise build.Failure(f"Slides show what {name} computes: `make book` executes it.")
+    try:
+        made = deck.deck(Path(name).stem, source, nbformat.read(executed / name, 4))
+    except deck.Unexecuted as error:
+        raise build.Failure(f"{name}: {error}; `make book` builds it anew.") from error
+    for path, data in made.files.items():
+        target = place / FILES / path
+        target.parent.mkdir(exist_ok=True)
+        target.write_bytes(data)
+    page = PAGE.format(title=escape(made.title, False), slides=made.html(), files=FILES)
+    target = (place / name).with_suffix(".html")
+    target.write_text(page, "utf-8")
+    return target
+
+
+def copy(package: str, folder: str, names: Iterable[str], place: Path) -> None:
+    """Copy files of an installed package, without importing it."""
+    found = find_spec(package)
+    if found is None or not found.submodule_search_locations:
+        raise build.Failure(f"Slides need the package {package} of environment.txt.")
+    for name in names:
+        source = Path(found.submodule_search_locations[0]) / folder / name
+        target = f"{package}-LICENSE" if source.name == "LICENSE" else source.name
+        shutil.copyfile(source, place / target)
+
+
+def printed(decks: Iterable[Path]) -> list[Path]:
+    """Each deck as a PDF beside it, one slide a page, by the distribution's Chromium."""
+    browser = pdf.chromium()
+    from playwright.sync_api import sync_playwright  # only here: a refusal should not wait for it
+
+    made = []
+    with (
+        sync_playwright() as playwright,
+        playwright.chromium.launch(executable_path=browser, args=pdf.FLAGS) as chromium,
+    ):
+        for path in decks:
+            tab = chromium.new_page(viewport=LANDSCAPE)
+            tab.goto(f"{path.resolve().as_uri()}?print-pdf")
+            tab.wait_for_selector("html[data-ready] .pdf-page", state="attached")
+            made.append(path.with_suffix(".pdf"))
+            tab.pdf(path=made[-1], prefer_css_page_size=True, print_background=True)
+            tab.close()
+    return made

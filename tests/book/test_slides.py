@@ -1,0 +1,210 @@
+"""The decks: what of a chapter they show, and that they work from disk, with the keyboard."""
+
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from importlib.util import find_spec
+from pathlib import Path
+
+import build
+import course
+import deck
+import pytest
+import slides
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from pypdf import PdfReader
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = course.chapters()
+LIVE = ("01_mdp_and_nmpc", "02_expected_sarsa", "04_ges")
+
+each_chapter = pytest.mark.parametrize("name", [Path(name).stem for name in SOURCES])
+
+
+def notebook(*cells):
+    title = new_markdown_cell("# A question\n\nAnswered here. And there.", id="title")
+    return new_notebook(cells=[title, *cells])
+
+
+def text(source: str, *tags: str):
+    return new_markdown_cell(source, id=f"cell-{len(source)}", metadata={"tags": list(tags)})
+
+
+def made(*cells) -> list[deck.Slide]:
+    source = notebook(*cells)
+    return deck.deck("chapter", source, source).slides
+
+
+def test_a_deck_begins_with_the_title_and_ends_with_the_exercises():
+    first, last = made(text("Not chosen."))
+    assert (first.title, first.shown) == ("A question", ["<p>Answered here.</p>"])
+    assert "<p>Answered here. And there.</p>" in first.said
+    assert last.title == "Exercises"
+
+
+def test_of_a_text_the_first_sentence_and_the_formulas_are_shown_and_all_of_it_is_said():
+    _, slide, _ = made(text("## Head\n\nOne. Two.\n\n$$\na < b\n$$\n\nThree.", "slide"))
+    assert slide.title == "Head"
+    assert slide.shown[0] == "<p>One.</p>"
+    assert r"\[" in slide.shown[1]
+    assert "a &lt; b" in slide.shown[1]
+    assert slide.said == ["<p>One. Two.</p>", "<p>Three.</p>"]
+
+
+def test_a_slide_has_the_heading_it_stands_under_and_each_heading_begins_a_slide():
+    _, one, two, three, _ = made(
+        text("## Before"), text("Text.", "slide"), text("## A\n\nB.\n\n### C\n\nD.", "slide")
+    )
+    assert [slide.title for slide in (one, two, three)] == ["Before", "A", "C"]
+    assert two.name != three.name
+
+
+def test_fragments_and_notes_join_the_slide_before_them():
+    _, slide, _ = made(text("## A", "slide"), text("- b", "fragment"), text("C, d.", "notes"))
+    assert 'class="fragment"' in slide.shown[0]
+    assert slide.said == ["<p>C, d.</p>"]
+
+
+def test_links_become_words():
+    _, slide, _ = made(text("See [Chapter 2](02_expected_sarsa.ipynb).", "slide"))
+    assert slide.shown == ["<p>See Chapter 2.</p>"]
+
+
+def test_a_chosen_cell_that_was_not_executed_is_refused():
+    cell = new_code_cell("1", id="bare", metadata={"tags": ["slide"]})
+    with pytest.raises(deck.Unexecuted, match="bare"):
+        made(cell)
+    cell.outputs = [new_output("execute_result", data={"text/plain": "<1>"})]
+    assert made(cell)[1].shown == ["<pre>&lt;1&gt;</pre>"]
+
+
+def test_a_chapter_that_was_not_executed_is_refused_in_a_sentence(tmp_path):
+    with pytest.raises(build.Failure, match=r"01.ipynb computes: `make book`"):
+        slides.write("01.ipynb", notebook(), tmp_path, tmp_path)
+
+
+def test_a_package_that_lacks_is_refused_in_a_sentence(tmp_path):
+    with pytest.raises(build.Failure, match=r"no_such_package of environment\.txt"):
+        slides.copy("no_such_package", "", ("a",), tmp_path)
+
+
+SIZE = "[Reveal.getCurrentSlide()].flatMap(s => [s.scrollWidth, s.scrollHeight])"
+
+
+class Images(HTMLParser):
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[dict] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        if tag == "img":
+            self.found.append(dict(attrs))
+
+
+@pytest.fixture(scope="session")
+def decks(site, tmp_path_factory) -> Path:
+    """The decks of the built book."""
+    if find_spec("sphinx_revealjs") is None:
+        pytest.skip("sphinx-revealjs is not installed")
+    place = tmp_path_factory.mktemp("decks")
+    slides.make(SOURCES, ROOT / slides.EXECUTED, place / "one")
+    return place / "one"
+
+
+@pytest.fixture
+def shown(decks, browser):
+    """Opens a deck in a browser; nothing outside the folder is asked for, and nothing fails."""
+    tab = browser.new_page(viewport={"width": 1280, "height": 720})
+    wrong: list[str] = []
+    tab.on("pageerror", lambda error: wrong.append(str(error)))
+    tab.on("requestfailed", lambda request: wrong.append(request.url))
+    inside = ("data:", "blob:", "about:", decks.resolve().as_uri())
+    tab.on("request", lambda r: r.url.startswith(inside) or wrong.append(r.url))
+
+    def opened(name: str, query: str = ""):
+        tab.goto(f"{(decks / name).resolve().as_uri()}.html{query}")
+        tab.wait_for_selector("html[data-ready]", state="attached")
+        return tab
+
+    yield opened
+    tab.close()
+    assert wrong == []
+
+
+@pytest.mark.book
+@each_chapter
+def test_a_deck_has_a_title_and_eight_to_twenty_slides_and_says_what_pictures_show(decks, name):
+    page = (decks / f"{name}.html").read_text()
+    assert page.count("<h1>") == 1
+    assert 8 <= page.count("<section") <= 20
+    names = re.findall(r'<section id="([^"]+)"', page)
+    assert len(names) == len(set(names))
+    images = Images(page).found
+    assert images
+    assert all(image["alt"] and (decks / image["src"]).exists() for image in images)
+    assert "<h2></h2>" not in page
+
+
+@pytest.mark.book
+def test_two_decks_are_the_same_bytes(decks):
+    again = decks.parent / "two"
+    slides.make(SOURCES, ROOT / slides.EXECUTED, again)
+    files = [path for path in decks.rglob("*") if path.is_file() and path.suffix != ".pdf"]
+    assert len(files) > 2 * len(SOURCES)
+    for path in files:
+        assert path.read_bytes() == (again / path.relative_to(decks)).read_bytes(), path
+
+
+@pytest.mark.book
+@each_chapter
+def test_arrows_move_and_every_slide_fits_and_has_no_formula_in_error(shown, name):
+    tab = shown(name)
+    last = tab.evaluate("Reveal.getTotalSlides()") - 1
+    for step in range(last + 1):
+        assert tab.evaluate("Reveal.getIndices().h") == step
+        slide = tab.evaluate(SIZE)
+        assert max(slide[0] - 1280, slide[1] - 720) <= 0, (step, slide)
+        tab.keyboard.press("ArrowRight")
+    tab.keyboard.press("ArrowLeft")
+    assert tab.evaluate("Reveal.getIndices().h") == last - 1
+    assert tab.locator("mjx-container").count() > 0
+    assert tab.locator("[data-mjx-error], mjx-merror").count() == 0
+
+
+@pytest.mark.book
+def test_the_notes_are_shown_by_a_key(shown):
+    tab = shown(LIVE[0])
+    assert not tab.locator(".speaker-notes").is_visible()
+    tab.keyboard.press("n")
+    assert "exercises, together" in tab.locator(".speaker-notes").inner_text()
+
+
+@pytest.mark.book
+@pytest.mark.parametrize("name", LIVE)
+def test_a_live_figure_works_on_its_slide_and_keeps_the_arrow_keys(shown, name):
+    tab = shown(name)
+    tab.evaluate("Reveal.slide(Reveal.getSlides().findIndex(s => s.querySelector('.live')))")
+    figure = tab.locator("section.present figure.live")
+    figure.wait_for()
+    slider = figure.locator("input[type=range]").first
+    before, where = slider.input_value(), tab.evaluate("Reveal.getIndices().h")
+    slider.focus()
+    tab.keyboard.press("ArrowRight")
+    assert slider.input_value() != before
+    assert tab.evaluate("Reveal.getIndices().h") == where
+
+
+PRINTED = "import sys, pathlib, slides; slides.printed([pathlib.Path(sys.argv[1])])"
+
+
+@pytest.mark.book
+def test_a_pdf_has_a_wide_page_for_each_slide_but_the_live_ones(decks):
+    path = decks / f"{LIVE[0]}.html"
+    run = [sys.executable, "-c", PRINTED, str(path)]  # another Chromium needs another process
+    subprocess.run(run, check=True, cwd=ROOT / "book")
+    page = path.read_text()
+    pages = PdfReader(path.with_suffix(".pdf")).pages
+    assert len(pages) == page.count("<section") - page.count('class="live-figure"')
+    assert float(pages[0].mediabox.width / pages[0].mediabox.height) == pytest.approx(16 / 9, 0.01)
