@@ -174,7 +174,7 @@ def test_a_click_moves_what_was_clicked_before(tab):
     tab.page.mouse.click(*goal)
     moved = tab.shown()
     np.testing.assert_allclose(tab.middle("Obstacle 2"), goal, atol=1)
-    tab.page.get_by_role("button", name="Reset").focus()
+    tab.page.locator("figure.live").get_by_role("button", name="Reset").focus()
     tab.page.mouse.click(*(goal + [0, 20]))  # now nothing is chosen
     assert tab.shown() == moved
 

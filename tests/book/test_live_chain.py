@@ -137,9 +137,8 @@ def test_without_webassembly_there_is_a_sentence(opened):
 @pytest.mark.parametrize("width", [390, 1400])
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_axe_finds_nothing_in_the_chapters_figures(opened, width, theme):
-    tab = opened(
-        FIGURE, viewport={"width": width, "height": 900}, color_scheme=theme, has_touch=width < 400
-    )
+    size = {"width": width, "height": 900}
+    tab = opened(FIGURE, formulas=True, viewport=size, color_scheme=theme, has_touch=width < 400)
     tab.begun()
     tab.click("Step")
     tab.page.wait_for_function(

@@ -79,6 +79,7 @@ STOPS = """() => [...document.querySelectorAll(".math, .math *")]
   .map(one => one.outerHTML.slice(0, 200))"""
 
 SMALL = """() => [...document.querySelectorAll(".bd-article :is(summary, button, .download a)")]
+  .filter(one => one.checkVisibility())
   .filter(one => Math.min(one.offsetWidth, one.offsetHeight) < 24)
   .map(one => one.outerHTML.slice(0, 200))"""
 

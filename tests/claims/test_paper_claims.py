@@ -12,7 +12,7 @@ import pytest
 
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.statistics import rate
-from nmpcrl.analysis.summary import experiment_of, row, summarise, table
+from nmpcrl.analysis.summary import as_text, experiment_of, row, summarise, table
 from nmpcrl.claims import own_claims, paper_claims
 from nmpcrl.claims.by_runs import RunClaim
 from nmpcrl.claims.robustness import part_changes, variant_changes
@@ -37,7 +37,7 @@ Changes = Callable[[Experiment], dict[str, Any]]
 
 def summary(experiment: Experiment) -> dict[str, Any]:
     """The row of a run in which nothing happened."""
-    fields = asdict(experiment) | {"theta": " ".join(map(repr, experiment.theta))}
+    fields = {name: as_text(value) for name, value in asdict(experiment).items()}
     still = {"stopped": "finished", "initial_cost": START_COST, "final_cost": START_COST}
     still |= {"late_cost_range": 0.0, "cost_ratio": 1.0, "inputs": 0, "outside": 0, "distance": 0.1}
     still |= {"steps_done": 39_000, "worst_overlap": 0.0, "eval_worst_overlap": 0.0}

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.summary import SIZES, experiment_of
+from nmpcrl.analysis.summary import SIZES, as_text, experiment_of
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.robustness import (
     WHOLE,
@@ -29,8 +29,8 @@ def summary(experiment: Experiment, variant: str, **unlike) -> dict:
     """The row of a run that saved a tenth and in which nothing went wrong."""
     counts = {f"{name}_{size}": 0 for name in ("inside", "eval_inside") for size in SIZES}
     return (
-        asdict(experiment)
-        | {"theta": " ".join(map(repr, experiment.theta)), "variant": variant}
+        {name: as_text(value) for name, value in asdict(experiment).items()}
+        | {"variant": variant}
         | {
             "stopped": "finished",
             "initial_cost": 1000.0,
