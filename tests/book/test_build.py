@@ -108,6 +108,15 @@ def test_values_are_read_as_papermill_reads_them():
     assert given == {"a": 1, "b": "[3]", "c": 1e-7, "d": "1", "e": [3]}
 
 
+INTRO = """# A small book
+
+See [Chapter 1](one.ipynb).
+
+(teach-self-test)=
+## Before you begin
+"""
+
+
 @pytest.fixture
 def small(tmp_path):
     """A copy of the driver with a book of one page and one chapter."""
@@ -125,7 +134,8 @@ def small(tmp_path):
         "parts": [{"caption": "Part", "numbered": True, "chapters": [{"file": "book/one"}]}],
     }
     (tmp_path / "_toc.yml").write_text(yaml.safe_dump(toc))
-    (tmp_path / "book/intro.md").write_text("# A small book\n\nSee [Chapter 1](one.ipynb).\n")
+    (tmp_path / "book/intro.md").write_text(INTRO)
+    (tmp_path / "book/syllabus.yml").write_text("chapters: {one: {needs: {}}}\n")
     write(tmp_path, "print(episodes)")
     return tmp_path
 
