@@ -110,9 +110,11 @@ def test_an_obstacle_follows_the_mouse_and_a_click(opened):
     reader = opened("controller")
     before, place = reader.shown()["given"]["discs"], reader.middle("Obstacle 2")
     reader.drag("Obstacle 2", (40, -30))
+    reader.shown()  # what was moved is drawn with the next frame
     np.testing.assert_allclose(reader.middle("Obstacle 2"), place + [40, -30], atol=1)
     goal = place + [40, 60]
     reader.page.click(goal)
+    reader.shown()
     np.testing.assert_allclose(reader.middle("Obstacle 2"), goal, atol=1)
     after = reader.shown()["given"]["discs"]
     assert [k for k in range(4) if after[k] != before[k]] == [1]
