@@ -8,6 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, probability_of_improvement
@@ -82,9 +83,12 @@ def _evidence(learners: tuple[str, str], runs: pd.DataFrame, _: Paths) -> str:
 def costs_less(runs: pd.DataFrame, first: str, second: str) -> Estimate:
     """Probability that a run of the first learner costs less than one of the second in its layout.
 
-    Every pair counts alike: one that got stuck loses, by however much, no more than once.
+    Every pair counts alike: one that got stuck loses, by however much, no more than once. Runs
+    without a counterpart do not count; without any pair the estimate is nan.
     """
-    return _costs_less(*arms(runs, first, second))
+    one, other = arms(runs, first, second)
+    whole = (one.stopped.notna() & other.stopped.notna()).to_numpy(bool)
+    return _costs_less(one[whole], other[whole]) if whole.any() else Estimate(*[np.nan] * 3)
 
 
 def _costs_less(first: pd.DataFrame, second: pd.DataFrame) -> Estimate:
