@@ -15,7 +15,7 @@ import build
 import enrich
 import nbformat
 import pytest
-from live_page import FRAMES
+from live_page import CHAPTERS, FRAMES
 
 from nmpcrl.learning import td_error
 from nmpcrl.study import paper
