@@ -22,6 +22,8 @@
     for (const figure of fresh) start(figure, build);
   }
 
+  const runs = () => Boolean(self.WebAssembly && self.DecompressionStream);
+
   async function start(figure, build) {
     figure.hidden = false;
     figure.querySelector("p").remove();
@@ -29,7 +31,8 @@
     let nmpc;
     try {
       nmpc = await solver(window.nmpcrl.module, data.problem);
-    } catch { // no WebAssembly, or a page that forbids it
+    } catch (error) { // without WebAssembly, or in a page that forbids it
+      if (runs() && !(error instanceof WebAssembly.CompileError)) throw error;
       add(figure, "p", {}, words.none);
       return;
     }

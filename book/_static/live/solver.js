@@ -12,17 +12,19 @@
   const DISCS = 16; // at most
   const LONGEST_VECTOR = 16; // of an update rule
 
-  async function instance(base64) {
-    const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-    const made = await WebAssembly.instantiate(bytes, { env: GIVEN });
+  // `packed` is a module: gzip, then base64.
+  async function instance(packed) {
+    const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+    const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const made = await WebAssembly.instantiate(await new Response(unpacked).arrayBuffer(), { env: GIVEN });
     return made.instance.exports;
   }
 
   // Everything that is solved, with up to DISCS obstacles and as many planned inputs as
   // `problem.discount` has room for. What is asked is { state, theta, discs, horizon }, and a `target`
   // if it is not the problem's.
-  async function solver(base64, problem) {
-    const wasm = await instance(base64);
+  async function solver(packed, problem) {
+    const wasm = await instance(packed);
     const room = (count) => new Float64Array(wasm.memory.buffer, wasm.reserve(8 * count), count);
     const filled = (numbers) => {
       const array = room(numbers.length);

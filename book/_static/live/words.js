@@ -28,7 +28,7 @@
   const parts = {
     fixed,
     scientific,
-    none: "This browser does not run WebAssembly, so the figure stays as it is printed above.",
+    none: "This browser does not run WebAssembly, or cannot unpack it, so the figure stays as it is printed above.",
     target: "target",
     robot: "Robot, start",
     heading: "Robot, heading",

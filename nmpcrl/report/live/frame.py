@@ -1,5 +1,6 @@
 """The frame of every live figure: what it is given, its style, its module and its scripts."""
 
+import gzip
 import json
 import os
 from base64 import b64encode
@@ -80,7 +81,7 @@ def files(scripts: Iterable[str], module: bytes | None, styles: Iterable[str] = 
     """Styles, module and scripts in the order in which they are needed, each with its name."""
     texts = {name: (folder() / name).read_text("utf-8") for name in (STYLE, *styles)}
     if module is not None:
-        texts[MODULE] = COMPILED % b64encode(module).decode()
+        texts[MODULE] = COMPILED % b64encode(gzip.compress(module, mtime=0)).decode()
     texts |= {name: (folder() / name).read_text("utf-8") for name in scripts}
     kinds = {name: "style" if name.endswith(".css") else "script" for name in texts}
     return [FILE.format(kind=kinds[name], name=name, text=texts[name].strip()) for name in texts]
