@@ -10,7 +10,6 @@
   const TURN = Math.PI / 3.6; // by an arrow key, for each metre that it would move a place [rad]
   const QUIET = 500; // after the last change, before a screen reader speaks [ms]
   const TICKS = 2; // [m]
-  const CONTROLS = "button, input, select, [tabindex]";
   const OWN_KEYS = { "data-lm-suppress-shortcuts": true }; // or JupyterLab takes the arrow keys for its own
 
   const clamp = (number, least, most) => Math.min(Math.max(number, least), most);
@@ -26,6 +25,7 @@
 
   async function start(figure, build) {
     figure.hidden = false;
+    figure.addEventListener("focusin", ({ target }) => set(target, OWN_KEYS));
     figure.querySelector("p").remove();
     const data = JSON.parse(figure.querySelector("script").textContent);
     let nmpc;
@@ -37,7 +37,6 @@
       return;
     }
     build(figure, data, nmpc);
-    for (const control of figure.querySelectorAll(CONTROLS)) set(control, OWN_KEYS);
   }
 
   // What is given now, and what changes it; `show(given)` follows with the next frame.
