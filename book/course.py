@@ -1,6 +1,10 @@
-"""Make the editions for a course: notebooks for students and for teachers, with their data; slides.
+"""Make the editions for a course: notebooks for students, teachers and graders, with data; slides.
 
-    python book/course.py      _build/course/student, _build/course/instructor, _build/course/slides
+    python book/course.py              _build/course/student, instructor, grader and slides
+    python book/course.py --otter      the third for otter in place of nbgrader
+
+The folder `grader` is one of a course of nbgrader's, with one assignment, `nmpcrl`; it is for
+teachers alone, and `nmpcrl grade` reads it.
 
 Each folder can be handed out as it is. The first two hold the chapters that have exercises, the
 library as a wheel, the libraries to install with it, and the published study; the slides, which
@@ -14,9 +18,11 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import autograded
 import build
 import click
 import editions
@@ -29,7 +35,9 @@ ROOT = build.ROOT
 EDITIONS: dict[str, Callable[..., Any]] = {
     "student": editions.student,
     "instructor": editions.teacher,
+    "grader": editions.grader,
 }
+WITHIN = {"grader": "source/nmpcrl"}  # where in its folder an edition is, if not there itself
 SINCE_1980 = "315532800"  # the earliest time that a ZIP file, so a wheel, can hold [s]
 WHEEL = ("--no-deps", "--no-build-isolation", "--no-index", "--quiet")
 PACKAGED = ("pyproject.toml", "LICENSE")
@@ -55,26 +63,30 @@ def wheel(place: Path) -> Path:
     return made
 
 
-def edition(name: str, place: Path) -> None:
-    """Write one edition to a folder, which is made anew."""
+def edition(name: str, place: Path, *, otter: bool = False) -> None:
+    """Write one edition to a folder, which is made anew; that of graders perhaps for otter."""
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     library = wheel(place).name
     sources = chapters()
+    make = partial(EDITIONS[name], otter=True) if otter else EDITIONS[name]
     for file, source in sources.items():
-        nbformat.write(EDITIONS[name](source, set(sources), library), place / file)
+        nbformat.write(make(source, set(sources), library), place / file)
     shutil.copy2(ROOT / "environment.txt", place)
     for data in ("published", "_static/live"):
         shutil.copytree(ROOT / "book" / data, place / "data" / Path(data).name)
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
-def main() -> None:
+@click.option("--otter", is_flag=True, help="Mark the notebooks of graders for otter.")
+def main(otter: bool) -> None:
     """Write the editions to _build/course."""
     os.chdir(ROOT)
     for name in EDITIONS:
-        edition(name, Path("_build/course") / name)
-        click.echo(f"_build/course/{name}")
+        folder = Path("_build/course") / name
+        edition(name, folder / WITHIN.get(name, ""), otter=otter and name == "grader")
+        click.echo(folder)
+    Path("_build/course/grader/nbgrader_config.py").write_text(autograded.NBGRADER_CONFIG)
     try:
         slides.printed(slides.make(chapters(), slides.EXECUTED, Path("_build/course/slides")))
         click.echo("_build/course/slides")

@@ -3,7 +3,7 @@
 Both have a cell that says how to set up and where the data are, a line with kind, level, minutes
 and points in each exercise, and parameters with which a notebook takes less than two minutes.
 Students get no solutions; teachers get them in the place of the answers, a table of the exercises,
-and a note in each.
+and a note in each. Graders get one from which nbgrader, otter or `nmpcrl grade` makes the rest.
 """
 
 import re
@@ -11,6 +11,7 @@ from collections.abc import Collection
 from copy import deepcopy
 from typing import Any
 
+import autograded
 from nbformat.v4 import new_code_cell, new_markdown_cell
 
 from nmpcrl.course.exercises import HEAD, Exercise, exercises, solved
@@ -72,6 +73,18 @@ def teacher(source: Notebook, pages: Collection[str], wheel: str) -> Notebook:
         table = new_markdown_cell(_table(every), id="exercises-table", metadata={"tags": ["note"]})
         notebook.cells.insert(1, table)
     return _edition(notebook, pages, wheel)
+
+
+def grader(
+    source: Notebook, pages: Collection[str], wheel: str, *, otter: bool = False
+) -> Notebook:
+    """A chapter with marks for nbgrader, or for otter; other arguments as for `student`."""
+    notebook = deepcopy(source)
+    for one in exercises(notebook):
+        _line(one)
+        one.text.metadata["nmpcrl"]["exercise"].pop("mistakes", None)
+    made = _edition(notebook, pages, wheel)
+    return autograded.for_otter(made) if otter else autograded.for_nbgrader(made)
 
 
 def _edition(notebook: Notebook, pages: Collection[str], wheel: str) -> Notebook:

@@ -8,6 +8,7 @@ from nmpcrl.commands.clean import clean
 from nmpcrl.commands.compare import compare
 from nmpcrl.commands.completion import completion
 from nmpcrl.commands.evaluate import evaluate
+from nmpcrl.commands.grade import grade
 from nmpcrl.commands.refusals import Commands
 from nmpcrl.commands.runs import runs
 from nmpcrl.commands.show import show
@@ -42,6 +43,7 @@ for command in (
     study,
     verify,
     bench,
+    grade,
     wasm,
     completion,
 ):

@@ -1,0 +1,167 @@
+"""What a student hands in, put into the chapter: answers and own cells are theirs, the rest ours.
+
+A chapter comes from the edition for graders, of which the solutions are taken out. So it does not
+matter if a check, a parameter or any other cell of it was edited or deleted.
+"""
+
+import json
+import re
+from collections import defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from nmpcrl.course.exercises import HEAD, Cell, Exercise, Notebook, exercises
+from nmpcrl.study.parameters import Refusal
+
+SOLUTION = re.compile(r"\n### BEGIN SOLUTION\n.*?\n### END SOLUTION", flags=re.S)
+CHECKS = "exercises-checks"  # the cell that imports them
+
+
+class CannotGrade(Refusal):
+    """A file is no notebook, or a folder no edition for graders; the message says which."""
+
+
+class Fields(dict[str, Any]):
+    """A JSON object whose fields are attributes, as those of nbformat are."""
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            raise AttributeError(name) from None
+
+
+@dataclass(frozen=True, eq=False)
+class Chapter:
+    """A chapter of the edition for graders."""
+
+    name: str  # of its file, without its ending
+    notebook: Notebook  # without solutions
+    exercises: list[Exercise]
+    data: Path | None = None  # the folder of what it reads
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A code cell to execute."""
+
+    name: str
+    code: str
+    exercise: str | None = None  # to which it belongs
+    theirs: bool = False  # a cell that the student added
+
+
+@dataclass(frozen=True, eq=False)
+class Submission:
+    """The code cells in their order, and what is to be said of an exercise in any case."""
+
+    steps: list[Step]
+    remarks: dict[str, str] = field(default_factory=dict)  # by the name of an exercise
+
+
+def notebook_of(path: Path) -> Notebook:
+    """A notebook from its file, whoever wrote it.
+
+    Raises:
+        CannotGrade: it is none.
+    """
+    try:
+        notebook = json.loads(path.read_text(encoding="utf-8"), object_hook=Fields)
+        for cell in notebook["cells"]:
+            source = cell["source"]
+            cell["source"] = source if isinstance(source, str) else "".join(source)
+            cell["metadata"] = Fields(cell.get("metadata") or {})
+            tags = cell["metadata"].get("tags")
+            cell["metadata"]["tags"] = tags if isinstance(tags, list) else []
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise CannotGrade("The file is no notebook.") from None
+    return notebook
+
+
+def chapters(edition: Path) -> list[Chapter]:
+    """The chapters of an edition for graders.
+
+    Raises:
+        CannotGrade: the folder has none.
+    """
+    found = []
+    for path in sorted(edition.rglob("*.ipynb")):
+        notebook = notebook_of(path)
+        for cell in notebook.cells:
+            cell["source"] = SOLUTION.sub("", cell["source"])
+        data = path.parent / "data"
+        every = list(exercises(notebook))
+        if any("nbgrader" in c.metadata for one in every for c in one.parts["check"]):
+            found.append(Chapter(path.stem, notebook, every, data if data.is_dir() else None))
+    if not found:
+        raise CannotGrade(f"{edition} has no edition for graders; `make course` writes it")
+    return found
+
+
+def taken(chapter: Chapter, notebook: Notebook) -> Submission:
+    """A student's answers and own cells in a chapter."""
+    answers, added = _theirs(chapter, notebook)
+    owner = {cell.id: one for one in chapter.exercises for cell in _cells(one)}
+    imports = next((c.source for c in chapter.notebook.cells if c.id == CHECKS), "")
+    steps, remarks = [_step(cell, None, theirs=True) for cell in added[""]], {}
+    for cell in chapter.notebook.cells:
+        one = owner.get(cell.id)
+        name = one.name if one else None
+        if cell.cell_type == "code":
+            code = answers.get(cell.id, cell.source)
+            if one and cell in one.parts["answer"] and cell.id not in answers:
+                remarks[one.name] = "The answer cell is missing."
+            if one and cell in one.parts["check"]:
+                code = f"{imports}\n{code}"  # whatever `check` has come to be
+            steps.append(Step(cell.id, code, name))
+        steps += [_step(one_more, name, theirs=True) for one_more in added[cell.id]]
+    return Submission(steps, remarks)
+
+
+def _step(cell: Cell, exercise: str | None, *, theirs: bool) -> Step:
+    return Step(f"theirs-{id(cell)}", cell["source"], exercise, theirs)
+
+
+def _cells(one: Exercise) -> list[Cell]:
+    return [one.text, *(cell for cells in one.parts.values() for cell in cells)]
+
+
+def _theirs(chapter: Chapter, notebook: Notebook) -> tuple[dict[str, str], dict[str, list[Cell]]]:
+    """Answers by the cell's name in the chapter, and added cells by that which they follow."""
+    ours = {cell.id: cell.source for cell in chapter.notebook.cells}
+    asked = {cell.id for one in chapter.exercises for cell in one.parts["answer"]}
+    answers: dict[str, str] = {}
+    added: dict[str, list[Cell]] = defaultdict(list)
+    last = ""
+    for cell, name in zip(notebook.cells, _names(chapter, notebook), strict=True):
+        if name in ours and not (name in answers and name in asked):
+            last = name
+            if name in asked and cell.get("cell_type") == "code":
+                answers[name] = cell.source
+        elif cell.get("cell_type") == "code" and not _copied(cell, set(ours.values())):
+            added[last].append(cell)
+    return answers, added
+
+
+def _copied(cell: Cell, ours: set[str]) -> bool:
+    """Whether an added cell is one of the chapter, or claims to be a check."""
+    return cell.source in ours or "check" in cell.metadata["tags"]
+
+
+def _names(chapter: Chapter, notebook: Notebook) -> list[str]:
+    """The name of each cell: nbgrader's, its own, or that of the answer which it must be."""
+    answers = {one.name: [cell.id for cell in one.parts["answer"]] for one in chapter.exercises}
+    known = {cell.id for cell in chapter.notebook.cells}
+    names, left = [], list[str]()
+    for cell in notebook.cells:
+        head = HEAD.match(cell.source)
+        if head:
+            left = list(answers.get(head["name"], []))
+        marks = cell.metadata.get("nbgrader") or {}
+        name = str(marks.get("grade_id") or cell.get("id") or "")
+        if name not in known and "answer" in cell.metadata["tags"] and left:
+            name = left[0]
+        left = [one for one in left if one != name]
+        names.append(name)
+    return names
