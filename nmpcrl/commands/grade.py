@@ -1,6 +1,8 @@
 """`nmpcrl grade`: points of the notebooks that students hand in."""
 
 import csv
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +14,7 @@ from nmpcrl.commands.tables import columns, counted
 if TYPE_CHECKING:
     from nmpcrl.course.grading import Mark
 
+NOTEBOOK = attrgetter("notebook")
 FIELDS = ("student", "notebook", "exercise", "points", "of", "why")
 HEADER = ("student", "notebook", "points", "of", "by hand")
 FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
@@ -32,60 +35,80 @@ NO_SANDBOX = (
     help="What `make course` writes for graders.",
 )
 @click.option(
-    "--time-limit", type=click.IntRange(1), default=120, show_default=True, help="Seconds a run."
+    "--time-limit",
+    type=click.IntRange(1),
+    default=600,
+    show_default=True,
+    help="Seconds a notebook, all its runs together.",
 )
 @click.option(
-    "--memory", type=click.IntRange(100), default=2000, show_default=True, help="Megabytes a run."
+    "--cell-limit",
+    type=click.IntRange(1),
+    default=60,
+    show_default=True,
+    help="Seconds a cell of an exercise, or one that a student added.",
 )
-def grade(folder: Path, out: Path, edition: Path, time_limit: int, memory: int) -> None:
+@click.option(
+    "--memory",
+    type=click.IntRange(100),
+    default=2000,
+    show_default=True,
+    help="Megabytes a notebook.",
+)
+def grade(
+    folder: Path, out: Path, edition: Path, time_limit: int, cell_limit: int, memory: int
+) -> None:
     """Grade every notebook below FOLDER, and write the points to a file.
 
     FOLDER has a folder for each student, or notebooks such as
     anna_01_mdp_and_nmpc.ipynb. Each runs in a process and a temporary folder of
     its own. Answers and added cells are the student's; every other cell, so each
-    check, is put back from the edition for graders. A cell that does not end in
-    time, takes too much memory or ends the process is taken out, and the others
-    run again without it. Projects are left to you.
+    check, is put back from the edition for graders. Where a cell does not end in
+    time, takes too much memory or ends the process, its exercise gets no points,
+    and the others run again without it. Projects are left to you.
 
     This is no sandbox for hostile code: a notebook has your rights, reads your
-    files and reaches your network. Where you do not trust one, run this command in
-    a container that has neither, after `nmpcrl` is installed in an image:
+    files, reaches your network, and can lie about its points. Where you do not
+    trust one, run this command as another user in a container that has no network
+    and no files but these, from an image in which nmpcrl is installed:
 
     \b
-      docker run --rm --network none --read-only --tmpfs /tmp --tmpfs /root \\
+      docker run --rm --network none --read-only --cap-drop ALL \\
+        --user "$(id -u):$(id -g)" --memory 4g --pids-limit 512 \\
+        --tmpfs /tmp:exec -e HOME=/tmp \\
         -v "$PWD/handed-in:/in:ro" -v "$PWD/grader:/edition:ro" \\
         -v "$PWD/marks:/out" IMAGE \\
         nmpcrl grade /in --edition /edition --out /out/grades.csv
 
     \b
     Example:
-      nmpcrl grade . --out grades.csv --time-limit 60
+      nmpcrl grade . --out grades.csv --time-limit 300
     """
     from nmpcrl.course import grading
     from nmpcrl.course.confined import Limits
 
-    limits = Limits(time_limit, memory)
-    marks = []
+    limits = Limits(time_limit, cell_limit, memory)
+    rows = []
     with out.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(FIELDS)
-        for mark in grading.grade(folder, edition, limits):
-            marks.append(mark)
-            writer.writerow(["" if (v := getattr(mark, f)) is None else v for f in FIELDS])
+        for notebook, marks in groupby(grading.grade(folder, edition, limits), NOTEBOOK):
+            each = list(marks)
+            rows.append(total(each))
+            student, _, got, of, by_hand = rows[-1]
+            writer.writerows([getattr(mark, name) for name in FIELDS] for mark in each)
+            left = f"{by_hand} more are given by hand." if by_hand != "0" else ""
+            writer.writerow((student, notebook, "total", got, of, left))
             file.flush()
-    click.echo("\n".join(columns([HEADER, *totals(marks)], frozenset({2, 3, 4}))))
-    notebooks = counted(len({mark.notebook for mark in marks}), "notebook")
-    click.echo(f"\n{notebooks}, {counted(len(marks), 'row')} in {out}")
+            click.echo(f"{notebook}: {got} of {of}", err=True)
+    click.echo("\n".join(columns([HEADER, *rows], frozenset({2, 3, 4}))))
+    click.echo(f"\n{counted(len(rows), 'notebook')} in {out}")
     click.echo(NO_SANDBOX)
 
 
-def totals(marks: "list[Mark]") -> list[tuple[str, ...]]:
-    """A row a notebook: points, points to be had from checks, and those that a person gives."""
-    rows: list[tuple[str, ...]] = []
-    for student, notebook in dict.fromkeys((mark.student, mark.notebook) for mark in marks):
-        mine = [mark for mark in marks if mark.notebook == notebook]
-        checked = [(mark.points, mark.of) for mark in mine if mark.points is not None]
-        got, of = (sum(pair[k] for pair in checked) for k in (0, 1))
-        by_hand = sum(mark.of for mark in mine if mark.points is None)
-        rows.append((student, notebook, str(got), str(of), str(by_hand)))
-    return rows
+def total(marks: "list[Mark]") -> tuple[str, ...]:
+    """Of a notebook: points, points to be had from checks, and those that a person gives."""
+    checked = [(mark.points, mark.of) for mark in marks if mark.points is not None]
+    got, of = (sum(pair[k] for pair in checked) for k in (0, 1))
+    by_hand = sum(mark.of for mark in marks if mark.points is None)
+    return marks[0].student, marks[0].notebook, str(got), str(of), str(by_hand)

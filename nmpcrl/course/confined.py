@@ -9,23 +9,27 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from math import ceil
 from pathlib import Path
 from typing import Any
 
 import psutil
 
-SETTLE = 0.1  # between two looks at the process [s]
-FATAL = {"cpu": signal.SIGXCPU, "file": signal.SIGXFSZ}
+from nmpcrl.course.submissions import Chapter, Step
 
-Plan = list[tuple[str, str]]  # name and code of each cell
+SETTLE = 0.1  # between two looks at the process [s]
+NO_MEMORY = 77  # the code with which a process ends where a student's cell takes too much
+
+End = dict[str, Any]  # of a cell: its `error`, if it is `right`, and the names it has `rebound`
 
 
 @dataclass(frozen=True)
 class Limits:
     """What a notebook may take."""
 
-    seconds: int = 120
+    seconds: int = 600  # in all
+    cell: int = 60  # seconds of one cell of an exercise, or of one that was added
     megabytes: int = 2000
 
 
@@ -33,33 +37,46 @@ class Limits:
 class Sat:
     """What became of a notebook."""
 
-    ends: dict[str, dict[str, Any]]  # how each cell ended that did, by name
-    stopped: str | None = None  # the cell that did not end, if there is one
-    why: str = ""  # it did not
+    ends: dict[str, End]  # how each cell ended that did, by name
+    why: str = ""  # others did not
 
 
-def run(plan: Plan, data: Path | None, limits: Limits) -> Sat:
-    """Execute cells in a fresh process, in a temporary folder with a copy of the data."""
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
-        place = Path(name)
-        work = place / "work"
+def run(
+    chapter: Chapter, steps: list[Step], limits: Limits, until: float, *, restored: bool = False
+) -> Sat:
+    """Execute cells in a fresh process, in a temporary folder with a copy of the chapter's data.
+
+    Args:
+        chapter: to which they belong.
+        steps: the cells.
+        limits: of the notebook.
+        until: when it has had its time, as `time.monotonic` counts it.
+        restored: after each exercise the names of the chapter have their meaning again.
+    """
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name,
+        tempfile.TemporaryFile("w+") as log,
+    ):
+        work = Path(name) / "work"
         work.mkdir()
-        if data is not None:
-            shutil.copytree(data, work / "data")
-        (place / "plan.json").write_text(json.dumps(plan))
-        files = [str(place / "plan.json"), str(place / "log")]
-        numbers = [str(limits.megabytes), str(limits.seconds)]
-        why = _ended(
-            [sys.executable, "-m", "nmpcrl.course.sitting", *files, *numbers], work, limits
-        )
-        return _read(place / "log", why)
+        if chapter.data is not None:
+            shutil.copytree(chapter.data, work / "data")
+        asked = sorted(chapter.asked)
+        plan = {"steps": list(map(asdict, steps)), "asked": asked, "restored": restored}
+        (work.parent / "plan.json").write_text(json.dumps(plan))
+        seconds = max(1, ceil(until - time.monotonic()))
+        words = [work.parent / "plan.json", log.fileno(), limits.megabytes, seconds, limits.cell]
+        why = _ended(list(map(str, words)), log.fileno(), work, limits, until)
+        log.seek(0)
+        return Sat({end["name"]: end for end in map(json.loads, log)}, why)
 
 
-def _ended(command: list[str], work: Path, limits: Limits) -> str:
-    """Wait for a process, end it and its own at a limit, and say how it ended."""
+def _ended(words: list[str], log: int, work: Path, limits: Limits, until: float) -> str:
+    """Wait for a process, end it and its own at a limit, and say why it ended before the end."""
     own = {"MPLBACKEND": "Agg", "IPYTHONDIR": str(work.parent), "TMPDIR": str(work)}
     child = subprocess.Popen(
-        command,
+        [sys.executable, "-m", "nmpcrl.course.sitting", *words],
+        pass_fds=[log],
         cwd=work,
         env=os.environ | own,
         stdin=subprocess.DEVNULL,
@@ -67,24 +84,30 @@ def _ended(command: list[str], work: Path, limits: Limits) -> str:
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    until = time.monotonic() + limits.seconds
+    said = _said(limits)
     why = ""
     try:
         while child.poll() is None and not why:
             if time.monotonic() > until:
-                why = f"it took longer than {limits.seconds} s"
+                why = said[-signal.SIGXCPU]
             elif _memory(child.pid) > limits.megabytes * 1_000_000:
-                why = f"it took more than {limits.megabytes} MB of memory"
+                why = said[NO_MEMORY]
             time.sleep(SETTLE)
     finally:
         _end(child)
-    if why or not child.returncode:
-        return why or "it ended the process"
-    if child.returncode == -FATAL["cpu"]:
-        return f"it took longer than {limits.seconds} s"
-    if child.returncode == -FATAL["file"]:
-        return "it wrote too large a file"
-    return f"it ended the process, with code {child.returncode}"
+    code = child.returncode
+    return why or said.get(code, f"it ended the process, with code {code}")
+
+
+def _said(limits: Limits) -> dict[int, str]:
+    """What codes mean with which a process ends."""
+    return {
+        0: "it ended the process",
+        NO_MEMORY: f"it took more than {limits.megabytes} MB of memory",
+        -signal.SIGALRM: f"a cell took longer than {limits.cell} s",
+        -signal.SIGXCPU: f"the notebook took longer than {limits.seconds} s",
+        -signal.SIGXFSZ: "it wrote too large a file",
+    }
 
 
 def _family(pid: int) -> list[psutil.Process]:
@@ -113,15 +136,3 @@ def _end(child: "subprocess.Popen[bytes]") -> None:
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(child.pid, signal.SIGKILL)
     child.wait()
-
-
-def _read(log: Path, why: str) -> Sat:
-    """How the cells ended, and which one did not."""
-    ends: dict[str, dict[str, Any]] = {}
-    begun: str | None = None
-    for line in log.read_text().splitlines() if log.exists() else []:
-        entry = json.loads(line)
-        begun = None if "right" in entry else entry["name"]
-        if "right" in entry:
-            ends[entry["name"]] = entry
-    return Sat(ends, begun, why)

@@ -8,7 +8,9 @@ import json
 import re
 from collections import defaultdict
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
+from symtable import symtable
 from typing import Any
 
 from nmpcrl.course.exercises import HEAD, Cell, Exercise, Notebook, exercises
@@ -41,6 +43,17 @@ class Chapter:
     exercises: list[Exercise]
     data: Path | None = None  # the folder of what it reads
 
+    @cached_property
+    def blanks(self) -> dict[str, str]:
+        """The code of the untouched answer cells, by their names."""
+        return {c.id: c.source for one in self.exercises for c in one.parts["answer"]}
+
+    @cached_property
+    def asked(self) -> set[str]:
+        """The names that answers bind."""
+        tables = [symtable(code, name, "exec") for name, code in self.blanks.items()]
+        return {one.get_name() for t in tables for one in t.get_symbols() if one.is_assigned()}
+
 
 @dataclass(frozen=True, eq=False)
 class Step:
@@ -48,8 +61,8 @@ class Step:
 
     name: str
     code: str
-    exercise: str | None = None  # to which it belongs
-    theirs: bool = False  # a cell that the student added
+    group: str = ""  # its exercise; the cell alone if a student added it elsewhere; else empty
+    theirs: bool = False  # a student wrote it
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,23 +117,24 @@ def taken(chapter: Chapter, notebook: Notebook) -> Submission:
     answers, added = _theirs(chapter, notebook)
     owner = {cell.id: one for one in chapter.exercises for cell in _cells(one)}
     imports = next((c.source for c in chapter.notebook.cells if c.id == CHECKS), "")
-    steps, remarks = [_step(cell, None, theirs=True) for cell in added[""]], {}
+    steps, remarks = [_added(cell, "") for cell in added[""]], {}
     for cell in chapter.notebook.cells:
         one = owner.get(cell.id)
-        name = one.name if one else None
+        name = one.name if one else ""
         if cell.cell_type == "code":
-            code = answers.get(cell.id, cell.source)
-            if one and cell in one.parts["answer"] and cell.id not in answers:
-                remarks[one.name] = "The answer cell is missing."
+            code, theirs = answers.get(cell.id, cell.source), cell.id in chapter.blanks
+            if theirs and cell.id not in answers:
+                remarks[name] = "The answer cell is missing."
             if one and cell in one.parts["check"]:
                 code = f"{imports}\n{code}"  # whatever `check` has come to be
-            steps.append(Step(cell.id, code, name))
-        steps += [_step(one_more, name, theirs=True) for one_more in added[cell.id]]
+            steps.append(Step(cell.id, code, name, theirs))
+        steps += [_added(one_more, name) for one_more in added[cell.id]]
     return Submission(steps, remarks)
 
 
-def _step(cell: Cell, exercise: str | None, *, theirs: bool) -> Step:
-    return Step(f"theirs-{id(cell)}", cell["source"], exercise, theirs)
+def _added(cell: Cell, exercise: str) -> Step:
+    name = f"theirs-{id(cell)}"
+    return Step(name, cell["source"], exercise or name, theirs=True)
 
 
 def _cells(one: Exercise) -> list[Cell]:
@@ -130,14 +144,13 @@ def _cells(one: Exercise) -> list[Cell]:
 def _theirs(chapter: Chapter, notebook: Notebook) -> tuple[dict[str, str], dict[str, list[Cell]]]:
     """Answers by the cell's name in the chapter, and added cells by that which they follow."""
     ours = {cell.id: cell.source for cell in chapter.notebook.cells}
-    asked = {cell.id for one in chapter.exercises for cell in one.parts["answer"]}
     answers: dict[str, str] = {}
     added: dict[str, list[Cell]] = defaultdict(list)
     last = ""
     for cell, name in zip(notebook.cells, _names(chapter, notebook), strict=True):
-        if name in ours and not (name in answers and name in asked):
+        if name in ours and not (name in answers and name in chapter.blanks):
             last = name
-            if name in asked and cell.get("cell_type") == "code":
+            if name in chapter.blanks and cell.get("cell_type") == "code":
                 answers[name] = cell.source
         elif cell.get("cell_type") == "code" and not _copied(cell, set(ours.values())):
             added[last].append(cell)

@@ -1,167 +1,110 @@
 """Grading: what students hand in, run as strangers' code that hangs, ends or cheats."""
 
-import csv
-import json
-import os
-import shutil
-import subprocess
-import sys
-from itertools import chain
-from pathlib import Path
+import time
+from dataclasses import replace
 
-import course
+import editions
 import nbformat
 import pytest
 from click.testing import CliRunner
 from nbformat.v4 import new_code_cell
+from small_course import ASKED, cell_of, small_chapter, solved_by_student
 
 from nmpcrl.commands import main
-from nmpcrl.course.confined import Limits, run
+from nmpcrl.course import confined, grading
+from nmpcrl.course.confined import Limits, Sat
 from nmpcrl.course.exercises import exercises
 from nmpcrl.course.submissions import CannotGrade, chapters, notebook_of, taken
 
-CHAPTER = "01_mdp_and_nmpc"
-SOURCE = course.chapters()[f"{CHAPTER}.ipynb"]
-EVERY = list(exercises(SOURCE))
-CHECKED = [one for one in EVERY if one.parts["check"]]
-POINTS = {one.number: one.about.points for one in CHECKED}
-HALF = EVERY[:3]  # of which the sample "half" has the answers
-NBGRADER = os.environ.get("NMPCRL_NBGRADER", "")
-
-
-def made(edition: str):
-    return course.EDITIONS[edition](SOURCE, {f"{CHAPTER}.ipynb"}, "nmpcrl.whl")
-
-
-def sample(answered=()):
-    """A student's notebook with the answers of some exercises."""
-    notebook = tiny(made("student"))
-    right = {cell.id: code for one in answered for cell, code in _answers(one)}
-    for cell in notebook.cells:
-        cell.source = right.get(cell.id, cell.source)
-    return notebook
-
-
-def _answers(one):
-    return zip(one.parts["answer"], one.answers, strict=True)
-
-
-def cell_of(notebook, name):
-    return next(cell for cell in notebook.cells if cell.id == name)
-
-
-def tiny(notebook):
-    """Without the chapter: setup, checks and exercises are all that most behaviour needs."""
-    kept = {"setup", "check", "exercises-checks"}  # the cell "check" makes the task and the NMPC
-    for one in exercises(notebook):
-        kept |= {cell.id for cell in (one.text, *chain.from_iterable(one.parts.values()))}
-    kept |= {c.id for c in notebook.cells if "parameters" in c.metadata.get("tags", [])}
-    notebook.cells = [cell for cell in notebook.cells if cell.id in kept]
-    return notebook
-
-
-@pytest.fixture
-def edition(tmp_path) -> Path:
-    place = tmp_path / "edition/source/nmpcrl"
-    place.mkdir(parents=True)
-    nbformat.write(tiny(made("grader")), place / f"{CHAPTER}.ipynb")
-    return tmp_path / "edition"
-
-
-@pytest.fixture
-def graded(tmp_path, edition):
-    """Rows of the CSV file by exercise, of notebooks that are handed in; by student if many."""
-
-    def grade(*words, **handed):
-        for student, notebook in handed.items():
-            place = tmp_path / "in" / student / f"{CHAPTER}.ipynb"
-            place.parent.mkdir(parents=True)
-            text = notebook if isinstance(notebook, str) else nbformat.writes(notebook)
-            place.write_text(text)
-        out = tmp_path / "grades.csv"
-        given = ["grade", str(tmp_path / "in"), "--out", str(out), "--edition", str(edition)]
-        called = CliRunner().invoke(main, [*given, *words])
-        assert called.exit_code == 0, called.output
-        assert "no sandbox" in called.output
-        with out.open(newline="") as file:
-            rows = list(csv.DictReader(file))
-        return {s: {r["exercise"]: r for r in rows if r["student"] == s} for s in handed}
-
-    return grade
-
-
-def points(rows) -> dict[str, int]:
-    return {number: int(row["points"]) for number, row in rows.items() if row["points"]}
+POINTS = {f"1.{number}": number for number in range(1, len(ASKED) + 1)}
+SLEEPS = "import time\ntime.sleep(10**6)"
+GROWS = "taken = []\nwhile True:\n    taken.append(bytearray(10**8))"
 
 
 def expected(*lost: str) -> dict[str, int]:
     return {number: 0 if number in lost else of for number, of in POINTS.items()}
 
 
-@pytest.mark.slow
-def test_points_of_the_samples_and_a_sentence_for_each_loss(graded):
-    rows = graded(untouched=sample(), half=sample(HALF), perfect=sample(CHECKED))
+def points(rows) -> dict[str, int]:
+    return {number: int(row["points"]) for number, row in rows.items() if number in POINTS}
+
+
+def reasons(rows) -> dict[str, str]:
+    return {number: row["why"] for number, row in rows.items() if number in POINTS}
+
+
+def test_points_of_samples_and_a_sentence_for_each_loss(graded):
+    untouched = editions.student(small_chapter(), set(), "nmpcrl.whl")
+    half = solved_by_student(**dict.fromkeys(ASKED[3:], "pass"), two="root_of_two = 16")
+    rows = graded(untouched=untouched, half=half, perfect=solved_by_student())
     assert points(rows["untouched"]) == expected(*POINTS)
-    assert points(rows["half"]) == expected(*(one.number for one in CHECKED[3:]))
+    assert points(rows["half"]) == expected("1.2", "1.4", "1.5", "1.6", "1.7")
     assert points(rows["perfect"]) == expected()
-    assert "Not answered yet" in rows["untouched"]["1.1"]["why"]
-    assert [row["why"] for row in rows["perfect"].values() if row["points"]] == [""] * len(POINTS)
-    (project,) = (row for row in rows["perfect"].values() if not row["points"])
+    assert all("Not answered yet" in why for why in reasons(rows["untouched"]).values())
+    assert set(reasons(rows["perfect"]).values()) == {""}
+    assert rows["half"]["1.2"]["why"] == "16 is not right: it is too large."
+    assert rows["half"]["1.4"]["why"].startswith("The check fails with NameError")
+    project, total = rows["half"]["1.8"], rows["half"]["total"]
+    assert (project["points"], project["of"]) == ("", "6")
     assert "rubric" in project["why"]
-    assert project["of"] == "6"
+    assert (total["points"], total["of"]) == ("4", "28")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("answer", "said"),
-    [
-        ("while True:\n    pass", "longer than 40 s"),
-        ("import os\nos._exit(0)", "ended the process"),
-        ("import os, signal\nos.kill(os.getpid(), signal.SIGKILL)", "ended the process, with code"),
-    ],
-)
-def test_an_answer_that_hangs_or_ends_the_process_costs_its_own_points(graded, answer, said):
-    notebook = sample(CHECKED)
-    cell_of(notebook, "ex-reach-answer").source = answer
-    rows = graded("--time-limit", "40", one=notebook)["one"]
-    assert points(rows) == expected("1.3")
-    assert said in rows["1.3"]["why"]
+def test_an_answer_that_hangs_ends_the_process_or_takes_memory_costs_its_own_points(graded):
+    fatal = {
+        "one": SLEEPS,
+        "two": "import os\nos._exit(0)",
+        "three": "import os, signal\nos.kill(os.getpid(), signal.SIGKILL)",
+        "four": GROWS,
+        "six": "import sys\nsys.exit()",
+    }
+    limits = ("--cell-limit", "3", "--memory", "600")
+    rows = graded(*limits, one=solved_by_student(**fatal))["one"]
+    assert points(rows) == expected("1.1", "1.2", "1.3", "1.4", "1.6")
+    said = reasons(rows)
+    assert "a cell took longer than 3 s" in said["1.1"]
+    assert "it ended the process" in said["1.2"]
+    assert "it ended the process, with code -9" in said["1.3"]
+    assert "it took more than 600 MB of memory" in said["1.4"]
+    assert "SystemExit" in said["1.6"]
 
 
-@pytest.mark.slow
-def test_a_notebook_that_takes_memory_is_stopped_where_it_does(graded):
-    notebook = sample(CHECKED)
-    cell_of(notebook, "ex-reach-answer").source = "longest = bytearray(10**11)"
-    rows = graded(one=notebook)["one"]
-    assert points(rows) == expected("1.3")
-    assert "Memory" in rows["1.3"]["why"] or "memory" in rows["1.3"]["why"]
+def test_other_meanings_of_names_and_a_folder_left_cost_no_points_elsewhere(graded):
+    other = {
+        "one": "four = sorted = None\nroot_of_one = 3",
+        "two": "import os\nos.chdir('/')\nroot_of_two = 2\nfour = 5",
+        "three": "root_of_three = int(len(open('data/of_the_chapter.txt').read()) * four ** 0.5)",
+        "four": "%reset -f\nroot_of_four = 2",
+        "five": "check = print\nroot_of_five = 2",
+        "six": "root_of_six = sorted([four])[0] ** 0.5",
+        "seven": "root_of_seven = root_of_six",
+    }
+    assert points(graded(one=solved_by_student(**other))["one"]) == expected("1.1")
 
 
-@pytest.mark.slow
-def test_checks_that_are_edited_or_deleted_and_what_stands_for_them_do_not_count(graded):
-    edited = sample()
-    for one in exercises(edited):
-        for cell in one.parts["check"]:
-            cell.source = "'Right.'"
-    edited.cells.append(new_code_cell("class check:\n    distance = print"))
-    strict = cell_of(edited, "setup")
+def test_what_a_student_gave_another_meaning_keeps_it_where_an_answer_relies_on_it(graded):
+    notebook = solved_by_student(one="root_of_one = five", three="root_of_three = 3")
+    at = notebook.cells.index(cell_of(notebook, "chapter"))
+    notebook.cells.insert(at + 1, new_code_cell("five = 2; max = 2"))
+    cell_of(notebook, "six-answer").source = "root_of_six = max"
+    assert points(graded(one=notebook)["one"]) == expected("1.3")
+
+
+def test_checks_that_are_edited_or_deleted_do_not_count(graded):
+    notebook = solved_by_student(two="root_of_two = 3")
+    one, two, three = list(exercises(notebook))[:3]
+    one.parts["check"][0].source = "1 / 0"
+    two.parts["check"][0].source = "'Right: 2.'"
+    notebook.cells.remove(three.parts["check"][0])
+    notebook.cells.append(new_code_cell("class check:\n    four = print"))
+    strict = cell_of(notebook, "setup")
     strict.source = strict.source.replace('"1"', '""')
-    deleted = sample(HALF)
-    for one in list(exercises(deleted)):
-        for cell in one.parts["check"]:
-            deleted.cells.remove(cell)
-    rebound = sample(HALF)
-    cell_of(rebound, "ex-apart-answer").source = "check = print\nreason = 'c'"
-    rows = graded(edited=edited, deleted=deleted, rebound=rebound)
-    assert points(rows["edited"]) == expected(*POINTS)
-    assert points(rows["deleted"]) == points(rows["rebound"]) | {"1.4": 0}
-    assert points(rows["rebound"])["1.4"] == POINTS["1.4"]
+    assert points(graded(one=notebook)["one"]) == expected("1.2")
 
 
-@pytest.mark.slow
 def test_cells_that_are_gone_and_files_that_are_no_notebook_are_rows_with_a_sentence(graded):
-    gone = sample(CHECKED)
-    gone.cells = [cell for cell in gone.cells if cell.id.startswith("ex-scale")]
+    gone = solved_by_student()
+    gone.cells = [cell for cell in gone.cells if cell.id.startswith("two")]
     texts = {"broken": "{", "list": "[1]", "cells": '{"cells": 3}'}
     rows = graded(gone=gone, **texts)
     assert points(rows["gone"]) == expected(*(set(POINTS) - {"1.2"}))
@@ -171,46 +114,105 @@ def test_cells_that_are_gone_and_files_that_are_no_notebook_are_rows_with_a_sent
         assert rows[name]["1.1"]["why"] == "The file is no notebook."
 
 
-def test_files_are_written_in_a_folder_that_is_thrown_away(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code = "from pathlib import Path\nPath('left.txt').write_text(str(Path.cwd()))\nPath.cwd()"
-    sat = run([("writes", code), ("next", "1 / 0")], None, Limits(60))
-    assert sat.ends["writes"]["error"] is None
-    assert sat.ends["next"]["error"][0] == "ZeroDivisionError"
-    assert list(tmp_path.iterdir()) == []
+def test_a_notebook_whose_name_is_that_of_no_chapter_is_a_row_with_a_sentence(graded):
+    rows = graded(name="holidays", one=solved_by_student())["one"]
+    assert rows[""]["why"] == "The name of the file does not end in that of a chapter."
 
 
-def steps(notebook, edition):
-    (chapter,) = chapters(edition)
-    path = edition / "handed-in.ipynb"
-    path.write_text(nbformat.writes(notebook))
-    return taken(chapter, notebook_of(path)).steps
+def test_the_time_of_a_notebook_holds_for_all_its_runs(graded):
+    rows = graded("--time-limit", "3", one=solved_by_student(three=SLEEPS))["one"]
+    assert rows["1.3"]["points"] == rows["1.7"]["points"] == "0"
+    assert "the notebook took longer than 3 s" in rows["1.7"]["why"]
 
 
-def test_added_cells_stay_behind_the_cell_that_they_followed(edition):
-    notebook = sample()
-    at = notebook.cells.index(cell_of(notebook, "ex-scale-hint-1"))
+@pytest.fixture
+def submission(edition):
+    """A chapter, and what a student hands in for it."""
+
+    def made(notebook):
+        (chapter,) = chapters(edition)
+        path = edition / "handed-in.ipynb"
+        path.write_text(nbformat.writes(notebook))
+        return chapter, taken(chapter, notebook_of(path))
+
+    return made
+
+
+def test_where_the_chapter_itself_is_stopped_the_last_answer_before_it_is_taken_out(
+    submission, monkeypatch
+):
+    chapter, handed = submission(solved_by_student())
+    codes = []
+
+    def ends_between(chapter, steps, limits, until, *, restored):
+        code = {step.name: step.code for step in steps}
+        codes.append(code)
+        names = list(code)
+        if "2" in code["two-answer"]:  # as if it had left a timer running
+            names = names[: names.index("between-2")]
+        return Sat({n: {"error": None, "right": True, "rebound": []} for n in names}, "it ended")
+
+    monkeypatch.setattr(confined, "run", ends_between)
+    losses = grading.judged(chapter, handed, Limits())
+    assert [name for name in ASKED if losses[name]] == ["two"]
+    assert len(codes) == 2
+    changed = {name for name, code in codes[1].items() if code != codes[0][name]}
+    assert changed == {"two-answer"}
+
+
+def test_an_exercise_that_is_stopped_untouched_is_left_out_altogether(submission, monkeypatch):
+    chapter, handed = submission(solved_by_student())
+
+    def ends_in_its_check(chapter, steps, limits, until, *, restored):
+        names = [step.name for step in steps]
+        if "two-check" in names:
+            names = names[: names.index("two-check")]
+        return Sat({n: {"error": None, "right": True, "rebound": []} for n in names}, "it ended")
+
+    monkeypatch.setattr(confined, "run", ends_in_its_check)
+    losses = grading.judged(chapter, handed, Limits())
+    assert [name for name in ASKED if losses[name]] == ["two"]
+
+
+def test_files_are_written_in_a_folder_that_is_thrown_away(submission, tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    code = "from pathlib import Path\nPath('left.txt').write_text(str(Path.cwd()))"
+    chapter, handed = submission(solved_by_student(one=code))
+    steps = [replace(step, code="1 / 0") if step.group == "two" else step for step in handed.steps]
+    sat = confined.run(chapter, steps, Limits(), time.monotonic() + 60)
+    assert sat.ends["one-answer"]["error"] is None
+    assert sat.ends["two-answer"]["error"][0] == "ZeroDivisionError"
+    assert list(tmp_path.joinpath("here").iterdir()) == []
+    assert not list(edition_files(chapter) - {"of_the_chapter.txt"})
+
+
+def edition_files(chapter) -> set[str]:
+    return {path.name for path in chapter.data.iterdir()}
+
+
+def test_added_cells_stay_behind_the_cell_that_they_followed(submission):
+    notebook = editions.student(small_chapter(), set(), "nmpcrl.whl")
+    at = notebook.cells.index(cell_of(notebook, "two-text"))
     notebook.cells.insert(at + 1, new_code_cell("power = 2", id="own"))
-    every = steps(notebook, edition)
-    (own,) = (k for k, step in enumerate(every) if step.theirs)
-    assert every[own].code == "power = 2"
-    assert (every[own].exercise, every[own + 1].name) == ("mdp-scale", "ex-scale-answer")
+    every = submission(notebook)[1].steps
+    (own,) = (k for k, step in enumerate(every) if step.code == "power = 2")
+    assert (every[own].group, every[own + 1].name) == ("two", "two-answer")
 
 
-def test_an_answer_is_found_by_its_exercise_where_an_editor_has_renamed_the_cells(edition):
-    notebook = sample(HALF)
+def test_an_answer_is_found_by_its_exercise_where_an_editor_has_renamed_the_cells(submission):
+    notebook = solved_by_student(three="root_of_three = 2.0")
     for k, cell in enumerate(notebook.cells):
         cell.id = f"other-{k}"
-    by_exercise = {s.name: s.code for s in steps(notebook, edition)}
-    (code,) = HALF[0].answers
-    assert by_exercise["ex-distance-answer"] == code
+    by_name = {step.name: step.code for step in submission(notebook)[1].steps}
+    assert by_name["three-answer"] == "root_of_three = 2.0"
 
 
 def test_the_edition_for_graders_runs_without_its_solutions(edition):
     (chapter,) = chapters(edition)
     code = "\n".join(cell.source for cell in chapter.notebook.cells)
     assert "SOLUTION" not in code
-    assert HALF[0].answers[0] not in code
+    assert "math.sqrt" not in code
 
 
 @pytest.mark.parametrize("place", ["nothing", "empty"])
@@ -228,69 +230,3 @@ def test_a_folder_that_is_not_what_it_should_be_is_one_sentence(place, tmp_path,
 def test_an_edition_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(CannotGrade, match="make course"):
         chapters(tmp_path)
-
-
-def test_otter_gets_a_question_around_each_exercise_with_a_check():
-    notebook = course.EDITIONS["grader"](SOURCE, set(), "nmpcrl.whl", otter=True)
-    nbformat.validate(notebook)
-    raw = [cell.source for cell in notebook.cells if cell.cell_type == "raw"]
-    words = [source.splitlines()[0].removeprefix("# ") for source in raw[1:]]
-    pairs = ("QUESTION", "SOLUTION", "SOLUTION", "TESTS", "TESTS", "QUESTION")
-    order = [
-        f"{way} {word}"
-        for way, word in zip(("BEGIN", "BEGIN", "END") * 2, pairs, strict=True)
-        if word
-    ]
-    order[3:] = ["BEGIN TESTS", "END TESTS", "END QUESTION"]
-    assert words == order * len(CHECKED)
-    assert f"name: {CHECKED[0].name}\npoints: 1" in raw[1]
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not NBGRADER, reason="NMPCRL_NBGRADER names no Python that has nbgrader")
-def test_nbgrader_gives_the_same_points(tmp_path, edition, graded):
-    place = edition / "source/nmpcrl"
-    (edition / "nbgrader_config.py").write_text(course.autograded.NBGRADER_CONFIG)
-    samples = {"untouched": (), "half": HALF, "perfect": CHECKED}
-    _nbgrader(edition, "generate_assignment", "nmpcrl")
-    released = edition / "release/nmpcrl" / f"{CHAPTER}.ipynb"
-    assert "SOLUTION" not in released.read_text()
-    assert "MARK SCHEME" not in released.read_text()
-    handed = {}
-    for student, answered in samples.items():
-        notebook = nbformat.read(released, 4)
-        for one in answered:
-            for cell, code in _answers(one):
-                cell_of(notebook, cell.id).source = code
-        to = edition / "submitted" / student / "nmpcrl"
-        shutil.copytree(place, to)
-        nbformat.write(notebook, to / f"{CHAPTER}.ipynb")
-        handed[student] = notebook
-    _nbgrader(edition, "autograde", "nmpcrl")
-    _nbgrader(edition, "export", "--to", str(tmp_path / "theirs.csv"))
-    with (tmp_path / "theirs.csv").open(newline="") as file:
-        theirs = {row["student_id"]: float(row["raw_score"]) for row in csv.DictReader(file)}
-    shutil.rmtree(edition / "release")
-    shutil.rmtree(edition / "submitted")
-    shutil.rmtree(edition / "autograded")
-    ours = {name: sum(points(rows).values()) for name, rows in graded(**handed).items()}
-    assert theirs == ours
-
-
-def _nbgrader(folder: Path, *words: str) -> None:
-    """Call nbgrader; its kernel is this Python, which has the library."""
-    kernel = folder / "jupyter/kernels/python3"
-    kernel.mkdir(parents=True, exist_ok=True)
-    argv = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
-    (kernel / "kernel.json").write_text(
-        json.dumps({"argv": argv, "display_name": "Python 3", "language": "python"})
-    )
-    own = {"JUPYTER_PATH": str(folder / "jupyter"), "NMPCRL_STRICT": "1"}
-    done = subprocess.run(
-        [NBGRADER, "-m", "nbgrader", *words],
-        cwd=folder,
-        env=os.environ | own,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr[-3000:]

@@ -1,0 +1,44 @@
+"""Grades of what students hand in."""
+
+import csv
+from pathlib import Path
+
+import editions
+import nbformat
+import pytest
+from click.testing import CliRunner
+from small_course import SMALL, small_chapter
+
+from nmpcrl.commands import main
+
+
+@pytest.fixture
+def edition(tmp_path) -> Path:
+    """The edition for graders of the small chapter."""
+    place = tmp_path / "edition/source/nmpcrl"
+    (place / "data").mkdir(parents=True)
+    (place / "data/of_the_chapter.txt").write_text("4")
+    nbformat.write(editions.grader(small_chapter(), set(), "nmpcrl.whl"), place / f"{SMALL}.ipynb")
+    return tmp_path / "edition"
+
+
+@pytest.fixture
+def graded(tmp_path, edition):
+    """By student, the rows of the CSV file by exercise."""
+
+    def grade(*words, name=SMALL, **handed):
+        for student, notebook in handed.items():
+            place = tmp_path / "in" / student / f"{name}.ipynb"
+            place.parent.mkdir(parents=True)
+            text = notebook if isinstance(notebook, str) else nbformat.writes(notebook)
+            place.write_text(text)
+        out = tmp_path / "grades.csv"
+        given = ["grade", str(tmp_path / "in"), "--out", str(out), "--edition", str(edition)]
+        called = CliRunner().invoke(main, [*given, *words])
+        assert called.exit_code == 0, called.output
+        assert "no sandbox" in called.output
+        with out.open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        return {s: {r["exercise"]: r for r in rows if r["student"] == s} for s in handed}
+
+    return grade

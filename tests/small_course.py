@@ -1,0 +1,64 @@
+"""A chapter that takes no time to run, as a student gets it: exercises that all ask for a root."""
+
+import editions
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+SMALL = "01_small"
+ASKED = ("one", "two", "three", "four", "five", "six", "seven")  # of each the square root of four
+CHECKS = f"""from types import SimpleNamespace
+from nmpcrl.course import number
+check = SimpleNamespace(**{{name: lambda a: number(a, 2) for name in {ASKED}}})"""
+SOLUTION = "<details><summary>Solution</summary>\n\n```python\n{}\n```\n\n</details>"
+
+
+def exercise(number, name):
+    """The cells of an exercise that asks for a root."""
+    about = {"kind": "by hand", "level": 1, "minutes": 1, "points": number, "goal": "a root"}
+    head = f'<a id="ex-{name}"></a>\n**Exercise 1.{number}.** What is the root of `four`?'
+    code = f"import math\nroot_of_{name} = math.sqrt(four)"
+    return [
+        new_markdown_cell(head, id=f"{name}-text", metadata={"nmpcrl": {"exercise": about}}),
+        tagged("answer", new_code_cell(f"root_of_{name} = ...", id=f"{name}-answer")),
+        tagged("check", new_code_cell(f"check.{name}(root_of_{name})", id=f"{name}-check")),
+        tagged("solution", new_markdown_cell(SOLUTION.format(code), id=f"{name}-solution")),
+    ]
+
+
+def tagged(tag, cell):
+    cell.metadata["tags"] = [tag]
+    return cell
+
+
+def project():
+    about = {"kind": "project", "level": 3, "minutes": 9, "points": 6, "goal": "a report"}
+    head = '<a id="ex-open"></a>\n**Exercise 1.8.** Write a report.'
+    return [
+        new_markdown_cell(head, id="open-text", metadata={"nmpcrl": {"exercise": about}}),
+        tagged("rubric", new_markdown_cell("A rubric", id="open-rubric")),
+    ]
+
+
+def small_chapter():
+    """The source: seven exercises, worth one to seven points, and a project."""
+    cells = [
+        new_markdown_cell("# Small", id="title"),
+        new_code_cell("four = 4.0", id="chapter"),
+        new_code_cell(CHECKS, id="exercises-checks"),
+    ]
+    for number, name in enumerate(ASKED, start=1):
+        cells += exercise(number, name)
+        cells.append(new_code_cell("sorted([four])", id=f"between-{number}"))
+    return new_notebook(cells=[*cells, *project()])
+
+
+def solved_by_student(**answers):
+    """The notebook of a student who solves all exercises, but for some other answers."""
+    notebook = editions.student(small_chapter(), set(), "nmpcrl.whl")
+    for name in ASKED:
+        answer = answers.get(name, f"root_of_{name} = 2")
+        cell_of(notebook, f"{name}-answer").source = answer
+    return notebook
+
+
+def cell_of(notebook, name):
+    return next(cell for cell in notebook.cells if cell.id == name)
