@@ -42,7 +42,13 @@ class Sat:
 
 
 def run(
-    chapter: Chapter, steps: list[Step], limits: Limits, until: float, *, restored: bool = False
+    chapter: Chapter,
+    steps: list[Step],
+    limits: Limits,
+    until: float,
+    *,
+    restored: bool = False,
+    kept: Path | None = None,
 ) -> Sat:
     """Execute cells in a fresh process, in a temporary folder with a copy of the chapter's data.
 
@@ -52,6 +58,7 @@ def run(
         limits: of the notebook.
         until: when it has had its time, as `time.monotonic` counts it.
         restored: after each exercise the names of the chapter have their meaning again.
+        kept: a new folder for the data as the cells leave them; nowhere if absent.
     """
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name,
@@ -60,13 +67,15 @@ def run(
         work = Path(name) / "work"
         work.mkdir()
         if chapter.data is not None:
-            shutil.copytree(chapter.data, work / "data")
+            shutil.copytree(chapter.data, work / "data", symlinks=True)
         asked = sorted(chapter.asked)
         plan = {"steps": list(map(asdict, steps)), "asked": asked, "restored": restored}
         (work.parent / "plan.json").write_text(json.dumps(plan))
         seconds = max(1, ceil(until - time.monotonic()))
         words = [work.parent / "plan.json", log.fileno(), limits.megabytes, seconds, limits.cell]
         why = _ended(list(map(str, words)), log.fileno(), work, limits, until)
+        if kept and (work / "data").is_dir():
+            shutil.copytree(work / "data", kept, symlinks=True)
         log.seek(0)
         return Sat({end["name"]: end for end in map(json.loads, log)}, why)
 

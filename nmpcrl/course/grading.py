@@ -3,26 +3,16 @@
 This is no sandbox. A notebook runs with the rights of whoever grades, and can read their files.
 """
 
+import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from nmpcrl.course import confined
-from nmpcrl.course.confined import End, Limits, Sat
-from nmpcrl.course.exercises import Exercise
-from nmpcrl.course.submissions import (
-    CannotGrade,
-    Chapter,
-    Step,
-    Submission,
-    chapters,
-    notebook_of,
-    taken,
-)
-
-BY_HAND = "A project: read it with its rubric."
-SAID = ("Unsolved", "Refusal", "ParameterError")  # errors whose message is a sentence
+from nmpcrl.course.confined import Limits
+from nmpcrl.course.judging import judged
+from nmpcrl.course.submissions import CannotGrade, Chapter, chapters, notebook_of, taken
 
 
 @dataclass(frozen=True)
@@ -52,13 +42,37 @@ def grade(folder: Path, edition: Path, limits: Limits) -> Iterator[Mark]:
     paths = [p for p in sorted(folder.rglob("*.ipynb")) if ".ipynb_checkpoints" not in p.parts]
     if not paths:
         raise CannotGrade(f"{folder} has no notebook")
-    for path in paths:
-        yield from _marks(path, path.relative_to(folder), known, limits)
+    of = {path: next((c for c in known if path.stem.endswith(c.name)), None) for path in paths}
+    with tempfile.TemporaryDirectory() as place:
+        ready = {c: rehearsed(c, limits, Path(place) / c.name) for c in known if c in of.values()}
+        for path, chapter in of.items():
+            yield from _marks(path, path.relative_to(folder), chapter and ready[chapter], limits)
 
 
-def _marks(path: Path, file: Path, known: list[Chapter], limits: Limits) -> Iterator[Mark]:
+def rehearsed(chapter: Chapter, limits: Limits, place: Path) -> Chapter:
+    """The chapter with data that hold what it trains, so that no notebook trains that again.
+
+    Args:
+        chapter: of an edition for graders.
+        limits: as for a notebook that is handed in.
+        place: a new folder for the data.
+
+    Raises:
+        CannotGrade: it fails, or does not reach its end, although nobody has answered anything.
+    """
+    steps = taken(chapter, chapter.notebook).steps
+    until = time.monotonic() + limits.seconds
+    sat = confined.run(chapter, steps, limits, until, kept=place)
+    for step in steps:
+        if step.name not in sat.ends:
+            raise CannotGrade(f"{chapter.name} itself was stopped on this computer: {sat.why}")
+        if (error := sat.ends[step.name]["error"]) and not step.group:
+            raise CannotGrade(f"{chapter.name} itself fails with {error[0]}: {error[1]}")
+    return replace(chapter, data=place if place.is_dir() else None)
+
+
+def _marks(path: Path, file: Path, chapter: Chapter | None, limits: Limits) -> Iterator[Mark]:
     """The marks of one notebook, or why it has none."""
-    chapter = next((one for one in known if file.stem.endswith(one.name)), None)
     if chapter is None:
         why = "The name of the file does not end in that of a chapter."
         yield Mark(_student(file, file.stem), file.as_posix(), "", None, 0, why)
@@ -79,95 +93,3 @@ def _marks(path: Path, file: Path, known: list[Chapter], limits: Limits) -> Iter
 def _student(file: Path, alone: str) -> str:
     """The folder of a student; what is left of the file's name where there is none."""
     return file.parts[0] if len(file.parts) > 1 else alone
-
-
-def judged(chapter: Chapter, submission: Submission, limits: Limits) -> dict[str, str]:
-    """Why the points of an exercise are lost, by its name; empty where they are not.
-
-    Where a student gave a name of the chapter another meaning, it is all executed once more with
-    the old meanings put back after each exercise, and the better of both counts.
-    """
-    until = time.monotonic() + limits.seconds
-    losses, rebound = _losses(chapter, submission, limits, until)
-    if rebound and any(losses[one.name] for one in chapter.exercises if one.parts["check"]):
-        again, _ = _losses(chapter, submission, limits, until, restored=True)
-        losses = {name: why and again[name] and why for name, why in losses.items()}
-    return losses
-
-
-def _losses(
-    chapter: Chapter,
-    submission: Submission,
-    limits: Limits,
-    until: float,
-    *,
-    restored: bool = False,
-) -> tuple[dict[str, str], bool]:
-    """Why points are lost, and whether a student gave a name of the chapter another meaning.
-
-    Where a cell has to be stopped, its exercise is emptied, and the others run again without it.
-    """
-    remarks, steps = dict(submission.remarks), submission.steps
-    ends: dict[str, End] = {}
-    while True:
-        sat = confined.run(chapter, steps, limits, until, restored=restored)
-        ends |= sat.ends
-        group = _guilty(steps, sat, chapter)
-        if group is None or time.monotonic() > until:
-            break
-        remarks[group] = f"The notebook was stopped in this exercise: {sat.why}."
-        steps = _without(steps, group, chapter)
-    losses = {o.name: _loss(o, remarks.get(o.name, ""), ends, sat.why) for o in chapter.exercises}
-    return losses, any(end["rebound"] for end in ends.values())
-
-
-def _guilty(steps: list[Step], sat: Sat, chapter: Chapter) -> str | None:
-    """The group of the cell that did not end, or of the last before it that a student wrote."""
-    at = next((k for k, step in enumerate(steps) if step.name not in sat.ends), None)
-    if at is None:
-        return None
-    written = (s.group for s in reversed(steps[:at]) if s.theirs and not _blank(s, chapter))
-    return steps[at].group or next(written, None)
-
-
-def _blank(step: Step, chapter: Chapter) -> bool:
-    return step.code == chapter.blanks.get(step.name)
-
-
-def _without(steps: list[Step], group: str, chapter: Chapter) -> list[Step]:
-    """The cells with an exercise as if it was untouched; without it where it is."""
-    if all(_blank(step, chapter) for step in steps if step.group == group and step.theirs):
-        return [step for step in steps if step.group != group]
-    blanks = chapter.blanks
-    return [
-        replace(step, code=blanks[step.name]) if step.group == group and step.theirs else step
-        for step in steps
-        if step.group != group or not step.theirs or step.name in blanks
-    ]
-
-
-def _loss(one: Exercise, remark: str, ends: dict[str, End], stopped: str) -> str:
-    """Why an exercise gets no points, if it gets none."""
-    if not one.parts["check"]:
-        return BY_HAND
-    if remark:
-        return remark
-    for cell in one.parts["answer"]:
-        error = ends.get(cell.id, {}).get("error")
-        if error and error[0] not in SAID:
-            return f"The answer fails with {error[0]}: {_line(error[1])}"
-    for cell in one.parts["check"]:
-        end = ends.get(cell.id)
-        if end is None:
-            return f"The notebook was stopped before this exercise: {stopped}."
-        if end["error"]:
-            kind, said = end["error"]
-            return said if kind in SAID else f"The check fails with {kind}: {_line(said)}"
-        if not end["right"]:
-            return "The check gives something else than an outcome."
-    return ""
-
-
-def _line(message: str) -> str:
-    """The first line of a message."""
-    return message.strip().partition("\n")[0] or "no message"

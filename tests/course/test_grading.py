@@ -1,20 +1,17 @@
 """Grading: what students hand in, run as strangers' code that hangs, ends or cheats."""
 
-import time
-from dataclasses import replace
-
 import editions
 import nbformat
 import pytest
 from click.testing import CliRunner
 from nbformat.v4 import new_code_cell
-from small_course import ASKED, cell_of, small_chapter, solved_by_student
+from small_course import ASKED, SMALL, cell_of, small_chapter, solved_by_student
 
 from nmpcrl.commands import main
-from nmpcrl.course import confined, grading
-from nmpcrl.course.confined import Limits, Sat
+from nmpcrl.course.confined import Limits
 from nmpcrl.course.exercises import exercises
-from nmpcrl.course.submissions import CannotGrade, chapters, notebook_of, taken
+from nmpcrl.course.grading import grade, rehearsed
+from nmpcrl.course.submissions import CannotGrade, chapters
 
 POINTS = {f"1.{number}": number for number in range(1, len(ASKED) + 1)}
 SLEEPS = "import time\ntime.sleep(10**6)"
@@ -125,96 +122,6 @@ def test_the_time_of_a_notebook_holds_for_all_its_runs(graded):
     assert "the notebook took longer than 3 s" in rows["1.7"]["why"]
 
 
-@pytest.fixture
-def submission(edition):
-    """A chapter, and what a student hands in for it."""
-
-    def made(notebook):
-        (chapter,) = chapters(edition)
-        path = edition / "handed-in.ipynb"
-        path.write_text(nbformat.writes(notebook))
-        return chapter, taken(chapter, notebook_of(path))
-
-    return made
-
-
-def test_where_the_chapter_itself_is_stopped_the_last_answer_before_it_is_taken_out(
-    submission, monkeypatch
-):
-    chapter, handed = submission(solved_by_student())
-    codes = []
-
-    def ends_between(chapter, steps, limits, until, *, restored):
-        code = {step.name: step.code for step in steps}
-        codes.append(code)
-        names = list(code)
-        if "2" in code["two-answer"]:  # as if it had left a timer running
-            names = names[: names.index("between-2")]
-        return Sat({n: {"error": None, "right": True, "rebound": []} for n in names}, "it ended")
-
-    monkeypatch.setattr(confined, "run", ends_between)
-    losses = grading.judged(chapter, handed, Limits())
-    assert [name for name in ASKED if losses[name]] == ["two"]
-    assert len(codes) == 2
-    changed = {name for name, code in codes[1].items() if code != codes[0][name]}
-    assert changed == {"two-answer"}
-
-
-def test_an_exercise_that_is_stopped_untouched_is_left_out_altogether(submission, monkeypatch):
-    chapter, handed = submission(solved_by_student())
-
-    def ends_in_its_check(chapter, steps, limits, until, *, restored):
-        names = [step.name for step in steps]
-        if "two-check" in names:
-            names = names[: names.index("two-check")]
-        return Sat({n: {"error": None, "right": True, "rebound": []} for n in names}, "it ended")
-
-    monkeypatch.setattr(confined, "run", ends_in_its_check)
-    losses = grading.judged(chapter, handed, Limits())
-    assert [name for name in ASKED if losses[name]] == ["two"]
-
-
-def test_files_are_written_in_a_folder_that_is_thrown_away(submission, tmp_path, monkeypatch):
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir(tmp_path / "here")
-    code = "from pathlib import Path\nPath('left.txt').write_text(str(Path.cwd()))"
-    chapter, handed = submission(solved_by_student(one=code))
-    steps = [replace(step, code="1 / 0") if step.group == "two" else step for step in handed.steps]
-    sat = confined.run(chapter, steps, Limits(), time.monotonic() + 60)
-    assert sat.ends["one-answer"]["error"] is None
-    assert sat.ends["two-answer"]["error"][0] == "ZeroDivisionError"
-    assert list(tmp_path.joinpath("here").iterdir()) == []
-    assert not list(edition_files(chapter) - {"of_the_chapter.txt"})
-
-
-def edition_files(chapter) -> set[str]:
-    return {path.name for path in chapter.data.iterdir()}
-
-
-def test_added_cells_stay_behind_the_cell_that_they_followed(submission):
-    notebook = editions.student(small_chapter(), set(), "nmpcrl.whl")
-    at = notebook.cells.index(cell_of(notebook, "two-text"))
-    notebook.cells.insert(at + 1, new_code_cell("power = 2", id="own"))
-    every = submission(notebook)[1].steps
-    (own,) = (k for k, step in enumerate(every) if step.code == "power = 2")
-    assert (every[own].group, every[own + 1].name) == ("two", "two-answer")
-
-
-def test_an_answer_is_found_by_its_exercise_where_an_editor_has_renamed_the_cells(submission):
-    notebook = solved_by_student(three="root_of_three = 2.0")
-    for k, cell in enumerate(notebook.cells):
-        cell.id = f"other-{k}"
-    by_name = {step.name: step.code for step in submission(notebook)[1].steps}
-    assert by_name["three-answer"] == "root_of_three = 2.0"
-
-
-def test_the_edition_for_graders_runs_without_its_solutions(edition):
-    (chapter,) = chapters(edition)
-    code = "\n".join(cell.source for cell in chapter.notebook.cells)
-    assert "SOLUTION" not in code
-    assert "math.sqrt" not in code
-
-
 @pytest.mark.parametrize("place", ["nothing", "empty"])
 def test_a_folder_that_is_not_what_it_should_be_is_one_sentence(place, tmp_path, edition):
     (tmp_path / "empty").mkdir()
@@ -225,6 +132,25 @@ def test_a_folder_that_is_not_what_it_should_be_is_one_sentence(place, tmp_path,
         assert refused.exit_code
         assert "Traceback" not in refused.output
         assert refused.output.count("Error: ") == 1
+
+
+def test_a_chapter_that_fails_without_any_answer_is_refused_before_one_is_graded(edition, tmp_path):
+    place = edition / f"source/nmpcrl/{SMALL}.ipynb"
+    place.write_text(place.read_text().replace("four = 4.0", "four = 1 / 0"))
+    (tmp_path / "in").mkdir()
+    nbformat.write(solved_by_student(), tmp_path / f"in/{SMALL}.ipynb")
+    with pytest.raises(CannotGrade, match="01_small itself fails with ZeroDivisionError"):
+        list(grade(tmp_path / "in", edition, Limits()))
+
+
+def test_what_a_chapter_trains_is_there_for_every_notebook(edition, tmp_path):
+    place = edition / f"source/nmpcrl/{SMALL}.ipynb"
+    once = "from pathlib import Path\nassert not (new := Path('data/new')).exists()\nnew.touch()"
+    (chapter,) = chapters(edition)
+    cell_of(chapter.notebook, "between-1")["source"] = once
+    ready = rehearsed(chapter, Limits(), tmp_path / "ready")
+    assert {path.name for path in ready.data.iterdir()} == {"new", "of_the_chapter.txt"}
+    assert not (place.parent / "data/new").exists()
 
 
 def test_an_edition_that_is_not_there_is_refused(tmp_path):

@@ -1,0 +1,62 @@
+"""What is lost where a notebook is stopped, and that nothing else is."""
+
+import time
+from dataclasses import replace
+
+from small_course import ASKED, solved_by_student
+
+from nmpcrl.course import confined, judging
+from nmpcrl.course.confined import Limits, Sat
+
+
+def test_where_the_chapter_itself_is_stopped_the_last_answer_before_it_is_taken_out(
+    submission, monkeypatch
+):
+    chapter, handed = submission(solved_by_student())
+    codes = []
+
+    def ends_between(chapter, steps, limits, until, *, restored):
+        code = {step.name: step.code for step in steps}
+        codes.append(code)
+        names = list(code)
+        if "2" in code["two-answer"]:  # as if it had left a timer running
+            names = names[: names.index("between-2")]
+        return Sat({n: {"error": None, "right": True, "rebound": []} for n in names}, "it ended")
+
+    monkeypatch.setattr(confined, "run", ends_between)
+    losses = judging.judged(chapter, handed, Limits())
+    assert [name for name in ASKED if losses[name]] == ["two"]
+    assert len(codes) == 2
+    changed = {name for name, code in codes[1].items() if code != codes[0][name]}
+    assert changed == {"two-answer"}
+
+
+def test_an_exercise_that_is_stopped_untouched_is_left_out_altogether(submission, monkeypatch):
+    chapter, handed = submission(solved_by_student())
+
+    def ends_in_its_check(chapter, steps, limits, until, *, restored):
+        names = [step.name for step in steps]
+        if "two-check" in names:
+            names = names[: names.index("two-check")]
+        return Sat({n: {"error": None, "right": True, "rebound": []} for n in names}, "it ended")
+
+    monkeypatch.setattr(confined, "run", ends_in_its_check)
+    losses = judging.judged(chapter, handed, Limits())
+    assert [name for name in ASKED if losses[name]] == ["two"]
+
+
+def test_files_are_written_in_a_folder_that_is_thrown_away(submission, tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    code = "from pathlib import Path\nPath('left.txt').write_text(str(Path.cwd()))"
+    chapter, handed = submission(solved_by_student(one=code))
+    steps = [replace(step, code="1 / 0") if step.group == "two" else step for step in handed.steps]
+    sat = confined.run(chapter, steps, Limits(), time.monotonic() + 60)
+    assert sat.ends["one-answer"]["error"] is None
+    assert sat.ends["two-answer"]["error"][0] == "ZeroDivisionError"
+    assert list(tmp_path.joinpath("here").iterdir()) == []
+    assert not list(edition_files(chapter) - {"of_the_chapter.txt"})
+
+
+def edition_files(chapter) -> set[str]:
+    return {path.name for path in chapter.data.iterdir()}
