@@ -119,10 +119,14 @@ def called(python: Path, folder: Path, *words: str) -> None:
     argv = [sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}"]
     about = {"argv": argv, "display_name": "Python 3", "language": "python"}
     (kernel / "kernel.json").write_text(json.dumps(about))
+    paths = {
+        "JUPYTER_PATH": str(folder / "jupyter"),
+        "PATH": f"{python.parent}:{os.environ['PATH']}",
+    }
     done = subprocess.run(
         [python, "-m", "nbgrader", *words],
         cwd=folder,
-        env=os.environ | {"JUPYTER_PATH": str(folder / "jupyter")},
+        env=os.environ | paths,  # it calls a command of its own, alembic
         capture_output=True,
         text=True,
     )
