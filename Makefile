@@ -26,7 +26,7 @@ book: .venv/ready  ## Train what is missing, execute every chapter, build _build
 pdf: .venv/ready  ## The built book as one PDF, _build/html/nmpcrl.pdf; needs a Chromium
 	@$(BIN)/python book/pdf.py
 
-course: .venv/ready  ## Notebooks for students and for teachers, and slides, in _build/course
+course: .venv/ready  ## Notebooks for students, teachers and graders, and slides, in _build/course
 	@$(BIN)/python book/course.py
 
 smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/html
@@ -51,7 +51,7 @@ test: .venv/ready  ## All tests but the next two; those of the site need a built
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
 	@$(BIN)/python -m pytest -m lab
 
-test-course: .venv/ready  ## Run every notebook of the course, as students and as teachers get it
+test-course: .venv/ready  ## Run every notebook of the course, as students and as teachers get it, and grade it
 	@$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal -m course
 
 test-fast: .venv/ready  ## The fast tests: no book, no training
