@@ -58,9 +58,9 @@ NO_SANDBOX = (
 def grade(
     folder: Path, out: Path, edition: Path, time_limit: int, cell_limit: int, memory: int
 ) -> None:
-    """Grade every notebook below FOLDER, and write the points to a file.
+    """Grade the notebooks that students hand in.
 
-    FOLDER has a folder for each student, or notebooks such as
+    FOLDER has a folder of notebooks for each student, or notebooks such as
     anna_01_mdp_and_nmpc.ipynb. Each runs in a process and a temporary folder of
     its own. Answers and added cells are the student's; every other cell, so each
     check, is put back from the edition for graders. Where a cell does not end in
