@@ -89,7 +89,7 @@ def grade(
 
     limits = Limits(time_limit, cell_limit, memory)
     rows = []
-    with out.open("w", newline="", encoding="utf-8") as file:
+    with out.open("w", newline="", encoding="utf-8", errors="replace") as file:
         writer = csv.writer(file)
         writer.writerow(FIELDS)
         for notebook, marks in groupby(grading.grade(folder, edition, limits), NOTEBOOK):

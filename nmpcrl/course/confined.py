@@ -12,7 +12,7 @@ import time
 from dataclasses import asdict, dataclass
 from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import psutil
 
@@ -62,7 +62,7 @@ def run(
     """
     with (
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name,
-        tempfile.TemporaryFile("w+") as log,
+        tempfile.TemporaryFile() as log,
     ):
         work = Path(name) / "work"
         work.mkdir()
@@ -76,8 +76,18 @@ def run(
         why = _ended(list(map(str, words)), log.fileno(), work, limits, until)
         if kept and (work / "data").is_dir():
             shutil.copytree(work / "data", kept, symlinks=True)
-        log.seek(0)
-        return Sat({end["name"]: end for end in map(json.loads, log)}, why)
+        return Sat(_ends(log), why)
+
+
+def _ends(log: BinaryIO) -> dict[str, End]:
+    """How the cells ended that did, up to a line that is none of ours."""
+    ends: dict[str, End] = {}
+    log.seek(0)
+    with contextlib.suppress(ValueError, KeyError, TypeError):
+        for line in log:
+            end = json.loads(line)
+            ends[end["name"]] = {key: end[key] for key in ("error", "right", "rebound")}
+    return ends
 
 
 def _ended(words: list[str], log: int, work: Path, limits: Limits, until: float) -> str:

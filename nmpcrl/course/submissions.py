@@ -87,6 +87,8 @@ def notebook_of(path: Path) -> Notebook:
             cell["metadata"] = Fields(cell.get("metadata") or {})
             tags = cell["metadata"].get("tags")
             cell["metadata"]["tags"] = tags if isinstance(tags, list) else []
+            marks = cell["metadata"].get("nbgrader")
+            cell["metadata"]["nbgrader"] = marks if isinstance(marks, dict) else {}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise CannotGrade("The file is no notebook.") from None
     return notebook
@@ -105,7 +107,7 @@ def chapters(edition: Path) -> list[Chapter]:
             cell["source"] = SOLUTION.sub("", cell["source"])
         data = path.parent / "data"
         every = list(exercises(notebook))
-        if any("nbgrader" in c.metadata for one in every for c in one.parts["check"]):
+        if any(c.metadata.nbgrader for one in every for c in one.parts["check"]):
             found.append(Chapter(path.stem, notebook, every, data if data.is_dir() else None))
     if not found:
         raise CannotGrade(f"{edition} has no edition for graders; `make course` writes it")
@@ -171,8 +173,7 @@ def _names(chapter: Chapter, notebook: Notebook) -> list[str]:
         head = HEAD.match(cell.source)
         if head:
             left = list(answers.get(head["name"], []))
-        marks = cell.metadata.get("nbgrader") or {}
-        name = str(marks.get("grade_id") or cell.get("id") or "")
+        name = str(cell.metadata.nbgrader.get("grade_id") or cell.get("id") or "")
         if name not in known and "answer" in cell.metadata["tags"] and left:
             name = left[0]
         left = [one for one in left if one != name]

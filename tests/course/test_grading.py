@@ -1,5 +1,7 @@
 """Grading: what students hand in, run as strangers' code that hangs, ends or cheats."""
 
+import json
+
 import editions
 import nbformat
 import pytest
@@ -15,6 +17,8 @@ from nmpcrl.course.submissions import CannotGrade, chapters
 
 POINTS = {f"1.{number}": number for number in range(1, len(ASKED) + 1)}
 SLEEPS = "import time\ntime.sleep(10**6)"
+LINES = "import os\nfor file in range(3, 20):\n    try:\n        os.write(file, b'{')\n"
+LINES += "    except OSError:\n        pass\nroot_of_six = 2"
 GROWS = "taken = []\nwhile True:\n    taken.append(bytearray(10**8))"
 
 
@@ -109,6 +113,20 @@ def test_cells_that_are_gone_and_files_that_are_no_notebook_are_rows_with_a_sent
     for name in texts:
         assert points(rows[name]) == expected(*POINTS)
         assert rows[name]["1.1"]["why"] == "The file is no notebook."
+
+
+def test_cells_that_no_editor_writes_cost_no_more_than_their_points(graded):
+    notebook = json.loads(nbformat.writes(solved_by_student()))
+    cells = {cell["id"]: cell for cell in notebook["cells"]}
+    cells["one-answer"]["source"] = "root_of_one = '\0'"
+    cells["two-answer"]["source"] = "raise ValueError('\ud800')"
+    cells["three-answer"]["metadata"] = {"nbgrader": 3, "tags": {"answer": 1}}
+    cells["four-answer"]["source"] = ["root_of_four", " = 2"]
+    cells["chapter"] |= {"id": [1], "metadata": None, "cell_type": None}
+    cells["six-answer"]["source"] = LINES
+    rows = graded(one=json.dumps(notebook))["one"]
+    assert points(rows) == expected("1.1", "1.2", "1.6")  # the last writes where it should not
+    assert rows["1.2"]["why"] == "The answer fails with ValueError: ?"
 
 
 def test_a_notebook_whose_name_is_that_of_no_chapter_is_a_row_with_a_sentence(graded):
