@@ -119,7 +119,7 @@ def test_cells_that_no_editor_writes_cost_no_more_than_their_points(graded):
     notebook = json.loads(nbformat.writes(solved_by_student()))
     cells = {cell["id"]: cell for cell in notebook["cells"]}
     cells["one-answer"]["source"] = "root_of_one = '\0'"
-    cells["two-answer"]["source"] = "raise ValueError('\ud800')"
+    cells["two-answer"]["source"] = "raise ValueError(chr(0xD800))"
     cells["three-answer"]["metadata"] = {"nbgrader": 3, "tags": {"answer": 1}}
     cells["four-answer"]["source"] = ["root_of_four", " = 2"]
     cells["chapter"] |= {"id": [1], "metadata": None, "cell_type": None}
