@@ -59,6 +59,7 @@ def settings(experiment: Experiment, learner: str, nmpc: Nmpc) -> dict[str, Any]
     return {
         "learner": learner,
         "beta": own.beta,
+        "zeta": own.zeta,
         "decayRate": own.decay_rate,
         "episodes": own.episodes,
         "steps": own.steps,
