@@ -12,8 +12,8 @@ from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.setup import controller_of
 
 SETTINGS = (
-    "learner", "alpha", "beta", "beta_tdc", "decay", "decay_rate", "horizon", "seed", "episodes",
-    "start", "target", "theta",
+    "learner", "alpha", "beta", "beta_tdc", "zeta", "decay", "decay_rate", "horizon", "seed",
+    "episodes", "start", "target", "theta",
 )  # fmt: skip
 BESIDE = 1e-5  # of theta_c, to either side of a kink
 ASIDE = 0.01  # of a start, to either side of a tie [m]

@@ -1,4 +1,4 @@
-"""The network that a page fits: torch's first weights, numpy's draws, and runs as Python trains them."""
+"""The network that a page fits: torch's first weights, numpy's draws, and the runs of Python."""
 
 from base64 import b64encode
 
@@ -18,13 +18,15 @@ BATCH, HIDDEN = 128, 64
 SIZES = (BATCH, BATCH + 1, 1000, 7800, 39_000)  # of buffers
 SEEDS = (0, 1, 2, 7, 2**31 - 1)
 DRAWN = """([seeds, sizes, inputs, batch]) => seeds.map(seed => {
-  const { generator, firstWeights } = window.nmpcrl, drawn = generator(seed), first = drawn.integer63()
+  const { generator, firstWeights } = window.nmpcrl
+  const drawn = generator(seed), first = drawn.integer63()
   const weights = inputs.map(count => Array.from(firstWeights([count, 64, 64, 1], first)))
   return { weights, chosen: sizes.map(size => drawn.choice(size, batch)) }
 })"""
 TRAINED = """async ({ module, problem, settings, widths }) => {
   const { solver, normal, train } = window.nmpcrl, nmpc = await solver(module, problem)
-  const noise = normal(settings.seed, settings.episodes * settings.steps * problem.lower.length, widths)
+  const count = settings.episodes * settings.steps * problem.lower.length
+  const noise = normal(settings.seed, count, widths)
   return Array.from(train(nmpc, settings, noise), ({ theta, nextValue }) => ({ theta, nextValue }))
 }"""
 

@@ -57,7 +57,8 @@ def test_whatever_it_allows_an_experiment_takes(data):
 
 def test_a_setting_is_shown_for_the_learners_that_read_it(data):
     read_by = {field["name"]: field["read_by"] for field in data["fields"]}
-    assert read_by["alpha"] == ["ES", "GES", "TDC", "QL"]
+    assert read_by["alpha"] == ["ES", "DES", "RDES", "GES", "TDC", "QL"]
+    assert read_by["zeta"] == ["DES", "RDES"]
     assert (read_by["beta"], read_by["beta_tdc"]) == (["GES"], ["TDC"])
     assert read_by["seed"] == list(training.LEARNERS)
 
