@@ -14,7 +14,7 @@ from nmpcrl.report.finds import Find
 from nmpcrl.report.live import frame, noise, training
 from nmpcrl.study import Experiment, ParameterError, paper
 
-FIND = Find("One", "See.", {}, Experiment(seed=3), Experiment(seed=3))
+FIND = Find("One", "See.", {}, Experiment(seed=3))
 
 
 @pytest.fixture(scope="module")

@@ -84,7 +84,7 @@
     const parts = data.parts.map((name) => shown[name](numbers, data));
     parts.push(shown.charts(figure, data));
     add(figure, "p", { class: "legend" }, [words.legend(each[0]), ...data.charts.map((name) => words.axes[name])].join(" "));
-    if (own.question) shared.write(add(figure, "p", { class: "question" }), own.question);
+    if (own.question) shared.write(add(figure, "p"), own.question);
     const say = shared.results(figure);
 
     const training = slices({
