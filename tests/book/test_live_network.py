@@ -1,5 +1,6 @@
 """The network that a page fits: torch's first weights, numpy's draws, and the runs of Python."""
 
+import gzip
 from base64 import b64encode
 
 import numpy as np
@@ -76,7 +77,7 @@ def test_a_run_is_that_of_the_library(page, robot_module, learner, layout, decay
     found = page.evaluate(
         TRAINED,
         {
-            "module": b64encode(robot_module).decode(),
+            "module": b64encode(gzip.compress(robot_module)).decode(),
             "problem": problem_of(nmpc),
             "settings": two_learners.settings(experiment, learner, nmpc) | given,
             "widths": noise.widths(),
