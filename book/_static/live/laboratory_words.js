@@ -26,7 +26,7 @@
       decay: "Decay per", decay_rate: "Decay factor c", horizon: "Horizon N", seed: "Seed", episodes: "Episodes",
     },
     learners: {
-      ES: "ES: Expected Sarsa", DES: "DES: with a network of (s, a)", RDES: "RDES: with a network of (s, a, θ)",
+      ES: "ES: Expected Sarsa", DES: "DES: network of (s, a)", RDES: "RDES: network of (s, a, θ)",
       GES: "GES: gradient Expected Sarsa", TDC: "TDC: exact gradient TD", QL: "QL: Q-learning", frozen: "frozen: θ never moves",
     },
     refused: (name, { least, most, whole }) => (
