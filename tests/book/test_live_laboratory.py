@@ -319,6 +319,16 @@ def test_a_find_opens_with_a_click(tab):
     assert tab.shown()["given"]["layout"] == [list(one) for one in paper.LAYOUTS["A"]]
 
 
+def test_a_find_about_a_network_fails_here_as_in_python(tab):
+    tab.click("RDES fails, DES does not")
+    tab.click("Train")
+    (found,) = trained(tab)
+    expected = run(Experiment(**tab.shown()["given"]))
+    assert found["state"] == "diverged"
+    assert found["rows"][-1]["episode"] == expected.steps["episode"][-1] + 1
+    assert expected.facts["stopped"].startswith("diverged")
+
+
 def test_the_link_is_copied(opened):
     tab = opened(FIGURE, permissions=["clipboard-read", "clipboard-write"]).begun()
     tab.click("Copy code")

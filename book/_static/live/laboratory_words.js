@@ -99,7 +99,7 @@
       const same = "The command and the code train the same run, with the same numbers";
       if (learner !== "DES" && learner !== "RDES") return `${same}.`;
       return `${same} up to the network’s first fit. A fit is in single precision, and Python adds its numbers in `
-        + "another order: after it the runs part slowly, as on two computers.";
+        + "another order: after it the runs part, as on two computers.";
     },
     commandLabel: "Command of the same run",
     codeLabel: "Library code of the same run",
