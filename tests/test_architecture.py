@@ -28,6 +28,7 @@ HOMES = {  # foreign library -> where alone it may be imported
         "control/solvers/entries.py",
         "control/solvers/hessian.py",
         "control/solvers/kernel.py",
+        "learning/network_rules.py",
         "learning/rules.py",
     ),
     "torch": "learning/network.py",

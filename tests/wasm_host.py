@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import wasmtime
 from numba import carray, cfunc, types
+from numpy.typing import NDArray
 from wasmtime import _bindings as c
 
 from nmpcrl import Vector
@@ -123,6 +124,15 @@ class Module:
     def read(self, address: int, count: int) -> Vector:
         first = address // SIZE
         return self._numbers[first : first + count].copy()
+
+    def put_singles(self, numbers: Any) -> tuple[int, NDArray[np.float32]]:
+        """Reserve room for an array in single precision; its address, and the room itself."""
+        array = np.asarray(numbers, np.float32)
+        address = self("reserve", array.nbytes)
+        first = address // array.itemsize
+        room = self._numbers.view(np.float32)[first : first + array.size].reshape(array.shape)
+        room[...] = array
+        return address, room
 
     @staticmethod
     def _given(store: wasmtime.Store, name: str, kind: wasmtime.FuncType) -> wasmtime.Func:

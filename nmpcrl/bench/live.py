@@ -31,6 +31,8 @@ WHOLE = re.compile(rf"{FIGURE}.*?</figure>", re.DOTALL)
 TURNS = 20  # closed loops here and in the page, in turn
 LEARNERS = ("ES", "GES")  # whose whole runs are timed
 MOVES, RADIUS = 150, 25  # of the pointer while it drags [pixels]
+EXAMPLES = 1000  # that the network remembers
+FITS = 20  # that are timed together: a page's clock is coarse
 WAIT = 30_000  # for a figure [ms]
 
 # Notes when the first figure has drawn something, and how long every frame takes that draws anew.
@@ -78,6 +80,21 @@ TRAIN = f"""([learner, episodes]) => new Promise((done, failed) => {{
   window.nmpcrl.trainer({{ module, problem, settings, widths }}, {{ row() {{}}, end }})
 }})"""
 
+FIT = f"""async ([turns, fits]) => {{
+  const {{ solver, module, network, generator }} = window.nmpcrl, {{ problem, theta }} = {DATA}
+  const {{ wasm }} = await solver(module, problem)
+  const inputs = problem.target.length + problem.lower.length + theta.length
+  const one = network(wasm, inputs, generator(0), 0.01)
+  for (let k = 0; k < {EXAMPLES}; k++) {{
+    one.remember(Array.from({{ length: inputs }}, (_, i) => Math.sin(k * (i + 1))), k)
+  }}
+  return Array.from({{ length: turns }}, () => {{
+    const began = performance.now()
+    for (let k = 0; k < fits; k++) one.fit()
+    return (performance.now() - began) / fits
+  }})
+}}"""
+
 
 def measure(site: Path = SITE) -> Live:
     """Measure everything that there is a page for, and store it.
@@ -97,6 +114,7 @@ def measure(site: Path = SITE) -> Live:
             found |= in_turn(browser, chapter) | {"drag": dragged(browser, chapter)}
         laboratory = site / "book" / LABORATORY
         if laboratory in pages:
+            found["fit"] = fitted(browser, laboratory)
             found["runs"] = {one: trained(browser, laboratory, one) for one in LEARNERS}
     place.keep(path(), partial(write_json, content=found))
     return found
@@ -213,6 +231,14 @@ def dragged(browser: Any, page: Path) -> list[float]:
     frames: list[float] = tab.evaluate("window.bench.frames")
     tab.close()
     return frames
+
+
+def fitted(browser: Any, page: Path) -> list[float]:
+    """How long a fit of RDES's network takes in the laboratory [ms], means of `FITS` at a time."""
+    tab = opened(browser, page)
+    times: list[float] = tab.evaluate(FIT, [TURNS + 1, FITS])
+    tab.close()
+    return times[1:]  # the first compile
 
 
 def trained(browser: Any, page: Path, learner: str) -> dict[str, float]:

@@ -10,6 +10,7 @@ from nmpcrl.study import paper
 
 SOLVE = 1.5  # times as long in Chromium as in machine code
 DRAG = (16.0, 33.0)  # [ms] median and 95th percentile of a frame
+FIT = 1.0  # [ms] of the network
 RUN = 1.6  # times as long in a page as here
 WEIGHT = 200.0  # [kB] of a chapter
 FIRST = 300.0  # [ms]
@@ -20,6 +21,7 @@ def live_targets(found: Live) -> list[Target]:
     return [
         _solve(found),
         _drag(found),
+        _fit(found),
         *_runs(found),
         _weight(found),
         *_quiet(found),
@@ -51,6 +53,14 @@ def _drag(found: Live) -> Target:
     return Target(
         what, to_reach, f"{middle:.0f} ms, {high:.0f} ms", bool(middle <= median and high <= p95)
     )
+
+
+def _fit(found: Live) -> Target:
+    what, to_reach = "a fit of the network in a page", f"at most {FIT:.0f} ms"
+    if not found.get("fit"):
+        return _missing(what, to_reach)
+    took = float(np.median(found["fit"]))
+    return Target(what, to_reach, f"{took:.2f} ms", took <= FIT)
 
 
 def _runs(found: Live) -> Iterator[Target]:

@@ -5,13 +5,15 @@ from importlib.resources import files
 from nmpcrl.control import Plant, Task, browser
 from nmpcrl.control.codegen.browser import from_texts
 
+OWN = ("updates", "rules", "network_rules")
+
 
 def module(plant: Plant, task: Task) -> bytes:
-    """`control.browser.module` with the update rules, which `rules` describes.
+    """`control.browser.module` with what `rules` and `network_rules` describe.
 
     Raises:
         CannotCompile, RuntimeError, CannotLink: as there.
     """
     here = files(__package__)
-    own = {name: here.joinpath(f"{name}.py").read_text("utf-8") for name in ("updates", "rules")}
+    own = {name: here.joinpath(f"{name}.py").read_text("utf-8") for name in OWN}
     return from_texts(browser.texts(plant, task) | own)

@@ -12,8 +12,8 @@ from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.setup import controller_of
 
 SETTINGS = (
-    "learner", "alpha", "beta", "beta_tdc", "decay", "decay_rate", "horizon", "seed", "episodes",
-    "start", "target", "theta",
+    "learner", "alpha", "beta", "beta_tdc", "zeta", "decay", "decay_rate", "horizon", "seed",
+    "episodes", "start", "target", "theta",
 )  # fmt: skip
 BESIDE = 1e-5  # of theta_c, to either side of a kink
 ASIDE = 0.01  # of a start, to either side of a tie [m]
@@ -26,32 +26,20 @@ class Find:
     title: str
     sentence: str  # what to see
     numbers: dict[str, float]  # of the sentence, not rounded
-    experiment: Experiment  # the run
-    shown: Experiment  # the run that a page trains: the same, or one that stands in for it
-
-    @property
-    def replayed(self) -> bool:
-        """Whether a page cannot train the run, and shows what one of its thetas does."""
-        return self.shown != self.experiment
+    experiment: Experiment  # the run, which a page trains
 
     @property
     def settings(self) -> dict[str, Any]:
         """`SETTINGS` and the centres of the layout as a page opens them, in the types of JSON."""
-        values = {name: getattr(self.shown, name) for name in SETTINGS}
+        values = {name: getattr(self.experiment, name) for name in SETTINGS}
         plain = {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
-        return plain | {"layout": [list(one) for one in paper.centres_of(self.shown.layout)]}
+        return plain | {"layout": [list(one) for one in paper.centres_of(self.experiment.layout)]}
 
 
-def find(
-    title: str,
-    sentence: str,
-    numbers: dict[str, float],
-    experiment: Experiment,
-    shown: Experiment | None = None,
-) -> Find:
+def find(title: str, sentence: str, numbers: dict[str, float], experiment: Experiment) -> Find:
     """A find whose `sentence` is filled with the `numbers` and the `learner`."""
     said = sentence.format(learner=experiment.learner, **numbers)
-    return Find(title, said, numbers, experiment, shown or experiment)
+    return Find(title, said, numbers, experiment)
 
 
 def kink() -> Find:

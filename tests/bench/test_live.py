@@ -13,6 +13,7 @@ MET = {
     "page": [40.0, 42.0, 90.0],
     "native": [35.0, 35.0, 80.0],
     "drag": [10.0] * 19 + [30.0],
+    "fit": [0.4, 0.5, 3.0],
     "runs": {"ES": {"page": 3.0, "native": 2.0}, "GES": {"page": 3.0, "native": 2.0}},
     "weights": {"01.html": 150_000, live.LABORATORY: 900_000},
     "requests": {"01.html": 0},
@@ -22,6 +23,7 @@ MET = {
 MISSED = {
     "native": [20.0, 20.0, 20.0],
     "drag": [10.0] * 10 + [50.0] * 10,
+    "fit": [0.9, 1.1, 1.2],
     "runs": {"ES": {"page": 4.0, "native": 2.0}, "GES": {"page": 4.0, "native": 2.0}},
     "weights": {"01.html": 250_000},
     "requests": {"01.html": 1},
@@ -31,7 +33,7 @@ MISSED = {
 PAGE = """<!doctype html><html lang="en"><head><title>A page</title></head><body>
 <script src="_static/live/a.js"></script><script src="_static/live/a.js?v=1"></script>
 <figure class="live" hidden><script type="application/json">{
-"problem": {"discs": [], "target": [0]}, "start": [0], "theta": [1],
+"problem": {"discs": [], "target": [0], "lower": [0]}, "start": [0], "theta": [1],
 "fields": [{"name": "alpha", "default": 1}], "layout": [], "steps": 2,
 "widths": []}</script></figure></body></html>"""
 SCRIPT = """
@@ -43,7 +45,11 @@ const draw = () => { due = false; figure.shown = {} }
 addEventListener("pointermove", () => { if (!due) requestAnimationFrame(draw); due = true })
 draw()
 window.nmpcrl = {
-  module: "", solver: async () => ({ rollout: () => ({ failed: false }) }),
+  module: "", solver: async () => ({ wasm: {}, rollout: () => ({ failed: false }) }),
+  generator: () => 0, network: (_, inputs) => ({
+    remember(row) { if (row.length !== inputs || inputs !== 3) throw new Error("other inputs") },
+    fit: () => 0,
+  }),
   trainer: ({ settings }, { end }) => end(settings.episodes === 300 ? "" : "other episodes"),
 }
 console.error("an error")
@@ -68,15 +74,15 @@ def site(tmp_path):
 def test_targets_are_reached_missed_or_not_measured(found):
     outcomes = [one.outcome for one in live_targets(found)]
     if not found:
-        assert outcomes == ["not measured"] * 8
+        assert outcomes == ["not measured"] * 9
     else:
-        assert outcomes == ["reached" if found is MET else "missed"] * 8
+        assert outcomes == ["reached" if found is MET else "missed"] * 9
 
 
 def test_ratios_are_medians_of_turns_so_that_one_disturbed_turn_changes_nothing():
     solve = live_targets(MET)[0]
     assert solve.measured == "1.14x (42 µs, 35 µs)"
-    weight = live_targets(MET)[4]
+    weight = live_targets(MET)[5]
     assert weight.measured == "150 kB (01.html)"  # the laboratory is no chapter
 
 
@@ -97,7 +103,7 @@ def test_all_is_measured_in_a_real_browser_and_stored(site, browser, tmp_path, m
     assert found == live.stored()
     assert set(found) == {*MET, "date"}
     assert set(found["weights"]) == {"01.html", live.LABORATORY}
-    assert len(found["page"]) == len(found["native"]) == 2
+    assert len(found["page"]) == len(found["native"]) == len(found["fit"]) == 2
     assert min(found["native"]) > 0
     assert len(found["drag"]) > live.MOVES / 4
     assert found["requests"] == {"01.html": 1, live.LABORATORY: 1}

@@ -7,12 +7,13 @@ CHAPTERS = {  # of each live figure
     "gradient": "02_expected_sarsa",
     "kink": "02_expected_sarsa",
     "update": "02_expected_sarsa",
+    "networks": "03_rdes",
     "chain": "04_ges",
     "learners": "04_ges",
     "runs": "05_results",
     "laboratory": "laboratory",
 }
-ALSO = ("03_rdes", "07_beyond")  # have the figure of runs, too
+ALSO = ("07_beyond",)  # has the figure of runs, too
 FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => done(figure.shown))))"""
 MOST = 200_000  # bytes that a chapter's live figures may add

@@ -137,6 +137,14 @@ def test_an_episode_of_es_and_ges_is_that_of_the_library(opened):
         np.testing.assert_allclose(found["theta"], theta, rtol=0, atol=1e-9 * theta.max())
 
 
+def test_a_network_is_fitted_as_in_the_library(opened):
+    reader = opened("networks").click("One episode")
+    shown = reader.click("One episode").shown()
+    for found in shown["found"]:
+        theta = run(Experiment(learner=found["learner"], episodes=2)).steps["theta"][-1]
+        np.testing.assert_allclose(found["theta"], theta, rtol=0, atol=1e-5 * theta.max())
+
+
 def test_it_trains_until_it_is_stopped(opened):
     reader = opened("learners").click("Train")
     reader.wait("figure => figure.querySelector('progress').value >= 1")

@@ -27,7 +27,7 @@ DRAWN = """([seed, count]) => {
   return Array.from(window.nmpcrl.normal(seed, count, widths))
 }"""
 DAMAGED = (
-    "learner=DES", "alpha=", "alpha=0", "alpha=%", "seed=1.5", "horizon=41", "colour=red",
+    "learner=random", "alpha=", "alpha=0", "alpha=%", "seed=1.5", "horizon=41", "colour=red",
     "theta=1,2", "layout=1,2;3", "layout=1,2,3", "layout=" + ";".join(["0,0"] * 9), "start=0,0",
     "target=8.5,20,0",
 )  # fmt: skip
@@ -125,6 +125,27 @@ def test_twenty_episodes_of_each_learner_are_those_of_python(tab):
         assert_equal_to_python(found, one, 1e-9 if one.learner in ("ES", "GES") else 1e-8)
         text = tab.figure.get_by_role("listitem").nth(found["number"] - 1).inner_text()
         assert f"noise-free cost {run(one).facts['final_cost']:.1f}" in text
+
+
+def test_a_network_is_fitted_as_in_python(tab):
+    """To single precision, in which nothing has grown yet after five episodes."""
+    fill(tab, Episodes=5)
+    experiments = [
+        Experiment(learner="DES", seed=2, episodes=5),
+        Experiment(learner="RDES", decay="episode", zeta=3e-3, episodes=5),
+    ]
+    assert not tab.figure.get_by_label("Learning rate ζ").is_visible()
+    for one in experiments:
+        choose(tab, "Learner", one.learner)
+        choose(tab, "Decay per", one.decay)
+        fill(tab, Seed=one.seed, Learning_rate_ζ=one.zeta)
+        tab.click("Train")
+        assert_command(tab, one)
+    for found, one in zip(trained(tab), experiments, strict=True):
+        assert_equal_to_python(found, one, 1e-5)
+    assert "up to the network’s first fit" in tab.figure.inner_text()
+    choose(tab, "Learner", "ES")
+    assert "first fit" not in tab.figure.inner_text()
 
 
 def test_a_layout_that_is_drawn_is_the_same_run_in_python(tab):
@@ -296,6 +317,16 @@ def test_a_find_opens_with_a_click(tab):
         assert_command(tab, Experiment(**find["settings"]))
         tab.click("Reset")
     assert tab.shown()["given"]["layout"] == [list(one) for one in paper.LAYOUTS["A"]]
+
+
+def test_a_find_about_a_network_fails_here_as_in_python(tab):
+    tab.click("RDES fails, DES does not")
+    tab.click("Train")
+    (found,) = trained(tab)
+    expected = run(Experiment(**tab.shown()["given"]))
+    assert found["state"] == "diverged"
+    assert found["rows"][-1]["episode"] == expected.steps["episode"][-1] + 1
+    assert expected.facts["stopped"].startswith("diverged")
 
 
 def test_the_link_is_copied(opened):

@@ -14,7 +14,7 @@ from nmpcrl.report.finds import Find
 from nmpcrl.report.live import frame, noise, training
 from nmpcrl.study import Experiment, ParameterError, paper
 
-FIND = Find("One", "See.", {}, Experiment(seed=3), Experiment(seed=3))
+FIND = Find("One", "See.", {}, Experiment(seed=3))
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,8 @@ def test_whatever_it_allows_an_experiment_takes(data):
 
 def test_a_setting_is_shown_for_the_learners_that_read_it(data):
     read_by = {field["name"]: field["read_by"] for field in data["fields"]}
-    assert read_by["alpha"] == ["ES", "GES", "TDC", "QL"]
+    assert read_by["alpha"] == ["ES", "DES", "RDES", "GES", "TDC", "QL"]
+    assert read_by["zeta"] == ["DES", "RDES"]
     assert (read_by["beta"], read_by["beta_tdc"]) == (["GES"], ["TDC"])
     assert read_by["seed"] == list(training.LEARNERS)
 
@@ -65,7 +66,7 @@ def test_a_setting_is_shown_for_the_learners_that_read_it(data):
 def test_learners_have_their_colours(data):
     assert set(data["looks"]) == set(training.LEARNERS)
     for learner, (colour, dashes) in data["looks"].items():
-        assert colour == LOOKS[learner].color
+        assert colour in (LOOKS[learner].color, "var(--ink)")
         assert bool(dashes) == (LOOKS[learner].linestyle != "-")
 
 

@@ -1,7 +1,8 @@
-"""What chapter 4's live figures are given: the chain and the experiment that Python has."""
+"""What the live figures of learners are given: the chain and the experiment that Python has."""
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ EXPERIMENT = Experiment(layout="C", alpha=3e-8, decay="episode", seed=4, episode
 FIGURES = {
     "chain": (lambda: live.chain(0.1, 0.4, 0.97), two_states.SCRIPTS),
     "learners": (lambda: live.learners(EXPERIMENT), two_learners.SCRIPTS),
+    "networks": (lambda: live.networks(EXPERIMENT), two_learners.WITH_NETWORK),
 }
 
 
@@ -69,8 +71,9 @@ def test_each_slider_of_the_chain_has_a_step_at_its_first_value():
         assert steps == pytest.approx(round(steps), abs=1e-9)
 
 
-def test_both_learners_begin_as_the_experiment_does():
-    data = data_of("learners")
+@pytest.mark.parametrize("figure", ["learners", "networks"])
+def test_both_learners_begin_as_the_experiment_does(figure):
+    data = data_of(figure)
     assert data["given"] == {"alpha": 3e-8, "decay": "episode", "seed": 4}
     nmpc = paper.nmpc("C", horizon=7)
     _, weights, explore = prepare(EXPERIMENT, Persistent(nmpc))
@@ -82,6 +85,22 @@ def test_both_learners_begin_as_the_experiment_does():
         assert settings["discs"] == np.column_stack(nmpc.task.discs).tolist()
         assert settings["horizon"] == 7
         assert settings["beta"] == paper.BETA
+        assert settings["zeta"] == paper.ZETA
+
+
+def test_networks_are_fitted_for_sixty_episodes_at_most(monkeypatch):
+    for asked, shown in ((300, 60), (12, 12)):
+        monkeypatch.setitem(globals(), "EXPERIMENT", replace(EXPERIMENT, episodes=asked))
+        settings = data_of("networks")["settings"]
+        assert list(settings) == ["DES", "RDES"]
+        assert {one["episodes"] for one in settings.values()} == {shown}
+
+
+@pytest.mark.parametrize("changes", [{"network": "tanh"}, {"gated": False}])
+def test_a_network_that_a_page_does_not_have_is_refused(changes):
+    ((name, value),) = changes.items()
+    with pytest.raises(ValueError, match=re.escape(f"{name} = {value!r}")):
+        live.networks(replace(EXPERIMENT, learner="RDES", **changes))
 
 
 @pytest.mark.parametrize("alpha", [1e-7, 3e-9, 2.5e-6])

@@ -90,10 +90,11 @@
     const address = copied(link, { name: words.copyLink, label: words.link, rows: 2, tell });
     const python = add(parent, "div", { class: "along" });
     add(python, "p", { class: "plot-title" }, words.python);
-    add(python, "p", { class: "hint" }, words.pythonHint);
+    const same = add(python, "p", { class: "hint" });
     const command = copied(python, { name: words.copyCommand, label: words.commandLabel, tell });
     const code = copied(python, { name: words.copyCode, label: words.codeLabel, tell });
     return (given) => {
+      same.textContent = words.pythonHint(given);
       address(`${location.href.split("#")[0]}#${settings.written(given, data)}`);
       command(settings.command(given, data));
       code(settings.code(given, data).trimEnd());

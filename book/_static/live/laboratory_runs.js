@@ -10,6 +10,7 @@
   function learned(given, data) {
     return {
       learner: given.learner, alpha: given.alpha, beta: given.learner === "TDC" ? given.beta_tdc : given.beta,
+      zeta: given.zeta,
       decay: given.decay, decayRate: given.decay_rate, episodes: given.episodes, seed: given.seed,
       steps: data.steps, theta: given.theta, w: data.w, thetaSet: data.theta_set, evaluateEvery: data.evaluate_every,
       start: given.start, target: given.target, horizon: given.horizon,
@@ -48,7 +49,7 @@
     }
 
     function arm(run, settings) {
-      const same = JSON.stringify({ ...settings, learner: ARM, alpha: 0, beta: 0 });
+      const same = JSON.stringify({ ...settings, learner: ARM, alpha: 0, beta: 0, zeta: 0 });
       if (run.given.learner === ARM) arms.set(same, run.rows);
       run.arm = arms.get(same) ?? [];
       if (arms.has(same)) return next();

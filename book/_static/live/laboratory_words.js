@@ -22,12 +22,12 @@
     reset: "Reset",
     gallery: "Six finds, to open with a click:",
     names: {
-      learner: "Learner", alpha: "Step size α", beta: "Step size β", beta_tdc: "Step size β", decay: "Decay per",
-      decay_rate: "Decay factor c", horizon: "Horizon N", seed: "Seed", episodes: "Episodes",
+      learner: "Learner", alpha: "Step size α", beta: "Step size β", beta_tdc: "Step size β", zeta: "Learning rate ζ",
+      decay: "Decay per", decay_rate: "Decay factor c", horizon: "Horizon N", seed: "Seed", episodes: "Episodes",
     },
     learners: {
-      ES: "ES: Expected Sarsa", GES: "GES: gradient Expected Sarsa", TDC: "TDC: exact gradient TD",
-      QL: "QL: Q-learning", frozen: "frozen: θ never moves",
+      ES: "ES: Expected Sarsa", DES: "DES: network of (s, a)", RDES: "RDES: network of (s, a, θ)",
+      GES: "GES: gradient Expected Sarsa", TDC: "TDC: exact gradient TD", QL: "QL: Q-learning", frozen: "frozen: θ never moves",
     },
     refused: (name, { least, most, whole }) => (
       `${words.laboratory.names[name]}: a ${whole ? "whole " : ""}number `
@@ -41,11 +41,14 @@
     arm: (name) => `frozen arm of ${name}`,
     waiting: (count) => (count ? `; ${plural(count, "run")} waiting` : ""),
     run: (number, { learner, seed }, others) => [`${number}: ${learner}, seed ${seed}`, ...others].join(", "),
-    other: { alpha: "α", beta: "β", beta_tdc: "β", decay: "decay per", decay_rate: "c", horizon: "N", episodes: "episodes" },
+    other: {
+      alpha: "α", beta: "β", beta_tdc: "β", zeta: "ζ", decay: "decay per", decay_rate: "c", horizon: "N",
+      episodes: "episodes",
+    },
     layout: (letter) => `layout ${letter}`,
     elsewhere: "own places",
     runs: "Runs",
-    none: "No run yet. A run of 300 episodes takes a few seconds.",
+    none: "No run yet. A run of 300 episodes takes a few seconds, one that fits a network half a minute or more.",
     removeRun: (name) => `Remove ${name}`,
     removeShort: "Remove",
     ends: {
@@ -92,7 +95,12 @@
     copied: "Copied.",
     notCopied: "This browser does not copy; the text is selected.",
     python: "Continue in Python",
-    pythonHint: "The command and the code train the same run, with the same numbers.",
+    pythonHint: ({ learner }) => {
+      const same = "The command and the code train the same run, with the same numbers";
+      if (learner !== "DES" && learner !== "RDES") return `${same}.`;
+      return `${same} up to the network’s first fit. A fit is in single precision, and Python adds its numbers in `
+        + "another order: after it the runs part, as on two computers.";
+    },
     commandLabel: "Command of the same run",
     codeLabel: "Library code of the same run",
     copyCommand: "Copy command",

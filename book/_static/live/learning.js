@@ -1,14 +1,36 @@
 // Algorithm 1 in this page, as nmpcrl/learning/training.py has it, on the compiled solver and update rules.
 //
-// `settings`: { learner, alpha, beta, decay, decayRate, episodes, steps, theta, w, thetaSet, evaluateEvery,
-// start, target, discs, horizon }; `noise` holds epsilon, shape (episodes, steps, m).
+// `settings`: { learner, alpha, beta, zeta, decay, decayRate, seed, episodes, steps, theta, w, thetaSet,
+// evaluateEvery, start, target, discs, horizon }; `noise` holds epsilon, shape (episodes, steps, m).
 (function learning() {
   "use strict";
 
   const ABSURD = 1e6; // no theta or w beyond this
   const PATIENCE = 10; // so many episodes in a row that a failed solve ended are a divergence
 
-  // ---- The learners: a rule takes { theta, w }, delta, the solution in s and that in s+
+  // ---- Where the value of the next state comes from: { value, features, warm }, of which `warm` is what the next
+  // solve starts from, and `value` null if there is nothing to go by yet; null where a solve failed
+
+  const secondSolve = (nmpc) => ({ here, solution, next }) => {
+    const solved = nmpc.solve({ ...here, state: next }, { warm: solution });
+    return solved && { value: solved.value, features: solved.features, warm: solved };
+  };
+
+  // A network imitates the NMPC's value: remember, fit, predict.
+  const imitation = (withTheta) => ({ problem, wasm }, { seed, zeta }) => {
+    const { network, generator } = self.nmpcrl;
+    const inputs = problem.target.length + problem.lower.length + (withTheta ? problem.theta : 0);
+    const imitator = network(wasm, inputs, generator(seed), zeta);
+    const input = (state, action, theta) => [...state, ...action, ...(withTheta ? theta : [])];
+    return ({ here: { state, theta }, action, solution, next }) => {
+      imitator.remember(input(state, action, theta), solution.value);
+      if (!imitator.ready()) return { value: null, warm: solution };
+      imitator.fit();
+      return { value: imitator.predict(input(next, solution.nextAction, theta)), warm: solution };
+    };
+  };
+
+  // ---- The learners: a rule takes { theta, w }, delta, the solution in s and what is known of s+
 
   const semiGradient = ({ rules }, { alpha }) => ({ theta, w }, delta, { features }) => ({
     theta: rules.semiGradient(theta, delta, features, alpha), w,
@@ -34,6 +56,8 @@
 
   const LEARNERS = {
     ES: { rule: semiGradient },
+    DES: { rule: semiGradient, bootstrap: imitation(false) },
+    RDES: { rule: semiGradient, bootstrap: imitation(true) },
     GES: { rule: gradientTd },
     TDC: { rule: exactGradientTd },
     QL: { rule: semiGradient, constrained: true },
@@ -59,15 +83,22 @@
   const small = (vector) => vector.reduce((sum, each) => sum + Math.abs(each), 0) <= ABSURD;
   const absurd = ({ theta, w }) => !(small(theta) && small(w));
 
+  function learnerOf(nmpc, settings) {
+    const { rule, bootstrap = secondSolve, constrained = false } = LEARNERS[settings.learner];
+    return { move: rule?.(nmpc, settings), valued: bootstrap(nmpc, settings), constrained };
+  }
+
   // The steps of one episode; the last one says so if a solve failed.
-  function* steps(nmpc, settings, explore, episode, weights) {
-    const { rule, constrained = false } = LEARNERS[settings.learner], gamma = nmpc.problem.discount[1];
-    const move = rule?.(nmpc, settings);
+  function* steps(nmpc, settings, { move, valued, constrained }, explore, episode, weights) {
+    const gamma = nmpc.problem.discount[1];
     const given = { discs: settings.discs, target: settings.target, horizon: settings.horizon };
     let state = settings.start, warm = null;
     for (let time = 0; time < settings.steps; time++) {
       const here = { ...given, state, theta: weights.theta };
-      const step = { episode, time, state, ...weights, action: null, cost: NaN, value: NaN, delta: NaN, phi2: NaN };
+      const step = {
+        episode, time, state, ...weights,
+        action: null, cost: NaN, value: NaN, features: null, nextValue: NaN, delta: NaN, phi2: NaN,
+      };
       const plan = nmpc.solve(here, { warm });
       if (!plan) return yield { ...step, failed: true };
       step.action = explore(plan.action, episode, time);
@@ -76,29 +107,33 @@
       const solution = constrained ? nmpc.solve(here, { warm: plan, action: step.action }) : plan;
       if (!solution) return yield { ...step, failed: true };
       step.value = solution.value;
+      step.features = solution.features;
       step.phi2 = squared(solution.features);
       warm = solution;
       if (move) {
-        const successor = nmpc.solve({ ...here, state }, { warm: solution });
+        const successor = valued({ here, action: step.action, solution, next: state });
         if (!successor) return yield { ...step, failed: true };
-        step.delta = nmpc.rules.tdError(step.cost, gamma, solution.value, successor.value);
-        const moved = move(weights, step.delta, solution, successor, here);
-        if (!moved) return yield { ...step, failed: true };
-        weights = moved;
-        warm = successor;
+        ({ warm } = successor);
+        if (successor.value !== null) {
+          step.nextValue = successor.value;
+          step.delta = nmpc.rules.tdError(step.cost, gamma, solution.value, successor.value);
+          const moved = move(weights, step.delta, solution, successor, here);
+          if (!moved) return yield { ...step, failed: true };
+          weights = moved;
+        }
       }
       yield { ...step, ...weights, failed: false };
     }
   }
 
-  // Algorithm 1, step by step: { episode, time, state, action, cost, value, delta, phi2, theta, w, failed,
-  // diverged }, theta and w after the step. What is diverged is the last.
+  // Algorithm 1, step by step: { episode, time, state, action, cost, value, features, nextValue, delta, phi2, theta,
+  // w, failed, diverged }, theta and w after the step. What is diverged is the last.
   function* train(nmpc, settings, noise) {
-    const explore = explorer(nmpc, settings, noise);
+    const explore = explorer(nmpc, settings, noise), learner = learnerOf(nmpc, settings);
     let weights = { theta: settings.theta, w: settings.w }, failures = 0;
     for (let episode = 0; episode < settings.episodes; episode++) {
       let failed = false;
-      for (const step of steps(nmpc, settings, explore, episode, weights)) {
+      for (const step of steps(nmpc, settings, learner, explore, episode, weights)) {
         ({ failed } = step);
         weights = { theta: step.theta, w: step.w };
         const diverged = absurd(weights) || (failed && failures + 1 === PATIENCE);

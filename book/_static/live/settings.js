@@ -1,7 +1,7 @@
 // The settings of a run: what each may be, the link that restores them, and the same run in Python.
 //
-// Settings: { learner, alpha, beta, beta_tdc, decay, decay_rate, horizon, seed, episodes, layout, start, target,
-// theta }, under the names of `Experiment`; `layout` holds centres [m], `fields` is report/live/training.py's.
+// Settings: { learner, alpha, beta, beta_tdc, zeta, decay, decay_rate, horizon, seed, episodes, layout, start,
+// target, theta }, under the names of `Experiment`; `layout` holds centres [m], `fields` is report/live/training.py's.
 (() => {
   "use strict";
 

@@ -143,7 +143,7 @@
       return found;
     }
 
-    return { problem, solve, rollout, step, cost, hessianTimes, rules: rules(wasm, room) };
+    return { problem, wasm, solve, rollout, step, cost, hessianTimes, rules: rules(wasm, room) };
   }
 
   // The update rules, as nmpcrl/learning/rules.py describes them: vectors in, vectors out.

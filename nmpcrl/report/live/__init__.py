@@ -9,7 +9,7 @@ from nmpcrl.report.live.closed_loop import controller
 from nmpcrl.report.live.expected_sarsa import gradient, kink, update
 from nmpcrl.report.live.published_runs import runs
 from nmpcrl.report.live.training import laboratory
-from nmpcrl.report.live.two_learners import learners
+from nmpcrl.report.live.two_learners import learners, networks
 from nmpcrl.report.live.two_states import chain
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "kink",
     "laboratory",
     "learners",
+    "networks",
     "runs",
     "update",
 ]

@@ -1,4 +1,4 @@
-"""The live figure of chapters 3, 5 and 7: published runs, episode by episode.
+"""The live figure of chapters 5 and 7: published runs, episode by episode.
 
 A page is given one seed in one layout; `scripts` are the files that it loads for all others. The
 trajectories are in neither: the page solves them again.

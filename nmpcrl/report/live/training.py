@@ -21,13 +21,15 @@ from nmpcrl.study import Experiment, paper
 from nmpcrl.study.records import LAST
 
 SCRIPTS = (
-    *frame.PARTS, "random.js", "learning.js", "trainer.js", "plot.js", "laboratory_words.js",
-    "settings.js", "laboratory_map.js", "laboratory_runs.js", "laboratory.js",
+    *frame.PARTS, "random.js", "network.js", "learning.js", "trainer.js", "plot.js",
+    "laboratory_words.js", "settings.js", "laboratory_map.js", "laboratory_runs.js",
+    "laboratory.js",
 )  # fmt: skip
 STYLES = ("laboratory.css",)
-LEARNERS = ("ES", "GES", "TDC", "QL", "frozen")  # the others need a network
+LEARNERS = ("ES", "DES", "RDES", "GES", "TDC", "QL", "frozen")
 SETTINGS = (
-    "learner", "alpha", "beta", "beta_tdc", "decay", "decay_rate", "horizon", "seed", "episodes",
+    "learner", "alpha", "beta", "beta_tdc", "zeta", "decay", "decay_rate", "horizon", "seed",
+    "episodes",
 )  # fmt: skip
 MOST = {"horizon": LONGEST, "episodes": 3000}  # of a page
 MOST_OBSTACLES = 8

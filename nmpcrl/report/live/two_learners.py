@@ -1,5 +1,6 @@
-"""Chapter 4's live figure of the robot: ES and GES learn from the same noise, step by step."""
+"""Two learners on the robot that learn from the same noise, step by step, in the page."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import log10
 from typing import Any
@@ -19,11 +20,12 @@ from nmpcrl.study.setup import DECAYS, controller_of
 
 SCRIPTS = (
     *frame.PARTS, "charts.js", "random.js", "learning.js", "slices.js", "side_by_side.js",
-    "learners.js",
+    "learners_shown.js", "learners.js",
 )  # fmt: skip
-LEARNERS = ("ES", "GES")
+WITH_NETWORK = ("network.js", *SCRIPTS)
 SEEDS = 20  # offered
 WIDE = 1.0  # of alpha's slider, to either side, in powers of ten
+EPISODES = 60  # at most, of learners that fit a network: seconds in the page
 
 
 def learners(experiment: Experiment) -> HTML:
@@ -32,6 +34,33 @@ def learners(experiment: Experiment) -> HTML:
     Args:
         experiment: what both are given; its learner is not read.
     """
+    shown = {"parts": ["gauges", "weights"], "charts": ["costs", "gauges"]}
+    return _pair("learners", ("ES", "GES"), experiment, shown, SCRIPTS)
+
+
+def networks(experiment: Experiment) -> HTML:
+    """DES and RDES side by side, each with its network, for at most `EPISODES` episodes.
+
+    Args:
+        experiment: as for `learners`; with the plain network, which waits for its first fit.
+    """
+    if experiment.network != "plain" or not experiment.gated:
+        raise ValueError(
+            f"a page has the plain network and its gate, not network = {experiment.network!r} "
+            f"with gated = {experiment.gated}"
+        )
+    short = replace(experiment, episodes=min(experiment.episodes, EPISODES))
+    shown = {"parts": ["weights"], "charts": ["costs", "errors"]}
+    return _pair("networks", ("DES", "RDES"), short, shown, WITH_NETWORK)
+
+
+def _pair(
+    name: str,
+    pair: tuple[str, str],
+    experiment: Experiment,
+    shown: Mapping[str, list[str]],
+    scripts: tuple[str, ...],
+) -> HTML:
     nmpc = controller_of(experiment).nmpc
     try:
         problem, module = problem_of(nmpc), browser.module(nmpc.plant, nmpc.task)
@@ -42,15 +71,16 @@ def learners(experiment: Experiment) -> HTML:
         "decays": list(DECAYS),
         "seeds": [*range(SEEDS)],
         "alphas": around(experiment.alpha),
-        "settings": {learner: settings(experiment, learner, nmpc) for learner in LEARNERS},
+        "settings": {learner: settings(experiment, learner, nmpc) for learner in pair},
         "noise": {"deviation": paper.NOISE, "widths": widths()},
         "overshoot": OVERSHOOT,
         "names": paper.THETA_NAMES,
-        "looks": {name: look(name) for name in (*LEARNERS, "frozen")},
+        "looks": {name: look(name) for name in (*pair, "frozen")},
         "problem": problem,
+        **shown,
         **surroundings(nmpc.task),
     }
-    return frame.figure("learners", data, SCRIPTS, module)
+    return frame.figure(name, data, scripts, module)
 
 
 def settings(experiment: Experiment, learner: str, nmpc: Nmpc) -> dict[str, Any]:
@@ -59,6 +89,7 @@ def settings(experiment: Experiment, learner: str, nmpc: Nmpc) -> dict[str, Any]
     return {
         "learner": learner,
         "beta": own.beta,
+        "zeta": own.zeta,
         "decayRate": own.decay_rate,
         "episodes": own.episodes,
         "steps": own.steps,

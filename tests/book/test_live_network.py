@@ -1,0 +1,92 @@
+"""The network that a page fits: torch's first weights, numpy's draws, and the runs of Python."""
+
+import gzip
+from base64 import b64encode
+
+import numpy as np
+import pytest
+
+from nmpcrl.learning.network import QNetwork
+from nmpcrl.report.live import frame, noise, two_learners
+from nmpcrl.report.live.problem import problem_of
+from nmpcrl.study import Experiment, run
+from nmpcrl.study.setup import controller_of
+
+pytestmark = pytest.mark.book
+
+SCRIPTS = ("solver.js", "random.js", "network.js", "learning.js")
+BATCH, HIDDEN = 128, 64
+SIZES = (BATCH, BATCH + 1, 1000, 7800, 39_000)  # of buffers
+SEEDS = (0, 1, 2, 7, 2**31 - 1)
+DRAWN = """([seeds, sizes, inputs, batch]) => seeds.map(seed => {
+  const { generator, firstWeights } = window.nmpcrl
+  const drawn = generator(seed), first = drawn.integer63()
+  const weights = inputs.map(count => Array.from(firstWeights([count, 64, 64, 1], first)))
+  return { weights, chosen: sizes.map(size => drawn.choice(size, batch)) }
+})"""
+TRAINED = """async ({ module, problem, settings, widths }) => {
+  const { solver, normal, train } = window.nmpcrl, nmpc = await solver(module, problem)
+  const count = settings.episodes * settings.steps * problem.lower.length
+  const noise = normal(settings.seed, count, widths)
+  return Array.from(train(nmpc, settings, noise), ({ theta, nextValue }) => ({ theta, nextValue }))
+}"""
+
+
+@pytest.fixture(scope="module")
+def page(browser):
+    """A page with the scripts that learn, and nothing else."""
+    page = browser.new_page()
+    for name in SCRIPTS:
+        page.add_script_tag(content=(frame.folder() / name).read_text("utf-8"))
+    yield page
+    page.close()
+
+
+def numpys(seed: int) -> np.random.Generator:
+    """The generator of a run's network."""
+    return np.random.default_rng(np.random.SeedSequence(seed).spawn(3)[1])
+
+
+def test_first_weights_are_those_of_torch_in_every_bit(page):
+    inputs = (5, 14)
+    found = page.evaluate(DRAWN, [SEEDS, [], inputs, BATCH])
+    for seed, drawn in zip(SEEDS, found, strict=True):
+        for count, weights in zip(inputs, drawn["weights"], strict=True):
+            expected = QNetwork(count, numpys(seed), hidden=HIDDEN)._weights.numpy()
+            assert (np.array(weights, np.float32) == expected).all()
+
+
+def test_mini_batches_are_those_of_numpy(page):
+    """With small batches, too, from so few examples that most are drawn twice."""
+    for sizes, batch in ((SIZES, BATCH), ((1, 2, 3, 9), 1), ((9, 10, 11), 9)):
+        found = page.evaluate(DRAWN, [SEEDS, sizes, [], batch])
+        for seed, drawn in zip(SEEDS, found, strict=True):
+            rng = numpys(seed)
+            rng.integers(2**63)
+            for size, chosen in zip(sizes, drawn["chosen"], strict=True):
+                assert chosen == rng.choice(size, batch, replace=False).tolist()
+
+
+@pytest.mark.parametrize("learner", ["DES", "RDES"])
+@pytest.mark.parametrize(("layout", "decay", "seed"), [("A", "step", 0), ("C", "episode", 1)])
+def test_a_run_is_that_of_the_library(page, robot_module, learner, layout, decay, seed):
+    """Equal until the first fit, then to single precision; 4e-7 is the farthest seen so early."""
+    experiment = Experiment(learner=learner, layout=layout, decay=decay, seed=seed, episodes=3)
+    nmpc = controller_of(experiment).nmpc
+    given = {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")}
+    found = page.evaluate(
+        TRAINED,
+        {
+            "module": b64encode(gzip.compress(robot_module)).decode(),
+            "problem": problem_of(nmpc),
+            "settings": two_learners.settings(experiment, learner, nmpc) | given,
+            "widths": noise.widths(),
+        },
+    )
+    expected = run(experiment).steps
+    theta = np.array([step["theta"] for step in found])
+    np.testing.assert_array_equal(theta[: BATCH - 1], expected["theta"][: BATCH - 1])
+    values = np.array([step["nextValue"] for step in found])
+    assert np.isnan(values[: BATCH - 1]).all()
+    for these, those in ((theta, expected["theta"]), (values, expected["next_value"])):
+        np.testing.assert_allclose(these, those, rtol=0, atol=1e-5 * np.nanmax(np.abs(those)))
