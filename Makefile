@@ -15,7 +15,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book pdf course smoke chapter lab study bench test test-lab test-course test-fast check locks clean anew
+.PHONY: help book pdf course smoke chapter lab study bench test test-site test-lab test-course test-fast check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -45,14 +45,20 @@ bench: .venv/ready  ## Measure how long solves, steps and runs take, and print w
 	@if [ -d _build/html ]; then $(BIN)/python -m nmpcrl bench --live > /dev/null; fi
 	@$(BIN)/python -m nmpcrl bench
 
-test: .venv/ready  ## All tests but the next two; those of the site need a built book, a Chromium and a Firefox
-	@$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal -m "not lab and not course"
+# On all cores, up to four.
+PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
+
+test: .venv/ready  ## All tests of the library, its commands and the sources of the book
+	@$(PYTEST) -m "not book and not lab and not course"
+
+test-site: .venv/ready  ## The built book in browsers; needs a built book, a Chromium and a Firefox
+	@$(PYTEST) -m "book and not lab and not course"
 
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
 	@$(BIN)/python -m pytest -m lab
 
 test-course: .venv/ready  ## Run every notebook of the course, as students and as teachers get it, and grade it
-	@$(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal -m course
+	@$(PYTEST) -m course
 
 test-fast: .venv/ready  ## The fast tests: no book, no training
 	@$(BIN)/python -m pytest -m "not slow and not book and not slurm and not lab and not course"
