@@ -80,8 +80,8 @@ def opened(site, distributed_firefox):
     """Opens the page of a live figure; at the end it has had no errors and asked nobody."""
     pages = []
 
-    def open_page(figure: str, **size: int) -> Reader:
-        url = (site / f"book/{CHAPTERS[figure]}.html").resolve().as_uri()
+    def open_page(figure: str, fragment: str = "", **size: int) -> Reader:
+        url = (site / f"book/{CHAPTERS[figure]}.html").resolve().as_uri() + fragment
         pages.append(distributed_firefox.page(url, **size))
         return Reader(pages[-1], figure)
 
@@ -143,6 +143,19 @@ def test_a_network_is_fitted_as_in_the_library(opened):
     for found in shown["found"]:
         theta = run(Experiment(learner=found["learner"], episodes=2)).steps["theta"][-1]
         np.testing.assert_allclose(found["theta"], theta, rtol=0, atol=1e-5 * theta.max())
+
+
+def test_a_layout_that_is_drawn_in_the_laboratory_is_trained_there_as_in_the_library(opened):
+    reader = opened("laboratory", "#learner=GES&episodes=3")
+    before = reader.shown()["given"]["layout"]
+    reader.drag("Obstacle 2", (40, -30))
+    reader.click("Train").wait("figure => figure.shown.runs[0]?.state === 'finished'")
+    shown = reader.shown()
+    layout = tuple(map(tuple, shown["given"]["layout"]))
+    assert [k for k in range(4) if list(layout[k]) != before[k]] == [1]
+    steps = run(Experiment("GES", episodes=3, layout=layout)).steps
+    theta = shown["runs"][0]["rows"][-1]["theta"]
+    np.testing.assert_allclose(theta, steps["theta"][-1], rtol=0, atol=1e-9 * np.max(theta))
 
 
 def test_it_trains_until_it_is_stopped(opened):
