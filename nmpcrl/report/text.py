@@ -244,8 +244,8 @@ def open_gaps(depends_on: Mapping[str, tuple[str, ...]]) -> str:
     )
 
 
-def own_claims(verdicts: Iterable[Verdict]) -> str:
-    """One item a claim of our own: what it says, and whether that holds."""
+def outcomes(verdicts: Iterable[Verdict]) -> str:
+    """One item a claim, in Markdown: what it says, and what became of it."""
     return "\n".join(f"- {v.claim}. {v.statement} *{v.words.capitalize()}.*" for v in verdicts)
 
 

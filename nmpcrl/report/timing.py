@@ -85,6 +85,15 @@ def rdes_to_es(bench: Bench, solver: str) -> str:
     return str(ratio) if known else f"{ratio.value:.2f} (too few steps for an interval)"
 
 
+def at_paper_speed(timings: pd.DataFrame) -> str:
+    """What C3's ratio would be with solves as slow as the paper's; `timings` of `time_learners`."""
+    ratio = summary.saving({"learners": timings.to_dict("list")}).ratio(1e3 * summary.PAPER_SOLVE)
+    return (
+        f"With solves as slow as the paper's ({summary.PAPER_SOLVE:.2f} s), a step of RDES would"
+        f" take {ratio:.2f} of the time of a step of ES (C3)."
+    )
+
+
 def reached(targets: Sequence[Target]) -> str:
     """How many targets are reached, missed and not measured, without what there is none of."""
     outcomes = [one.outcome for one in targets]

@@ -17,10 +17,11 @@ ABOUT = {"kind": "by hand", "level": 1, "minutes": 5, "points": 1, "goal": "comp
 RIGHT = {
     "weight": number(2.5, 2.5, unit="kg", mistakes={5.0: "That is </script> twice as much."}),
     "reason": choice("b", "b", {"a": "Not a.", "b": "it is b.", "c": "Not c."}),
+    "many": number(2600, 2600),
     "path": formula("x / 2", lambda x: x / 2, {"x": (1, 2)}, mistakes={"Half.": lambda x: x}),
 }
 SCRIPTS = ("words", "formula", "exercises")
-PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head><title>Exercises</title>
+PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head><meta charset="utf-8"><title>Exercises</title>
 <link rel="stylesheet" href="{static}/nmpcrl.css">
 <link rel="stylesheet" href="{static}/exercises/exercises.css">{scripts}</head>
 <body><main class="bd-article"><h1>Exercises</h1>{places}</main></body></html>"""
@@ -127,25 +128,48 @@ def answered(tab, name: str, answer: str) -> str:
         ("weight", "2.5", "Right: 2.5 kg."),
         ("weight", "2,505", "Right: 2.5 kg."),
         ("weight", "25e-1", "Right: 2.5 kg."),
+        ("weight", "2.5 kg", "Right: 2.5 kg."),
+        ("weight", "25·10⁻¹", "Right: 2.5 kg."),
+        ("weight", "0.25*10^1", "Right: 2.5 kg."),
+        ("weight", "250 %", "Right: 2.5 kg."),
+        ("weight", "2,500", "Right: 2.5 kg."),
+        ("many", "2,600", "Right: 2600."),
         ("weight", "5", "That is </script> twice as much. The next hint is open above."),
         ("weight", "-2.5", "Not right: look at the sign."),
         ("weight", "250", "Not right: it is too large by a power of ten."),
         ("weight", "2", "Not right: it is too small."),
-        ("weight", "much", "That is no number."),
-        ("weight", "", "That is no number."),
         ("path", "0.5*x", "Right."),
         ("path", "x^1/2", "Right."),
         ("path", "x", "Half."),
         ("path", "x+1", "Not right: for x = "),
-        ("path", "y", "y is not among its variables"),
-        ("path", "alert(1)", "alert is not among its variables"),
-        ("path", "(x", 'a ")" is missing'),
     ],
 )
 def test_a_typed_answer_is_judged_as_the_notebook_judges_it(tab, name, answer, what):
     assert answered(tab, name, answer).startswith(what) or what in said(tab, name).inner_text()
     verdict = tab.locator(f'[data-exercise="{name}"]').get_attribute("data-verdict")
     assert verdict == ("right" if what.startswith("Right") else "wrong")
+
+
+@pytest.mark.book
+@pytest.mark.parametrize(
+    ("name", "right", "answer", "what"),
+    [
+        ("weight", "2.5", "much", "That cannot be read as a number."),
+        ("weight", "2.5", "", "That cannot be read as a number."),
+        ("weight", "2.5", "1/0", "That cannot be read as a number."),
+        ("path", "x/2", "y", "y is not among its variables"),
+        ("path", "x/2", "alert(1)", "alert is not among its variables"),
+        ("path", "x/2", "(x", 'a ")" is missing'),
+        ("path", "x/2", "0.5 x", "a product needs its *"),
+    ],
+)
+def test_what_cannot_be_read_costs_nothing(tab, name, right, answer, what):
+    answered(tab, name, right)
+    progress = tab.locator(".exercise-progress").inner_text()
+    assert what in answered(tab, name, answer)
+    assert tab.locator(f'[data-exercise="{name}"]').get_attribute("data-verdict") == ""
+    assert tab.locator(".exercise-progress").inner_text() == progress
+    assert tab.locator("details[open]").count() == 0
 
 
 FORMULAS = (
@@ -204,10 +228,10 @@ def test_answers_and_progress_are_kept_until_they_are_reset(tab):
     assert said(tab, "weight").inner_text() == "Right: 2.5 kg."
     assert said(tab, "path").inner_text() == "Half."
     progress = tab.locator(".exercise-progress")
-    assert progress.inner_text().startswith("1 of 3 exercises")
+    assert progress.inner_text().startswith("1 of 4 exercises")
     tab.locator('[data-exercise="weight"]').get_by_role("button", name="Reset").click()
     assert tab.locator("#answer-weight").input_value() == ""
-    assert progress.inner_text().startswith("0 of 3 exercises")
+    assert progress.inner_text().startswith("0 of 4 exercises")
     tab.get_by_role("button", name="Reset all").click()
     tab.reload()
     assert tab.locator("#answer-path").input_value() == ""
@@ -227,14 +251,14 @@ def test_a_browser_that_keeps_nothing_says_so(tab):
     tab.add_init_script("Storage.prototype.setItem = () => { throw new Error('full') }")
     tab.reload()
     answered(tab, "weight", "2.5")
-    assert tab.locator(".exercise-progress").inner_text().startswith("1 of 3")
+    assert tab.locator(".exercise-progress").inner_text().startswith("1 of 4")
     assert "keeps nothing" in tab.locator(".exercise-progress").inner_text()
 
 
 @pytest.mark.book
 def test_what_is_said_is_announced_and_every_field_has_a_name(tab):
     assert said(tab, "weight").get_attribute("role") == "status"
-    assert tab.get_by_role("textbox", name="Your answer", exact=True).count() == 1
+    assert tab.get_by_role("textbox", name="Your answer", exact=True).count() == 2
     assert tab.get_by_role("textbox", name="Your answer, a formula of x").count() == 1
     assert tab.get_by_role("group", name="Your answer").get_by_role("radio").count() == 3
     assert tab.get_by_role("form", name="Exercise 1.2").count() == 1

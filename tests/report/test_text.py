@@ -240,7 +240,7 @@ def test_claims_of_our_own_are_confirmed_or_not_and_never_called_reproduced():
         replace(verdict(name, outcome), said=OWN_CLAIMS[name].words.get(outcome, ""))
         for name, outcome in (("B1", NOT), ("B2", PARTLY), ("B3", REPRODUCED), ("B4", UNDECIDABLE))
     ]
-    assert text.own_claims(judged).splitlines() == [
+    assert text.outcomes(judged).splitlines() == [
         "- B1. It is so. *Not confirmed.*",
         "- B2. It is so. *Confirmed in part.*",
         "- B3. It is so. *Confirmed.*",

@@ -6,12 +6,34 @@
 
   /* Checks: an answer as it was typed, to what is said of it and whether it is right. */
 
+  /* What `read` gives, or null where what was typed cannot be read; `why` is given its sentence. */
+  function readable(read, why = () => {}) {
+    try {
+      return read();
+    } catch (error) {
+      if (!(error instanceof SyntaxError)) throw error;
+      why(error.message);
+      return null;
+    }
+  }
+
   const near = (value, other, within) => Math.abs(value - other) <= within;
 
-  function number(typed, { expected, within, mistakes, said }) {
-    const text = typed.trim().replace(",", ".").replace("−", "-");
-    const value = text === "" ? NaN : Number(text);
-    if (!Number.isFinite(value)) return { said: words.noNumber };
+  /* What a number can mean as it was typed: 2,600 is read with either comma, 20 % as 20 and as 0.2. */
+  function meanings(typed, unit) {
+    let text = typed.trim().replaceAll("−", "-").replace(/[·×]/g, "*");
+    text = text.replace(/[⁻⁰¹²³⁴-⁹]+/g, (power) => `^${[...power].map((one) => "-0123456789"["⁻⁰¹²³⁴⁵⁶⁷⁸⁹".indexOf(one)]).join("")}`);
+    if (unit && text.endsWith(unit)) text = text.slice(0, -unit.length);
+    const share = text.endsWith("%");
+    if (share) text = text.slice(0, -1);
+    const read = [text.replace(",", "."), text.replace(/,(?=\d{3}(?!\d))/g, "")].map((one) => formula.value(one, {}));
+    return share ? [...read, ...read.map((value) => value / 100)] : read;
+  }
+
+  function number(typed, { expected, within, mistakes, said, unit }) {
+    const read = readable(() => meanings(typed, unit));
+    if (!read || !read.every(Number.isFinite)) return { said: words.noNumber, unread: true };
+    const value = read.find((one) => near(one, expected, within)) ?? read[0];
     if (near(value, expected, within)) return { said, solved: true };
     const share = within / (Math.abs(expected) || 1);
     const known = mistakes.find(([wrong]) => near(value, wrong, share * (Math.abs(wrong) || 1)));
@@ -26,18 +48,14 @@
   }
 
   function choice(typed, { right, why, said }) {
-    if (!typed) return { said: words.noChoice };
+    if (!typed) return { said: words.noChoice, unread: true };
     return typed === right ? { said, solved: true } : { said: why[typed] };
   }
 
   function formulaOf(typed, { cases, values, mistakes, said }) {
-    let given;
-    try {
-      given = cases.map((one) => formula.value(typed, one));
-    } catch (error) {
-      if (!(error instanceof SyntaxError)) throw error;
-      return { said: words.noFormula(error.message) };
-    }
+    let why;
+    const given = readable(() => cases.map((one) => formula.value(typed, one)), (message) => { why = message; });
+    if (!given) return { said: words.noFormula(why), unread: true };
     const same = (others) => given.every((one, k) => near(one, others[k], 1e-12 + 1e-6 * Math.abs(others[k])));
     if (same(values)) return { said, solved: true };
     const known = mistakes.find(([others]) => same(others));
@@ -146,6 +164,10 @@
       event.preventDefault();
       const answer = field.read();
       const verdict = checks[data.kind](answer, data);
+      if (verdict.unread) { // costs nothing
+        show(verdict.said, "");
+        return;
+      }
       const misses = (kept()[name]?.misses || 0) + (verdict.solved ? 0 : 1);
       const hint = !verdict.solved && hintsOf(place)[misses - 1];
       if (hint) hint.open = true;

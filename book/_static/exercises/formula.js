@@ -66,7 +66,7 @@
     }
 
     const total = sum();
-    if (rest.length) fail("something is left at its end");
+    if (rest.length) fail("something is left at its end, and a product needs its *");
     return total;
   }
 

@@ -7,7 +7,7 @@ window.nmpcrl = {
     check: "Check",
     reset: "Reset",
     resetAll: "Reset all",
-    noNumber: "That is no number.",
+    noNumber: "That cannot be read as a number.",
     noChoice: "Choose one of them.",
     noFormula: (why) => `That cannot be read: ${why}.`,
     power: (large) => `Not right: it is too ${large ? "large" : "small"} by a power of ten.`,

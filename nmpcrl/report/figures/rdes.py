@@ -46,13 +46,14 @@ def online_errors(runs: Runs[Records], learners: tuple[str, ...] = ("DES", "RDES
                 )
                 panel.semilogy(np.arange(1, error.size + 1), error, **thin(learner))
                 known = error[np.isfinite(error)]
-                last[learner].extend(known[known.size // 2 :])
+                if known.size:
+                    last[learner].append(np.median(known[known.size // 2 :]))
         label_panel(panel, decay)
     axes[0, 0].set_ylabel("error of the\nnext value [cost]")
     one_entry_each(axes[0, -1], learners)
     means = " and ".join(f"{np.median(last[name]):.0f} ({name})" for name in learners)
     title = f"In the second half of training, the next value is off by {means}"
-    return headed(figure, f"{title}: medians of the root mean square of an episode")
+    return headed(figure, f"{title}: medians of the runs")
 
 
 @page
