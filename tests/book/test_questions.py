@@ -21,7 +21,8 @@ RIGHT = {
     "path": formula("x / 2", lambda x: x / 2, {"x": (1, 2)}, mistakes={"Half.": lambda x: x}),
 }
 SCRIPTS = ("words", "formula", "exercises")
-PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head><meta charset="utf-8"><title>Exercises</title>
+PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head>
+<meta charset="utf-8"><title>Exercises</title>
 <link rel="stylesheet" href="{static}/nmpcrl.css">
 <link rel="stylesheet" href="{static}/exercises/exercises.css">{scripts}</head>
 <body><main class="bd-article"><h1>Exercises</h1>{places}</main></body></html>"""

@@ -25,15 +25,11 @@ def closed_loop(task: Task, rollout: Rollout, plans: Sequence[Solution]) -> Figu
         label = "plans" if i == 0 else None
         axes.plot(*plan.states[:, :2].T, ".-", color=WINE, lw=2.2, ms=5, label=label)
     farthest = max((_length(plan.states) for plan in plans), default=0.0)
-    axes.set(
-        title=f"Plans of at most {farthest:.1f} m make a trajectory of"
-        f" {_length(rollout.states):.1f} m",
-        xlabel="x [m]",
-        ylabel="y [m]",
-    )
+    axes.set(xlabel="x [m]", ylabel="y [m]")
     below(figure, *axes.get_legend_handles_labels())
     axes.margins(0.04)
-    return figure
+    title = f"Plans of at most {farthest:.1f} m make a trajectory of"
+    return headed(figure, f"{title} {_length(rollout.states):.1f} m")
 
 
 @page

@@ -76,7 +76,12 @@ def overshoot(runs: Runs[Records]) -> Figure:
         worst = max(worst, np.nanmax(largest))
     axes.axhline(OVERSHOOT, color=INK, ls=":", lw=1)
     axes.annotate(
-        "above: overshoots", (0, 2), (4, 3), axes.get_yaxis_transform(), textcoords="offset points"
+        "above: overshoots",
+        (0, OVERSHOOT),
+        (4, 3),
+        axes.get_yaxis_transform(),
+        textcoords="offset points",
+        bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"},  # on runs
     )
     side = "passes 2: such a step overshoots" if worst > OVERSHOOT else "stays below 2"
     axes.set(
