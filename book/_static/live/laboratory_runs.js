@@ -39,9 +39,14 @@
         run.state = "running";
         const settings = learned(run.given, data);
         begin(run, settings, run.rows, (why) => {
-          run.state = why ? "stopped" : run.rows.at(-1).diverged ? "diverged" : "finished";
-          run.why = why;
-          arm(run, settings);
+          if (!why) {
+            run.state = run.rows.at(-1).diverged ? "diverged" : "finished";
+            arm(run, settings);
+          } else {
+            run.state = "failed";
+            run.why = words.failed(why);
+            next();
+          }
         });
       }
       changed();
@@ -51,10 +56,14 @@
       const same = JSON.stringify({ ...settings, learner: ARM, alpha: 0, beta: 0, zeta: 0 });
       if (run.given.learner === ARM) arms.set(same, run.rows);
       run.arm = arms.get(same) ?? [];
-      if (arms.has(same)) return next();
+      if (arms.has(same)) {
+        next();
+        return;
+      }
       const rows = run.arm;
-      return begin(run, { ...settings, learner: ARM }, rows, () => {
-        arms.set(same, rows);
+      begin(run, { ...settings, learner: ARM }, rows, (why) => {
+        if (why) run.why = words.armFailed(why);
+        else arms.set(same, rows);
         next();
       });
     }
@@ -88,7 +97,7 @@
 
   // How a run has done: its costs without noise at the start and at the end.
   function verdict({ rows, state, why }, data) {
-    const costs = judged(rows).map(([, cost]) => cost), ended = words.ends[state] || why;
+    const costs = judged(rows).map(([, cost]) => cost), ended = why || words.ends[state];
     const end = state === "finished" ? finalCost(costs, data.last) : null;
     return [...(costs.length ? [words.cost(costs[0], end)] : []), ...(ended ? [ended] : [])].join("; ");
   }
