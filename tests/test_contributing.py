@@ -229,7 +229,6 @@ from IPython.display import HTML
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
-from nmpcrl.learning import browser
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.problem import problem_of
 
@@ -238,8 +237,7 @@ def worth(nmpc: Nmpc, theta: Vector) -> HTML:
     """V at the start."""
     asked = {"state": nmpc.task.start.tolist(), "theta": theta.tolist()}
     data = {"asked": asked, "problem": problem_of(nmpc)}
-    module = browser.module(nmpc.plant, nmpc.task)
-    return frame.figure("worth", data, (*frame.PARTS, "worth.js"), module)
+    return frame.solving("worth", nmpc, lambda: data, frame.scripts_of("worth"))
 '''),
         "nmpcrl/report/live/__init__.py": both(
             imported("from nmpcrl.report.live.worth import worth"),
@@ -258,15 +256,18 @@ def worth(nmpc: Nmpc, theta: Vector) -> HTML:
   });
 })();
 """),
-        "book/_static/live/words.js": replaced(
-            "  window.nmpcrl = { ...window.nmpcrl, words: {",
-            """  const worth = {
-    map: "V at the start", title: "Try it.", hint: "Look.",
-    results: ({ value }) => [["V =", fixed(value, 6)]],
-  };
+        "book/_static/live/worth_words.js": added("""// Every word that a reader of the worth sees.
+(() => {
+  "use strict";
 
-  window.nmpcrl = { ...window.nmpcrl, words: { worth,""",
-        ),
+  const { words } = window.nmpcrl;
+
+  words.worth = {
+    map: "V at the start", title: "Try it.", hint: "Look.",
+    results: ({ value }) => [["V =", words.parts.fixed(value, 6)]],
+  };
+})();
+"""),
         "book/03_rdes.ipynb": shown("from nmpcrl.report import live\n\nlive.worth(nmpc, theta)"),
         "tests/book/live_page.py": entered("CHAPTERS", '    "worth": "03_rdes",\n'),
     },

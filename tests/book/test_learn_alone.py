@@ -10,6 +10,7 @@ from axe_playwright_python.sync_playwright import Axe
 
 STATIC = Path(__file__).resolve().parents[2] / "book/_static"
 PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head><title>Path</title>
+<link rel="stylesheet" href="{static}/controls.css">
 <link rel="stylesheet" href="{static}/exercises/exercises.css">
 <link rel="stylesheet" href="{static}/syllabus.css">
 {scripts}</head><body><main class="bd-article"><h1>Path</h1>

@@ -31,6 +31,20 @@ DAMAGED = (
     "theta=1,2", "layout=1,2;3", "layout=1,2,3", "layout=" + ";".join(["0,0"] * 9), "start=0,0",
     "target=8.5,20,0",
 )  # fmt: skip
+FAILS_ONCE = """learner => {
+  const post = Worker.prototype.postMessage
+  let failed = false
+  Worker.prototype.postMessage = function (given) {
+    const fails = !failed && given.settings.learner === learner
+    failed ||= fails
+    post.call(this, fails ? { ...given, module: "" } : given)
+  }
+}"""
+ARMS_OF = """lengths => {
+  const { runs } = document.querySelector("figure.live").shown
+  return String(runs.map(run => run.arm.length)) === String(lengths)
+}"""
+REFUSES = "Clipboard.prototype.writeText = async () => { throw new Error('refused') }"
 SLOW = """
   const post = Worker.prototype.postMessage
   Worker.prototype.postMessage = function (given) {
@@ -338,18 +352,39 @@ def test_the_link_is_copied(opened):
     assert copied.startswith("from nmpcrl.study import Experiment, run")
 
 
-def test_without_javascript_there_are_the_picture_and_the_text(opened):
+def test_without_javascript_the_text_says_how_to_train(opened):
     tab = opened(FIGURE, java_script_enabled=False)
     assert tab.page.locator("article figure img[alt*='Five panels']").is_visible()
-    assert not tab.figure.is_visible()
     assert "from a terminal" in tab.page.locator("article").inner_text()
 
 
-def test_without_webassembly_there_is_a_sentence(opened):
-    tab = opened(FIGURE, script="delete window.WebAssembly")
-    tab.figure.locator("p").wait_for()
-    assert "does not run WebAssembly" in tab.figure.inner_text()
-    assert tab.errors == []
+@pytest.mark.parametrize("broken", ["module = 'AAAA'", "sources.push('not a script')"])
+def test_training_that_fails_says_why(tab, broken):
+    """A module that cannot be unpacked; a worker that does not begin."""
+    tab.page.evaluate(f"window.nmpcrl.{broken}")
+    tab.click("Train")
+    tab.figure.get_by_text("this browser could not train: ").wait_for()
+    assert tab.shown()["runs"][0]["state"] == "failed"
+    assert tab.figure.get_by_role("button", name="Stop").get_attribute("aria-disabled") == "true"
+
+
+def test_a_frozen_arm_that_fails_is_said_and_is_tried_again(tab):
+    tab.page.evaluate(FAILS_ONCE, "frozen")
+    fill(tab, Episodes=1)
+    tab.click("Train")
+    said = tab.figure.get_by_text("this browser could not train its frozen arm: ")
+    assert "noise-free cost" in said.inner_text()
+    tab.click("Train")
+    tab.page.wait_for_function(ARMS_OF, arg=[0, 2])
+
+
+def test_text_that_may_not_be_copied_is_selected(opened):
+    for script in ("delete Navigator.prototype.clipboard", REFUSES):
+        tab = opened(FIGURE, script=script).begun()
+        tab.click("Copy link")
+        tab.figure.get_by_text("does not copy").wait_for()
+        assert tab.page.evaluate("getSelection().toString()").startswith("file:")
+        assert tab.errors == []
 
 
 @pytest.mark.parametrize("width", [390, 1400])

@@ -74,7 +74,7 @@ def test_axe_finds_nothing(opened, figure, width, theme):
 def test_a_finger_can_hit_everything_on_a_telephone(opened, figure):
     tab = opened(figure, viewport={"width": 390, "height": 844}).begun()
     tab.shown()
-    aimed_at = ".reach, input:not([type=radio]), label:has([type=radio]), button"
+    aimed_at = ".reach, input:not([type=radio]), label:has([type=radio]), button, select"
     for target in tab.figure.locator(f":is({aimed_at}):visible").all():
         box = target.bounding_box()
         assert min(box["width"], box["height"]) >= 24

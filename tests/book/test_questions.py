@@ -24,6 +24,7 @@ SCRIPTS = ("words", "formula", "exercises")
 PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head>
 <meta charset="utf-8"><title>Exercises</title>
 <link rel="stylesheet" href="{static}/nmpcrl.css">
+<link rel="stylesheet" href="{static}/controls.css">
 <link rel="stylesheet" href="{static}/exercises/exercises.css">{scripts}</head>
 <body><main class="bd-article"><h1>Exercises</h1>{places}</main></body></html>"""
 AROUND = """<div class="exercise">How?</div>

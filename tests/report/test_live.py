@@ -12,7 +12,7 @@ from nmpcrl.control import Riccati
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
-from nmpcrl.report.live import frame
+from nmpcrl.report.live import closed_loop, frame
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -88,7 +88,7 @@ def test_the_output_is_whole_and_loads_nothing(shown):
     assert re.findall(r'data-file="([^"]+)"', shown) == [
         frame.STYLE,
         frame.MODULE,
-        *frame.scripts_of("controller"),
+        *closed_loop.SCRIPTS,
     ]
     assert not re.search(r"\b(src|href)=|https?://(?!www\.w3\.org/2000/svg)", shown)
     packed = b64decode(re.search(r'module: "([^"]+)"', shown)[1])

@@ -9,9 +9,9 @@ import pytest
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
-from nmpcrl.report.figures.style import LOOKS
 from nmpcrl.report.finds import Find
 from nmpcrl.report.live import frame, noise, training
+from nmpcrl.report.live.looks import look
 from nmpcrl.study import Experiment, ParameterError, paper
 
 FIND = Find("One", "See.", {}, Experiment(seed=3))
@@ -64,10 +64,7 @@ def test_a_setting_is_shown_for_the_learners_that_read_it(data):
 
 
 def test_learners_have_their_colours(data):
-    assert set(data["looks"]) == set(training.LEARNERS)
-    for learner, (colour, dashes) in data["looks"].items():
-        assert colour in (LOOKS[learner].color, "var(--ink)")
-        assert bool(dashes) == (LOOKS[learner].linestyle != "-")
+    assert data["looks"] == {learner: look(learner) for learner in training.LEARNERS}
 
 
 def test_the_longest_horizon_has_a_discount_for_every_stage(data):

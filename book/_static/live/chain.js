@@ -5,7 +5,7 @@
 (() => {
   "use strict";
 
-  const { add, chart, key, player, parts: shared, words: { chain: words } } = window.nmpcrl;
+  const { add, slider, chart, key, player, parts: shared, words: { chain: words } } = window.nmpcrl;
   const PACE = 100; // of an update while it plays [ms]
   const FIRST = 0, SECOND = 1;
   const ERRORS = {
@@ -37,7 +37,7 @@
     const row = add(parent, "div", { class: "groups" });
     const all = Object.entries(words.sliders).map(([name, label]) => {
       const kind = { name, label, range: ranges[name], text: words.number };
-      return shared.slider(add(row, "div"), kind, {
+      return slider(add(row, "div"), kind, {
         read: (given) => given[name],
         write: (number) => move({ [name]: number }),
       });
@@ -83,7 +83,8 @@
     const { read, move } = shared.state(begin, show);
     shared.heading(figure, words);
     const parts = [choice(figure, move), sliders(figure, data, read, move)];
-    const playing = player(figure, { label: words.slider, last: data.updates, pace: PACE, text: words.after }, {
+    const moved = { label: words.slider, last: data.updates, pace: PACE, text: words.after, steps: true };
+    const playing = player(figure, moved, {
       read: () => read().at,
       write: (at) => move({ at }),
     });

@@ -2,7 +2,7 @@
 (() => {
   "use strict";
 
-  const { add, set, plane, parts: shared, words: { controller: words } } = window.nmpcrl;
+  const { add, set, plane, mapParts, slider, weight, parts: shared, words: { controller: words } } = window.nmpcrl;
   const { points } = shared;
 
   // The parts of V. It is quadratic in each weight, so a weight's part is half its product with its feature.
@@ -21,7 +21,7 @@
 
   function horizon(group, { ranges: { horizon: range } }, move) {
     const kind = { name: "horizon", label: words.horizon, range, text: String };
-    return shared.slider(group, kind, {
+    return slider(group, kind, {
       read: (given) => given.horizon,
       write: (number) => move({ horizon: number }),
     });
@@ -33,7 +33,7 @@
       const group = add(row, "fieldset");
       add(group, "legend", {}, legend);
       return names.map((name) => (
-        name === "horizon" ? horizon(group, data, move) : shared.weight(group, name, data, read, move)
+        name === "horizon" ? horizon(group, data, move) : weight(group, name, data, read, move)
       ));
     });
     return (given) => all.forEach((draw) => draw(given));
@@ -50,13 +50,11 @@
     const { read, move } = shared.state(begin, show);
     shared.heading(figure, words);
     const map = plane(figure, data.view, words.handles);
-    shared.background(map, data);
+    mapParts.background(map, data);
     const parts = [
-      shared.obstacles(map, data, read, move),
-      shared.robot(map, data, read, move),
-      shared.arrow(map, read, move),
+      ...mapParts.handles(map, data, read, move),
       closedLoop(map, rollout(begin, data.steps)),
-      shared.planned(map, data),
+      mapParts.planned(map, data),
     ];
     add(figure, "p", { class: "legend" }, words.legend(data.steps));
     const tell = shared.results(figure);

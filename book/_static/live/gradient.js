@@ -2,15 +2,17 @@
 (() => {
   "use strict";
 
-  const { add, plane, graph, parts: shared, words: { gradient: words, parts: { scientific } } } = window.nmpcrl;
+  const {
+    add, plane, mapParts, slider, weight, graph, parts: shared, words: { gradient: words, parts: { scientific } },
+  } = window.nmpcrl;
   const LEAST = -2, DECADES = 6; // of a bar, which is logarithmic
   const IDLE = 120; // after the last change, before the curves are computed [ms]
   const norm = (vector) => Math.hypot(...vector);
 
   // V with one component of theta moved, all nine in turn; null if one cannot be solved.
   function moved(nmpc, given, h) {
-    const plans = given.theta.map((weight, k) => (
-      nmpc.solve({ ...given, theta: given.theta.with(k, weight + h) })
+    const plans = given.theta.map((each, k) => (
+      nmpc.solve({ ...given, theta: given.theta.with(k, each + h) })
     ));
     return plans.every(Boolean) ? plans.map(({ value }) => value) : null;
   }
@@ -27,7 +29,7 @@
   function bars(parent, data, read, move) {
     const rows = data.names.map((name) => {
       const row = add(parent, "div", { class: "component" });
-      const slide = shared.weight(row, name, data, read, move);
+      const slide = weight(row, name, data, read, move);
       const pair = add(row, "div", { class: "pair", "aria-hidden": true });
       const both = { envelope: add(pair, "i", { class: "envelope" }), difference: add(pair, "i", { class: "difference" }) };
       return { slide, both, number: add(row, "span", { class: "numbers" }) };
@@ -43,7 +45,7 @@
 
   function stepSlider(parent, steps, move) {
     const kind = { name: "h", label: words.step, range: [0, steps.length - 1, 1], text: (k) => scientific(steps[k]) };
-    return shared.slider(add(parent, "div", { class: "wide" }), kind, {
+    return slider(add(parent, "div", { class: "wide" }), kind, {
       read: ({ step }) => step,
       write: (step) => move({ step }),
     });
@@ -55,7 +57,7 @@
 
   // Both errors against the step, on logarithmic axes.
   function curves(parent, steps) {
-    const draw = graph(parent, words.curves);
+    const { draw } = graph(parent, words.curves);
     const tick = (exponent) => [exponent, scientific(10 ** exponent)];
     const log = (found, kind) => [Math.log10(found.step), Math.log10(Math.max(found.errors[kind], 1e-14))];
     const [first, last] = [steps.at(0), steps.at(-1)].map(Math.log10);
@@ -68,8 +70,8 @@
       draw({
         x: { name: words.across, from: first, to: last, ticks: across },
         y: { from: lowest, to: highest, ticks: evens(lowest, highest).map(tick) },
-        lines: { forward, central },
-        dots: chosen ? { forward: log(chosen, "forward"), central: log(chosen, "central") } : {},
+        lines: [{ look: "forward", points: forward }, { look: "central", points: central }],
+        dots: chosen ? [log(chosen, "forward"), log(chosen, "central")] : [],
       });
     };
   }
@@ -80,13 +82,8 @@
     shared.heading(figure, words);
     const top = add(figure, "div", { class: "columns map" }), left = add(top, "div"), right = add(top, "div");
     const map = plane(left, data.view, words.handles);
-    shared.background(map, data);
-    const parts = [
-      shared.obstacles(map, data, read, move),
-      shared.robot(map, data, read, move),
-      shared.arrow(map, read, move),
-      shared.planned(map, data),
-    ];
+    mapParts.background(map, data);
+    const parts = [...mapParts.handles(map, data, read, move), mapParts.planned(map, data)];
     const tell = shared.results(figure);
     parts.push(stepSlider(figure, data.steps, move));
     parts.push(curves(right, data.steps));

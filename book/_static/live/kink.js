@@ -2,7 +2,7 @@
 (() => {
   "use strict";
 
-  const { add, set, plane, graph, parts: shared, words: { kink: words } } = window.nmpcrl;
+  const { add, set, plane, mapParts, slider, graph, parts: shared, words: { kink: words } } = window.nmpcrl;
   const REACH = 0.1; // of the walk, on either side of the boundary [m]
   const BESIDE = 3e-6; // how far beside the boundary its two slopes are read [m]
   const PLACES = 16; // on either side, in a plot
@@ -10,10 +10,7 @@
 
   // Obstacles that stay where they are, each with a circle of its radius in `around`.
   function discs(map, { problem, radii }, around) {
-    problem.discs.forEach(([cx, cy], k) => {
-      add(map.ground, "circle", { class: "disc", cx, cy, r: radii[k] });
-      add(map.ground, "circle", { class: "safety", cx, cy, r: around[k] });
-    });
+    problem.discs.forEach(([x, y], k) => mapParts.circles(map.ground, [x, y, 2 * around[k]], radii[k]));
   }
 
   // The nearest boundary: the way outwards from its obstacle's centre through the robot, and where on it
@@ -46,7 +43,7 @@
   function walkSlider(parent, data, read, move) {
     const kind = { name: "walk", label: words.walk, range: [-100, 100, 5], text: words.millimetres };
     const line = add(parent, "div", { class: "wide" });
-    return shared.slider(line, kind, {
+    return slider(line, kind, {
       read: (given) => Math.round(1000 * nearest(given, data).offset),
       write: (millimetres) => {
         const [x, y] = place(nearest(read(), data), millimetres / 1000);
@@ -67,18 +64,18 @@
   function curve(parent, label, name, here) {
     const whole = add(parent, "div");
     shared.write(add(whole, "p", { class: "caption" }), words[name]);
-    const draw = graph(whole, label);
+    const { draw } = graph(whole, label);
     return (_, { plan, boundary, inside, outside }) => {
       const heights = [...inside, ...outside].map((each) => each[name]);
       if (!plan || !heights.length) return;
       const least = Math.min(...heights), most = Math.max(...heights), room = 0.08 * (most - least) + 1e-6;
-      const line = (side) => side.map((each) => [each.offset, each[name]]);
+      const [from, to] = [least - room, most + room];
+      const line = (look, side) => ({ look, points: side.map((each) => [each.offset, each[name]]) });
       draw({
         x: { name: words.across, from: -REACH, to: REACH },
-        y: { from: least - room, to: most + room },
-        rules: { edge: 0 },
-        lines: { inside: line(inside), outside: line(outside) },
-        dots: { here: [boundary.offset, here(plan)] },
+        y: { from, to },
+        lines: [{ look: "edge", points: [[0, to], [0, from]] }, line("inside", inside), line("outside", outside)],
+        dots: [[boundary.offset, here(plan)]],
       });
     };
   }
@@ -88,9 +85,9 @@
     const { read, move } = shared.state(begin, show);
     shared.heading(figure, words);
     const map = plane(figure, data.view, words.handles);
-    shared.background(map, data);
+    mapParts.background(map, data);
     discs(map, data, data.boundaries);
-    const parts = [shared.planned(map, data), way(map), shared.robot(map, data, read, move)];
+    const parts = [mapParts.planned(map, data), way(map), mapParts.robot(map, data, read, move)];
     const tell = shared.results(figure);
     parts.push(walkSlider(figure, data, read, move));
     const row = add(figure, "div", { class: "columns" });

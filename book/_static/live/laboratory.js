@@ -5,7 +5,8 @@
   "use strict";
 
   const {
-    add, set, settings, laboratoryMap, laboratoryRuns, parts: shared, words: { laboratory: words },
+    add, set, settings, laboratoryMap, laboratoryRuns, laboratoryPlots, laboratoryAlong,
+    parts: shared, words: { laboratory: words },
   } = window.nmpcrl;
   const OTHERS = 3; // further seeds at a click
   const OFTEN = 100; // between two pictures of what is being trained [ms]
@@ -64,53 +65,6 @@
       const what = now && (now.rows === now.run.rows ? name(now.run) : words.arm(name(now.run)));
       text.textContent = now ? words.training(what, done, all) + words.waiting(waiting) : "";
     };
-  }
-
-  // Text to take along, with a button that copies it.
-  function copied(parent, { name, label, rows, tell }) {
-    const box = add(parent, "textarea", { readonly: "", "aria-label": label, spellcheck: false, rows });
-    shared.button(parent, name, async () => {
-      box.select();
-      try {
-        await navigator.clipboard.writeText(box.value);
-        tell([[words.copied]]);
-      } catch { // not allowed here
-        tell([[words.notCopied]]);
-      }
-    });
-    return (text) => {
-      if (box.value !== text) box.value = text;
-      set(box, { rows: rows ?? text.split("\n").length });
-    };
-  }
-
-  function takeAlong(parent, data, tell) {
-    const link = add(parent, "div", { class: "along" });
-    add(link, "p", { class: "plot-title" }, words.link);
-    const address = copied(link, { name: words.copyLink, label: words.link, rows: 2, tell });
-    const python = add(parent, "div", { class: "along" });
-    add(python, "p", { class: "plot-title" }, words.python);
-    const same = add(python, "p", { class: "hint" });
-    const command = copied(python, { name: words.copyCommand, label: words.commandLabel, tell });
-    const code = copied(python, { name: words.copyCode, label: words.codeLabel, tell });
-    return (given) => {
-      same.textContent = words.pythonHint(given);
-      address(`${location.href.split("#")[0]}#${settings.written(given, data)}`);
-      command(settings.command(given, data));
-      code(settings.code(given, data).trimEnd());
-    };
-  }
-
-  function gallery(parent, data, open) {
-    if (!data.gallery.length) return;
-    add(parent, "p", { class: "plot-title" }, words.gallery);
-    const row = add(parent, "div", { class: "buttons gallery" }), sentence = add(parent, "p", { class: "sentence", role: "status" });
-    for (const find of data.gallery) {
-      shared.button(row, find.title, () => {
-        sentence.textContent = find.sentence;
-        open({ ...settings.defaults(data), ...find.settings });
-      });
-    }
   }
 
   // The address follows what is set once nothing changes any more, and what is set follows the address.
@@ -174,11 +128,11 @@
       stop: runs.stop,
     });
     const note = shared.results(side);
-    gallery(figure, data, open);
+    laboratoryAlong.gallery(figure, data, open);
     add(figure, "p", { class: "plot-title" }, words.runs);
     const drawList = laboratoryRuns.list(figure, data, { choose, remove: removed, name });
-    const drawPlots = laboratoryRuns.plots(figure, data);
-    const drawAlong = takeAlong(figure, data, tell);
+    const drawPlots = laboratoryPlots(figure, data);
+    const drawAlong = laboratoryAlong.takeAlong(figure, data, tell);
 
     function say(lines) {
       problem.lines = lines;
@@ -215,7 +169,7 @@
       drawn = theta;
       const first = nmpc.rollout({ ...where, theta: given.theta }, data.steps);
       const last = theta ? nmpc.rollout({ ...where, theta }, data.steps) : null;
-      const [color] = chosen ? data.looks[chosen.given.learner] : [""];
+      const color = chosen ? data.looks[chosen.given.learner].color : "";
       drawMap(given, { first, last, color });
       problem.now = words.now(last ?? first, last ? words.ofRun(chosen.number) : words.atStart);
       note([...(problem.lines ?? []), ...problem.now]);

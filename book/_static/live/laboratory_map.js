@@ -2,7 +2,7 @@
 (() => {
   "use strict";
 
-  const { add, set, plane, parts: shared, words: { parts: common, laboratory: words } } = window.nmpcrl;
+  const { add, set, plane, mapParts, parts: shared, words: { parts: common, laboratory: words } } = window.nmpcrl;
   const { clamp, points } = shared;
   const GRID = 100; // places of a metre, and of a radian: short numbers in links and commands
 
@@ -43,7 +43,7 @@
     const handle = map.handle({ label, kind, range: map.range, to, by });
     add(handle.body, "circle", { class: "disc", r: robot });
     const turn = ({ start }) => move({ [name]: [...start.slice(0, 2), onGrid(start[2])] });
-    const arrow = shared.arrow(map, () => ({ start: read()[name] }), turn, turned);
+    const arrow = mapParts.arrow(map, () => ({ start: read()[name] }), turn, turned);
     return (given) => {
       const [x, y] = given[name];
       handle.put([x, y], x, common.place(x, y));
@@ -93,7 +93,7 @@
   function laboratoryMap(parent, data, read, move, restore) {
     const side = add(parent, "div", { class: "side" });
     const map = plane(side, data.view, words.handles);
-    shared.background(map, data);
+    mapParts.background(map, data);
     const start = { kind: "robot", label: common.robot, turned: common.heading };
     const target = { kind: "goal", label: words.target, turned: words.targetHeading };
     const parts = [

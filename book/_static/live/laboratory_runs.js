@@ -1,9 +1,8 @@
-// The laboratory's runs: a queue that trains one after the other, their list, and four plots.
+// The laboratory's runs: a queue that trains one after the other, and their list.
 (() => {
   "use strict";
 
-  const { add, set, plot, trainer, finalCost, parts: shared, words: { laboratory: words, parts: { symbols } } } = window.nmpcrl;
-  const NAMED = 4; // components of theta that have names
+  const { add, set, trainer, finalCost, parts: shared, words: { laboratory: words } } = window.nmpcrl;
   const ARM = "frozen";
 
   // What the page is given to a run as `learning` takes it.
@@ -40,9 +39,14 @@
         run.state = "running";
         const settings = learned(run.given, data);
         begin(run, settings, run.rows, (why) => {
-          run.state = why ? "stopped" : run.rows.at(-1).diverged ? "diverged" : "finished";
-          run.why = why;
-          arm(run, settings);
+          if (!why) {
+            run.state = run.rows.at(-1).diverged ? "diverged" : "finished";
+            arm(run, settings);
+          } else {
+            run.state = "failed";
+            run.why = words.failed(why);
+            next();
+          }
         });
       }
       changed();
@@ -52,10 +56,14 @@
       const same = JSON.stringify({ ...settings, learner: ARM, alpha: 0, beta: 0, zeta: 0 });
       if (run.given.learner === ARM) arms.set(same, run.rows);
       run.arm = arms.get(same) ?? [];
-      if (arms.has(same)) return next();
+      if (arms.has(same)) {
+        next();
+        return;
+      }
       const rows = run.arm;
-      return begin(run, { ...settings, learner: ARM }, rows, () => {
-        arms.set(same, rows);
+      begin(run, { ...settings, learner: ARM }, rows, (why) => {
+        if (why) run.why = words.armFailed(why);
+        else arms.set(same, rows);
         next();
       });
     }
@@ -86,55 +94,10 @@
   }
 
   const judged = (rows) => rows.filter((row) => row.judged).map(({ episode, judged: { cost } }) => [episode, cost]);
-  const after = (rows) => rows.filter(({ episode }) => episode);
-
-  // The four that move most have names.
-  function components({ rows }, data, color) {
-    const moved = data.names.map((_, k) => {
-      const values = rows.map(({ theta }) => theta[k]);
-      return Math.max(...values) - Math.min(...values);
-    });
-    const most = [...moved].sort((a, b) => b - a)[NAMED - 1];
-    return data.names.map((name, k) => ({
-      name: moved[k] > 0 && moved[k] >= most ? symbols[name] : "",
-      look: moved[k] > 0 && moved[k] >= most ? "" : "quiet", color,
-      points: rows.map(({ episode, theta }) => [episode, theta[k]]),
-    }));
-  }
-
-  function plots(parent, data) {
-    const grid = add(parent, "div", { class: "plots" });
-    const draw = Object.fromEntries(["judged", "cost", "theta", "step"].map((name) => (
-      [name, plot(add(grid, "div"), words.plots[name])]
-    )));
-    const wide = (values) => Math.max(...values) > 20 * Math.min(...values.filter((value) => value > 0));
-    return (runs, chosen) => {
-      const x = [0, Math.max(...runs.map(({ given }) => given.episodes), 1)];
-      const lines = (points) => runs.map((run) => {
-        const [color, dashes] = data.looks[run.given.learner];
-        return { name: `${run.number}`, color, dashes, look: run === chosen ? "chosen" : "", points: points(run.rows) };
-      });
-      const [grey, dots] = data.looks[ARM];
-      const arms = (points) => runs.map((run) => ({ color: grey, dashes: dots, points: points(run) }));
-      const both = (points, ofArm) => {
-        const all = [...arms(ofArm), ...lines(points)];
-        const known = all.flatMap((line) => line.points.map(([, y]) => y)).filter(Number.isFinite);
-        return { lines: all, x, log: wide(known) };
-      };
-      const trained = (rows) => after(rows).map(({ episode, cost }) => [episode, cost]);
-      const level = ({ rows, given }) => judged(rows.slice(0, 1)).flatMap(([, cost]) => [[0, cost], [given.episodes, cost]]);
-      draw.judged(both(judged, level)); // without noise the frozen arm always does the same
-      draw.cost(both(trained, ({ arm }) => trained(arm)));
-      draw.theta({ x, lines: chosen ? components(chosen, data, data.looks[chosen.given.learner][0]) : [] });
-      const steps = lines((rows) => after(rows).map(({ episode, alphaPhi2 }) => [episode, alphaPhi2]));
-      const values = steps.flatMap(({ points }) => points.map(([, y]) => y)).filter(Number.isFinite);
-      draw.step({ x, lines: steps, levels: [{ y: data.overshoot, name: "2" }], log: wide([...values, data.overshoot]) });
-    };
-  }
 
   // How a run has done: its costs without noise at the start and at the end.
   function verdict({ rows, state, why }, data) {
-    const costs = judged(rows).map(([, cost]) => cost), ended = words.ends[state] || why;
+    const costs = judged(rows).map(([, cost]) => cost), ended = why || words.ends[state];
     const end = state === "finished" ? finalCost(costs, data.last) : null;
     return [...(costs.length ? [words.cost(costs[0], end)] : []), ...(ended ? [ended] : [])].join("; ");
   }
@@ -150,8 +113,7 @@
       const label = add(line, "label");
       const input = add(label, "input", { type: "radio", name: "nmpcrl-run" });
       const swatch = add(label, "span", { class: "swatch" });
-      const [color] = data.looks[run.given.learner];
-      swatch.style.setProperty("--look", color);
+      swatch.style.setProperty("--look", data.looks[run.given.learner].color);
       add(label, "span", {}, name(run));
       const found = add(line, "span", { class: "found" });
       input.addEventListener("change", () => choose(run));
@@ -176,5 +138,5 @@
     };
   }
 
-  window.nmpcrl = { ...window.nmpcrl, laboratoryRuns: { queue, plots, list } };
+  window.nmpcrl = { ...window.nmpcrl, laboratoryRuns: { queue, list, judged } };
 })();

@@ -6,7 +6,7 @@
   "use strict";
 
   const {
-    add, solver, normal, learner, sideBySide, slices, learnersShown: shown,
+    add, solver, slider, choice, normal, learner, sideBySide, slices, learnersShown: shown,
     parts: shared, words: { learners: words },
   } = window.nmpcrl;
   const still = matchMedia("(prefers-reduced-motion: reduce)");
@@ -15,26 +15,17 @@
 
   function settings(parent, { decays, seeds, alphas }, move) {
     const row = add(parent, "div", { class: "choices" });
-    const choice = (name, options, read) => {
-      const line = add(row, "label", { class: "choice" });
-      add(line, "span", {}, words.choices[name]);
-      const select = add(line, "select");
-      for (const value of options) add(select, "option", { value }, words.option(value));
-      select.addEventListener("change", () => move({ [name]: read(select.value) }));
-      return (given) => { select.value = given[name]; };
-    };
-    const decay = choice("decay", decays, String), seed = choice("seed", seeds, Number);
-    const alpha = shared.slider(add(row, "div", { class: "long" }), {
+    const menus = Object.entries({ decay: decays, seed: seeds }).map(([name, options]) => {
+      const kind = { label: words.choices[name], options, text: words.option };
+      return choice(row, kind, { read: (given) => given[name], write: (value) => move({ [name]: value }) });
+    });
+    const alpha = slider(add(row, "div", { class: "long" }), {
       name: "alpha", label: words.alpha, range: alphas, text: (power) => words.size(10 ** power),
     }, {
       read: (given) => Math.log10(given.alpha),
       write: (power) => move({ alpha: Number((10 ** power).toPrecision(3)) }),
     });
-    return (given) => {
-      decay(given);
-      seed(given);
-      alpha(given);
-    };
+    return (given) => [...menus, alpha].forEach((draw) => draw(given));
   }
 
   // ---- The figure
@@ -64,11 +55,7 @@
     shared.heading(figure, own);
     const chosen = settings(figure, data, move);
     const row = add(figure, "div", { class: "buttons" });
-    const press = (name, act) => {
-      const made = add(row, "button", { type: "button" }, words.buttons[name]);
-      made.addEventListener("click", act);
-      return made;
-    };
+    const press = (name, act) => shared.button(row, words.buttons[name], act);
     const train = press("train", () => (training.running() ? training.stop() : training.begin()));
     const some = ["wholeEpisode", "step"].map((name) => press(name, () => {
       training.stop();

@@ -5,7 +5,8 @@
   "use strict";
 
   const {
-    add, set, plane, chart, key, trace, parts: shared, words: { learners: words, parts: { sliders: meanings } },
+    add, set, plane, mapParts, chart, key, trace, parts: shared,
+    words: { learners: words, parts: { sliders: meanings } },
   } = window.nmpcrl;
   const GAUGE = 4; // its end
   const LOWEST = 0.97; // of the axis of costs, times the least of all
@@ -15,14 +16,9 @@
 
   function map(parent, data, label) {
     const ground = plane(parent, data.view, label);
-    shared.background(ground, data);
-    data.problem.discs.forEach(([cx, cy, clearance], k) => {
-      add(ground.ground, "circle", { class: "safety", cx, cy, r: clearance / 2 });
-      add(ground.ground, "circle", { class: "disc", cx, cy, r: data.radii[k] });
-    });
-    const [x, y] = data.problem.target;
-    add(ground.ground, "circle", { class: "target", cx: x, cy: y });
-    ground.write(words.target, x, y, { class: "name" });
+    mapParts.background(ground, data);
+    data.problem.discs.forEach((disc, k) => mapParts.circles(ground.ground, disc, data.radii[k]));
+    mapParts.target(ground, data);
     const drawn = add(ground.ground, "g");
     return (found, policies) => {
       drawn.replaceChildren();

@@ -2,22 +2,9 @@
 (() => {
   "use strict";
 
+  const { add, set, parts: { clamp } } = window.nmpcrl;
   const STEP = { plain: 0.1, large: 0.5 }; // of an arrow key [m]
   const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-
-  const SVG = "http://www.w3.org/2000/svg";
-
-  // A new element of HTML or, within a picture, of SVG.
-  function add(parent, name, attributes = {}, text = "") {
-    const element = document.createElementNS(name === "svg" ? SVG : parent.namespaceURI, name);
-    set(element, attributes);
-    element.textContent = text;
-    return parent.appendChild(element);
-  }
-
-  function set(element, attributes) {
-    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  }
 
   // `view` is [least x, least y, width, height].
   function plane(parent, view, label) {
@@ -28,10 +15,7 @@
     const ground = add(svg, "g", { transform: "scale(1 -1)" });
     let chosen = null; // what has the focus, which a click on the ground moves
 
-    const inside = ([x, y]) => [
-      Math.min(Math.max(x, left), left + width),
-      Math.min(Math.max(y, bottom), bottom + height),
-    ];
+    const inside = ([x, y]) => [clamp(x, left, left + width), clamp(y, bottom, bottom + height)];
     const under = (event) => {
       const { x, y } = new DOMPoint(event.clientX, event.clientY)
         .matrixTransform(ground.getScreenCTM().inverse());
@@ -100,5 +84,5 @@
     return { ground, range: [left, left + width], inside, write, handle };
   }
 
-  window.nmpcrl = { ...window.nmpcrl, add, set, plane };
+  window.nmpcrl = { ...window.nmpcrl, plane };
 })();

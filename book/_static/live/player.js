@@ -1,19 +1,15 @@
-// What plays: a slider over steps, and buttons that move it. Nothing moves by itself, and whoever asked for
-// reduced motion has no button that would.
+// What plays: a slider over steps, and buttons that move it. Nothing moves by itself; whoever asked for reduced motion
+// has no Play where there is a button for one step.
 (() => {
   "use strict";
 
-  const { add, set, words: { player: words } } = window.nmpcrl;
+  const { add, set, parts: { button }, words: { player: words } } = window.nmpcrl;
   const still = matchMedia("(prefers-reduced-motion: reduce)");
 
-  // `read()` is the step now, `write(step)` moves it; `pace` is the time of a step [ms].
-  function player(parent, { label, last, pace, text }, { read, write }) {
-    const row = add(parent, "div", { class: "stepped player" });
-    const button = (name, press) => {
-      const made = add(row, "button", { type: "button" }, words[name]);
-      made.addEventListener("click", press);
-      return made;
-    };
+  // `read()` is the step now, `write(step)` moves it; `pace` is the time of a step [ms]; with `steps`, a button
+  // makes one of them.
+  function player(parent, { label, last, pace, text, steps = false }, { read, write }) {
+    const row = add(parent, "div", { class: steps ? "stepped player" : "player" });
     let timer = 0;
     const stop = () => {
       clearInterval(timer);
@@ -24,16 +20,18 @@
       write(Math.min(read() + 1, last));
       if (read() === last) stop();
     };
-    const play = button("play", () => {
+    const play = button(row, words.play, () => {
       if (timer) return stop();
       if (read() === last) write(0);
       timer = setInterval(next, pace);
       play.textContent = words.pause;
     });
-    button("step", () => {
-      stop();
-      next();
-    });
+    if (steps) {
+      button(row, words.step, () => {
+        stop();
+        next();
+      });
+    }
     const range = add(row, "input", { type: "range", min: 0, max: last, step: 1, "aria-label": label });
     const value = add(row, "span", { class: "value" });
     range.addEventListener("input", () => {
@@ -42,7 +40,7 @@
     });
     const settle = () => {
       stop();
-      play.hidden = still.matches;
+      play.hidden = steps && still.matches;
     };
     still.addEventListener("change", settle);
     settle();

@@ -4,71 +4,30 @@
 (() => {
   "use strict";
 
-  const { add, set, plane, chart, trace, published, parts: shared, words: { runs: words } } = window.nmpcrl;
+  const {
+    add, plane, mapParts, choice, chart, trace, key, player, published, parts: shared, words: { runs: words },
+  } = window.nmpcrl;
   const PACE = 350; // from one evaluation to the next while it plays [ms]
   const LEAST = 0.97, MOST = 1.3; // of the axes of costs: times the least of all, times theta_init's
 
   const finite = (numbers) => numbers.filter(Number.isFinite);
-  function choice(row, name, options, move) {
-    const line = add(row, "label", { class: "choice" });
-    add(line, "span", {}, words.choices[name]);
-    const select = add(line, "select", { "aria-label": words.choices[name] });
-    for (const value of options) add(select, "option", { value }, words.option(name, value));
-    select.addEventListener("change", () => move({ [name]: name === "seed" ? Number(select.value) : select.value }));
-    return (given) => { select.value = given[name]; };
-  }
 
   function choices(parent, offered, move) {
     const row = add(parent, "div", { class: "choices" });
-    const all = Object.entries(offered).map(([name, options]) => choice(row, name, options, move));
+    const all = Object.entries(offered).map(([name, options]) => {
+      const kind = { label: words.choices[name], options, text: (value) => words.option(name, value) };
+      return choice(row, kind, { read: (given) => given[name], write: (value) => move({ [name]: value }) });
+    });
     return (given) => all.forEach((draw) => draw(given));
   }
 
-  // A slider, and a button that moves it to the end.
-  function player(parent, episodes, read, move) {
-    const row = add(parent, "div", { class: "player" });
-    const play = add(row, "button", { type: "button" }, words.play);
-    const last = episodes.length - 1;
-    const range = add(row, "input", { type: "range", min: 0, max: last, step: 1, "aria-label": words.slider });
-    const value = add(row, "span", { class: "value" });
-    let timer = 0;
-    const stop = () => {
-      clearInterval(timer);
-      timer = 0;
-      play.textContent = words.play;
-    };
-    const next = () => {
-      if (read().at < last) move({ at: read().at + 1 });
-      if (read().at >= last) stop();
-    };
-    play.addEventListener("click", () => {
-      if (timer) return stop();
-      if (read().at === last) move({ at: 0 });
-      timer = setInterval(next, PACE);
-      play.textContent = words.pause;
-    });
-    range.addEventListener("input", () => {
-      stop();
-      move({ at: Number(range.value) });
-    });
-    return ({ at }) => {
-      range.value = at;
-      value.textContent = words.after(episodes[at]);
-      set(range, { "aria-valuetext": value.textContent });
-    };
-  }
-
-  function trajectories(map, { radii, problem: { target: [x, y] } }) {
+  function trajectories(map, data) {
     const discs = add(map.ground, "g");
     const lines = add(map.ground, "g");
-    add(map.ground, "circle", { class: "target", cx: x, cy: y });
-    map.write(words.target, x, y, { class: "name" });
+    mapParts.target(map, data);
     return (centres, found) => {
       discs.replaceChildren();
-      centres.forEach(([cx, cy, clearance], k) => {
-        add(discs, "circle", { class: "safety", cx, cy, r: clearance / 2 });
-        add(discs, "circle", { class: "disc", cx, cy, r: radii[k] });
-      });
+      centres.forEach((disc, k) => mapParts.circles(discs, disc, data.radii[k]));
       lines.replaceChildren();
       for (const { states, look } of found) trace(lines, "polyline", { points: shared.points(states) }, look);
     };
@@ -110,16 +69,11 @@
     return { lines, point: (x) => all.forEach((one) => one.point(x)) };
   }
 
-  function key(parent) {
+  function keys(parent) {
     const line = add(parent, "p", { class: "key" });
     return (found) => {
       line.replaceChildren();
-      for (const { learner, look } of found) {
-        const item = add(line, "span");
-        const svg = add(item, "svg", { viewBox: "0 0 34 4", "aria-hidden": true });
-        trace(svg, "path", { d: "M0 2H34" }, look);
-        item.append(words.option("first", learner));
-      }
+      for (const { learner, look } of found) key(line, words.option("first", learner), look);
     };
   }
 
@@ -144,20 +98,22 @@
     const { read, move } = shared.state(begin, show);
     shared.heading(figure, words);
     const choose = choices(figure, runs.offered, move);
-    const play = player(figure, data.episodes, read, move);
+    const { draw: play } = player(figure, {
+      label: words.slider, last: data.episodes.length - 1, pace: PACE, text: (at) => words.after(data.episodes[at]),
+    }, { read: () => read().at, write: (at) => move({ at }) });
     const scene = add(figure, "div", { class: "scene" });
     const map = plane(scene, data.view, words.map);
-    shared.background(map, data);
+    mapParts.background(map, data);
     const draw = trajectories(map, data);
     const curves = [costs(scene, data), thetas(figure, data)];
-    const named = key(figure);
+    const named = keys(figure);
     const tell = shared.results(figure);
     add(figure, "p", { class: "legend" }, words.legend(data.steps));
     let before = "";
 
     function show(given) {
       choose(given);
-      play(given);
+      play(given.at);
       const wanted = [...new Set([given.first, given.second, "frozen"])].filter(Boolean);
       const has = (learner) => Boolean(runs.find(given, learner));
       if (!wanted.every(has) && runs.more(given.layout)) {

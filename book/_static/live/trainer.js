@@ -2,7 +2,7 @@
 (() => {
   "use strict";
 
-  const { sources } = window.nmpcrl;
+  const { sources, words: { laboratory: words } } = window.nmpcrl;
 
   // Runs in the worker, which is given { module, problem, settings, widths }.
   function work() {
@@ -22,11 +22,12 @@
     const place = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
     const worker = new Worker(place);
     URL.revokeObjectURL(place);
-    worker.onmessage = ({ data: { row, end } }) => {
-      if (row) return on.row(row);
+    const end = (why) => {
       worker.terminate();
-      return on.end(end);
+      on.end(why);
     };
+    worker.onmessage = ({ data }) => (data.row ? on.row(data.row) : end(data.end));
+    worker.onerror = ({ message }) => end(message || words.noWorker); // it does not even begin
     worker.postMessage(given);
     return () => worker.terminate();
   }

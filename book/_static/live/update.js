@@ -2,8 +2,8 @@
 (() => {
   "use strict";
 
-  const { add, set, parts: shared, words: { update: words } } = window.nmpcrl;
-  const { clamp, slider } = shared;
+  const { add, set, slider, parts: shared, words: { update: words } } = window.nmpcrl;
+  const { clamp } = shared;
   const EXPONENTS = [-9, -5, 0.05]; // of alpha
   const NOISE = [-2, 2, 0.1]; // standard deviations
   const UNIT = 100, MOST = 3; // of the gauge; what is beyond stands at its end

@@ -1,11 +1,15 @@
 """Chapter 1's live figure: the controller, its plan and its closed loop."""
 
+from typing import Any
+
 from IPython.display import HTML
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.problem import begin
+
+SCRIPTS = frame.scripts_of("controller", *frame.MAP, "sliders.js")
 
 
 def controller(nmpc: Nmpc, theta: Vector, steps: int) -> HTML:
@@ -16,5 +20,8 @@ def controller(nmpc: Nmpc, theta: Vector, steps: int) -> HTML:
         theta: to begin with, shape (2n + m + 1,).
         steps: of the closed loop.
     """
-    own = {"steps": steps}
-    return frame.solving("controller", nmpc, lambda: begin(nmpc, nmpc.task.start, theta) | own)
+
+    def data() -> dict[str, Any]:
+        return begin(nmpc, nmpc.task.start, theta) | {"steps": steps}
+
+    return frame.solving("controller", nmpc, data, SCRIPTS)

@@ -1,5 +1,7 @@
 """Chapter 2's live figures: the gradient, its kink, and one update."""
 
+from typing import Any
+
 from IPython.display import HTML
 
 from nmpcrl import Vector
@@ -7,6 +9,8 @@ from nmpcrl.control import Nmpc
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.problem import begin, boundaries, close
+
+ON_MAP = (*frame.MAP, "sliders.js", "graph.js")
 
 
 def gradient(nmpc: Nmpc, state: Vector, theta: Vector, steps: Vector) -> HTML:
@@ -18,8 +22,11 @@ def gradient(nmpc: Nmpc, state: Vector, theta: Vector, steps: Vector) -> HTML:
         theta: likewise, shape (2n + m + 1,).
         steps: of the differences, growing, shape (k,).
     """
-    own = {"steps": steps.tolist(), "step": len(steps) // 2}
-    return frame.solving("gradient", nmpc, lambda: begin(nmpc, state, theta) | own, "graph.js")
+
+    def data() -> dict[str, Any]:
+        return begin(nmpc, state, theta) | {"steps": steps.tolist(), "step": len(steps) // 2}
+
+    return frame.solving("gradient", nmpc, data, frame.scripts_of("gradient", *ON_MAP))
 
 
 def kink(nmpc: Nmpc, state: Vector, theta: Vector) -> HTML:
@@ -31,7 +38,11 @@ def kink(nmpc: Nmpc, state: Vector, theta: Vector) -> HTML:
         theta: shape (2n + m + 1,).
     """
     own = {"boundaries": boundaries(nmpc.task, theta[-1]), "view": close(nmpc.task, state)}
-    return frame.solving("kink", nmpc, lambda: begin(nmpc, state, theta) | own, "graph.js")
+
+    def data() -> dict[str, Any]:
+        return begin(nmpc, state, theta) | own
+
+    return frame.solving("kink", nmpc, data, frame.scripts_of("kink", *ON_MAP))
 
 
 def update(nmpc: Nmpc, theta: Vector, alpha: float) -> HTML:
@@ -43,4 +54,8 @@ def update(nmpc: Nmpc, theta: Vector, alpha: float) -> HTML:
         alpha: likewise.
     """
     own = {"gamma": nmpc.gamma, "alpha": alpha, "overshoot": OVERSHOOT}
-    return frame.solving("update", nmpc, lambda: begin(nmpc, nmpc.task.start, theta) | own)
+
+    def data() -> dict[str, Any]:
+        return begin(nmpc, nmpc.task.start, theta) | own
+
+    return frame.solving("update", nmpc, data, frame.scripts_of("update", "sliders.js"))

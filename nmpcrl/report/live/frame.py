@@ -16,7 +16,8 @@ from nmpcrl.learning import browser
 from nmpcrl.report.prose import ROOT
 
 STYLE, MODULE = "live.css", "module.js"
-PARTS = ("solver.js", "words.js", "plane.js", "parts.js")  # of every figure that solves
+PARTS = ("solver.js", "words.js", "parts.js")  # of every figure that solves
+MAP = ("plane.js", "map_parts.js")
 FIGURE = """<figure class="live" data-figure="{}" hidden>
 <p>This figure is live once the notebook is trusted, or its cells are run.</p>
 <script type="application/json">{}</script>
@@ -47,24 +48,34 @@ def figure(
     return HTML("\n".join(shown))  # type: ignore[no-untyped-call]
 
 
-def solving(name: str, nmpc: Nmpc, data: Callable[[], Mapping[str, Any]], *more: str) -> HTML:
+def solving(
+    name: str,
+    nmpc: Nmpc,
+    data: Callable[[], Mapping[str, Any]],
+    scripts: Iterable[str],
+    styles: Iterable[str] = (),
+) -> HTML:
     """A live figure that solves; a sentence where its controller cannot be compiled.
 
     Args:
-        name: of the figure, and of its script without .js.
+        name: as for `figure`, and so are scripts and styles.
         nmpc: whose plant and task are compiled.
         data: makes what the script is given.
-        more: scripts between `PARTS` and the figure's own.
     """
     try:
-        return figure(name, data(), scripts_of(name, *more), browser.module(nmpc.plant, nmpc.task))
+        return figure(name, data(), scripts, browser.module(nmpc.plant, nmpc.task), styles)
     except CannotCompile as error:
         return absent(error)
 
 
 def scripts_of(name: str, *more: str) -> tuple[str, ...]:
-    """The scripts of a figure that solves, in the order in which they are needed."""
-    return (*PARTS, *more, f"{name}.js")
+    """The scripts of a figure that solves, in the order in which they are needed.
+
+    Args:
+        name: of its own script without .js, and of its words without _words.js.
+        more: what its own script needs besides `PARTS` and its words.
+    """
+    return (*PARTS, f"{name}_words.js", *more, f"{name}.js")
 
 
 def folder() -> Path:

@@ -15,8 +15,7 @@ from IPython.display import HTML
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import published
 from nmpcrl.claims.published import Published
-from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.learning import browser
+from nmpcrl.control import Nmpc
 from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.looks import look
@@ -26,7 +25,9 @@ from nmpcrl.study.design import LAYOUTS, MAIN_TABLE, SEEDS
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column
 
-SCRIPTS = (*frame.PARTS, "charts.js", "published.js", "runs.js")
+SCRIPTS = frame.scripts_of(
+    "runs", *frame.MAP, "sliders.js", "charts.js", "player.js", "published.js"
+)
 SHOWN = (MAIN_TABLE, "controls")  # parts of the study; in the others something else is changed
 LAYOUT, SEED = LAYOUTS[0], SEEDS[0]  # what a page is given
 CHOICES = ("first", "second", "layout", "decay", "seed")
@@ -36,13 +37,14 @@ LATER = "window.nmpcrl.packed = {{ ...window.nmpcrl.packed, {}: {} }};\n"
 
 def runs(*learners: str) -> HTML:
     """Published runs of these learners beside the frozen arm; the first two to begin with."""
-    nmpc, known = paper.nmpc(LAYOUT), published.load()
-    try:
-        problem, module = problem_of(nmpc), browser.module(nmpc.plant, nmpc.task)
-    except CannotCompile as error:
-        return frame.absent(error)
+    nmpc = paper.nmpc(LAYOUT)
+    return frame.solving("runs", nmpc, lambda: _data(nmpc, learners), SCRIPTS)
+
+
+def _data(nmpc: Nmpc, learners: tuple[str, ...]) -> dict[str, Any]:
+    known = published.load()
     tasks = {layout: paper.task(layout) for layout in LAYOUTS}
-    data = {
+    return {
         "looks": {name: look(name) for name in (*learners, "frozen")},
         "chosen": dict(zip(CHOICES, (*learners[:2], LAYOUT, "step", SEED), strict=True)),
         "layouts": {name: problem_of(paper.nmpc(name))["discs"] for name in tasks},
@@ -54,11 +56,10 @@ def runs(*learners: str) -> HTML:
         "start": nmpc.task.start.tolist(),
         "horizon": nmpc.horizon,
         "steps": paper.STEPS,
-        "problem": problem,
+        "problem": problem_of(nmpc),
         **surroundings(nmpc.task),
         "view": _union([view(task) for task in tasks.values()]),
     }
-    return frame.figure("runs", data, SCRIPTS, module)
 
 
 def scripts() -> dict[str, str]:

@@ -6,10 +6,8 @@ from typing import Any
 
 from IPython.display import HTML
 
-from nmpcrl.control import Obstacle
-from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.control import Nmpc, Obstacle
 from nmpcrl.control.solvers.charge import LONGEST
-from nmpcrl.learning import browser
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.continuing import TEMPLATES
 from nmpcrl.report.finds import Find
@@ -20,10 +18,10 @@ from nmpcrl.report.live.problem import WALL, problem_of
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.records import LAST
 
-SCRIPTS = (
-    *frame.PARTS, "random.js", "network.js", "learning.js", "trainer.js", "plot.js",
-    "laboratory_words.js", "settings.js", "laboratory_map.js", "laboratory_runs.js",
-    "laboratory.js",
+SCRIPTS = frame.scripts_of(
+    "laboratory", *frame.MAP, "random.js", "network.js", "learning.js", "trainer.js", "graph.js",
+    "settings.js", "laboratory_map.js", "laboratory_runs.js", "laboratory_plots.js",
+    "laboratory_along.js",
 )  # fmt: skip
 STYLES = ("laboratory.css",)
 LEARNERS = ("ES", "DES", "RDES", "GES", "TDC", "QL", "frozen")
@@ -42,15 +40,14 @@ def laboratory(gallery: Iterable[Find] = ()) -> HTML:
         gallery: what opens with a click.
     """
     nmpc = paper.nmpc("A")
-    try:
-        problem = problem_of(nmpc, LONGEST)
-        module = browser.module(nmpc.plant, nmpc.task)
-    except CannotCompile as error:
-        return frame.absent(error)
+    return frame.solving("laboratory", nmpc, lambda: _data(nmpc, gallery), SCRIPTS, STYLES)
+
+
+def _data(nmpc: Nmpc, gallery: Iterable[Find]) -> dict[str, Any]:
     (left, bottom), (right, top) = box = [paper.LOWER[:2], paper.UPPER[:2]]
     disc = Obstacle(0.0, 0.0).diameter
-    data = {
-        "problem": problem,
+    return {
+        "problem": problem_of(nmpc, LONGEST),
         "fields": [setting(name) for name in SETTINGS],
         "layouts": paper.LAYOUTS,
         "start": paper.START,
@@ -69,7 +66,7 @@ def laboratory(gallery: Iterable[Find] = ()) -> HTML:
         "robot": nmpc.task.robot_diameter / 2,
         "box": box,
         "view": [left - WALL, bottom - WALL, right - left + 2 * WALL, top - bottom + 2 * WALL],
-        "looks": {learner: [*look(learner).values()] for learner in LEARNERS},
+        "looks": {learner: look(learner) for learner in LEARNERS},
         "widths": widths(),
         "templates": TEMPLATES,
         "gallery": [
@@ -77,7 +74,6 @@ def laboratory(gallery: Iterable[Find] = ()) -> HTML:
             for one in gallery
         ],
     }
-    return frame.figure("laboratory", data, SCRIPTS, module, STYLES)
 
 
 def default(name: str) -> Any:

@@ -8,8 +8,6 @@ from typing import Any
 from IPython.display import HTML
 
 from nmpcrl.control import Nmpc
-from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.learning import browser
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.looks import look
@@ -18,9 +16,9 @@ from nmpcrl.report.live.problem import problem_of, surroundings
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.setup import DECAYS, controller_of
 
-SCRIPTS = (
-    *frame.PARTS, "charts.js", "random.js", "learning.js", "slices.js", "side_by_side.js",
-    "learners_shown.js", "learners.js",
+SCRIPTS = frame.scripts_of(
+    "learners", *frame.MAP, "sliders.js", "charts.js", "random.js", "learning.js", "slices.js",
+    "side_by_side.js", "learners_shown.js",
 )  # fmt: skip
 WITH_NETWORK = ("network.js", *SCRIPTS)
 SEEDS = 20  # offered
@@ -62,25 +60,24 @@ def _pair(
     scripts: tuple[str, ...],
 ) -> HTML:
     nmpc = controller_of(experiment).nmpc
-    try:
-        problem, module = problem_of(nmpc), browser.module(nmpc.plant, nmpc.task)
-    except CannotCompile as error:
-        return frame.absent(error)
-    data = {
-        "given": {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")},
-        "decays": list(DECAYS),
-        "seeds": [*range(SEEDS)],
-        "alphas": around(experiment.alpha),
-        "settings": {learner: settings(experiment, learner, nmpc) for learner in pair},
-        "noise": {"deviation": paper.NOISE, "widths": widths()},
-        "overshoot": OVERSHOOT,
-        "names": paper.THETA_NAMES,
-        "looks": {name: look(name) for name in (*pair, "frozen")},
-        "problem": problem,
-        **shown,
-        **surroundings(nmpc.task),
-    }
-    return frame.figure(name, data, scripts, module)
+
+    def data() -> dict[str, Any]:
+        return {
+            "given": {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")},
+            "decays": list(DECAYS),
+            "seeds": [*range(SEEDS)],
+            "alphas": around(experiment.alpha),
+            "settings": {learner: settings(experiment, learner, nmpc) for learner in pair},
+            "noise": {"deviation": paper.NOISE, "widths": widths()},
+            "overshoot": OVERSHOOT,
+            "names": paper.THETA_NAMES,
+            "looks": {name: look(name) for name in (*pair, "frozen")},
+            "problem": problem_of(nmpc),
+            **shown,
+            **surroundings(nmpc.task),
+        }
+
+    return frame.solving(name, nmpc, data, scripts)
 
 
 def settings(experiment: Experiment, learner: str, nmpc: Nmpc) -> dict[str, Any]:

@@ -1,16 +1,16 @@
 """Chapter 4's live figure of the chain: where theta goes, update by update."""
 
+from typing import Any
+
 from IPython.display import HTML
 
 from nmpcrl.analysis import two_state
-from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.learning import browser
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.problem import problem_of
 from nmpcrl.study import paper
 
-SCRIPTS = (*frame.PARTS, "charts.js", "player.js", "chain.js")
+SCRIPTS = frame.scripts_of("chain", "sliders.js", "charts.js", "player.js")
 RANGES = {"alpha": (0.01, 0.5, 0.01), "beta": (0.01, 1.0, 0.01), "gamma": (0.0, 1.0, 0.01)}
 LIMITS = (1e-4, 1e4)  # of the axis of theta
 
@@ -25,21 +25,22 @@ def chain(alpha: float, beta: float, gamma: float, *, updates: int = 120) -> HTM
         updates: how many are shown.
     """
     nmpc = paper.nmpc("A")  # the module has a controller's update rules
-    try:
-        problem, module = problem_of(nmpc), browser.module(nmpc.plant, nmpc.task)
-    except CannotCompile as error:
-        return frame.absent(error)
-    data = {
-        "given": {"alpha": alpha, "beta": beta, "gamma": gamma, "states": "first", "at": 0},
+    given = {"alpha": alpha, "beta": beta, "gamma": gamma, "states": "first", "at": 0}
+
+    def data() -> dict[str, Any]:
+        return _chain() | {"given": given, "updates": updates, "problem": problem_of(nmpc)}
+
+    return frame.solving("chain", nmpc, data, SCRIPTS)
+
+
+def _chain() -> dict[str, Any]:
+    return {
         "ranges": RANGES,
         "limits": LIMITS,
-        "updates": updates,
         "theta": 1.0,
         "w": 0.0,
         "phi": two_state.PHI.tolist(),
         "phi_next": two_state.PHI_NEXT.tolist(),
         "cost": two_state.COST,
         "looks": {learner: look(learner) for learner in ("ES", "GES")},
-        "problem": problem,
     }
-    return frame.figure("chain", data, SCRIPTS, module)

@@ -1,0 +1,55 @@
+// What a reader of the laboratory takes along, the run as a link and as Python; and the finds that open with a click.
+(() => {
+  "use strict";
+
+  const { add, set, settings, parts: shared, words: { laboratory: words } } = window.nmpcrl;
+
+  // Copies a text, and says whether this page may.
+  async function copy(text) {
+    return Boolean(navigator.clipboard) && navigator.clipboard.writeText(text).then(() => true, () => false);
+  }
+
+  // Text to take along, with a button that copies it.
+  function copied(parent, { name, label, rows, tell }) {
+    const box = add(parent, "textarea", { readonly: "", "aria-label": label, spellcheck: false, rows });
+    shared.button(parent, name, async () => {
+      box.select();
+      tell([[await copy(box.value) ? words.copied : words.notCopied]]);
+    });
+    return (text) => {
+      if (box.value !== text) box.value = text;
+      set(box, { rows: rows ?? text.split("\n").length });
+    };
+  }
+
+  function takeAlong(parent, data, tell) {
+    const link = add(parent, "div", { class: "along" });
+    add(link, "p", { class: "plot-title" }, words.link);
+    const address = copied(link, { name: words.copyLink, label: words.link, rows: 2, tell });
+    const python = add(parent, "div", { class: "along" });
+    add(python, "p", { class: "plot-title" }, words.python);
+    const same = add(python, "p", { class: "hint" });
+    const command = copied(python, { name: words.copyCommand, label: words.commandLabel, tell });
+    const code = copied(python, { name: words.copyCode, label: words.codeLabel, tell });
+    return (given) => {
+      same.textContent = words.pythonHint(given);
+      address(`${location.href.split("#")[0]}#${settings.written(given, data)}`);
+      command(settings.command(given, data));
+      code(settings.code(given, data).trimEnd());
+    };
+  }
+
+  function gallery(parent, data, open) {
+    if (!data.gallery.length) return;
+    add(parent, "p", { class: "plot-title" }, words.gallery);
+    const row = add(parent, "div", { class: "buttons gallery" }), sentence = add(parent, "p", { class: "sentence", role: "status" });
+    for (const find of data.gallery) {
+      shared.button(row, find.title, () => {
+        sentence.textContent = find.sentence;
+        open({ ...settings.defaults(data), ...find.settings });
+      });
+    }
+  }
+
+  window.nmpcrl = { ...window.nmpcrl, laboratoryAlong: { takeAlong, gallery } };
+})();

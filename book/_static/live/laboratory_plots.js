@@ -1,0 +1,129 @@
+// The laboratory's four plots: what all runs cost and how theta moves, over the episodes.
+(() => {
+  "use strict";
+
+  const { add, graph, laboratoryRuns: { judged }, words: { laboratory: words, parts: { fixed, symbols } } } = window.nmpcrl;
+  const NAMED = 4; // components of theta that have names
+  const ARM = "frozen";
+  const SIZE = [600, 190], MARGIN = { left: 50, right: 30, top: 10, bottom: 24 }; // [px]
+  const LINE = 12; // height of a small letter [px]
+  const ROOM = 0.06; // above and below all that is drawn, of its height
+  const TICKS = { x: 5, y: 4 };
+
+  // Powers of ten; every second or third where they are many.
+  function powers(from, to, count) {
+    const first = Math.ceil(from - 1e-9), all = Math.floor(to + 1e-9) - first + 1;
+    const every = Math.max(1, Math.ceil(all / count));
+    const name = (k) => (Math.abs(k) < 4 ? fixed(10 ** k, Math.max(0, -k)) : `1e${fixed(k, 0)}`);
+    return Array.from({ length: Math.ceil(all / every) }, (_, k) => first + every * k).map((at) => [at, name(at)]);
+  }
+
+  // Least and most of these, with some room.
+  function extent(values) {
+    if (!values.length) return [0, 1];
+    const least = Math.min(...values), most = Math.max(...values);
+    const room = ROOM * (most - least) || 0.05 * Math.abs(most) || 1;
+    return [least - room, most + room];
+  }
+
+  // Places of texts, moved apart so that none covers another, and up again from below the last place.
+  function apart(places, last) {
+    const order = places.map((_, k) => k).sort((a, b) => places[a] - places[b]), moved = [...places];
+    order.forEach((k, i) => {
+      if (i) moved[k] = Math.max(moved[k], moved[order[i - 1]] + LINE);
+    });
+    order.reverse().forEach((k, i) => {
+      moved[k] = Math.min(moved[k], i ? moved[order[i - 1]] - LINE : last);
+    });
+    return moved;
+  }
+
+  // What is returned draws { lines, x, log }: lines { points, name, look, color, dashes }; `x` is [least, most]; with
+  // `log` the y axis is logarithmic. A `name` stands at the end of its line; one of several parts is a letter and its
+  // subscripts. It is as wide as there is room, and redrawn as a whole.
+  function plot(parent, { title, label }) {
+    add(parent, "p", { class: "plot-title" }, title);
+    const { svg, draw } = graph(parent, label, { kind: "plot", size: SIZE, margin: MARGIN });
+    let shown = null;
+    new ResizeObserver(() => shown && redraw()).observe(svg);
+
+    function redraw() {
+      const { lines, x, log = false } = shown, scale = log ? Math.log10 : (value) => value;
+      const scaled = lines.map(({ points, ...line }) => ({
+        ...line, points: points.map(([k, value]) => [k, scale(value)]).filter(([, y]) => Number.isFinite(y)),
+      })).filter(({ points }) => points.length);
+      const [from, to] = extent(scaled.flatMap(({ points }) => points.map(([, y]) => y)));
+      const places = draw({
+        x: { from: x[0], to: x[1], count: TICKS.x },
+        y: { from, to, count: TICKS.y, ticks: log ? powers(from, to, TICKS.y) : undefined },
+        lines: scaled,
+        width: svg.clientWidth || SIZE[0],
+      });
+      names(scaled.filter(({ name }) => name), places);
+    }
+
+    function names(lines, { across, up, right, bottom }) {
+      const ends = lines.map(({ points }) => points.at(-1));
+      const places = apart(ends.map(([, y]) => up(y)), bottom);
+      lines.forEach(({ name }, k) => {
+        const [letter, ...subscripts] = [name].flat(), x = Math.min(across(ends[k][0]), right) + 4;
+        const text = add(svg, "text", { class: "right", x, y: places[k] + 4 }, letter);
+        if (subscripts.length) add(text, "tspan", { class: "subscript", dy: 3 }, subscripts.join(""));
+      });
+    }
+
+    return (content) => {
+      shown = content;
+      redraw();
+    };
+  }
+
+  const after = (rows) => rows.filter(({ episode }) => episode);
+
+  // The four that move most have names.
+  function components({ rows }, data, color) {
+    const moved = data.names.map((_, k) => {
+      const values = rows.map(({ theta }) => theta[k]);
+      return Math.max(...values) - Math.min(...values);
+    });
+    const most = [...moved].sort((a, b) => b - a)[NAMED - 1];
+    return data.names.map((name, k) => ({
+      name: moved[k] > 0 && moved[k] >= most ? symbols[name] : "",
+      look: moved[k] > 0 && moved[k] >= most ? "line" : "line quiet",
+      color,
+      points: rows.map(({ episode, theta }) => [episode, theta[k]]),
+    }));
+  }
+
+  function plots(parent, data) {
+    const grid = add(parent, "div", { class: "plots" });
+    const draw = Object.fromEntries(["judged", "cost", "theta", "step"].map((name) => (
+      [name, plot(add(grid, "div"), words.plots[name])]
+    )));
+    const heights = (lines) => lines.flatMap(({ points }) => points.map(([, y]) => y)).filter(Number.isFinite);
+    const wide = (values) => Math.max(...values) > 20 * Math.min(...values.filter((value) => value > 0));
+    return (runs, chosen) => {
+      const x = [0, Math.max(...runs.map(({ given }) => given.episodes), 1)];
+      const lines = (points) => runs.map((run) => {
+        const look = run === chosen ? "line chosen" : "line";
+        return { ...data.looks[run.given.learner], look, name: `${run.number}`, points: points(run.rows) };
+      });
+      const arms = (points) => runs.map((run) => ({ ...data.looks[ARM], look: "line", points: points(run) }));
+      const both = (points, ofArm) => {
+        const all = [...arms(ofArm), ...lines(points)];
+        return { lines: all, x, log: wide(heights(all)) };
+      };
+      const trained = (rows) => after(rows).map(({ episode, cost }) => [episode, cost]);
+      const level = ({ rows, given }) => judged(rows.slice(0, 1)).flatMap(([, cost]) => [[0, cost], [given.episodes, cost]]);
+      draw.judged(both(judged, level)); // without noise the frozen arm always does the same
+      draw.cost(both(trained, ({ arm }) => trained(arm)));
+      draw.theta({ x, lines: chosen ? components(chosen, data, data.looks[chosen.given.learner].color) : [] });
+      const steps = lines((rows) => after(rows).map(({ episode, alphaPhi2 }) => [episode, alphaPhi2]));
+      const limit = { look: "level", name: `${data.overshoot}`, points: x.map((episode) => [episode, data.overshoot]) };
+      const all = [limit, ...steps];
+      draw.step({ x, lines: all, log: wide(heights(all)) });
+    };
+  }
+
+  window.nmpcrl = { ...window.nmpcrl, laboratoryPlots: plots };
+})();
