@@ -106,7 +106,7 @@ def test_a_finger_drags_as_the_mouse_does(opened):
     tab.begun()
     tab.see()
     before = tab.shown()["given"]["discs"][2]
-    tab.swipe(tab.middle("Obstacle 3"), (0, 30))
+    tab.swipe(tab.middle("Obstacle 3"), (0, 30), steps=10)
     after = tab.shown()["given"]["discs"][2]
     assert after[1] < before[1] - 0.9
     assert after[0] == pytest.approx(before[0], abs=0.05)

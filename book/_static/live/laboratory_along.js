@@ -12,10 +12,14 @@
   // Text to take along, with a button that copies it.
   function copied(parent, { name, label, rows, tell }) {
     const box = add(parent, "textarea", { readonly: "", "aria-label": label, spellcheck: false, rows });
-    shared.button(parent, name, async () => {
+    const button = shared.button(parent, name, async () => {
       box.select();
-      tell([[await copy(box.value) ? words.copied : words.notCopied]]);
+      const said = await copy(box.value) ? words.copied : words.notCopied;
+      tell([[said]]);
+      beside.textContent = said;
     });
+    const beside = add(parent, "span", { class: "hint", "aria-hidden": true });
+    button.addEventListener("blur", () => { beside.textContent = ""; });
     return (text) => {
       if (box.value !== text) box.value = text;
       set(box, { rows: rows ?? text.split("\n").length });
