@@ -3,6 +3,8 @@
 Every chapter says what it needs, with the parameters of the editions; what of that is not stored
 is trained first. Summaries are small, and all of them are taken. A whole run takes up to 11 MB:
 those are taken that are long to train, and a notebook trains the others.
+
+Which runs Chapter 5 shows as `examples` it knows only once it has read the study.
 """
 
 import shutil
@@ -22,6 +24,7 @@ def stored(files: Iterable[str]) -> dict[str, Path]:
     from nmpcrl.study import store
 
     whole, summarised = needed(files)
+    summarised = tuple(dict.fromkeys((*summarised, *examples())))
     build.train(whole, summarised)
     paths = [*map(store.path_of, whole), *map(summaries.path_of, summarised)]
     # what another solver had to solve is not stored; a notebook does that again
@@ -39,6 +42,13 @@ def needed(files: Iterable[str]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         for what in ("experiments", "summaries")
     )
     return tuple(one for one in whole if seconds_of(one) > LONG), summarised
+
+
+def examples() -> tuple[Any, ...]:
+    """The runs of which Chapter 5 shows one for each mechanism, out of the published study."""
+    from nmpcrl.claims import evidence
+
+    return tuple(evidence.gather("published").examples.values())
 
 
 def given(notebook: Path) -> dict[str, Any]:

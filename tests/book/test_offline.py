@@ -7,6 +7,7 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 
 from nmpcrl.analysis import summaries
+from nmpcrl.claims import failure_modes, published
 from nmpcrl.study import Experiment, store
 
 ASKS = """from nmpcrl.study import Experiment
@@ -44,6 +45,7 @@ def test_long_runs_and_all_summaries_are_taken_with_the_parameters_of_the_editio
 @pytest.mark.usefixtures("trains_here")
 def test_what_is_missing_is_trained_and_an_edition_reads_it(chapter, tmp_path, monkeypatch):
     monkeypatch.setattr(offline, "LONG", 0)
+    monkeypatch.setattr(offline, "examples", lambda: (Experiment("frozen", episodes=1),))
     found = offline.stored([chapter])
     place = tmp_path / "student"
     offline.copy(found, place)
@@ -57,3 +59,11 @@ def test_runs_with_networks_are_taken_and_those_without_are_not():
     whole, summarised = offline.needed(course.chapters())
     assert {one.learner for one in whole} == {"DES", "RDES"}
     assert {one.learner for one in summarised} > {"ES", "GES", "TDC", "frozen"}
+
+
+def test_the_examples_of_chapter_5_are_a_run_of_each_mechanism_of_the_published_study():
+    known = published.load()
+    found = [known.rows[one]["mechanism"] for one in offline.examples()]
+    assert sorted(found) == sorted(set(found))
+    assert len(found) >= 3
+    assert failure_modes.WELL not in found
