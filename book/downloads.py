@@ -2,6 +2,7 @@
 
 A page says with `<div class="course-downloads" data-editions="student"></div>` where links to them
 stand. In a site without the files there are none: `make course` makes both, after `make book`.
+Whole runs are large, and only students download them: the notebooks of others train them anew.
 """
 
 import os
@@ -17,6 +18,7 @@ CONTENTS = {  # in words, by edition
     "grader": "Notebooks for graders, marked for nbgrader",
     "slides": "Slides, a deck for each chapter",
 }
+WITHOUT_RUNS = ("instructor", "grader")  # but with their summaries
 PLACE = re.compile(
     r'(?P<open><div class="course-downloads" data-editions="(?P<editions>[\w ]+)">).*?</div>',
     flags=re.S,
@@ -29,6 +31,8 @@ def zipped(folder: Path, target: Path) -> None:
     """A folder as a ZIP, which unpacks to a folder of its name; no date, the same bytes."""
     with ZipFile(target, "w") as archive:
         for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+            if folder.name in WITHOUT_RUNS and path.parent.name == "runs":
+                continue
             name = folder.name / path.relative_to(folder)
             entry = ZipInfo(name.as_posix())  # of 1980
             entry.external_attr = 0o644 << 16

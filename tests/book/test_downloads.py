@@ -22,10 +22,16 @@ def small(tmp_path) -> Path:
 
 
 def folder(place: Path, text: str = "text") -> Path:
-    (place / "data").mkdir(parents=True)
+    (place / "data/runs/summaries").mkdir(parents=True)
     (place / "a.ipynb").write_text(text)
-    (place / "data/run.npz").write_bytes(bytes(2_000))
+    for name in ("run", "summaries/run"):
+        (place / f"data/runs/{name}.npz").write_bytes(bytes(2_000))
     return place
+
+
+def names(zipped: Path) -> list[str]:
+    with ZipFile(zipped) as archive:
+        return archive.namelist()
 
 
 def links(site: Path) -> dict[str, str]:
@@ -41,9 +47,20 @@ def test_the_same_folder_gives_the_same_bytes_whenever_it_was_written(tmp_path):
             (place / "a.ipynb").chmod(0o600)
         downloads.zipped(place, tmp_path / f"{name}.zip")
     assert (tmp_path / "one.zip").read_bytes() == (tmp_path / "two.zip").read_bytes()
-    with ZipFile(tmp_path / "one.zip") as archive:
-        assert archive.namelist() == ["student/a.ipynb", "student/data/run.npz"]
-        assert archive.read("student/a.ipynb") == b"text"
+    assert names(tmp_path / "one.zip") == [
+        "student/a.ipynb",
+        "student/data/runs/run.npz",
+        "student/data/runs/summaries/run.npz",
+    ]
+
+
+@pytest.mark.parametrize("edition", downloads.WITHOUT_RUNS)
+def test_only_students_download_whole_runs_which_are_large(edition, tmp_path):
+    downloads.zipped(folder(tmp_path / edition), tmp_path / "one.zip")
+    assert names(tmp_path / "one.zip") == [
+        f"{edition}/a.ipynb",
+        f"{edition}/data/runs/summaries/run.npz",
+    ]
 
 
 def test_a_page_links_to_the_files_that_are_there_with_their_size(small, tmp_path):
