@@ -19,13 +19,17 @@ LONG = 10  # of a run [s], as `limits.seconds_of` has it: those whose learner fi
 
 
 def stored(files: Iterable[str]) -> dict[str, Path]:
-    """What the chapters in these files need stored: path in the folder of an edition -> file."""
+    """What the chapters in these files need stored: path in the folder of an edition -> file.
+
+    Examples are not compared with the published study as `build.train` does: they are those of
+    its runs that went wrong, and no sample of it.
+    """
     from nmpcrl.analysis import summaries  # only here: a mistake elsewhere should not wait for it
     from nmpcrl.study import store
 
     whole, summarised = needed(files)
-    summarised = tuple(dict.fromkeys((*summarised, *examples())))
     build.train(whole, summarised)
+    summarised = tuple(summaries.fetch_summaries((*summarised, *examples())))
     paths = [*map(store.path_of, whole), *map(summaries.path_of, summarised)]
     # what another solver had to solve is not stored; a notebook does that again
     there = filter(Path.exists, paths)
