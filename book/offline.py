@@ -4,7 +4,7 @@ Every chapter says what it needs, with the parameters of the editions; what of t
 is trained first. Summaries are small, and all of them are taken. A whole run takes up to 11 MB:
 those are taken that are long to train, and a notebook trains the others.
 
-Which runs Chapter 5 shows as `examples` it knows only once it has read the study.
+Chapter 5 names its `examples` after it has read the study, and so they are found here.
 """
 
 import shutil
