@@ -6,10 +6,11 @@
 The folder `grader` is one of a course of nbgrader's, with one assignment, `nmpcrl`; it is for
 teachers alone, and `nmpcrl grade` reads it.
 
-Each folder can be handed out as it is. The first two hold the chapters that have exercises, the
-library as a wheel, the libraries to install with it, and the published study; the slides, which
-show what the last `make book` computed, are also PDFs if there is a Chromium. Two builds give the
-same bytes, but for PDFs.
+Each folder can be handed out as it is. The first three hold the chapters that have exercises, the
+library as a wheel, the libraries to install with it, the published study, and the runs that would
+take long to train, as `offline` says. The slides and the teachers' figures show what the last
+`make book` computed; a Chromium prints the slides, too. If there is a built book, it offers all of
+this, as `downloads` says. Two builds give the same bytes.
 """
 
 import os
@@ -17,7 +18,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,13 +26,17 @@ from typing import Any
 import autograded
 import build
 import click
+import downloads
 import editions
 import nbformat
+import offline
+import pictures
 import slides
 
 from nmpcrl.course.exercises import exercises
 
 ROOT = build.ROOT
+PLACE, SITE = Path("_build/course"), Path("_build/html")
 EDITIONS: dict[str, Callable[..., Any]] = {
     "student": editions.student,
     "instructor": editions.teacher,
@@ -63,8 +68,15 @@ def wheel(place: Path) -> Path:
     return made
 
 
-def edition(name: str, place: Path, *, otter: bool = False) -> None:
-    """Write one edition to a folder, which is made anew; that of graders perhaps for otter."""
+def edition(name: str, place: Path, runs: Mapping[str, Path], *, otter: bool = False) -> None:
+    """Write one edition to a folder, which is made anew.
+
+    Args:
+        name: of the edition.
+        place: the folder.
+        runs: what else it holds, as `offline.stored` has it.
+        otter: mark the notebooks of graders for otter.
+    """
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     library = wheel(place).name
@@ -75,6 +87,46 @@ def edition(name: str, place: Path, *, otter: bool = False) -> None:
     shutil.copy2(ROOT / "environment.txt", place)
     for data in ("published", "_static/live"):
         shutil.copytree(ROOT / "book" / data, place / "data" / Path(data).name)
+    offline.copy(runs, place)
+
+
+def figures(sources: Iterable[str], place: Path) -> None:
+    """Write the figures of executed chapters, each to its folder in `place`."""
+    for name in sources:
+        folder = place / Path(name).stem
+        folder.mkdir(parents=True)
+        for file, data in drawn(slides.EXECUTED / name).items():
+            (folder / file).write_bytes(data)
+
+
+def drawn(executed: Path) -> dict[str, bytes]:
+    """The figures of an executed chapter, by file name."""
+    try:
+        return pictures.vectors(nbformat.read(executed, 4))
+    except (FileNotFoundError, KeyError) as missing:
+        reason = f"Figures are those of an executed {executed.name}: `make book` executes it."
+        raise build.Failure(reason) from missing
+
+
+def decks(sources: dict[str, Any], place: Path) -> None:
+    """Write the slides of executed chapters to a folder, as PDFs, too."""
+    slides.printed(slides.make(sources, slides.EXECUTED, place))
+
+
+SHOWN: dict[str, Callable[[dict[str, Any], Path], None]] = {  # of the last build, by folder
+    "instructor/figures": figures,
+    "slides": decks,
+}
+
+
+def is_whole(name: str, sources: dict[str, Any]) -> bool:
+    """Make one of `SHOWN`, or say why it is not whole; the notebooks need none of them."""
+    try:
+        SHOWN[name](sources, PLACE / name)
+    except build.Failure as reason:
+        click.echo(f"{PLACE / name} is not whole. {reason.message}")
+        return False
+    return True
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
@@ -82,16 +134,18 @@ def edition(name: str, place: Path, *, otter: bool = False) -> None:
 def main(otter: bool) -> None:
     """Write the editions to _build/course."""
     os.chdir(ROOT)
+    sources = chapters()
+    runs = offline.stored(sources)
     for name in EDITIONS:
-        folder = Path("_build/course") / name
-        edition(name, folder / WITHIN.get(name, ""), otter=otter and name == "grader")
-        click.echo(folder)
-    Path("_build/course/grader/nbgrader_config.py").write_text(autograded.NBGRADER_CONFIG)
-    try:
-        slides.printed(slides.make(chapters(), slides.EXECUTED, Path("_build/course/slides")))
-        click.echo("_build/course/slides")
-    except build.Failure as reason:  # the notebooks need neither
-        click.echo(f"_build/course/slides is not whole. {reason.message}")
+        place = PLACE / name / WITHIN.get(name, "")
+        edition(name, place, runs, otter=otter and name == "grader")
+    (PLACE / "grader/nbgrader_config.py").write_text(autograded.NBGRADER_CONFIG)
+    whole = [*EDITIONS, *(name for name in SHOWN if is_whole(name, sources))]
+    made = [PLACE / name for name in whole]
+    if (SITE / "index.html").exists():
+        made += downloads.offer([path for path in made if path.parent == PLACE], SITE)
+    for path in made:
+        click.echo(path)
 
 
 if __name__ == "__main__":

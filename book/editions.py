@@ -2,8 +2,9 @@
 
 Both have a cell that says how to set up and where the data are, a line with kind, level, minutes
 and points in each exercise, and parameters with which a notebook takes less than two minutes.
-Students get no solutions; teachers get them in the place of the answers, a table of the exercises,
-and a note in each. Graders get one from which nbgrader, otter or `nmpcrl grade` makes the rest.
+Students get no solutions; teachers get them in the place of the answers, tables with the minutes of
+sections and exercises, and a note in each exercise and at each live figure. Graders get one from
+which nbgrader, otter or `nmpcrl grade` makes the rest.
 """
 
 import re
@@ -12,7 +13,11 @@ from copy import deepcopy
 from typing import Any
 
 import autograded
+import syllabus
 from nbformat.v4 import new_code_cell, new_markdown_cell
+from plans import LIVE, lecture
+from syllabus import LIVE as LIVE_FIGURE
+from syllabus import Chapter
 
 from nmpcrl.course.exercises import HEAD, Exercise, exercises, solved
 
@@ -38,6 +43,7 @@ folders = {"PUBLISHED": "published", "RUNS": "runs", "LIVE": "live"}
 os.environ |= {f"NMPCRL_{name}": f"data/{folder}" for name, folder in folders.items()}
 os.environ["NMPCRL_STRICT"] = "1"  # an answer that is missing or wrong fails"""
 COLUMNS = "| exercise | kind | level | minutes | points | goal |\n|---|---|---|---|---|---|"
+TIMES = "| section | reading | lecture | live figures |\n|---|---:|---:|---:|"
 
 
 def student(source: Notebook, pages: Collection[str], wheel: str) -> Notebook:
@@ -65,13 +71,15 @@ def teacher(source: Notebook, pages: Collection[str], wheel: str) -> Notebook:
     every = list(exercises(notebook))
     for one in every:
         _line(one)
-        note = new_markdown_cell(_note(one), id=f"{one.text.id}-note", metadata={"tags": ["note"]})
-        notebook.cells.insert(notebook.cells.index(one.text) + 1, note)
+        _insert(notebook, notebook.cells.index(one.text) + 1, _note(one), f"{one.text.id}-note")
         for cell in one.parts["answer"]:
             del cell.metadata["nmpcrl"]
+    for cell in [cell for cell in notebook.cells if LIVE_FIGURE.search(cell.source)]:
+        note = f"> **For the teacher.** {syllabus.helps(cell.id)}"
+        _insert(notebook, notebook.cells.index(cell), note, f"{cell.id}-note")
     if every:
-        table = new_markdown_cell(_table(every), id="exercises-table", metadata={"tags": ["note"]})
-        notebook.cells.insert(1, table)
+        _insert(notebook, 1, _table(every), "exercises-table")
+    _insert(notebook, 1, _times(syllabus.chapter("", 0, source)), "sections-table")
     return _edition(notebook, pages, wheel)
 
 
@@ -125,6 +133,11 @@ def _drop(notebook: Notebook, cells: list[Any]) -> None:
     notebook.cells = [cell for cell in notebook.cells if cell.id not in ids]
 
 
+def _insert(notebook: Notebook, index: int, text: str, name: str) -> None:
+    note = new_markdown_cell(text, id=name, metadata={"tags": ["note"]})
+    notebook.cells.insert(index, note)
+
+
 def _note(exercise: Exercise) -> str:
     """For whoever teaches: the goal, and what goes wrong."""
     about = exercise.about
@@ -144,3 +157,16 @@ def _table(every: list[Exercise]) -> str:
     return "\n".join(
         ["**For the teacher: the exercises of this chapter.**\n", COLUMNS, *rows, "", total]
     )
+
+
+def _times(chapter: Chapter) -> str:
+    """The minutes of each section, as the plans of a course count them."""
+    rows = [
+        f"| {one.title} | {syllabus.minutes([one])} | {lecture([one])} | {LIVE * one.live or ''} |"
+        for one in chapter.sections
+    ]
+    every = chapter.sections
+    total = f"| Together | {chapter.reading} | {lecture(every)} "
+    total += f"| {LIVE * sum(one.live for one in every) or ''} |"
+    title = "**For the teacher: minutes of each section.**\n"
+    return "\n".join([title, TIMES, *rows, total])

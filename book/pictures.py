@@ -1,7 +1,8 @@
 """Figures on a page: files beside it, and the `<picture>` that chooses among them.
 
 A figure of `nmpcrl.report.figures.sheet` displays a PNG, for every notebook editor. In a build it
-displays more, for the page alone: its finding, an SVG of it, and one that a telephone has room for.
+displays more, for the page alone: its finding, an SVG of it, and one that a telephone has room for;
+and a PDF, for whoever teaches.
 """
 
 import re
@@ -77,6 +78,21 @@ def beside(markdown: str, folder: Path) -> str:
         return f'<div class="cell_output docutils container">\n{picture}\n</div>'  # a block: whole
 
     return IMAGE.sub(shown, markdown)
+
+
+def vectors(notebook: Any) -> dict[str, bytes]:
+    """The figures of an executed notebook for one's own slides: SVG and PDF, by file name.
+
+    Raises:
+        KeyError: the notebook was executed before figures had a PDF.
+    """
+    files: dict[str, bytes] = {}
+    for cell, data in _figures(notebook):
+        shown = data[MIME]
+        svg = shown["wide"].get("svg") or shown["wide"]["heavy"]
+        files[f"{cell.id}.svg"] = svg.encode()
+        files[f"{cell.id}.pdf"] = b64decode(shown["pdf"])
+    return files
 
 
 def plain(notebook: Any) -> Any:

@@ -5,7 +5,7 @@ chapters in their order; those that do not fit are homework after the chapter's 
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,7 +40,7 @@ class Unit:
     def minutes(self) -> dict[str, int]:
         """Minutes by what they are spent on."""
         return {
-            "lecture": math.ceil(PACE * minutes(self.sections)),
+            "lecture": lecture(self.sections),
             "live figures": LIVE * sum(one.live for one in self.sections),
             "exercises": sum(one.about.minutes for one in self.exercises),
             "discussion": self.discussion[0],
@@ -49,6 +49,11 @@ class Unit:
     @property
     def total(self) -> int:
         return sum(self.minutes.values())
+
+
+def lecture(sections: Sequence[Section]) -> int:
+    """Minutes that it takes to teach sections."""
+    return math.ceil(PACE * minutes(list(sections)))
 
 
 def plan(name: str) -> list[Unit]:

@@ -6,6 +6,7 @@ sphinx-mathjax-offline. Keys: arrows move, S opens the speaker's window, N shows
 and `?print-pdf` prints.
 """
 
+import re
 import shutil
 from collections.abc import Iterable
 from html import escape
@@ -28,6 +29,7 @@ PACKAGES = {  # where its files are, and which of them a deck takes
     "sphinx-mathjax-offline": ("static/mathjax", ("tex-svg-full.js",)),
 }
 OWN = ("deck.css", "deck.js")
+DATE = re.compile(rb"(?<=Date \(D:)\d{14}")  # when a PDF was made
 LANDSCAPE: Any = {"width": 1280, "height": 720}  # [px]
 PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -97,8 +99,8 @@ def copy(package: str, folder: str, names: Iterable[str], place: Path) -> None:
 
 
 def printed(decks: Iterable[Path]) -> list[Path]:
-    """Each deck as a PDF beside it, one slide a page, by the distribution's Chromium."""
-    browser = pdf.chromium()
+    """Each deck as a PDF beside it, one slide a page, with the version's date, by a Chromium."""
+    browser, date = pdf.chromium(), f"{pdf.version()[1]:%Y%m%d%H%M%S}".encode()
     from playwright.sync_api import sync_playwright  # only here: a refusal should not wait for it
 
     made = []
@@ -110,7 +112,8 @@ def printed(decks: Iterable[Path]) -> list[Path]:
             tab = chromium.new_page(viewport=LANDSCAPE)
             tab.goto(f"{path.resolve().as_uri()}?print-pdf")
             tab.wait_for_selector("html[data-ready] .pdf-page", state="attached")
+            printed = tab.pdf(prefer_css_page_size=True, print_background=True)
             made.append(path.with_suffix(".pdf"))
-            tab.pdf(path=made[-1], prefer_css_page_size=True, print_background=True)
+            made[-1].write_bytes(DATE.sub(date, printed))
             tab.close()
     return made

@@ -146,6 +146,21 @@ def declared_of(page: str) -> dict[str, Any]:
     return found
 
 
+def helps(figure: str) -> str:
+    """Where a live figure helps, for whoever teaches.
+
+    Args:
+        figure: the name of its cell.
+
+    Raises:
+        Unknown: `syllabus.yml` does not say.
+    """
+    said: dict[str, str] = declared()["live"]
+    if figure not in said:
+        raise Unknown(f"book/syllabus.yml does not say where the live figure {figure} helps")
+    return said[figure]
+
+
 def _sections(page: str, notebook: Any) -> Iterator[Section]:
     title, spent, live = "", 0.0, 0
     for cell in [*notebook.cells, nbformat.v4.new_markdown_cell("## End")]:

@@ -26,6 +26,7 @@ settings.register_profile("no clock", deadline=None)  # the machine may be busy
 settings.load_profile("no clock")
 
 ROOT = Path(__file__).resolve().parent.parent
+RUNS = Path(os.environ.get("NMPCRL_RUNS") or ROOT / "runs")  # before a test names others
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run"
@@ -61,6 +62,17 @@ def shared(tmp_path_factory) -> Path:
     """A folder that the workers of a session have in common."""
     own = tmp_path_factory.getbasetemp()
     return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+
+@pytest.fixture(scope="session")
+def long_runs(shared) -> dict[str, Path]:
+    """What every edition of the course holds stored, as `make course` finds or trains it."""
+    import course
+    import offline
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("NMPCRL_RUNS", str(RUNS if RUNS.is_dir() else shared / "long_runs"))
+        return offline.stored(course.chapters())
 
 
 @pytest.fixture

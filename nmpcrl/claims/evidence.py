@@ -13,6 +13,7 @@ import pandas as pd
 
 from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import RunSummary, cost_ratios, table
+from nmpcrl.claims.failure_modes import WELL
 from nmpcrl.claims.published import failure_modes_of, load
 from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
@@ -52,6 +53,18 @@ class Evidence:
         counts = {"trained for this page": fresh, "published": len(self.runs) - fresh}
         parts = [f"{count} runs {where}" for where, count in counts.items() if count]
         return ", ".join(parts) or "no runs"
+
+    @property
+    def wrong(self) -> pd.DataFrame:
+        """The runs that went wrong, those trained here first; `run` is each one's experiment."""
+        runs = self.runs.assign(run=list(self.summaries))
+        runs = runs[~runs.mechanism.isin(("", WELL))]
+        return runs.sort_values("source", kind="stable")
+
+    @property
+    def examples(self) -> dict[str, Experiment]:
+        """The first run that went wrong of each mechanism."""
+        return dict(self.wrong.drop_duplicates("mechanism").set_index("mechanism").run)
 
 
 def needed(

@@ -1,16 +1,22 @@
 """The editions for a course: what students get, what teachers get, and that both run."""
 
 import ast
+import math
 import re
 import zipfile
+from base64 import b64encode
 from pathlib import Path
 
 import course
 import nbformat
+import plans
 import pytest
+import syllabus
 from nbclient import NotebookClient
+from nbformat.v4 import new_code_cell, new_notebook, new_output
 
 from nmpcrl.course.exercises import exercises, solved
+from nmpcrl.report.figures.sheet import MIME
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = course.chapters()
@@ -97,10 +103,71 @@ def test_teachers_get_the_solutions_a_table_and_what_goes_wrong(name):
         assert [c.source for c in one.parts["answer"]] == [c.source for c in source.parts["answer"]]
         for mistake in source.about.mistakes:
             assert f"- Common: {mistake}" in text(notebook).replace('\\"', '"')
-    table = notebook.cells[3].source
+    (table,) = (cell.source for cell in notebook.cells if cell.id == "exercises-table")
     every = list(exercises(answered))
     assert table.count("\n| ") == len(every) + 1
     assert f"Together {sum(one.about.minutes for one in every)} minutes" in table
+
+
+@each_chapter
+def test_teachers_get_the_minutes_of_each_section(name):
+    (table,) = (c.source for c in made("instructor", name).cells if c.id == "sections-table")
+    rows = [row.strip("| ").split(" | ") for row in table.splitlines() if row.startswith("| ")][1:]
+    chapter = syllabus.chapters()[Path(name).stem]
+    assert [row[0] for row in rows] == [*(one.title for one in chapter.sections), "Together"]
+    assert int(rows[-1][1]) == chapter.reading
+    for one, row in zip(chapter.sections, rows, strict=False):
+        assert int(row[1]) == syllabus.minutes([one])
+        assert int(row[2]) == math.ceil(plans.PACE * int(row[1]))
+        assert row[3:] == ([str(plans.LIVE * one.live)] if one.live else [])
+
+
+@each_chapter
+def test_a_note_before_each_live_figure_says_to_teachers_where_it_helps(name):
+    cells = made("instructor", name).cells
+    figures = [k for k, cell in enumerate(cells) if syllabus.LIVE.search(cell.source)]
+    assert len(figures) == sum(one.live for one in syllabus.chapters()[Path(name).stem].sections)
+    for k in figures:
+        said = syllabus.declared()["live"][cells[k].id]
+        assert cells[k - 1].source == f"> **For the teacher.** {said}"
+        assert said.endswith(".")
+
+
+def test_the_syllabus_says_where_a_live_figure_helps_for_those_that_there_are():
+    every = {cell.id for notebook in SOURCES.values() for cell in notebook.cells}
+    assert set(syllabus.declared()["live"]) <= every
+    with pytest.raises(syllabus.Unknown, match="new-live"):
+        syllabus.helps("new-live")
+
+
+@pytest.fixture
+def last_build(tmp_path, monkeypatch) -> Path:
+    """An executed chapter with one figure."""
+    shown = {"wide": {"svg": "<svg/>"}, "pdf": b64encode(b"%PDF").decode()}
+    data = {"image/png": b64encode(b"PNG").decode(), MIME: shown}
+    cell = new_code_cell("draw()", id="loop", outputs=[new_output("display_data", data)])
+    nbformat.write(new_notebook(cells=[cell]), tmp_path / "01_a.ipynb")
+    monkeypatch.setattr(course.slides, "EXECUTED", tmp_path)
+    return tmp_path
+
+
+def test_teachers_get_the_figures_of_the_last_build_as_svg_and_pdf(last_build):
+    course.figures(["01_a.ipynb"], last_build / "figures")
+    place = last_build / "figures/01_a"
+    assert (place / "loop.svg").read_text() == "<svg/>"
+    assert (place / "loop.pdf").read_bytes() == b"%PDF"
+
+
+def test_without_an_executed_chapter_the_figures_are_not_whole_and_the_reason_is_said(
+    last_build, monkeypatch, capsys
+):
+    monkeypatch.setattr(course, "PLACE", last_build)
+    assert not course.is_whole("instructor/figures", {"02_b.ipynb": None})
+    assert "`make book`" in capsys.readouterr().out
+    notebook = nbformat.read(last_build / "01_a.ipynb", 4)
+    del notebook.cells[0].outputs[0].data[MIME]["pdf"]  # an older build
+    nbformat.write(notebook, last_build / "01_a.ipynb")
+    assert not course.is_whole("instructor/figures", {"01_a.ipynb": None})
 
 
 @each_chapter
@@ -124,9 +191,11 @@ def test_an_edition_is_a_valid_notebook_that_leads_nowhere_else(edition, name):
 
 @pytest.mark.slow
 def test_two_builds_give_the_same_bytes(tmp_path):
+    (tmp_path / "run.npz").write_bytes(bytes(9))
+    runs = {"data/runs/run.npz": tmp_path / "run.npz"}
     for build in ("one", "two"):
         for edition in course.EDITIONS:
-            course.edition(edition, tmp_path / build / edition)
+            course.edition(edition, tmp_path / build / edition, runs)
     files = {
         path.relative_to(tmp_path / "one"): path.read_bytes()
         for path in sorted((tmp_path / "one").rglob("*"))
@@ -135,20 +204,15 @@ def test_two_builds_give_the_same_bytes(tmp_path):
     again = {path: (tmp_path / "two" / path).read_bytes() for path in files}
     assert files == again
     assert {path.parts[0] for path in files} == set(course.EDITIONS)
+    assert all(Path(edition, *runs) in files for edition in course.EDITIONS)
     assert not any(b"/" + b"work/" in data or str(ROOT).encode() in data for data in files.values())
 
 
-def executed(edition: str, name: str, folder: Path, monkeypatch):
-    """An edition of a chapter, run from its own folder, with its own wheel.
-
-    Runs that are stored in this checkout are not trained.
-    """
-    stored = ROOT / "runs"
+def executed(edition: str, name: str, folder: Path, runs, monkeypatch):
+    """An edition of a chapter, run from its own folder, with its own wheel and runs."""
     for variable in ("NMPCRL_RUNS", "NMPCRL_PUBLISHED", "NMPCRL_STRICT"):
         monkeypatch.delenv(variable, raising=False)
-    course.edition(edition, folder)
-    if stored.is_dir():
-        (folder / "data/runs").symlink_to(stored)
+    course.edition(edition, folder, runs)
     zipfile.ZipFile(next(folder.glob("*.whl"))).extractall(folder.parent / "installed")
     monkeypatch.setenv("PYTHONPATH", str(folder.parent / "installed"))
     notebook = nbformat.read(folder / name, 4)
@@ -169,17 +233,17 @@ def failed(notebook) -> list[str]:
 @pytest.mark.course
 @each_chapter
 def test_an_untouched_notebook_of_a_student_runs_and_fails_exactly_its_checks(
-    name, tmp_path, monkeypatch
+    name, tmp_path, long_runs, monkeypatch
 ):
-    notebook = executed("student", name, tmp_path / "student", monkeypatch)
+    notebook = executed("student", name, tmp_path / "student", long_runs, monkeypatch)
     checks = [c.id for one in exercises(notebook) for c in one.parts["check"]]
     assert failed(notebook) == checks
 
 
 @pytest.mark.course
 @each_chapter
-def test_every_check_passes_in_the_notebook_of_a_teacher(name, tmp_path, monkeypatch):
-    notebook = executed("instructor", name, tmp_path / "instructor", monkeypatch)
+def test_every_check_passes_in_the_notebook_of_a_teacher(name, tmp_path, long_runs, monkeypatch):
+    notebook = executed("instructor", name, tmp_path / "instructor", long_runs, monkeypatch)
     assert failed(notebook) == []
     for one in exercises(notebook):
         for cell in one.parts["check"]:

@@ -83,6 +83,11 @@ def test_every_link_leads_to_a_page_and_a_label_that_are_there(page):
 
 
 @each_page
+def test_a_link_to_a_label_has_no_code_in_its_words_which_a_role_cannot_show(page):
+    assert [words for words, _, label in links(page) if label and "`" in words] == []
+
+
+@each_page
 def test_equations_exercises_and_algorithms_are_numbered_in_their_order(page):
     for label, words in numbers(page).items():
         after = SOURCES[page].partition(f'<a id="{label}"></a>')[2]

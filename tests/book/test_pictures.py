@@ -51,6 +51,17 @@ def test_what_has_no_light_svg_is_shown_as_a_png():
     assert html(one).count('"../_static/figures/es-theta.png"') == 3
 
 
+@pytest.mark.parametrize("kind", ["svg", "heavy"])
+def test_a_teacher_gets_each_figure_as_svg_and_pdf_however_heavy_it_is(kind):
+    one = notebook({kind: SVG}, None)
+    shown = one.cells[1].outputs[0].data[MIME]
+    with pytest.raises(KeyError):  # of an older build
+        pictures.vectors(one)
+    shown["pdf"] = b64encode(b"%PDF").decode()
+    name = one.cells[1].id
+    assert pictures.vectors(one) == {f"{name}.svg": SVG.encode(), f"{name}.pdf": b"%PDF"}
+
+
 def test_the_alternative_text_is_the_finding_and_then_the_form():
     one = notebook({"svg": SVG}, {"svg": SVG})
     pictures.placed(one)

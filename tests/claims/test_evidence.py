@@ -1,13 +1,14 @@
 """A chapter's evidence: what is trained here and what is published, side by side."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import table
-from nmpcrl.claims import evidence, published
+from nmpcrl.claims import evidence, failure_modes, published
 from nmpcrl.claims.evidence import gather, needed
-from nmpcrl.study import ParameterError
+from nmpcrl.study import Experiment, ParameterError, Runs
 from nmpcrl.study.design import fresh, main_table
 from nmpcrl.study.experiment import frozen_arm
 
@@ -99,3 +100,16 @@ def test_runs_trained_here_stand_beside_published_ones(known):
     only = found.where(found.runs.seed == 1)
     assert {e.seed for e in only.summaries} == {1}
     assert len(only.runs) == 4
+
+
+def test_of_each_mechanism_the_first_run_that_went_wrong_is_an_example_trained_here_before_others():
+    experiments = [Experiment("ES", seed=seed) for seed in range(5)]
+    runs = pd.DataFrame(
+        {
+            "mechanism": ["", "gap", "gap", failure_modes.WELL, "overshoot"],
+            "source": ["fresh", "published", "fresh", "published", "published"],
+        }
+    )
+    found = evidence.Evidence(Runs(dict.fromkeys(experiments)), runs)
+    assert list(found.wrong.run) == [experiments[k] for k in (2, 1, 4)]
+    assert found.examples == {"gap": experiments[2], "overshoot": experiments[4]}

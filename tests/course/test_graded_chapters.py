@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import venv
+from collections.abc import Mapping
 from pathlib import Path
 
 import course
@@ -31,16 +32,13 @@ where auto_score is not null"""
 pytestmark = pytest.mark.course
 
 
-def for_graders(folder: Path, name: str) -> Path:
-    """The edition for graders with one chapter; runs that are stored here are not trained."""
+def for_graders(folder: Path, name: str, runs: Mapping[str, Path]) -> Path:
+    """The edition for graders with one chapter."""
     place = folder / course.WITHIN["grader"]
-    course.edition("grader", place)
+    course.edition("grader", place, runs)
     for path in place.glob("*.ipynb"):
         if path.name != name:
             path.unlink()
-    stored = course.ROOT / "runs"
-    if stored.is_dir():
-        (place / "data/runs").symlink_to(stored)
     return place
 
 
@@ -54,8 +52,8 @@ def answered(notebook, every):
 
 
 @pytest.mark.parametrize("name", SOURCES)
-def test_all_solutions_of_a_chapter_have_all_points(name, tmp_path):
-    for_graders(tmp_path / "grader", name)
+def test_all_solutions_of_a_chapter_have_all_points(name, long_runs, tmp_path):
+    for_graders(tmp_path / "grader", name, long_runs)
     student = course.EDITIONS["student"](SOURCES[name], set(SOURCES), "nmpcrl.whl")
     (tmp_path / "in").mkdir()
     nbformat.write(answered(student, exercises(SOURCES[name])), tmp_path / "in" / name)
@@ -84,7 +82,7 @@ def nbgrader(request) -> Path:
 
 def test_nbgrader_gives_the_same_points(nbgrader, tmp_path):
     name, folder = f"{CHAPTER}.ipynb", tmp_path / "grader"
-    place = for_graders(folder, name)
+    place = for_graders(folder, name, {})  # this chapter needs none
     (folder / "nbgrader_config.py").write_text(course.autograded.NBGRADER_CONFIG)
     called(nbgrader, folder, "generate_assignment", "nmpcrl")
     released = folder / "release/nmpcrl" / name

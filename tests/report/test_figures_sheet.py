@@ -2,15 +2,17 @@
 
 import ast
 from base64 import b64decode
+from io import BytesIO
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from legibility import CONTRAST, contrast, flaws
 from test_figures import FIGURES
 
 from nmpcrl.report.figures import failure_modes, perturbed, sheet, style
-from nmpcrl.report.figures.axes import below
-from nmpcrl.study import Experiment
+from nmpcrl.report.figures.axes import below, draw_task
+from nmpcrl.study import Experiment, paper
 
 START = 1e-12
 TESTS = FIGURES.parents[2] / "tests/report"
@@ -164,9 +166,19 @@ def test_without_a_title_of_its_own_a_figure_finds_what_its_panels_do():
     assert figure.finding == "It falls; it rises"
 
 
-@pytest.mark.parametrize("kind", ["svg", "png"])
+@pytest.mark.parametrize("kind", ["svg", "pdf", "png"])
 def test_the_same_figure_gives_the_same_bytes(kind):
     assert bars().written(kind) == bars().written(kind)
+
+
+def test_a_title_above_a_map_with_equal_scales_is_within_the_figure():
+    figure, axes = sheet.subplots(height=3.7)
+    draw_task(axes, paper.task("A"))
+    axes.plot([-2.5, 8.5], [1.5, 2], label="a line")
+    axes.set_title("It goes on", loc="left")
+    below(figure, *axes.get_legend_handles_labels())
+    image = plt.imread(BytesIO(figure.written("png")))
+    assert (image[:3] == 1).all()
 
 
 def test_a_notebook_is_shown_the_wide_figure_alone(monkeypatch):
@@ -185,6 +197,7 @@ def test_a_page_is_given_the_finding_and_both_sizes(monkeypatch):
     assert page["wide"]["svg"] != page["narrow"]["svg"]
     assert (page["wide"]["width"], page["narrow"]["width"]) == (672, 346)
     assert "png" not in page["narrow"]
+    assert b64decode(page["pdf"]).startswith(b"%PDF")
 
 
 def test_what_would_be_a_heavy_svg_is_a_png(monkeypatch):
@@ -192,6 +205,8 @@ def test_what_would_be_a_heavy_svg_is_a_png(monkeypatch):
     monkeypatch.setattr(sheet, "HEAVY", 1000)
     page = shown(bars(), monkeypatch)[sheet.MIME]
     assert "svg" not in page["wide"]
+    assert page["wide"]["heavy"].startswith("<?xml")  # for whoever teaches
+    assert set(page["narrow"]) == {"width", "height", "png"}
     assert b64decode(page["narrow"]["png"]).startswith(b"\x89PNG")
 
 

@@ -20,6 +20,7 @@ import numpy as np
 from IPython.display import display
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 PAGE: dict[Any, Any] = {
     "axes.spines.right": False,
@@ -30,15 +31,17 @@ PAGE: dict[Any, Any] = {
     "font.size": 9.6,  # "small" is 8
     "legend.frameon": False,
     "lines.linewidth": 1.6,
+    "pdf.fonttype": 42,  # letters stay letters where a PDF is edited
     "svg.fonttype": "path",  # an image has no fonts but its own, and nobody searches in it
     "svg.hashsalt": "nmpcrl",  # the same figure, the same bytes
 }
 MIME = "application/vnd.nmpcrl.figure+json"  # what the book's page shows, beside "image/png"
 FOR_PAGE = "NMPCRL_FIGURES_FOR_PAGE"  # set where `MIME` is wanted, too: it takes time and room
-HEAVY = 300_000  # bytes of an SVG from which on a PNG is shown
+HEAVY = 300_000  # bytes of an SVG from which on a page shows a PNG
 SHARP = 216  # dots an inch of a narrow PNG: telephones show several where a page counts one
 TALL = 2.0  # inches of a panel that stands above others, at most
 REST = 1.1  # inches of a narrow figure for what is not a panel
+DATES = {"svg": "Date", "pdf": "CreationDate"}  # what a file would say of when it was made
 
 Parameters = ParamSpec("Parameters")
 Panels = Any  # an array of Axes
@@ -77,12 +80,14 @@ class Drawn(Figure):
         return in_words("; ".join(filter(None, titles)))
 
     def written(self, kind: str) -> bytes:
-        """The figure as "svg" or "png"; the same figure gives the same bytes."""
+        """The figure as "svg", "pdf" or "png"; the same figure gives the same bytes."""
         file = BytesIO()
         with plt.rc_context(PAGE):
-            options: dict[str, Any] = {"metadata": {"Date": None}} if kind == "svg" else {}
+            options: dict[str, Any] = {"metadata": {DATES[kind]: None}} if kind in DATES else {}
             if kind == "png" and self.get_figwidth() <= NARROW.width:
                 options["dpi"] = SHARP
+            if isinstance(self.get_layout_engine(), ConstrainedLayoutEngine):
+                self.draw_without_rendering()  # equal scales settle first, and the layout after
             self.savefig(file, format=kind, **options)
         self.set_layout_engine("none")  # what is laid out stays so
         return file.getvalue()
@@ -91,20 +96,21 @@ class Drawn(Figure):
         shown: dict[str, Any] = {"text/plain": self.finding, "image/png": self._png()}
         if FOR_PAGE in os.environ:
             shown[MIME] = {"finding": self.finding, "wide": self._file()}
+            shown[MIME]["pdf"] = b64encode(self.written("pdf")).decode()
             if self.again is not None:
                 narrow = self.again(NARROW)
                 assert isinstance(narrow, Drawn)
                 shown[MIME]["narrow"] = narrow._file()
-                if "svg" not in shown[MIME]["narrow"]:
+                if shown[MIME]["narrow"].pop("heavy", None):
                     shown[MIME]["narrow"]["png"] = narrow._png()
         display(shown, raw=True)  # type: ignore[no-untyped-call]
 
     def _file(self) -> dict[str, Any]:
-        """The size of the figure in a browser's pixels, and its SVG, if that is light."""
+        """The size of the figure in a browser's pixels, and its SVG, light or "heavy"."""
         width, height = np.round(96 * self.get_size_inches()).astype(int).tolist()
         svg = self.written("svg")
-        light = {"svg": svg.decode()} if len(svg) < HEAVY else {}
-        return {"width": width, "height": height, **light}
+        kind = "svg" if len(svg) < HEAVY else "heavy"
+        return {"width": width, "height": height, kind: svg.decode()}
 
     def _png(self) -> str:
         return b64encode(self.written("png")).decode()

@@ -1,0 +1,68 @@
+"""Stored runs for the editions, so that no notebook of them takes longer than two minutes.
+
+Every chapter says what it needs, with the parameters of the editions; what of that is not stored
+is trained first. Summaries are small, and all of them are taken. A whole run takes up to 11 MB:
+those are taken that are long to train, and a notebook trains the others.
+
+Chapter 5 names its `examples` after it has read the study, and so they are found here.
+"""
+
+import shutil
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import build
+import editions
+
+LONG = 10  # of a run [s], as `limits.seconds_of` has it: those whose learner fits a network
+
+
+def stored(files: Iterable[str]) -> dict[str, Path]:
+    """What the chapters in these files need stored: path in the folder of an edition -> file.
+
+    Examples are not compared with the published study as `build.train` does: they are those of
+    its runs that went wrong, and no sample of it.
+    """
+    from nmpcrl.analysis import summaries  # only here: a mistake elsewhere should not wait for it
+    from nmpcrl.study import store
+
+    whole, summarised = needed(files)
+    build.train(whole, summarised)
+    summarised = tuple(summaries.fetch_summaries((*summarised, *examples())))
+    paths = [*map(store.path_of, whole), *map(summaries.path_of, summarised)]
+    # what another solver had to solve is not stored; a notebook does that again
+    there = filter(Path.exists, paths)
+    return {f"data/runs/{path.relative_to(store.folder())}": path for path in there}
+
+
+def needed(files: Iterable[str]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """The runs, and the runs of which the summaries, are to be stored."""
+    from nmpcrl.study.limits import seconds_of
+
+    asked = [build.ask(path, given(path)) for path in (build.ROOT / "book" / f for f in files)]
+    whole, summarised = (
+        tuple(dict.fromkeys(one for needs in asked for one in needs[what]))
+        for what in ("experiments", "summaries")
+    )
+    return tuple(one for one in whole if seconds_of(one) > LONG), summarised
+
+
+def examples() -> tuple[Any, ...]:
+    """The runs of which Chapter 5 shows one for each mechanism, out of the published study."""
+    from nmpcrl.claims import evidence
+
+    return tuple(evidence.gather("published").examples.values())
+
+
+def given(notebook: Path) -> dict[str, Any]:
+    """The parameters of a chapter that its editions change."""
+    names = build.parameters(notebook)
+    return {name: value for name, value in editions.OFFLINE.items() if name in names}
+
+
+def copy(stored: Mapping[str, Path], place: Path) -> None:
+    """Copy what is stored to the folder of an edition."""
+    for name, path in stored.items():
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, place / name)
