@@ -11,6 +11,7 @@
   const GAUGE = 4; // its end
   const LOWEST = 0.97; // of the axis of costs, times the least of all
   const HIGHER = 1.02, HIGHEST = 1.3; // the range of its end, times the cost of theta_init
+  const FARTHEST = 5; // what a bar of theta shows at most, times its first value
   const NO_ERROR = 1; // the power of ten that stands on the axis before there is an error
   const LEVEL = { color: "var(--quiet)", dashes: "2 2" };
 
@@ -70,8 +71,9 @@
     });
     return (found) => {
       const first = found[0].costs[0].theta[k], numbers = found.map(({ theta }) => theta[k]);
-      const least = Math.min(0, ...numbers), most = Math.max(2 * first, ...numbers);
-      const share = (number) => (100 * (number - least)) / (most - least);
+      const least = Math.max(Math.min(0, ...numbers), -FARTHEST * first);
+      const most = Math.min(Math.max(2 * first, ...numbers), FARTHEST * first);
+      const share = (number) => shared.clamp((100 * (number - least)) / (most - least), 0, 100);
       found.forEach(({ theta }, i) => {
         const [low, high] = [share(Math.min(0, theta[k])), share(Math.max(0, theta[k]))];
         Object.assign(bars[i].bar.style, { left: `${low}%`, width: `${high - low}%` });

@@ -5,6 +5,13 @@
   const { words } = window.nmpcrl;
   const { fixed, power, sized } = words.parts;
 
+  // A large number with one digit, where there is little room.
+  function coarse(number) {
+    if (!Number.isFinite(number)) return sized(number);
+    const [digit, exponent] = number.toExponential(0).split("e");
+    return `${digit.replace("-", "\u2212")}\u00b7${power(Number(exponent))}`;
+  }
+
   const training = "Press Train, and Stop when you like; or go on by one episode or one step of both. "
     + "Whatever you choose anew, training begins again.";
 
@@ -38,7 +45,7 @@
     },
     gauges: (overshoot) => `Largest α‖φ‖² of the episode so far; the mark is at ${overshoot}:`,
     weights: "θ now; the mark is at its first value:",
-    weight: (number) => (Math.abs(number) < 100 ? fixed(number, 3) : sized(number)),
+    weight: (number) => (Math.abs(number) < 100 ? fixed(number, 3) : coarse(number)),
     charts: {
       costs: ({ every }) => `Cost without noise, every ${every} episodes`,
       gauges: ({ overshoot }) => `Largest α‖φ‖² of each episode; dotted: ${overshoot}`,
@@ -46,7 +53,8 @@
     },
     cost: (number) => fixed(number, 0),
     power,
-    legend: ({ steps }) => `The map shows ${steps} steps without noise; circles are the robot in training.`,
+    legend: ({ steps, evaluateEvery: every }) => `The map shows ${steps} steps without noise, anew after every ${every} `
+      + "episodes; circles are the robot in training.",
     axes: {
       costs: "The axis of the cost ends at 1.3 times the cost of the frozen arm or before; a line that leaves an axis goes on.",
       gauges: "",
@@ -64,7 +72,8 @@
       ];
       const error = errors.at(-1);
       if (charts.includes("errors") && Number.isFinite(error)) {
-        texts.push(`; error of the next value in episode ${errors.length}`, fixed(error, 1));
+        const shown = error < 10000 ? fixed(error, 1) : sized(error);
+        texts.push(`; error of the next value in episode ${errors.length}`, shown);
       }
       return diverged ? [...texts, `; diverged in episode ${episode}`] : texts;
     },
