@@ -346,7 +346,7 @@ def test_a_find_about_a_network_fails_here_as_in_python(tab):
 def test_the_link_is_copied(opened):
     tab = opened(FIGURE, permissions=["clipboard-read", "clipboard-write"]).begun()
     tab.click("Copy code")
-    tab.figure.get_by_text("Copied.").wait_for()
+    tab.figure.locator(".along").get_by_text("Copied.").wait_for()
     copied = tab.page.evaluate("navigator.clipboard.readText()")
     assert copied == box(tab, "Library code of the same run")
     assert copied.startswith("from nmpcrl.study import Experiment, run")
@@ -382,7 +382,7 @@ def test_text_that_may_not_be_copied_is_selected(opened):
     for script in ("delete Navigator.prototype.clipboard", REFUSES):
         tab = opened(FIGURE, script=script).begun()
         tab.click("Copy link")
-        tab.figure.get_by_text("does not copy").wait_for()
+        tab.figure.locator(".along").get_by_text("does not copy").wait_for()
         assert tab.page.evaluate("getSelection().toString()").startswith("file:")
         assert tab.errors == []
 
