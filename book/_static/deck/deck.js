@@ -1,4 +1,4 @@
-// A deck: formulas are typeset, slides that are too full get smaller letters, then it begins.
+// A deck: formulas are typeset, those that are too wide and slides that are too full get smaller letters, then it begins.
 "use strict";
 
 window.MathJax = {
@@ -34,11 +34,17 @@ async function begin() {
   document.documentElement.dataset.ready = "";
 }
 
+// Smaller letters, as long as `tooLarge()`.
+function shrink(element, tooLarge) {
+  const whole = parseFloat(element.style.fontSize) || 100; // %
+  for (let size = 1; tooLarge() && size > SMALLEST; size -= 0.05) element.style.fontSize = `${whole * size}%`;
+}
+
 function fit(slide) {
-  const tooFull = () => slide.scrollHeight > SIZE.height || slide.scrollWidth > SIZE.width;
   Object.assign(slide.style, { display: "block", width: `${SIZE.width}px` });
-  for (let size = 1; tooFull() && size > SMALLEST; size -= 0.05) {
-    slide.style.fontSize = `${size}em`;
+  for (const formula of slide.querySelectorAll("mjx-container[display]")) {
+    shrink(formula, () => formula.offsetWidth > formula.parentElement.clientWidth);
   }
+  shrink(slide, () => slide.scrollHeight > SIZE.height || slide.scrollWidth > SIZE.width);
   slide.style.display = slide.style.width = "";
 }
