@@ -60,7 +60,7 @@
       if (!Number.isFinite(after)) return `no noise-free cost at the end; ${fixed(before, 1)} at the start`;
       const change = 1 - after / before;
       const than = Math.abs(change) < 5e-4 ? "as much as" : `${percent(change)} ${change > 0 ? "less" : "more"} than`;
-      return `noise-free cost ${fixed(after, 1)}, ${than} the frozen arm's ${fixed(before, 1)}`;
+      return `noise-free cost ${fixed(after, 1)} (mean of the last rollouts), ${than} the frozen arm's ${fixed(before, 1)}`;
     },
     frozen: "frozen",
     plots: {
