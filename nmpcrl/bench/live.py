@@ -67,13 +67,13 @@ LOOP = """(steps) => {
   if (failed) throw new Error("a solve failed")
   return (performance.now() - began) / steps
 }"""
-TRAIN = f"""([learner, episodes]) => new Promise((done, failed) => {{
+TRAIN = f"""([learner, layout, episodes]) => new Promise((done, failed) => {{
   const data = {DATA}, {{ problem, theta, w, steps, start, target, widths }} = data
   const of = Object.fromEntries(data.fields.map((field) => [field.name, field.default]))
   const settings = {{
     ...of, learner, episodes, steps, theta, w, start, target, seed: 0, decayRate: of.decay_rate,
     thetaSet: data.theta_set, evaluateEvery: data.evaluate_every,
-    discs: data.layout.map((centre) => [...centre, data.clearance]),
+    discs: data.layouts[layout].map((centre) => [...centre, data.clearance]),
   }}
   const began = performance.now(), module = window.nmpcrl.module
   const end = (why) => why ? failed(why) : done((performance.now() - began) / 1000)
@@ -244,7 +244,7 @@ def fitted(browser: Any, page: Path) -> list[float]:
 def trained(browser: Any, page: Path, learner: str) -> dict[str, float]:
     """How long a whole run takes in the laboratory's worker and here [s]."""
     tab = opened(browser, page)
-    there = float(tab.evaluate(TRAIN, [learner, paper.EPISODES]))
+    there = float(tab.evaluate(TRAIN, [learner, Experiment(learner).layout, paper.EPISODES]))
     tab.close()
     run(Experiment(learner, episodes=1))  # compiles
     began = time.perf_counter()

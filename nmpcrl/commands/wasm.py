@@ -24,11 +24,12 @@ ROBOT = "nmpcrl.control:differential_drive"
 @click.option("--task", "of_task", metavar="MODULE:NAME", help="Of a Task; by default the paper's.")
 @click.option("--out", type=NewFile(), default="nmpc.wasm", show_default=True)
 def wasm(of_plant: str, of_task: str | None, out: Path) -> None:
-    """Compile the solver, the update rules and the network to WebAssembly.
+    """Compile what solves and learns to WebAssembly.
 
-    The module runs in any browser, in Node and in engines such as wasmtime; target, obstacles,
-    horizon and discount are arguments of its functions. It takes about a minute, once. MODULE:NAME
-    may be a function that returns a Plant or a Task.
+    It holds the solver, the update rules and the network, and runs in any
+    browser, in Node and in engines such as wasmtime; target, obstacles, horizon
+    and discount are arguments of its functions. It takes about a minute, once.
+    MODULE:NAME may be a function that returns a Plant or a Task.
 
     \b
     Example:

@@ -34,7 +34,7 @@ PAGE = """<!doctype html><html lang="en"><head><title>A page</title></head><body
 <script src="_static/live/a.js"></script><script src="_static/live/a.js?v=1"></script>
 <figure class="live" hidden><script type="application/json">{
 "problem": {"discs": [], "target": [0], "lower": [0]}, "start": [0], "theta": [1],
-"fields": [{"name": "alpha", "default": 1}], "layout": [], "steps": 2,
+"fields": [{"name": "alpha", "default": 1}], "layouts": {"A": []}, "steps": 2,
 "widths": []}</script></figure></body></html>"""
 SCRIPT = """
 const figure = document.querySelector("figure.live")
