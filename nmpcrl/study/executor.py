@@ -193,7 +193,7 @@ def _process() -> ProcessPoolExecutor:
 
 def _begin_worker() -> None:
     """What a worker does first."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # an interrupt ends it without a traceback
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller ends it; else it would be replaced
     end_with_parent()
 
 

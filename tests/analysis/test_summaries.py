@@ -42,7 +42,7 @@ def make(experiment, *expected):
     note("began", experiment)
     time.sleep({pause})
     if experiment.seed in {killed} and (first or {always}):
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.kill(os.getpid(), signal.{by})
     made = summaries.make(experiment, *expected)
     note("ended", experiment)
     return made
@@ -75,10 +75,16 @@ def trained(monkeypatch) -> list[Experiment]:
 def workers(tmp_path, monkeypatch):
     """Let workers note what they do, and let the runs of some seeds kill them, once or always."""
 
-    def watch(killed: tuple[int, ...] = (), *, always: bool = False, pause: float = 0) -> Path:
+    def watch(
+        killed: tuple[int, ...] = (),
+        *,
+        by: str = "SIGKILL",
+        always: bool = False,
+        pause: float = 0,
+    ) -> Path:
         log = tmp_path / "log"
         log.touch()
-        text = MADE_ELSEWHERE.format(log=str(log), killed=killed, always=always, pause=pause)
+        text = MADE_ELSEWHERE.format(log=str(log), killed=killed, by=by, always=always, pause=pause)
         (tmp_path / "made_elsewhere.py").write_text(text)
         monkeypatch.syspath_prepend(tmp_path)
         monkeypatch.delitem(sys.modules, "made_elsewhere", raising=False)
@@ -405,6 +411,15 @@ def interrupted(tmp_path):
     with contextlib.suppress(ProcessLookupError):
         os.killpg(program.pid, signal.SIGKILL)
     program.communicate()
+
+
+@pytest.mark.slow
+def test_an_interrupt_that_a_worker_meets_first_begins_nothing_anew(workers):
+    """A terminal tells the whole group, in any order; the caller alone ends a study."""
+    log = workers(killed=(0, 1), by="SIGINT")
+    study = fetch_summaries(THREE, workers=2, progress=False)
+    assert len(study) == 3
+    assert times(log, "began") == times(log, "ended") == [0, 1, 2]
 
 
 @pytest.mark.slow
