@@ -16,6 +16,7 @@ CHAPTERS = {  # of each live figure
 ALSO = ("07_beyond",)  # has the figure of runs, too
 FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => done(figure.shown))))"""
+OTHERWISE = {"alpha": 5.01e-8, "decay": "episode", "seed": 3}  # than two learners begin with
 MOST = 200_000  # bytes that a chapter's live figures may add
 
 
@@ -83,6 +84,16 @@ class Tab:
 
     def click(self, button) -> None:
         self.figure.get_by_role("button", name=button, exact=True).click()
+
+    def ask_otherwise(self) -> None:
+        """Ask two learners for `OTHERWISE`, after a step of theirs that this takes back."""
+        self.click("One step")
+        self.figure.get_by_label("Noise decays").select_option(OTHERWISE["decay"])
+        self.figure.get_by_label("Seed").select_option(str(OTHERWISE["seed"]))
+        self.press("alpha, step size of theta", "ArrowLeft", "ArrowLeft", "ArrowLeft")
+        shown = self.shown()
+        assert shown["given"] == OTHERWISE
+        assert [one["step"] for one in shown["found"]] == [None, None]
 
     def external(self) -> list[str]:
         """What the page has asked other places for."""

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from live_page import OTHERWISE
 
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import Experiment, run
 
 FIGURE = "learners"
-ALPHA = "alpha, step size of theta"
 EPISODES = "([figure, count]) => figure.shown.found.every(one => one.costs.length >= count)"
 PICTURES = """figure => {
   window.changes = 0
@@ -39,15 +39,9 @@ def test_two_episodes_are_those_of_the_library(tab):
 
 
 def test_they_are_with_another_seed_decay_and_alpha(tab):
-    tab.click("One step")
-    tab.figure.get_by_label("Noise decays").select_option("episode")
-    tab.figure.get_by_label("Seed").select_option("3")
-    tab.press(ALPHA, "ArrowLeft", "ArrowLeft", "ArrowLeft")
-    shown = tab.shown()
-    assert shown["given"] == {"alpha": 5.01e-8, "decay": "episode", "seed": 3}
-    assert [one["step"] for one in shown["found"]] == [None, None]
+    tab.ask_otherwise()
     tab.click("One episode")
-    assert_equal_to_python(tab.shown(), 1, alpha=5.01e-8, decay="episode", seed=3)
+    assert_equal_to_python(tab.shown(), 1, **OTHERWISE)
 
 
 def test_a_step_moves_both_learners_by_one(tab):
@@ -82,7 +76,7 @@ def test_the_gauge_says_so_above_two_and_not_by_colour_alone(tab):
     meter = tab.figure.get_by_role("meter").first
     tab.click("One step")
     assert float(meter.get_attribute("aria-valuetext")) < OVERSHOOT
-    tab.press(ALPHA, "End")
+    tab.press("alpha, step size of theta", "End")
     tab.click("One step")
     shown = tab.shown()
     number = shown["found"][0]["gauge"]

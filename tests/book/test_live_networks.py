@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from live_page import OTHERWISE
 
 from nmpcrl.analysis import metrics
 from nmpcrl.report.live import two_learners
 from nmpcrl.study import Experiment, paper, run
 
 FIGURE = "networks"
-ALPHA = "alpha, step size of theta"
 TRAINED = "([figure, count]) => figure.shown.found.every(one => one.episode >= count)"
 pytestmark = pytest.mark.book
 
@@ -34,16 +34,10 @@ def test_two_episodes_are_those_of_the_library(tab):
 
 
 def test_they_are_with_another_seed_decay_and_alpha(tab):
-    tab.click("One step")
-    tab.figure.get_by_label("Noise decays").select_option("episode")
-    tab.figure.get_by_label("Seed").select_option("3")
-    tab.press(ALPHA, "ArrowLeft", "ArrowLeft", "ArrowLeft")
-    shown = tab.shown()
-    assert shown["given"] == {"alpha": 5.01e-8, "decay": "episode", "seed": 3}
-    assert [one["step"] for one in shown["found"]] == [None, None]
+    tab.ask_otherwise()
     tab.click("One episode")
     tab.click("One episode")
-    assert_equal_to_python(tab.shown(), 2, alpha=5.01e-8, decay="episode", seed=3)
+    assert_equal_to_python(tab.shown(), 2, **OTHERWISE)
 
 
 def test_before_the_first_fit_nothing_moves(tab):
