@@ -308,7 +308,9 @@ def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
             )
         )
     for notebook in jobs:
-        shutil.copy2(executed / notebook.name, place / "src" / notebook)
+        clean = enrich.without_notices(nbformat.read(executed / notebook.name, 4))
+        for target in (executed / notebook.name, place / "src" / notebook):
+            nbformat.write(clean, target)
 
 
 def dress(source: Path, executed: Iterable[Path]) -> None:

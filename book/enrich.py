@@ -24,6 +24,8 @@ from typing import Any
 
 import nbformat
 
+from nmpcrl.control.solvers.riccati import NOTICE
+
 Cell = Any  # nbformat's, a dictionary with attributes
 
 ANCHOR = r'<a id="(?P<label>[^"]+)"></a>\n'
@@ -40,6 +42,7 @@ DETAILS = re.compile(
 ENTRIES = re.compile(r'(?:^- <a id="[^"]+"></a>.*\n(?:  .*\n)*)+', flags=re.M)
 OUTPUT = re.compile(r"<!-- output: (?P<page>[\w.]+) (?P<tag>[\w-]+) -->")
 PROSE = ("say", "source")
+COMPILED = re.compile(re.escape(NOTICE) + r" done in \d+ s\.\n")
 DOWNLOAD = '<p class="download"><a href="{}" download>Download this page as a notebook</a></p>'
 
 
@@ -73,6 +76,23 @@ def notebook(source: Any, download: str = "") -> Any:
             if "text/markdown" in output.get("data", {}):
                 output.data["text/markdown"] = text(output.data["text/markdown"])
     return source
+
+
+def without_notices(executed: Any) -> Any:
+    """An executed notebook without what the first solve of a plant says on a new machine.
+
+    Everything else on standard error stays, and ends the build.
+    """
+    for cell in executed.cells:
+        outputs = cell.get("outputs", [])
+        said = [one for one in outputs if one.get("name") == "stderr"]
+        text = "".join(one.text for one in said)
+        left = COMPILED.sub("", text)
+        if left != text:
+            others = [one for one in outputs if one not in said]
+            kept = [nbformat.v4.new_output("stream", name="stderr", text=left)] if left else []
+            cell.outputs = [*kept, *others]
+    return executed
 
 
 def download(executed: Any) -> Any:

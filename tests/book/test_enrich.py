@@ -6,6 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
+from nmpcrl.control.solvers.riccati import NOTICE
+
 
 def dressed(*cells) -> list:
     return enrich.notebook(new_notebook(cells=list(cells))).cells
@@ -174,3 +176,25 @@ def test_a_page_that_was_executed_offers_its_file_below_the_title():
     title, link, _ = enrich.notebook(book, "one.ipynb").cells
     assert title.source == "# One"
     assert 'href="one.ipynb" download' in link.source
+
+
+def streams(*texts: str) -> list:
+    return [new_output("stream", name="stderr", text=text) for text in texts]
+
+
+@pytest.mark.parametrize(
+    ("said", "left"),
+    [
+        ((f"{NOTICE} ", "done in 41 s.\n"), []),
+        ((f"{NOTICE} done in 0 s.\n", f"{NOTICE} done in 7 s.\n"), []),
+        (("A warning.\n", f"{NOTICE} ", "done in 41 s.\n"), ["A warning.\n"]),
+        (("A warning.\n",), ["A warning.\n"]),
+        ((f"{NOTICE} stopped.\n",), [f"{NOTICE} stopped.\n"]),
+    ],
+)
+def test_what_a_first_solve_says_stands_on_no_page_and_all_else_does(said, left):
+    shown = displayed(text_plain="1.0")
+    executed = new_notebook(cells=[new_code_cell("solve()", outputs=[*streams(*said), shown])])
+    outputs = enrich.without_notices(executed).cells[0].outputs
+    assert [one.text for one in outputs if one.output_type == "stream"] == left
+    assert outputs[-1] == shown
