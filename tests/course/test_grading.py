@@ -17,7 +17,7 @@ from nmpcrl.course.submissions import CannotGrade, chapters
 
 POINTS = {f"1.{number}": number for number in range(1, len(ASKED) + 1)}
 SLEEPS = "import time\ntime.sleep(10**6)"
-LINES = "import os\nfor file in range(3, 20):\n    try:\n        os.write(file, b'{')\n"
+LINES = "import os\nfor file in range(3, 256):\n    try:\n        os.write(file, b'{')\n"
 LINES += "    except OSError:\n        pass\nroot_of_six = 2"
 GROWS = "taken = []\nwhile True:\n    taken.append(bytearray(10**8))"
 
