@@ -136,7 +136,7 @@ def test_twenty_episodes_of_each_learner_are_those_of_python(tab):
         fill(tab, Seed=one.seed, Decay_factor_c=one.decay_rate, Horizon_N=one.horizon)
         tab.click("Train")
     for found, one in zip(trained(tab), experiments, strict=True):
-        assert_equal_to_python(found, one, 1e-9 if one.learner in ("ES", "GES") else 1e-8)
+        assert_equal_to_python(found, one, 1e-11 if one.learner in ("ES", "GES") else 1e-8)
         text = tab.figure.get_by_role("listitem").nth(found["number"] - 1).inner_text()
         assert f"noise-free cost {run(one).facts['final_cost']:.1f}" in text
 
