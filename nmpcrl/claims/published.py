@@ -3,6 +3,7 @@
 - `runs.csv`: one row a run, `summary.row`, with the part of the study it belongs to and its key;
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
+- `thetas.npz`: theta after every episode, of the runs that a reader can follow (see `thetas`);
 - `verdicts.json`: what became of each claim;
 - `timings.csv`: of `time_learners`, on which the verdicts on time rest;
 - `about.json`: code, libraries and machine, and when the thresholds were fixed.
@@ -25,6 +26,7 @@ import nmpcrl
 from nmpcrl.analysis.summary import DEFAULTS, RunSummary, experiment_of, row
 from nmpcrl.bench.learners import ratio
 from nmpcrl.bench.paired import Ratio
+from nmpcrl.claims import thetas
 from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism, failure_modes
 from nmpcrl.claims.prespecified import from_git
 from nmpcrl.claims.rule import Outcome, Verdict
@@ -36,7 +38,7 @@ from nmpcrl.study.parameters import Refusal, shortened
 from nmpcrl.study.provenance import EPOCHS, environment, hash_of, summary_key
 from nmpcrl.study.records import Column
 
-FILES = ("runs.csv", "curves.npz", "verdicts.json", "timings.csv", "about.json")
+FILES = ("runs.csv", "curves.npz", thetas.FILE, "verdicts.json", "timings.csv", "about.json")
 SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
 # Columns of `failure_modes`, and what may be in them; the frozen arms have none.
@@ -65,8 +67,9 @@ class Damaged(Refusal):
 class Published:
     """The published study.
 
-    Of a summary it holds episodes["cost"], evaluations["episode"], ["theta"] and ["cost"], states
-    and the facts "stopped" and "seconds"; single precision but for the summaries in `rows`.
+    Of a summary it holds episodes["cost"] and, of some (see `thetas`), ["theta"];
+    evaluations["episode"], ["theta"] and ["cost"], states and the facts "stopped" and "seconds";
+    single precision but for the summaries in `rows`.
     """
 
     summaries: Mapping[Experiment, RunSummary] = field(default_factory=dict)
@@ -126,6 +129,7 @@ def publish(
     runs.to_csv(folder / "runs.csv", index=False)
     curves: dict[str, Any] = _curves(list(summaries.values()))
     np.savez_compressed(folder / "curves.npz", **curves)
+    thetas.save(folder, summaries, variants)
     _write(folder, verdicts, pd.DataFrame() if timings is None else timings)
     about = {
         "date": datetime.now(UTC).date().isoformat(),
@@ -210,9 +214,10 @@ def _read(folder: Path) -> Published:
         curves = {name: file[name] for name in file.files}
     if {len(rows)} != {len(column) for column in curves.values()}:
         raise ValueError("runs.csv and curves.npz are not of the same runs")
+    followed = thetas.load(folder)
     verdicts = json.loads((folder / "verdicts.json").read_text())
     return Published(
-        {e: _summary_of(one, curves, i) for i, (e, one) in enumerate(rows.items())},
+        {e: _summary_of(one, curves, i, followed) for i, (e, one) in enumerate(rows.items())},
         {e: one["variant"] for e, one in rows.items()},
         rows,
         tuple(_verdict(one) for one in verdicts),
@@ -333,12 +338,20 @@ def _padded(columns: list[Column]) -> Column:
     return result
 
 
-def _summary_of(summary: dict[str, Any], curves: Mapping[str, Column], i: int) -> RunSummary:
+def _summary_of(
+    summary: dict[str, Any],
+    curves: Mapping[str, Column],
+    i: int,
+    followed: Mapping[int, Column],
+) -> RunSummary:
     judged = np.isfinite(curves["judged_after"][i])
     experiment = asdict(experiment_of(summary))
+    episodes = {"cost": curves["cost"][i][: experiment["episodes"]]}
+    if i in followed:
+        episodes["theta"] = followed[i][: experiment["episodes"]]
     return RunSummary(
         experiment,
-        {"cost": curves["cost"][i][: experiment["episodes"]]},
+        episodes,
         {
             "episode": curves["judged_after"][i][judged].astype(int),
             "theta": curves["judged_theta"][i][judged],

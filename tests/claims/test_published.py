@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from nmpcrl.analysis.summary import row, summarise, table
-from nmpcrl.claims import published
+from nmpcrl.claims import published, thetas
 from nmpcrl.claims.published import FILES, Damaged, Published, compare, load, publish
 from nmpcrl.claims.rule import PARTLY, REPRODUCED, Verdict
 from nmpcrl.study import Experiment, design, paper, run, sweep
@@ -129,12 +129,43 @@ def test_a_notebook_shows_the_sentence_alone(folder):
     assert refused.value._render_traceback_() == [f"Damaged: {refused.value}"]
 
 
+def test_theta_of_every_episode_is_kept_of_the_parts_that_a_reader_can_follow(known, summaries):
+    for e, one in known.summaries.items():
+        if known.variants[e] in thetas.FOLLOWED:
+            theta = summaries[e].episodes["theta"].astype(np.float32)
+            np.testing.assert_array_equal(one.episodes["theta"], theta)
+        else:
+            assert "theta" not in one.episodes
+
+
+def test_the_bytes_of_any_numbers_are_read_bit_for_bit():
+    numbers = np.array([0.0, -0.0, 1.0, -1e-38, 3e38, np.inf, -np.inf, np.nan, 1e-45], np.float32)
+    planes = thetas.byte_planes(numbers)
+    assert planes.shape == (4, numbers.size)
+    assert thetas.numbers_of(planes).tobytes() == numbers.tobytes()
+
+
+def test_a_study_without_such_parts_has_an_empty_file(summaries):
+    publish(summaries, dict.fromkeys(summaries, "N = 2"), VERDICTS)
+    assert not any("theta" in one.episodes for one in load().summaries.values())
+
+
+def test_published_theta_is_that_of_the_evaluations(monkeypatch):
+    """Both are of the same runs, trained twice on machines of two kinds."""
+    monkeypatch.delenv("NMPCRL_PUBLISHED")
+    for one in published.load().summaries.values():
+        if "theta" in one.episodes:
+            judged = one.evaluations["theta"][1:]
+            after = one.episodes["theta"][one.evaluations["episode"][1:] - 1]
+            np.testing.assert_allclose(after, judged, rtol=1e-6)
+
+
 def test_where_no_folder_is_named_the_projects_own_is_read(monkeypatch):
     monkeypatch.setenv("NMPCRL_PUBLISHED", "")
     assert published.place().parts[-2:] == ("book", "published")
 
 
-def test_what_is_published_is_in_five_files(known, folder):
+def test_what_is_published_is_in_six_files(known, folder):
     assert {path.name for path in folder.iterdir()} == set(FILES)
 
 
@@ -218,20 +249,24 @@ def test_what_is_published_anew_takes_the_place_of_what_was_read(known, summarie
 
 
 def test_the_whole_study_takes_20_megabytes_at_most(summaries, folder):
-    """Runs of full length whose numbers no compression makes smaller."""
+    """Runs of full length whose numbers no compression makes smaller; theta moves by little."""
     rng, full, n = np.random.default_rng(0), Experiment(), 40
     rollouts = full.episodes // full.evaluate_every + 1
     noise = {}
     for experiment in sweep(learner=("ES", "frozen"), seed=tuple(range(n // 2))):
         one = summaries[RUNS[0]]
         episodes = {k: rng.normal(size=(300, *c.shape[1:])) for k, c in one.episodes.items()}
+        episodes["theta"] = 1 + np.cumsum(1e-3 * episodes["theta"], axis=0)
         judged = {k: rng.normal(size=(rollouts, *c.shape[1:])) for k, c in one.evaluations.items()}
         judged |= {"episode": np.arange(rollouts) * full.evaluate_every}
         states = rng.normal(size=(129, 3))
         noise[experiment] = replace(
             one, experiment=asdict(experiment), episodes=episodes, evaluations=judged, states=states
         )
-    publish(noise, dict.fromkeys(noise, "main"), VERDICTS)
+    followed = sum(variant in thetas.FOLLOWED for variant in design.whole_study().values())
+    share = followed / len(design.whole_study())
+    labels = {e: "main" if i < share * n else "N = 5" for i, e in enumerate(noise)}
+    publish(noise, labels, VERDICTS)
     each = sum(path.stat().st_size for path in folder.iterdir()) / n
     assert each * len(design.whole_study()) < 20e6
 

@@ -1,13 +1,14 @@
 // The live figure of published runs: choose two, and move through their episodes.
 //
-// What can be moved is `given`: { first, second, layout, decay, seed, at }, where `at` counts evaluations.
+// What can be moved is `given`: { first, second, layout, decay, seed, episode }.
 (() => {
   "use strict";
 
   const {
     add, plane, mapParts, choice, chart, trace, key, player, published, parts: shared, words: { runs: words },
   } = window.nmpcrl;
-  const PACE = 350; // from one evaluation to the next while it plays [ms]
+  const PACE = 60; // from one episode to the next while it plays [ms]
+  const KEPT = 100; // closed loops, at most
   const LEAST = 0.97, MOST = 1.3; // of the axes of costs: times the least of all, times theta_init's
 
   const finite = (numbers) => numbers.filter(Number.isFinite);
@@ -61,9 +62,10 @@
       return one;
     });
     const lines = (found) => all.forEach((one, k) => {
-      const points = (run) => run.theta.map((theta, at) => [episodes[at], theta[k]]);
-      const numbers = finite(found.flatMap(({ run }) => run.theta.map((theta) => theta[k])));
-      const drawn = found.map(({ run, look }) => ({ look, points: points(run) }));
+      const known = (run) => run.theta.map((theta, episode) => [episode, theta[k]])
+        .filter(([, number]) => Number.isFinite(number));
+      const drawn = found.map(({ run, look }) => ({ look, points: known(run) }));
+      const numbers = drawn.flatMap(({ points }) => points.map(([, number]) => number));
       one.draw(drawn, [Math.min(...numbers), Math.max(...numbers)], words.weight);
     });
     return { lines, point: (x) => all.forEach((one) => one.point(x)) };
@@ -79,28 +81,34 @@
 
   // The closed loop of theta in a layout, solved once; there is none where a run had been stopped before.
   function loops({ start, horizon, steps, layouts }, rollout) {
-    const known = {};
+    const known = new Map();
     return (theta, layout) => {
-      if (!theta.every(Number.isFinite)) return { states: [] };
-      return known[[layout, theta]] ??= rollout({ start, horizon, theta, discs: layouts[layout] }, steps);
+      if (!theta.every(Number.isFinite)) return { states: [], cost: NaN };
+      const name = `${layout} ${theta}`;
+      if (known.size === KEPT) known.clear();
+      if (!known.has(name)) known.set(name, rollout({ start, horizon, theta, discs: layouts[layout] }, steps));
+      return known.get(name);
     };
   }
 
-  // What is drawn of a run.
-  function drawn(run, learner, { at, layout }, { looks, episodes }, loop) {
-    const theta = run.theta[at], judged = run.costs[at], training = run.training[episodes[at] - 1];
-    return { learner, look: looks[learner], run, theta, judged, training, ...loop(theta, layout) };
+  // What is drawn of a run: of networks, theta is known after an evaluation only, and stays until the next one.
+  function drawn(run, learner, { episode, layout }, { looks, episodes }, loop) {
+    const evaluation = episodes.findLastIndex((one) => one <= episode);
+    const after = run.theta[episode].every(Number.isFinite) ? episode : episodes[evaluation];
+    const theta = run.theta[after], solved = loop(theta, layout);
+    const judged = after === episodes[evaluation] ? run.costs[evaluation] : solved.cost;
+    return { learner, look: looks[learner], run, theta, after, judged, training: run.training[episode - 1], ...solved };
   }
 
-  function build(figure, data, { rollout }) {
-    const runs = published(data), loop = loops(data, rollout);
-    const begin = { ...data.chosen, at: data.episodes.length - 1 };
+  async function build(figure, data, { rollout }) {
+    const runs = await published(data), loop = loops(data, rollout), last = data.episodes.at(-1);
+    const begin = { ...data.chosen, episode: last };
     const { read, move } = shared.state(begin, show);
     shared.heading(figure, words);
     const choose = choices(figure, runs.offered, move);
     const { draw: play } = player(figure, {
-      label: words.slider, last: data.episodes.length - 1, pace: PACE, text: (at) => words.after(data.episodes[at]),
-    }, { read: () => read().at, write: (at) => move({ at }) });
+      label: words.slider, last, pace: PACE, text: words.after,
+    }, { read: () => read().episode, write: (episode) => move({ episode }) });
     const scene = add(figure, "div", { class: "scene" });
     const map = plane(scene, data.view, words.map);
     mapParts.background(map, data);
@@ -113,7 +121,7 @@
 
     function show(given) {
       choose(given);
-      play(given.at);
+      play(given.episode);
       const wanted = [...new Set([given.first, given.second, "frozen"])].filter(Boolean);
       const has = (learner) => Boolean(runs.find(given, learner));
       if (!wanted.every(has) && runs.more(given.layout)) {
@@ -123,15 +131,15 @@
       const found = wanted.filter(has)
         .map((learner) => drawn(runs.find(given, learner), learner, given, data, loop));
       draw(data.layouts[given.layout], found);
-      const cell = JSON.stringify({ ...given, at: 0 });
+      const cell = JSON.stringify({ ...given, episode: 0 });
       if (cell !== before) {
         named(found);
         for (const { lines } of curves) lines(found);
       }
       before = cell;
-      for (const { point } of curves) point(data.episodes[given.at]);
+      for (const { point } of curves) point(given.episode);
       const missing = wanted.filter((learner) => !has(learner)).map((learner) => [words.missing(learner, given)]);
-      tell([...missing, ...words.results(found, data.episodes[given.at])]);
+      tell([...missing, ...words.results(found, given.episode)]);
       figure.shown = { given, found }; // for whoever asks; tests do
     }
     show(begin);

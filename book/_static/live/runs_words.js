@@ -21,7 +21,7 @@
       if (name === "decay") return `per ${value}`;
       return value === "" ? "none" : named(value);
     },
-    slider: "Episode, a step of ten",
+    slider: "Episode",
     after: (episode) => `episode ${episode}`,
     charts: { training: "Cost of a training episode, with noise", costs: "Cost without noise" },
     theta: (name) => `${sliders[name]}, over the episodes`,
@@ -31,16 +31,19 @@
       `There is no run of ${named(learner)} in layout ${layout} with noise that decays per ${decay} and seed ${seed}.`
     ),
     absent: "The runs of this layout could not be loaded.",
-    results: (found, episode) => found.map(({ learner, training, judged, failed, states }) => {
-      const name = `${named(learner)}:`, after = ["; without noise", fixed(judged, 1)];
-      if (!Number.isFinite(judged)) return [`${name} this run was stopped before episode ${episode}.`];
-      if (failed) after.push(`; the solver found no plan at step ${states.length}`);
-      if (!episode) return [`${name} before training`, "", ...after];
-      return [`${name} cost of episode ${episode}`, Number.isFinite(training) ? fixed(training, 1) : "cut short", ...after];
+    results: (found, episode) => found.map(({ learner, theta, training, judged, failed, states, after }) => {
+      const name = `${named(learner)}:`;
+      if (!theta.every(Number.isFinite)) return [`${name} this run was stopped before episode ${episode}.`];
+      const held = after === episode ? "" : `, its controller of episode ${after}`;
+      const cost = failed ? [`; without noise${held}: no plan was found at step ${states.length}`]
+        : [`; without noise${held}`, fixed(judged, 1)];
+      if (!episode) return [`${name} before training`, "", ...cost];
+      return [`${name} cost of episode ${episode}`, Number.isFinite(training) ? fixed(training, 1) : "cut short", ...cost];
     }),
     legend: (steps) => `Map: ${steps} steps without noise; dashed circles are the obstacles' safety distance. `
       + "Lines run over the episodes, and end where a run was stopped. The axis of the training cost ends at the "
       + "highest of the frozen arm, that of the cost without noise at 1.3 times the cost at the start; a line that "
-      + "leaves its axis goes on beyond it.",
+      + "leaves its axis goes on beyond it. Of DES and RDES, the parameters are published after every tenth episode, and "
+      + "their controller stays until the next.",
   };
 })();

@@ -12,11 +12,15 @@
   const DISCS = 16; // at most
   const LONGEST_VECTOR = 16; // of an update rule
 
-  // `packed` is a module: gzip, then base64.
-  async function instance(packed) {
+  // The bytes that were packed: gzip, then base64.
+  async function unpack(packed) {
     const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
     const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    const made = await WebAssembly.instantiate(await new Response(unpacked).arrayBuffer(), { env: GIVEN });
+    return new Response(unpacked).arrayBuffer();
+  }
+
+  async function instance(packed) {
+    const made = await WebAssembly.instantiate(await unpack(packed), { env: GIVEN });
     return made.instance.exports;
   }
 
@@ -170,5 +174,5 @@
     };
   }
 
-  self.nmpcrl = { ...self.nmpcrl, solver, sources: [...(self.nmpcrl?.sources ?? []), solving] };
+  self.nmpcrl = { ...self.nmpcrl, solver, unpack, sources: [...(self.nmpcrl?.sources ?? []), solving] };
 })();

@@ -4,6 +4,7 @@ A page is given one seed in one layout; `scripts` are the files that it loads fo
 trajectories are in neither: the page solves them again.
 """
 
+import gzip
 import json
 from base64 import b64encode
 from collections.abc import Collection
@@ -15,20 +16,20 @@ from IPython.display import HTML
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import published
 from nmpcrl.claims.published import Published
+from nmpcrl.claims.thetas import FOLLOWED, byte_planes
 from nmpcrl.control import Nmpc
 from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.problem import problem_of, surroundings, view
 from nmpcrl.study import paper
-from nmpcrl.study.design import LAYOUTS, MAIN_TABLE, SEEDS
+from nmpcrl.study.design import LAYOUTS, SEEDS
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column
 
 SCRIPTS = frame.scripts_of(
     "runs", *frame.MAP, "sliders.js", "charts.js", "player.js", "published.js"
 )
-SHOWN = (MAIN_TABLE, "controls")  # parts of the study; in the others something else is changed
 LAYOUT, SEED = LAYOUTS[0], SEEDS[0]  # what a page is given
 CHOICES = ("first", "second", "layout", "decay", "seed")
 FILE = "runs_{}.js"
@@ -77,29 +78,34 @@ def packed(
     """Some runs as JSON takes them.
 
     Returns:
-        The name of each run, and of all runs in turn, single precision in base 64: the training
-        cost by episode, the cost without noise by evaluation, and theta by evaluation.
+        The name of each run, and of all runs in turn the training cost by episode, the cost without
+        noise by evaluation, and each component of theta by episode, the 0th included: the
+        `byte_planes` of them, compressed, in base 64.
     """
     chosen = {
-        _name(e): _numbers(summary, len(_episodes(known)))
+        _name(e): _numbers(summary, _episodes(known))
         for e, summary in known.summaries.items()
-        if known.variants[e] in SHOWN and e.layout == layout and e.learner in learners
+        if known.variants[e] in FOLLOWED and e.layout == layout and e.learner in learners
         and seed in (None, e.seed)
     }  # fmt: skip
-    numbers = np.stack(list(chosen.values())).astype("<f4")
-    return {"runs": list(chosen), "numbers": b64encode(numbers.tobytes()).decode()}
+    planes = byte_planes(list(chosen.values())).tobytes()
+    numbers = b64encode(gzip.compress(planes, mtime=0)).decode()
+    return {"runs": list(chosen), "numbers": numbers}
 
 
 def _name(e: Experiment) -> str:
     return f"{e.learner} {e.decay} {e.seed}"
 
 
-def _numbers(summary: RunSummary, count: int) -> Column:
-    """One row; nan where a run was stopped before."""
-    judged = np.full((count, 1 + len(paper.THETA_INIT)), np.nan)
-    found = summary.evaluations
-    judged[: len(found["cost"])] = np.column_stack([found["cost"], found["theta"]])
-    return np.concatenate([summary.episodes["cost"], judged[:, 0], judged[:, 1:].ravel()])
+def _numbers(summary: RunSummary, evaluated: list[int]) -> Column:
+    """One row; nan where a run was stopped before, and for a theta that is not known."""
+    found, training = summary.evaluations, summary.episodes["cost"]
+    judged = np.full(len(evaluated), np.nan)
+    judged[: len(found["cost"])] = found["cost"]
+    theta = np.full((1 + len(training), len(paper.THETA_INIT)), np.nan)
+    theta[1:] = summary.episodes.get("theta", np.nan)
+    theta[found["episode"]] = found["theta"]
+    return np.concatenate([training, judged, theta.T.ravel()])
 
 
 def _episodes(known: Published) -> list[int]:
