@@ -34,9 +34,9 @@ def legible(seen, monkeypatch) -> Iterator[None]:
     monkeypatch.setattr(sheet, "_drawn_on", noted)
     yield
     for figure in drawn:
+        assert isinstance(figure, sheet.Drawn), "it has no narrow version"
         assert not flaws(figure)
-        if isinstance(figure, sheet.Drawn):
-            assert not flaws(figure.again(sheet.NARROW))
+        assert not flaws(figure.again(sheet.NARROW))
 
 
 @pytest.fixture(scope="session")

@@ -57,7 +57,6 @@ def narrow(figure: sheet.Figure) -> sheet.Figure:
 def test_every_figure_function_is_drawn_by_a_test_of_this_folder():
     """And so it is looked at, wide and narrow: see `legible`."""
     tests = "".join(path.read_text() for path in TESTS.glob("test_*.py"))
-    tests += (TESTS.parent / "commands/test_show.py").read_text()
     missing = [
         f"{path.stem}.{node.name}"
         for path in FIGURES.glob("*.py")
@@ -90,6 +89,21 @@ def test_columns_stay_together_or_rows_do(options, expected):
     draw = sheet.page(lambda: sheet.subplots(2, 3, **options)[0])
     assert places(draw()) == [(i, j) for i in (0, 1) for j in (0, 1, 2)]
     assert places(narrow(draw())) == expected
+
+
+def test_a_mosaic_is_read_row_by_row_on_a_narrow_sheet():
+    rows = (("all", "all"), ("left", "right"))
+
+    @sheet.page
+    def draw() -> sheet.Figure:
+        figure, panels = sheet.mosaic(rows, (2, 1), 4.0, (1.5, 1.0, 1.0))
+        assert list(panels) == ["all", "left", "right"]
+        return figure
+
+    assert places(draw()) == [(0, 0), (1, 0), (1, 1)]
+    assert places(narrow(draw())) == [(0, 0), (1, 0), (2, 0)]
+    assert draw().get_size_inches().tolist() == [sheet.WIDE.width, 4.0]
+    assert narrow(draw()).get_size_inches().tolist() == [sheet.NARROW.width, 3.5 + sheet.REST]
 
 
 def test_what_a_panel_said_for_those_beside_it_each_says_for_itself_below():

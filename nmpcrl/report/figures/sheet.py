@@ -7,7 +7,7 @@ returns can call it again for a narrow one, whose panels stand below each other:
 import os
 import re
 from base64 import b64encode
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -176,6 +176,36 @@ def subplots(
     if not squeeze:
         return figure, panels
     return figure, panels.item() if panels.size == 1 else panels.squeeze()
+
+
+def mosaic(
+    rows: Sequence[Sequence[str]], heights: Sequence[float], height: float, tall: Sequence[float]
+) -> tuple[Figure, dict[str, Axes]]:
+    """A figure as wide as the sheet, and its axes by name, as `plt.subplot_mosaic` returns them.
+
+    On a narrow sheet they stand below each other in the order in which they are read.
+
+    Args:
+        rows: of names; one that stands several times in a row is as much wider.
+        heights: of the rows on a wide sheet, relative to each other.
+        height: of the figure on a wide sheet [inches].
+        tall: heights of the panels on a narrow sheet [inches].
+    """
+    if sheet().narrow:
+        rows = [(name,) for name in dict.fromkeys(name for row in rows for name in row)]
+        heights, height = tall, REST + sum(tall)
+    with plt.rc_context(PAGE):
+        figure, panels = plt.subplot_mosaic(
+            [list(row) for row in rows],
+            FigureClass=Drawn,
+            figsize=(sheet().width, height),
+            layout="constrained",
+            height_ratios=heights,
+        )
+    plt.close(figure)  # a notebook shows it once
+    assert isinstance(figure, Drawn)
+    figure.panels, figure.across = np.array([[axes] for axes in panels.values()]), 1
+    return figure, panels
 
 
 def in_words(title: str) -> str:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 
 from nmpcrl import Vector
+from nmpcrl.report.figures.sheet import mosaic as mosaic
 from nmpcrl.report.figures.sheet import page as page
 from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.sheet import subplots as subplots
