@@ -173,7 +173,7 @@ def test_a_click_moves_what_was_clicked_before(tab):
     tab.page.mouse.click(*goal)
     moved = tab.shown()
     np.testing.assert_allclose(tab.middle("Obstacle 2"), goal, atol=1)
-    tab.page.locator("figure.live").get_by_role("button", name="Reset").focus()
+    tab.page.locator("figure.live").get_by_role("button", name="Reset all").focus()
     tab.page.mouse.click(*(goal + [0, 20]))  # now nothing is chosen
     assert tab.shown() == moved
 
@@ -205,7 +205,7 @@ def test_reset_restores_the_beginning_in_every_digit(tab):
     tab.drag("Robot, start", (30, 60))
     tab.press("N, steps planned", "ArrowLeft")
     assert tab.shown() != before
-    tab.click("Reset")
+    tab.click("Reset all")
     assert tab.shown() == before
 
 

@@ -82,7 +82,7 @@ def test_a_step_a_key_and_play_move_through_the_updates(tab):
     tab.click("Play")
     tab.page.wait_for_function(AT, arg=[tab.figure.element_handle(), 120])
     tab.figure.get_by_role("button", name="Play").wait_for()
-    tab.click("Reset")
+    tab.click("Reset all")
     assert tab.shown()["given"]["at"] == 0
 
 

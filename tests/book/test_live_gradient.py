@@ -111,5 +111,5 @@ def test_reset_restores_the_beginning(tab):
     tab.press("Obstacle 1", "ArrowDown")
     tab.press(STEP, "ArrowLeft")
     assert tab.shown()["given"] != begin
-    tab.click("Reset")
+    tab.click("Reset all")
     assert tab.shown()["given"] == begin

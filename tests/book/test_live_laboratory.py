@@ -229,7 +229,7 @@ def test_obstacles_come_and_go_by_mouse_and_by_key(tab):
     assert tab.shown()["given"]["layout"] == before[:1]
     tab.press("Obstacle 1", "Delete")
     assert tab.shown()["given"]["layout"] == before[:1]
-    tab.click("Reset")
+    tab.click("Reset all")
     assert tab.shown()["given"]["layout"] == before
 
 
@@ -329,7 +329,7 @@ def test_a_find_opens_with_a_click(tab):
         assert tab.figure.locator(".sentence").inner_text() == find["sentence"]
         assert tab.shown()["last"] is None
         assert_command(tab, Experiment(**find["settings"]))
-        tab.click("Reset")
+        tab.click("Reset all")
     assert tab.shown()["given"]["layout"] == [list(one) for one in paper.LAYOUTS["A"]]
 
 

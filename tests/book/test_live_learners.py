@@ -68,7 +68,7 @@ def test_it_trains_until_it_is_stopped_and_goes_on(tab):
     assert tab.figure.locator("progress").evaluate("bar => bar.value") == found["episode"]
     tab.click("One episode")
     assert tab.shown()["found"][0]["episode"] == found["episode"] + 1
-    tab.click("Reset")
+    tab.click("Reset all")
     assert tab.shown()["found"][0]["episode"] == 0
 
 

@@ -65,7 +65,7 @@ def test_it_trains_until_it_is_stopped_and_the_network_with_theta_errs_less(tab)
     said = tab.figure.get_by_role("status").inner_text()
     count = len(rdes["errors"])
     assert f"error of the next value in episode {count} {rdes['errors'][-1]:.1f}" in said
-    tab.click("Reset")
+    tab.click("Reset all")
     assert [one["episode"] for one in tab.shown()["found"]] == [0, 0]
 
 

@@ -106,5 +106,5 @@ def test_reset_restores_the_beginning(tab):
     begin = tab.shown()
     tab.press(ALPHA, "ArrowRight")
     tab.click("Draw noise")
-    tab.click("Reset")
+    tab.click("Reset all")
     assert tab.shown() == begin

@@ -132,6 +132,21 @@ def test_the_chain_s_figure_names_the_ratio_from_which_gradient_td_converges():
     assert heading(figure) == "Gradient TD converges once β is above 1.03 α"
 
 
+def test_the_name_of_the_paper_s_ratio_lies_on_no_curve():
+    figure = ges.on_the_chain(Chain(), 0.1, (0.1, 4.0), updates=50)
+    figure.draw_without_rendering()
+    right = figure.axes[1]
+    radius = max(right.get_lines(), key=lambda line: len(line.get_xdata()))
+    name = right.texts[0].get_window_extent()
+    assert not name.count_contains(right.transData.transform(radius.get_xydata()))
+
+
+def test_no_line_strikes_the_legend_of_the_corrections(study):
+    figure = ges.corrections(study)
+    figure.draw_without_rendering()
+    assert figure.legends[0].get_window_extent().y1 < figure.axes[0].get_window_extent().y0
+
+
 def test_the_gate_s_figure_says_how_far_theta_x_fell():
     literal, gated = (run(Experiment("RDES", episodes=2, gated=g)) for g in (False, True))
     figure = rdes.literal_and_gated(literal, gated)

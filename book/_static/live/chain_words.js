@@ -8,7 +8,7 @@
   words.chain = {
     map: "The chain of two states, whose step sizes and discount can be moved",
     title: "Try it: the chain, updated in your browser by the functions that train the robot.",
-    hint: "Move the sliders with the mouse or the arrow keys. Press Step for one update, or Play for all.",
+    hint: "Move the sliders by mouse, finger or arrow keys. Press Step for one update, or Play for all.",
     states: {
       legend: "Updates are made",
       first: "in the first state only (off-policy)",
@@ -31,7 +31,7 @@
     legend: "Logarithmic axes: a dip is a change of sign; a line that leaves an axis goes on beyond it. "
       + "Pale: what is still to come.",
     question: "How small may β be before gradient TD diverges, too? And what changes with updates in both states?",
-    reset: "Reset",
+    reset: "Reset all",
     results: ({ ES, GES }, { alpha, beta, at }) => [
       [
         "Semi-gradient: θ =", sized(ES[at].theta), "; value of the state that is updated next", sized(ES[at].value),

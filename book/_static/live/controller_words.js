@@ -15,7 +15,7 @@
       + "Thick line: first plan, a dot for each step. Dotted line: closed loop before any change.",
     // With symbols.
     questions: "What does {c} do to the distance from the obstacles? What does the robot miss with a smaller {horizon}?",
-    reset: "Reset",
+    reset: "Reset all",
     horizon: "N, steps planned",
     groups: {
       "On the way": ["x", "y", "heading"],

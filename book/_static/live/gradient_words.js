@@ -17,7 +17,7 @@
     curves: "Distance of finite differences to the envelope gradient, relative, against their step",
     across: "step h (no unit)",
     step: "h, step of the finite differences",
-    reset: "Reset",
+    reset: "Reset all",
     pair: ({ envelope, difference }) => `${fixed(envelope, 3)} | ${fixed(difference, 3)}`,
     results: ({ chosen: { step, errors } }) => [
       [

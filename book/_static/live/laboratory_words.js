@@ -19,7 +19,7 @@
     targetHeading: "Target, heading",
     add: "Add an obstacle",
     remove: "Remove the last one",
-    reset: "Reset",
+    reset: "Reset all",
     gallery: "Six finds, to open with a click:",
     names: {
       learner: "Learner", alpha: "Step size α", beta: "Step size β", beta_tdc: "Step size β", zeta: "Learning rate ζ",

@@ -34,7 +34,7 @@
     option: (value) => (typeof value === "number" ? String(value) : `per ${value}`),
     alpha: "alpha, step size of theta",
     size: sized,
-    buttons: { train: "Train", stop: "Stop", wholeEpisode: "One episode", step: "One step", reset: "Reset" },
+    buttons: { train: "Train", stop: "Stop", wholeEpisode: "One episode", step: "One step", reset: "Reset all" },
     progress: "Episodes done",
     done: (episode, all) => `episode ${episode} of ${all}`,
     names: { ES: "ES", GES: "GES", DES: "DES", RDES: "RDES", frozen: "frozen arm" },

@@ -14,7 +14,7 @@
   words.runs = {
     map: "Published runs: their trajectories, costs and parameters, episode by episode",
     title: "Try it: follow published runs from the first episode to the last.",
-    hint: "Choose one or two runs. Then press Play, or move the slider with the mouse or the arrow keys. The robot "
+    hint: "Choose one or two runs. Then press Play, or move the slider by mouse, finger or arrow keys. The robot "
       + "follows the controller of that episode, solved in your browser.",
     choices: { first: "Learner", second: "Beside it", layout: "Layout", decay: "Noise decays", seed: "Seed" },
     option: (name, value) => {

@@ -34,7 +34,7 @@
       + "In the shaded part it ends farther from the target than it began.",
     draw: "Draw noise",
     next: "Apply, go on to s⁺",
-    reset: "Reset",
+    reset: "Reset all",
     results: ({ following, pull, closed, again }, { overshoot }) => [
       following ? ["α‖φ‖² =", fixed(pull, 3), "; the update closes", again ? fixed(closed, 3) : "?", "of the TD error."]
         : ["The solver found no plan."],

@@ -37,7 +37,7 @@ def on_the_chain(chain: Chain, alpha: float, ratios: tuple[float, ...], updates:
     right.semilogx(grid, radius, color=LOOKS["GES"].color)
     right.axhline(1, **AT_ONE)
     right.axvline(paper.BETA / paper.ALPHA, color="0.35", linewidth=1, linestyle=":")
-    right.annotate(" Table I", (paper.BETA / paper.ALPHA, radius.max()), color="0.35", va="top")
+    right.annotate(" Table I", (paper.BETA / paper.ALPHA, radius.min()), color="0.35")
     right.set(xlabel=r"$\beta / \alpha$ [-]", ylabel="spectral radius [-]")
     enough = grid[radius < 1]
     return headed(
@@ -98,7 +98,7 @@ def corrections(runs: Runs[Records]) -> Figure:
     axes.axhline(1, **AT_ONE)
     label_panel(axes)
     axes.set(ylabel="correction / semi-gradient [-]", ylim=(0, None))
-    axes.legend()
+    below(figure, *axes.get_legend_handles_labels())
     axes.set_title(f"The corrections are {np.median(shares):.2f} times as long as δφ (median run)")
     return figure
 
