@@ -5,9 +5,9 @@ What the page needs stands where an editor shows nothing, or as what an editor s
 
 | in the source | on the page |
 |---|---|
-| `<a id="eq:x"></a>` before `$$ ... \\tag{1.2} $$` | a numbered equation with that label |
+| `<a id="eq-x"></a>` before `$$ ... \\tag{1.2} $$` | a numbered equation with that label |
 | `<a id="x"></a>` before a heading | a label |
-| `[Eq. (1.2)](page.ipynb#eq:x)`, `[Fig. 1.2](#fig:x)`, `[departure A](departures.ipynb#departure-A)` | references, which Sphinx numbers and checks |
+| `[Eq. (1.2)](page.ipynb#eq-x)`, `[Fig. 1.2](#fig-x)`, `[departure A](departures.ipynb#departure-A)` | references, which Sphinx numbers and checks |
 | `[Gros (2020)](references.md#key)`, `[(Gros, 2020)](references.md#key)` | citations, as a word and in brackets |
 | `<details><summary>title</summary>` | a box that opens |
 | a list of `<a id="key"></a>` on the page of references | the bibliography |
@@ -190,7 +190,7 @@ def _reference(found: re.Match[str]) -> str:
     words, label = found["words"], found["label"]
     if found["page"] == "references.md":
         return f"{{cite:{'p' if words.startswith('(') else 't'}}}`{label}`"
-    kind = label.partition(":")[0]
+    kind = label.partition("-")[0]
     if kind in NUMBERED:
         return f"{{{NUMBERED[kind]}}}`{label}`"
     return f"{{ref}}`{label}`" if label.startswith("ex-") else f"{{ref}}`{words} <{label}>`"

@@ -34,7 +34,7 @@ def placed(notebook: Any) -> dict[str, bytes]:
     for cell, data in _figures(notebook):
         shown, settings = data.pop(MIME), cell.metadata["mystnb"]
         if "narrow" in shown:
-            name = settings["figure"]["name"].removeprefix("fig:")
+            name = settings["figure"]["name"].removeprefix("fig-")
             wide, narrow = shown["wide"], shown["narrow"]
             png = _kept(files, name, {"png": data["image/png"]})
             data["text/html"] = PICTURE.format(

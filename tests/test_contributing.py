@@ -84,7 +84,7 @@ def shown(source: str) -> Edit:
         mystnb = {"image": {"alt": "A few dots.", "width": "100%"}}
         metadata = {"tags": ["hide-input"], "mystnb": mystnb}
         notebook.cells.append(nbformat.v4.new_code_cell(source, metadata=metadata))
-        caption = '<a id="fig:new"></a>\n**Fig. 2.7.** The end of theta.'
+        caption = '<a id="fig-new"></a>\n**Fig. 2.7.** The end of theta.'
         tags = {"tags": ["caption"]}
         notebook.cells.append(nbformat.v4.new_markdown_cell(caption, metadata=tags))
         nbformat.write(notebook, path)

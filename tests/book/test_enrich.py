@@ -23,15 +23,15 @@ def displayed(**data: str):
 
 
 def test_an_equation_with_an_anchor_gets_its_label_and_loses_its_number():
-    source = 'so\n\n<a id="eq:a"></a>\n$$\nx = \\text{if } y\n\\tag{1.2}\n$$\n\nand'
-    assert enrich.text(source) == ("so\n\n```{math}\n:label: eq:a\nx = \\text{if } y\n```\n\nand")
+    source = 'so\n\n<a id="eq-a"></a>\n$$\nx = \\text{if } y\n\\tag{1.2}\n$$\n\nand'
+    assert enrich.text(source) == ("so\n\n```{math}\n:label: eq-a\nx = \\text{if } y\n```\n\nand")
 
 
 def test_equations_in_a_row_and_in_a_list_keep_their_own_labels():
-    one = '<a id="eq:a"></a>\n$$\na\n\\tag{1.1}\n$$'
-    two = '  <a id="eq:b"></a>\n  $$\n  b\n  \\tag{1.2}\n  $$'
+    one = '<a id="eq-a"></a>\n$$\na\n\\tag{1.1}\n$$'
+    two = '  <a id="eq-b"></a>\n  $$\n  b\n  \\tag{1.2}\n  $$'
     assert enrich.text(f"{one}\n\n- item\n\n{two}") == (
-        "```{math}\n:label: eq:a\na\n```\n\n- item\n\n  ```{math}\n  :label: eq:b\n  b\n  ```"
+        "```{math}\n:label: eq-a\na\n```\n\n- item\n\n  ```{math}\n  :label: eq-b\n  b\n  ```"
     )
 
 
@@ -47,9 +47,9 @@ def test_a_heading_with_an_anchor_gets_a_label():
 @pytest.mark.parametrize(
     ("link", "role"),
     [
-        ("[Eq. (1.6)](01_mdp.ipynb#eq:ocp)", "{eq}`eq:ocp`"),
-        ("[Fig. 1.2](#fig:mdp-plan)", "{numref}`fig:mdp-plan`"),
-        ("[Algorithm 2.1](02_es.ipynb#alg:learning)", "{prf:ref}`alg:learning`"),
+        ("[Eq. (1.6)](01_mdp.ipynb#eq-ocp)", "{eq}`eq-ocp`"),
+        ("[Fig. 1.2](#fig-mdp-plan)", "{numref}`fig-mdp-plan`"),
+        ("[Algorithm 2.1](02_es.ipynb#alg-learning)", "{prf:ref}`alg-learning`"),
         ("[Exercise 1.2](#ex-mdp-scale)", "{ref}`ex-mdp-scale`"),
         ("[departure B](departures.ipynb#departure-B)", "{ref}`departure B <departure-B>`"),
         ("[Gros and Zanon (2020)](references.md#gros2019data)", "{cite:t}`gros2019data`"),
@@ -83,14 +83,14 @@ def test_tagged_cells_become_the_boxes_of_the_page():
         tagged("**Try.** A seed", "try"),
         tagged('<a id="ex-a"></a>\n**Exercise 1.1.** How?', "exercise"),
         tagged("<details><summary>Solution</summary>\n\nSo.\n\n</details>", "solution"),
-        tagged('<a id="alg:a"></a>\n**Algorithm 1.1.** *Learning*\n\n1. Solve', "algorithm"),
+        tagged('<a id="alg-a"></a>\n**Algorithm 1.1.** *Learning*\n\n1. Solve', "algorithm"),
     )
     assert [cell.source for cell in cells] == [
         "::::::{admonition} Learning goals\n:class: tip\n\nAfter\n::::::",
         "::::::{admonition} Try\n:class: seealso\n\nA seed\n::::::",
         "::::::{exercise}\n:label: ex-a\n\nHow?\n::::::",
         "::::::{solution} ex-a\n:class: dropdown\n\nSo.\n::::::",
-        "::::::{prf:algorithm} Learning\n:label: alg:a\n\n1. Solve\n::::::",
+        "::::::{prf:algorithm} Learning\n:label: alg-a\n\n1. Solve\n::::::",
     ]
 
 
@@ -98,22 +98,22 @@ def test_a_caption_moves_to_the_figure_before_it():
     image = {"mystnb": {"image": {"alt": "dots"}}}
     (cell,) = dressed(
         new_code_cell("draw()", metadata=image),
-        tagged('<a id="fig:a"></a>\n**Fig. 1.1.** As [Eq. (1.1)](#eq:a) says.', "caption"),
+        tagged('<a id="fig-a"></a>\n**Fig. 1.1.** As [Eq. (1.1)](#eq-a) says.', "caption"),
     )
     assert cell.metadata.mystnb == {
         "image": {"alt": "dots"},
-        "figure": {"name": "fig:a", "caption": "As {eq}`eq:a` says."},
+        "figure": {"name": "fig-a", "caption": "As {eq}`eq-a` says."},
     }
 
 
 def test_what_say_displayed_becomes_prose_of_the_page():
     code = 'from nmpcrl.report.prose import say\n\nsay("It costs {c} ({f}).", c=1)\nsay("So.")'
     outputs = [
-        displayed(text_markdown="It costs 1 ([Fig. 1.1](#fig:a))."),
+        displayed(text_markdown="It costs 1 ([Fig. 1.1](#fig-a))."),
         displayed(text_markdown="So."),
     ]
     (cell,) = dressed(new_code_cell(code, outputs=outputs))
-    assert (cell.cell_type, cell.source) == ("markdown", "It costs 1 ({numref}`fig:a`).\n\nSo.")
+    assert (cell.cell_type, cell.source) == ("markdown", "It costs 1 ({numref}`fig-a`).\n\nSo.")
 
 
 def test_a_cell_that_was_not_executed_stays_code():

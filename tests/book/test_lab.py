@@ -226,7 +226,7 @@ def test_a_link_to_an_equation_leads_there(opened):
     tab.locator(".jp-MarkdownOutput").get_by_text("Eq. (2.4)").last.click()  # in a solution
     tab.wait_for_function(
         """() => {
-          const place = document.querySelector("[data-jupyter-id='eq:es-features']")
+          const place = document.querySelector("[data-jupyter-id='eq-es-features']")
           const { top } = place.getBoundingClientRect()
           return 0 < top && top < innerHeight
         }"""

@@ -91,7 +91,7 @@ def test_a_link_to_a_label_has_no_code_in_its_words_which_a_role_cannot_show(pag
 def test_equations_exercises_and_algorithms_are_numbered_in_their_order(page):
     for label, words in numbers(page).items():
         after = SOURCES[page].partition(f'<a id="{label}"></a>')[2]
-        if label.startswith("eq:"):
+        if label.startswith("eq-"):
             assert re.search(r"\\tag\{(.*?)\}", after)[1] == words[5:-1]
         else:
             assert after.startswith(f"\n**{words}.**")

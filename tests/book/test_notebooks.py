@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
 from itertools import pairwise
@@ -140,6 +141,82 @@ def test_a_source_has_nothing_that_only_the_page_can_show(name, what):
         assert "figure" not in cell.metadata.get("mystnb", {})
 
 
+MACROS = re.findall(  # KaTeX of VS Code has them, and so has MathJax of JupyterLab and of the page
+    r"\w+",
+    """
+    alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta kappa lambda mu nu pi varpi
+    rho varrho sigma varsigma phi varphi omega Gamma Delta Xi Pi Upsilon ell gimel partial nabla
+    approx ge gg in le leftarrow mapsto mid subseteq to cdot pm star times top
+    arg cos log max min sin operatorname sum binom dot frac hat sqrt tfrac underbrace
+    left right lVert rVert bigl bigr Bigl Bigr dots quad qquad
+    boldsymbol mathbb mathbf mathcal mathrm text textstyle begin end tag
+    """,
+)
+ENVIRONMENTS = {"aligned", "cases", "pmatrix"}
+BLOCK, INLINE = r"\$\$.+?\$\$", r"\$[^$]+\$"
+CODE = re.compile(r"^```.*?^```|`[^`\n]*`", flags=re.M | re.S)
+
+
+def texts(cells: list) -> list[str]:
+    """All Markdown of a notebook, that of its calls of `say` included, without code."""
+    found = []
+    for cell in cells:
+        if cell.cell_type == "markdown":
+            found.append(cell.source)
+        elif enrich.says(cell.source):
+            calls = [
+                node for node in ast.walk(ast.parse(cell.source)) if isinstance(node, ast.Call)
+            ]
+            said = [one.args[0].value for one in calls if getattr(one.func, "id", "") == "say"]
+            found += [dedent(one).replace("{{", "{").replace("}}", "}") for one in said]
+    return [CODE.sub("code", one) for one in found]
+
+
+def unreadable(text: str) -> Iterator[str]:
+    """What VS Code would show as it is written, or not at all."""
+    for formula in re.findall(f"{BLOCK}|{INLINE}", text, flags=re.S):
+        yield from sorted(set(re.findall(r"\\([A-Za-z]+)", formula)).difference(MACROS))
+        yield from sorted(set(re.findall(r"\\begin\{(.*?)\}", formula)) - ENVIRONMENTS)
+    words = re.sub(BLOCK, "", text, flags=re.S)
+    for found in re.finditer(INLINE, words):  # a letter or a digit at a dollar sign
+        around = words[: found.start()][-1:] + words[found.end() :][:1]
+        if re.search(r"\w", around):
+            yield found[0]
+    yield from re.findall(r".*\$.*", re.sub(INLINE, "", words))  # which begins or ends no formula
+    for block in re.findall(r"^<.*?(?=\n\n|\Z)", words, flags=re.M | re.S):
+        if not block.startswith("<a "):  # inline: what follows is Markdown
+            yield from re.findall(INLINE, block)
+    for row in re.findall(r"^ *\|.*", words, flags=re.M):  # where a bar ends a cell
+        yield from (formula for formula in re.findall(INLINE, row) if "|" in formula)
+    for place in re.findall(r"\]\(#(.*?)\)", words):  # VS Code's links have no other characters
+        if re.search("[^a-z0-9-]", place):
+            yield place
+
+
+@each_notebook
+def test_formulas_and_links_are_those_that_every_editor_knows(name):
+    """VS Code has KaTeX for formulas, and markdown-it for the rest."""
+    assert [one for text in texts(NOTEBOOKS[name].cells) for one in unreadable(text)] == []
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        (r"$\eqref{a}$ and $x$", ["eqref"]),
+        ("$$\n\\begin{multline}\na\n\\end{multline}\n$$", ["multline"]),
+        ("the $n$th", ["$n$"]),
+        ("It costs 5 $.", ["It costs 5 $."]),
+        ("| $|x|$ | $y$ |", ["$|x|$"]),
+        ("<details><summary>Why $x$</summary>\n\n$y$\n\n</details>", ["$x$"]),
+        ('<a id="eq-a"></a>\n$x$', []),
+        ("[Eq. (1.1)](#eq:a) and [Eq. (1.2)](#eq-b)", ["eq:a"]),
+        ("$x$-axis, $$y$$ and ($z$).", []),
+    ],
+)
+def test_what_vs_code_cannot_show_is_found(text, found):
+    assert list(unreadable(text)) == found
+
+
 @each_notebook
 def test_html_in_prose_is_what_every_editor_shows(name):
     elements = set(re.findall(r"</?([a-z]+)[ >]", re.sub(r"`[^`]*`", "", prose(name))))
@@ -161,7 +238,7 @@ def test_figures_hide_their_code_and_have_a_name_a_caption_and_alt_text(name):
     for figure, caption in figures(name):
         assert "hide-input" in tags(figure), figure.source
         assert re.fullmatch(
-            r'<a id="fig:[\w-]+"></a>\n\*\*Fig\. [\d.]+\*\* .*\.', caption.source, flags=re.S
+            r'<a id="fig-[\w-]+"></a>\n\*\*Fig\. [\d.]+\*\* .*\.', caption.source, flags=re.S
         )
         assert figure.metadata.mystnb.image.alt.strip(), figure.source
 

@@ -20,7 +20,7 @@ def notebook(wide: dict, narrow: dict | None) -> object:
     if narrow is not None:
         shown["narrow"] = {"width": 346, "height": 500, **narrow}
     data = {"image/png": b64encode(PNG).decode(), MIME: shown}
-    settings = {"image": {"alt": "Two lines."}, "figure": {"name": "fig:es-theta", "caption": "C"}}
+    settings = {"image": {"alt": "Two lines."}, "figure": {"name": "fig-es-theta", "caption": "C"}}
     cell = new_code_cell(
         "draw()", metadata={"mystnb": settings}, outputs=[new_output("display_data", data)]
     )
