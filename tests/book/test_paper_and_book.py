@@ -47,7 +47,7 @@ def test_every_equation_has_a_line_that_says_where_it_is():
     lines = rows(CELLS["equations"])
     assert [what.split()[0] for what, *_ in lines] == EQUATIONS
     for what, where, _ in lines:
-        assert re.search(r"\]\([\w.]+#(eq|alg|fig):|^not (solved|computed): ", where), what
+        assert re.search(r"\]\([\w.]+#(eq|alg|fig)-|^not (solved|computed): ", where), what
 
 
 def test_every_figure_is_drawn_under_its_number_in_the_paper():
