@@ -159,6 +159,7 @@ def test_a_network_is_fitted_as_in_python(tab):
         assert_equal_to_python(found, one, 1e-5)
     assert "up to the network’s first fit" in tab.figure.inner_text()
     choose(tab, "Learner", "ES")
+    tab.shown()  # the note follows with the next frame
     assert "first fit" not in tab.figure.inner_text()
 
 
