@@ -55,7 +55,7 @@ OLD = {  # the word that replaces it: the pattern of the old one, and where it m
     "chance": (r"luck(y|ily)?", ""),
     "correct": (r"mend(s|ed|ing)?", ""),
     "three times": (r"thrice", ""),
-    "theta_c": (r"θ_?c|vartheta_c|theta_\{c\}", ""),  # in text; in formulas \\theta_c
+    "theta_c": (r"θ_\w*|θc|vartheta_c|theta_\{c\}", ""),  # in text; in formulas \\theta_c
 }
 
 PLACES = (  # of a panel: on a telephone the panels are stacked
