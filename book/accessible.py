@@ -29,7 +29,7 @@ def site(html: Path) -> None:
     """Repair every page below a folder, in place."""
     for path in html.rglob("*.html"):
         if "_static" not in path.parts:
-            path.write_text(page(path.read_text()))
+            path.write_text(page(path.read_text("utf-8")))
 
 
 def page(html: str) -> str:

@@ -20,7 +20,8 @@ Each build has its own place, in the last column, and six steps, each a function
 6. `render`   the mirror with Jupyter Book, every warning an error, into PLACE/html, its pages
               repaired for all readers, as `accessible` says
 
-PLACE/html is removed first and put there last: it exists only if everything went well.
+PLACE/html is removed first and put there last: it exists only if everything went well. What was
+executed before something went wrong is not executed again, as long as nothing it rests on changed.
 """
 
 import os
@@ -37,11 +38,13 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from hashlib import sha256
 from importlib.resources import as_file, files
 from multiprocessing import get_context
 from pathlib import Path
@@ -57,11 +60,12 @@ import pictures
 import questions
 import teaching
 import yaml
-from papermill.cli import _resolve_type as papermill_value
 from papermill.exceptions import PapermillExecutionError
 from tqdm import tqdm
+from traitlets.config import Config
 
 from nmpcrl.course import exercises
+from nmpcrl.study.provenance import hash_of
 
 logging.getLogger("papermill").setLevel(logging.ERROR)  # a page without parameters is no news
 
@@ -103,7 +107,7 @@ def reported(log: Path) -> Iterator[None]:
 
 def pages() -> list[str]:
     """The pages of _toc.yml in their order, without suffix."""
-    toc = yaml.safe_load((ROOT / "_toc.yml").read_text())
+    toc = yaml.safe_load((ROOT / "_toc.yml").read_text("utf-8"))
     return [toc["root"], *(page["file"] for part in toc["parts"] for page in part["chapters"])]
 
 
@@ -182,7 +186,7 @@ def mirror(place: Path, announcement: str) -> Path:
     )
     shutil.copy2(ROOT / "_toc.yml", source)
     (source / "nmpcrl").symlink_to(ROOT / "nmpcrl")  # for literalinclude
-    config = yaml.safe_load((ROOT / "_config.yml").read_text())
+    config = yaml.safe_load((ROOT / "_config.yml").read_text("utf-8"))
     config["html"]["announcement"] = announcement
     if config["repository"]["url"]:
         config["html"] |= dict.fromkeys(BUTTONS, True)
@@ -207,7 +211,7 @@ def require_published() -> None:
 def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     """Run what is not stored yet; the bars are the store's."""
     from nmpcrl.analysis.summaries import fetch_summaries
-    from nmpcrl.claims import agreement, published
+    from nmpcrl.claims import agreement, comparison, published
     from nmpcrl.study import Experiment
     from nmpcrl.study.provenance import warn_of_changes
     from nmpcrl.study.setup import compile_ahead
@@ -217,7 +221,7 @@ def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     compile_ahead((*experiments, *summaries) or (Experiment(),))
     fetch_all(experiments, progress=True)
     made, known = fetch_summaries(summaries), published.load()
-    contradictions = published.compare(made, known)
+    contradictions = comparison.compare(made, known)
     if len(contradictions):
         raise Failure(
             "Runs that were trained here contradict the published ones:\n"
@@ -253,18 +257,54 @@ def execute(notebook: Path, target: Path, log: Path, given: Given) -> tuple[floa
     os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)  # the kernel's stderr, too
     problem = ""
     try:
-        papermill.execute_notebook(
-            str(source),
-            str(target),
-            parameters=given,
-            kernel_name="python3",
-            cwd=str(ROOT),
-            progress_bar=False,
-        )
+        with sockets() as kernels:
+            papermill.execute_notebook(
+                str(source),
+                str(target),
+                parameters=given,
+                kernel_name="python3",
+                cwd=str(ROOT),
+                progress_bar=False,
+                config=kernels,
+            )
+        finished(target).write_text(rests_on(notebook, given))
     except Exception as error:
         traceback.print_exc()
         problem = sentence(error)
     return time.perf_counter() - started, problem
+
+
+@contextmanager
+def sockets() -> Iterator[Config]:
+    """How a kernel is talked to: through files in a folder of its own.
+
+    A port that was free may be taken before it is opened, and so may a file in a folder that
+    kernels share: then two kernels get each other's messages, and one of them never answers.
+    """
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as place:
+        files = {"transport": "ipc", "ip": f"{place}/kernel"}
+        yield Config() if os.name == "nt" else Config({"KernelManager": files})
+
+
+def finished(executed: Path) -> Path:
+    """What an executed notebook rests on stands here until its build is done."""
+    return executed.with_suffix(".done")
+
+
+def rests_on(notebook: Path, given: Given) -> str:
+    """A hash of all that decides what a notebook comes to, but for times."""
+    package, published = ROOT / "nmpcrl", ROOT / "book/published"
+    read = [notebook, *sorted(package.rglob("*.py")), *sorted(published.glob("*"))]
+    chosen = {name: value for name, value in os.environ.items() if name.startswith("NMPCRL_")}
+    return hash_of([[sha256(path.read_bytes()).hexdigest() for path in read], given, chosen])
+
+
+def still_good(executed: Path, notebook: Path, given: Given) -> bool:
+    """Whether a build that did not end executed this, and nothing has changed since."""
+    done = finished(executed)
+    return (
+        executed.exists() and done.exists() and done.read_text("utf-8") == rests_on(notebook, given)
+    )
 
 
 def solved(notebook: Path, folder: Path) -> Path:
@@ -285,7 +325,12 @@ def sentence(error: Exception) -> str:
 def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
     """Execute notebooks (path -> given parameters), and put them into the mirror."""
     executed, logs = place / "executed", place / "logs"
-    shutil.rmtree(executed, ignore_errors=True)
+    kept = [n for n, given in jobs.items() if still_good(executed / n.name, n, given)]
+    for path in executed.glob("*"):
+        if path.stem not in {notebook.stem for notebook in kept}:
+            path.unlink()
+    if kept:
+        tqdm.write(f"  executed before: {', '.join(notebook.stem for notebook in kept)}")
     problems = {}
     with ProcessPoolExecutor(max_workers=2, mp_context=get_context("spawn")) as pool:
         running = {
@@ -293,6 +338,7 @@ def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
                 execute, notebook, executed / notebook.name, logs / f"{notebook.stem}.log", given
             ): notebook
             for notebook, given in reversed(jobs.items())  # the later chapters take longest
+            if notebook not in kept
         }
         bar = tqdm(as_completed(running), "chapters", len(running), leave=False, disable=None)
         for done in bar:
@@ -323,7 +369,7 @@ def dress(source: Path, executed: Iterable[Path]) -> None:
     (source / "book" / pictures.FOLDER).mkdir(exist_ok=True)
     live.add_runs(read.values(), source / "book/_static/live")
     for path in source.glob("book/*.md"):
-        text = pictures.beside(path.read_text(), path.parent)
+        text = pictures.beside(path.read_text("utf-8"), path.parent)
         path.write_text(teaching.filled(enrich.page(text, output)))
     for path, notebook in read.items():
         live.share(notebook, path, source / "book/_static/live")
@@ -355,13 +401,13 @@ def render(place: Path, strict: bool) -> None:
         nbformat.write(notebook, work / "_build/html/book" / path.name)
     accessible.site(work / "_build/html")
     (work / "_build/html").rename(place / "html")
-    title = yaml.safe_load((ROOT / "_config.yml").read_text())["title"]
+    title = yaml.safe_load((ROOT / "_config.yml").read_text("utf-8"))["title"]
     (place / "html/index.html").write_text(INDEX.format(title=title, page=pages()[0]))
 
 
 def warnings(log: Path, most: int = 20) -> str:
     """The lines of a Sphinx log that say what is wrong, or its end if none does."""
-    text = re.sub(r"\x1b\[[0-9;]*m", "", log.read_text()).replace(f"{ROOT}/", "")
+    text = re.sub(r"\x1b\[[0-9;]*m", "", log.read_text("utf-8")).replace(f"{ROOT}/", "")
     text = re.sub(r"\.ipynb:(\d+)(\d{4}):", in_cell, text)
     lines = text.splitlines()
     wrong = [line for line in lines if "WARNING: " in line or "ERROR: " in line]
@@ -387,8 +433,19 @@ def values(
             given |= yaml.safe_load(text)
         except (yaml.YAMLError, TypeError) as error:
             raise Failure(f"-y takes a form such as '{{seeds: [3]}}', not {text!r}.") from error
-    given |= {name: papermill_value(value) for name, value in pairs}
+    given |= {name: typed(value) for name, value in pairs}
     return given | dict(raw)
+
+
+def typed(text: str) -> Any:
+    """A value as `papermill -p` reads it: a truth, nothing, a number, or else a text."""
+    words = {"True": True, "False": False, "None": None}
+    if text in words:
+        return words[text]
+    for kind in (int, float):
+        with suppress(ValueError):
+            return kind(text)
+    return text
 
 
 def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool) -> Path:
@@ -404,6 +461,8 @@ def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool)
         execute_all(place, jobs)
         dress(place / "src", jobs)
         render(place, strict)
+        for notebook in jobs:
+            finished(place / "executed" / notebook.name).unlink()
     return place / "html"
 
 

@@ -7,10 +7,13 @@ The folder `grader` is one of a course of nbgrader's, with one assignment, `nmpc
 teachers alone, and `nmpcrl grade` reads it.
 
 Each folder can be handed out as it is. The first three hold the chapters that have exercises, the
-library as a wheel, the libraries to install with it, the published study, and the runs that would
-take long to train, as `offline` says. The slides and the teachers' figures show what the last
-`make book` computed; a Chromium prints the slides, too. If there is a built book, it offers all of
-this, as `downloads` says. Two builds give the same bytes.
+library as a wheel, what to install with it and how, as `handout` says, the published study, and the
+runs that would take long to train, as `offline` says.
+
+The slides and the teachers' figures show what the last `make book` computed; a Chromium prints the
+slides, too. Where they are not whole, all else is written, a sentence says why, and the exit code
+is 1. If there is a built book, it offers all of this, as `downloads` says. Two builds give the same
+bytes.
 """
 
 import os
@@ -28,6 +31,7 @@ import build
 import click
 import downloads
 import editions
+import handout
 import nbformat
 import offline
 import pictures
@@ -83,8 +87,9 @@ def edition(name: str, place: Path, runs: Mapping[str, Path], *, otter: bool = F
     sources = chapters()
     make = partial(EDITIONS[name], otter=True) if otter else EDITIONS[name]
     for file, source in sources.items():
-        nbformat.write(make(source, set(sources), library), place / file)
-    shutil.copy2(ROOT / "environment.txt", place)
+        nbformat.write(make(source, set(sources)), place / file)
+    (place / "requirements.txt").write_text(handout.requirements(library))
+    (place / "README.md").write_text(handout.readme(name, library, first=next(iter(sources))))
     for data in ("published", "_static/live"):
         shutil.copytree(ROOT / "book" / data, place / "data" / Path(data).name)
     offline.copy(runs, place)
@@ -130,22 +135,26 @@ def is_whole(name: str, sources: dict[str, Any]) -> bool:
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--otter", is_flag=True, help="Mark the notebooks of graders for otter.")
+@click.option("--otter", is_flag=True, help="An edition for graders with otter, too.")
 def main(otter: bool) -> None:
     """Write the editions to _build/course."""
     os.chdir(ROOT)
     sources = chapters()
     runs = offline.stored(sources)
     for name in EDITIONS:
-        place = PLACE / name / WITHIN.get(name, "")
-        edition(name, place, runs, otter=otter and name == "grader")
+        edition(name, PLACE / name / WITHIN.get(name, ""), runs)
+    if otter:
+        edition("grader", PLACE / "otter", runs, otter=True)
     (PLACE / "grader/nbgrader_config.py").write_text(autograded.NBGRADER_CONFIG)
     whole = [*EDITIONS, *(name for name in SHOWN if is_whole(name, sources))]
-    made = [PLACE / name for name in whole]
+    made = [PLACE / name for name in whole] + [PLACE / "otter"] * otter
     if (SITE / "index.html").exists():
-        made += downloads.offer([path for path in made if path.parent == PLACE], SITE)
+        offered = [PLACE / name for name in whole if name in downloads.CONTENTS]
+        made += downloads.offer(offered, SITE)
     for path in made:
         click.echo(path)
+    if len(whole) < len(EDITIONS) + len(SHOWN):
+        raise SystemExit(1)
 
 
 if __name__ == "__main__":

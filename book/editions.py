@@ -23,14 +23,15 @@ from nmpcrl.course.exercises import HEAD, Exercise, exercises, solved
 
 Notebook = Any
 
-OFFLINE = {"study": "published", "length": "smoke", "budget": 200}  # parameters of every edition
+OFFLINE = {"repeat": False, "length": "smoke", "budget": 200}  # parameters of every edition
 LINK = re.compile(r"\[(?P<words>[^][]+)\]\((?P<page>[\w.-]+\.(?:ipynb|md))(?:#[\w:-]+)?\)")
 ELSEWHERE = re.compile(r"^make .*\n|(?<=^papermill )book/", flags=re.M)  # in a box "Try"
-INSTALL = """**Before you begin.** In the folder of these notebooks, once, in a terminal:
+INSTALL = """**Before you begin.** In the folder of these notebooks, once, in a terminal on macOS or
+Linux; `README.md` says how on Windows:
 
 ```bash
-python -m venv .venv
-.venv/bin/pip install -r environment.txt {wheel} jupyterlab
+python3 -m venv .venv
+.venv/bin/pip install -r requirements.txt
 .venv/bin/jupyter lab
 ```
 
@@ -38,7 +39,10 @@ Put your answers where the dots are, and run the check below each. A check that 
 one sentence; nothing else depends on it. Everything runs without a network, from the folder
 `data`."""
 SETUP = """import os
+from pathlib import Path
 
+if not Path("data/published").is_dir():
+    raise FileNotFoundError("There is no folder `data` here: keep it beside the notebooks.")
 folders = {"PUBLISHED": "published", "RUNS": "runs", "LIVE": "live"}
 os.environ |= {f"NMPCRL_{name}": f"data/{folder}" for name, folder in folders.items()}
 os.environ["NMPCRL_STRICT"] = "1"  # an answer that is missing or wrong fails"""
@@ -46,13 +50,12 @@ COLUMNS = "| exercise | kind | level | minutes | points | goal |\n|---|---|---|-
 TIMES = "| section | reading | lecture | live figures |\n|---|---:|---:|---:|"
 
 
-def student(source: Notebook, pages: Collection[str], wheel: str) -> Notebook:
+def student(source: Notebook, pages: Collection[str]) -> Notebook:
     """A chapter without answers and solutions; a check that fails does not stop the notebook.
 
     Args:
         source: the chapter.
         pages: what lies beside the edition: links elsewhere become words.
-        wheel: the file of the library there.
     """
     notebook = deepcopy(source)
     for one in exercises(notebook):
@@ -62,10 +65,10 @@ def student(source: Notebook, pages: Collection[str], wheel: str) -> Notebook:
             cell.metadata["tags"] = [*cell.metadata["tags"], "raises-exception"]
         _drop(notebook, one.parts["solution"])
         one.text.metadata["nmpcrl"]["exercise"].pop("mistakes", None)
-    return _edition(notebook, pages, wheel)
+    return _edition(notebook, pages)
 
 
-def teacher(source: Notebook, pages: Collection[str], wheel: str) -> Notebook:
+def teacher(source: Notebook, pages: Collection[str]) -> Notebook:
     """A chapter with solutions, and notes on its exercises; arguments as for `student`."""
     notebook = solved(source)
     every = list(exercises(notebook))
@@ -80,25 +83,23 @@ def teacher(source: Notebook, pages: Collection[str], wheel: str) -> Notebook:
     if every:
         _insert(notebook, 1, _table(every), "exercises-table")
     _insert(notebook, 1, _times(syllabus.chapter("", 0, source)), "sections-table")
-    return _edition(notebook, pages, wheel)
+    return _edition(notebook, pages)
 
 
-def grader(
-    source: Notebook, pages: Collection[str], wheel: str, *, otter: bool = False
-) -> Notebook:
+def grader(source: Notebook, pages: Collection[str], *, otter: bool = False) -> Notebook:
     """A chapter with marks for nbgrader, or for otter; other arguments as for `student`."""
     notebook = deepcopy(source)
     for one in exercises(notebook):
         _line(one)
         one.text.metadata["nmpcrl"]["exercise"].pop("mistakes", None)
-    made = _edition(notebook, pages, wheel)
+    made = _edition(notebook, pages)
     return autograded.for_otter(made) if otter else autograded.for_nbgrader(made)
 
 
-def _edition(notebook: Notebook, pages: Collection[str], wheel: str) -> Notebook:
+def _edition(notebook: Notebook, pages: Collection[str]) -> Notebook:
     """What both have in common."""
     setup = [
-        new_markdown_cell(INSTALL.format(wheel=wheel), id="setup-text"),
+        new_markdown_cell(INSTALL, id="setup-text"),
         new_code_cell(SETUP, id="setup"),
     ]
     notebook.cells[1:1] = setup

@@ -89,7 +89,7 @@ def version() -> tuple[str, datetime]:
         found = subprocess.check_output(command, text=True, stderr=subprocess.DEVNULL)
         commit, date = found.split()
     except (OSError, subprocess.CalledProcessError):
-        about = yaml.safe_load((ROOT / "book/published/about.json").read_text())
+        about = yaml.safe_load((ROOT / "book/published/about.json").read_text("utf-8"))
         commit, date = "", about["date"]
     when = datetime.fromisoformat(date)
     words = f"Version {__version__}, {when.day} {when:%B %Y}"
@@ -127,7 +127,7 @@ def numbers(pdf: bytes) -> dict[str, int]:
 
 def described(pdf: bytes, headings: list[str], date: datetime) -> bytes:
     """A PDF that says what it is, what its headings are, and which of its pictures are formulas."""
-    config = yaml.safe_load((ROOT / "_config.yml").read_text())
+    config = yaml.safe_load((ROOT / "_config.yml").read_text("utf-8"))
     writer = PdfWriter(clone_from=BytesIO(pdf))
     about = {"/Title": config["title"], "/Author": config["author"]}
     when = f"D:{date:%Y%m%d%H%M%S}"
@@ -168,7 +168,7 @@ def offer(site: Path, size: int) -> None:
     """Link to the PDF below the list of chapters on every page that has one."""
     for path in site.rglob("*.html"):
         link = OFFER.format(os.path.relpath(site / NAME, path.parent), size / 1e6)
-        page = OFFERED.sub("", path.read_text())
+        page = OFFERED.sub("", path.read_text("utf-8"))
         path.write_text(CHAPTERS.sub(rf"\1{link}", page))
 
 

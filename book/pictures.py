@@ -118,7 +118,7 @@ def _figures(notebook: Any) -> Iterator[tuple[Any, Any]]:
 
 def _size(svg: Path) -> tuple[int, int]:
     """Width and height of a picture in a browser's pixels, of which three are four points."""
-    points = re.findall(r' (?:width|height)="([\d.]+)pt"', svg.read_text())[:2]
+    points = re.findall(r' (?:width|height)="([\d.]+)pt"', svg.read_text("utf-8"))[:2]
     width, height = (round(float(one) * 96 / 72) for one in points)
     return width, height
 

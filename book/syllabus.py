@@ -118,7 +118,7 @@ def chapter(page: str, number: int, notebook: Any) -> Chapter:
 @cache
 def chapters() -> dict[str, Chapter]:
     """The numbered chapters by page, in the order of _toc.yml."""
-    parts = yaml.safe_load((BOOK.parent / "_toc.yml").read_text())["parts"]
+    parts = yaml.safe_load((BOOK.parent / "_toc.yml").read_text("utf-8"))["parts"]
     numbered = [one["file"] for part in parts if part.get("numbered") for one in part["chapters"]]
     pages = [Path(file).name for file in numbered]
     return {
@@ -130,7 +130,7 @@ def chapters() -> dict[str, Chapter]:
 @cache
 def declared() -> dict[str, Any]:
     """What `syllabus.yml` says."""
-    found: dict[str, Any] = yaml.safe_load((BOOK / "syllabus.yml").read_text())
+    found: dict[str, Any] = yaml.safe_load((BOOK / "syllabus.yml").read_text("utf-8"))
     return found
 
 

@@ -167,7 +167,7 @@ def _steps(page: str) -> list[str]:
 
 def citation() -> str:
     """The entry of CITATION.cff for BibTeX."""
-    entry = yaml.safe_load((BOOK.parent / "CITATION.cff").read_text())
+    entry = yaml.safe_load((BOOK.parent / "CITATION.cff").read_text("utf-8"))
     fields = {
         "author": " and ".join(f"{{{one['name']}}}" for one in entry["authors"]),
         "title": f"{{{entry['title']}}}",

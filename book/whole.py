@@ -95,7 +95,7 @@ class Page:
 
 def read(site: Path) -> Iterator[Page]:
     """The pages in the order of _toc.yml."""
-    toc = yaml.safe_load((ROOT / "_toc.yml").read_text())
+    toc = yaml.safe_load((ROOT / "_toc.yml").read_text("utf-8"))
     yield page(site, toc["root"], "", 1)
     for part in toc["parts"]:
         captions = [part["caption"]] + [""] * len(part["chapters"])
@@ -104,7 +104,7 @@ def read(site: Path) -> Iterator[Page]:
 
 
 def parsed(site: Path, name: str) -> Element:
-    return BeautifulSoup((site / f"{name}.html").read_text(), "html.parser")
+    return BeautifulSoup((site / f"{name}.html").read_text("utf-8"), "html.parser")
 
 
 def page(site: Path, name: str, part: str, level: int) -> Page:
@@ -138,7 +138,7 @@ def document(site: Path, target: Path, version: str) -> str:
     """The book as one document, whose place will be `target`."""
     pages = list(read(site))
     names = [page.name for page in pages]
-    config = yaml.safe_load((ROOT / "_config.yml").read_text())
+    config = yaml.safe_load((ROOT / "_config.yml").read_text("utf-8"))
     for one in pages:
         adapt(one, site, target, names)
     return DOCUMENT.format(
@@ -181,7 +181,7 @@ def quoted(text: str) -> str:
 
 
 def cover(config: dict[str, str], version: str, warning: str, site: str) -> str:
-    (paper,) = yaml.safe_load((ROOT / "CITATION.cff").read_text())["references"]
+    (paper,) = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))["references"]
     names = [f"{one['given-names']} {one['family-names']}" for one in paper["authors"]]
     number = f'<a href="{paper["url"]}">{paper["identifiers"][0]["value"]}</a>'
     *most, last = names

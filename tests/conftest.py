@@ -15,7 +15,8 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
-from nmpcrl.analysis.summary import RunSummary, table
+from nmpcrl.analysis.rows import table
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.published import failure_modes_of
 from nmpcrl.control import differential_drive
@@ -256,6 +257,9 @@ def evidence_of(
     return Evidence(Runs(summaries), runs)
 
 
+STILL = np.empty(0)  # the inputs of a robot that is not moved
+
+
 def summary_of(
     experiment: Experiment,
     *,
@@ -264,7 +268,7 @@ def summary_of(
     training: float = 1.0,
     reached: int | None = None,
     states: np.ndarray = TRAJECTORY,
-    actions: np.ndarray | None = None,
+    actions: np.ndarray | None = STILL,
     inside: tuple[int, int, int] = (0, 0, 0),
     imitation: tuple[float, float] = (0.5, 1.0),
     **columns: Any,
@@ -278,7 +282,7 @@ def summary_of(
         training: cost of its training episodes, over the start's.
         reached: after how many episodes it was stopped.
         states: of its last rollout without noise.
-        actions: likewise.
+        actions: likewise; zeros by default, and None if they are not known.
         inside: states in an obstacle by size, in its first episode.
         imitation: held-out errors with and without theta.
         columns: further columns of `RunSummary.episodes`, or the value of all their rows.
@@ -311,5 +315,5 @@ def summary_of(
     errors = dict(zip(("with_theta", "without_theta"), imitation, strict=True))
     facts: dict[str, Any] = {"seconds": 1.0, "imitation": errors}
     facts["stopped"] = "finished" if reached is None else "diverged: theta"
-    inputs = np.zeros((len(states), 2)) if actions is None else actions
+    inputs = np.zeros((len(states), 2)) if actions is STILL else actions
     return RunSummary(asdict(experiment), episodes, evaluations, states, inputs, facts)

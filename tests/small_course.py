@@ -6,8 +6,8 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 SMALL = "01_small"
 ASKED = ("one", "two", "three", "four", "five", "six", "seven")  # of each the square root of four
 CHECKS = f"""from types import SimpleNamespace
-from nmpcrl.course import number
-check = SimpleNamespace(**{{name: lambda a: number(a, 2) for name in {ASKED}}})"""
+from nmpcrl.course import exercise, number
+check = SimpleNamespace(**{{name: exercise(lambda a: number(a, 2)) for name in {ASKED}}})"""
 SOLUTION = "<details><summary>Solution</summary>\n\n```python\n{}\n```\n\n</details>"
 
 
@@ -53,7 +53,7 @@ def small_chapter():
 
 def solved_by_student(**answers):
     """The notebook of a student who solves all exercises, but for some other answers."""
-    notebook = editions.student(small_chapter(), set(), "nmpcrl.whl")
+    notebook = editions.student(small_chapter(), set())
     for name in ASKED:
         answer = answers.get(name, f"root_of_{name} = 2")
         cell_of(notebook, f"{name}-answer").source = answer

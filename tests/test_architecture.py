@@ -4,8 +4,6 @@ import ast
 import re
 from pathlib import Path
 
-import pytest
-
 from nmpcrl.study.departures import DEPARTURES
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,8 +32,6 @@ HOMES = {  # foreign library -> where alone it may be imported
     "torch": "learning/network.py",
     "matplotlib": "report/figures",
 }
-
-each_module = pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
 
 
 def place(path: Path) -> str:
@@ -72,32 +68,39 @@ def test_every_module_is_in_a_room():
     assert places == {*ROOMS, "__init__.py", "__main__.py"}
 
 
-@each_module
-def test_imports_run_one_way_from_commands_to_control(path):
-    room = place(path).split("/")[0]
-    imported = {name.split(".")[1] for name in imports(path) if name.startswith("nmpcrl.")}
-    if room in ROOMS:
-        assert imported & set(ROOMS) <= below(room)
+def test_imports_run_one_way_from_commands_to_control():
+    wrong = {}
+    for path in MODULES:
+        room = place(path).split("/")[0]
+        imported = {name.split(".")[1] for name in imports(path) if name.startswith("nmpcrl.")}
+        if room in ROOMS and (against := imported & set(ROOMS) - below(room)):
+            wrong[place(path)] = against
+    assert not wrong
 
 
-@each_module
-@pytest.mark.parametrize("library", HOMES)
-def test_a_foreign_library_has_one_home(path, library):
-    used = any(name.split(".")[0] == library for name in imports(path))
-    assert not used or place(path).startswith(HOMES[library])
+def test_a_foreign_library_has_one_home():
+    used = {place(path): {name.split(".")[0] for name in imports(path)} for path in MODULES}
+    wrong = {
+        path: library
+        for path, libraries in used.items()
+        for library in libraries & set(HOMES)
+        if not path.startswith(HOMES[library])
+    }
+    assert not wrong
 
 
-@each_module
-def test_only_the_study_knows_the_disk(path):
-    if place(path).split("/")[0] not in ("control", "learning"):
-        return
-    if place(path).startswith("control/codegen/"):  # its cache of what numba compiled
-        return
-    calls = [
-        node.func for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)
-    ]
-    assert not {name.split(".")[0] for name in imports(path)} & DISK
-    assert not [func for func in calls if isinstance(func, ast.Name) and func.id == "open"]
+def test_only_the_study_knows_the_disk():
+    """But for the cache of what numba compiled."""
+    wrong = {}
+    for path in MODULES:
+        if place(path).startswith(("control/", "learning/")) and "codegen/" not in place(path):
+            calls = [
+                n.func for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Call)
+            ]
+            opened = {func.id for func in calls if isinstance(func, ast.Name)} & {"open"}
+            if known := {name.split(".")[0] for name in imports(path)} & DISK | opened:
+                wrong[place(path)] = known
+    assert not wrong
 
 
 def test_departures_are_lettered_without_a_gap():

@@ -102,6 +102,22 @@ def both(*edits: Edit) -> Edit:
     return edit
 
 
+ADDED_LEARNERS = """\
+    "half": Entry(
+        lambda e, nmpc, _: half_expected_sarsa(nmpc, e.alpha), step_size=lambda e: e.alpha / 2
+    ),
+    "slow": Entry(
+        lambda e, nmpc, _: slow_gradient_expected_sarsa(nmpc, e.alpha, e.beta), (*VALUING, "beta")
+    ),
+    "shy": Entry(
+        partial(_network_learner, shy_deep_expected_sarsa, with_theta=False),
+        IMITATING,
+        network=True,
+        solves=1,
+        step_size=lambda e: e.alpha / 3,
+    ),
+"""
+
 EDITS: dict[str, dict[str, Edit]] = {  # what is added in which file, by row
     "learner": {
         "nmpcrl/learning/learners.py": added('''
@@ -109,15 +125,33 @@ EDITS: dict[str, dict[str, Edit]] = {  # what is added in which file, by row
 def half_expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
     """ES with steps half as long."""
     return Learner("half", SecondSolve(nmpc), semi_gradient(alpha / 2), nmpc.gamma)
+
+
+def slow_gradient_expected_sarsa(nmpc: Controller, alpha: float, beta: float) -> Learner:
+    """GES with w moving a tenth as fast."""
+    rule = gradient_td(alpha, beta / 10, nmpc.gamma)
+    return Learner("slow", SecondSolve(nmpc), rule, nmpc.gamma)
+
+
+def shy_deep_expected_sarsa(
+    nmpc: Controller, network: "QNetwork", alpha: float, **options: Any
+) -> Learner:
+    """DES with steps a third as long."""
+    bootstrap = Imitation(network, with_theta=False, **options)
+    return Learner("shy", bootstrap, semi_gradient(alpha / 3), nmpc.gamma)
 '''),
         "nmpcrl/study/setup.py": both(
-            imported("from nmpcrl.learning.learners import half_expected_sarsa"),
-            entered(
-                "LEARNERS", '    "half": lambda e, nmpc, _: half_expected_sarsa(nmpc, e.alpha),\n'
+            imported(
+                "from nmpcrl.learning.learners import (\n    half_expected_sarsa,\n"
+                "    shy_deep_expected_sarsa,\n    slow_gradient_expected_sarsa,\n)"
             ),
+            entered("LEARNERS", ADDED_LEARNERS),
         ),
         "nmpcrl/report/figures/style.py": entered(
-            "LOOKS", '    "half": Look("#332288", "-", "*"),\n'
+            "LOOKS",
+            "".join(
+                f'    "{name}": Look("#332288", "-", "*"),\n' for name in ("half", "slow", "shy")
+            ),
         ),
     },
     "plant": {},
@@ -160,9 +194,13 @@ def largest_reduction(cost: Vector) -> float:
     """By how much the least of some noise-free costs is below the first."""
     return float(cost[0] - cost.min())
 '''),
-        "nmpcrl/analysis/summary.py": replaced(
-            '        "best_cost"',
-            '        "largest_reduction": metrics.largest_reduction(cost),\n        "best_cost"',
+        "nmpcrl/analysis/rows.py": both(
+            replaced('    "best_cost",', '    "largest_reduction",\n    "best_cost",'),
+            replaced(
+                '        "best_cost"',
+                '        "largest_reduction": metrics.largest_reduction(cost),\n'
+                '        "best_cost"',
+            ),
         ),
     },
     "variant": {
@@ -283,7 +321,30 @@ half, es = run(Experiment("half", **short)), run(Experiment(alpha=Experiment().a
 assert half.facts["stopped"] == "finished"
 assert (half.steps["theta"][-1] != half.experiment["theta"]).any()
 assert (half.steps["theta"] == es.steps["theta"]).all()
+assert (half.steps["alpha_phi2"] == es.steps["alpha_phi2"]).all()
 style.line("half")
+
+from nmpcrl.study.provenance import key, versions
+
+def theta(learner, **fields):
+    return run(Experiment(learner, **short | fields)).steps["theta"]
+
+default, fast = Experiment("slow", **short), Experiment("slow", beta=1e-7, **short)
+assert key(default) != key(fast) and fast.canonical.beta == 1e-7
+assert (theta("slow", beta=1e-7) == theta("GES")).all()  # a tenth of 1e-7 is GES's
+assert (theta("slow") != theta("GES")).any()
+
+fit = {"episodes": 2, "steps": 80}
+other = {"zeta": 1e-3, "gated": False, "network": "tanh"}
+runs = {name: theta("shy", **fit | {name: value}) for name, value in other.items()}
+keys = {key(Experiment("shy", **short | {name: value})) for name, value in other.items()}
+assert len({key(Experiment("shy", **short)), *keys}) == 4
+assert all((one[-1] != theta("shy", **fit)[-1]).any() for one in runs.values())
+assert "torch" in versions(Experiment("shy")) and "torch" not in versions(Experiment("slow"))
+third, des = Experiment("shy", **fit), Experiment("DES", alpha=Experiment().alpha / 3, **fit)
+third, des = run(third), run(des)
+assert (third.steps["theta"] == des.steps["theta"]).all()
+assert (third.steps["alpha_phi2"] == des.steps["alpha_phi2"]).all()
 """,
     "layout": """
 from nmpcrl.study import Experiment, design, layouts, paper, run
@@ -311,7 +372,8 @@ axis = claims.times(timings, verdict, "RDES").axes[0]
 assert "relay" in [label.get_text() for label in axis.get_yticklabels()]
 """,
     "metric": """
-from nmpcrl.analysis.summary import summarise, table
+from nmpcrl.analysis.rows import table
+from nmpcrl.analysis.summary import summarise
 from nmpcrl.study import Experiment, run
 
 records = run(Experiment(episodes=2, steps=5, evaluate_every=1))

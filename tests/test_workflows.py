@@ -49,3 +49,9 @@ def test_artifacts_are_kept_from_where_they_are_written(path, monkeypatch):
             assert f'place / "{name}' in DRIVER
     names = [one["name"] for one in kept if "name" in one]
     assert len(names) == len(set(names))
+
+
+@each_workflow
+def test_actions_of_others_are_named_by_a_hash_that_nobody_can_move(path):
+    for step in steps(path):
+        assert re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", step.get("uses", f"a@{'0' * 40}"))

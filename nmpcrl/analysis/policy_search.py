@@ -167,7 +167,7 @@ def _kept() -> dict[Search, Found]:
     """The searches in the file, if they are of this code and these versions."""
     path = _place()
     try:
-        kept = json.loads(path.read_text())
+        kept = json.loads(path.read_text("utf-8"))
         if kept["key"] != _depends_on():
             return {}
         return {Search(**one): Found(**_tuples(found)) for one, found in kept["searches"]}

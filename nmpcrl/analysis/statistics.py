@@ -11,6 +11,7 @@ ties with another failure. nan is refused, because it cannot be said what it wou
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -36,6 +37,7 @@ class Estimate:
         return f"{format(self.value, form)} [{low}, {high}]"
 
 
+@cache
 def rate(held: int, of: int) -> Estimate:
     """Share of independent runs in which something held, with Wilson's interval.
 

@@ -4,7 +4,6 @@ A worker trains, summarises, and hands the summary back; who asked for it stores
 reserved the run until then. What somebody else has reserved is left for the end.
 """
 
-import threading
 import traceback
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
@@ -15,12 +14,19 @@ from pathlib import Path
 from typing import Any
 
 from nmpcrl.analysis.summary import RunSummary, summarise
+from nmpcrl.control import Riccati
 from nmpcrl.study import place, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import seconds_of
-from nmpcrl.study.provenance import provenance, signature, summary_key, warn_of_changes
+from nmpcrl.study.provenance import (
+    environment,
+    provenance,
+    signature,
+    summary_key,
+    warn_of_changes,
+)
 from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
 from nmpcrl.study.reservation import reservations
 from nmpcrl.study.run import run
@@ -29,7 +35,6 @@ from nmpcrl.study.store import Runs
 
 FOLDER = "summaries"  # among the runs
 EPISODE, EVALUATION, STEP, REST = 280, 140, 40, 10_000  # bytes that a summary's file takes at most
-ALONE = threading.Lock()  # of a process: torch's generator, which draws weights, is its only one
 
 
 class Failed(RuntimeError):
@@ -66,6 +71,7 @@ def fetch_summaries(
 
     Raises:
         StoreError: summaries are missing and cannot be stored; nothing is trained.
+        OtherSolver: what solves them is not installed; nothing is trained.
         Failed: runs failed, and `strict` holds.
     """
     wanted = tuple(dict.fromkeys(experiments))
@@ -74,6 +80,7 @@ def fetch_summaries(
     # the long ones first, so that no worker is alone with one at the end
     missing = sorted((e for e in wanted if e not in found), key=seconds_of, reverse=True)
     if missing:
+        _refuse_without_numba(missing)
         store.check_folder(sum(map(size_of, missing)), folder())
         compile_ahead(missing)
     options = {"executor": executor, "workers": workers, "progress": progress}
@@ -82,6 +89,20 @@ def fetch_summaries(
     if failures:
         _tell(failures, len(wanted), strict)
     return Runs({e: found[e] for e in wanted if e in found})
+
+
+def _refuse_without_numba(missing: Iterable[Experiment]) -> None:
+    """Say before anything is trained what would be known after it.
+
+    Raises:
+        OtherSolver: runs of riccati are missing, and without numba another one would solve them.
+    """
+    needing = sum(one.solver == Riccati.name for one in missing)
+    if needing and environment()["numba"] == "absent":
+        raise OtherSolver(
+            f"numba is not installed, and without it {Riccati.name}, which {needing} of the missing"
+            " runs name, solves nothing: `pip install numba`"
+        )
 
 
 def _make_all(
@@ -209,14 +230,13 @@ def make(experiment: Experiment, expected: str, *, afresh: bool = False) -> RunS
     """
     if signature() != expected:
         raise OtherCode("the worker has other code, or other versions of what the numbers need")
-    with ALONE:
-        records = None if afresh else _stored_run(experiment)
-        if records is None:
-            records = run(experiment)
-            records.facts.update(provenance(experiment))
-        if other := store.solved_by_another(experiment, records.facts):
-            raise OtherSolver(f"it was {other}")
-        return summarise(records)
+    records = None if afresh else _stored_run(experiment)
+    if records is None:
+        records = run(experiment)
+        records.facts.update(provenance(experiment))
+    if other := store.solved_by_another(experiment, records.facts):
+        raise OtherSolver(f"it was {other}")
+    return summarise(records)
 
 
 def _stored_run(experiment: Experiment) -> Records | None:

@@ -4,53 +4,59 @@ A run's records take megabytes, most of them noise, and are trained again in sec
 takes a hundredth of that and is enough for every figure, verdict and mechanism of the study.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.imitation import imitate
-from nmpcrl.analysis.metrics import LATE, TOUCH
+from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.archive import Column, Field, Form, Forms, load_about, load_arrays, save_arrays
-from nmpcrl.study.experiment import Experiment, frozen_arm
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import (
     INPUTS,
     STATES,
     Records,
     StepStatus,
-    final_cost,
     most_evaluations,
     named_in,
 )
 from nmpcrl.study.setup import controller_of
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
-NAMES = ("learner", "layout", "decay", "seed", "episodes")  # of a row: without them it names no run
-VECTORS = {"theta", "start", "target"}  # fields that a row holds as text
 IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
 
 
-def as_text(value: Any) -> Any:
-    """A field as a table holds it: a vector's numbers between blanks."""
-    return " ".join(map(repr, value)) if isinstance(value, tuple | list) else value
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """What is known of every run, trained here or published: what pages draw.
 
+    `episodes` has the column cost, and of some runs theta; `evaluations` has episode, theta and
+    cost; `facts` has stopped and seconds. `RunSummary` says what these are.
+    """
 
-DEFAULTS = {one.name: as_text(one.default) for one in fields(Experiment)}  # if a run is older
+    experiment: dict[str, Any]  # the fields of the Experiment
+    episodes: dict[str, Column]
+    evaluations: dict[str, Column]
+    states: Column  # of the last rollout without noise, shape (K + 1, n); nan after a failed solve
+    actions: Column | None  # shape (K + 1, m); None where they are not known
+    facts: dict[str, Any]
+
+    @property
+    def name(self) -> Experiment:
+        """The experiment as the value that names the run."""
+        return Experiment(**self.experiment)
 
 
 @dataclass(frozen=True, eq=False)
-class RunSummary:
-    """One run, in short.
+class RunSummary(Outline):
+    """One run that was trained here, in short.
 
     Columns of `episodes`, each of shape (episodes,) unless said: cost (summed RL cost; nan where
     the episode was cut short or never reached), steps, failed (0 or 1), restarts, inside (states
@@ -65,11 +71,7 @@ class RunSummary:
     distance (to the target at the end).
     """
 
-    experiment: dict[str, Any]  # the fields of the Experiment
-    episodes: dict[str, Column]
-    evaluations: dict[str, Column]
-    states: Column  # of the last rollout without noise, shape (K + 1, n); nan after a failed solve
-    actions: Column  # shape (K + 1, m)
+    actions: Column
     facts: dict[str, Any]  # those of the records, and `imitation` where C6 asks for it
 
     def save(self, path: Path) -> None:
@@ -105,11 +107,6 @@ class RunSummary:
         """The experiment's fields and the facts, as `Records.about`."""
         about = load_about(path, _forms)
         return about["experiment"], about["facts"]
-
-    @property
-    def name(self) -> Experiment:
-        """The experiment as the value that names the run."""
-        return Experiment(**self.experiment)
 
 
 def _forms(about: dict[str, Any]) -> Forms:
@@ -152,105 +149,7 @@ def summarise(records: Records) -> RunSummary:
     return RunSummary(records.experiment, episodes, evaluations, states, actions, facts)
 
 
-def row(summary: RunSummary) -> dict[str, Any]:
-    """One flat row: the experiment's fields, then what became of it."""
-    experiment, episodes, evaluations = summary.experiment, summary.episodes, summary.evaluations
-    named = DEFAULTS | {name: as_text(value) for name, value in experiment.items()}
-    late = slice(-min(LATE, max(1, experiment["episodes"] // 2)), None)
-    cost = evaluations["cost"]
-    columns = {
-        "stopped": summary.facts["stopped"],
-        "initial_cost": float(cost[0]),
-        "final_cost": final_cost(cost),
-        "best_cost": float(cost.min()),
-        "late_cost_range": metrics.late_cost_range_of(
-            evaluations["episode"], cost, experiment["episodes"]
-        ),
-        "training_cost": metrics.late_training_cost(episodes["cost"]),
-        "cut_short": int(np.isnan(episodes["cost"]).sum()),
-        "failed": int(episodes["failed"].sum()),
-        "restarts": int(episodes["restarts"].sum()),
-        "outside": int(episodes["outside"].sum()),
-        "inputs": int(episodes["inputs"].sum()),
-        "steps_done": int(episodes["steps"].sum()),
-        "over": float(episodes["over"].sum() / max(1, episodes["steps"].sum())),
-        "bias": _median(episodes["bias"][late]),
-        "error": _median(episodes["error"][late]),
-        "distance": float(evaluations["distance"][-1]),
-        "iterations": float(np.nanmean(episodes["iterations"])),
-        "seconds": float(summary.facts["seconds"]),
-    }
-    for name, table in (("inside", episodes), ("eval_inside", evaluations)):
-        counts = table["inside"].sum(axis=0)
-        columns |= {f"{name}_{size}": int(count) for size, count in zip(SIZES, counts, strict=True)}
-    columns |= {
-        "worst_overlap": float(np.nanmax(episodes["overlap"])),
-        "eval_worst_overlap": float(np.nanmax(evaluations["overlap"])),
-    }
-    theta = _last_known(episodes["theta"], experiment["theta"])
-    columns |= {f"theta_{i}": float(value) for i, value in enumerate(theta)}
-    imitation = summary.facts.get("imitation", {})
-    columns |= {
-        "imitation_with": imitation.get("with_theta", np.nan),
-        "imitation_without": imitation.get("without_theta", np.nan),
-    }
-    return named | columns
-
-
-def experiment_of(row: Mapping[str, Any]) -> Experiment:
-    """The experiment that a `row` summarises.
-
-    A field for which an older table has no column takes its default.
-
-    Raises:
-        LookupError: one of `NAMES` is missing.
-    """
-    missing = {one.name for one in fields(Experiment)} - row.keys()
-    if nameless := missing & set(NAMES):
-        raise LookupError(f"there is no column {min(nameless)}")
-    named = {one.name: row[one.name] for one in fields(Experiment) if one.name not in missing}
-    for name in VECTORS & named.keys():
-        named[name] = tuple(float(value) for value in named[name].split())
-    return Experiment(**named)
-
-
-def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> "pd.DataFrame":
-    """One `row` a run, with `cost_ratio` as `cost_ratios` gives it."""
-    import pandas as pd  # not for those who only make summaries
-
-    listed = list(summaries.values() if isinstance(summaries, Mapping) else summaries)
-    rows = {one.name: row(one) for one in listed}
-    ratios = cost_ratios(rows)
-    return pd.DataFrame([values | {"cost_ratio": ratios[e]} for e, values in rows.items()])
-
-
-def cost_ratios(rows: Mapping[Experiment, Mapping[str, Any]]) -> dict[Experiment, float]:
-    """`metrics.cost_ratio` of each `row`; nan where its frozen arm is not among them."""
-    arms = {e: rows.get(frozen_arm(e)) for e in rows}
-    return {
-        e: one["training_cost"] / arm["training_cost"] if (arm := arms[e]) else np.nan
-        for e, one in rows.items()
-    }
-
-
-def tidy(summaries: Iterable[RunSummary]) -> "pd.DataFrame":
-    """One row an episode of each run: what names the run, and the columns that are numbers."""
-    import pandas as pd
-
-    named = ("learner", "layout", "decay", "seed")
-    frames = []
-    for one in summaries:
-        columns = {name: one.experiment[name] for name in named}
-        columns |= {"episode": np.arange(one.experiment["episodes"])}
-        columns |= {name: c for name, c in one.episodes.items() if c.ndim == 1}
-        columns |= {
-            f"theta_{name}": one.episodes["theta"][:, i] for i, name in enumerate(paper.THETA_NAMES)
-        }
-        frames.append(pd.DataFrame(columns))
-    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
-
-
-def separation(one: RunSummary, other: RunSummary) -> Vector:
+def separation(one: Outline, other: Outline) -> Vector:
     """The largest difference of any component of theta, after each episode that both reached."""
     apart = np.abs(one.episodes["theta"] - other.episodes["theta"]).max(axis=1)
     result: Vector = apart[np.isfinite(apart)]
@@ -330,13 +229,3 @@ def _distance(states: Column, task: Task) -> Vector:
     """Distance to the target at the end of each rollout, shape (rollouts,)."""
     result: Vector = np.linalg.norm(states[:, -1] - task.target, axis=-1)
     return result
-
-
-def _median(values: Vector) -> float:
-    return float(np.nanmedian(values)) if np.isfinite(values).any() else np.nan
-
-
-def _last_known(theta: Column, first: Iterable[float]) -> Vector:
-    """theta after the last episode that was reached."""
-    reached = np.flatnonzero(np.isfinite(theta).all(axis=1))
-    return theta[reached[-1]] if reached.size else np.array(list(first))

@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from nmpcrl.bench.suite import LENGTHS, STEPS, beforehand, read_or_measure
+    from nmpcrl.bench.suite import LENGTHS, OTHERS, STEPS, beforehand, read_or_measure
 else:
 
     def __getattr__(name: str) -> Any:
@@ -17,4 +17,4 @@ else:
         return getattr(import_module("nmpcrl.bench.suite"), name)
 
 
-__all__ = ["LENGTHS", "STEPS", "beforehand", "read_or_measure"]
+__all__ = ["LENGTHS", "OTHERS", "STEPS", "beforehand", "read_or_measure"]

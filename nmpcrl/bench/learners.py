@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Matrix
-from nmpcrl.bench.paired import Ratio, paired_ratio
+from nmpcrl.bench.paired import TURN, Ratio, paired_ratio
 from nmpcrl.bench.solves import Columns
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning.rollout import Persistent
@@ -21,7 +21,6 @@ from nmpcrl.study.setup import prepare
 SETTLED = max(paper.BATCH, paper.STEPS)  # steps before counting: the networks are fitted then
 REFERENCE = "ES"  # whose step the others' are compared with
 COMPARED = ["ratio", "ratio_low", "ratio_high", "waited"]  # columns: the fields of `Ratio`
-TURN = 20  # steps that a learner takes at a time: then the caches hold what its own loop leaves
 
 
 def against_mpcrl(rounds: int, steps: int) -> Columns:
@@ -84,9 +83,9 @@ def time_learners(
     Returns:
         Columns solver, learner, solves (per step), ms_per_step, ms_per_solve, ms_per_fit (nan where
         there is no fit), ms_per_rest (plant, cost, update and the loop around them), which are
-        medians, hours (the median step times the paper's 300 x 130 steps), hours_paper (Table II;
-        nan for DES, which is not in it), and of `Ratio` to ES: ratio, ratio_low, ratio_high and
-        waited (nan where ES is not among the learners).
+        means and add up, hours (the mean step times the paper's 300 x 130 steps), hours_paper
+        (Table II; nan for DES, which is not in it), and of `Ratio` to ES: ratio, ratio_low,
+        ratio_high and waited (nan where ES is not among the learners).
     """
     runs = {
         (solver, learner): learn(learner, solver=solver)
@@ -101,7 +100,7 @@ def time_learners(
                 times[names[i]].append(_timed(runs[names[i]]))
     counted = {name: np.array(rows[SETTLED:]).T for name, rows in times.items()}
     rows = [
-        _medians(parts)
+        _means(parts)
         | {"hours_paper": PAPER_HOURS.get(learner, np.nan)}
         | _against(parts, counted.get((solver, REFERENCE)))
         for (solver, learner), parts in counted.items()
@@ -110,17 +109,17 @@ def time_learners(
     return named.join(pd.DataFrame(rows))
 
 
-def _medians(parts: Matrix) -> dict[str, float]:
+def _means(parts: Matrix) -> dict[str, float]:
     """What a step of one learner is made of; `parts` are the rows of `_timed`, one a column."""
     solves, solving, fitting, passed, work = parts
     share = work / passed  # what the processor did of each part, which has only the other clock
-    step = float(np.median(work))
+    step = float(work.mean())
     return {
         "solves": float(solves.mean()),
         "ms_per_step": 1e3 * step,
-        "ms_per_solve": 1e3 * float(np.median(share * solving / solves)),
-        "ms_per_fit": 1e3 * float(np.median(share * fitting)) if fitting.any() else np.nan,
-        "ms_per_rest": 1e3 * float(np.median(work - share * (solving + fitting))),
+        "ms_per_solve": 1e3 * float((share * solving).sum() / solves.sum()),
+        "ms_per_fit": 1e3 * float((share * fitting).mean()) if fitting.any() else np.nan,
+        "ms_per_rest": 1e3 * float((work - share * (solving + fitting)).mean()),
         "hours": step * paper.EPISODES * paper.STEPS / 3600,
     }
 

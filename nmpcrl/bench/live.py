@@ -123,7 +123,7 @@ def measure(site: Path = SITE) -> Live:
 def stored() -> Live:
     """What was measured last, or nothing."""
     try:
-        return dict(json.loads(path().read_text()))
+        return dict(json.loads(path().read_text("utf-8")))
     except (OSError, ValueError):
         return {}
 

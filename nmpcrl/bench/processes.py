@@ -6,11 +6,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from nmpcrl.bench.learners import COMPARED
@@ -22,6 +23,8 @@ from nmpcrl.study.store import fetch_all
 from nmpcrl.study.sweeps import sweep
 
 PROCESSES = 7  # leave Student's interval 2.4 standard errors wide on each side; 21 would leave 2.1
+REPETITIONS = 10  # of a measurement that is published: of so many, nine intervals should hold
+NAMED = ["solver", "learner"]  # a row of the table of times
 
 
 def whole_runs(learners: tuple[str, ...], episodes: int) -> tuple[Columns, Columns]:
@@ -85,25 +88,74 @@ def first_calls(times: int, *, compile_too: bool) -> Columns:
 
 
 def time_learners_afresh(processes: int = PROCESSES, steps: int = paper.STEPS) -> pd.DataFrame:
-    """`time_learners` in so many fresh processes, one after the other, each number their median.
+    """`time_learners` in so many fresh processes, one after the other, `together`.
 
-    But for the ratios to ES and their intervals, which are `pooled`: so the interval also covers
-    where code and data come to lie in memory.
+    The intervals also cover where code and data come to lie in memory.
 
     Args:
         processes: how many, two or more.
-        steps: of each learner, in each of them; a whole episode shows a median in each.
+        steps: of each learner, in each of them: whole episodes.
     """
-    tables = [pd.DataFrame(_alone("steps", str(steps))[0]) for _ in range(processes)]
-    named = ["solver", "learner"]
-    numbers = tables[0].columns.difference(named)
-    whole = pd.concat(tables).astype(dict.fromkeys(numbers, float)).groupby(named, sort=False)
+    return together([_time_learners(steps) for _ in range(processes)])
+
+
+def time_learners_repeatedly(
+    repetitions: int = REPETITIONS, processes: int = PROCESSES, steps: int = paper.STEPS
+) -> pd.DataFrame:
+    """`time_learners_afresh` so many times, one after the other, with the coverage of each.
+
+    The intervals cover what changes from one repetition to the next as well.
+
+    Args:
+        repetitions: how many, two or more.
+        processes: of each, two or more.
+        steps: as of `time_learners_afresh`.
+    """
+    return repeated([time_learners_afresh(processes, steps) for _ in range(repetitions)])
+
+
+def together(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """What several measurements of the same learners come to.
+
+    Times are geometric means, as `pooled` ratios are, so that they divide to them; the rest of a
+    step is what its solves and its fit leave.
+
+    Args:
+        tables: of `time_learners`, or of this function; two or more.
+    """
+    numbers = tables[0].columns.difference(NAMED)
+    times = numbers.difference(COMPARED)
+    whole = pd.concat(tables).astype(dict.fromkeys(numbers, float)).groupby(NAMED, sort=False)
     rows = []
-    for (solver, learner), group in whole:
+    for name, group in whole:
         ratios = [Ratio(*one) for one in group[COMPARED].itertuples(index=False)]
-        row = {"solver": solver, "learner": learner, **group[numbers].median()}
+        row = dict(zip(NAMED, name, strict=True)) | dict(np.exp(np.log(group[times]).mean()))
+        parts = row["solves"] * row["ms_per_solve"] + np.nan_to_num(row["ms_per_fit"])
+        row["ms_per_rest"] = row["ms_per_step"] - parts
         rows.append(row | dict(zip(COMPARED, astuple(pooled(ratios)), strict=True)))
     return pd.DataFrame(rows)[list(tables[0])]
+
+
+def repeated(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Repetitions of one measurement `together`, with how many of their intervals hold the whole's.
+
+    Args:
+        tables: of `time_learners_afresh`, two or more.
+
+    Returns:
+        Further columns repetitions, and inside: of how many the interval holds the ratio of all.
+    """
+    whole = together(tables).set_index(NAMED)
+    inside = sum(
+        (one.ratio_low <= whole.ratio) & (whole.ratio <= one.ratio_high)
+        for one in (table.set_index(NAMED) for table in tables)
+    )
+    return whole.assign(repetitions=len(tables), inside=inside).reset_index()
+
+
+def _time_learners(steps: int) -> pd.DataFrame:
+    """`time_learners` in a process of its own."""
+    return pd.DataFrame(_alone("steps", str(steps))[0])
 
 
 def _alone(*arguments: str) -> tuple[dict[str, Any], str]:

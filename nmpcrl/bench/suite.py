@@ -78,7 +78,7 @@ LENGTHS = {  # from the shortest
         run=30,
         learners=ALL,
         seeds=6,
-        seed_run=paper.EPISODES,
+        seed_run=100,
         firsts=3,
         compile=True,
     ),
@@ -169,7 +169,7 @@ def check(length: object) -> None:
 def stored() -> Bench | None:
     """What is in the file, if it is of this code, these versions and this machine."""
     try:
-        kept = json.loads(path().read_text())
+        kept = json.loads(path().read_text("utf-8"))
         return kept if kept["about"]["key"] == depends_on() and dict(kept["stages"]) else None
     except FileNotFoundError:
         return None
@@ -248,6 +248,9 @@ def _stages(size: Length) -> list[Stage]:
         ("runs at once", lambda: {"parallel": at_once(size.seeds, size.seed_run)}),
         ("first call", lambda: {"first": first_calls(size.firsts, compile_too=size.compile)}),
     ]
+
+
+OTHERS = tuple(name for name, _ in _stages(LENGTHS["smoke"]) if name != STEPS)
 
 
 def path() -> Path:

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy import optimize
 
+from nmpcrl import Vector
 from nmpcrl.bench.learners import PAPER_HOURS, ratio
 from nmpcrl.bench.solves import LOOPS
 from nmpcrl.study import paper
@@ -151,46 +153,95 @@ def first_call(bench: Bench, *, cached: bool) -> tuple[float, bool]:
     return float((mine.solve + mine.step).median()), bool(mine.notice.all())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Saving:
-    """The time of a step of RDES over that of ES when a solve takes t milliseconds (claim C3).
+    """The time of a step of RDES over that of ES when a solve of RDES takes t (claim C3).
 
-    ES: 2 t + rest; RDES: t + network + rest, all but t measured here.
+    Eq. (9.1): ES takes 2 u t + r_ES and RDES t + f + r_RDES. A solver leaves the caches in one
+    state or another, and gains more or less from a warm start, so all but t was measured beside
+    several. Between these it is interpolated over log t, and beyond them it stays. The curve goes
+    through what was measured.
     """
 
-    network: float  # fit and prediction [ms]
-    rest: float  # of a step of ES, all but its solves [ms]
-    rest_rdes: float  # of a step of RDES, all but solve and network [ms]
+    solve: Vector  # t, of each solver that was measured beside, ascending [ms]
+    warm: Vector  # u: a solve of ES, which starts nearer to its solution, over one of RDES
+    network: Vector  # f: fit and prediction [ms]
+    rest: Vector  # r_ES: of a step of ES, all but its solves [ms]
+    rest_rdes: Vector  # r_RDES: of a step of RDES, all but solve and network [ms]
 
-    def ratio(self, solve: Any) -> Any:
-        """RDES over ES for a solve of so many milliseconds."""
-        return (solve + self.network + self.rest_rdes) / (2 * solve + self.rest)
+    def ratio(self, solve: float | Vector, warm: float | None = None) -> Any:
+        """RDES over ES for a solve of so many milliseconds.
+
+        Args:
+            solve: t, of any shape.
+            warm: u, where another than was measured is to be tried.
+        """
+        u = self._at(solve, self.warm) if warm is None else warm
+        extra = self._at(solve, self.network + self.rest_rdes)
+        return (solve + extra) / (2 * u * solve + self._at(solve, self.rest))
 
     def solve_at(self, ratio: float) -> float:
-        """The time of a solve [ms] at which RDES takes `ratio` of the time of ES; above 1/2."""
-        rdes = self.network + self.rest_rdes
-        return (rdes - ratio * self.rest) / (2 * ratio - 1)
+        """The time of a solve [ms] from which on RDES takes at most `ratio` of the time of ES.
+
+        0 where the fastest solver is slow enough, and infinite where none is.
+        """
+        times = np.geomspace(1e-3 * self.solve[0], 1e6 * self.solve[-1], 9001)
+        above = np.flatnonzero(self.ratio(times) > ratio)
+        if not len(above):
+            return 0.0
+        if above[-1] == len(times) - 1:
+            return np.inf
+        low, high = times[above[-1]], times[above[-1] + 1]
+        return float(optimize.brentq(lambda t: self.ratio(t) - ratio, low, high))
 
     @property
     def break_even(self) -> float:
         """The time of a solve [ms] below which the network costs more than it saves."""
         return self.solve_at(1.0)
 
+    @property
+    def break_even_within(self) -> tuple[float, float]:
+        """Between which times the break-even lies, whatever way leads from solver to solver.
 
-def saving(bench: Bench) -> Saving:
-    """C3's curve, from the learners with the fastest solver."""
-    table = learners(bench)
-    mine = table[table.solver == FORMULATIONS[0]].set_index("learner")
-    return Saving(
-        network=float(mine.ms_per_fit["RDES"]),
-        rest=float(mine.ms_per_rest["ES"]),
-        rest_rdes=float(mine.ms_per_rest["RDES"]),
-    )
+        Of the two solvers about it, the least and the most of what a step of RDES takes besides its
+        solve, and of u. (nan, nan) where there is no break-even between two solvers.
+        """
+        k = int(np.searchsorted(self.solve, self.break_even))
+        if not 0 < k < len(self.solve):
+            return np.nan, np.nan
+        beside = slice(k - 1, k + 1)
+        costs = (self.network + self.rest_rdes - self.rest)[beside]
+        saves = 2 * self.warm[beside] - 1
+        if saves.min() <= 0:
+            return np.nan, np.nan
+        low, high = costs.min() / saves.max(), costs.max() / saves.min()
+        return float(max(low, self.solve[k - 1])), float(min(high, self.solve[k]))
+
+    def _at(self, solve: float | Vector, measured: Vector) -> Any:
+        return np.interp(np.log(solve), np.log(self.solve), measured)
 
 
-def measured_ratios(bench: Bench) -> pd.DataFrame:
-    """RDES over ES as the learners ran, a row a solver: solve (of RDES and of ES) [ms], ratio."""
-    table = learners(bench)
+def saving(table: pd.DataFrame) -> Saving:
+    """C3's curve, from the times of RDES and ES with each solver; `table` as of `time_learners`."""
+    times = table.set_index(["learner", "solver"])
+    rdes = times.loc["RDES"].sort_values("ms_per_solve")
+    es = times.loc["ES"].loc[rdes.index]
+    columns = {
+        "solve": rdes.ms_per_solve,
+        "warm": es.ms_per_solve / rdes.ms_per_solve,
+        "network": rdes.ms_per_fit,
+        "rest": es.ms_per_rest,
+        "rest_rdes": rdes.ms_per_rest,
+    }
+    return Saving(**{name: column.to_numpy(float) for name, column in columns.items()})
+
+
+def measured_ratios(table: pd.DataFrame) -> pd.DataFrame:
+    """RDES over ES as they ran, a row a solver: solve (of RDES and of ES) [ms], ratio.
+
+    Args:
+        table: as of `time_learners`.
+    """
     rows = {}
     for solver in table.solver.unique():
         mine = table[table.solver == solver].set_index("learner").ms_per_solve

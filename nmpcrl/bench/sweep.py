@@ -136,7 +136,8 @@ def sweep(problems: int, *, workers: int | None = None, progress: bool = True) -
     for error in failures.values():
         raise error
     table = SweepTable(total, _about(time.perf_counter() - began))
-    content = {"about": table.about, "tally": asdict(total)}
+    content: dict[str, Any] = {"about": table.about, "tally": asdict(total)}
+    content["seal"] = provenance.hash_of(content)
     keep_file(path(), partial(write_json, content=content, indent=1))
     return table
 
@@ -154,6 +155,8 @@ def read(place: Path) -> SweepTable:
     """
     try:
         kept = json.loads(place.read_text("utf-8"))
+        if kept.pop("seal") != provenance.hash_of(kept):
+            raise ValueError("it is not what was written")
         return SweepTable(Tally(**kept["tally"]), kept["about"])
     except (OSError, ValueError, LookupError, TypeError) as error:
         raise DamagedSweep(

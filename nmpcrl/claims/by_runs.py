@@ -14,8 +14,9 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis.statistics import rate
-from nmpcrl.claims.halves import confirmations, counted, halves, reversals, sentence
-from nmpcrl.claims.rule import Claim, Observations, Paths, Verdict, arms, read, settle
+from nmpcrl.claims.halves import confirmations, halves, reversals
+from nmpcrl.claims.rule import Claim, Observations, Paths, arms, read, settle
+from nmpcrl.claims.verdict import WHOLE, Verdict
 
 # One row a cell of layout, decay and seed, one column an arm; nan is unknown.
 Values: TypeAlias = pd.DataFrame
@@ -30,7 +31,7 @@ class RunClaim(Claim):
     threshold: float  # where yes ends
     evidence: Callable[[pd.DataFrame, Paths], str]  # what the numbers are, in sentences
     besides: Measure | None = None  # counts that have to be 0; the weaker question forgives them
-    halves: Callable[[pd.DataFrame, Paths], str] | None = None  # and for each learner
+    each: Callable[[pd.DataFrame, Paths], str] | None = None  # and for each learner
     unit: str = "pairs"  # what is asked, in the plural
     nothing: float = 0.0  # the number of a run in which nothing is to be seen
     short: str = ""  # statement for the head of a column
@@ -54,7 +55,7 @@ class RunClaim(Claim):
             weaker, counts = answers, _long(self.besides(*found))
             answers = weaker & _known(counts == 0, counts)
         verdict = settle(self, answers, self.evidence(*found), weaker=weaker, unit=self.unit)
-        return replace(verdict, halves=self.halves(*found) if self.halves else "")
+        return replace(verdict, each=self.each(*found) if self.each else "")
 
     def at_borders(self, values: Values, borders: Iterable[float]) -> pd.DataFrame:
         """What would become of the claim at other borders than its own, which stays where it is.
@@ -113,9 +114,9 @@ class Contrast(RunClaim):
         found = halves((first, second), self.measure(observed.runs, observed.paths), borders)
         return replace(
             verdict,
-            halves=counted(found),
-            as_claimed=tuple(map(sentence, confirmations(found))),
-            reverse=tuple(map(sentence, reversals(found))),
+            halves=tuple(one for one in found if one.layouts == (WHOLE,)),
+            as_claimed=tuple(confirmations(found)),
+            reverse=tuple(reversals(found)),
         )
 
     def yes(self, values: Values, border: float) -> pd.Series:

@@ -1,35 +1,42 @@
-"""Where a chapter's evidence comes from: runs trained here, published ones, or both.
+"""Where a chapter's evidence comes from: published runs, or runs trained here.
 
-`book/published` holds the whole study as it was trained once. A reader's machine trains a part of
-it afresh, which takes the place of the published runs of the same name; so a figure or a verdict
-can rest on both, and says so.
+`book/published` holds the whole study as it was trained once, and the book speaks of that. Whoever
+asks for other runs, or for runs of his own, gets those; every figure says whose it shows. What a
+reader's machine makes of a part of the published study is a check, and stands by itself: see
+`agreement.repeated`.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
 import pandas as pd
 
+from nmpcrl import Vector
+from nmpcrl.analysis.rows import THETA, cost_ratios, row, table
 from nmpcrl.analysis.summaries import fetch_summaries
-from nmpcrl.analysis.summary import RunSummary, cost_ratios, table
-from nmpcrl.claims.failure_modes import WELL
+from nmpcrl.analysis.summary import Outline, RunSummary
+from nmpcrl.claims.failure_modes import WELL, mechanism, went_wrong
 from nmpcrl.claims.published import failure_modes_of, load
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
-from nmpcrl.study.parameters import OneOf, ParameterError
-from nmpcrl.study.records import Column
+from nmpcrl.study.parameters import OneOf, Truth
+from nmpcrl.study.records import Column, Stopped
+from nmpcrl.study.setup import LEARNERS, controller_of
 from nmpcrl.study.store import Runs
 
-SOURCES = ("fresh", "published")
+SOURCES = ("published", "fresh")
+TRIED = 5  # runs of a mechanism that are trained again before it is left without an example
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """Runs, their summaries, and where each comes from."""
 
-    summaries: Runs[RunSummary]  # a published one has fewer columns: see `Published`
-    runs: pd.DataFrame  # `summary.table` with `variant` and `source`, one row a run, in that order
+    summaries: Runs[Outline]
+    runs: pd.DataFrame  # `rows.table` with `variant` and `source`, one row a run, in that order
 
     @cached_property
     def main(self) -> "Evidence":
@@ -55,16 +62,26 @@ class Evidence:
         return ", ".join(parts) or "no runs"
 
     @property
-    def wrong(self) -> pd.DataFrame:
-        """The runs that went wrong, those trained here first; `run` is each one's experiment."""
-        runs = self.runs.assign(run=list(self.summaries))
-        runs = runs[~runs.mechanism.isin(("", WELL))]
-        return runs.sort_values("source", kind="stable")
+    def origin(self) -> str:
+        """Whose runs these are, where and in which readings, for numbers on pages."""
+        if self.is_published:
+            return "the published main table"
+        names = {"layouts": "layout", "noise per": "decay"}
+        parts = [f"{words} {_named(self.runs[column])}" for words, column in names.items()]
+        return f"{self.mark}, of {_named(self.runs.learner)}; {'; '.join(parts)}"
 
     @property
-    def examples(self) -> dict[str, Experiment]:
-        """The first run that went wrong of each mechanism."""
-        return dict(self.wrong.drop_duplicates("mechanism").set_index("mechanism").run)
+    def is_published(self) -> bool:
+        """Whether this is the published main table, whole."""
+        parts = load().variants.items()
+        main = {e for e, part in parts if part == design.MAIN_TABLE}
+        return set(self.summaries) == main and set(self.runs.source) == {"published"}
+
+    @property
+    def wrong(self) -> pd.DataFrame:
+        """The runs that went wrong; `run` is each one's experiment."""
+        runs = self.runs.assign(run=list(self.summaries))
+        return runs[~runs.mechanism.isin(("", WELL))]
 
 
 def needed(
@@ -75,27 +92,32 @@ def needed(
     seeds: Sequence[int] = design.SEEDS,
     episodes: int = paper.EPISODES,
 ) -> tuple[Experiment, ...]:
-    """The runs of the main table that have to be trained here.
+    """The runs of the main table that have to be trained here, with their frozen arms.
 
-    All that is asked for and not published, if `source` is "fresh", and of what is published
-    `design.fresh`; none if it is "published".
+    All that are asked for if `source` is "fresh", and those that are not published if it is
+    "published".
 
     Raises:
-        ParameterError: a value is not what it may be, or something asked for is not published.
+        ParameterError: a value is not what it may be.
     """
     OneOf(SOURCES).check("study", source)
-    asked = _asked(learners, layouts, seeds, episodes)
+    asked, known = _asked(learners, layouts, seeds, episodes), load().summaries
+    return tuple(e for e in asked if source == "fresh" or e not in known)
+
+
+def repeatable(
+    repeat: bool, **asked: Sequence[str] | Sequence[int] | int
+) -> tuple[Experiment, ...]:
+    """Of the runs asked for, the published ones that a build trains again: those of `design.fresh`.
+
+    None unless `repeat` holds.
+
+    Raises:
+        ParameterError: `repeat` is neither true nor false, or a value is not what it may be.
+    """
+    again = set(design.fresh()) if Truth().check("repeat", repeat) else set()
     known = load().summaries
-    if source == "published":
-        for experiment in asked:
-            if experiment not in known:
-                raise ParameterError(
-                    f"study = 'published' holds no run of {experiment} over {experiment.episodes}"
-                    " episodes; study = 'fresh' trains it"
-                )
-        return ()
-    afresh = set(design.fresh())
-    return tuple(e for e in asked if e in afresh or e not in known)
+    return tuple(e for e in _asked(**asked) if e in again and e in known)  # type: ignore[arg-type]
 
 
 def gather(
@@ -104,7 +126,7 @@ def gather(
     """The runs that a chapter rests on; what `needed` names is trained if it is not stored.
 
     Args:
-        source: "fresh" or "published".
+        source: "published" or "fresh".
         variants: whether to add the published controls and variants.
         asked: as `needed` takes it.
 
@@ -118,7 +140,7 @@ def gather(
         wanted = {
             e: name for e, name in published.variants.items() if name != design.MAIN_TABLE
         } | wanted
-    summaries: dict[Experiment, RunSummary] = {
+    summaries: dict[Experiment, Outline] = {
         e: here[e] if e in here else published.summaries[e] for e in wanted
     }
     made = table(here).join(failure_modes_of(here)) if here else table(here)
@@ -129,6 +151,69 @@ def gather(
     ratios = cost_ratios(rows)
     runs["cost_ratio"] = [ratios[e] for e in wanted]
     return Evidence(Runs(summaries), runs)
+
+
+def examples(found: Evidence) -> dict[str, RunSummary]:
+    """A run of each mechanism that occurs, whole: the first that shows it when trained here, too.
+
+    A mechanism that none of `TRIED` runs shows again has no example.
+    """
+    return {name: run for name, run in tried(found) if _mechanism(run, found) == name}
+
+
+def tried(found: Evidence) -> Iterator[tuple[str, RunSummary]]:
+    """The runs that `examples` trains again with the mechanism that each is to show.
+
+    Those without a network come first, because every processor gives them the same numbers, and
+    then those of the learner in which the mechanism is most common.
+    """
+    runs = found.wrong
+    runs = runs.assign(fits=[LEARNERS[name].network for name in runs.learner])
+    runs["common"] = runs.groupby(["mechanism", "learner"]).learner.transform("size")
+    ordered = runs.sort_values(["fits", "common"], ascending=[True, False], kind="stable")
+    for name, some in ordered.groupby("mechanism", sort=False):
+        for experiment in some.run.head(TRIED):
+            (again,) = fetch_summaries([experiment], progress=False).values()
+            yield str(name), again
+            if _mechanism(again, found) == name:
+                break
+
+
+def _mechanism(run: RunSummary, found: Evidence) -> str:
+    """Of a run that is trained again; `WELL` if it did not go wrong this time."""
+    arm = frozen_arm(run.name)
+    costs = dict(zip(found.summaries, found.runs.training_cost, strict=True))
+    own = row(run)
+    if went_wrong(pd.DataFrame([own | {"cost_ratio": own["training_cost"] / costs[arm]}])) == [
+        None
+    ]:
+        return WELL
+    return mechanism(run, run.name.task, found.summaries[arm].states)
+
+
+def with_inputs(found: Evidence) -> Evidence:
+    """The finished runs with the inputs of their last rollouts, which published runs lack.
+
+    They are solved for again, from the final theta. A run that was stopped left no policy.
+    """
+    finished = found.where(found.runs.stopped == Stopped.FINISHED)
+    thetas = finished.runs[[*THETA]].to_numpy(float)
+    made: dict[Experiment, Outline] = {}
+    for (e, summary), theta in zip(finished.summaries.items(), thetas, strict=True):
+        known = summary.actions is not None
+        made[e] = summary if known else replace(summary, actions=_inputs(e, theta))
+    return replace(finished, summaries=Runs(made))
+
+
+def _inputs(experiment: Experiment, theta: Vector) -> Column:
+    """Of a rollout without noise, shape (K + 1, m); nan after a failed solve."""
+    actions = evaluate(controller_of(experiment), theta, experiment.steps).actions
+    missing = ((0, experiment.steps - len(actions)), (0, 0))
+    return np.pad(actions, missing, constant_values=np.nan)
+
+
+def _named(column: pd.Series) -> str:
+    return ", ".join(map(str, column.unique()))
 
 
 def paths(evidence: Evidence) -> Mapping[Experiment, Column]:

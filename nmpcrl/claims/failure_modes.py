@@ -13,12 +13,14 @@ these columns in five short runs. They sort runs, and decide no claim.
 
 from collections.abc import Iterable, Mapping
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.metrics import TOUCH
-from nmpcrl.analysis.summary import RunSummary, table
+from nmpcrl.analysis.rows import table
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.paper_claims import BETTER, divergence, was_stopped
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
@@ -92,19 +94,27 @@ def failure_modes(
     for run, share, wrong in zip(listed, shares, went_wrong(runs), strict=True):
         if run.name.learner == "frozen":
             continue
-        task = run.name.task
+        names = {name: run.experiment[name] for name in NAMED}
         first_rollout = named[frozen_arm(run.name)].states
-        rows.append(
-            {
-                **{name: run.experiment[name] for name in NAMED},
-                "ending": ending(run.states, task),
-                "cost": share,
-                "wrong": wrong or "",
-                "episode": rise(run).start if wrong else pd.NA,
-                "mechanism": mechanism(run, task, first_rollout) if wrong else WELL,
-            }
-        )
+        rows.append(names | {"cost": share} | failure_mode(run, wrong, first_rollout))
     return pd.DataFrame(rows)
+
+
+def failure_mode(run: RunSummary, wrong: Failure | None, first_rollout: Column) -> dict[str, Any]:
+    """What became of one run: ending, wrong, episode and mechanism of `failure_modes`.
+
+    Args:
+        run: one that learned.
+        wrong: where it went wrong.
+        first_rollout: states of theta_init's rollout without noise, shape (K + 1, n).
+    """
+    task = run.name.task
+    return {
+        "ending": ending(run.states, task),
+        "wrong": wrong or "",
+        "episode": rise(run).start if wrong else pd.NA,
+        "mechanism": mechanism(run, task, first_rollout) if wrong else WELL,
+    }
 
 
 def went_wrong(runs: pd.DataFrame) -> list[Failure | None]:

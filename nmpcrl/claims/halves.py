@@ -10,55 +10,14 @@ decided after the study had been seen, and with a dozen cells a claim an interva
 for being the most striking of them.
 """
 
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
 from itertools import groupby
 
 import pandas as pd
 
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.claims.rule import MAJORITY
-
-WHOLE = "all"  # in the place of a layout
-
-
-@dataclass(frozen=True)
-class Halves:
-    """In how many runs each of two learners went wrong, in one reading of the decay."""
-
-    learners: tuple[str, str]  # the claim says that the first goes wrong, and the second does not
-    wrong: str  # how: "diverged"
-    decay: str
-    layouts: tuple[str, ...]  # (`WHOLE`,) for all of them together
-    pairs: int  # of which both answers are known
-    counts: tuple[int, int]  # of the first and of the second
-    against: int  # pairs in which only the second went wrong
-    apart: int  # pairs in which only one of them did
-
-    @property
-    def reversed(self) -> bool:
-        """Whether this is the reverse of what is claimed."""
-        return _most(self.against, self.apart)
-
-    @property
-    def as_claimed(self) -> bool:
-        """Whether the two differ in the way that is claimed."""
-        return _most(self.apart - self.against, self.apart)
-
-    def __add__(self, other: "Halves") -> "Halves":
-        """Two cells of one reading together."""
-        first, second = (a + b for a, b in zip(self.counts, other.counts, strict=True))
-        return Halves(
-            self.learners,
-            self.wrong,
-            self.decay,
-            self.layouts + other.layouts,
-            self.pairs + other.pairs,
-            (first, second),
-            self.against + other.against,
-            self.apart + other.apart,
-        )
+from nmpcrl.claims.verdict import WHOLE, Halves
 
 
 def halves(
@@ -102,12 +61,12 @@ def _count(
 
 def reversals(found: list[Halves]) -> Iterator[Halves]:
     """Where the reverse of the claim was seen: in a whole reading, else its layouts together."""
-    return _clear(found, lambda one: one.reversed)
+    return _clear(found, lambda one: _most(one.against, one.apart))
 
 
 def confirmations(found: list[Halves]) -> Iterator[Halves]:
     """Where the two were seen to differ as claimed, likewise."""
-    return _clear(found, lambda one: one.as_claimed)
+    return _clear(found, lambda one: _most(one.apart - one.against, one.apart))
 
 
 def _clear(found: list[Halves], clear: Callable[[Halves], bool]) -> Iterator[Halves]:
@@ -122,46 +81,3 @@ def _clear(found: list[Halves], clear: Callable[[Halves], bool]) -> Iterator[Hal
 
 def _most(some: int, of: int) -> bool:
     return of > 0 and rate(some, of).low > MAJORITY
-
-
-def counted(found: Iterable[Halves]) -> str:
-    """How often each learner went wrong in each reading, in a sentence a way of going wrong."""
-    wholes = [one for one in found if one.layouts == (WHOLE,)]
-    return " ".join(
-        _counted(list(group)) for _, group in groupby(wholes, key=lambda one: one.wrong)
-    )
-
-
-def _counted(readings: list[Halves]) -> str:
-    first, second = readings[0].learners
-    parts = [
-        f"with noise that decays per {one.decay} in {one.counts[0]} of {one.pairs} runs of {first}"
-        f" and {one.counts[1]} of {second}"
-        for one in readings
-    ]
-    return f"{readings[0].wrong.capitalize()}: {', '.join(parts)}."
-
-
-def sentence(found: Halves) -> str:
-    """How the two differ where that is clear, with the counts and the interval."""
-    first, second = found.learners
-    one, other = found.counts
-    seen, going = "as claimed", found.apart - found.against
-    if found.reversed:
-        first, second, one, other = second, first, other, one
-        seen, going = "the reverse was seen", found.against
-    several = "s" if len(found.layouts) > 1 else ""
-    where = (
-        "" if found.layouts == (WHOLE,) else f", in layout{several} {' and '.join(found.layouts)}"
-    )
-    return (
-        f"With noise that decays per {found.decay}{where}, {seen}: {first} {found.wrong} in"
-        f" {one} of {found.pairs} runs and {second} in {other} ({going} of {found.apart} pairs that"
-        f" differ: {rate(going, found.apart):.0%})."
-    )
-
-
-def readings(sentences: Iterable[str]) -> tuple[str, ...]:
-    """The readings of the decay of which sentences of `sentence` are, each once."""
-    named = (re.match(r"With noise that decays per (\w+)", one) for one in sentences)
-    return tuple(dict.fromkeys(found[1] for found in named if found))

@@ -14,17 +14,8 @@ import pandas as pd
 from nmpcrl.analysis.statistics import Estimate, probability_of_improvement
 from nmpcrl.claims.by_runs import AtMost, RunClaim, Values
 from nmpcrl.claims.paper_claims import BETTER, SAME_COST, cost_difference, cost_reduction
-from nmpcrl.claims.rule import (
-    NOT,
-    PARTLY,
-    REPRODUCED,
-    Observations,
-    Paths,
-    Verdict,
-    arms,
-    median,
-    shown,
-)
+from nmpcrl.claims.rule import Observations, Paths, arms, median, shown
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Verdict
 from nmpcrl.study.experiment import PAPER
 
 

@@ -10,6 +10,7 @@ what it is, and infinite where a solve failed or training had to be stopped.
 """
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,24 +19,13 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.metrics import TOUCH
-from nmpcrl.analysis.summary import SIZES, experiment_of
+from nmpcrl.analysis.rows import THETA, experiment_of
+from nmpcrl.analysis.summary import SIZES
 from nmpcrl.claims.assumptions import TheoremClaim
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values, beside
-from nmpcrl.claims.rule import (
-    CELL,
-    NOT,
-    REPRODUCED,
-    Assumption,
-    Claim,
-    Observations,
-    Paths,
-    Verdict,
-    arms,
-    median,
-    shown,
-)
+from nmpcrl.claims.rule import CELL, Assumption, Claim, Observations, Paths, arms, median, shown
 from nmpcrl.claims.timing import TimeClaim
-from nmpcrl.study import paper
+from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records, Stopped
@@ -68,12 +58,12 @@ TIMED: dict[str, Any] = {
     "solver": SOLVER,
     "measured": f"the processor's time for a step over that for one of ES, with {SOLVER}, the"
     " paper's solver",
-    "test": "median ratio of steps taken in turn, with its interval; see `timing`",
+    "test": "ratio of the sums over steps taken in turn, with its interval; see `timing`",
 }
 UP_TO = 60  # borders at which a claim is decided once more
 
 
-# Numbers of runs, one a row of `summary.table`
+# Numbers of runs, one a row of `rows.table`
 
 
 def was_stopped(runs: pd.DataFrame) -> pd.Series:
@@ -121,7 +111,7 @@ def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.S
     1 is as good as what is possible and 0 as theta_init; nan where nothing is known to be possible.
 
     Args:
-        runs: of `summary.table`.
+        runs: of `rows.table`.
         possible: by which share of theta_init's noise-free cost it can be lowered, by layout.
     """
     known = {layout: share for layout, share in possible.items() if share > 0}
@@ -238,8 +228,7 @@ def _c5_evidence(runs: pd.DataFrame, paths: Paths) -> str:
 
 def _theta_distances(first: pd.DataFrame, second: pd.DataFrame) -> Vector:
     """Largest relative difference between the components of two final thetas, one a pair."""
-    names = [f"theta_{i}" for i in range(len(paper.THETA_INIT))]
-    one, other = (arm[names].to_numpy(float) for arm in (first, second))
+    one, other = (arm[[*THETA]].to_numpy(float) for arm in (first, second))
     relative = np.abs(one - other) / np.maximum(np.abs(one), np.abs(other))
     result: Vector = np.max(relative, axis=1, initial=0)
     return result
@@ -267,23 +256,36 @@ def _c6_evidence(runs: pd.DataFrame, _: Paths) -> str:
 # C7, from Section III-A and the conclusion
 
 
-def _largest_overlap(runs: pd.DataFrame, _: Paths) -> Values:
+def constraints_held(learners: tuple[str, ...]) -> dict[str, Any]:
+    """The fields of a claim that the constraints hold with some learners."""
+    return {
+        "learners": learners,
+        "measure": partial(_largest_overlap, learners),
+        "besides": partial(_states_inside, learners),
+        "evidence": partial(_c7_evidence, learners),
+        "each": partial(_c7_each, learners),
+    }
+
+
+def _largest_overlap(learners: tuple[str, ...], runs: pd.DataFrame, _: Paths) -> Values:
     """Largest Xi without noise, 0 if none was above; infinite for an input out of bounds."""
     return beside(
-        runs, PAPER, lambda arm: arm.eval_worst_overlap.clip(lower=0).mask(arm.inputs > 0, np.inf)
+        runs,
+        learners,
+        lambda arm: arm.eval_worst_overlap.clip(lower=0).mask(arm.inputs > 0, np.inf),
     )
 
 
-def _states_inside(runs: pd.DataFrame, _: Paths) -> Values:
+def _states_inside(learners: tuple[str, ...], runs: pd.DataFrame, _: Paths) -> Values:
     """How many states in training lay in an obstacle."""
-    return beside(runs, PAPER, lambda arm: _inside(arm, "inside").sum(axis=1, skipna=False))
+    return beside(runs, learners, lambda arm: _inside(arm, "inside").sum(axis=1, skipna=False))
 
 
-def _c7_evidence(runs: pd.DataFrame, paths: Paths) -> str:
-    every = pd.concat(arms(runs, *PAPER), keys=PAPER, names=["learner"])
+def _c7_evidence(learners: tuple[str, ...], runs: pd.DataFrame, paths: Paths) -> str:
+    every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
     training, judged = (_inside(every, name) for name in ("inside", "eval_inside"))
     worst = [shown(every[c].max(), ".3f") for c in ("worst_overlap", "eval_worst_overlap")]
-    kept = BY_RUNS["C7"].answers(_largest_overlap(runs, paths))
+    kept = BY_RUNS["C7"].answers(_largest_overlap(learners, runs, paths))
     by_learner = judged.sum(axis=1).groupby(level="learner", sort=False).sum()
     listed = ", ".join(f"{name} {states:.0f}" for name, states in by_learner.items())
     return (
@@ -296,9 +298,9 @@ def _c7_evidence(runs: pd.DataFrame, paths: Paths) -> str:
     )
 
 
-def _c7_halves(runs: pd.DataFrame, paths: Paths) -> str:
-    kept = BY_RUNS["C7"].answers(_largest_overlap(runs, paths))
-    every = pd.concat(arms(runs, *PAPER), keys=PAPER, names=["learner"])
+def _c7_each(learners: tuple[str, ...], runs: pd.DataFrame, paths: Paths) -> str:
+    kept = BY_RUNS["C7"].answers(_largest_overlap(learners, runs, paths))
+    every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
     states = _inside(every, "eval_inside").sum(axis=1).groupby(level="learner", sort=False).sum()
     inside = ", ".join(f"{count:.0f} of {name}" for name, count in states.items())
     return (
@@ -307,15 +309,19 @@ def _c7_halves(runs: pd.DataFrame, paths: Paths) -> str:
     )
 
 
-def kept_without_noise(runs: pd.DataFrame) -> pd.DataFrame:
-    """The runs that C7's weaker question is put to, a row a run, by learner.
+def kept_without_noise(runs: pd.DataFrame, learners: tuple[str, ...]) -> pd.DataFrame:
+    """The runs that C7's weaker question is put to, or that of the wider claim, by learner.
+
+    Args:
+        runs: of `rows.table`.
+        learners: of whom the claim speaks.
 
     Returns:
         Columns kept (whether its rollouts without noise kept the constraints) and stopped (whether
         training had to be stopped: then only the rollouts up to there are asked).
     """
-    every = pd.concat(arms(runs, *PAPER), keys=PAPER, names=["learner"])
-    kept = BY_RUNS["C7"].answers(_largest_overlap(runs, {})).dropna().astype(bool)
+    every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
+    kept = BY_RUNS["C7"].answers(_largest_overlap(learners, runs, {})).dropna().astype(bool)
     stopped = was_stopped(every).reorder_levels(kept.index.names)
     return pd.DataFrame({"kept": kept, "stopped": stopped.reindex(kept.index)})
 
@@ -339,26 +345,37 @@ def _sized(inside: pd.DataFrame) -> str:
 # C9, what the paper takes for granted
 
 
-def _cost_reductions(runs: pd.DataFrame, _: Paths) -> Values:
-    return beside(runs, ("RDES", "GES"), cost_reduction)
+def cost_reduced(learners: tuple[str, ...]) -> dict[str, Any]:
+    """The fields of a claim that some learners reduce the cost."""
+    return {
+        "learners": learners,
+        "measure": partial(_cost_reductions, learners),
+        "evidence": partial(_c9_evidence, learners),
+        "each": partial(_c9_each, learners),
+    }
 
 
-def _c9_evidence(runs: pd.DataFrame, _: Paths) -> str:
+def _cost_reductions(learners: tuple[str, ...], runs: pd.DataFrame, _: Paths) -> Values:
+    return beside(runs, learners, cost_reduction)
+
+
+def _c9_evidence(learners: tuple[str, ...], runs: pd.DataFrame, _: Paths) -> str:
     every = dict(zip(PAPER, arms(runs, *PAPER), strict=True))
     medians = {name: shown(median(cost_reduction(arm)), "+.1%") for name, arm in every.items()}
-    claimed = pd.concat(arms(runs, "RDES", "GES"))
+    claimed = pd.concat(arms(runs, *learners))
     failed = int(np.isinf(claimed.final_cost).sum())
     stuck = int((claimed.distance > ARRIVED).sum())
     listed = ", ".join(f"{name} {value}" for name, value in medians.items())
+    named = f"{', '.join(learners[:-1])} and {learners[-1]}"
     return (
-        f"Median reduction of the noise-free cost: {listed}. Of the last rollouts of RDES and GES,"
+        f"Median reduction of the noise-free cost: {listed}. Of the last rollouts of {named},"
         f" {stuck} end more than {ARRIVED} away from the target, and in {failed} runs one of the"
         " last three failed or training was stopped; they count."
     )
 
 
-def _c9_halves(runs: pd.DataFrame, paths: Paths) -> str:
-    better = BY_RUNS["C9"].answers(_cost_reductions(runs, paths))
+def _c9_each(learners: tuple[str, ...], runs: pd.DataFrame, paths: Paths) -> str:
+    better = BY_RUNS["C9"].answers(_cost_reductions(learners, runs, paths))
     return f"It holds in {_by_learner(better)}."
 
 
@@ -374,6 +391,8 @@ CLAIMS: dict[str, Claim] = {
             name="C1",
             statement="DES diverges within 300 episodes; RDES does not.",
             short="DES diverges,\nRDES does not",
+            quotation="“shows divergent RL performance”, of DES; “with the learning process"
+            " remaining stable throughout training episodes”, of RDES (Section IV-B)",
             question="Did DES diverge, and RDES with the same layout, decay and seed not?",
             measured="whether the run was stopped; median training cost of the last 20 episodes"
             " over that of the frozen arm under the same noise",
@@ -394,6 +413,8 @@ CLAIMS: dict[str, Claim] = {
             name="C2",
             statement="ES is unstable; GES is stable.",
             short="ES is unstable,\nGES is not",
+            quotation="“an unstable learning process as training episodes progress”, of ES; “stable"
+            " RL performance”, of GES (Section IV-B)",
             question="Was ES unstable, and GES with the same layout, decay and seed not?",
             measured="as C1; range of the noise-free cost in the second half of training, as a"
             " share of theta_init's",
@@ -412,6 +433,8 @@ CLAIMS: dict[str, Claim] = {
         TimeClaim(
             name="C3",
             statement="RDES takes half of the time of ES.",
+            quotation="“our RDES method completes the training episodes in half the time required"
+            " for both the method from [ES] and our GES method” (Section IV-B)",
             question="How long does a step of RDES take, in steps of ES?",
             border=f"{HALF[0]} to {HALF[1]}; partly below {NEAR_HALF[1]:g}",
             would_change="The time of one solve: the slower the solver, the closer to one half. And"
@@ -426,6 +449,7 @@ CLAIMS: dict[str, Claim] = {
         TimeClaim(
             name="C4",
             statement="GES takes the time of ES.",
+            quotation="“≈ 18” hours, for ES and for GES (Table II)",
             question="How long does a step of GES take, in steps of ES?",
             border=f"{SAME_TIME[0]} to {SAME_TIME[1]}; partly from {NEAR_SAME_TIME[0]} to"
             f" {NEAR_SAME_TIME[1]}",
@@ -440,6 +464,7 @@ CLAIMS: dict[str, Claim] = {
             name="C5",
             statement="RDES and GES reach the same policy.",
             short="RDES and GES:\nsame policy",
+            quotation="“both methods achieve the same optimal policy” (Section V)",
             question="Did RDES and GES with the same layout, decay and seed end in the same"
             " policy?",
             measured="largest distance of their trajectories without noise; difference of the final"
@@ -458,6 +483,9 @@ CLAIMS: dict[str, Claim] = {
             name="C6",
             statement="theta as an input makes the network more accurate.",
             short="θ helps the\nnetwork",
+            quotation="“by adding the parameter vector $\\boldsymbol{\\theta}$ to the training"
+            " data, the NN gains more knowledge about the behavior of the primary NMPC”"
+            " (Section III-A)",
             question="Fitted to the same run of RDES, does the network that has theta as an input"
             " err less?",
             measured="root mean square errors on held-out pairs of state and theta, with over"
@@ -476,7 +504,7 @@ CLAIMS: dict[str, Claim] = {
         ),
         AtMost(
             name="C7",
-            statement="Input and obstacle constraints hold throughout.",
+            statement="With RDES, input and obstacle constraints hold throughout.",
             short="constraints\nhold",
             question="Did every action stay in its bounds and every state out of the obstacles, in"
             " training and without noise? The weaker question: without noise?",
@@ -484,24 +512,26 @@ CLAIMS: dict[str, Claim] = {
             border=f"none beyond {TOUCH:g}; partly if only the weaker question is not refuted",
             would_change="The obstacle constraint is soft, and noise is added after it was"
             " enforced.",
-            learners=PAPER,
-            measure=_largest_overlap,
+            quotation="“even when replacing the subsequent action-value function by the NN"
+            " approximator, the constraint satisfaction is always maintained since the policy is"
+            " derived from the OCP scheme” (Section III-A)",
             threshold=TOUCH,
-            besides=_states_inside,
-            evidence=_c7_evidence,
-            halves=_c7_halves,
             unit="runs",
             label="largest Ξ without noise",
             linear_to=TOUCH,
             borders=np.geomspace(1e-8, 1.0, UP_TO),
+            **constraints_held(("RDES",)),
         ),
         TheoremClaim(
             name="C8",
             statement="Convergence of GES is guaranteed.",
-            question="Does what is run meet the assumptions of the theorem?",
+            quotation="“Under some assumptions […] on the positive step sizes […], it follows that"
+            " $\\boldsymbol{\\theta}$ converges almost surely to a stable equilibrium"
+            " point” (Section III-B), of GES",
+            question="Does what is run meet the assumptions of a theorem that is cited for it?",
             measured="each assumption beside the code, with a measurement where one is possible",
-            border="all of them",
-            test="one assumption that does not hold is enough",
+            border="all of one theorem's",
+            test="of each theorem, one assumption that does not hold is enough",
             words={
                 REPRODUCED: "the guarantee applies",
                 NOT: "the guarantee does not apply",
@@ -520,15 +550,16 @@ CLAIMS: dict[str, Claim] = {
             border=f"at least {BETTER:.0%}",
             would_change="The layout, and theta_c: near d_o it removes the penalty altogether"
             " (departure N).",
-            learners=("RDES", "GES"),
-            measure=_cost_reductions,
+            quotation="“an RL algorithm can advantageously adjust the parameters of the NMPC […] to"
+            " enhance closed-loop performance” (Section II-B); no figure shows the performance"
+            " without learning",
+            implied=True,
             threshold=BETTER,
-            evidence=_c9_evidence,
-            halves=_c9_halves,
             unit="runs",
             label="fall of noise-free cost",
             linear_to=0.1,
             borders=np.linspace(-0.05, 0.15, UP_TO),
+            **cost_reduced(("RDES", "GES")),
         ),
     )
 }
@@ -546,7 +577,7 @@ def judge(
     """Every claim of the paper, in order.
 
     Args:
-        runs: of `summary.table`, all of one setting; a missing learner leaves its claims undecided.
+        runs: of `rows.table`, all of one setting; a missing learner leaves its claims undecided.
         paths: states of the last rollout without noise; only those of RDES and GES are read.
         timings: of `time_learners`; what is not in it is not decided.
         assumptions: of `audit`.

@@ -49,6 +49,69 @@ class Commit:
 
 
 @dataclass(frozen=True)
+class Decision:
+    """A definition that came after the thresholds, which stayed as they were."""
+
+    commit: str
+    date: str  # as in `Commit`
+    when: str  # what had been seen by then
+    what: str  # is decided otherwise, in a sentence
+    moved: str  # what became otherwise by it, in a sentence
+
+
+SINCE = (  # in the order in which they were made
+    Decision(
+        "b82880deae",
+        "2026-11-21 13:40",
+        "before the runs were published",
+        "The final cost of a run that had to be stopped is infinite, in every claim.",
+        "C9 holds in 135 of 240 runs and not in 139; no outcome changed.",
+    ),
+    Decision(
+        "9cc97081fa",
+        "2026-11-21 21:50",
+        "after the verdicts had been seen",
+        "The time of a step is the processor's, compared in pairs of steps, with an interval; it"
+        " had been a ratio of two medians.",
+        "No outcome changed.",
+    ),
+    Decision(
+        "ad7adf081b",
+        "2026-11-22 03:59",
+        "after the verdicts had been seen",
+        "Both halves of C1 and C2 are counted by themselves, in each reading and layout: what"
+        " clearly differs there was found by looking.",
+        "This is no part of a verdict.",
+    ),
+    Decision(
+        "417746ef7c",
+        "2026-11-22 11:48",
+        "after the verdicts had been seen",
+        "A verdict depends on the decay where its outcome differs between the readings, and where"
+        " two learners clearly differ as claimed in one and the other way round in the other.",
+        "C1 depends on the decay, and not C6 alone; no outcome changed.",
+    ),
+    Decision(
+        "bd39257279",
+        "2026-11-23 03:27",
+        "after the verdicts had been seen, and before those of the new questions were",
+        "Each claim is judged as the paper makes it: C7 is asked of RDES alone, of which the paper"
+        " says it, and C8 of both theorems that are cited; the same of all four learners are W7 and"
+        " W9.",
+        "C7 is asked of 120 runs and not of 480; no outcome changed.",
+    ),
+    Decision(
+        "815da09895",
+        "2026-11-23 03:58",
+        "after the verdicts had been seen, and before the learners were timed so",
+        "A ratio of times is that of the sums over the same steps, so that the times of a table"
+        " divide to it; it had been a median of ratios.",
+        "C3 had been 0.63 and C4 1.00, on another machine as well; no outcome changed.",
+    ),
+)
+
+
+@dataclass(frozen=True)
 class Fixed:
     """The commit in which the thresholds were fixed, and the one in which runs were published."""
 

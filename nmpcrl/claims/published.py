@@ -1,6 +1,6 @@
 """The whole study as it was trained once, in `book/published`, small enough to go with the book.
 
-- `runs.csv`: one row a run, `summary.row`, with the part of the study it belongs to and its key;
+- `runs.csv`: one row a run, `rows.row`, with the part of the study it belongs to and its key;
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
 - `thetas.npz`: theta after every episode, of the runs that a reader can follow (see `thetas`);
@@ -12,7 +12,7 @@
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from functools import cache
 from hashlib import sha256
@@ -23,24 +23,31 @@ import numpy as np
 import pandas as pd
 
 import nmpcrl
-from nmpcrl.analysis.summary import DEFAULTS, RunSummary, experiment_of, row
+from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, experiment_of, row
+from nmpcrl.analysis.summary import Outline, RunSummary
 from nmpcrl.bench.learners import ratio
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import thetas
-from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism, failure_modes
+from nmpcrl.claims.failure_modes import (
+    WELL,
+    Ending,
+    Failure,
+    Mechanism,
+    failure_mode,
+    failure_modes,
+    went_wrong,
+)
 from nmpcrl.claims.prespecified import from_git
-from nmpcrl.claims.rule import Outcome, Verdict
+from nmpcrl.claims.verdict import Halves, Outcome, Verdict
 from nmpcrl.study import design
 from nmpcrl.study.atomic import write_json
-from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.parameters import Refusal, shortened
 from nmpcrl.study.provenance import EPOCHS, environment, hash_of, summary_key
 from nmpcrl.study.records import Column
 
 FILES = ("runs.csv", "curves.npz", thetas.FILE, "verdicts.json", "timings.csv", "about.json")
-SEEDLESS = [one.name for one in fields(Experiment) if one.name != "seed"]  # what a cell shares
-CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows
 # Columns of `failure_modes`, and what may be in them; the frozen arms have none.
 WORDS = {
     "ending": {*Ending, ""},
@@ -48,14 +55,14 @@ WORDS = {
     "mechanism": {*Mechanism, WELL, ""},
 }
 FAILURE_MODE = [*WORDS, "episode"]
-MEASURES = ("final_cost", "training_cost")  # by which runs of another machine are judged
-SLACK = 0.01  # of theta_init's cost, that they may be out of the published range
-EXACT = 1e-6  # relative: the cost of theta_init, which no noise and no learning moves
+# Columns of `runs.csv`; those that are younger than it are missing, and a metric is then not known.
+COLUMNS = (*FIELDS, *OUTCOME, "variant", "key", *FAILURE_MODE)
 
 
-RESTORE = (
-    "`git checkout -- book/published` restores what came with the project,"
-    " `nmpcrl study --publish` makes it anew"
+CHECKOUT = "`git checkout -- book/published` restores what came with the project,"
+ELSEWHERE = (
+    "it comes with the project's repository and not with an installed package: set"
+    " NMPCRL_PUBLISHED to its folder book/published there;"
 )
 
 
@@ -65,14 +72,9 @@ class Damaged(Refusal):
 
 @dataclass(frozen=True, eq=False)
 class Published:
-    """The published study.
+    """The published study; theta after every episode is kept of some runs, as `thetas` says."""
 
-    Of a summary it holds episodes["cost"] and, of some (see `thetas`), ["theta"];
-    evaluations["episode"], ["theta"] and ["cost"], states and the facts "stopped" and "seconds";
-    single precision but for the summaries in `rows`.
-    """
-
-    summaries: Mapping[Experiment, RunSummary] = field(default_factory=dict)
+    summaries: Mapping[Experiment, Outline] = field(default_factory=dict)  # single precision
     variants: Mapping[Experiment, str] = field(default_factory=dict)  # the part each belongs to
     rows: Mapping[Experiment, dict[str, Any]] = field(default_factory=dict)  # of `runs.csv`
     verdicts: tuple[Verdict, ...] = ()
@@ -84,6 +86,14 @@ class Published:
         """The rows of the main table."""
         parts = self.variants.items()
         return pd.DataFrame([self.rows[e] for e, part in parts if part == design.MAIN_TABLE])
+
+    @property
+    def batches(self) -> tuple[Mapping[str, Any], ...]:
+        """When, where, with what and how long the runs were trained that were published together.
+
+        The first is of the study as it was published first; `extend` added the others.
+        """
+        return (self.about, *self.about.get("additions", ())) if self.rows else ()
 
     def verdict(self, claim: str) -> Verdict:
         """What became of a claim.
@@ -102,6 +112,12 @@ def place() -> Path:
     """The folder, or what the environment variable NMPCRL_PUBLISHED says."""
     beside = Path(nmpcrl.__file__).parent.parent / "book" / "published"
     return Path(os.environ.get("NMPCRL_PUBLISHED") or beside)
+
+
+def _restore() -> str:
+    """How to get what is published, in a checkout of the project and elsewhere."""
+    known = CHECKOUT if (Path(nmpcrl.__file__).parents[1] / ".git").exists() else ELSEWHERE
+    return f"{known} `nmpcrl study --publish` makes it anew"
 
 
 def publish(
@@ -131,14 +147,14 @@ def publish(
     np.savez_compressed(folder / "curves.npz", **curves)
     thetas.save(folder, summaries, variants)
     _write(folder, verdicts, pd.DataFrame() if timings is None else timings)
-    about = {
-        "date": datetime.now(UTC).date().isoformat(),
-        "epochs": EPOCHS,
-        "versions": environment(),
-        "machine": fingerprint(),
-        "runs": runs.variant.value_counts(sort=False).to_dict(),
-        "hours": float(runs.seconds.sum() / 3600),
-    }
+    about = (
+        made_here()
+        | _timed(timings)
+        | {
+            "runs": runs.variant.value_counts(sort=False).to_dict(),
+            "hours": float(runs.seconds.sum() / 3600),
+        }
+    )
     _seal(folder, about)
     return folder
 
@@ -147,7 +163,8 @@ def republish(verdicts: Iterable[Verdict], timings: pd.DataFrame | None = None) 
     """Put these in the place of the published verdicts on the same claims; the runs stay.
 
     Args:
-        verdicts: on claims of which a verdict is published.
+        verdicts: where a claim has no published verdict, its own comes after the others; if they
+            are on all that have one, they are published in their order.
         timings: of `time_learners`, in the place of the published ones, if they were taken anew.
 
     Returns:
@@ -155,17 +172,97 @@ def republish(verdicts: Iterable[Verdict], timings: pd.DataFrame | None = None) 
 
     Raises:
         Damaged: what is published is not what `publish` wrote.
-        KeyError: there is no published verdict on a claim.
     """
     found, folder = load(), place()
-    kept = {verdict.claim: verdict for verdict in found.verdicts}
-    for verdict in verdicts:
-        if verdict.claim not in kept:
-            raise KeyError(f"no verdict on {verdict.claim} is published in {folder}")
-        kept[verdict.claim] = verdict
+    new = {verdict.claim: verdict for verdict in verdicts}
+    known = {verdict.claim: verdict for verdict in found.verdicts}
+    kept = new if known.keys() <= new.keys() else known | new
     _write(folder, kept.values(), found.timings if timings is None else timings)
-    _seal(folder, found.about)
+    _seal(folder, {**found.about, **_timed(timings)})
     return folder
+
+
+class Unpublishable(Refusal):
+    """Runs cannot be put beside those that are published."""
+
+
+def extend(summaries: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]) -> Path:
+    """Publish further runs beside those that are there, which stay as they are to the last byte.
+
+    Args:
+        summaries: the runs.
+        variants: the part of the study that each belongs to: none of `thetas.FOLLOWED`.
+
+    Returns:
+        Where they are.
+
+    Raises:
+        Damaged: what is published is not what `publish` wrote.
+        Unpublishable: a run is there already, or lacks its frozen arm there, or differs in a field
+            for which the published table has no column.
+    """
+    found, folder = load(), place()
+    header = pd.read_csv(folder / "runs.csv", nrows=0).columns.tolist()
+    rows = [_row_beside(found, e, one, variants[e], header) for e, one in summaries.items()]
+    runs = pd.DataFrame(rows, columns=header)
+    with (folder / "curves.npz").open("rb") as whole, np.load(whole, allow_pickle=False) as file:
+        curves = {name: file[name] for name in file.files}
+    more = _curves(list(summaries.values()))
+    joined: dict[str, Any] = {name: _below(curves[name], more[name]) for name in curves}
+    with (folder / "runs.csv").open("a", encoding="utf-8") as table:
+        runs.to_csv(table, index=False, header=False)
+    np.savez_compressed(folder / "curves.npz", **joined)
+    counts, hours = (
+        runs.variant.value_counts(sort=False).to_dict(),
+        float(runs.seconds.sum() / 3600),
+    )
+    addition = made_here() | {"runs": counts, "hours": hours}
+    about = {**found.about, "runs": {**found.about["runs"], **counts}}
+    _seal(folder, about | {"additions": [*found.about.get("additions", []), addition]})
+    return folder
+
+
+def made_here() -> dict[str, Any]:
+    """When runs were made, by which code and libraries, and on which machine."""
+    return {
+        "date": datetime.now(UTC).date().isoformat(),
+        "epochs": EPOCHS,
+        "versions": environment(),
+        "machine": fingerprint(),
+    }
+
+
+def _row_beside(
+    found: Published, e: Experiment, one: RunSummary, part: str, header: list[str]
+) -> dict[str, Any]:
+    """The row of a further run, with how it went wrong beside its published frozen arm."""
+    arm = frozen_arm(e)
+    if e in found.rows:
+        raise Unpublishable(f"{e} is published already, in the part {found.variants[e]!r}")
+    if arm not in found.rows:
+        raise Unpublishable(f"the frozen arm of {e} is not published, so it has nothing beside it")
+    made = row(one)
+    other = {name for name in made.keys() - set(header) if made[name] != OLDER.get(name)}
+    if other:
+        raise Unpublishable(f"{e} has another {min(other)}, for which runs.csv has no column")
+    ratio = made["training_cost"] / found.rows[arm]["training_cost"]
+    (wrong,) = went_wrong(pd.DataFrame([made | {"cost_ratio": ratio}]))
+    mode = failure_mode(one, wrong, found.summaries[arm].states)
+    return made | {"variant": part, "key": summary_key(e)} | mode
+
+
+def _below(first: Column, second: Column) -> Column:
+    """Two columns of `_curves`, one below the other, padded with nan to one length."""
+    length = max(first.shape[1], second.shape[1])
+    padded = (
+        np.pad(
+            one,
+            [(0, 0), (0, length - one.shape[1]), *[(0, 0)] * (one.ndim - 2)],
+            constant_values=np.nan,
+        )
+        for one in (first, second)
+    )
+    return np.concatenate([*padded])
 
 
 def failure_modes_of(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
@@ -191,109 +288,44 @@ def _load(folder: Path) -> Published:
     try:
         if not folder.is_dir() or not any(folder.iterdir()):
             kind = ", which is no folder" if folder.exists() and not folder.is_dir() else ""
-            raise Damaged(f"nothing is published in {folder}{kind}; {RESTORE}")
+            raise Damaged(f"nothing is published in {folder}{kind}; {_restore()}")
         return _read(folder)
     except Damaged:
         raise
     except Exception as error:  # whatever a damaged file may lead to, a RecursionError included
         why = shortened(f"{type(error).__name__}: {error}")
-        raise Damaged(f"{folder} is damaged ({why}); {RESTORE}") from error
+        raise Damaged(f"{folder} is damaged ({why}); {_restore()}") from error
 
 
 def _read(folder: Path) -> Published:
-    about = json.loads((folder / "about.json").read_text())
+    about = json.loads((folder / "about.json").read_text("utf-8"))
     if about["seal"] != _sealed(about) or about["files"] != _sums(folder):
         raise ValueError("a file is not the one that was written")
     runs = pd.read_csv(folder / "runs.csv", dtype=dict.fromkeys(WORDS, str))
     runs = runs.fillna(dict.fromkeys(WORDS, ""))
+    if strange := {*runs} - {*COLUMNS}:
+        raise ValueError(f"runs.csv has columns that are not known: {', '.join(sorted(strange))}")
     for name, known in WORDS.items():
         if unknown := set(runs[name]) - known:
             raise ValueError(f"no {name} is called {', '.join(sorted(unknown))}")
-    rows = {experiment_of(one): DEFAULTS | one for one in runs.to_dict("records")}
+    rows = {
+        experiment_of(one): {name: one.get(name, OLDER.get(name, np.nan)) for name in COLUMNS}
+        for one in runs.to_dict("records")
+    }
     with (folder / "curves.npz").open("rb") as whole, np.load(whole, allow_pickle=False) as file:
         curves = {name: file[name] for name in file.files}
     if {len(rows)} != {len(column) for column in curves.values()}:
         raise ValueError("runs.csv and curves.npz are not of the same runs")
     followed = thetas.load(folder)
-    verdicts = json.loads((folder / "verdicts.json").read_text())
+    verdicts = json.loads((folder / "verdicts.json").read_text("utf-8"))
     return Published(
-        {e: _summary_of(one, curves, i, followed) for i, (e, one) in enumerate(rows.items())},
+        {e: _outline_of(one, curves, i, followed) for i, (e, one) in enumerate(rows.items())},
         {e: one["variant"] for e, one in rows.items()},
         rows,
         tuple(_verdict(one) for one in verdicts),
         _timings(folder / "timings.csv"),
         about,
     )
-
-
-def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.DataFrame:
-    """Where runs that were trained here contradict the published ones: one row each, none if none.
-
-    Where code, versions and machine are the same, every run must be the same to the last bit.
-    Elsewhere rounding differs, and learning may make much of that. So theta_init's cost must agree
-    to `EXACT`, and of the runs of a learner, layout and reading of the decay at least half must lie
-    within the range of the published ones, widened on both sides by itself and by `SLACK`.
-    """
-    rows = {e: row(one) for e, one in fresh.items() if e in published.rows}
-    exact = comparable(rows, published)
-    wrong = [unequal(e, rows[e], published.rows[e]) for e in sorted(exact, key=str)]
-    others = {e: one for e, one in rows.items() if e not in exact}
-    wrong += _out_of_range(others, published)
-    names = [*CELL, "seed", "what", "here", "published"]
-    return pd.DataFrame([one for one in wrong if one], columns=names)
-
-
-def comparable(runs: Iterable[Experiment], published: Published) -> set[Experiment]:
-    """Those of which code, versions and machine are the ones of the published runs."""
-    made = {"machine": fingerprint(), "versions": environment()}
-    if any(published.about.get(name) != value for name, value in made.items()):
-        return set()
-    known = published.rows
-    return {e for e in runs if e in known and known[e]["key"] == summary_key(e)}
-
-
-def unequal(
-    e: Experiment, here: Mapping[str, Any], there: Mapping[str, Any]
-) -> tuple[Any, ...] | None:
-    """The first number in which two runs differ that should be the same."""
-    compared = [*MEASURES, "initial_cost", *(f"theta_{i}" for i in range(len(e.theta)))]
-    for name in compared:
-        if here[name] != there[name]:
-            return e.learner, e.layout, e.decay, e.seed, name, here[name], str(there[name])
-    return None
-
-
-def _out_of_range(
-    rows: Mapping[Experiment, dict[str, Any]], published: Published
-) -> list[tuple[Any, ...]]:
-    """The rule for runs of another machine; see `compare`."""
-    wrong: list[tuple[Any, ...]] = []
-    if not rows:
-        return wrong
-    known = pd.DataFrame([published.rows[e] for e in published.rows])
-    cells = dict(list(known.groupby(SEEDLESS)))
-    for named, group in pd.DataFrame(list(rows.values())).groupby(SEEDLESS):
-        there, cell = cells[named], tuple(group[list(CELL)].iloc[0])
-        start = float(there.initial_cost.iloc[0])
-        for seed, here in zip(group.seed, group.initial_cost, strict=True):
-            if abs(here / start - 1) > EXACT:
-                wrong.append((*cell, seed, "initial_cost", here, str(start)))
-        for name in MEASURES:
-            low, high = _widened(there[name].to_numpy(float), SLACK * start)
-            outside = ~group[name].between(low, high)
-            if outside.mean() > 0.5:
-                middle = float(group[name].median())
-                wrong.append((*cell, "all", name, middle, f"{low:.1f} to {high:.1f}"))
-    return wrong
-
-
-def _widened(values: Column, slack: float) -> tuple[float, float]:
-    finite = values[np.isfinite(values)]
-    if not finite.size:
-        return -np.inf, np.inf
-    width = float(np.ptp(finite)) + slack
-    most = np.inf if finite.size < values.size else float(finite.max()) + width
-    return float(finite.min()) - width, most
 
 
 def _sums(folder: Path) -> dict[str, str]:
@@ -338,18 +370,18 @@ def _padded(columns: list[Column]) -> Column:
     return result
 
 
-def _summary_of(
-    summary: dict[str, Any],
+def _outline_of(
+    row: dict[str, Any],
     curves: Mapping[str, Column],
     i: int,
     followed: Mapping[int, Column],
-) -> RunSummary:
+) -> Outline:
     judged = np.isfinite(curves["judged_after"][i])
-    experiment = asdict(experiment_of(summary))
+    experiment = asdict(experiment_of(row))
     episodes = {"cost": curves["cost"][i][: experiment["episodes"]]}
     if i in followed:
         episodes["theta"] = followed[i][: experiment["episodes"]]
-    return RunSummary(
+    return Outline(
         experiment,
         episodes,
         {
@@ -358,9 +390,14 @@ def _summary_of(
             "cost": curves["judged_cost"][i][judged],
         },
         curves["states"][i][: experiment["steps"]],
-        np.empty((0, 0)),
-        {"stopped": summary["stopped"], "seconds": summary["seconds"]},
+        None,
+        {"stopped": row["stopped"], "seconds": row["seconds"]},
     )
+
+
+def _timed(timings: pd.DataFrame | None) -> dict[str, Any]:
+    """What about.json says of times that were taken just now, on this machine; else nothing."""
+    return {} if timings is None else {"timings": made_here()}
 
 
 def _write(folder: Path, verdicts: Iterable[Verdict], timings: pd.DataFrame) -> None:
@@ -371,7 +408,7 @@ def _write(folder: Path, verdicts: Iterable[Verdict], timings: pd.DataFrame) -> 
 
 def _timings(path: Path) -> pd.DataFrame:
     """As they were written; no rows where no time was taken."""
-    return pd.read_csv(path) if path.read_text().strip() else pd.DataFrame()
+    return pd.read_csv(path) if path.read_text("utf-8").strip() else pd.DataFrame()
 
 
 def _verdict(stored: dict[str, Any]) -> Verdict:
@@ -383,5 +420,13 @@ def _verdict(stored: dict[str, Any]) -> Verdict:
         for name in ("by_layout", "by_decay")
     }
     parts |= {"outcome": Outcome(stored["outcome"]), "interval": interval, "counts": counts}
-    parts |= {name: tuple(stored.get(name, ())) for name in ("as_claimed", "reverse")}
+    for name in ("halves", "as_claimed", "reverse"):
+        parts[name] = tuple(_halves(one) for one in stored[name])
     return Verdict(**stored | parts)
+
+
+def _halves(stored: dict[str, Any]) -> Halves:
+    parts: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in stored.items()
+    }
+    return Halves(**parts)

@@ -7,7 +7,7 @@ compared with: a layout or a reading is compared with the whole main table, a va
 table in the same cells of layout, decay and seed.
 """
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,8 @@ import pandas as pd
 from scipy import stats
 
 from nmpcrl.claims.paper_claims import BY_RUNS, judge_runs
-from nmpcrl.claims.rule import CELL, UNDECIDABLE, Outcome, Paths, Verdict
+from nmpcrl.claims.rule import CELL, Paths
+from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
 from nmpcrl.study.experiment import PAPER
@@ -28,7 +29,7 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     """The map: the main table as a whole, its parts (`part_changes`), and `variant_changes`.
 
     Args:
-        runs: of `summary.table`, with a column `variant`.
+        runs: of `rows.table`, with a column `variant`.
         paths: as `judge` takes them.
 
     Returns:
@@ -114,7 +115,7 @@ def variant_changes(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) ->
     for it cannot change, and neither have the controls, which change no learner of the paper.
 
     Args:
-        runs: of `summary.table`, with a column `variant`.
+        runs: of `rows.table`, with a column `variant`.
         paths: as `judge` takes them, of the variants and of the main table.
         base: the `variant` of the main table's rows.
 
@@ -124,11 +125,15 @@ def variant_changes(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) ->
     paper = runs[runs.learner.isin(PAPER)]
     main = paper[paper.variant == base]
     rows = []
+    bases: dict[Hashable, tuple[Verdict, ...]] = {}  # many variants have the same cells
     for name, changed in paper[paper.variant != base].groupby("variant", sort=False):
-        before = main.merge(changed[CELL].drop_duplicates(), on=CELL)
+        cells = changed[CELL].drop_duplicates().sort_values(CELL)
+        before = main.merge(cells, on=CELL)
         kept = before[~before.learner.isin(changed.learner)]
         after = judge_runs(pd.concat([changed, kept], ignore_index=True), paths)
-        for verdict, other in zip(after, judge_runs(before, paths), strict=True):
+        asked = tuple(cells.itertuples(index=False, name=None))
+        bases[asked] = bases.get(asked) or judge_runs(before, paths)
+        for verdict, other in zip(after, bases[asked], strict=True):
             if not changed.learner.isin(BY_RUNS[verdict.claim].learners).any():
                 continue
             judged, compared = (Cell(v.outcome, *v.counts["all"]) for v in (verdict, other))
@@ -139,19 +144,23 @@ def variant_changes(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) ->
 def part_changes(verdicts: Iterable[Verdict]) -> pd.DataFrame:
     """The outcome of every claim in each layout and reading of the decay, beside that of all.
 
+    It changes a verdict only where the verdict depends on it: see `Verdict.depends_on`.
+
     Returns:
         `COLUMNS`; `base` is the outcome over the whole table, `base_share` the share in its rest.
     """
     rows = []
-    for verdict in verdicts:
-        named = {name: f"layout {name}" for name in verdict.by_layout}
-        named |= {name: f"decay per {name}" for name in verdict.by_decay}
-        outcomes = verdict.by_layout | verdict.by_decay
-        for name, variant in named.items():
-            yes, of = verdict.counts[name]
-            all_yes, all_of = verdict.counts["all"]
-            others = Cell(verdict.outcome, all_yes - yes, all_of - of)
-            rows.append(_row(variant, verdict.claim, Cell(outcomes[name], yes, of), others))
+    for verdict in (one for one in verdicts if one.counts):
+        all_yes, all_of = verdict.counts["all"]
+        for field, words, outcomes in (
+            ("layout", "layout", verdict.by_layout),
+            ("decay", "decay per", verdict.by_decay),
+        ):
+            for name, outcome in outcomes.items():
+                yes, of = verdict.counts[name]
+                rest = Cell(verdict.outcome, all_yes - yes, all_of - of)
+                row = _row(f"{words} {name}", verdict.claim, Cell(outcome, yes, of), rest)
+                rows.append(row | {"changes": row["changes"] and verdict.depends_on(field)})
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -169,14 +178,13 @@ class Cell(NamedTuple):
 
 
 def _row(variant: str, claim: str, judged: Cell, base: Cell) -> dict[str, Any]:
-    decided = UNDECIDABLE not in (judged.outcome, base.outcome)
     answers = [[cell.yes, cell.of - cell.yes] for cell in (judged, base)]
     return {
         "variant": variant,
         "claim": claim,
         "outcome": judged.outcome,
         "base": base.outcome,
-        "changes": decided and judged.outcome != base.outcome,
+        "changes": differ(judged.outcome, base.outcome),
         "share": judged.share,
         "base_share": base.share,
         "pairs": judged.of,

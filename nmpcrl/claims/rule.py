@@ -23,13 +23,13 @@ compared with) is excluded; if it could change the verdict, the claim is undecid
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, rate
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column, Stopped
@@ -44,58 +44,21 @@ NAMED = {"decay": ("reading", " of the decay")}  # a level that a sentence calls
 Paths: TypeAlias = Mapping[Experiment, Column]  # the states of each run's last rollout
 
 
-class Outcome(StrEnum):
-    """What becomes of a claim."""
-
-    REPRODUCED = "reproduced"
-    PARTLY = "partly reproduced"
-    NOT = "not reproduced"
-    UNDECIDABLE = "not decidable here"
-
-
-REPRODUCED, PARTLY, NOT, UNDECIDABLE = Outcome
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What became of one claim."""
-
-    claim: str  # "C1"
-    statement: str  # what the paper says
-    outcome: Outcome
-    evidence: str  # the numbers
-    would_change: str  # where another verdict is to be expected
-    share: float | None = None  # of the answers, how many are yes; None where no run is asked
-    interval: tuple[float, float] | None = None  # of the share, whatever the missing say; or ratio
-    by_layout: dict[str, Outcome] = field(default_factory=dict)  # the outcome in each
-    by_decay: dict[str, Outcome] = field(default_factory=dict)  # and in each reading of the decay
-    counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
-    ratio: float | None = None  # of times, where the claim is about time
-    halves: str = ""  # what a claim on several learners comes to for each, in sentences
-    as_claimed: tuple[str, ...] = ()  # where the learners clearly differ as claimed, likewise
-    reverse: tuple[str, ...] = ()  # and where they clearly differ the other way round
-    said: str = ""  # the outcome in the claim's own words, where it has any
-
-    @property
-    def words(self) -> str:
-        """The outcome as a page says it."""
-        return self.said or str(self.outcome)
-
-
 @dataclass(frozen=True, eq=False)
 class Assumption:
-    """One assumption of the theorem behind C8, beside what is run."""
+    """One assumption of the theorems behind C8, beside what is run."""
 
-    theorem: str  # what Maei et al. (2009) assume
+    theorem: str  # what is assumed
     here: str  # what the paper does, with a measurement where one is possible
     holds: bool
+    by: tuple[str, ...] = ()  # the theorems that assume it, as `assumptions.THEOREMS` names them
 
 
 @dataclass(frozen=True, eq=False)
 class Observations:
     """All that a claim may be judged by; each takes what it asks for."""
 
-    runs: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `summary.table`
+    runs: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `rows.table`
     paths: Paths = field(default_factory=dict)
     timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
     assumptions: tuple[Assumption, ...] = ()  # of `audit`
@@ -113,6 +76,8 @@ class Claim(ABC):
     test: str = "share of yes, with its interval"
     would_change: str  # where another verdict is to be expected
     learners: tuple[str, ...] = ()  # whose runs answer, in the order of the question
+    quotation: str = ""  # the sentences of the paper that it rests on, in Markdown
+    implied: bool = False  # whether the paper takes it for granted, and nowhere says it
     words: Mapping[Outcome, str] = field(default_factory=dict)  # for outcomes, where not their own
 
     @abstractmethod
@@ -217,7 +182,7 @@ def arms(
     left no policy, so its final cost is infinite, whatever the last rollout cost.
 
     Args:
-        runs: of `summary.table`, all of one setting.
+        runs: of `rows.table`, all of one setting.
         learners: whose runs are wanted.
         among: the learners in whose cells they are wanted; by default themselves.
 

@@ -29,16 +29,8 @@ import pandas as pd
 
 from nmpcrl.bench.learners import REFERENCE, ratio
 from nmpcrl.bench.paired import IDLE, Ratio
-from nmpcrl.claims.rule import (
-    NOT,
-    PARTLY,
-    REPRODUCED,
-    UNDECIDABLE,
-    Claim,
-    Observations,
-    Outcome,
-    Verdict,
-)
+from nmpcrl.claims.rule import Claim, Observations
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 
 WAITED = 0.75  # share of the time
 

@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from nmpcrl.analysis import summaries
-from nmpcrl.analysis.summary import RunSummary, row
-from nmpcrl.claims.published import Published, comparable, unequal
+from nmpcrl.analysis.rows import row
+from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.claims.comparison import comparable, unequal
+from nmpcrl.claims.published import Published
 from nmpcrl.study import provenance
 from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
@@ -88,7 +90,7 @@ def _interleaved(groups: Iterable[Iterable[Experiment]]) -> list[Experiment]:
 def _stored_by_lock(drawn: Iterable[Experiment]) -> list[tuple[Experiment, RunSummary]]:
     """The stored summaries that the code of the lock made on such a machine with such versions."""
     made = {
-        "sources": provenance.hash_of(sorted(provenance.locked().values())),
+        "sources": provenance.locked_hash(),
         "machine": fingerprint(),
         "versions": provenance.environment(),
     }

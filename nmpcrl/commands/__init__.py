@@ -1,5 +1,7 @@
 """The command `nmpcrl`, a module a command; what a command needs is imported when it is called."""
 
+import os
+
 import click
 
 from nmpcrl import __version__
@@ -31,6 +33,7 @@ def main() -> None:
       nmpcrl runs --sort cost
       nmpcrl show GES
     """
+    os.environ["MPLBACKEND"] = "agg"  # no command opens a window, whatever is set elsewhere
 
 
 for command in (

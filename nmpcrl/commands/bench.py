@@ -87,7 +87,7 @@ def _print_table(rows: list[tuple[str, str, str, str]]) -> None:
 def _publish_timing() -> None:
     """Measure and publish the verdicts on time, if they can be decided on this machine."""
     from nmpcrl.claims.publish import publish_timing
-    from nmpcrl.claims.rule import UNDECIDABLE
+    from nmpcrl.claims.verdict import UNDECIDABLE
 
     judged = publish_timing()
     for verdict in judged:

@@ -36,6 +36,9 @@ def clean(yes: bool, only: tuple[str, ...], runs: bool) -> None:
     from nmpcrl.analysis import summaries
     from nmpcrl.study import store
     from nmpcrl.study.cleaning import leftovers, remove
+    from nmpcrl.study.place import refuse_file
+
+    refuse_file()
 
     wanted = [*(only or KINDS), *(["runs"] * runs)]
     names = {store.folder(): store.path_of, summaries.folder(): summaries.path_of}

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nmpcrl.commands.names import RunName, file_of
+from nmpcrl.commands.names import RunName, file_of, records_of
 from nmpcrl.commands.tables import columns, counted
 
 if TYPE_CHECKING:
@@ -28,9 +28,8 @@ def compare(run: str, other: str) -> None:
     paths = file_of(run), file_of(other)
     from nmpcrl.analysis import comparison
     from nmpcrl.report.run import figures
-    from nmpcrl.study import Records
 
-    first, second = map(Records.load, paths)
+    first, second = map(records_of, paths)
     found = comparison.compare(first, second)
     rows = [["", "first", "second"]]
     rows += [[name, *map(_word, pair)] for name, pair in found.fields.items()]

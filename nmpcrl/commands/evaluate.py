@@ -2,7 +2,8 @@
 
 import click
 
-from nmpcrl.commands.names import RunName, file_of
+from nmpcrl.commands.names import RunName, file_of, records_of
+from nmpcrl.commands.tables import harmless
 
 
 @click.command()
@@ -17,9 +18,8 @@ def evaluate(run: str) -> None:
       nmpcrl evaluate GES-A-step-seed0
     """
     from nmpcrl.report.run import figures, verdict
-    from nmpcrl.study import Records
 
-    records = Records.load(file_of(run))
-    click.echo(verdict(records))
+    records = records_of(file_of(run))
+    click.echo(harmless(verdict(records)))
     for name, value in figures(records).items():
-        click.echo(f"{name:38} {value}")
+        click.echo(harmless(f"{name:38} {value}"))

@@ -1,21 +1,19 @@
 """`nmpcrl grade`: points of the notebooks that students hand in."""
 
 import csv
-from itertools import groupby
-from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from nmpcrl.commands.places import NewFile
-from nmpcrl.commands.tables import columns, counted
+from nmpcrl.commands.tables import columns, counted, harmless
 
 if TYPE_CHECKING:
     from nmpcrl.course.grading import Mark
 
-NOTEBOOK = attrgetter("notebook")
 FIELDS = ("student", "notebook", "exercise", "points", "of", "why")
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet computes begins so
 HEADER = ("student", "notebook", "points", "of", "by hand")
 FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 NO_SANDBOX = (
@@ -55,8 +53,21 @@ NO_SANDBOX = (
     show_default=True,
     help="Megabytes a notebook.",
 )
+@click.option(
+    "--workers",
+    type=click.IntRange(1),
+    default=1,
+    show_default=True,
+    help="Notebooks at a time.",
+)
 def grade(
-    folder: Path, out: Path, edition: Path, time_limit: int, cell_limit: int, memory: int
+    folder: Path,
+    out: Path,
+    edition: Path,
+    time_limit: int,
+    cell_limit: int,
+    memory: int,
+    workers: int,
 ) -> None:
     """Grade the notebooks that students hand in.
 
@@ -89,21 +100,26 @@ def grade(
 
     limits = Limits(time_limit, cell_limit, memory)
     rows = []
+    graded = grading.grade(folder, edition, limits, workers)  # refuses before anything is written
     with out.open("w", newline="", encoding="utf-8", errors="replace") as file:
         writer = csv.writer(file)
         writer.writerow(FIELDS)
-        for notebook, marks in groupby(grading.grade(folder, edition, limits), NOTEBOOK):
-            each = list(marks)
+        for each in graded:
             rows.append(total(each))
-            student, _, got, of, by_hand = rows[-1]
-            writer.writerows([getattr(mark, name) for name in FIELDS] for mark in each)
+            student, notebook, got, of, by_hand = rows[-1]
+            writer.writerows([cell(getattr(mark, name)) for name in FIELDS] for mark in each)
             left = f"{by_hand} more are given by hand." if by_hand != "0" else ""
-            writer.writerow((student, notebook, "total", got, of, left))
+            writer.writerow((cell(student), cell(notebook), "total", got, of, left))
             file.flush()
-            click.echo(f"{notebook}: {got} of {of}", err=True)
+            click.echo(harmless(f"{notebook}: {got} of {of}"), err=True)
     click.echo("\n".join(columns([HEADER, *rows], frozenset({2, 3, 4}))))
     click.echo(f"\n{counted(len(rows), 'notebook')} in {out}")
     click.echo(NO_SANDBOX)
+
+
+def cell(value: object) -> object:
+    """What a table shows, and never computes: a text that begins as a formula is quoted."""
+    return f"'{value}" if isinstance(value, str) and value[:1] in FORMULA else value
 
 
 def total(marks: "list[Mark]") -> tuple[str, ...]:

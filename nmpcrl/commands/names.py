@@ -1,14 +1,20 @@
 """Runs by name: a stored one's, its beginning, or a path."""
 
+import re
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
 
 from nmpcrl.commands.tables import counted
 
+if TYPE_CHECKING:
+    from nmpcrl.study import Records
+
 SHOWN = 5  # names that a refusal lists
+WHOLE = re.compile(r"(?P<learner>[^-]+)-(?P<layout>[^-]+)-(?P<decay>[a-z]+)-seed(?P<seed>\d+)")
 
 
 class RunName(click.types.StringParamType):
@@ -40,6 +46,8 @@ def file_of(run: str) -> Path:
         return Path(run)
     stored, wanted = names(), run.removesuffix(".npz")
     begin = [wanted] if wanted in stored else [name for name in stored if name.startswith(wanted)]
+    if len(begin) > 1 and (whole := _as_in_the_paper(wanted)) in begin:
+        begin = [whole]
     if len(begin) == 1:
         return folder() / f"{begin[0]}.npz"
     if begin:
@@ -48,6 +56,41 @@ def file_of(run: str) -> Path:
     raise click.ClickException(
         f"there is no run {run!r} in {folder()}; stored runs: {_listed(near)}"
     )
+
+
+def _as_in_the_paper(wanted: str) -> str:
+    """The name of the run that is as long as the paper's and differs in nothing that is not named.
+
+    "" if a learner, a layout, a reading and a seed are not what is named.
+    """
+    from nmpcrl.study import Experiment
+    from nmpcrl.study.parameters import ParameterError
+    from nmpcrl.study.store import path_of
+
+    found = WHOLE.fullmatch(wanted)
+    try:
+        named = {**found.groupdict(), "seed": int(found["seed"])} if found else {}
+        return path_of(Experiment(**named)).stem if named else ""  # type: ignore[arg-type]
+    except ParameterError:
+        return ""
+
+
+def records_of(path: Path) -> "Records":
+    """What a file of `file_of` holds, if it is the run that its name in the folder says.
+
+    Raises:
+        click.ClickException: it is another run.
+        DamagedRecords: it cannot be read whole.
+    """
+    from nmpcrl.study import Experiment, Records
+    from nmpcrl.study.store import folder, name_of
+
+    records = Records.load(path)
+    key = records.facts.get("key", "")[:10]
+    said = f"{name_of(Experiment(**records.experiment))}-{key}"
+    if key and path.parent == folder() and path.stem != said:
+        raise click.ClickException(f"{path} holds another run, {said}: give it that name")
+    return records
 
 
 def _listed(found: list[str]) -> str:

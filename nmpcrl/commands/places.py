@@ -30,6 +30,8 @@ class NewFile(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """The path, once a file beside it could be made."""
+        if not str(value):
+            self.fail("'' is not a path: it has no name.", param, ctx)
         try:
             path = Path(str(super().convert(value, param, ctx)))
             with tempfile.TemporaryFile(dir=path.parent):

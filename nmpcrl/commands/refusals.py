@@ -6,6 +6,8 @@ from typing import Any
 
 import click
 
+from nmpcrl.commands.tables import harmless
+
 SAID = (  # errors whose message is a sentence for the reader, and where they are defined
     ("nmpcrl.study.parameters", "Refusal"),
     ("nmpcrl.study.records", "DamagedRecords"),
@@ -13,6 +15,7 @@ SAID = (  # errors whose message is a sentence for the reader, and where they ar
     ("nmpcrl.study.cluster", "NoCluster"),
     ("nmpcrl.bench.sweep", "DamagedSweep"),
     ("nmpcrl.analysis.summaries", "Failed"),
+    ("nmpcrl.analysis.summaries", "OtherSolver"),
     ("nmpcrl.claims.published", "Damaged"),
     ("nmpcrl.claims.verification", "CannotRelock"),
 )
@@ -33,7 +36,7 @@ class Commands(click.Group):
             said = sentence(error)
             if said is None:
                 raise
-            raise click.ClickException(said) from None
+            raise click.ClickException(harmless(said)) from None
 
 
 def sentence(error: Exception) -> str | None:
@@ -48,5 +51,5 @@ def sentence(error: Exception) -> str | None:
         reason = error.strerror or str(error) or type(error).__name__
         return f"{error.filename}: {reason}" if error.filename else reason
     if isinstance(error, MemoryError):
-        return "this machine does not have enough memory for this"
+        return str(error) or "this machine does not have enough memory for this"
     return None

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from nmpcrl.commands.names import RunName, file_of
+from nmpcrl.commands.names import RunName, file_of, records_of
 from nmpcrl.commands.places import NewFile
 
 if TYPE_CHECKING:
@@ -35,10 +35,9 @@ def show(run: str, out: Path | None, kind: str | None, frozen: bool) -> None:
     path = file_of(run)
     out, kind = _place(path, out, kind)
     from nmpcrl.report.figures.run import run_page, write
-    from nmpcrl.study import Records
     from nmpcrl.study.atomic import write_whole
 
-    records = Records.load(path)
+    records = records_of(path)
     figure = run_page(records, _frozen_arm(records, train=frozen))
     write_whole(out, lambda file: write(figure, file, kind))
     click.echo(out)
@@ -60,7 +59,7 @@ def _place(run: Path, out: Path | None, kind: str | None) -> tuple[Path, str]:
 
 def _frozen_arm(records: "Records", *, train: bool) -> "Records | None":
     """The frozen arm of a run, if it has one and that is stored or to be trained."""
-    from nmpcrl.commands.train import fetched
+    from nmpcrl.commands.progress import fetched
     from nmpcrl.study import Experiment, Records
     from nmpcrl.study.experiment import frozen_arm
     from nmpcrl.study.store import path_of

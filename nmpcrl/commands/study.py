@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 @click.option("--security", metavar="FILE", help="Certificates for a scheduler at tls://.")
 @click.option("--dry-run", is_flag=True, help="Only report what is missing.")
 @click.option("--table", metavar="PATH", type=NewFile(), help="Write a CSV row per episode.")
-@click.option("--publish", is_flag=True, help="Judge these runs and write book/published.")
+@click.option("--publish", is_flag=True, help="Judge the runs and write book/published.")
+@click.option("--judge", is_flag=True, help="Only judge again what is published.")
 @click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
 def study(
     parts: tuple[str, ...],
@@ -33,11 +34,13 @@ def study(
     dry_run: bool,
     table: Path | None,
     publish: bool,
+    judge: bool,
     yes: bool,
 ) -> None:
     """Train the runs of the study that are not stored.
 
-    Finished runs are stored, so it can be interrupted and started again.
+    Finished runs are stored, so it can be interrupted and started again. With --publish and --part,
+    the runs of these parts are published beside those that are there.
 
     \b
     Example:
@@ -46,7 +49,12 @@ def study(
     from nmpcrl.analysis import summaries
     from nmpcrl.study import cluster
     from nmpcrl.study.limits import estimate
+    from nmpcrl.study.place import refuse_file
 
+    if judge:
+        _judge()
+        return
+    refuse_file()
     chosen = _chosen(parts)
     _check(workers, scheduler, security, publish=publish, sure=yes)
     missing = [e for e in chosen if not summaries.is_stored(e)]
@@ -63,11 +71,21 @@ def study(
     if table:
         _write(table, found, chosen)
     if publish:
-        from nmpcrl.claims.publish import publish_study
+        from nmpcrl.claims.publish import publish_parts, publish_study
 
-        click.echo(f"{publish_study(found, chosen)}: published")
+        place = publish_parts(found, chosen) if parts else publish_study(found, chosen)
+        click.echo(f"{place}: published")
+        _judge()
     if len(found) < len(chosen):
         raise SystemExit(1)  # what failed has been said
+
+
+def _judge() -> None:
+    """Judge what is published, and say each verdict."""
+    from nmpcrl.claims.publish import rejudge
+
+    for verdict in rejudge():
+        click.echo(f"{verdict.claim} {verdict.words}")
 
 
 def _check(
@@ -110,8 +128,8 @@ def _write(
     """One row an episode, as CSV."""
     import pandas as pd
 
-    from nmpcrl.analysis import summary
+    from nmpcrl.analysis.rows import tidy
 
-    frames = [summary.tidy([one]).assign(variant=parts[e]) for e, one in found.items()]
+    frames = [tidy([one]).assign(variant=parts[e]) for e, one in found.items()]
     pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
     click.echo(f"{table}: {table.stat().st_size / 1e6:.0f} MB")

@@ -7,7 +7,7 @@ import click
 from nmpcrl.commands.fields import Settings
 
 if TYPE_CHECKING:
-    from nmpcrl.study import Experiment, Records
+    from nmpcrl.study import Experiment
 
 
 @click.command(cls=Settings)
@@ -22,6 +22,7 @@ def train(yes: bool, **fields: Any) -> None:
       nmpcrl train --learner RDES --layout B --episodes 50 --no-gated
       nmpcrl train --layout "0.5,2.2 3,0.5" --target 8,4,1.57
     """
+    from nmpcrl.commands.progress import fetched
     from nmpcrl.report.run import verdict
     from nmpcrl.study import Experiment
     from nmpcrl.study.limits import estimate
@@ -41,25 +42,6 @@ def train(yes: bool, **fields: Any) -> None:
     click.echo(verdict(records))
     click.echo(f"Next: nmpcrl show {path.stem}")
     click.echo(f"      nmpcrl compare {path.stem} {_other(experiment)}")
-
-
-def fetched(experiment: "Experiment") -> "Records":
-    """The run, with a bar while it is trained."""
-    from tqdm import tqdm
-
-    from nmpcrl.study import fetch
-    from nmpcrl.study.records import Stopped
-
-    with tqdm(total=experiment.episodes, unit="ep", desc=experiment.learner) as bar:
-
-        def on_episode(done: int, cost: float) -> None:
-            bar.set_postfix_str(f"cost {cost:.0f}", refresh=False)
-            bar.update(done - bar.n)
-
-        records = fetch(experiment, on_episode=on_episode)
-        finished = records.facts["stopped"] == Stopped.FINISHED
-        bar.update(experiment.episodes - bar.n if finished else 0)
-    return records
 
 
 def _other(experiment: "Experiment") -> str:

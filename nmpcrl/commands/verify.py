@@ -31,6 +31,10 @@ def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
     from nmpcrl.claims import published
 
     known = published.load()
+    if sample > len(known.rows):
+        raise click.BadParameter(
+            f"{sample} is more than the {len(known.rows):,} published runs.", param_hint="--sample"
+        )
     if relock:
         _relock(known, sample or RELOCKED, workers)
     else:
@@ -53,7 +57,7 @@ def _relock(known: "Published", sample: int, workers: int | None) -> None:
 def _compare(known: "Published", sample: int, workers: int | None) -> None:
     """Print every contradiction; exit code 1 if there is one."""
     from nmpcrl.analysis import summaries
-    from nmpcrl.claims import published, verification
+    from nmpcrl.claims import comparison, verification
 
     drawn = set(verification.sample(known, sample)) if sample else set()
     own = [e for e in known.rows if e in drawn or summaries.path_of(e).exists()]
@@ -62,8 +66,8 @@ def _compare(known: "Published", sample: int, workers: int | None) -> None:
             "no run of the study was trained here; --sample 5 trains five for the comparison"
         )
     found = summaries.fetch_summaries(own, workers=workers)
-    wrong = published.compare(found, known)
-    exact = published.comparable(found, known)
+    wrong = comparison.compare(found, known)
+    exact = comparison.comparable(found, known)
     ways = {"bit for bit": len(exact), "by distribution": len(found) - len(exact)}
     parts = [f"{count} {way}" for way, count in ways.items() if count]
     click.echo(

@@ -9,6 +9,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
+from nmpcrl.control.vectors import kept
 
 Dynamics = Callable[[ca.SX, ca.SX], ca.SX]
 
@@ -41,7 +42,7 @@ class Plant:
 
     def __post_init__(self) -> None:
         for side in ("lower", "upper"):
-            bound = np.asarray(getattr(self, side), float)
+            bound = kept(getattr(self, side))
             if bound.shape != (self.m,) or np.isnan(bound).any():
                 raise ValueError(f"plant.{side} = {bound} must hold {self.m} numbers, one an input")
             object.__setattr__(self, side, bound)

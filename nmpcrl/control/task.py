@@ -10,6 +10,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
+from nmpcrl.control.vectors import kept
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class Task:
 
     def __post_init__(self) -> None:
         for name in ("start", "target", "lower", "upper", "weights"):
-            vector = np.asarray(getattr(self, name), float)
+            vector = kept(getattr(self, name))
             if vector.shape != np.shape(self.start) or np.isnan(vector).any():
                 raise ValueError(
                     f"task.{name} = {vector} must hold {np.size(self.start)} numbers, as start does"

@@ -1,7 +1,17 @@
 """The course: exercises, the checks of their answers, and the notebooks that hold them."""
 
 from nmpcrl.course.answers import choice, formula, number
-from nmpcrl.course.behaviour import function, holds
+from nmpcrl.course.behaviour import behaves, function, holds
 from nmpcrl.course.outcome import Outcome, Unsolved, exercise
 
-__all__ = ["Outcome", "Unsolved", "choice", "exercise", "formula", "function", "holds", "number"]
+__all__ = [
+    "Outcome",
+    "Unsolved",
+    "behaves",
+    "choice",
+    "exercise",
+    "formula",
+    "function",
+    "holds",
+    "number",
+]

@@ -1,5 +1,6 @@
 """Answers that can be typed: a number, a choice, a formula. The page checks them, too."""
 
+import re
 from collections.abc import Callable, Mapping
 from math import isfinite, log10
 from typing import Any
@@ -8,7 +9,9 @@ import numpy as np
 
 from nmpcrl.course.formulas import FormulaError, evaluated
 from nmpcrl.course.outcome import Outcome, Unsolved, refuse_unanswered
+from nmpcrl.study.parameters import shortened
 
+THOUSANDS = re.compile(r",(?=\d{3}(?!\d))")
 CASES = 8  # at which a formula is compared
 CLOSE = 1e-6  # relative, of two formulas
 
@@ -34,11 +37,9 @@ def number(
         Unsolved: it is missing, no number, or wrong.
     """
     refuse_unanswered(answer)
-    try:
-        value = float(answer)
-    except (TypeError, ValueError):
-        raise Unsolved(f"{answer!r} is no number.") from None
+    read = _meanings(answer, unit)
     within = tolerance * (abs(expected) or 1)
+    value = next((one for one in read if abs(one - expected) <= within), read[0])
     said = f"Right: {expected:.4g}{unit and ' '}{unit}."
     if abs(value - expected) <= within:
         known = [[float(wrong), why] for wrong, why in (mistakes or {}).items()]
@@ -48,6 +49,23 @@ def number(
         if abs(value - wrong) <= tolerance * (abs(wrong) or 1):
             raise Unsolved(why)
     raise Unsolved(f"{value:g}{unit and ' '}{unit} is not right: {_direction(value, expected)}.")
+
+
+def _meanings(answer: Any, unit: str) -> list[float]:
+    """What a number can mean; as a text, 2,600 is read with either comma, 20 % as 20 and as 0.2."""
+    try:
+        if not isinstance(answer, str):
+            return [float(answer)]
+        text = answer.strip()
+        text = text.removesuffix(unit).strip() if unit else text
+        share, text = text.endswith("%"), text.removesuffix("%")
+        texts = dict.fromkeys([text.replace(",", ".", 1), THOUSANDS.sub("", text)])
+        read = [evaluated(one, {}) for one in texts if "," not in one]
+        if not read:
+            raise FormulaError("it has too many commas")
+        return [*read, *(one / 100 for one in read)] if share else read
+    except (TypeError, ValueError):
+        raise Unsolved(f"{shortened(repr(answer))} is no number.") from None
 
 
 def _direction(value: float, expected: float) -> str:
@@ -78,7 +96,7 @@ def choice(answer: Any, right: str, why: Mapping[str, str]) -> Outcome:
         Unsolved: it is missing, no letter of these, or wrong.
     """
     refuse_unanswered(answer)
-    letter = answer.strip().lower() if isinstance(answer, str) else answer
+    letter = answer.strip().lower() if type(answer) is str else ""
     if letter not in why:
         *most, last = why
         raise Unsolved(f"{answer!r} is none of {', '.join(most)} and {last}.")
@@ -107,7 +125,7 @@ def formula(
         Unsolved: it is missing, no formula of these variables, or wrong.
     """
     refuse_unanswered(answer)
-    if not isinstance(answer, str):
+    if type(answer) is not str:
         raise Unsolved(f"Write the formula as a text between quotes, of {', '.join(variables)}.")
     cases = _cases(np.random.default_rng(), variables)
     try:

@@ -55,8 +55,45 @@ def function(
     right = expected(**deepcopy(case))
     raise Unsolved(
         f"It is wrong in {len(different)} of {TIMES} random cases: "
-        f"for {described(case)} it gives {brief(value)}, and {brief(right)} is right."
+        f"{described(case)}it gives {brief(value)}, and {brief(right)} is right."
     )
+
+
+def behaves(
+    answer: Any, seen: Callable[..., Mapping[str, Any]], draw: Draw, times: int = TIMES
+) -> Outcome:
+    """A function that need not give what another one does, but of which several things hold.
+
+    Args:
+        answer: the reader's; one that returns `...` is not answered yet.
+        seen: calls its first argument, the answer, with what was drawn; gives what must hold, each
+            by the sentence that is said where it does not.
+        draw: as `function` takes it.
+        times: how many cases are drawn.
+
+    Raises:
+        Unsolved: it fails, or something does not hold in one of the cases.
+    """
+    refuse_unanswered(answer)
+    if not callable(answer):
+        raise Unsolved(f"A function is asked for, not {answer!r}.")
+
+    def asked(*args: Any, **kwargs: Any) -> Any:
+        value = answer(*args, **kwargs)
+        refuse_unanswered(value)
+        return value
+
+    rng = np.random.default_rng()
+    for case in [draw(rng) for _ in range(times)]:
+        try:
+            found = seen(asked, **deepcopy(case))
+        except Unsolved:
+            raise
+        except Exception as error:
+            raise Unsolved(f"It fails with {type(error).__name__}: {error}") from None
+        for why, truth in found.items():
+            holds(truth, why)
+    return Outcome(f"Right: it does what it should in {times} random cases.")
 
 
 def _called(answer: Callable[..., Any], case: Arguments) -> Any:
@@ -64,13 +101,15 @@ def _called(answer: Callable[..., Any], case: Arguments) -> Any:
     try:
         return answer(**deepcopy(case))
     except Exception as error:
-        raise Unsolved(
-            f"For {described(case)} it fails with {type(error).__name__}: {error}"
-        ) from None
+        raise Unsolved(f"It fails {described(case)}with {type(error).__name__}: {error}") from None
 
 
 def agree(value: Any, other: Any, tolerance: float) -> bool:
-    """Whether two results are the same: numbers, arrays, or tuples of them."""
+    """Whether two results are the same: numbers, arrays, or tuples of them.
+
+    Of what is no number the type must be the same, too: an answer's own type could be equal to
+    everything.
+    """
     if isinstance(other, tuple):
         alike = isinstance(value, tuple | list) and len(value) == len(other)
         pairs = zip(value, other, strict=True) if alike else ()
@@ -78,7 +117,7 @@ def agree(value: Any, other: Any, tolerance: float) -> bool:
     try:
         one, two = np.asarray(value, float), np.asarray(other, float)
     except (TypeError, ValueError):
-        return bool(value == other)
+        return type(value) is type(other) and bool(other == value)
     return one.shape == two.shape and np.allclose(one, two, tolerance, tolerance, equal_nan=True)
 
 
@@ -93,9 +132,10 @@ def holds(truth: Any, why: str) -> None:
 
 
 def described(case: Arguments) -> str:
-    """The arguments that can be shown in a sentence."""
+    """The arguments that can be shown in a sentence, with which it begins."""
     shown = {name: brief(value) for name, value in case.items()}
-    return ", ".join(f"{name} = {value}" for name, value in shown.items() if len(value) < 80)
+    listed = ", ".join(f"{name} = {value}" for name, value in shown.items() if len(value) < 80)
+    return f"for {listed} " if listed else ""
 
 
 def brief(value: Any) -> str:

@@ -70,7 +70,7 @@ def run(
             shutil.copytree(chapter.data, work / "data", symlinks=True)
         asked = sorted(chapter.asked)
         plan = {"steps": list(map(asdict, steps)), "asked": asked, "restored": restored}
-        (work.parent / "plan.json").write_text(json.dumps(plan))
+        (work.parent / "plan.json").write_text(json.dumps(plan), "utf-8")
         seconds = max(1, ceil(until - time.monotonic()))
         words = [work.parent / "plan.json", log.fileno(), limits.megabytes, seconds, limits.cell]
         why = _ended(list(map(str, words)), log.fileno(), work, limits, until)
@@ -92,7 +92,8 @@ def _ends(log: BinaryIO) -> dict[str, End]:
 
 def _ended(words: list[str], log: int, work: Path, limits: Limits, until: float) -> str:
     """Wait for a process, end it and its own at a limit, and say why it ended before the end."""
-    own = {"MPLBACKEND": "Agg", "IPYTHONDIR": str(work.parent), "TMPDIR": str(work)}
+    own = {"MPLBACKEND": "Agg", "NMPCRL_STRICT": "1"}
+    own |= {"IPYTHONDIR": str(work.parent), "TMPDIR": str(work)}
     child = subprocess.Popen(
         [sys.executable, "-m", "nmpcrl.course.sitting", *words],
         pass_fds=[log],

@@ -6,6 +6,7 @@
 import ast
 import math
 import operator
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -31,8 +32,19 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
 }
 
 
+RAISED = re.compile("[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
+DIGITS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+PRODUCT = re.compile(r"\d\s*[A-Za-z_(]|\)\s*[\w(]")  # without its sign
+
+
 class FormulaError(ValueError):
     """A text is no formula of the variables that there are, or has no value; says why."""
+
+
+def plain(text: str) -> str:
+    """What is typed as it is printed, with a keyboard's signs: 2·10⁻⁷ as 2*10^-7."""
+    text = text.replace("−", "-").replace("·", "*").replace("×", "*")
+    return RAISED.sub(lambda power: "^" + power[0].translate(DIGITS), text)
 
 
 def evaluated(text: str, values: Mapping[str, float]) -> float:
@@ -43,11 +55,13 @@ def evaluated(text: str, values: Mapping[str, float]) -> float:
     """
     if len(text) > LONGEST:
         raise FormulaError(f"it has more than {LONGEST} characters")
+    text = plain(text)
     try:
         tree = ast.parse(text.strip().replace("^", "**"), mode="eval").body
         return float(_value(tree, values))
     except (SyntaxError, RecursionError):
-        raise FormulaError("it cannot be read") from None
+        why = "a product needs its *" if PRODUCT.search(text) else "it cannot be read"
+        raise FormulaError(why) from None
     except (ArithmeticError, ValueError, TypeError) as error:
         if isinstance(error, FormulaError):
             raise

@@ -3,9 +3,11 @@
 This is no sandbox. A notebook runs with the rights of whoever grades, and can read their files.
 """
 
+import re
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,6 +15,8 @@ from nmpcrl.course import confined
 from nmpcrl.course.confined import Limits
 from nmpcrl.course.judging import judged
 from nmpcrl.course.submissions import CannotGrade, Chapter, chapters, notebook_of, taken
+
+COPY = re.compile(r"(-Copy\d+| ?\(\d+\))$")
 
 
 @dataclass(frozen=True)
@@ -27,26 +31,49 @@ class Mark:
     why: str = ""  # points were lost
 
 
-def grade(folder: Path, edition: Path, limits: Limits) -> Iterator[Mark]:
+def grade(folder: Path, edition: Path, limits: Limits, workers: int = 1) -> Iterator[list[Mark]]:
     """Marks of every notebook below a folder, in the order of their paths.
 
     Args:
         folder: of a folder for each student, or of notebooks whose names end in the chapter's.
         edition: the folder that `make course` writes for graders.
         limits: of each notebook.
+        workers: how many notebooks are executed at a time.
 
     Raises:
-        CannotGrade: a folder is not there, or holds no notebook.
+        CannotGrade: a folder is not there, or holds no notebook; nothing has been executed.
     """
     known = chapters(edition)
     paths = [p for p in sorted(folder.rglob("*.ipynb")) if ".ipynb_checkpoints" not in p.parts]
     if not paths:
         raise CannotGrade(f"{folder} has no notebook")
-    of = {path: next((c for c in known if path.stem.endswith(c.name)), None) for path in paths}
-    with tempfile.TemporaryDirectory() as place:
-        ready = {c: rehearsed(c, limits, Path(place) / c.name) for c in known if c in of.values()}
-        for path, chapter in of.items():
-            yield from _marks(path, path.relative_to(folder), chapter and ready[chapter], limits)
+    of = {path: next((c for c in known if _stem(path).endswith(c.name)), None) for path in paths}
+    return _graded(folder, of, limits, workers)
+
+
+def _graded(
+    folder: Path, of: Mapping[Path, Chapter | None], limits: Limits, workers: int
+) -> Iterator[list[Mark]]:
+    """The marks of each notebook."""
+    asked = {chapter for chapter in of.values() if chapter}
+    with tempfile.TemporaryDirectory() as place, ThreadPoolExecutor(workers) as threads:
+        ready = dict(
+            zip(
+                asked,
+                threads.map(lambda c: rehearsed(c, limits, Path(place) / c.name), asked),
+                strict=True,
+            )
+        )
+
+        def marks(path: Path, chapter: Chapter | None) -> list[Mark]:
+            return list(_marks(path, path.relative_to(folder), chapter and ready[chapter], limits))
+
+        yield from threads.map(marks, of.keys(), of.values())
+
+
+def _stem(file: Path) -> str:
+    """The name of a notebook, without what a browser or JupyterLab adds to that of a copy."""
+    return COPY.sub("", file.stem)
 
 
 def rehearsed(chapter: Chapter, limits: Limits, place: Path) -> Chapter:
@@ -77,7 +104,8 @@ def _marks(path: Path, file: Path, chapter: Chapter | None, limits: Limits) -> I
         why = "The name of the file does not end in that of a chapter."
         yield Mark(_student(file, file.stem), file.as_posix(), "", None, 0, why)
         return
-    student = _student(file, file.stem.removesuffix(chapter.name).rstrip("_- ") or file.stem)
+    stem = _stem(file)
+    student = _student(file, stem.removesuffix(chapter.name).rstrip("_- ") or stem)
     try:
         submission = taken(chapter, notebook_of(path))
     except (CannotGrade, OSError) as error:

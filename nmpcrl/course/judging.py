@@ -9,6 +9,7 @@ from nmpcrl.course.exercises import Exercise
 from nmpcrl.course.submissions import Chapter, Step, Submission
 
 BY_HAND = "A project: read it with its rubric."
+LONGEST = 1000  # letters of a sentence: what a student's object calls itself may have more
 SAID = ("Unsolved", "Refusal", "ParameterError")  # errors whose message is a sentence
 
 
@@ -93,12 +94,12 @@ def _loss(one: Exercise, remark: str, ends: dict[str, End], stopped: str) -> str
             return f"The notebook was stopped before this exercise: {stopped}."
         if end["error"]:
             kind, said = end["error"]
-            return said if kind in SAID else f"The check fails with {kind}: {_line(said)}"
+            return _line(said) if kind in SAID else f"The check fails with {kind}: {_line(said)}"
         if not end["right"]:
-            return "The check gives something else than an outcome."
+            return "The check does not say that it is right."
     return ""
 
 
 def _line(message: str) -> str:
-    """The first line of a message."""
-    return message.strip().partition("\n")[0] or "no message"
+    """The first line of a message, or what a table has room for of it."""
+    return message.strip().partition("\n")[0][:LONGEST] or "no message"

@@ -2,7 +2,8 @@
 
 The functions of this room return an `Outcome` for a right answer and raise `Unsolved` for any
 other. An `exercise` of a chapter raises only in an edition for students and in a build of the book,
-where NMPCRL_STRICT is set; elsewhere it says the same, and the chapter runs to its end.
+where NMPCRL_STRICT is set when this is imported; elsewhere it says the same, in an `Outcome` that
+is not right, and the chapter runs to its end.
 """
 
 import os
@@ -14,7 +15,7 @@ from typing import Any, ParamSpec
 from nmpcrl.study.parameters import Refusal
 
 MIME = "application/vnd.nmpcrl.check+json"  # of what the page is given
-STRICT = "NMPCRL_STRICT"
+STRICT = bool(os.environ.get("NMPCRL_STRICT"))  # no answer can change it later
 UNANSWERED = "Not answered yet: put your answer where the dots are, run that cell, then this one."
 
 P = ParamSpec("P")
@@ -30,6 +31,7 @@ class Outcome:
 
     said: str
     page: Mapping[str, Any] | None = None  # with which the page checks the same answer
+    right: bool = True
 
     def _repr_mimebundle_(self, **_: Any) -> dict[str, Any]:
         """The sentence, and what the page is given."""
@@ -54,8 +56,8 @@ def exercise(check: Callable[P, Outcome]) -> Callable[P, Outcome]:
         try:
             return check(*args, **kwargs)
         except Unsolved as unsolved:
-            if os.environ.get(STRICT):
+            if STRICT:
                 raise
-            return Outcome(str(unsolved))
+            return Outcome(str(unsolved), right=False)
 
     return said

@@ -71,7 +71,7 @@ def _executed(shell: Any, step: Step, cell: int) -> tuple[tuple[str, str] | None
         os._exit(NO_MEMORY)  # what it took would be missing in other cells
     said = None if error is None else (type(error).__name__, str(error))
     signal.alarm(0)
-    return said, isinstance(done.result, Outcome)
+    return said, isinstance(done.result, Outcome) and done.result.right
 
 
 def _rebound(names: Names, ours: Names) -> set[str]:
@@ -93,9 +93,9 @@ def _restore(names: Names, ours: Names, asked: set[str]) -> None:
 def main(plan_file: str, *numbers: str) -> None:
     """Execute a plan, and end without waiting for what a notebook left running."""
     file, megabytes, seconds, cell = map(int, numbers)
-    plan = json.loads(Path(plan_file).read_text())
+    plan = json.loads(Path(plan_file).read_text("utf-8"))
     confine(megabytes, seconds)
-    with os.fdopen(file, "w") as log:
+    with os.fdopen(file, "w", encoding="utf-8") as log:
         steps = [Step(**step) for step in plan["steps"]]
         sit(steps, set(plan["asked"]), log, cell, restored=plan["restored"])
     os._exit(0)

@@ -80,7 +80,7 @@ def notebook_of(path: Path) -> Notebook:
         CannotGrade: it is none.
     """
     try:
-        notebook = json.loads(path.read_text(encoding="utf-8"), object_hook=Fields)
+        notebook = json.loads(path.read_text("utf-8-sig"), object_hook=Fields)
         for cell in notebook["cells"]:
             source = cell["source"]
             cell["source"] = source if isinstance(source, str) else "".join(source)

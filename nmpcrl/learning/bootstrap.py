@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution
+from nmpcrl.learning.minimiser import minimiser
 
 if TYPE_CHECKING:
-    from nmpcrl.learning.network import QNetwork
+    from nmpcrl.learning.network import Predictor, QNetwork, Target
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,30 +83,67 @@ class SecondSolve:
 class Imitation:
     """A network learns the NMPC's value, Eq. (10), and predicts the next one, Eq. (11).
 
-    It is that of DES, and of RDES if theta is an input.
+    It is that of DES, and of RDES if theta is an input. What waits, waits until what predicts, the
+    network or its `target`, knows of a fit.
     """
 
     network: "QNetwork"  # learns in place
     with_theta: bool  # whether theta is an input
     gated: bool = True  # wait for the first fit; Algorithm 1 read literally does not  # departure G
     fits: int = 1  # mini-batches a step  # departure H
+    target: "Target | None" = None  # predicts in the network's place  # departure I
+    late: bool = False  # predict before the fits, as where they run in parallel  # departure I
+    actions: tuple[Vector, Vector] | None = None  # a box, whose best is a+  # departure I
 
     def __call__(self, transition: Transition, theta: Vector) -> Successor | None:
-        """Remember (s, a[, theta]) -> Q, fit, and predict Q(s+, a+) with a+ = u_1 of the plan."""
+        """Remember (s, a[, theta]) -> Q, fit, and predict Q(s+, a+); a+ = u_1 of the plan."""
         began = time.perf_counter()
         solution = transition.solution
         self.network.remember(  # departure R
             self.inputs(transition.state, transition.action, solution.theta), solution.value
         )
-        if self.gated and not self.network.ready:
+        value = self._predict(transition, theta) if self.late else None
+        loss = self._fit()
+        if not self.late:
+            value = self._predict(transition, theta)
+        if value is None:
             return None
-        loss = np.nan
-        if self.network.ready:
-            for _ in range(self.fits):
-                loss = self.network.fit()
-        inputs = self.inputs(transition.next_state, solution.next_action, theta)
-        value = float(self.network.predict(inputs))
         return Successor(value, loss=loss, seconds=time.perf_counter() - began)
+
+    def _fit(self) -> float:
+        """The loss of the last fit in this step; nan if there are too few examples for one."""
+        if not self.network.ready:
+            return np.nan
+        for _ in range(self.fits):
+            loss = self.network.fit()
+        if self.target:
+            self.target.follow()
+        return loss
+
+    def _predict(self, transition: Transition, theta: Vector) -> float | None:
+        """Q(s+, a+); None while a gated bootstrap waits for the first fit."""
+        predictor = self.target or self.network
+        if self.gated and not predictor.fitted:
+            return None
+        state, action = transition.next_state, transition.solution.next_action
+        if self.actions:
+            action = self._best(predictor, state, theta)
+        return float(predictor.predict(self.inputs(state, action, theta)))
+
+    def _best(self, predictor: "Predictor", state: Vector, theta: Vector) -> Vector:
+        """The action whose predicted value is least."""
+        assert self.actions
+        lower, upper = self.actions
+        inputs = self.inputs(state, lower, theta)
+        where = slice(state.size, state.size + lower.size)
+
+        def values(actions: Matrix) -> Vector:
+            rows = np.empty((len(actions), inputs.size))
+            rows[:] = inputs
+            rows[:, where] = actions
+            return predictor.predict(rows)
+
+        return minimiser(values, lower, upper)
 
     def inputs(self, state: Vector, action: Vector, theta: Vector) -> Vector:
         """The network's inputs: (s, a, theta) for RDES, (s, a) for DES.  # departure I"""

@@ -14,7 +14,7 @@ The control arms that they are compared with are in `baselines`.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nmpcrl import Vector
 from nmpcrl.control import Solution
@@ -154,24 +154,24 @@ def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
 
 
 def deep_expected_sarsa(
-    nmpc: Controller, network: "QNetwork", alpha: float, *, gated: bool = True, fits: int = 1
+    nmpc: Controller, network: "QNetwork", alpha: float, **options: Any
 ) -> Learner:
     """DES: a network of (s, a) instead of the second solve, Eq. (11); a semi-gradient, Eq. (9).
 
-    `gated` and `fits` are those of `Imitation`.
+    `options` are those of `Imitation`.
     """
-    bootstrap = Imitation(network, with_theta=False, gated=gated, fits=fits)
+    bootstrap = Imitation(network, with_theta=False, **options)
     return Learner("DES", bootstrap, semi_gradient(alpha), nmpc.gamma)
 
 
 def regularized_deep_expected_sarsa(
-    nmpc: Controller, network: "QNetwork", alpha: float, *, gated: bool = True, fits: int = 1
+    nmpc: Controller, network: "QNetwork", alpha: float, **options: Any
 ) -> Learner:
     """RDES, the paper's first method: DES, and theta is an input of the network, too.
 
-    Eqs. (9), (10) and (11); `gated` and `fits` are those of `Imitation`.
+    Eqs. (9), (10) and (11); `options` are those of `Imitation`.
     """
-    bootstrap = Imitation(network, with_theta=True, gated=gated, fits=fits)
+    bootstrap = Imitation(network, with_theta=True, **options)
     return Learner("RDES", bootstrap, semi_gradient(alpha), nmpc.gamma)
 
 

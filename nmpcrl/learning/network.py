@@ -1,6 +1,7 @@
 """The network that imitates the NMPC's value. The only home of torch."""
 
 import sys
+import threading
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -12,6 +13,9 @@ from nmpcrl import Vector
 
 torch.set_num_threads(1)  # matrices this small only get slower with more
 
+KEPT = 256  # rows: room for more predictions at once is made anew
+DRAWING = threading.Lock()  # torch draws first weights from one generator a process
+
 # In place, and its slope from what it made; that of a ReLU is its output's sign.
 Activation = tuple[Callable[[Tensor], Tensor], Callable[[Tensor], Tensor]]
 ACTIVATIONS: dict[str, Activation] = {
@@ -20,7 +24,61 @@ ACTIVATIONS: dict[str, Activation] = {
 }
 
 
-class QNetwork:
+class Predictor:
+    """What some weights predict: inputs - 64 - 64 - 1."""
+
+    def __init__(
+        self,
+        weights: Tensor,
+        gradient: Tensor,
+        widths: tuple[int, ...],
+        activation: Activation,
+        scales: tuple[Vector | float, float],
+    ) -> None:
+        """Look at the weights, which may change.
+
+        Args:
+            weights: of all layers, in one vector.
+            gradient: as long; for who fits them.
+            widths: of the inputs and of each layer.
+            activation: of the hidden layers.
+            scales: what inputs and target are divided by.
+        """
+        self._weights, self._gradient, self._widths = weights, gradient, widths
+        self._activation = activation
+        self._input_scale, self._target_scale = scales
+        self._matrices = _matrices(weights, widths), _matrices(gradient, widths)
+        self._one = self._layers(_ones(1, widths[0] + 1))  # predicts a single value
+        self._rooms = {1: self._one}  # by the number of rows; of few, which are asked for often
+        self.fitted = False  # whether the weights know of a fit
+
+    def predict(self, inputs: Vector) -> Vector:
+        """The value of one input (k,) or of many (..., k); the result drops the last axis."""
+        *shape, k = inputs.shape
+        rows = inputs.reshape(-1, k)
+        layers = self._room(len(rows))
+        layers[0].x.numpy()[:, :-1] = rows / self._input_scale
+        value = _forward(layers, self._activation[0]).numpy().astype(float)
+        return value.reshape(shape) * self._target_scale
+
+    def _room(self, rows: int) -> "Layers":
+        """Layers for so many rows, which are kept if they are small: to make them takes longer."""
+        if rows in self._rooms:
+            return self._rooms[rows]
+        layers = self._layers(_ones(rows, self._widths[0] + 1))
+        if rows <= KEPT:
+            self._rooms[rows] = layers
+        return layers
+
+    def _layers(self, x: Tensor) -> "Layers":
+        """The three layers, with room for the rows of `x`."""
+        (W1, W2, W3), (dW1, dW2, dW3) = self._matrices
+        first = _Layer(x, W1, dW1)
+        second = _Layer(first.y, W2, dW2)
+        return first, second, _Layer(second.y, W3, dW3)
+
+
+class QNetwork(Predictor):
     """Inputs - 64 - 64 - 1 with ReLU, trained by Adam on a growing replay buffer: Eq. (10).
 
     Learns in place. Activation, initialisation (torch's own), no normalisation, an unlimited buffer
@@ -61,21 +119,18 @@ class QNetwork:
             raise ValueError(f"activation = {activation!r} must be one of {', '.join(ACTIVATIONS)}")
         if memory is not None and memory < batch:
             raise ValueError(f"memory = {memory} must hold at least a batch of {batch}")
-        self._activation = ACTIVATIONS[activation]
         self._memory = memory or sys.maxsize
-        self._input_scale, self._target_scale = scales
         self._rng = rng
         self._learning_rate = learning_rate
         self._buffer = np.ones((capacity, inputs + 2), np.float32)  # rows of input, 1, target
         self._seen = 0  # examples so far
         self._drawn = np.ones((batch, inputs + 2), np.float32)  # the rows of a fit
         widths = (inputs, hidden, hidden, 1)
-        self._weights = _first_weights(widths, seed=int(rng.integers(2**63)))
-        self._gradient, self._mean, self._square = torch.zeros(3, len(self._weights))
-        self._fits = torch.zeros(())
-        self._matrices = _matrices(self._weights, widths), _matrices(self._gradient, widths)
+        weights = _first_weights(widths, seed=int(rng.integers(2**63)))
+        gradient, self._mean, self._square = torch.zeros(3, len(weights), dtype=torch.float32)
+        self._fits = torch.zeros((), dtype=torch.float32)
+        super().__init__(weights, gradient, widths, ACTIVATIONS[activation], scales)
         self._batch = self._layers(torch.from_numpy(self._drawn[:, :-1]))  # looks at those rows
-        self._one = self._layers(torch.ones(1, inputs + 1))  # predicts a single value
 
     def __len__(self) -> int:
         """How many examples are remembered."""
@@ -106,23 +161,8 @@ class QNetwork:
         error = _forward(self._batch, activate).numpy() - self._drawn[:, -1:]
         _backward(self._batch, slope, torch.from_numpy(2 / batch * error))
         self._descend()
+        self.fitted = True
         return float(np.vdot(error, error)) / batch * self._target_scale**2
-
-    def predict(self, inputs: Vector) -> Vector:
-        """The value of one input (k,) or of many (..., k); the result drops the last axis."""
-        *shape, k = inputs.shape
-        rows = inputs.reshape(-1, k)
-        layers = self._one if len(rows) == 1 else self._layers(torch.ones(len(rows), k + 1))
-        layers[0].x.numpy()[:, :-1] = rows / self._input_scale
-        value = _forward(layers, self._activation[0]).numpy().astype(float)
-        return value.reshape(shape) * self._target_scale
-
-    def _layers(self, x: Tensor) -> "Layers":
-        """The three layers, with room for the rows of `x`."""
-        (W1, W2, W3), (dW1, dW2, dW3) = self._matrices
-        first = _Layer(x, W1, dW1)
-        second = _Layer(first.y, W2, dW2)
-        return first, second, _Layer(second.y, W3, dW3)
 
     def _descend(self) -> None:
         """Adam: the kernel under torch.optim.Adam(fused=True), whose way there takes 100 us."""
@@ -144,6 +184,34 @@ class QNetwork:
         )
 
 
+class Target(Predictor):
+    """A copy of a network that predicts in its place, and follows it.
+
+    It begins with the network's first weights, as in Mnih et al. (2015), and every so many steps
+    goes a part of the way to its present ones.  # departure I
+    """
+
+    def __init__(self, network: QNetwork, *, every: int = 1, rate: float = 1.0) -> None:
+        """Copy the weights.
+
+        Args:
+            network: which is followed.
+            every: how many calls of `follow` move the copy once.
+            rate: the part of the way; 1 for all of it.
+        """
+        weights, scales = network._weights.clone(), (network._input_scale, network._target_scale)
+        gradient = torch.zeros_like(weights)
+        super().__init__(weights, gradient, network._widths, network._activation, scales)
+        self._network, self._every, self._rate, self._steps = network, every, rate, 0
+
+    def follow(self) -> None:
+        """Count a step in which the network was fitted, and move where it is time."""
+        self._steps += 1
+        if self._steps % self._every == 0:
+            self._weights.lerp_(self._network._weights, self._rate)
+            self.fitted = self._network.fitted
+
+
 class _Layer:
     """out = x W for many rows x at once; each ends in a one, so that W ends in the bias."""
 
@@ -156,7 +224,7 @@ class _Layer:
             dW: where `differentiate` leaves the loss's derivative in W.
         """
         self.x, self.W, self.dW = x, W, dW
-        self.y = torch.ones(len(x), W.shape[1] + 1)
+        self.y = _ones(len(x), W.shape[1] + 1)
         self.out = self.y[:, :-1]
         self._x_transposed, self._W_transposed = x.T, W[:-1].T
 
@@ -192,11 +260,16 @@ def _backward(layers: Layers, slope: Callable[[Tensor], Tensor], d3: Tensor) -> 
         layer.differentiate(d)
 
 
+def _ones(*shape: int) -> Tensor:
+    """In single precision, whatever a program has made torch's default."""
+    return torch.ones(shape, dtype=torch.float32)
+
+
 def _first_weights(widths: tuple[int, ...], seed: int) -> Tensor:
     """What torch draws for linear layers of these widths, in one vector."""
-    with torch.random.fork_rng(devices=[]):
+    with DRAWING, torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        layers = [torch.nn.Linear(*pair) for pair in pairwise(widths)]
+        layers = [torch.nn.Linear(*pair, dtype=torch.float32) for pair in pairwise(widths)]
     matrices = [torch.cat([layer.weight.T, layer.bias[None]]) for layer in layers]
     return torch.cat([matrix.flatten() for matrix in matrices]).detach()
 

@@ -26,7 +26,7 @@ from typing import Any
 
 import pandas as pd
 
-from nmpcrl.analysis.summary import experiment_of
+from nmpcrl.analysis.rows import experiment_of
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.failure_modes import Mechanism
 from nmpcrl.claims.published import Published

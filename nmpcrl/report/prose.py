@@ -11,7 +11,9 @@ from typing import Any
 from IPython.display import Markdown, display
 
 import nmpcrl
-from nmpcrl.claims.rule import Outcome, read
+from nmpcrl.claims.rule import read
+from nmpcrl.claims.verdict import Outcome
+from nmpcrl.report.cited import cited, is_number
 
 ROOT = Path(nmpcrl.__file__).parents[1]
 
@@ -19,13 +21,19 @@ ROOT = Path(nmpcrl.__file__).parents[1]
 PLACEHOLDER = re.compile(r"(?<![\w\\^}\])])\{([^\W\d]\w*)(?::([^{}]*))?\}")
 
 
-def say(template: str, **numbers: Any) -> None:
+def say(template: str, *, origin: str = "", **numbers: Any) -> None:
     """Display a paragraph of Markdown with its numbers filled in, as `filled` does."""
-    _show(filled(template, **numbers))
+    _show(filled(template, origin=origin, **numbers))
 
 
-def filled(template: str, **numbers: Any) -> str:
+def filled(template: str, *, origin: str = "", **numbers: Any) -> str:
     """The template with `{name}` and `{name:.2f}` replaced; the braces of LaTeX stay.
+
+    Args:
+        template: Markdown.
+        origin: whose numbers these are and from where, "720 runs published". A number outside
+            formulas then carries its name and this: see `cited`.
+        numbers: by name.
 
     Raises:
         NameError: a placeholder has no number, or a number no placeholder.
@@ -36,7 +44,22 @@ def filled(template: str, **numbers: Any) -> str:
         raise NameError(f"no number is given for {{{min(missing)}}} in: {text}")
     if unused := set(numbers) - wanted:
         raise NameError(f"{min(unused)} is given, and there is no {{{min(unused)}}} in: {text}")
-    return PLACEHOLDER.sub(lambda found: format(numbers[found[1]], found[2] or ""), text)
+
+    def shown(found: re.Match[str]) -> str:
+        name, form = found[1], found[2] or ""
+        value = numbers[name]
+        words = format(value, form)
+        if not origin or not is_number(value) or _in_formula(found):
+            return words
+        return cited(words, value, f"{name.replace('_', ' ')}: {origin}")
+
+    return PLACEHOLDER.sub(shown, text)
+
+
+def _in_formula(found: re.Match[str]) -> bool:
+    """Whether a placeholder stands between dollar signs or back quotes."""
+    before = found.string[: found.start()]
+    return any(before.count(sign) % 2 for sign in ("$", "`"))
 
 
 def share(value: float, digits: int = 0) -> str:
@@ -83,7 +106,7 @@ def listing(shown: Any) -> str:
     spec = find_spec(module)
     assert spec
     assert spec.origin
-    text = Path(spec.origin).read_text()
+    text = Path(spec.origin).read_text("utf-8")
     lines = text.splitlines()[slice(*_extent(ast.parse(text), name))]
     path = Path(spec.origin).relative_to(ROOT).as_posix()
     return f"`{path}`\n\n```python\n{dedent(chr(10).join(lines))}\n```"

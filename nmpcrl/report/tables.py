@@ -7,21 +7,17 @@ from html import escape
 
 import pandas as pd
 
-from nmpcrl.bench.learners import COMPARED
-from nmpcrl.bench.paired import Ratio
+from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.bench.targets import Target
+from nmpcrl.claims.assumptions import THEOREMS
 from nmpcrl.claims.paper_claims import CLAIMS
-from nmpcrl.claims.rule import (
-    NOT,
-    PARTLY,
-    REPRODUCED,
-    UNDECIDABLE,
-    Assumption,
-    Claim,
-    Outcome,
-    Verdict,
-)
-from nmpcrl.report.text import SURE, departure_link, differ, listed
+from nmpcrl.claims.rule import Assumption, Claim
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
+from nmpcrl.claims.wider_claims import WIDER_THAN
+from nmpcrl.report.cited import Cited, cited
+from nmpcrl.report.halves import apart, differ
+from nmpcrl.report.text import SURE, departure_link, listed
+from nmpcrl.report.timing import to_es
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 
@@ -32,6 +28,7 @@ BADGES: dict[str, str] = {  # by what is said of a claim, or by its outcome
     UNDECIDABLE: "verdict-undecidable",
     CLAIMS["C8"].words[NOT]: "verdict-not-applicable",  # refutes nothing: no colour of a no
 }
+PUBLISHED = "published"  # whose numbers a table shows, if nothing else is said
 WORDS = {REPRODUCED: "yes", PARTLY: "partly", NOT: "no", UNDECIDABLE: "open"}  # in narrow cells
 MET = {
     True: ("reached", BADGES[REPRODUCED]),
@@ -65,9 +62,9 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
     others = {v.claim: v for v in beside}
     rows = (
         (
-            f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}{_differ(v)}",
+            f"<strong>{_text(v.claim)}</strong> {_aside(v)}{_text(v.statement)}{_differ(v)}",
             _outcome(v),
-            *([_outcome(others[v.claim])] if others else []),
+            *([_outcome(others[v.claim], "runs of this page")] if others else []),
         )
         for v in verdicts
     )
@@ -94,9 +91,16 @@ def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
 
 
 def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
-    """One row an assumption of the theorem, in HTML: what it asks for and what is run."""
-    rows = ((_text(a.theorem), f"{_badge(*HELD[a.holds])}<br>{_text(a.here)}") for a in assumptions)
-    return _table(caption, ("The theorem assumes", "Here"), rows)
+    """One row an assumption, in HTML: which theorem makes it, and what is run."""
+    rows = (
+        (
+            _text(a.theorem),
+            *("assumed" if name in a.by else "–" for name in THEOREMS),
+            f"{_badge(*HELD[a.holds])}<br>{_text(a.here)}",
+        )
+        for a in assumptions
+    )
+    return _table(caption, ("Assumption", *THEOREMS, "Here"), rows)
 
 
 def target_table(targets: Iterable[Target], caption: str) -> str:
@@ -108,40 +112,44 @@ def target_table(targets: Iterable[Target], caption: str) -> str:
     return _table(caption, ("What", "To reach", "Here"), rows)
 
 
-TIMES = {  # columns of `time_learners` with one number each
-    "solves": "solves",
-    "ms_per_step": "ms per step",
-    "ms_per_solve": "ms per solve",
-    "ms_per_fit": "ms per fit",
-    "ms_per_rest": "ms per rest",
-    "hours": "hours",
-    "hours_paper": "hours, paper",
+TIMES = {  # columns of `time_learners` with one number each, and what one of their units is
+    "solves": ("solves", 1),
+    "ms_per_step": ("ms per step", 1),
+    "ms_per_solve": ("ms per solve", 1),
+    "ms_per_fit": ("ms per fit", 1),
+    "ms_per_rest": ("ms per rest", 1),
+    "hours": ("run [s]", 3600),
+    "hours_paper": ("paper [h]", 1),
 }
 
 
-def timing_table(timings: pd.DataFrame) -> str:
+def timing_table(timings: pd.DataFrame, machine: str) -> str:
     """One row a solver and learner, in HTML: Table II, with each ratio to ES and its interval.
 
     Args:
         timings: of `time_learners`.
+        machine: that they were timed on.
     """
     rows = (
         (
             _text(f"{row['learner']} with {row['solver']}"),
-            *("–" if pd.isna(row[name]) else f"{row[name]:.3g}" for name in TIMES),
-            _in_two_lines(Ratio(*(row[name] for name in COMPARED))),
+            *(
+                "–" if pd.isna(row[name]) else f"{one * row[name]:.3g}"
+                for name, (_, one) in TIMES.items()
+            ),
+            _in_two_lines(to_es(timings, row["solver"], row["learner"])),
         )
         for row in timings.to_dict("records")
     )
-    header = ("step of", *TIMES.values(), "ratio")
-    return _table("Times of a learning step.", header, rows, headed=True)
+    header = ("step of", *(words for words, _ in TIMES.values()), "ratio")
+    return _table(f"Times of a learning step on {machine}.", header, rows, headed=True)
 
 
 def evidence(verdicts: Iterable[Verdict]) -> str:
     """One item a claim, in Markdown: verdict, evidence, and where it would change."""
     return "\n\n".join(
         f"- **{v.claim}: {v.statement}**\n\n"
-        f"  {_labelled(v)} {f'{v.evidence} {v.halves}'.strip()}\n\n"
+        f"  {_labelled(v)} {f'{v.evidence} {apart(v)}'.strip()}\n\n"
         f"  *Where it would change.* {_linked(v.would_change)}"
         for v in verdicts
     )
@@ -167,7 +175,7 @@ def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
 
 
 def scope(runs: pd.DataFrame) -> str:
-    """What the runs of `summary.table` cover, in a sentence."""
+    """What the runs of `rows.table` cover, in a sentence."""
     names = ("layout", "seed", "decay", "episodes")
     layouts, seeds, readings, episodes = (tuple(runs[name].unique().tolist()) for name in names)
     return (
@@ -231,30 +239,38 @@ def _word(outcome: Outcome | None) -> str:
     return _badge(WORDS[outcome], BADGES[outcome]) if outcome else ""
 
 
-def _share(verdict: Verdict) -> str:
+def _share(verdict: Verdict, source: str = PUBLISHED) -> str:
     """The share, or ratio, on which a verdict rests and its interval, below its badge."""
     if verdict.interval is None:
         return ""
-    low, high = verdict.interval
-    if verdict.share is None:
-        return f"<br>{verdict.ratio:.2f} [{low:.2f}, {high:.2f}]"
-    return f"<br>{verdict.share:.0%} [{low:.0%}, {high:.0%}]"
+    value, form = (verdict.ratio, ".2f") if verdict.share is None else (verdict.share, ".0%")
+    assert value is not None
+    number, kind = Estimate(value, *verdict.interval), "ratio" if form == ".2f" else "share"
+    return f"<br>{cited(format(number, form), number, f'{verdict.claim}, {kind}: {source}')}"
 
 
-def _in_two_lines(ratio: Ratio) -> str:
+def _in_two_lines(ratio: Cited) -> str:
     """A ratio above its interval, for a narrow column."""
-    value, _, interval = str(ratio).partition(" ")
-    return f'{value}<br><span style="white-space: nowrap">{interval}</span>'
+    _, _, interval = str(ratio.value).partition(" ")
+    return f'{ratio:.2f}<br><span style="white-space: nowrap">{interval}</span>'
 
 
-def _outcome(verdict: Verdict) -> str:
+def _outcome(verdict: Verdict, source: str = PUBLISHED) -> str:
     """What became of a claim, and the number on which that rests."""
-    return f"{_labelled(verdict)}{_share(verdict)}"
+    return f"{_labelled(verdict)}{_share(verdict, source)}"
 
 
 def _labelled(verdict: Verdict) -> str:
     """What is said of a claim, in the colour of those words or else of its outcome."""
     return _badge(verdict.words, BADGES.get(verdict.words, BADGES[verdict.outcome]))
+
+
+def _aside(verdict: Verdict) -> str:
+    """Before the statement of what the paper does not say."""
+    if verdict.claim in WIDER_THAN:
+        return f"<em>Wider than {WIDER_THAN[verdict.claim]}:</em> "
+    implied = verdict.claim in CLAIMS and CLAIMS[verdict.claim].implied
+    return "<em>Taken for granted:</em> " if implied else ""
 
 
 def _differ(verdict: Verdict) -> str:

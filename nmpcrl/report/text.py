@@ -2,14 +2,16 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import isnan
+from typing import Any
 
 import pandas as pd
 
-from nmpcrl.claims.halves import readings
-from nmpcrl.claims.paper_claims import kept_without_noise
-from nmpcrl.claims.prespecified import Fixed
+from nmpcrl.claims.agreement import Repeated
+from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
+from nmpcrl.claims.prespecified import SINCE, Fixed
 from nmpcrl.claims.published import Published
-from nmpcrl.claims.rule import PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
+from nmpcrl.claims.robustness import PARTS
+from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import design
 from nmpcrl.study.departures import DEPARTURES
 
@@ -20,24 +22,30 @@ NOTHING = (
 WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 SHOWN = 10  # letters of a commit's hash
 SURE = 0.01  # of Fisher's test: what chance explains as rarely is called more than chance
-LAYOUT, DECAY = "B", "C"  # the departures that the main table itself reads in several ways
 
 
 def compute_effort(found: Published) -> str:
     """What was trained, where, with what, and how long that took."""
     if not found.rows:
         return NOTHING
-    about, episodes = found.about, {e.episodes for e in found.rows}
-    parts = dict(about["runs"])
+    episodes = {e.episodes for e in found.rows}
+    parts = dict(found.about["runs"])
     main, controls = parts.pop(design.MAIN_TABLE, 0), parts.pop("controls", 0)
-    libraries = listed([f"{name} {version}" for name, version in about["versions"].items()])
-    machine = about["machine"]
     return (
         f"These are {len(found.rows):,} runs of {listed(sorted(episodes))} episodes: {main:,} in"
         f" the main table, {controls:,} with other learners for comparison, and"
         f" {sum(parts.values()):,} in {len(parts)} variants. Their clocks add up to"
-        f" {about['hours']:.1f} hours of one core, on a machine with {machine['cores']}"
-        f" cores ({machine['processor']}, {machine['system']}), with {libraries}."
+        f" {listed(map(_made, found.batches))}."
+    )
+
+
+def _made(about: Mapping[str, Any]) -> str:
+    """How long some runs took, on which machine, and with what."""
+    libraries = listed([f"{name} {version}" for name, version in about["versions"].items()])
+    machine = about["machine"]
+    return (
+        f"{about['hours']:.1f} hours of one core on a machine with {machine['cores']} cores"
+        f" ({machine['processor']}, {machine['system']}; {libraries})"
     )
 
 
@@ -45,6 +53,7 @@ def answer(verdicts: Sequence[Verdict]) -> str:
     """Whether the paper reproduces, in a sentence: how many claims had each outcome, and which."""
     if not verdicts:
         return NOTHING
+    verdicts = [v for v in verdicts if v.claim in CLAIMS]
     decided = {v.outcome for v in verdicts} - {UNDECIDABLE}
     head = "in part" if decided & {REPRODUCED, PARTLY} else "no" if decided else "not decidable"
     if decided == {REPRODUCED}:
@@ -69,7 +78,11 @@ def _counted(group: Sequence[Verdict]) -> str:
 
 
 def _all(verdicts: Sequence[Verdict]) -> str:
-    return f"the paper's {number(len(verdicts))} claim{'s' if len(verdicts) > 1 else ''}"
+    implied = sum(CLAIMS[v.claim].implied for v in verdicts)
+    made = len(verdicts) - implied
+    parts = [f"the paper's {number(made)} claim{'s' if made > 1 else ''}"] * bool(made)
+    parts += [f"{number(implied)} that it takes for granted"] * bool(implied)
+    return listed(parts)
 
 
 def number(count: int) -> str:
@@ -80,8 +93,8 @@ def number(count: int) -> str:
 def legend(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
     """What the numbers of a table of verdicts mean; `runs` are those that were judged."""
     asked_twice = ""
-    if any(v.claim == "C7" and v.halves for v in verdicts):
-        asked = kept_without_noise(runs)
+    if any(v.claim == "C7" and v.each for v in verdicts):
+        asked = kept_without_noise(runs, BY_RUNS["C7"].learners)
         stopped = (asked.kept & asked.stopped).sum()
         asked_twice = (
             " C7 is asked twice: its percentage counts the runs that kept every constraint in"
@@ -105,10 +118,18 @@ def fixed(found: Fixed | None) -> str:
     first, then = found.thresholds, found.published
     return (
         f"The thresholds and the rule were fixed in commit `{first.hash[:SHOWN]}` ({first.date}"
-        f" UTC), and none of their numbers has changed since. The runs of the study were published"
-        f" after it, in commit `{then.hash[:SHOWN]}` ({then.date} UTC). In the repository,"
-        f" `git show {first.hash[:SHOWN]}` shows the thresholds, and"
+        f" UTC), and none of their numbers has changed since; [what they are applied"
+        f" to](reproducibility.ipynb#reproducibility-since) has. The runs of the study were"
+        f" published after it, in commit `{then.hash[:SHOWN]}` ({then.date} UTC). In the"
+        f" repository, `git show {first.hash[:SHOWN]}` shows the thresholds, and"
         f" `git log {first.hash[:SHOWN]}..{then.hash[:SHOWN]}` what came between."
+    )
+
+
+def decided_since() -> str:
+    """One item a definition that came after the thresholds: when, what, and what it moved."""
+    return "\n".join(
+        f"- `{one.commit}` ({one.date} UTC, {one.when}): {one.what} {one.moved}" for one in SINCE
     )
 
 
@@ -134,67 +155,37 @@ def agreement(found: Sequence[Verdict], known: Iterable[Verdict], mark: str) -> 
     return f"Judged alone, the runs of this page ({mark}) give {listed(parts)}."
 
 
-def halves(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
-    """One item a claim that joins statements or learners: each by itself, and what is clear.
-
-    Args:
-        verdicts: on the claims.
-        runs: those that were judged; of C7, some were stopped.
-    """
-    return "\n".join(
-        "\n".join([f"- **{v.claim}.** {v.halves}", *(f"  - {one}" for one in _beside(v, runs))])
-        for v in verdicts
-        if v.halves
-    )
-
-
-def _beside(verdict: Verdict, runs: pd.DataFrame) -> tuple[str, ...]:
-    return (stopped_early(runs),) if verdict.claim == "C7" else clear(verdict)
-
-
-def stopped_early(runs: pd.DataFrame) -> str:
-    """How many runs count as keeping C7's constraints that were stopped in training."""
-    asked = kept_without_noise(runs)
-    counts = (asked.kept & asked.stopped).groupby(level="learner", sort=False).sum()
-    parts = listed(f"{count} of {name}" for name, count in counts.items() if count)
+def repeated(found: Repeated) -> str:
+    """How the published runs that were trained again came out, in two sentences."""
+    if not found.runs:
+        return "No published run was trained again here."
+    there = {v.claim: v for v in found.there}
+    undecided = [v.claim for v in found.here if v.outcome == UNDECIDABLE]
+    other = [
+        f"{v.claim}: {v.words} here, {there[v.claim].words} there"
+        for v in found.here
+        if v.outcome not in (UNDECIDABLE, there[v.claim].outcome)
+    ]
+    same = len(found.here) - len(undecided) - len(other)
+    parts = [f"for {number(same)} of {number(len(found.here))} claims"]
+    parts += [f"another one for {number(len(other))} ({'; '.join(other)})"] * bool(other)
+    parts += [f"none for {number(len(undecided))} ({listed(undecided)})"] * bool(undecided)
     return (
-        f"Of those that kept them, {parts} had to be stopped in training: of these, the rollouts"
-        " up to then are asked."
+        f"Of {found.runs} published runs that were trained again on this machine, {found.equal}"
+        f" have the published numbers in every digit, and {found.close} more to six digits."
+        " Judged alone, they give the outcome of the published runs in the same layouts and"
+        f" readings {listed(parts)}."
     )
-
-
-def clear(verdict: Verdict) -> tuple[str, ...]:
-    """Where two learners clearly differ, as claimed or the other way round."""
-    return (*verdict.as_claimed, *verdict.reverse)
-
-
-def differ(verdict: Verdict) -> str:
-    """In which readings of the decay `clear` holds, in a few words; nothing if in none."""
-    parts = {"as claimed": readings(verdict.as_claimed), "the reverse": readings(verdict.reverse)}
-    listing = (
-        f"{way} with noise that decays {listed(f'per {one}' for one in decays)}"
-        for way, decays in parts.items()
-        if decays
-    )
-    return ", ".join(listing)
-
-
-def differences(verdicts: Iterable[Verdict]) -> str:
-    """Of which claims two learners clearly differ, and which way round, in a sentence."""
-    found = [f"{v.claim} ({differ(v)})" for v in verdicts if differ(v)]
-    if not found:
-        return "Nowhere do two learners of a claim clearly differ."
-    return f"Where two learners of a claim clearly differ: {listed(found)}."
 
 
 def by_layout_and_decay(verdicts: Iterable[Verdict]) -> str:
     """On which claims the layouts, and the readings of the decay, disagree."""
     asked = [v for v in verdicts if v.by_layout]
-    layouts = [v.claim for v in asked if disagree(v.by_layout.values())]
-    decays = [v.claim for v in asked if disagree(v.by_decay.values())]
+    layouts = [v.claim for v in asked if v.differs_by("layout")]
+    decays = [v.claim for v in asked if v.differs_by("decay")]
     if not asked:
         return ""
-    turned = [v.claim for v in asked if turns(v)]
+    turned = [v.claim for v in asked if v.turns]
     beside = (
         f" The learners of {listed(turned)} clearly differ as claimed in one reading of the decay,"
         " and the other way round in the other."
@@ -222,10 +213,9 @@ def depends_on(verdicts: Iterable[Verdict], judged: pd.DataFrame) -> dict[str, t
     """The departures on which a verdict depends: letter -> claims, both in order."""
     found: dict[str, set[str]] = {letter: set() for letter in DEPARTURES}
     for verdict in verdicts:
-        if disagree(verdict.by_layout.values()):
-            found[LAYOUT].add(verdict.claim)
-        if disagree(verdict.by_decay.values()) or turns(verdict):
-            found[DECAY].add(verdict.claim)
+        for field, letter in PARTS.items():
+            if verdict.depends_on(field):
+                found[letter].add(verdict.claim)
     for variant, claim in _changed(judged)[["variant", "claim"]].itertuples(index=False):
         letter = design.VARIANTS[variant].departure
         if letter:
@@ -249,14 +239,33 @@ def outcomes(verdicts: Iterable[Verdict]) -> str:
     return "\n".join(f"- {v.claim}. {v.statement} *{v.words.capitalize()}.*" for v in verdicts)
 
 
+FIGURES = {  # of chapter 5, in which a claim is decided
+    "C1": ("5.2", "c1"),
+    "C2": ("5.6", "c2"),
+    "C3": ("5.20", "c3"),
+    "C4": ("5.21", "c4"),
+    "C5": ("5.12", "c5"),
+    "C6": ("5.4", "c6"),
+    "C7": ("5.14", "c7"),
+    "C8": ("5.8", "c8"),
+    "C9": ("5.15", "c9"),
+}
+
+
+def quotations(verdicts: Mapping[str, Verdict]) -> str:
+    """One item a claim, in Markdown: its verdict, where it is decided, and the paper's words."""
+    lines = []
+    for name, one in verdicts.items():
+        number, label = FIGURES[name]
+        link = f"[Fig. {number}](05_results.ipynb#fig-results-{label})"
+        implied = " Taken for granted:" if CLAIMS[name].implied else ""
+        lines.append(f"- **{name}**, *{one.words}* ({link}).{implied} {CLAIMS[name].quotation}.")
+    return "\n".join(lines)
+
+
 def departure_link(words: str, letter: str) -> str:
     """A link to a departure's entry, in Markdown."""
     return f"[{words}](departures.ipynb#departure-{letter})"
-
-
-def disagree(outcomes: Iterable[str]) -> bool:
-    """Whether there are two different ones among those that are decided."""
-    return len(set(outcomes) - {UNDECIDABLE}) > 1
 
 
 def mean_and_pairs(best: str, other: str, wins: float) -> str:
@@ -279,15 +288,6 @@ def mean_and_pairs(best: str, other: str, wins: float) -> str:
         f"Yet {said[:1].lower()}{said[1:]}: in a mean, a run that gets stuck weighs more than many"
         " that cost a little less ([Chapter 7](07_beyond.ipynb))."
     )
-
-
-def turns(verdict: Verdict) -> bool:
-    """Whether learners clearly differ as claimed in one reading of the decay and not in another.
-
-    A verdict on both together is then about neither.
-    """
-    claimed, reverse = readings(verdict.as_claimed), readings(verdict.reverse)
-    return any(one != other for one in claimed for other in reverse)
 
 
 def listed(names: Iterable[object]) -> str:

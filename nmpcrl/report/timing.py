@@ -1,6 +1,7 @@
 """What the appendix on performance says where a measurement decides how it has to be said."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -8,8 +9,9 @@ import pandas as pd
 from nmpcrl.bench import learners, summary
 from nmpcrl.bench.summary import Bench, Saving
 from nmpcrl.bench.targets import Target
+from nmpcrl.report.cited import Cited
 
-CLOSE = 0.01  # ratios of times that differ by less are called the same
+PUBLISHED = "the published measurement"
 NOTICED = 0.005  # a share below this is shown as 0 %
 
 
@@ -50,48 +52,76 @@ def beside_mpcrl(bench: Bench) -> str:
 
 def break_even(model: Saving) -> str:
     """From which time of a solve on the network saves time."""
-    if model.break_even <= 0:
+    if model.break_even == 0:
         return "With these times the network saves time, however fast the solver is."
-    return f"The network saves time only where a solve takes more than {model.break_even:.2f} ms."
+    if np.isinf(model.break_even):
+        return "With these times the network saves no time, however slow the solver is."
+    low, high = model.break_even_within
+    within = "" if np.isnan(low) else f" (it lies between {low:.1g} and {high:.1g} ms)"
+    return (
+        "The network saves time only where a solve takes more than about"
+        f" {model.break_even:.1g} ms{within}."
+    )
 
 
-def model_beside_measured(model: Saving, measured: pd.DataFrame, ratio: float) -> str:
-    """From which time of a solve on the model is below a ratio, and whether the slowest solver is.
+def slow_solves(model: Saving, solve: float) -> str:
+    """What the ratio comes to with solves as slow as that, and what keeps it from one half.
 
     Args:
         model: of the times of RDES and ES.
-        measured: of `summary.measured_ratios`.
-        ratio: of RDES to ES, above 1/2.
+        solve: time of a solve of RDES [ms].
     """
-    solver, slowest = max(measured.iterrows(), key=lambda row: row[1].solve)
-    expected = float(model.ratio(slowest.solve))
-    apart = slowest.ratio - expected
-    side = "higher" if apart > 0 else "lower"
-    where = (
-        f"With {solver}, whose solves in RDES take {slowest.solve:.2f} ms, the model gives"
-        f" {expected:.2f} and the measurement {slowest.ratio:.2f}"
-    )
-    end = f", which is {side} for the reasons below." if abs(apart) > CLOSE else ", so they agree."
     return (
-        f"By the model, the ratio is below {ratio} where a solve takes more than"
-        f" {model.solve_at(ratio):.1f} ms. {where}{end}"
+        f"With solves of {solve / 1e3:.2f} s, the paper's, a step of RDES would take"
+        f" {model.ratio(solve):.2f} of the time of a step of ES if warm starts helped as they help"
+        f" the slowest solver here, and {model.ratio(solve, warm=1.0):.2f} if all solves took alike"
+        " (C3)."
     )
 
 
-def rdes_to_es(bench: Bench, solver: str) -> str:
-    """The measured time of a step of RDES over one of ES, with its 95 % interval."""
-    ratio = learners.ratio(summary.learners(bench), solver, "RDES")
-    known = np.isfinite([ratio.low, ratio.high]).all()
-    return str(ratio) if known else f"{ratio.value:.2f} (too few steps for an interval)"
+def measured_on(about: Mapping[str, Any]) -> str:
+    """The machine and the day of a measurement; `about` as `published` and the benchmark say it."""
+    machine = about["machine"]
+    return f"{machine['cores']} cores ({machine['processor']}, {about['date']})"
+
+
+def coverage(timings: pd.DataFrame) -> str:
+    """How many of the repetitions' own intervals hold what they come to together.
+
+    Args:
+        timings: of `time_learners_repeatedly`.
+    """
+    others = timings[timings.learner != learners.REFERENCE]
+    times, least = int(others.repetitions.iloc[0]), int(others.inside.min())
+    share = others.inside.sum() / others.repetitions.sum()
+    return (
+        f"The measurement was repeated {times} times, and the intervals are of how far the"
+        f" repetitions are apart. Of the {times} intervals that they have themselves, at least"
+        f" {least} hold what all come to together, for every learner and solver, and {share:.0%} of"
+        " all; at 95 % one in twenty should miss."
+    )
+
+
+def to_es(timings: pd.DataFrame, solver: str, learner: str, source: str = PUBLISHED) -> Cited:
+    """The measured time of a step of a learner over one of ES, with its 95 % interval.
+
+    Args:
+        timings: of `time_learners`.
+        solver: name of both's.
+        learner: name.
+        source: where the times come from.
+    """
+    return Cited(learners.ratio(timings, solver, learner), of_steps(learner, solver, source))
+
+
+def of_steps(learner: str, solver: str, source: str = PUBLISHED) -> str:
+    """The quantity of that ratio; see `cited`."""
+    return f"step of {learner} in steps of ES, with {solver}: {source}"
 
 
 def at_paper_speed(timings: pd.DataFrame) -> str:
     """What C3's ratio would be with solves as slow as the paper's; `timings` of `time_learners`."""
-    ratio = summary.saving({"learners": timings.to_dict("list")}).ratio(1e3 * summary.PAPER_SOLVE)
-    return (
-        f"With solves as slow as the paper's ({summary.PAPER_SOLVE:.2f} s), a step of RDES would"
-        f" take {ratio:.2f} of the time of a step of ES (C3)."
-    )
+    return slow_solves(summary.saving(timings), 1e3 * summary.PAPER_SOLVE)
 
 
 def reached(targets: Sequence[Target]) -> str:

@@ -95,6 +95,8 @@ def load_about(path: Path, forms: Callable[[dict[str, Any]], Forms]) -> dict[str
 def _reading(path: Path) -> Iterator[Any]:
     """A file of arrays; whatever is wrong with it makes it a damaged one."""
     try:
+        if path.is_fifo() or path.is_socket() or path.is_char_device():
+            raise _Unlike("it is no file, and to read it would not end")
         with path.open("rb") as whole, np.load(whole, allow_pickle=False) as file:
             yield file
     except FileNotFoundError:

@@ -13,6 +13,8 @@ from nmpcrl.study.sweeps import AXES, FIELDS
 
 INJECTED = "# Parameters\n"  # so begins the cell in which papermill sets what it is given
 OF_PAPERMILL = "PAPERMILL_"  # so begin the names that it sets on its own account
+# Step sizes with which a chapter has something to show: with larger ones a run ends at once.
+MOST = {"alpha": 1e-5, "beta": 1e-4}  # 100 and 10,000 times the paper's
 
 
 def check(**declared: Any) -> None:
@@ -29,12 +31,17 @@ def check(**declared: Any) -> None:
         close = get_close_matches(name, declared, n=1)
         meant = f" (did you mean {close[0]!r}?)" if close else ""
         raise ParameterError(
-            f"this chapter has no parameter {name!r}{meant}; it has {', '.join(declared)}"
+            f"this chapter has no parameter {name!r}{meant}; it has {', '.join(declared) or 'none'}"
         )
     for name, value in declared.items():
         allowed = (FIELDS | AXES).get(name)
         if allowed:
             allowed.check(name, value)
+        if name in MOST and value > MOST[name]:
+            raise ParameterError(
+                f"{name} = {value:g} must be at most {MOST[name]:g} in a chapter: with larger ones"
+                " a run ends before there is anything to show"
+            )
 
 
 def afford(experiments: Iterable[Experiment]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from nmpcrl.study.archive import ABOUT
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.provenance import key
 
 RUN = re.compile(r"[A-Za-z]+-\w+-[a-z]+-seed\d+-\d+ep-[0-9a-f]{10}")  # what a run's file is called
 HALF = re.compile(r"\.half-.*\.tmp")
@@ -85,14 +86,22 @@ def _kind(path: Path, file_of: Callable[[Experiment], Path]) -> str:
 
 
 def _kind_of_run(path: Path, file_of: Callable[[Experiment], Path]) -> str:
-    """Whether this code would look for the run; one that cannot be read now may yet be whole."""
+    """Whether this code would look for the run; one that cannot be read now may yet be whole.
+
+    A run of this code that somebody gave the name of another one stays.
+    """
     try:
         with path.open("rb") as whole, np.load(whole, allow_pickle=False) as file:
-            fields = dict(json.loads(str(file[ABOUT]))["experiment"])
+            about = json.loads(str(file[ABOUT]))
+            fields, facts = dict(about["experiment"]), dict(about["facts"])
     except Exception:
         return ""
     try:
-        current = file_of(Experiment(**fields)).name == path.name
+        experiment = Experiment(**fields)
     except (TypeError, ValueError):  # fields that this code does not know
-        current = False
-    return "runs" if current else "old"
+        return "old"
+    own = file_of(experiment)
+    if own.name == path.name:
+        return "runs"
+    renamed = own.stem.rpartition("-")[0] != path.stem.rpartition("-")[0]
+    return "" if renamed and facts.get("key") == key(experiment) else "old"

@@ -114,7 +114,7 @@ def read_security(file: str | Path) -> Any:
 def _certificates(file: Path) -> tuple[str, str, str]:
     """Where the certificate of the authority is, the own one, and its key."""
     try:
-        named = tomllib.loads(file.read_text())
+        named = tomllib.loads(file.read_text("utf-8"))
     except OSError as error:
         raise NoCluster(f"the security file {file} cannot be read: {error.strerror}") from None
     except ValueError as error:

@@ -20,10 +20,11 @@ class Departure:
 DEPARTURES = {
     "A": Departure(
         gap="The target, $x = 8.5$ m, lies outside the printed state space, $[-9, 3]^2$.",
-        reading="State space $[-3, 9]^2$.",
-        why="One changed sign repairs everything: start and target then each lie 0.5 m inside a"
-        " wall, and 11 m at 0.6 m/s take 92 of the 129 steps. With the printed box the robot parks"
-        " at $x = 3$ m and never comes within $d_t$ of the target.",
+        reading="State space $[-3, 9]^2$: the printed box mirrored, so that both bounds of $x$ and"
+        " of $y$ change their sign.",
+        why="In $x$, start and target then each lie 0.5 m inside a wall, and 11 m at 0.6 m/s take"
+        " 92 of the 129 steps; in $y$, both lie inside the printed box as well. With the printed"
+        " box the robot parks at $x = 3$ m and never comes within $d_t$ of the target.",
         variant="box = 'printed'",
     ),
     "B": Departure(
@@ -83,9 +84,23 @@ DEPARTURES = {
         variant="network",
     ),
     "I": Departure(
-        gap="How the baseline DES is configured is not given.",
-        reading=r"RDES without $\boldsymbol{\theta}$ in the network's input.",
-        why="It is the only difference between the two that the paper names.",
+        gap="How the baseline DES is configured is hardly given. The introduction calls it “a deep"
+        " double Expected Sarsa (ES) RL method” and its network “a target neural network”, “trained"
+        " with inputs and outputs of the primary NMPC obtained at previous sampling times”.",
+        reading=r"RDES without $\boldsymbol{\theta}$ in the network's input: one network, which is"
+        " fitted once a step and then asked, with the second input of the plan as the next action.",
+        why="Section III-A names that input as what it adds to the earlier method. By the public"
+        " abstract of [Moradimaryamnegari et al."
+        " (2023)](references.md#moradimaryamnegari2023data), the MPC estimates the current value,"
+        " and the network the next one, which is what is double; the network is fitted within a"
+        " sampling time or in parallel to it; and the next action is the second one of the last"
+        " plan or the network's minimiser, which made no significant difference. Whether its"
+        " “target” network lags behind, as that word often says, is open. So four variants read it"
+        " otherwise, in all layouts and both readings of the decay: a copy of the network that is"
+        " refreshed once an episode (`lagged`) or follows it slowly (`averaged`, at the rate of"
+        " [Fujimoto et al. (2018)](references.md#fujimoto2018addressing)), the network's minimiser"
+        " as the next action (`greedy`), and a network that is one fit late (`late`).",
+        variant="network = 'lagged'",
     ),
     "J": Departure(
         gap=r"$\beta = 10^{-8}$ is smaller than $\alpha = 10^{-7}$.",

@@ -10,9 +10,9 @@ from types import MappingProxyType
 from typing import Any
 
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import MAIN, NETWORK_LEARNERS, PAPER, Experiment, frozen_arm
+from nmpcrl.study.experiment import MAIN, PAPER, Experiment, frozen_arm
 from nmpcrl.study.replicas import perturbed
-from nmpcrl.study.setup import DECAYS, NETWORKS
+from nmpcrl.study.setup import DECAYS, LEARNERS
 from nmpcrl.study.sweeps import sweep
 
 LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too
@@ -20,6 +20,13 @@ SEEDS = tuple(range(10))
 VARIED: dict[str, Any] = {"layout": ("A", "D"), "seed": tuple(range(5))}  # one open, one closing
 FRESH: dict[str, Any] = {"layouts": ("A", "B", "D"), "seeds": tuple(range(5))}
 MAIN_TABLE = "main"
+IMITATING = tuple(name for name in PAPER if LEARNERS[name].network)
+BASELINES = {  # what the paper leaves open of DES, on every layout and in both readings
+    "lagged": "a copy of the network, refreshed once an episode, predicts",
+    "averaged": "a copy that follows the network slowly predicts",
+    "greedy": "the next action is the network's minimiser",
+    "late": "the network is one fit late, as in parallel",
+}
 
 
 @dataclass(frozen=True)
@@ -43,11 +50,11 @@ def _variants() -> dict[str, Variant]:
         "soft box": Variant("M", "the box as soft as the obstacles", {"box": "soft"}),
         "no clipping": Variant("E", "actions may leave the action space", {"clipped": False}),
         "Q(s, a)": Variant("F", "u_0 = a fixed where the value is learned", {"constrained": True}),
-        "literal": Variant("G", "theta moves from step 1", {"gated": False}, NETWORK_LEARNERS),
+        "literal": Variant("G", "theta moves from step 1", {"gated": False}, IMITATING),
         "other side of the kink": Variant("L", "ties count as active", {"ties_active": True}),
     }
-    for network in list(NETWORKS)[1:]:
-        found[network] = Variant("H", f"network: {network}", {"network": network}, NETWORK_LEARNERS)
+    for network in ("normalised", "tanh", "small buffer", "four fits"):
+        found[network] = Variant("H", f"network: {network}", {"network": network}, IMITATING)
     for factor in (0.1, 10, 100):
         changed = f"beta x {factor:g}"
         found[changed] = Variant("J", changed, {"beta": factor * paper.BETA}, ("GES",))
@@ -59,6 +66,9 @@ def _variants() -> dict[str, Variant]:
     found["tolerance 1e-5"] = Variant("", "a looser solver", {"tolerance": 1e-5})
     theta = perturbed(Experiment()).theta
     found["perturbed"] = Variant("", "theta_init moved by 1e-12", {"theta": theta})
+    for network, changed in BASELINES.items():
+        fields = {"network": network, "layout": LAYOUTS, "decay": tuple(DECAYS)}
+        found[network] = Variant("I", changed, fields, ("DES",))
     return found
 
 

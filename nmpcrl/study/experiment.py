@@ -1,6 +1,5 @@
 """An `Experiment` is a frozen value that names one run."""
 
-from collections.abc import Collection
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any
 
@@ -24,9 +23,6 @@ from nmpcrl.study.setup import DECAYS, LEARNERS, NETWORKS
 
 PAPER = ("ES", "DES", "RDES", "GES")  # the paper's learners
 MAIN = (*PAPER, "TDC", "frozen")  # of the main table
-NETWORK_LEARNERS = ("DES", "RDES")
-MOVING = tuple(name for name in LEARNERS if name != "frozen")  # whose theta moves
-VALUING = tuple(name for name in MOVING if name != "QL")  # which may value u_0 = a or not
 
 # Nothing sensible lies above these.
 MOST_EPISODES = 100_000  # 333 times the paper's: exploration has long ended
@@ -37,15 +33,14 @@ WITHIN = Pose(paper.LOWER, paper.UPPER)  # the box
 STEP_SIZE = Number.above_zero(ABSURD)  # with more, theta leaves the numbers in one step
 
 
-def option(
-    default: Any, allowed: Allowed, about: str, read_by: Collection[str] | None = None
-) -> Any:
+def option(default: Any, allowed: Allowed, about: str, *, optional: bool = False) -> Any:
     """A field: its default, what it may be, and a line of help.
 
-    Learners that `read_by` does not name ignore it, and it is not part of their keys.
+    An optional one is read by the learners whose entry in `LEARNERS` names it. The others ignore
+    it, and it is not part of their keys.
     """
-    metadata = {"allowed": allowed, "help": about}
-    return field(default=default, metadata=metadata | ({"read_by": read_by} if read_by else {}))
+    metadata = {"allowed": allowed, "help": about, "optional": optional}
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True)
@@ -66,28 +61,33 @@ class Experiment:
     decay_rate: float = option(
         paper.DECAY_RATE, Number.above_zero(1), "c_epsilon, by which exploration decays."
     )
-    alpha: float = option(paper.ALPHA, STEP_SIZE, "Step size of theta.", MOVING)
-    beta: float = option(paper.BETA, STEP_SIZE, "Step size of w.", ("GES", "matched"))
-    zeta: float = option(paper.ZETA, STEP_SIZE, "Learning rate of the network.", NETWORK_LEARNERS)
+    alpha: float = option(paper.ALPHA, STEP_SIZE, "Step size of theta.", optional=True)
+    beta: float = option(paper.BETA, STEP_SIZE, "Step size of w.", optional=True)
+    zeta: float = option(paper.ZETA, STEP_SIZE, "Learning rate of the network.", optional=True)
     gated: bool = option(  # False: Algorithm 1 # departure G
-        True, Truth(), "Whether theta waits for the network's first fit.", NETWORK_LEARNERS
+        True, Truth(), "Whether theta waits for the network's first fit.", optional=True
     )
     clipped: bool = option(
         True, Truth(), "Whether noise is kept in the action space."
     )  # departure E
     constrained: bool = option(  # departure F
-        False, Truth(), "Whether Q(s, a) is learned, with u_0 = a fixed, and not V(s).", VALUING
+        False,
+        Truth(),
+        "Whether Q(s, a) is learned, with u_0 = a fixed, and not V(s).",
+        optional=True,
     )
     network: str = option(  # departure H
-        "plain", OneOf(NETWORKS), "What the paper leaves open of the network.", NETWORK_LEARNERS
+        "plain", OneOf(NETWORKS), "What the paper leaves open of the network.", optional=True
     )
     box: str = option("hard", OneOf(paper.BOXES), "The bounds of the state.")  # departures A and M
     ties_active: bool = option(  # the other side of the kink # departure L
-        False, Truth(), "Whether a state on an obstacle's boundary is in it.", MOVING
+        False, Truth(), "Whether a state on an obstacle's boundary is in it.", optional=True
     )
-    curvature: bool = option(True, Truth(), "Whether TDC subtracts h.", ("TDC",))
-    projected: bool = option(True, Truth(), "Whether theta is projected into [0, 10].", ("TDC",))
-    beta_tdc: float = option(paper.BETA_TDC, STEP_SIZE, "Step size of w in TDC.", ("TDC",))
+    curvature: bool = option(True, Truth(), "Whether TDC subtracts h.", optional=True)
+    projected: bool = option(
+        True, Truth(), "Whether theta is projected into [0, 10].", optional=True
+    )
+    beta_tdc: float = option(paper.BETA_TDC, STEP_SIZE, "Step size of w in TDC.", optional=True)
     theta: tuple[float, ...] = option(
         paper.THETA_INIT,
         Numbers(len(paper.THETA_INIT)),
@@ -129,7 +129,7 @@ class Experiment:
     @property
     def values_actions(self) -> bool:
         """Whether Q(s, a) proper is learned, with u_0 = a fixed, and not V(s)."""
-        return self.constrained or self.learner == "QL"
+        return self.constrained or LEARNERS[self.learner].valued
 
     @property
     def canonical(self) -> "Experiment":
@@ -138,7 +138,7 @@ class Experiment:
         return replace(self, **unread)
 
     def _skips(self, one: "Field[Any]") -> bool:
-        return self.learner not in one.metadata.get("read_by", LEARNERS)
+        return one.metadata["optional"] and one.name not in LEARNERS[self.learner].reads
 
     def __str__(self) -> str:
         place = f"layout {short_name(self.layout)}"

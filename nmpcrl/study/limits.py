@@ -4,9 +4,9 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from nmpcrl.study.experiment import NETWORK_LEARNERS, Experiment
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.parameters import ParameterError
-from nmpcrl.study.setup import NETWORKS
+from nmpcrl.study.setup import LEARNERS, NETWORKS
 
 HOURS = 24.0  # of one core, that are begun without asking; the whole study takes about 5
 MEMORY = 4e9  # bytes that a run may take
@@ -23,6 +23,7 @@ SUMMARY_ROW = 200  # bytes an episode
 START = 0.2  # [s] until the problem is set up
 STEP = 15e-6  # [s]; all of a step but its solves
 FIT = 150e-6  # [s]
+SEARCH = 250e-6  # [s]; of a network's best action
 NETWORK_STEP = 100e-6  # [s]; what a network does at a step besides
 SOLVE = {"riccati": (20e-6, 6e-6)}  # [s]; of a solve, and of each stage of its plan
 SLOW_SOLVE = (0.0, 250e-6)  # of every other solver
@@ -90,10 +91,11 @@ def seconds_of(experiment: Experiment) -> float:
     once, stage = SOLVE.get(e.solver, SLOW_SOLVE)
     rollouts = e.episodes // e.evaluate_every + 2
     each = STEP
-    if e.learner in NETWORK_LEARNERS:
-        each += NETWORK_STEP + FIT * NETWORKS[e.network].fits
-    solves = 1 if e.learner in ("frozen", *NETWORK_LEARNERS) else 2
-    solves += e.values_actions
+    entry = LEARNERS[e.learner]
+    if entry.network:
+        read = NETWORKS[e.network]
+        each += NETWORK_STEP + FIT * read.fits + SEARCH * read.greedy
+    solves = entry.solves + e.values_actions
     steps = e.episodes * e.steps
     return START + steps * each + (steps * solves + rollouts * e.steps) * (once + stage * e.horizon)
 
@@ -102,7 +104,7 @@ def memory_of(experiment: Experiment) -> float:
     """About how many bytes the process takes that trains it."""
     e = experiment
     rollouts = e.episodes // e.evaluate_every + 2
-    row = ROW + NETWORK_ROW * (e.learner in NETWORK_LEARNERS)
+    row = ROW + NETWORK_ROW * LEARNERS[e.learner].network
     return BASE + e.steps * (row * e.episodes + ROLLOUT_ROW * rollouts)
 
 

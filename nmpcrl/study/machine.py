@@ -12,6 +12,17 @@ import psutil
 CPUINFO = Path("/proc/cpuinfo")
 BOOT = Path("/proc/sys/kernel/random/boot_id")  # another after each start of the machine
 NAMESPACE = Path("/proc/self/ns/pid")  # another in each container
+SETTINGS = (  # environment variables by which the same code gives other last digits
+    "NUMBA_DISABLE_JIT",
+    "NUMBA_OPT",
+    "NUMBA_CPU_NAME",
+    "NUMBA_CPU_FEATURES",
+    "NUMBA_LOOP_VECTORIZE",
+    "NUMBA_SLP_VECTORIZE",
+    "OPENBLAS_CORETYPE",
+    "ATEN_CPU_CAPABILITY",
+    "MKL_CBWR",
+)
 
 
 def machine() -> dict[str, Any]:
@@ -24,13 +35,18 @@ def machine() -> dict[str, Any]:
     }
 
 
-@cache
 def fingerprint() -> dict[str, Any]:
-    """`machine`, with the abilities of its processor and its C library.
+    """`machine`, with the abilities of its processor, its C library, and what `SETTINGS` say.
 
-    Machine code is made for the former, and processors of one name may differ in them; sines and
-    cosines come from the latter.
+    Machine code is made for the first, and processors of one name may differ in them; sines and
+    cosines come from the second. "settings" is there only where one of them is set.
     """
+    settings = {name: os.environ[name] for name in SETTINGS if os.environ.get(name)}
+    return {**_fingerprint(), **({"settings": settings} if settings else {})}
+
+
+@cache
+def _fingerprint() -> dict[str, Any]:
     kept = ("flags", "Features", "cpu family", "model\t")
     told = sorted({line for line in _cpuinfo() if line.startswith(kept)})
     abilities = sha256("\n".join(told).encode()).hexdigest()[:16]

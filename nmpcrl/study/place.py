@@ -25,6 +25,18 @@ def folder() -> Path:
     return Path(os.environ.get("NMPCRL_RUNS") or "runs")
 
 
+def refuse_file(place: Path | None = None) -> None:
+    """Refuse a file where a folder belongs, which is not the same as an empty folder.
+
+    Raises:
+        StoreError: it is a file, or below one.
+    """
+    place = place or folder()
+    for above in (place, *place.parents):
+        if os.path.lexists(above) and not above.is_dir():
+            raise StoreError(refusal(f"cannot be a folder: {above} is a file"))
+
+
 def check_folder(needed: int = 0, place: Path | None = None) -> None:
     """See that runs can be kept before any is trained; what killed writers left is swept away.
 
@@ -39,9 +51,7 @@ def check_folder(needed: int = 0, place: Path | None = None) -> None:
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        for above in (place, *place.parents):
-            if os.path.lexists(above) and not above.is_dir():
-                raise StoreError(refusal(f"cannot be a folder: {above} is a file")) from error
+        refuse_file(place)
         raise StoreError(refusal(f"cannot be made ({error.strerror})", place)) from error
     sweep(place)
     try:

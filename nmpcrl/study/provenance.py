@@ -12,6 +12,9 @@ has no part in a key. Instead, `sources.lock.json` holds a hash of every file th
 Where one differs from the lock, a test fails and every command that reads a run warns, until
 either the epoch of its room is raised, so that all runs are trained anew, or
 `nmpcrl verify --relock` has shown with fresh runs that no bit has changed.
+
+A stored run says which sources made it. It is read if these are today's, the lock's, or those of an
+earlier lock of the same epochs; what was trained in the midst of an edit is trained again after it.
 """
 
 import ast
@@ -31,8 +34,9 @@ from typing import Any
 
 from nmpcrl.study import paper
 from nmpcrl.study.atomic import write_json
-from nmpcrl.study.experiment import NETWORK_LEARNERS, Experiment
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.machine import fingerprint
+from nmpcrl.study.setup import LEARNERS
 
 # Raised by hand where an edit of the room changes a number; then every run is trained anew.
 EPOCHS = {"control": 1, "learning": 1, "study": 1, "analysis": 1}
@@ -85,9 +89,19 @@ ELSEWHERE = (  # those that are compiled for other hosts, where no stored run is
     "learning/browser.py",
     "learning/rules.py",
 )
-ENTRIES = ("study/run.py", "analysis/summary.py")  # which count with all that they import
+ENTRIES = (
+    "study/run.py",
+    "analysis/summary.py",
+    "analysis/rows.py",
+)  # which count with all that they import
 ALONE = ("analysis/policy_search.py",)  # which count without
+UNCOUNTED = ("__future__", "collections.abc", "typing")  # modules that no number comes from
 PARSING = threading.Lock()  # Python 3.11 fails where two threads parse at once
+
+
+def before() -> dict[str, Any]:
+    """The fields of an experiment but the layout, with what all runs had before each was one."""
+    return {name: value for name, value in ORIGINAL.items() if name != "obstacles"}
 
 
 def key(experiment: Experiment) -> str:
@@ -117,7 +131,7 @@ def versions(experiment: Experiment | None = None) -> dict[str, str]:
 
     What a build adds after "+" is left out: it is the same code.
     """
-    learns = experiment is None or experiment.learner in NETWORK_LEARNERS
+    learns = experiment is None or LEARNERS[experiment.learner].network
     names = (*LIBRARIES, "torch") if learns else LIBRARIES
     return {name: _version(name).partition("+")[0] for name in names}
 
@@ -171,7 +185,7 @@ def sources(root: Path = ROOT) -> dict[str, str]:
         paths = {path for room in WHOLE_ROOMS for path in _counted(root, room)}
         paths |= _reached(root, [root / entry for entry in ENTRIES])
         paths |= {root / entry for entry in ALONE}
-        codes = {path: code(path.read_text()) for path in sorted(paths)}
+        codes = {path: code(path.read_text("utf-8")) for path in sorted(paths)}
     return {
         path.relative_to(root).as_posix(): hashlib.sha256(text.encode()).hexdigest()
         for path, text in codes.items()
@@ -193,12 +207,28 @@ def sources_hash() -> str:
 
 def room_hash(room: str) -> str:
     """One hash of the code of a whole room."""
-    return hash_of([code(path.read_text()) for path in sorted((ROOT / room).rglob("*.py"))])
+    return hash_of([code(path.read_text("utf-8")) for path in sorted((ROOT / room).rglob("*.py"))])
 
 
 def locked() -> dict[str, str]:
     """`sources` as the lock has them."""
-    return dict(json.loads(LOCK.read_text())["sources"])
+    return dict(json.loads(LOCK.read_text("utf-8"))["sources"])
+
+
+def locked_hash() -> str:
+    """`sources_hash` as it was when the lock was written."""
+    return hash_of(sorted(locked().values()))
+
+
+def is_accepted(made: str) -> bool:
+    """Whether the sources with this `sources_hash` make the numbers that these here make."""
+    return made in (sources_hash(), locked_hash(), *_earlier())
+
+
+def _earlier() -> list[str]:
+    """The hashes of the earlier locks of these epochs."""
+    lock = json.loads(LOCK.read_text("utf-8"))
+    return list(lock.get("earlier", ())) if lock["epochs"] == EPOCHS else []
 
 
 def changed(now: Mapping[str, str], lock: Mapping[str, str]) -> list[str]:
@@ -210,8 +240,11 @@ def changed(now: Mapping[str, str], lock: Mapping[str, str]) -> list[str]:
 
 
 def relock() -> Path:
-    """Write the lock anew."""
-    write_json(LOCK, {"epochs": EPOCHS, "sources": sources()}, indent=1)
+    """Write the lock anew; the one before is among the earlier ones, unless an epoch was raised."""
+    lock = json.loads(LOCK.read_text("utf-8")) if LOCK.exists() else {}
+    same = lock.get("epochs") == EPOCHS
+    earlier = list(dict.fromkeys([*_earlier(), locked_hash()])) if same else []
+    write_json(LOCK, {"epochs": EPOCHS, "earlier": earlier, "sources": sources()}, indent=1)
     return LOCK
 
 
@@ -235,11 +268,14 @@ def warn_of_changes() -> None:
 
 
 def code(text: str) -> str:
-    """A module's syntax tree as text, without comments, docstrings, imports and functions' types.
+    """A module's syntax tree as text, without comments, docstrings and functions' types.
 
-    Empty if nothing else is in it. The same text on every version of Python that we know.
+    Of its imports it has what can change a number: under which name something of ours is known that
+    has another, and all that comes from elsewhere. So a module of ours can be moved. Empty if there
+    is nothing else in it. The same text on every version of Python that we know.
     """
     tree = ast.parse(text)
+    renamed, foreign = _imports(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             node.returns = None
@@ -248,7 +284,25 @@ def code(text: str) -> str:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
             documented = ast.get_docstring(node) is not None
             node.body = [one for one in node.body[documented:] if not _is_bookkeeping(one)]
-    return "\n".join(map(_shape, tree.body))
+    body = list(map(_shape, tree.body))
+    return "\n".join([*renamed, *(foreign if body else ()), *body])
+
+
+def _imports(tree: ast.AST) -> tuple[list[str], list[str]]:
+    """What a module imports: ours under another name; and of others, what it uses in its code."""
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    renamed, foreign = set(), set()
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Import | ast.ImportFrom):
+            continue
+        module = (node.module or "") if isinstance(node, ast.ImportFrom) else ""
+        for one in node.names:
+            bound = one.asname or one.name.partition(".")[0]
+            if module.split(".")[0] == "nmpcrl":
+                renamed |= {f"import {one.name} as {bound}"} if bound != one.name else set()
+            elif bound in used and module not in UNCOUNTED:
+                foreign.add(f"from {module} import {one.name} as {bound}")
+    return sorted(renamed), sorted(foreign)
 
 
 def _is_bookkeeping(node: ast.stmt) -> bool:
@@ -287,7 +341,7 @@ def _reached(root: Path, entries: Iterable[Path]) -> set[Path]:
 
 def _imported(root: Path, path: Path) -> Iterator[Path]:
     """The files that a file imports; what a package passes on is followed to where it is made."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "nmpcrl":
             for alias in node.names:
                 yield from _defined(root, str(node.module), alias.name)
@@ -301,7 +355,7 @@ def _defined(root: Path, module: str, name: str) -> Iterator[Path]:
     elif (place / f"{name}.py").is_file():
         yield place / f"{name}.py"
     elif (place / "__init__.py").is_file():
-        for node in ast.parse((place / "__init__.py").read_text()).body:
+        for node in ast.parse((place / "__init__.py").read_text("utf-8")).body:
             if isinstance(node, ast.ImportFrom):
                 for alias in node.names:
                     if (alias.asname or alias.name) == name and node.module != module:

@@ -3,14 +3,15 @@
 Analyses read records and nothing else. Loading never unpickles.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.study import paper
 from nmpcrl.study.archive import (
     Column,
@@ -70,40 +71,58 @@ def final_cost(cost: Vector) -> float:
     return float(learned.mean()) if learned.size else np.inf
 
 
+class StepRow(NamedTuple):
+    """A row of `Records.steps`, but for alpha_phi2, which is filled when a run has ended."""
+
+    episode: int
+    time: int
+    state: Vector
+    action: Vector
+    cost: float
+    value: float
+    next_value: float
+    delta: float
+    features: Vector
+    theta: Vector
+    w: Vector
+    loss: float
+    status: int
+    restarts: int
+    violation: float
+    iterations: int
+    solves: int
+    solve_seconds: float
+    fit_seconds: float
+    seconds: float
+
+
+class EvaluationRow(NamedTuple):
+    """A row of `Records.evaluations`."""
+
+    episode: int
+    theta: Vector
+    cost: float
+    states: Matrix
+    actions: Matrix
+
+
 def step_fields(n: int, m: int, d: int) -> list[Field]:
-    """The columns of `Records.steps` that are filled step by step."""
-    return [
-        ("episode", int),
-        ("time", int),
-        ("state", float, n),
-        ("action", float, m),
-        ("cost", float),
-        ("value", float),
-        ("next_value", float),
-        ("delta", float),
-        ("features", float, d),
-        ("theta", float, d),
-        ("w", float, d),
-        ("loss", float),
-        ("status", int),
-        ("restarts", int),
-        ("violation", float),
-        ("iterations", int),
-        ("solves", int),
-        ("solve_seconds", float),
-        ("fit_seconds", float),
-        ("seconds", float),
-    ]
+    """The columns of `StepRow` for so many states, inputs and parameters."""
+    return _fields(
+        StepRow, {"state": n, "action": m} | dict.fromkeys(("features", "theta", "w"), d)
+    )
 
 
 def evaluation_fields(n: int, m: int, d: int, steps: int) -> list[Field]:
-    """The columns of `Records.evaluations`, for rollouts of so many steps."""
+    """Those of `EvaluationRow`, for rollouts of so many steps."""
+    return _fields(EvaluationRow, {"theta": d, "states": (steps, n), "actions": (steps, m)})
+
+
+def _fields(row: type[NamedTuple], shapes: Mapping[str, Any]) -> list[Field]:
+    """One column a field of a row; those that are arrays have a shape."""
+    kinds = row.__annotations__
     return [
-        ("episode", int),
-        ("theta", float, d),
-        ("cost", float),
-        ("states", float, (steps, n)),
-        ("actions", float, (steps, m)),
+        (name, float, shapes[name]) if name in shapes else (name, kinds[name]) for name in kinds
     ]
 
 
@@ -121,7 +140,7 @@ class Table:
         self._size = 0
 
     def append(self, row: tuple[Any, ...]) -> None:
-        """Fill the next row; one value a field, in their order."""
+        """Fill the next row; one value a field, in their order, as a named tuple has them."""
         self._rows[self._size] = row
         self._size += 1
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.setup import LEARNERS
 from nmpcrl.study.sweeps import paper_runs
 
 PERTURBATION = 1e-12  # added to theta_x at the start
@@ -21,7 +22,7 @@ def perturbed(experiment: Experiment) -> Experiment:
 
 def pairs(**fields: Any) -> tuple[Pair, ...]:
     """Every learner's run and its perturbed replica; `fields` as `paper_runs` takes them."""
-    moving = [e for e in paper_runs(**fields) if e.learner != "frozen"]
+    moving = [e for e in paper_runs(**fields) if LEARNERS[e.learner].moves]
     return tuple((e, perturbed(e)) for e in moving)
 
 

@@ -89,7 +89,7 @@ class Reservations:
             lock.acquire(timeout=0)
             self._alive = lock
         if names:
-            self._note.write_text(json.dumps(sorted(names)))
+            self._note.write_text(json.dumps(sorted(names)), "utf-8")
         elif self._alive is not None:
             self._note.unlink(missing_ok=True)
             alive.unlink(missing_ok=True)
@@ -122,6 +122,6 @@ def _of(process: int, folder: Path) -> Reservations:
 
 def _read(note: Path) -> set[str]:
     try:
-        return set(json.loads(note.read_text()))
+        return set(json.loads(note.read_text("utf-8")))
     except (OSError, ValueError):  # its writer found no room for it
         return set()

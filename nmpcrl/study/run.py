@@ -15,7 +15,9 @@ from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import Diverged, Step, absurd, train
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import (
+    EvaluationRow,
     Records,
+    StepRow,
     StepStatus,
     Stopped,
     Table,
@@ -24,7 +26,7 @@ from nmpcrl.study.records import (
     most_evaluations,
     step_fields,
 )
-from nmpcrl.study.setup import controller_of, prepare
+from nmpcrl.study.setup import controller_of, prepare, step_size
 
 UNKNOWN = Successor(np.nan)  # of a step that was not bootstrapped
 UNSOLVED: Any = SimpleNamespace(  # stands in for a solve that failed or was not asked for
@@ -86,7 +88,7 @@ def _run(
     except Diverged as error:
         stopped = f"{Stopped.DIVERGED}: {error}"
     table, judged = steps.columns(), evaluations.columns()
-    table["alpha_phi2"] = experiment.alpha * (table["features"] ** 2).sum(axis=1)
+    table["alpha_phi2"] = step_size(experiment) * (table["features"] ** 2).sum(axis=1)
     facts = {
         "stopped": stopped,
         "solver": solver,  # what solved: fatrop where riccati was not to be had, if only once
@@ -111,40 +113,40 @@ def _solvers(step: Step) -> list[str]:
     return [one.solver for one in (step.plan, step.solution, successor.solution) if one]
 
 
-def _row(step: Step, seconds: float) -> tuple[Any, ...]:
-    """The row of `Records.steps` for one step of training, in the order of `step_fields`."""
+def _row(step: Step, seconds: float) -> StepRow:
+    """One step of training as a row."""
     update = step.update
     successor = (update and update.successor) or UNKNOWN
     first = step.solution or UNSOLVED
     solves = list(dict.fromkeys(filter(None, (step.plan, step.solution, successor.solution))))
     restarts = sum(solve.restarts for solve in solves)
-    return (
-        step.episode,
-        step.time,
-        step.state,
-        step.action,
-        step.cost,
-        first.value,
-        successor.value,
-        np.nan if update is None or update.delta is None else update.delta,
-        first.features,
-        step.weights.theta,
-        step.weights.w,
-        successor.loss,
-        StepStatus.of(failed=bool(step.failure), restarts=restarts),
-        restarts,
-        max((solve.violation for solve in solves), default=np.nan),
-        sum(solve.iterations for solve in solves),
-        len(solves),
-        sum(solve.seconds for solve in solves),
-        successor.seconds,
-        seconds,
+    return StepRow(
+        episode=step.episode,
+        time=step.time,
+        state=step.state,
+        action=step.action,
+        cost=step.cost,
+        value=first.value,
+        next_value=successor.value,
+        delta=np.nan if update is None or update.delta is None else update.delta,
+        features=first.features,
+        theta=step.weights.theta,
+        w=step.weights.w,
+        loss=successor.loss,
+        status=StepStatus.of(failed=bool(step.failure), restarts=restarts),
+        restarts=restarts,
+        violation=max((solve.violation for solve in solves), default=np.nan),
+        iterations=sum(solve.iterations for solve in solves),
+        solves=len(solves),
+        solve_seconds=sum(solve.seconds for solve in solves),
+        fit_seconds=successor.seconds,
+        seconds=seconds,
     )
 
 
 def _evaluation(
     controller: Persistent, weights: Weights, episode: int, steps: int
-) -> tuple[Any, ...]:
+) -> EvaluationRow:
     """The row of `Records.evaluations` for the policy of `weights`."""
     rollout = evaluate(controller, weights.theta, steps)
     missing = ((0, steps - len(rollout.states)), (0, 0))
@@ -152,4 +154,4 @@ def _evaluation(
         np.pad(reached, missing, constant_values=np.nan)
         for reached in (rollout.states, rollout.actions)
     )
-    return episode, weights.theta, rollout.cost, states, actions
+    return EvaluationRow(episode, weights.theta, rollout.cost, states, actions)

@@ -1,9 +1,10 @@
 """From an experiment to what `train` takes: controller, learner, first weights and noise."""
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -25,11 +26,13 @@ from nmpcrl.learning import (
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Exploration, count_episodes, count_steps
 from nmpcrl.study import paper
+from nmpcrl.study.parameters import ParameterError
 
 if TYPE_CHECKING:
     from nmpcrl.study.experiment import Experiment
 
 SMALL_BUFFER = 10 * paper.STEPS  # examples
+AVERAGING = 0.005  # the part of the way that a slow copy goes a step: Fujimoto et al. (2018)
 LEAST_SCALE = 1e-3  # that an input of the normalised network is divided by
 
 DECAYS = {"step": count_steps, "episode": count_episodes}  # departure C
@@ -60,7 +63,8 @@ def controller_of(experiment: "Experiment") -> Persistent:
 def compile_ahead(experiments: Iterable["Experiment"]) -> None:
     """Compile what the runs will call, so that their processes find it done."""
     kinds = {
-        (e.layout, e.start, e.target, e.box, e.solver, e.learner == "TDC"): e for e in experiments
+        (e.layout, e.start, e.target, e.box, e.solver, LEARNERS[e.learner].curved): e
+        for e in experiments
     }
     for experiment in kinds.values():
         controller = controller_of(experiment)
@@ -68,14 +72,18 @@ def compile_ahead(experiments: Iterable["Experiment"]) -> None:
         solution = nmpc.solve(nmpc.task.start, theta)
         nmpc.plant.step(solution.state, solution.action)
         nmpc.task.stage_cost(solution.state, solution.action)
-        if experiment.learner == "TDC":
+        if LEARNERS[experiment.learner].curved:
             nmpc.value_hessian_times(solution, theta)
 
 
 def prepare(
     experiment: "Experiment", controller: Persistent
 ) -> tuple[Learner, Weights, Exploration]:
-    """The learner, its first weights and its noise: all that `train` needs besides `controller`."""
+    """The learner, its first weights and its noise: all that `train` needs besides `controller`.
+
+    Raises:
+        ParameterError: the learner holds or reads what its entry in `LEARNERS` does not say.
+    """
     children = np.random.SeedSequence(experiment.seed).spawn(3)
     generators = Generators(*map(np.random.default_rng, children))
     explore = Exploration.draw(
@@ -87,15 +95,57 @@ def prepare(
     )
     theta = np.array(experiment.theta)
     weights = Weights(theta, np.full(theta.size, paper.W_INIT))
-    return LEARNERS[experiment.learner](experiment, controller, generators), weights, explore
+    entry = LEARNERS[experiment.learner]
+    learner = entry.make(_as_read(experiment), controller, generators)
+    if hasattr(learner.bootstrap, "network") and not entry.network:
+        raise ParameterError(
+            f"learner = {experiment.learner!r} holds a network: its entry in LEARNERS needs"
+            " network=True, so that its runs are named by the version of torch, too"
+        )
+    return learner, weights, explore
+
+
+def step_size(experiment: "Experiment") -> float:
+    """The step size of theta that a run's learner has, which its recorded alpha ||phi||^2 uses."""
+    return LEARNERS[experiment.learner].step_size(_as_read(experiment))
+
+
+def readers(name: str) -> tuple[str, ...]:
+    """The learners that read a field of `Experiment` that not all do."""
+    return tuple(learner for learner, entry in LEARNERS.items() if name in entry.reads)
+
+
+class _AsRead:
+    """An experiment that refuses the fields that its learner's entry does not name."""
+
+    def __init__(self, experiment: "Experiment") -> None:
+        optional = {one.name for one in fields(experiment) if one.metadata["optional"]}
+        self._experiment = experiment
+        self._refused = optional - set(LEARNERS[experiment.learner].reads)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in self._refused:
+            raise ParameterError(
+                f"learner = {self._experiment.learner!r} reads {name}: its entry in LEARNERS needs"
+                f" {name!r} in `reads`, so that {name} is part of the names of its runs"
+            )
+        return getattr(self._experiment, name)
+
+
+def _as_read(experiment: "Experiment") -> "Experiment":
+    """The experiment as its learner may read it."""
+    return cast("Experiment", _AsRead(experiment))
 
 
 class Network(NamedTuple):
-    """A way to read what the paper leaves open of the network.  # departure H"""
+    """A way to read what the paper leaves open of the network.  # departures H and I"""
 
     options: Mapping[str, Any] = MappingProxyType({})  # of `QNetwork`
     fits: int = 1  # mini-batches a step
     normalised: bool = False  # whether inputs and target are divided by `scales`
+    target: Callable[["Experiment"], Mapping[str, Any]] | None = None  # gives options of `Target`
+    late: bool = False  # whether the value is predicted before the step's fit
+    greedy: bool = False  # whether the next action is the network's minimiser, and not u_1
 
 
 NETWORKS = {
@@ -104,6 +154,10 @@ NETWORKS = {
     "tanh": Network({"activation": "tanh"}),
     "small buffer": Network({"memory": SMALL_BUFFER}),
     "four fits": Network(fits=4),
+    "lagged": Network(target=lambda e: {"every": e.steps}),  # refreshed once an episode
+    "averaged": Network(target=lambda _: {"rate": AVERAGING}),
+    "greedy": Network(greedy=True),
+    "late": Network(late=True),
 }
 
 
@@ -116,10 +170,11 @@ def _network_learner(
     with_theta: bool,
 ) -> Learner:
     """A learner whose network predicts the next value."""
-    from nmpcrl.learning.network import QNetwork  # and with it torch: not for the other learners
+    from nmpcrl.learning.network import QNetwork, Target  # and torch: not for the other learners
 
-    plant, (options, fits, normalised) = controller.nmpc.plant, NETWORKS[experiment.network]
-    if normalised:
+    plant, read = controller.nmpc.plant, NETWORKS[experiment.network]
+    options = read.options
+    if read.normalised:
         scales = _scales(controller, np.array(experiment.theta), with_theta=with_theta)
         options = {**options, "scales": scales}
     network = QNetwork(
@@ -129,7 +184,16 @@ def _network_learner(
         batch=paper.BATCH,
         **options,
     )
-    return make(controller, network, experiment.alpha, gated=experiment.gated, fits=fits)
+    return make(
+        controller,
+        network,
+        experiment.alpha,
+        gated=experiment.gated,
+        fits=read.fits,
+        target=Target(network, **read.target(experiment)) if read.target else None,
+        late=read.late,
+        actions=(plant.lower, plant.upper) if read.greedy else None,
+    )
 
 
 def _scales(controller: Persistent, theta: Vector, *, with_theta: bool) -> tuple[Vector, float]:
@@ -157,14 +221,51 @@ def _tdc(experiment: "Experiment", controller: Persistent, _: Generators) -> Lea
     )
 
 
-LEARNERS: dict[str, Factory] = {  # the only list of learners: a name that is not in it is refused
-    "ES": lambda e, nmpc, _: expected_sarsa(nmpc, e.alpha),
-    "DES": partial(_network_learner, deep_expected_sarsa, with_theta=False),
-    "RDES": partial(_network_learner, regularized_deep_expected_sarsa, with_theta=True),
-    "GES": lambda e, nmpc, _: gradient_expected_sarsa(nmpc, e.alpha, e.beta),
-    "TDC": _tdc,
-    "QL": lambda e, nmpc, _: q_learning(nmpc, e.alpha),
-    "frozen": lambda _, nmpc, __: frozen(nmpc),
-    "matched": lambda e, nmpc, _: step_matched(nmpc, e.alpha, e.beta),
-    "random": lambda e, nmpc, rngs: random_direction(nmpc, e.alpha, rngs.directions),
+MOVING = ("alpha", "ties_active")  # fields that learners read whose theta moves
+VALUING = (*MOVING, "constrained")  # that may value u_0 = a or not
+IMITATING = (*VALUING, "zeta", "gated", "network")  # that hold a network
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A learner as experiments name it.
+
+    A field of `Experiment` that not all learners read is read, and is part of a run's key, only
+    where `reads` has it; a factory that reads another is refused.
+    """
+
+    make: Factory
+    reads: tuple[str, ...] = VALUING  # fields that not all learners read
+    network: bool = False  # whether it holds one: torch then is part of its keys
+    solves: int = 2  # a step, without the one for Q(s, a)
+    step_size: Callable[["Experiment"], float] = lambda e: e.alpha  # of theta
+    moves: bool = True  # whether theta does
+    valued: bool = False  # whether Q(s, a) itself is always learned, with u_0 = a fixed
+    curved: bool = False  # whether it asks for the Hessian of the value
+
+
+def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:
+    """The entry of a learner whose network predicts the next value."""
+    factory = partial(_network_learner, make, with_theta=with_theta)
+    return Entry(factory, IMITATING, network=True, solves=1)
+
+
+LEARNERS: dict[str, Entry] = {  # the only list of learners: a name that is not in it is refused
+    "ES": Entry(lambda e, nmpc, _: expected_sarsa(nmpc, e.alpha)),
+    "DES": _imitating(deep_expected_sarsa, with_theta=False),
+    "RDES": _imitating(regularized_deep_expected_sarsa, with_theta=True),
+    "GES": Entry(
+        lambda e, nmpc, _: gradient_expected_sarsa(nmpc, e.alpha, e.beta), (*VALUING, "beta")
+    ),
+    "TDC": Entry(_tdc, (*VALUING, "curvature", "projected", "beta_tdc"), curved=True),
+    "QL": Entry(lambda e, nmpc, _: q_learning(nmpc, e.alpha), MOVING, valued=True),
+    "frozen": Entry(
+        lambda _, nmpc, __: frozen(nmpc),
+        reads=(),
+        solves=1,
+        step_size=lambda _: paper.ALPHA,  # that theta would have
+        moves=False,
+    ),
+    "matched": Entry(lambda e, nmpc, _: step_matched(nmpc, e.alpha, e.beta), (*VALUING, "beta")),
+    "random": Entry(lambda e, nmpc, rngs: random_direction(nmpc, e.alpha, rngs.directions)),
 }

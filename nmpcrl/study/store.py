@@ -17,7 +17,15 @@ from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.geometry import short_name
 from nmpcrl.study.place import StoreError, check_folder, folder, keep, refusal, say, set_aside
-from nmpcrl.study.provenance import ORIGINAL, identity, key, provenance, warn_of_changes
+from nmpcrl.study.provenance import (
+    before,
+    identity,
+    is_accepted,
+    key,
+    locked_hash,
+    provenance,
+    warn_of_changes,
+)
 from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
 from nmpcrl.study.reservation import reservations, reserved
 from nmpcrl.study.run import run
@@ -227,14 +235,15 @@ def check_run(
         facts: that it states.
 
     Raises:
-        DamagedRecords: it is of another run.
+        DamagedRecords: it is of another run, or of code with other numbers.
     """
-    before = {name: value for name, value in ORIGINAL.items() if name != "obstacles"}
-    stated = Experiment(**{**before, **fields})
+    stated = Experiment(**{**before(), **fields})
     if identity(stated) != identity(experiment):
         raise DamagedRecords(f"{path} holds another run, {name_of(stated)}")
     if facts.get("key", key(experiment)) != key(experiment):
         raise DamagedRecords(f"{path} holds a run of other code or other versions than it says")
+    if not is_accepted(facts.get("sources", locked_hash())):
+        raise DamagedRecords(f"{path} holds a run of code that is neither this nor locked")
     if other := solved_by_another(experiment, facts):
         raise DamagedRecords(f"{path} holds a run {other}")
 

@@ -102,6 +102,24 @@ def here(experiments, **options):
         return fetch_summaries(experiments, executor=one, progress=False, **options)
 
 
+def test_without_numba_nothing_is_trained_that_could_not_be_kept(monkeypatch):
+    monkeypatch.setattr(summaries, "run", lambda _: pytest.fail("it was trained"))
+    monkeypatch.setattr(summaries, "environment", lambda: {"numba": "absent"})
+    with pytest.raises(summaries.OtherSolver, match="riccati, which 6 of the missing runs name"):
+        here(SIX)
+
+
+def test_threads_of_one_process_make_what_one_makes(monkeypatch, tmp_path):
+    """Torch's generator, from which networks are drawn, is one for the whole process."""
+    networks = sweep(learner=("DES", "RDES"), seed=tuple(range(4)), episodes=3, steps=40)
+    alone = here(networks)
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "again"))
+    with ThreadPoolExecutor(4) as threads:
+        together = fetch_summaries(networks, executor=threads, progress=False)
+    for one in networks:
+        assert_same_summary(alone[one], together[one])
+
+
 def times(log: Path, what: str) -> list[int]:
     """The seeds that have begun or ended, as often as they did."""
     lines = [line.split() for line in log.read_text().splitlines()]
@@ -379,8 +397,18 @@ def test_a_run_that_is_wanted_afresh_is_trained_though_it_is_stored(trained):
 def test_a_summary_of_a_stored_run_says_which_code_made_the_run(monkeypatch):
     fetch(QUICK)
     then = provenance.sources_hash()
+    monkeypatch.setattr(provenance, "locked_hash", lambda: then)
     monkeypatch.setattr(provenance, "sources_hash", lambda: "edited since")
     assert here([QUICK])[QUICK].facts["sources"] == then
+
+
+def test_a_summary_of_edited_code_is_made_again_when_the_edit_is_reverted(monkeypatch, trained):
+    with monkeypatch.context() as edited:
+        edited.setattr(provenance, "sources_hash", lambda: "of an edit")
+        here([QUICK])
+    assert not summaries.is_stored(QUICK)
+    assert here([QUICK])[QUICK].facts["sources"] == provenance.sources_hash()
+    assert len(trained) == 2
 
 
 INTERRUPTED = """
@@ -426,7 +454,8 @@ def test_an_interrupt_that_a_worker_meets_first_begins_nothing_anew(workers):
 def test_an_interrupted_study_goes_on_where_it_was(workers, folder, request):
     log = workers(pause=2)
     program = request.getfixturevalue("interrupted")
-    wait_until(lambda: any(folder.glob("*.npz")))
+    # once the caller has kept all that was made: on a busy machine it may be behind its workers
+    wait_until(lambda: 0 < len(times(log, "ended")) == len(list(folder.glob("*.npz"))))
     began = len(times(log, "began"))
     os.killpg(program.pid, signal.SIGINT)  # as a terminal does: the whole group is told
     said = program.communicate(timeout=240)[1]

@@ -5,8 +5,9 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from nmpcrl.analysis import metrics
-from nmpcrl.analysis.summary import RunSummary, row, summarise, table, tidy
+from nmpcrl.analysis import metrics, rows
+from nmpcrl.analysis.rows import experiment_of, row, table, tidy
+from nmpcrl.analysis.summary import RunSummary, summarise
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.records import DamagedRecords, Records
@@ -140,6 +141,19 @@ def test_the_tidy_table_has_a_row_an_episode(short):
     assert set(frame.learner) == {"RDES"}
 
 
-def test_a_field_that_is_younger_than_a_run_has_its_default_in_the_row(short):
-    older = {name: value for name, value in short.experiment.items() if name != "start"}
-    assert row(replace(short, experiment=older)) == row(short)
+def test_the_columns_of_a_row_are_those_that_are_named(short):
+    assert tuple(row(short)) == (*rows.FIELDS, *rows.OUTCOME)
+
+
+def test_a_field_that_is_younger_than_a_run_has_what_all_runs_had_before(short, monkeypatch):
+    """Today's default may be another one."""
+    monkeypatch.setitem(rows.OLDER, "start", "-1.0 1.0 0.0")
+    monkeypatch.setitem(rows.OLDER, "tolerance", 1e-6)
+    younger = ("start", "tolerance")
+    older = {name: value for name, value in short.experiment.items() if name not in younger}
+    found = row(replace(short, experiment=older))
+    assert (found["start"], found["tolerance"]) == ("-1.0 1.0 0.0", 1e-6)
+    for name in younger:
+        del found[name]
+    named = experiment_of(found)
+    assert (named.start, named.tolerance) == ((-1.0, 1.0, 0.0), 1e-6)

@@ -33,20 +33,29 @@ def test_who_is_compared_with_itself_takes_as_long_but_for_what_one_process_cann
     assert (found.value, found.low, found.high) == pytest.approx((1, 1 / 1.03, 1.03))
 
 
-def test_a_machine_that_becomes_slower_for_all_changes_nothing():
+def test_a_machine_that_becomes_slower_for_all_changes_next_to_nothing():
     mine, theirs = drawn(1, 0.6)
     slow = np.where(np.arange(ROUNDS) > ROUNDS / 2, 2.0, 1.0)
     before, after = (
         paired_ratio(a, b, a, b) for a, b in ((mine, theirs), (slow * mine, slow * theirs))
     )
-    assert after == before
+    assert after.value == pytest.approx(before.value, rel=0.005)
+    assert before.low < after.value < before.high
 
 
-def test_a_third_of_the_rounds_disturbed_in_one_learner_alone_widens_the_interval_first():
+def test_a_few_long_steps_count_by_their_length_as_they_do_in_a_run():
+    ones = np.ones(ROUNDS)
+    long = np.where(np.arange(ROUNDS) % 13 == 0, 14.0, 1.0)
+    found = paired_ratio(long, ones, long, ones)
+    assert found.value == pytest.approx(long.mean())
+    assert found.value > 1.9
+    assert np.median(long / ones) == 1  # which is what a median of ratios would say
+
+
+def test_rounds_disturbed_in_one_learner_alone_widen_the_interval():
     mine, theirs = drawn(2, 1.0)
     disturbed = mine * np.where(np.random.default_rng(0).random(ROUNDS) < 1 / 3, 3.0, 1.0)
     calm, found = (paired_ratio(a, theirs, a, theirs) for a in (mine, disturbed))
-    assert found.value == pytest.approx(1, abs=0.05)
     assert found.high / found.low > calm.high / calm.low
 
 

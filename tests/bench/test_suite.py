@@ -88,6 +88,13 @@ def test_what_is_asked_for_alone_is_measured_alone_and_then_read_with_the_rest(c
     assert counted == ["short"]
 
 
+def test_who_asks_for_all_but_the_learners_waits_for_no_learner():
+    assert suite.STEPS not in suite.OTHERS
+    assert {suite.STEPS, *suite.OTHERS} == {
+        name for name, _ in suite._stages(suite.LENGTHS["full"])
+    }
+
+
 def test_an_interrupted_benchmark_keeps_the_stages_that_it_has_measured(counted, monkeypatch):
     stages = suite._stages
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.bench import summary, targets
+from nmpcrl.claims import published
 from nmpcrl.report import tables
 from nmpcrl.study import paper
 
@@ -80,23 +81,66 @@ def test_quadratic_growth_is_seen(measured):
     assert len(missed(measured)) == 2
 
 
-def test_the_ratio_of_the_learners_comes_down_to_one_half_and_breaks_even_where_it_says():
-    model = summary.Saving(network=0.2, rest=0.03, rest_rdes=0.05)
-    assert model.ratio(1e9) == pytest.approx(0.5)
-    assert model.break_even == pytest.approx(0.22)
-    assert model.ratio(model.break_even) == pytest.approx(1.0)
-    assert model.ratio(model.solve_at(0.55)) == pytest.approx(0.55)
-    assert (np.diff(model.ratio(np.geomspace(0.01, 1e3))) < 0).all()
+def model(**changed) -> summary.Saving:
+    """Two solvers; a fit takes longer beside the slow one, which gains less from a warm start."""
+    parts = {
+        "solve": [0.05, 1.0],
+        "warm": [0.7, 0.8],
+        "network": [0.1, 0.2],
+        "rest": [0.02, 0.03],
+        "rest_rdes": [0.02, 0.05],
+    }
+    return summary.Saving(**{name: np.array(one) for name, one in (parts | changed).items()})
 
 
-def test_the_parts_are_those_of_the_fastest_solver(measured):
-    assert summary.saving(measured) == summary.Saving(0.2, 0.02, 0.02)
+def test_the_ratio_of_the_learners_breaks_even_where_it_says_and_comes_down_to_what_u_allows():
+    two = model()
+    assert two.ratio(1e9) == pytest.approx(1 / 1.6)
+    assert two.ratio(1e9, warm=1.0) == pytest.approx(0.5)
+    assert two.ratio(two.break_even) == pytest.approx(1.0)
+    assert two.ratio(two.solve_at(0.65)) == pytest.approx(0.65)
+    assert two.solve_at(0.6) == np.inf
 
 
-def test_learners_whose_steps_are_the_sum_of_these_parts_lie_on_the_curve(measured):
-    model, ran = summary.saving(measured), summary.measured_ratios(measured)
+def test_with_solves_that_take_alike_it_is_the_equation_without_u():
+    same = model(warm=[1.0, 1.0], network=[0.2, 0.2], rest=[0.03, 0.03], rest_rdes=[0.05, 0.05])
+    assert same.break_even == pytest.approx(0.22)
+    assert same.break_even_within == pytest.approx((0.22, 0.22))
+    assert (np.diff(same.ratio(np.geomspace(0.01, 1e3))) < 0).all()
+
+
+def test_the_break_even_lies_within_its_interval_whatever_way_leads_from_solver_to_solver():
+    low, high = model().break_even_within
+    assert low < model().break_even < high
+    assert (low, high) == pytest.approx((0.1 / 0.6, 0.22 / 0.4))
+    for early in (True, False):  # all changes at the fast end, or at the slow one
+        at = (0.051, 1.0) if early else (0.05, 0.999)
+        assert low <= model(solve=np.array(at)).break_even <= high
+
+
+def test_a_break_even_that_is_not_between_two_solvers_is_none():
+    slow = model(solve=[10.0, 100.0])
+    assert slow.break_even < 10
+    assert np.isnan(slow.break_even_within).all()
+    free = model(network=[0.0, 0.0], rest_rdes=[0.0, 0.0], rest=[0.02, 0.02])
+    assert free.break_even == 0
+    never = model(warm=[0.4, 0.4])
+    assert never.break_even == np.inf
+    assert np.isnan(never.break_even_within).all()
+
+
+def test_the_curve_goes_through_what_was_measured(measured):
+    table = summary.learners(measured)
+    curve, ran = summary.saving(table), summary.measured_ratios(table)
     assert list(ran.index) == ["riccati", "fatrop", "ipopt"]
-    assert ran.ratio.to_numpy() == pytest.approx(model.ratio(ran.solve.to_numpy()))
+    assert ran.ratio.to_numpy() == pytest.approx(curve.ratio(ran.solve.to_numpy()))
+
+
+def test_the_curve_goes_through_the_published_ratios():
+    """And so a bar of parts ends at the ratio that is written beside it."""
+    timings = published.load().timings
+    curve, ran = summary.saving(timings), summary.measured_ratios(timings)
+    assert ran.ratio.to_numpy() == pytest.approx(curve.ratio(ran.solve.to_numpy()), rel=1e-6)
 
 
 def test_what_was_not_measured_is_unknown(measured):
@@ -166,6 +210,6 @@ def test_the_printed_table_has_the_same_rows(measured):
 
 def test_a_ratio_that_json_could_not_hold_is_not_known(measured):
     measured["learners"]["ratio_low"] = [None] * len(measured["learners"]["ratio_low"])
-    ratios = summary.measured_ratios(measured)
+    ratios = summary.measured_ratios(summary.learners(measured))
     assert np.isfinite(ratios.ratio).all()
     assert summary.learners(measured).ratio_low.isna().all()

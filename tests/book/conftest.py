@@ -6,9 +6,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict
 
 import pytest
+from bs4 import BeautifulSoup
 from filelock import FileLock
 from live_page import Tab
 from visits import Visit, look_at
+
+
+@pytest.fixture(scope="session")
+def html(site) -> Callable[[str], BeautifulSoup]:
+    """A parsed page of the site, by path."""
+    return functools.cache(lambda path: BeautifulSoup((site / path).read_text(), "html.parser"))
 
 
 @pytest.fixture(scope="session")

@@ -15,6 +15,7 @@ import yaml
 from bs4 import BeautifulSoup
 from click.testing import CliRunner
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from papermill.cli import _resolve_type
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -177,6 +178,50 @@ def test_a_whole_build_ends_with_the_path_of_the_book(small):
 
 
 @pytest.mark.book
+def test_a_build_that_failed_goes_on_where_it_was_and_one_that_is_done_begins_anew(small):
+    save(small, new_code_cell("open('executions', 'a').write('x')"))
+    intro, executions = small / "book/intro.md", small / "executions"
+    good = intro.read_text()
+    intro.write_text(f"{good}\n[nowhere](nowhere.md)\n")
+    assert run(small).returncode == 1
+    intro.write_text(good)
+    second = run(small)
+    assert second.returncode == 0, second.stderr
+    assert "executed before: one" in second.stdout
+    assert executions.read_text() == "x"
+    assert run(small).returncode == 0
+    assert executions.read_text() == "xx"
+
+
+@pytest.mark.book
+def test_what_was_executed_before_a_source_was_changed_is_executed_again(small):
+    save(small, new_code_cell("open('executions', 'a').write('x')"))
+    (small / "book/intro.md").write_text("[nowhere](nowhere.md)\n")
+    assert run(small).returncode == 1
+    save(small, new_code_cell("open('executions', 'a').write('y')"))
+    assert run(small).returncode == 1
+    assert (small / "executions").read_text() == "xy"
+
+
+@pytest.mark.book
+@pytest.mark.skipif(os.name == "nt", reason="Windows has ports only")
+def test_no_port_that_another_program_may_take_leads_to_a_kernel(small):
+    save(small, new_code_cell("import ipykernel\nprint(ipykernel.get_connection_info())"))
+    assert run(small).returncode == 0
+    executed = nbformat.read(small / "_build/executed/one.ipynb", 4)
+    assert '"transport": "ipc"' in executed.cells[-1].outputs[0].text
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has ports only")
+def test_no_two_kernels_share_the_files_through_which_they_are_talked_to():
+    with build.sockets() as one, build.sockets() as other:
+        places = [Path(each.KernelManager.ip) for each in (one, other)]
+        assert len({place.parent for place in places}) == 2
+        assert all(place.parent.is_dir() and not any(place.parent.iterdir()) for place in places)
+    assert not any(place.parent.exists() for place in places)
+
+
+@pytest.mark.book
 def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(small):
     assert run(small, "--smoke").returncode == 0
     assert not (small / "_build/html").exists()
@@ -326,3 +371,12 @@ def test_papermill_runs_a_chapter_to_its_end_whatever_the_answers_are(answer, sm
     *_, check, _, last = nbformat.read(small / "o.ipynb", 4).cells
     assert not check.outputs[0].data["text/plain"].startswith("Right")
     assert last.outputs[0].text == "2\n"
+
+
+@pytest.mark.parametrize(
+    "text", ["True", "False", "None", "3", "-3", "3.5", "1e-7", "nan", "A", "true", "[0]", ""]
+)
+def test_a_parameter_is_what_papermill_takes_it_for(text):
+    mine, theirs = build.typed(text), _resolve_type(text)
+    assert type(mine) is type(theirs)
+    assert mine == theirs or text == "nan"

@@ -5,15 +5,21 @@ import math
 import re
 import zipfile
 from base64 import b64encode
+from importlib.metadata import distributions, requires
 from pathlib import Path
 
 import course
+import editions
+import handout
 import nbformat
 import plans
 import pytest
 import syllabus
+from click.testing import CliRunner
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_notebook, new_output
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from nmpcrl.course.exercises import exercises, solved
 from nmpcrl.report.figures.sheet import MIME
@@ -21,13 +27,12 @@ from nmpcrl.report.figures.sheet import MIME
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = course.chapters()
 PAGES = set(SOURCES)
-WHEEL = "nmpcrl.whl"
 
 each_chapter = pytest.mark.parametrize("name", SOURCES)
 
 
 def made(edition: str, name: str):
-    return course.EDITIONS[edition](SOURCES[name], PAGES, WHEEL)
+    return course.EDITIONS[edition](SOURCES[name], PAGES)
 
 
 def text(notebook) -> str:
@@ -140,6 +145,50 @@ def test_the_syllabus_says_where_a_live_figure_helps_for_those_that_there_are():
         syllabus.helps("new-live")
 
 
+WHEEL = "nmpcrl-0.1.0-py3-none-any.whl"
+
+
+def test_an_edition_installs_what_it_needs_and_nothing_that_tests_or_builds():
+    lines = handout.requirements(WHEEL).splitlines()
+    names = {re.match(r"[\w.-]+", line)[0] for line in lines if line[0] not in "#-."}
+    assert {"casadi", "torch", "ipykernel", "papermill", "jupyterlab", "psutil"} <= names
+    assert not {"pytest", "ruff", "mypy", "sphinx", "jupyter-book", "mpcrl", "dask"} & names
+    assert f"./{WHEEL}" in lines
+    assert handout.CPU in lines
+    pinned = set((ROOT / "environment.txt").read_text().splitlines())
+    assert {line for line in lines if line[0] not in "#-."} - pinned == {
+        line for line in lines if line.startswith("jupyterlab==")
+    }
+
+
+def test_what_an_edition_installs_is_all_that_it_brings():
+    """Nothing that is installed here and asked for by one of these is left out."""
+    names = set(handout.pins(ROOT / "environment.txt"))
+    lines = handout.requirements(WHEEL).splitlines()
+    chosen = {canonicalize_name(re.match(r"[\w.-]+", line)[0]) for line in lines[2:-1]}
+    for one in chosen & names:
+        for asked in map(Requirement, requires(one) or ()) if one in INSTALLED else ():
+            if not asked.marker or asked.marker.evaluate({"extra": ""}):
+                assert canonicalize_name(asked.name) in chosen, (one, asked.name)
+
+
+INSTALLED = {canonicalize_name(one.metadata["Name"]) for one in distributions()}
+
+
+@pytest.mark.parametrize("edition", course.EDITIONS)
+def test_an_edition_says_how_it_is_installed_on_three_systems(edition):
+    said = handout.readme(edition, WHEEL, "01_mdp_and_nmpc.ipynb")
+    for part in ("Windows", "macOS and Linux", "Python 3.11 to 3.14", WHEEL, "requirements.txt"):
+        assert part in said
+    assert ("solutions" in said) == (edition != "student")
+
+
+def test_an_edition_without_its_data_says_so_and_trains_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(FileNotFoundError, match="no folder `data` here"):
+        exec(editions.SETUP, {})
+
+
 @pytest.fixture
 def last_build(tmp_path, monkeypatch) -> Path:
     """An executed chapter with one figure."""
@@ -168,6 +217,19 @@ def test_without_an_executed_chapter_the_figures_are_not_whole_and_the_reason_is
     del notebook.cells[0].outputs[0].data[MIME]["pdf"]  # an older build
     nbformat.write(notebook, last_build / "01_a.ipynb")
     assert not course.is_whole("instructor/figures", {"01_a.ipynb": None})
+
+
+@pytest.mark.parametrize(("whole", "code"), [(True, 0), (False, 1)])
+def test_whoever_makes_a_course_without_a_built_book_is_told_by_the_exit_code_too(
+    whole, code, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(course, "PLACE", tmp_path)
+    monkeypatch.setattr(course, "SITE", tmp_path)
+    monkeypatch.setattr(course, "EDITIONS", {})
+    monkeypatch.setattr(course.offline, "stored", lambda sources: {})
+    monkeypatch.setattr(course, "is_whole", lambda name, sources: whole)
+    (tmp_path / "grader").mkdir()
+    assert CliRunner().invoke(course.main).exit_code == code
 
 
 @each_chapter

@@ -14,6 +14,8 @@ from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
 from pybtex.richtext import Text
 
+from nmpcrl.study.departures import DEPARTURES
+
 ROOT = Path(__file__).resolve().parents[2]
 BIBLIOGRAPHY = parse_file(str(ROOT / "book/references.bib"))
 PARTS = yaml.safe_load((ROOT / "_toc.yml").read_text())["parts"]
@@ -124,6 +126,7 @@ def test_a_citation_says_who_and_when(page):
 
 def test_the_page_of_references_has_what_is_cited_as_the_bibliography_has_it():
     cited = {key for page in SOURCES for _, to, key in links(page) if to == "references.md"}
+    cited |= set(re.findall(r"references\.md#(\w+)", str(DEPARTURES)))
     assert set(LABELS["references"]) == cited
     style, backend = (
         find_plugin(f"pybtex.{kind}", name)()

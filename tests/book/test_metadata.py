@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from nmpcrl.claims import published
-from nmpcrl.claims.rule import NOT, REPRODUCED
+from nmpcrl.claims.verdict import NOT, REPRODUCED
 
 ROOT = Path(__file__).resolve().parents[2]
 METADATA = yaml.safe_load((ROOT / "metadata.yaml").read_text())

@@ -294,6 +294,7 @@ MAY_BE = {  # what is drawn for a parameter, so that it is sometimes right
     "horizon": st.integers(-1, 30) | st.integers(),
     "seed": st.integers(),
     "study": st.sampled_from(["fresh", "published", "stale"]),
+    "repeat": st.sampled_from([True, False, "no", 1]),
     "budget": st.integers(0, 10**7),
     "length": st.sampled_from(["smoke", "short", "full", "long"]),
 }

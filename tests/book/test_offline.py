@@ -1,5 +1,7 @@
 """What an edition holds so that its notebooks need not train for long."""
 
+from types import SimpleNamespace
+
 import course
 import nbformat
 import offline
@@ -7,7 +9,7 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 
 from nmpcrl.analysis import summaries
-from nmpcrl.claims import failure_modes, published
+from nmpcrl.claims import evidence
 from nmpcrl.study import Experiment, store
 
 ASKS = """from nmpcrl.study import Experiment
@@ -58,12 +60,11 @@ def test_what_is_missing_is_trained_and_an_edition_reads_it(chapter, tmp_path, m
 def test_runs_with_networks_are_taken_and_those_without_are_not():
     whole, summarised = offline.needed(course.chapters())
     assert {one.learner for one in whole} == {"DES", "RDES"}
-    assert {one.learner for one in summarised} > {"ES", "GES", "TDC", "frozen"}
+    assert {one.learner for one in summarised} > {"ES", "GES", "TDC"}
 
 
-def test_the_examples_of_chapter_5_are_a_run_of_each_mechanism_of_the_published_study():
-    known = published.load()
-    found = [known.rows[one]["mechanism"] for one in offline.examples()]
-    assert sorted(found) == sorted(set(found))
-    assert len(found) >= 3
-    assert failure_modes.WELL not in found
+def test_all_runs_that_chapter_5_tries_as_examples_are_taken(monkeypatch):
+    runs = [Experiment("ES", seed=seed) for seed in (3, 4)]
+    tried = [("gap", SimpleNamespace(name=one)) for one in runs]
+    monkeypatch.setattr(evidence, "tried", lambda found: iter(tried))
+    assert offline.examples() == tuple(runs)

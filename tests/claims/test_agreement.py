@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.summary import table
+from nmpcrl.analysis.rows import row, table
 from nmpcrl.claims import agreement
 from nmpcrl.claims.agreement import contradictions, of_runs, of_times
 from nmpcrl.claims.paper_claims import judge_times
 from nmpcrl.claims.published import Published
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import design
 from nmpcrl.study.machine import fingerprint
 
@@ -74,7 +74,7 @@ def timings(ratio: float, waited: float = 0.0) -> pd.DataFrame:
 def timed(ratio: float) -> Published:
     """What is published of this machine."""
     taken = timings(ratio)
-    about = {"machine": fingerprint()}
+    about = {"timings": {"machine": fingerprint()}}
     return Published(verdicts=judge_times(taken), timings=taken, about=about)
 
 
@@ -90,7 +90,8 @@ def test_times_of_a_busy_machine_never_contradict():
 
 
 def test_times_of_another_machine_contradict_nothing():
-    known = replace(timed(0.65), about={"machine": fingerprint() | {"processor": "another"}})
+    another = {"machine": fingerprint() | {"processor": "another"}}
+    known = replace(timed(0.65), about={"machine": fingerprint(), "timings": another})
     assert of_times(timings(0.5), known) == ()
 
 
@@ -110,7 +111,7 @@ def diverges(experiment):
 def test_runs_contradict_published_ones_of_the_same_layouts(made_up):
     here, there = made_up(diverges), made_up()
     told = of_runs(here.summaries, published_of(there))
-    assert [one[:2] for one in told] == ["C1"]
+    assert [one[:2] for one in told] == ["C1", "W9"]
     assert "C1 is reproduced (100%" in told[0]
     assert "not reproduced (0%" in told[0]
 
@@ -144,4 +145,21 @@ def test_every_decidable_claim_of_the_runs_is_held_against_what_is_published(mad
 
     monkeypatch.setattr(agreement, "contradictions", keep)
     of_runs(made_up().summaries, published_of(made_up()))
-    assert asked == ["C1", "C2", "C5", "C6", "C7", "C9", "B1"]
+    assert asked == ["C1", "C2", "C5", "C6", "C7", "C9", "W7", "W9", "B1"]
+
+
+def test_published_runs_that_are_trained_again_are_counted_by_how_equal_they_are(made_up):
+    found = made_up(layouts=("A",), seeds=(0, 1))
+    rows = {e: row(one) for e, one in found.summaries.items()}
+    first, second, third, *_ = (e for e in rows if e.learner != "frozen")
+    rows[first] = rows[first] | {"final_cost": rows[first]["final_cost"] * (1 + 1e-9)}
+    rows[second] = rows[second] | {"theta_0": rows[second]["theta_0"] + 1}
+    parts = dict.fromkeys(rows, "main") | {third: "N = 5"}
+    told = agreement.repeated(found.summaries, Published(found.summaries, parts, rows))
+    assert (told.runs, told.equal, told.close) == (len(rows) - 1, len(rows) - 3, 1)
+    assert [one.claim for one in told.here] == [one.claim for one in told.there]
+
+
+def test_without_a_published_run_nothing_is_repeated():
+    told = agreement.repeated({}, Published())
+    assert (told.runs, told.here, told.there) == (0, (), ())

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summaries import fetch_summaries
-from nmpcrl.analysis.summary import table
 from nmpcrl.claims import evidence, failure_modes, published
 from nmpcrl.claims.evidence import gather, needed
 from nmpcrl.study import Experiment, ParameterError, Runs
@@ -43,24 +43,32 @@ def test_what_is_not_published_is_trained_with_its_frozen_arms(monkeypatch):
     assert {frozen_arm(e) for e in wanted} <= wanted
 
 
-def test_what_is_not_published_cannot_be_read(known):
+def test_of_the_published_study_only_what_it_lacks_is_trained(known):
     assert needed("published", **ASKED) == ()
-    with pytest.raises(ParameterError, match=r"holds no run of ES in layout A.*seed 3"):
-        needed("published", **ASKED | {"seeds": [3]})
+    lacking = needed("published", **ASKED | {"seeds": [0, 3]})
+    assert set(lacking) == {*main_table(["ES", "frozen"], ["A"], [3], 2)}
 
 
-def test_of_what_is_published_only_the_fresh_part_is_trained_again(monkeypatch):
+def test_of_fresh_runs_all_are_trained_here(known):
+    assert set(needed("fresh", **ASKED)) == set(known)
+
+
+def test_the_published_runs_that_a_build_trains_again_are_those_of_the_design(monkeypatch):
     runs = main_table(["ES", "frozen"], ["A", "F"], [0])
     monkeypatch.setattr(evidence, "load", lambda: published.Published(dict.fromkeys(runs)))
-    wanted = needed("fresh", learners=["ES"], layouts=["A", "F"], seeds=[0])
-    assert set(wanted) == set(runs) & set(fresh())
-    assert {e.layout for e in wanted} == {"A"}
+    again = evidence.repeatable(True, learners=["ES"], layouts=["A", "F"], seeds=[0, 1])
+    assert set(again) == set(runs) & set(fresh())
+    assert {e.layout for e in again} == {"A"}
+    assert evidence.repeatable(True, learners=["ES"], layouts=["A"], seeds=[0], episodes=4) == ()
+    assert evidence.repeatable(False, learners=["ES"], layouts=["A"], seeds=[0]) == ()
+    with pytest.raises(ParameterError, match="repeat = 'no' must be true or false"):
+        evidence.repeatable("no")
 
 
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"source": "stale"}, "study = 'stale' must be one of fresh, published"),
+        ({"source": "stale"}, "study = 'stale' must be one of published, fresh"),
         ({"layouts": ["Z"]}, "layout = 'Z'"),
         ({"seeds": []}, "must name at least one seed"),
         ({"seeds": "[3]"}, "arrived as text"),
@@ -89,8 +97,29 @@ def test_published_runs_say_what_they_said_when_they_were_trained(known):
         assert there.evaluations["episode"].tolist() == summary.evaluations["episode"].tolist()
 
 
+def test_what_is_published_is_what_is_shown_whatever_was_trained_here(known):
+    fetch_summaries(known, progress=False)  # stored here, too
+    assert set(gather("published", **ASKED).runs.source) == {"published"}
+
+
+def test_whose_runs_are_shown_is_known(known):
+    assert gather("published", **ASKED).is_published
+    assert not gather("fresh", **ASKED).is_published
+    assert not gather("published", **ASKED | {"seeds": [0, 1]}).is_published
+    assert gather("fresh", **ASKED).mark == "4 runs trained for this page"
+
+
+def test_inputs_that_are_not_published_are_those_of_the_final_theta(known):
+    found = gather("published", **ASKED)
+    assert {summary.actions for summary in found.summaries.values()} == {None}
+    whole = evidence.with_inputs(found)
+    for experiment, summary in known.items():
+        np.testing.assert_allclose(whole.summaries[experiment].actions, summary.actions, atol=1e-6)
+    assert len(whole.runs) == len(known)
+
+
 def test_runs_trained_here_stand_beside_published_ones(known):
-    found = gather("fresh", **ASKED | {"seeds": [0, 1]})
+    found = gather("published", **ASKED | {"seeds": [0, 1]})
     sources = found.runs.groupby("seed").source.unique()
     assert sources[0].tolist() == ["published"]
     assert sources[1].tolist() == ["fresh"]
@@ -102,14 +131,57 @@ def test_runs_trained_here_stand_beside_published_ones(known):
     assert len(only.runs) == 4
 
 
-def test_of_each_mechanism_the_first_run_that_went_wrong_is_an_example_trained_here_before_others():
-    experiments = [Experiment("ES", seed=seed) for seed in range(5)]
-    runs = pd.DataFrame(
+def went_wrong(*mechanisms: str) -> evidence.Evidence:
+    """Runs of ES and RDES in turn, and their frozen arms, with these mechanisms."""
+    runs = [Experiment(("RDES", "ES")[k % 2], seed=k) for k in range(len(mechanisms))]
+    named = dict(zip(runs, mechanisms, strict=True)) | {frozen_arm(e): "" for e in runs}
+    table = pd.DataFrame(
         {
-            "mechanism": ["", "gap", "gap", failure_modes.WELL, "overshoot"],
-            "source": ["fresh", "published", "fresh", "published", "published"],
+            "learner": [e.learner for e in named],
+            "mechanism": list(named.values()),
+            "training_cost": 1.0,
+            "source": "published",
         }
     )
-    found = evidence.Evidence(Runs(dict.fromkeys(experiments)), runs)
-    assert list(found.wrong.run) == [experiments[k] for k in (2, 1, 4)]
-    assert found.examples == {"gap": experiments[2], "overshoot": experiments[4]}
+    return evidence.Evidence(Runs(dict.fromkeys(named)), table)
+
+
+def test_an_example_of_a_mechanism_is_the_first_without_a_network_that_shows_it_again(monkeypatch):
+    found = went_wrong("gap", "gap", "network", "", "gap", "gap", "network", failure_modes.WELL)
+    first, second, third = (list(found.summaries)[k] for k in (1, 5, 2))
+    shown = {first: "overshoot", second: "gap", third: failure_modes.WELL}
+    tried = []
+
+    def train(runs, **_):
+        tried.extend(runs)
+        return dict.fromkeys(runs, runs[0])
+
+    monkeypatch.setattr(evidence, "fetch_summaries", train)
+    monkeypatch.setattr(evidence, "_mechanism", lambda run, _: shown.get(run, failure_modes.WELL))
+    assert evidence.examples(found) == {"gap": second}
+    assert tried[:2] == [first, second]
+    assert {e.learner for e in tried[2:]} == {"RDES"}
+
+
+def test_the_example_is_of_the_learner_in_which_the_mechanism_is_most_common(monkeypatch):
+    runs = [Experiment(name, seed=seed) for seed, name in enumerate(("DES", "RDES", "RDES"))]
+    arms = [frozen_arm(e) for e in runs]
+    learners = [e.learner for e in (*runs, *arms)]
+    table = pd.DataFrame({"learner": learners, "mechanism": ["overshoot"] * 3 + [""] * 3})
+    found = evidence.Evidence(Runs(dict.fromkeys((*runs, *arms))), table)
+    monkeypatch.setattr(evidence, "fetch_summaries", lambda runs, **_: dict.fromkeys(runs, runs[0]))
+    monkeypatch.setattr(evidence, "_mechanism", lambda run, _: "overshoot")
+    assert evidence.examples(found) == {"overshoot": runs[1]}
+
+
+def test_a_run_that_is_trained_again_may_have_gone_well(known):
+    found = gather("published", **ASKED)
+    (learned,) = (e for e in known if e.learner == "ES" and e.decay == "step")
+    assert evidence._mechanism(known[learned], found) == failure_modes.WELL
+
+
+def test_numbers_of_the_published_main_table_are_called_so(known):
+    assert gather("published", **ASKED).origin == "the published main table"
+    assert gather("fresh", **ASKED).origin == (
+        "4 runs trained for this page, of ES, frozen; layouts A; noise per step, episode"
+    )

@@ -4,15 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.claims.halves import (
-    WHOLE,
-    confirmations,
-    counted,
-    halves,
-    readings,
-    reversals,
-    sentence,
-)
+from nmpcrl.claims.halves import confirmations, halves, reversals
+from nmpcrl.claims.verdict import WHOLE
 
 LEARNERS = ("DES", "RDES")
 BORDERS = {"diverged": 1.5, "had to be stopped": np.finfo(float).max}
@@ -40,10 +33,6 @@ def test_both_halves_are_counted_in_every_reading_and_layout():
         ("had to be stopped", ("A",)): (0, 1),
         ("had to be stopped", ("B",)): (0, 0),
     }
-    assert counted(found) == (
-        "Diverged: with noise that decays per step in 2 of 3 runs of DES and 1 of RDES."
-        " Had to be stopped: with noise that decays per step in 0 of 3 runs of DES and 1 of RDES."
-    )
 
 
 def test_a_pair_of_which_one_is_not_known_says_nothing():
@@ -68,9 +57,12 @@ def test_what_is_claimed_is_no_reverse():
     found = halves(LEARNERS, values(step_A=[(2, 1)] * 10, step_B=[(2, 2)] * 10), BORDERS)
     assert not list(reversals(found))
     (one,) = confirmations(found)
-    assert sentence(one) == (
-        "With noise that decays per step, as claimed: DES diverged in 20 of 20 runs and RDES in"
-        " 10 (10 of 10 pairs that differ: 100% [72%, 100%])."
+    assert (one.layouts, one.counts, one.pairs, one.against, one.apart) == (
+        (WHOLE,),
+        (20, 10),
+        20,
+        0,
+        10,
     )
 
 
@@ -87,22 +79,10 @@ def test_where_a_whole_reading_is_undecided_its_reversed_layouts_are_named_toget
     }
     (one,) = reversals(halves(LEARNERS, values(**cells), BORDERS))
     assert one.layouts == ("B", "C")
-    assert sentence(one) == (
-        "With noise that decays per episode, in layouts B and C, the reverse was seen: RDES"
-        " diverged in 11 of 11 runs and DES in 0 (11 of 11 pairs that differ: 100% [74%, 100%])."
-    )
+    assert (one.counts, one.pairs, one.against, one.apart) == ((0, 11), 11, 11, 11)
 
 
 def test_a_reversal_of_a_whole_reading_is_said_of_all_layouts():
     (one,) = reversals(halves(LEARNERS, values(step_A=[(1, 2)] * 9, step_B=[(1, 1)]), BORDERS))
     assert one.layouts == (WHOLE,)
-    assert sentence(one).startswith(
-        "With noise that decays per step, the reverse was seen: RDES diverged in 9"
-    )
-
-
-def test_the_readings_of_the_decay_are_found_again_in_the_sentences():
-    cells = {"step_A": [(1, 2)] * 9, "episode_A": [(2, 1)] * 9, "episode_B": [(1, 2)] * 9}
-    found = list(reversals(halves(LEARNERS, values(**cells), {"diverged": 1.5, "failed": 1.6})))
-    assert readings(map(sentence, found)) == ("step", "episode")
-    assert readings(["Nothing of the kind."]) == ()
+    assert one.counts == (0, 9)

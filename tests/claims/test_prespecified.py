@@ -7,7 +7,16 @@ from pathlib import Path
 import pytest
 
 from nmpcrl.claims import prespecified, published
-from nmpcrl.claims.prespecified import NUMBERS, RUNS, Commit, Fixed, fixed, from_facts, from_git
+from nmpcrl.claims.prespecified import (
+    NUMBERS,
+    RUNS,
+    SINCE,
+    Commit,
+    Fixed,
+    fixed,
+    from_facts,
+    from_git,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 TODAY = "".join(f"{name} = {value!r}\n" for name, value in NUMBERS.items())
@@ -134,3 +143,17 @@ def test_the_published_facts_are_what_this_repository_says():
 
 def shallow() -> bool:
     return git(ROOT, "rev-parse", "--is-shallow-repository") == "true"
+
+
+@pytest.mark.parametrize("one", SINCE, ids=lambda one: one.commit)
+def test_what_was_decided_later_is_a_commit_of_that_date(one):
+    try:
+        known = prespecified._commit(prespecified.ROOT, one.commit)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("there is no history here")
+    assert known.hash.startswith(one.commit)
+    assert known.date == one.date
+
+
+def test_decisions_are_listed_in_their_order():
+    assert [one.date for one in SINCE] == sorted(one.date for one in SINCE)

@@ -1,10 +1,11 @@
-"""What rests on time alone is published anew, unless the machine was too busy to say."""
+"""Verdicts are published anew from what is published, and those on time unless it was too busy."""
 
 import pandas as pd
 import pytest
 
-from nmpcrl.claims import publish
-from nmpcrl.claims.rule import PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims import publish, published
+from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.study import Experiment
 
 
 def timings(width: float) -> pd.DataFrame:
@@ -23,9 +24,27 @@ def timings(width: float) -> pd.DataFrame:
 def test_verdicts_on_time_are_published_if_all_are_decided(monkeypatch, width, outcomes):
     kept = []
     taken = timings(width)
-    monkeypatch.setattr(publish, "time_learners_afresh", lambda: taken)
+    monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: taken)
     monkeypatch.setattr(publish.published, "republish", lambda *both: kept.append(both))
     judged = publish.publish_timing()
     assert [verdict.claim for verdict in judged] == ["C3", "C4"]
     assert [verdict.outcome for verdict in judged] == outcomes
     assert kept == ([(judged, taken)] if UNDECIDABLE not in outcomes else [])
+
+
+def test_what_is_published_gives_its_verdicts_again_without_a_run():
+    found = published.load()
+    assert publish.judge_published(found) == found.verdicts
+
+
+def test_each_wider_verdict_follows_the_one_it_widens():
+    claims = [one.claim for one in publish.judge_published(published.load())]
+    assert claims[claims.index("C7") + 1] == "W7"
+    assert claims[claims.index("C9") + 1] == "W9"
+    assert claims[-1].startswith("B")
+
+
+def test_the_main_table_and_the_controls_are_published_as_a_whole_only():
+    one = Experiment()
+    with pytest.raises(published.Unpublishable, match="with the whole study only"):
+        publish.publish_parts({one: None}, {one: "main"})

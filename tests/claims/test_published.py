@@ -11,10 +11,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from nmpcrl.analysis.summary import row, summarise, table
-from nmpcrl.claims import published, thetas
-from nmpcrl.claims.published import FILES, Damaged, Published, compare, load, publish
-from nmpcrl.claims.rule import PARTLY, REPRODUCED, Verdict
+from nmpcrl.analysis.rows import row, table
+from nmpcrl.analysis.summary import summarise
+from nmpcrl.claims import comparison, published, thetas
+from nmpcrl.claims.comparison import compare
+from nmpcrl.claims.published import FILES, Damaged, Published, load, publish
+from nmpcrl.claims.verdict import PARTLY, REPRODUCED, Verdict
 from nmpcrl.study import Experiment, design, paper, run, sweep
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.machine import fingerprint
@@ -81,7 +83,12 @@ def whole(known, folder):
 def elsewhere(monkeypatch):
     """From here on this is another machine."""
     there = fingerprint() | {"processor": "another"}
-    return lambda: monkeypatch.setattr(published, "fingerprint", lambda: there)
+
+    def moved() -> None:
+        for module in (published, comparison):
+            monkeypatch.setattr(module, "fingerprint", lambda: there)
+
+    return moved
 
 
 def changed(one, **rollouts):
@@ -335,6 +342,26 @@ def test_a_word_that_is_not_known_is_refused(known, folder, name, word):
     assert_refused(folder)
 
 
+def test_a_table_with_columns_that_are_not_known_is_refused_with_their_names(known, folder):
+    published_runs = pd.read_csv(folder / "runs.csv").rename(columns={"bias": "leaning"})
+    published_runs.to_csv(folder / "runs.csv", index=False)
+    published._seal(folder, json.loads((folder / "about.json").read_text()))
+    assert "columns that are not known: leaning" in refusal(folder)
+
+
+def test_a_metric_that_is_younger_than_the_table_is_not_known(known, folder):
+    found = without(folder, ["bias"])
+    assert all(np.isnan(one["bias"]) for one in found.rows.values())
+
+
+def test_who_has_no_repository_is_not_told_to_ask_git(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(published.nmpcrl, "__file__", str(tmp_path / "nmpcrl/__init__.py"))
+    published._load.cache_clear()
+    with pytest.raises(Damaged, match="comes with the project's repository") as refused:
+        load()
+    assert "git checkout" not in str(refused.value)
+
+
 def assert_refused(folder):
     assert f"{folder} is damaged" in refusal(folder)
 
@@ -429,8 +456,82 @@ def test_single_verdicts_are_published_anew_and_all_else_stays(known, folder):
     sums = {"files", "seal"}
     kept = {name: value for name, value in known.about.items() if name not in sums}
     assert {name: value for name, value in found.about.items() if name not in sums} == kept
-    with pytest.raises(KeyError, match="no verdict on C9"):
-        published.republish([replace(measured, claim="C9")])
+
+
+def test_a_verdict_on_a_new_claim_comes_after_the_others_and_all_of_them_in_their_own_order(known):
+    new = replace(VERDICTS[1], claim="B9")
+    published.republish([new])
+    assert load().verdicts == (*VERDICTS, new)
+    published.republish([new, *VERDICTS])
+    assert load().verdicts == (new, *VERDICTS)
+    published.republish([VERDICTS[0], new, VERDICTS[1]])
+    assert load().verdicts == (VERDICTS[0], new, VERDICTS[1])
+
+
+FURTHER = Experiment("ES", seed=7, episodes=6, steps=6, evaluate_every=2, alpha=2e-7)
+
+
+@pytest.fixture(scope="module")
+def further():
+    """A run of another length and step size, whose frozen arm is not published."""
+    return {FURTHER: summarise(run(FURTHER))}
+
+
+def test_further_runs_are_published_beside_the_others_which_keep_every_byte(known, folder):
+    more = replace(next(iter(known.rows)), alpha=3e-7)
+    made = summarise(run(more))
+    before = (folder / "runs.csv").read_text()
+    curves = dict(np.load(folder / "curves.npz"))
+    followed = (folder / "thetas.npz").read_bytes()
+    published.extend({more: made}, {more: "alpha x 3"})
+    found = load()
+    assert (folder / "runs.csv").read_text().startswith(before)
+    assert (folder / "thetas.npz").read_bytes() == followed
+    for name, column in np.load(folder / "curves.npz").items():
+        np.testing.assert_array_equal(column[: len(RUNS)], curves[name])
+    assert list(found.variants.values())[-1] == "alpha x 3"
+    assert found.rows[more]["final_cost"] == row(made)["final_cost"]
+    assert found.rows[more]["ending"]
+    np.testing.assert_allclose(found.summaries[more].states, made.states, atol=1e-6)
+    assert found.verdicts == known.verdicts
+    assert found.about["runs"]["alpha x 3"] == 1
+    (addition,) = found.about["additions"]
+    assert addition["machine"] == fingerprint()
+    assert addition["runs"] == {"alpha x 3": 1}
+
+
+def test_how_a_further_run_went_wrong_is_what_the_whole_study_would_say(known, summaries):
+    one = next(e for e in RUNS if e.learner == "ES" and e.seed == 1)
+    worse = changed(summaries[one], cost=summaries[one].evaluations["cost"] * [1, 1.5, 2])
+    more = replace(one, alpha=3e-7)
+    asked = {more: replace(worse, experiment=worse.experiment | {"alpha": 3e-7})}
+    published.extend(asked, {more: "alpha x 3"})
+    expected = published.failure_modes_of(summaries | asked).iloc[-1]
+    found = load().rows[more]
+    assert found["wrong"] == "without noise"
+    assert [found[name] for name in expected.index] == expected.tolist()
+
+
+def test_a_run_of_another_machine_is_not_compared_bit_for_bit(known, summaries, elsewhere):
+    more = replace(next(iter(known.rows)), alpha=3e-7)
+    made = {more: summarise(run(more))}
+    published.extend(made, {more: "alpha x 3"})
+    assert comparison.comparable([more, RUNS[0]], load()) == {more, RUNS[0]}
+    elsewhere()
+    assert comparison.comparable([more, RUNS[0]], load()) == set()
+    other = replace(more, alpha=4e-7)
+    published.extend({other: summarise(run(other))}, {other: "alpha x 4"})
+    assert comparison.comparable([more, other, RUNS[0]], load()) == {other}
+
+
+def test_runs_that_cannot_stand_beside_the_others_are_refused_in_a_sentence(
+    known, summaries, further
+):
+    with pytest.raises(published.Unpublishable, match="is published already, in the part 'main'"):
+        published.extend({RUNS[0]: summaries[RUNS[0]]}, LABELS)
+    with pytest.raises(published.Unpublishable, match=r"the frozen arm of ES .* is not published"):
+        published.extend(further, {FURTHER: "alpha x 2"})
+    assert load().rows.keys() == known.rows.keys()
 
 
 def test_what_is_published_does_not_contradict_itself(known, summaries, elsewhere):
@@ -472,7 +573,7 @@ def test_on_another_machine_the_last_bit_does_not_count(known, summaries, elsewh
 def test_with_other_versions_or_epochs_the_last_bit_does_not_count(
     known, summaries, monkeypatch, what, other
 ):
-    monkeypatch.setattr(published, what, other)
+    monkeypatch.setattr(comparison, what, other)
     moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in summaries.items()}
     assert compare(moved, known).empty
 
@@ -517,6 +618,16 @@ def test_on_another_machine_most_runs_must_lie_in_the_published_spread(
     elsewhere()
     wrong = compare(spread(summaries, here), load())
     assert list(wrong.what.unique()) == (["final_cost"] if contradicts else [])
+
+
+@pytest.mark.parametrize(("count", "contradicts"), [(1, False), (2, False), (3, True)])
+def test_one_or_two_runs_of_a_chaotic_learner_contradict_nothing(
+    summaries, elsewhere, count, contradicts
+):
+    publish(summaries | spread(summaries, (0.6, 0.7, 0.8, 0.9)), LABELS, VERDICTS)
+    elsewhere()
+    failed = dict(list(spread(summaries, (np.inf,) * 4).items())[:count])
+    assert bool(len(compare(failed, load()))) == contradicts
 
 
 def test_where_published_runs_failed_failures_are_no_contradiction(summaries, elsewhere):

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.summary import SIZES, as_text, experiment_of
+from nmpcrl.analysis.rows import as_text, experiment_of
+from nmpcrl.analysis.summary import SIZES
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.robustness import (
     WHOLE,
@@ -16,7 +17,7 @@ from nmpcrl.claims.robustness import (
     not_run,
     robustness_map,
 )
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED
 from nmpcrl.study import Experiment, design
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import PAPER, frozen_arm

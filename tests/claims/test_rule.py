@@ -12,10 +12,6 @@ from nmpcrl.claims.rule import (
     MAJORITY,
     NEARLY_ALL,
     NEARLY_NONE,
-    NOT,
-    PARTLY,
-    REPRODUCED,
-    UNDECIDABLE,
     Answers,
     Claim,
     arms,
@@ -24,6 +20,7 @@ from nmpcrl.claims.rule import (
     settle,
     shown,
 )
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 
 
 class Open(Claim):

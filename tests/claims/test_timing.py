@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nmpcrl.bench.paired import Ratio
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.claims.timing import IDLE, WAITED, decide
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 
 CLAIMED, NEAR = (0.9, 1.1), (0.8, 1.25)
 

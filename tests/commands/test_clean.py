@@ -96,6 +96,13 @@ def test_finished_runs_go_only_if_they_are_asked_for(command, folder):
     assert before - files(folder) == set(GOING) | own
 
 
+def test_a_run_of_this_code_that_somebody_renamed_stays(command, folder):
+    renamed = folder / NAME.replace("seed0", "seed7")
+    renamed = store.path_of(RUN).rename(renamed.with_suffix(".npz"))
+    command("clean", "--yes")
+    assert renamed.exists()
+
+
 def test_a_run_that_cannot_be_read_now_stays(command, folder):
     command("clean", "--runs", "--yes")
     assert f"{NAME[:-1]}a.npz" in files(folder)

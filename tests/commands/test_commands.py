@@ -7,10 +7,12 @@ from functools import partial
 import numpy as np
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
-from nmpcrl.claims.rule import Verdict
+from nmpcrl.claims.verdict import Verdict
+from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, design, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 from nmpcrl.study.sweeps import FIELDS
@@ -29,7 +31,7 @@ def small(monkeypatch, measured):
     times = pd.DataFrame(measured["learners"])
     monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
     monkeypatch.setattr(publish, "verdicts", lambda *_: ())
-    monkeypatch.setattr(publish, "time_learners_afresh", lambda: times)
+    monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: times)
 
 
 @pytest.fixture
@@ -345,3 +347,34 @@ def test_bench_sweeps_over_as_many_problems_as_asked_for(command, monkeypatch):
         done = command("bench", *words)
         assert done.output == f"a table\n{sweep.path()}: stored\n"
     assert asked == [100_000, 20]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("study", "--dry-run"), "cannot be a folder"),
+        (("clean",), "cannot be a folder"),
+        (("study", "--table", ""), "'' is not a path"),
+    ],
+)
+def test_what_is_no_folder_and_no_path_is_refused_before_anything_is_done(
+    words, said, tmp_path, monkeypatch
+):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "file"))
+    refused = CliRunner().invoke(main, words)
+    assert refused.exit_code
+    assert said in f"{refused.output}{refused.exception}"
+
+
+def test_no_more_runs_are_compared_than_are_published():
+    refused = CliRunner().invoke(main, ["verify", "--sample", "10000000000"])
+    assert "10000000000 is more than the 2,000 published runs." in refused.output
+
+
+def test_a_study_without_numba_is_refused_in_a_sentence(monkeypatch, tmp_path):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    monkeypatch.setattr(summaries, "environment", lambda: {"numba": "absent"})
+    refused = CliRunner().invoke(main, ["verify", "--sample", "1"])
+    assert refused.exit_code == 1
+    assert "Error: numba is not installed, and without it riccati" in refused.output

@@ -43,6 +43,7 @@ def fast(command, monkeypatch, tmp_path):
     monkeypatch.setattr(summaries, "fetch_summaries", refuse)
     monkeypatch.setattr(cluster, "executor", refuse)
     monkeypatch.setattr(publish, "publish_timing", refuse)
+    monkeypatch.setattr(publish, "rejudge", refuse)
     monkeypatch.setattr(verification, "relock", refuse)
     monkeypatch.setattr(published, "load", lambda: published.Published(rows={SHORT: {}}))
     monkeypatch.setattr(verification, "sample", lambda *_: [SHORT])

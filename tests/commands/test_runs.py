@@ -1,12 +1,15 @@
 """`nmpcrl runs`, and runs by the beginning of their names."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
+from click import ClickException
 from click.testing import CliRunner
 
 from nmpcrl.commands import main
+from nmpcrl.commands.names import file_of
 from nmpcrl.commands.tables import columns, counted, duration, size
 from nmpcrl.study import Experiment, fetch_all, store, sweep
 from nmpcrl.study.records import Records
@@ -204,3 +207,39 @@ def test_a_cost_that_is_not_known_sorts_last():
 )
 def test_one_is_singular(count, words):
     assert counted(count, "run") == words
+
+
+def test_a_shorter_run_does_not_make_the_name_of_the_papers_ambiguous(tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    whole, short = (store.path_of(Experiment("GES", episodes=n)) for n in (300, 2))
+    for path in (short, short.with_stem(short.stem.replace("2ep", "20ep"))):
+        path.touch()
+    with pytest.raises(ClickException, match="is the beginning of several runs"):
+        file_of("GES-A-step-seed0")
+    whole.touch()
+    assert file_of("GES-A-step-seed0") == whole
+    assert file_of(short.stem) == short
+    with pytest.raises(ClickException, match="is the beginning of several runs"):
+        file_of("GES-A")
+
+
+@pytest.mark.parametrize("words", [("evaluate",), ("show",), ("compare", "ES-A-step-seed0")])
+def test_a_run_under_the_name_of_another_is_refused(words, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    right, wrong = (Experiment(name, **SHORT) for name in ("ES", "GES"))
+    fetch_all([right], progress=False)
+    shutil.copy(store.path_of(right), store.path_of(wrong))
+    refused = CliRunner().invoke(main, [*words, "GES-A-step-seed0"])
+    assert refused.exit_code == 1
+    assert f"holds another run, {store.path_of(right).stem}" in refused.output
+
+
+def test_nothing_in_a_file_is_a_command_to_the_terminal(tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    records = fetch_all([Experiment(**SHORT)], progress=False)[Experiment(**SHORT)]
+    records.facts["stopped"] = "diverged: \x1b[31mred\x1b]0;title\x07"
+    records.save(store.path_of(Experiment(**SHORT)))
+    for words in (("runs",), ("evaluate", "ES"), ("compare", "ES", "ES")):
+        said = CliRunner().invoke(main, words).output
+        assert "\x1b" not in said
+        assert "\x07" not in said

@@ -1,5 +1,8 @@
 """`nmpcrl show` and `nmpcrl compare`."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -175,3 +178,12 @@ def test_compare_prints_fields_figures_and_differences(command):
         "Warning: the costs are not comparable: other layout"
         in command("compare", "ES-A", "ES-B").stderr
     )
+
+
+@pytest.mark.slow
+def test_no_window_system_that_is_set_elsewhere_matters(tmp_path):
+    command = [sys.executable, "-m", "nmpcrl"]
+    environment = os.environ | {"NMPCRL_RUNS": str(tmp_path), "MPLBACKEND": "nonsense"}
+    for words in (("train", "--episodes", "1", "--steps", "5"), ("show", "ES")):
+        subprocess.run([*command, *words], check=True, env=environment, capture_output=True)
+    assert list(tmp_path.glob("*.svg"))

@@ -9,7 +9,7 @@ import nmpcrl.control
 
 ROOT = Path(nmpcrl.control.__file__).parent
 FLOORS = (  # each may import from those before it, and from its own
-    ("codegen",),
+    ("codegen", "vectors"),
     ("plant", "task", "ocp", "sensitivity", "solution"),
     ("solvers",),
     ("nmpc", "browser"),

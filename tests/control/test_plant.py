@@ -102,3 +102,13 @@ def test_a_plant_refuses_nonsense_and_says_which(changed, message):
 
 def test_bounds_may_be_given_as_lists():
     assert plant(lower=[-2], upper=[3]).upper.dtype == float
+
+
+@pytest.mark.parametrize("name", ["lower", "upper"])
+def test_a_plant_keeps_its_own_bounds(name):
+    given = {"lower": -BOUND, "upper": BOUND.copy()}
+    made = plant(**given)
+    given[name][:] = 0.5
+    assert abs(getattr(made, name)[0]) == BOUND[0]
+    with pytest.raises(ValueError, match="read-only"):
+        getattr(made, name)[0] = 0.0

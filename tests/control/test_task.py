@@ -136,3 +136,19 @@ def test_a_task_refuses_nonsense_and_says_which(changed, message):
 def test_an_obstacle_refuses_nonsense_and_says_which(disc, message):
     with pytest.raises(ValueError, match=message):
         Obstacle(*disc)
+
+
+def test_a_target_that_is_used_again_for_another_task_changes_no_earlier_one():
+    target = np.array([8.5, 2.0, 0.0])
+    first = task(target=target)
+    target[:] = [1.0, 1.0, 0.0]
+    assert first.stage_cost(first.start, STILL) != task(target=target).stage_cost(
+        first.start, STILL
+    )
+    np.testing.assert_array_equal(first.target, [8.5, 2.0, 0.0])
+
+
+@pytest.mark.parametrize("name", ["start", "target", "lower", "upper", "weights"])
+def test_a_task_that_is_made_cannot_be_changed(name):
+    with pytest.raises(ValueError, match="read-only"):
+        getattr(task(), name)[0] = 1.0

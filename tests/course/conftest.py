@@ -18,9 +18,9 @@ from nmpcrl.course.submissions import chapters, notebook_of, taken
 def edition(tmp_path) -> Path:
     """The edition for graders of the small chapter."""
     place = tmp_path / "edition/source/nmpcrl"
-    (place / "data").mkdir(parents=True)
+    (place / "data/published").mkdir(parents=True)
     (place / "data/of_the_chapter.txt").write_text("4")
-    nbformat.write(editions.grader(small_chapter(), set(), "nmpcrl.whl"), place / f"{SMALL}.ipynb")
+    nbformat.write(editions.grader(small_chapter(), set()), place / f"{SMALL}.ipynb")
     return tmp_path / "edition"
 
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from nmpcrl.course import Outcome, Unsolved, choice, exercise, formula, number
+from nmpcrl.course import Outcome, Unsolved, choice, exercise, formula, number, outcome
 from nmpcrl.course.formulas import FormulaError, evaluated
-from nmpcrl.course.outcome import MIME, STRICT, UNANSWERED
+from nmpcrl.course.outcome import MIME, UNANSWERED
 
 WHY = {"a": "No: a.", "b": "b it is.", "c": "No: c."}
 UP = "It is the other way round."
@@ -40,13 +40,13 @@ def test_a_chapter_says_what_is_wrong_and_goes_on_and_a_students_notebook_fails(
     def check(answer) -> Outcome:
         return number(answer, 1.5)
 
-    monkeypatch.delenv(STRICT, raising=False)
+    monkeypatch.setattr(outcome, "STRICT", False)
     assert check(answer).said.startswith(said)
-    assert check(answer).page is None
-    monkeypatch.setenv(STRICT, "1")
+    assert (check(answer).page, check(answer).right) == (None, False)
+    monkeypatch.setattr(outcome, "STRICT", True)
     with pytest.raises(Unsolved, match=said):
         check(answer)
-    assert check(1.5).said == "Right: 1.5."
+    assert (check(1.5).said, check(1.5).right) == ("Right: 1.5.", True)
 
 
 @given(st.floats(-1e6, 1e6), st.floats(-0.9, 0.9))
@@ -145,3 +145,18 @@ def test_the_page_is_given_values_of_a_formula_and_not_the_formula():
     values = [doubled(**case) for case in page["cases"]]
     assert page["values"] == values
     assert page["mistakes"][0][1] == UP
+
+
+class Everything(str):
+    """A text that is equal to all others."""
+
+    __hash__ = str.__hash__
+
+    def __eq__(self, other: object) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("answer", [["c"], {"c": 1}, Everything("c"), None, 3])
+def test_a_choice_is_a_text_and_nothing_that_is_equal_to_all(answer):
+    with pytest.raises(Unsolved, match="is none of a, b and c"):
+        choice(answer, "c", {"a": "no", "b": "no", "c": "yes"})

@@ -7,7 +7,7 @@ from small_course import ASKED, cell_of, small_chapter
 
 
 def marked(**words):
-    return editions.grader(small_chapter(), set(), "nmpcrl.whl", **words)
+    return editions.grader(small_chapter(), set(), **words)
 
 
 def test_nbgrader_finds_solutions_points_and_what_is_locked():

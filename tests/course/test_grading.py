@@ -10,6 +10,7 @@ from nbformat.v4 import new_code_cell
 from small_course import ASKED, SMALL, cell_of, small_chapter, solved_by_student
 
 from nmpcrl.commands import main
+from nmpcrl.commands.grade import cell
 from nmpcrl.course.confined import Limits
 from nmpcrl.course.exercises import exercises
 from nmpcrl.course.grading import grade, rehearsed
@@ -35,7 +36,7 @@ def reasons(rows) -> dict[str, str]:
 
 
 def test_points_of_samples_and_a_sentence_for_each_loss(graded):
-    untouched = editions.student(small_chapter(), set(), "nmpcrl.whl")
+    untouched = editions.student(small_chapter(), set())
     half = solved_by_student(**dict.fromkeys(ASKED[3:], "pass"), two="root_of_two = 16")
     rows = graded(untouched=untouched, half=half, perfect=solved_by_student())
     assert points(rows["untouched"]) == expected(*POINTS)
@@ -103,6 +104,13 @@ def test_checks_that_are_edited_or_deleted_do_not_count(graded):
     assert points(graded(one=notebook)["one"]) == expected("1.2")
 
 
+@pytest.mark.parametrize("line", ['os.environ.pop("NMPCRL_STRICT", None)', "os.environ.clear()"])
+def test_an_answer_that_silences_its_checks_gets_no_points_for_that(line, graded):
+    untouched = editions.student(small_chapter(), set())
+    cell_of(untouched, "one-answer").source = f"import os\n{line}\nroot_of_one = ..."
+    assert points(graded(one=untouched)["one"]) == expected(*POINTS)
+
+
 def test_cells_that_are_gone_and_files_that_are_no_notebook_are_rows_with_a_sentence(graded):
     gone = solved_by_student()
     gone.cells = [cell for cell in gone.cells if cell.id.startswith("two")]
@@ -167,10 +175,52 @@ def test_what_a_chapter_trains_is_there_for_every_notebook(edition, tmp_path):
     (chapter,) = chapters(edition)
     cell_of(chapter.notebook, "between-1")["source"] = once
     ready = rehearsed(chapter, Limits(), tmp_path / "ready")
-    assert {path.name for path in ready.data.iterdir()} == {"new", "of_the_chapter.txt"}
+    assert {path.name for path in ready.data.iterdir()} == {
+        "new",
+        "of_the_chapter.txt",
+        "published",
+    }
     assert not (place.parent / "data/new").exists()
 
 
 def test_an_edition_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(CannotGrade, match="make course"):
         chapters(tmp_path)
+
+
+def test_a_table_never_computes_what_a_student_calls_a_folder():
+    assert [cell(one) for one in ("=1+1", "+1", "@x", "-1", "anna", 3)] == [
+        "'=1+1",
+        "'+1",
+        "'@x",
+        "'-1",
+        "anna",
+        3,
+    ]
+
+
+def test_what_an_earlier_call_graded_stays_if_this_one_cannot_begin(tmp_path, edition):
+    out = tmp_path / "grades.csv"
+    out.write_text("known")
+    (tmp_path / "in").mkdir()
+    words = ["grade", str(tmp_path / "in"), "--out", str(out), "--edition", str(edition)]
+    refused = CliRunner().invoke(main, words)
+    assert "has no notebook" in refused.output
+    assert out.read_text() == "known"
+
+
+def test_copies_and_files_that_windows_wrote_are_graded(tmp_path, edition):
+    for name, mark in ((f"anna_{SMALL}-Copy1", ""), (f"ben_{SMALL} (2)", "\ufeff")):
+        (tmp_path / "in").mkdir(exist_ok=True)
+        text = mark + nbformat.writes(solved_by_student())
+        (tmp_path / f"in/{name}.ipynb").write_text(text, "utf-8")
+    found = list(grade(tmp_path / "in", edition, Limits(), workers=2))
+    assert [marks[0].student for marks in found] == ["anna", "ben"]
+    for marks in found:
+        assert {mark.points == mark.of for mark in marks if mark.points is not None} == {True}
+
+
+def test_a_long_message_does_not_fill_the_table(graded):
+    long = 'raise ValueError("much" * 100_000)'
+    rows = graded(one=solved_by_student(one=long))
+    assert len(rows["one"]["1.1"]["why"]) < 2000

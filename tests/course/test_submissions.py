@@ -8,7 +8,7 @@ from nmpcrl.course.submissions import chapters
 
 
 def test_added_cells_stay_behind_the_cell_that_they_followed(submission):
-    notebook = editions.student(small_chapter(), set(), "nmpcrl.whl")
+    notebook = editions.student(small_chapter(), set())
     at = notebook.cells.index(cell_of(notebook, "two-text"))
     notebook.cells.insert(at + 1, new_code_cell("power = 2", id="own"))
     every = submission(notebook)[1].steps

@@ -70,6 +70,10 @@ class RecordingNetwork:
     def ready(self):
         return len(self.remembered) >= self.batch
 
+    @property
+    def fitted(self):
+        return self.fits > 0
+
     def remember(self, inputs, target):
         self.remembered.append((inputs, target))
 

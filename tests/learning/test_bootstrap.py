@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nmpcrl.learning import Imitation, SecondSolve
+from nmpcrl.learning import Imitation, QNetwork, SecondSolve
+from nmpcrl.learning.network import Target
 
 THETA = np.array([1.0, 0.5, -1.0])
 OTHER = np.array([2.0, 2.0, 2.0])
@@ -104,3 +105,83 @@ def test_the_network_fits_before_it_is_asked(network, transition):
     network.predict = lambda inputs: (order.append("predict"), predict(inputs))[1]
     Imitation(network, with_theta=False)(transition(THETA), THETA)
     assert order == ["fit", "predict"]
+
+
+@pytest.mark.parametrize("gated", [True, False])
+def test_a_late_network_is_asked_before_it_is_fitted(network, transition, gated):
+    order = []
+    fit, predict = network.fit, network.predict
+    network.fit = lambda: (order.append("fit"), fit())[1]
+    network.predict = lambda inputs: (order.append("predict"), predict(inputs))[1]
+    imitate = Imitation(network, with_theta=False, gated=gated, late=True)
+    answers = [imitate(transition(THETA), THETA) for _ in range(5)]
+    if gated:  # the first fit is made in the third step, and known of in the fourth
+        assert [answer is None for answer in answers] == [True, True, True, False, False]
+        assert order == ["fit", "predict", "fit", "predict", "fit"]
+    else:
+        assert order == ["predict", "predict", *["predict", "fit"] * 3]
+
+
+def test_a_late_network_predicts_what_it_did_after_the_step_before(transition):
+    """The same examples and fits; each value is that of the weights one fit earlier."""
+    imitate = {late: Imitation(taught(), with_theta=False, late=late) for late in (True, False)}
+    step = transition(THETA)
+    values = {late: [one(step, THETA) for _ in range(6)] for late, one in imitate.items()}
+    assert values[True][0] is None
+    late, prompt = ([one.value for one in values[key] if one] for key in (True, False))
+    assert late == prompt[:-1]
+
+
+def taught():
+    """A network that is ready with its first example, of state and action."""
+    return QNetwork(5, np.random.default_rng(0), batch=1)
+
+
+def test_a_lagged_copy_predicts_and_is_refreshed_after_so_many_steps(transition):
+    network = taught()
+    lagged = Imitation(network, with_theta=False, target=Target(network, every=3))
+    step, inputs = transition(THETA), np.array([0.5, 0.0, -1.0, 0.3, 0.4])
+    values, present = [], []
+    for _ in range(8):
+        successor = lagged(step, THETA)
+        values.append(successor and successor.value)
+        present.append(float(network.predict(inputs)))
+    assert values == [None, None, *[present[2]] * 3, *[present[5]] * 3]
+
+
+def test_an_averaged_copy_goes_a_part_of_the_way_at_each_step(transition):
+    network = taught()
+    target, average = Target(network, rate=0.1), network._weights.clone()
+    averaged, step = Imitation(network, with_theta=False, target=target), transition(THETA)
+    for _ in range(5):
+        averaged(step, THETA)
+        average += 0.1 * (network._weights - average)
+        np.testing.assert_allclose(target._weights, average, rtol=1e-5, atol=1e-7)
+
+
+def test_a_copy_that_follows_at_once_changes_nothing(transition):
+    one, other = taught(), taught()
+    plain = Imitation(one, with_theta=False)
+    copied = Imitation(other, with_theta=False, target=Target(other))
+    step = transition(THETA)
+    for _ in range(5):
+        assert copied(step, THETA).value == plain(step, THETA).value
+
+
+@pytest.mark.parametrize("with_theta", [True, False])
+def test_greedily_the_next_action_is_the_one_of_the_least_value(network, transition, with_theta):
+    network.batch, best = 1, np.array([0.25, -0.4])
+
+    def predict(inputs):
+        network.asked.append(inputs)
+        return ((inputs[..., 3:5] - best) ** 2).sum(axis=-1)
+
+    network.predict = predict
+    actions = np.array([0.0, -1.0]), np.array([0.6, 1.0])
+    imitate = Imitation(network, with_theta=with_theta, actions=actions)
+    successor = imitate(transition(THETA), OTHER)
+    np.testing.assert_allclose(network.asked[-1][3:5], best, atol=0.02)
+    for asked in network.asked:
+        assert (asked[..., :3] == [0.5, 0.0, -1.0]).all()
+        assert not with_theta or (asked[..., 5:] == OTHER).all()
+    assert successor.value == pytest.approx(0, abs=1e-3)

@@ -1,5 +1,7 @@
 """The network: it learns, forgets no row, disturbs no generator, and seeds decide its bits."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 import torch
@@ -268,3 +270,33 @@ def test_a_memory_smaller_than_a_mini_batch_is_refused():
 def test_an_activation_that_is_not_known_is_refused():
     with pytest.raises(ValueError, match="activation = 'gelu' must be one of relu, tanh"):
         network(activation="gelu")
+
+
+def test_a_room_for_few_predictions_is_used_again_and_changes_none():
+    learner = taught(rows(200))
+    some, others = rows(9)[0], rows(9, seed=3)[0]
+    first = learner.predict(some)
+    learner.predict(others)
+    np.testing.assert_array_equal(learner.predict(some), first)
+    for _ in range(5):
+        learner.fit()
+    np.testing.assert_allclose(learner.predict(some)[4], learner.predict(some[4]), rtol=1e-5)
+    assert not np.array_equal(learner.predict(some), first)
+
+
+def test_networks_that_begin_at_once_in_several_threads_begin_as_they_do_alone():
+    alone = [network(seed=seed).predict(rows(10)[0]) for seed in range(200)]
+    with ThreadPoolExecutor(4) as threads:
+        together = threads.map(lambda seed: network(seed=seed).predict(rows(10)[0]), range(200))
+        np.testing.assert_array_equal(alone, list(together))
+
+
+def test_what_a_program_makes_torchs_default_type_changes_no_bit():
+    before = train(5)
+    torch.set_default_dtype(torch.float64)
+    try:
+        after = train(5)
+    finally:
+        torch.set_default_dtype(torch.float32)
+    assert before[0] == after[0]
+    np.testing.assert_array_equal(before[1], after[1])

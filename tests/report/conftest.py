@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Iterator
 
+import pandas as pd
 import pytest
 from legibility import flaws
 from matplotlib.figure import Figure
 
 from nmpcrl.report.figures import sheet
+from nmpcrl.study import Experiment
 
 COUNTED = ("episode", "episodes trained", "noise-free RL cost", "relative")  # have no unit
 
@@ -74,3 +76,16 @@ def assert_readable(texts) -> Callable[[Figure], None]:
             assert "[" in label or "(no unit)" in label or label.endswith(COUNTED), label
 
     return check
+
+
+@pytest.fixture
+def some_stopped(made_up) -> pd.DataFrame:
+    """Of 16 runs, four of RDES and one of DES are stopped; two of RDES enter an obstacle."""
+
+    def unlike(e: Experiment) -> dict:
+        stopped = e.learner == "RDES" or (e.learner, e.seed, e.decay) == ("DES", 0, "step")
+        return {"reached": 40} if stopped else {}
+
+    runs = made_up(unlike, layouts=("A",), seeds=(0, 1)).runs
+    runs.loc[(runs.learner == "RDES") & (runs.seed == 1), "eval_worst_overlap"] = 0.2
+    return runs

@@ -9,7 +9,8 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from nmpcrl.analysis.summary import RunSummary, table
+from nmpcrl.analysis.rows import table
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import clearest_changes, robustness_map

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.claims.rule import NOT, REPRODUCED, Verdict
+from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
 from nmpcrl.report.figures import trials
 from nmpcrl.study import paper
 
@@ -30,7 +30,7 @@ def test_the_learner_that_ends_lowest_is_named_and_each_has_one_entry():
         ]
     )
     figure = trials.costs(rows)
-    assert title(figure) == "mine ends lowest: 6 (median)"
+    assert title(figure) == "mine ends lowest: 6.5 (median)"
     assert names(figure) == ["ES", "mine", "frozen"]
     colors = {line.get_color() for line in figure.axes[0].get_lines()}
     assert len(colors) == 3
@@ -50,7 +50,7 @@ def test_the_trajectory_that_costs_least_is_named():
     }
     figure = trials.trajectories(paper.task(), rollouts)
     assert title(figure) == "Lowest cost: after, 3"
-    assert names(figure) == ["before: 12", "after: 3"]
+    assert names(figure) == ["before: 12.4", "after: 3"]
 
 
 @pytest.mark.parametrize(("second", "said"), [(REPRODUCED, "2 of 2"), (NOT, "1 of 2")])
@@ -62,3 +62,15 @@ def test_the_title_counts_the_parts_that_say_yes(second, said):
     figure = trials.shares({0.1: verdict(REPRODUCED, 1.0), 4: verdict(second, 0.05)}, "ratio")
     assert title(figure) == f"Taken by themselves, {said} are a yes"
     assert [tick.get_text() for tick in figure.axes[0].get_xticklabels()] == ["0.1", "4"]
+
+
+def test_every_rollout_is_drawn_in_a_look_of_its_own_and_small_costs_keep_their_digits():
+    rollouts = {
+        name: SimpleNamespace(states=np.zeros((4, 5)), cost=cost)
+        for name, cost in zip("abcde", (0.384, 1.5, 99.96, 1234.5, np.inf), strict=True)
+    }
+    figure = trials.trajectories(paper.task("A"), rollouts)
+    assert names(figure) == ["a: 0.384", "b: 1.5", "c: 100", "d: 1234", "e: inf"]
+    drawn = figure.axes[0].get_lines()[-5:]
+    assert len({(line.get_color(), line.get_linestyle()) for line in drawn}) == 5
+    assert title(figure) == "Lowest cost: a, 0.384"

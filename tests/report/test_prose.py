@@ -8,9 +8,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.learning import updates
 from nmpcrl.learning.learners import Learner
 from nmpcrl.report import prose
+from nmpcrl.report.cited import Count
 from nmpcrl.report.prose import (
     PLACEHOLDER,
     filled,
@@ -166,3 +168,22 @@ def test_source_with_a_title_is_folded_behind_it(shown):
 def test_a_small_number_stands_in_a_formula_as_a_power_of_ten(value, shown):
     assert scientific(value) == shown
     assert filled(r"$\alpha = {alpha}$", alpha=scientific(value)) == rf"$\alpha = {shown}$"
+
+
+def test_a_number_with_an_origin_carries_its_value_and_what_it_is_of():
+    said = filled("It cost {left:.0%} in {n}.", origin="720 runs", left=0.123, n=Count(3, 6))
+    assert said == (
+        'It cost <data value="0.123" title="left: 720 runs">12%</data> in'
+        ' <data value="3 of 6" title="n: 720 runs">3 of 6</data>.'
+    )
+
+
+def test_an_estimate_carries_its_interval():
+    shown = filled("{rate:.2f}", origin="us", rate=Estimate(0.5, 0.25, 0.75))
+    assert shown.startswith('<data value="0.5 [0.25, 0.75]" title="rate: us">0.50 [')
+
+
+def test_words_formulas_and_code_stay_as_they_are():
+    said = filled("{a} $x = {b}$ `{c}` {d:g}", origin="us", a="one", b=1, c=2, d=3)
+    assert said == 'one $x = 1$ `2` <data value="3.0" title="d: us">3</data>'
+    assert filled("{a} {b}", a=1, b=2) == "1 2"

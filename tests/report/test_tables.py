@@ -10,7 +10,8 @@ from bs4 import BeautifulSoup
 
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import CLAIMS
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Assumption, Verdict
+from nmpcrl.claims.rule import Assumption
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, WHOLE, Halves, Verdict
 from nmpcrl.report import tables
 from nmpcrl.report.text import departure_link
 from nmpcrl.study import paper_runs
@@ -54,9 +55,11 @@ def test_a_verdict_shows_its_share_and_interval_where_it_has_one():
 
 
 def test_where_two_learners_clearly_differ_is_said_below_the_claim_whichever_way_round():
-    per = "With noise that decays per {}, {}: one of 9 and the other of 9 (9 of 9 pairs).".format
-    claimed = tuple(per("step", f"as claimed, {how},") for how in ("once", "again"))
-    one = replace(verdict(PARTLY), as_claimed=claimed, reverse=(per("episode", "the reverse"),))
+    step, episode = (
+        Halves(("DES", "RDES"), "diverged", decay, (WHOLE,), 9, (9, 0), 0, 9)
+        for decay in ("step", "episode")
+    )
+    one = replace(verdict(PARTLY), as_claimed=(step, step), reverse=(episode,))
     _, (claim, _) = cells(tables.verdict_table([one], "All of it."))
     assert claim.endswith(
         "|Its two learners clearly differ: as claimed with noise that decays per step, the reverse"
@@ -75,12 +78,13 @@ def test_a_timing_shows_each_ratio_with_its_interval_and_a_dash_for_no_number():
     numbers = dict.fromkeys(tables.TIMES, 1.2345) | {"ms_per_fit": np.nan}
     ratio = {"ratio": 0.6349, "ratio_low": 0.6251, "ratio_high": 0.641, "waited": 0.2}
     timings = pd.DataFrame([{"solver": "ipopt", "learner": "RDES", **numbers, **ratio}])
-    shown = tables.timing_table(timings)
+    shown = tables.timing_table(timings, "2 cores (Abacus 9)")
+    assert "Times of a learning step on 2 cores (Abacus 9)." in shown
     assert '<th scope="row"' in shown  # stays in sight where the table scrolls
     header, row = cells(shown)
     assert dict(zip(header, row, strict=True)) == {
         "step of": "RDES with ipopt",
-        **dict.fromkeys(tables.TIMES.values(), "1.23"),
+        **{words: f"{1.2345 * one:.3g}" for words, one in tables.TIMES.values()},
         "ms per fit": "–",
         "ratio": "0.63|[0.63, 0.64]",
     }

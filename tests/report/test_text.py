@@ -8,11 +8,20 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims import published
+from nmpcrl.claims.agreement import Repeated
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.prespecified import Commit, Fixed
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.robustness import COLUMNS
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
+from nmpcrl.claims.verdict import (
+    NOT,
+    PARTLY,
+    REPRODUCED,
+    UNDECIDABLE,
+    WHOLE,
+    Halves,
+    Verdict,
+)
 from nmpcrl.report import text
 from nmpcrl.study import Experiment
 from nmpcrl.study.departures import DEPARTURES
@@ -47,6 +56,11 @@ def verdict(claim: str, outcome: str, layouts: str = "", decays: str = "") -> Ve
     )
 
 
+def half(decay: str) -> Halves:
+    """Where two learners differ, in one reading of the decay."""
+    return Halves(("DES", "RDES"), "diverged", decay, (WHOLE,), 9, (9, 0), 0, 9)
+
+
 def table(*rows: tuple[str, str, bool]) -> pd.DataFrame:
     """What `variant_changes` returns, as far as it matters here."""
     frame = pd.DataFrame(rows, columns=["variant", "claim", "changes"])
@@ -60,7 +74,7 @@ def test_the_effort_names_runs_hours_machine_and_versions():
         assert part in said
     for part in (
         "12.3 hours",
-        "machine with 2 cores (Abacus 9, Linux)",
+        "machine with 2 cores (Abacus 9, Linux; ",
         "python 3.11.9 and casadi 3.8.2",
     ):
         assert part in said
@@ -99,29 +113,17 @@ def test_the_outcomes_are_counted_and_each_claim_is_named_once():
     ],
 )
 def test_the_answer_is_what_the_decided_claims_say(outcomes, head):
-    judged = [verdict(f"C{i}", one) for i, one in enumerate(outcomes)]
+    judged = [verdict(f"C{i}", one) for i, one in enumerate(outcomes, start=1)]
     assert f"**{head}:**" in text.answer(judged)
 
 
-def test_the_legend_says_what_c7s_percentage_leaves_out_where_c7_is_shown(made_up):
-    c7 = replace(verdict("C7", PARTLY), halves="Without noise, it held in 3 of 4 runs of ES.")
-    said = text.legend([c7], some_stopped(made_up))
+def test_the_legend_says_what_c7s_percentage_leaves_out_where_c7_is_shown(some_stopped):
+    c7 = replace(verdict("C7", PARTLY), each="Without noise, it held in 3 of 4 runs of ES.")
+    said = text.legend([c7], some_stopped)
     assert said.endswith(
-        " Without noise, 14 of 16 runs kept them, 3 of which had to be stopped in training."
+        " Without noise, 2 of 4 runs kept them, 2 of which had to be stopped in training."
     )
     assert "C7" not in text.legend([verdict("C1", PARTLY)], pd.DataFrame())
-
-
-def some_stopped(made_up) -> pd.DataFrame:
-    """Of 16 runs, four of RDES and one of DES are stopped; two of RDES enter an obstacle."""
-
-    def unlike(e: Experiment) -> dict:
-        stopped = e.learner == "RDES" or (e.learner, e.seed, e.decay) == ("DES", 0, "step")
-        return {"reached": 40} if stopped else {}
-
-    runs = made_up(unlike, layouts=("A",), seeds=(0, 1)).runs
-    runs.loc[(runs.learner == "RDES") & (runs.seed == 1), "eval_worst_overlap"] = 0.2
-    return runs
 
 
 def test_the_commit_that_fixed_the_thresholds_is_named_with_its_date_and_how_to_see_it():
@@ -145,16 +147,9 @@ def test_a_page_says_for_which_claims_its_own_runs_agree():
     )
 
 
-def test_the_parts_of_a_claim_are_listed_with_what_is_clear(made_up):
-    judged = [
-        verdict("C1", PARTLY),
-        replace(verdict("C2", NOT), halves="Both.", as_claimed=("So.",), reverse=("Not so.",)),
-    ]
-    assert text.halves(judged, pd.DataFrame()) == "- **C2.** Both.\n  - So.\n  - Not so."
-    kept = text.halves([replace(judged[0], claim="C7", halves="Each.")], some_stopped(made_up))
-    assert kept.startswith(
-        "- **C7.** Each.\n  - Of those that kept them, 1 of DES and 2 of RDES had"
-    )
+def test_claims_that_the_paper_takes_for_granted_are_counted_apart():
+    said = text.answer([verdict("C1", PARTLY), verdict("C9", PARTLY), verdict("W9", NOT)])
+    assert "of the paper's one claim and one that it takes for granted, two are" in said
 
 
 @pytest.mark.parametrize(
@@ -185,24 +180,6 @@ def test_variants_that_change_a_verdict_are_counted_once():
     assert ", 0 of them" in text.verdicts_changed(table(*rows).assign(p=[0.3, 0.01, 0.001]))
 
 
-PER = "With noise that decays per {}, so it was."
-
-
-def test_where_two_learners_clearly_differ_is_said_with_the_claim_and_the_readings():
-    claimed, reverse = ((PER.format(one),) for one in ("step", "episode"))
-    judged = [
-        verdict("C1", PARTLY),
-        replace(verdict("C2", NOT), reverse=reverse),
-        replace(verdict("C3", NOT), as_claimed=claimed, reverse=reverse),
-    ]
-    assert text.differences(judged) == (
-        "Where two learners of a claim clearly differ: C2 (the reverse with noise that decays per"
-        " episode) and C3 (as claimed with noise that decays per step, the reverse with noise that"
-        " decays per episode)."
-    )
-    assert text.differences(judged[:1]) == "Nowhere do two learners of a claim clearly differ."
-
-
 @pytest.mark.parametrize(
     ("wins", "said"),
     [
@@ -225,7 +202,7 @@ def test_the_first_claim_of_the_published_study_depends_on_the_reading_of_the_de
 
 
 def test_a_claim_that_turns_round_with_the_reading_of_the_decay_depends_on_it():
-    claimed, reverse = ((PER.format(one),) for one in ("step", "episode"))
+    claimed, reverse = ((half(one),) for one in ("step", "episode"))
     same = verdict("C1", PARTLY, "pp", "pp")
     turned = replace(same, as_claimed=claimed, reverse=reverse)
     assert text.depends_on([turned], table()) == {"C": ("C1",)}
@@ -290,3 +267,17 @@ def test_a_question_quotes_the_gap_and_leads_to_its_entry():
 )
 def test_names_are_listed_as_a_sentence_has_them(names, said):
     assert text.listed(names) == said
+
+
+def test_runs_that_were_trained_again_are_counted_and_judged_beside_the_published_ones():
+    there = (verdict("C1", PARTLY), verdict("C2", NOT), verdict("C3", NOT))
+    same = text.repeated(Repeated(6, 4, 1, there, there))
+    assert "Of 6 published runs" in same
+    assert "4 have the published numbers in every digit, and 1 more to six digits" in same
+    assert same.endswith("layouts and readings for three of three claims.")
+    here = (verdict("C1", PARTLY), verdict("C2", REPRODUCED), verdict("C3", UNDECIDABLE))
+    assert text.repeated(Repeated(6, 4, 1, here, there)).endswith(
+        "for one of three claims, another one for one (C2: reproduced here, not reproduced there)"
+        " and none for one (C3)."
+    )
+    assert text.repeated(Repeated(0, 0, 0, (), ())) == "No published run was trained again here."

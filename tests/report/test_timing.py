@@ -37,39 +37,44 @@ def test_mpcrl_has_no_time_where_it_is_not_installed(measured):
     assert "not installed" in timing.beside_mpcrl(without)
 
 
+def saving(**changed) -> Saving:
+    """Beside one solver, or beside several."""
+    parts = {"solve": 1.0, "warm": 1.0, "network": 0.2, "rest": 0.05, "rest_rdes": 0.05} | changed
+    count = np.size(parts["solve"])
+    return Saving(**{name: np.broadcast_to(one, count) for name, one in parts.items()})
+
+
 def test_there_is_a_break_even_only_where_the_network_costs_something():
-    assert timing.break_even(Saving(0.2, 0.05, 0.05)).endswith("more than 0.20 ms.")
-    assert "however fast" in timing.break_even(Saving(0.0, 0.05, 0.01))
+    assert timing.break_even(saving()).endswith("more than about 0.2 ms.")
+    assert "however fast" in timing.break_even(saving(network=0.0, rest_rdes=0.01))
+    assert "however slow" in timing.break_even(saving(warm=0.4))
+    two = saving(solve=[0.05, 1.0], network=[0.1, 0.2])
+    assert timing.break_even(two).endswith("about 0.1 ms (it lies between 0.1 and 0.2 ms).")
 
 
-def test_a_ratio_has_its_interval_or_says_why_not(measured):
-    table = summary.learners(measured).set_index(["solver", "learner"])
-    row = table.loc["ipopt", "RDES"]
-    shown = timing.rdes_to_es(measured, "ipopt")
-    assert np.isfinite(row.ratio_low)
-    assert shown == f"{row.ratio:.2f} [{row.ratio_low:.2f}, {row.ratio_high:.2f}]"
-    few = deepcopy(measured)
-    few["learners"]["ratio_low"] = [None] * len(table)
-    assert "too few steps" in timing.rdes_to_es(few, "ipopt")
+def test_slow_solves_give_one_half_only_where_all_take_alike():
+    said = timing.slow_solves(saving(warm=0.8), 830.0)
+    assert said.startswith("With solves of 0.83 s, the paper's, a step of RDES would take 0.63 of")
+    assert said.endswith("and 0.50 if all solves took alike (C3).")
+
+
+def test_the_coverage_is_that_of_the_worst_and_of_all():
+    rows = [("ES", 10, 10), ("GES", 10, 9), ("RDES", 10, 10)]
+    said = timing.coverage(pd.DataFrame(rows, columns=["learner", "repetitions", "inside"]))
+    assert "repeated 10 times" in said
+    assert "at least 9 hold" in said
+    assert "95% of all" in said
+
+
+def test_a_ratio_has_its_interval_and_carries_what_it_is_of(measured):
+    table = summary.learners(measured)
+    row = table.set_index(["solver", "learner"]).loc["ipopt", "RDES"]
+    shown = str(timing.to_es(table, "ipopt", "RDES"))
+    assert f">{row.ratio:.2f} [{row.ratio_low:.2f}, {row.ratio_high:.2f}]</data>" in shown
+    assert 'title="step of RDES in steps of ES, with ipopt: the published measurement"' in shown
+    assert f">{row.ratio:.3f}</data>" in f"{timing.to_es(table, 'ipopt', 'RDES'):.3f}"
     with pytest.raises(KeyError):
-        timing.rdes_to_es(measured, "scipy")
-
-
-@pytest.mark.parametrize(
-    ("ratio", "end"),
-    [
-        (0.63, "0.63, which is higher for the reasons below."),
-        (0.50, "0.50, which is lower for the reasons below."),
-        (0.555, "0.56, so they agree."),
-    ],
-)
-def test_the_models_ratio_stands_beside_the_one_that_was_measured(ratio, end):
-    measured = pd.DataFrame({"solve": [0.1, 2.0], "ratio": [9.0, ratio]}, ["fatrop", "ipopt"])
-    said = timing.model_beside_measured(Saving(0.2, 0.0, 0.0), measured, 0.55)
-    assert said == (
-        "By the model, the ratio is below 0.55 where a solve takes more than 2.0 ms. With ipopt,"
-        f" whose solves in RDES take 2.00 ms, the model gives 0.55 and the measurement {end}"
-    )
+        timing.to_es(table, "scipy", "RDES")
 
 
 @pytest.mark.parametrize(

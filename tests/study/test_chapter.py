@@ -34,6 +34,9 @@ def test_what_is_allowed_passes_outside_of_a_notebook_too():
     chapter.check(**PARAMETERS | {"layout": [[0.5, 2.2], [3, 0.5]]})
 
 
+AT_ONCE = "with larger ones a run ends before there is anything to show"
+
+
 @pytest.mark.parametrize(
     ("name", "given", "said"),
     [
@@ -42,6 +45,8 @@ def test_what_is_allowed_passes_outside_of_a_notebook_too():
         ("layout", ["A"], f"layout = ['A'] must be {FIELDS['layout'].text}"),
         ("seeds", 3, "seeds = 3 must be a list, such as [3]"),
         ("seeds", [-1], "seed = -1 must be a whole number from 0 to 2147483647"),
+        ("alpha", 1e3, f"alpha = 1000 must be at most 1e-05 in a chapter: {AT_ONCE}"),
+        ("beta", 1.0, f"beta = 1 must be at most 0.0001 in a chapter: {AT_ONCE}"),
     ],
 )
 def test_a_value_that_may_not_be_is_refused(name, given, said):
@@ -83,3 +88,8 @@ def test_days_of_training_are_refused(monkeypatch):
         chapter.afford(runs)
     monkeypatch.setenv("NMPCRL_YES", "1")
     chapter.afford(runs)
+
+
+def test_a_page_without_parameters_refuses_all(session):
+    session("# Parameters\nepisodes = 2\n")
+    assert refusal() == "this chapter has no parameter 'episodes'; it has none"

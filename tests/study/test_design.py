@@ -8,6 +8,7 @@ import pytest
 from nmpcrl.study import Experiment, design, paper
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import MAIN, frozen_arm
+from nmpcrl.study.setup import DECAYS
 
 
 @pytest.fixture(scope="module")
@@ -50,10 +51,15 @@ def test_every_run_of_the_study_has_its_frozen_arm_in_the_study():
     assert {frozen_arm(e) for e in study} <= set(study)
 
 
+MAIN_AXES = {"decay", "layout"}  # which the main table varies itself
+
+
 def base_of(experiment: Experiment, name: str) -> Experiment:
     """The run of the main table that a run of variant `name` is compared with."""
     default = Experiment()
-    changed = {key: getattr(default, key) for key in design.VARIANTS[name].fields if key != "decay"}
+    changed = {
+        key: getattr(default, key) for key in design.VARIANTS[name].fields if key not in MAIN_AXES
+    }
     return replace(experiment, **changed)
 
 
@@ -63,8 +69,21 @@ def test_a_variant_changes_one_thing(name, main_table):
     for experiment in design.variant(name):
         if experiment.learner != "frozen":
             base = base_of(experiment, name)
-            assert differing(experiment, base) == set(variant.fields) - {"decay"}
+            assert differing(experiment, base) == set(variant.fields) - MAIN_AXES
             assert base in main_table
+
+
+@pytest.mark.parametrize("name", design.BASELINES)
+def test_what_is_open_of_des_is_run_on_every_layout_in_both_readings(name, main_table):
+    runs = design.variant(name)
+    learning = [one for one in runs if one.learner != "frozen"]
+    axes = Counter((one.layout, one.decay) for one in learning)
+    assert axes == Counter({(layout, decay): 5 for layout in "ABCDEF" for decay in DECAYS})
+    assert {(one.learner, one.network) for one in learning} == {("DES", name)}
+    assert set(runs) - set(learning) < main_table
+    study = design.whole_study()
+    assert {study[one] for one in learning} == {name}
+    assert {study[one] for one in set(runs) - set(learning)} == {design.MAIN_TABLE}
 
 
 def test_variants_name_departures_that_there_are_and_no_two_are_the_same():

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import pytest
 
-from nmpcrl.study import Experiment, paper, provenance
+from nmpcrl.study import Experiment, machine, paper, provenance
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.provenance import ORIGINAL, changed, identity, key, sources, summary_key
 from nmpcrl.study.setup import LEARNERS
@@ -51,6 +51,12 @@ NUMBERS = [
     ("analysis/metrics.py", "TOUCH = 1e-6", "TOUCH = 1e-5"),
     ("analysis/imitation.py", "FITS = 4000", "FITS = 4001"),
     ("analysis/policy_search.py", "SPREAD = 0.3", "SPREAD = 0.4"),
+    (
+        "learning/learners.py",
+        "    semi_gradient_step,\n",
+        "    auxiliary_step as semi_gradient_step,\n",
+    ),
+    ("learning/updates.py", "import numpy as np", "import jax.numpy as np"),
 ]
 NO_NUMBERS = [
     ("learning/updates.py", '"""The update rules', '"""All update rules'),
@@ -205,3 +211,12 @@ def test_what_a_build_adds_to_a_version_does_not_count(monkeypatch):
     before = key(Experiment("RDES"))
     monkeypatch.setattr(provenance, "_version", lambda name: "1.2+cpu")
     assert key(Experiment("RDES")) == before
+
+
+def test_what_changes_last_digits_is_part_of_the_machine(monkeypatch):
+    for name in machine.SETTINGS:
+        monkeypatch.delenv(name, raising=False)
+    common = machine.fingerprint()
+    assert "settings" not in common
+    monkeypatch.setenv("ATEN_CPU_CAPABILITY", "default")
+    assert machine.fingerprint() == common | {"settings": {"ATEN_CPU_CAPABILITY": "default"}}

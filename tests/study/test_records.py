@@ -381,3 +381,11 @@ def test_the_final_cost_averages_the_last_rollouts_but_never_the_first(cost, exp
 )
 def test_the_status_of_a_step_is_the_worst_of_its_solves(failed, restarts, status):
     assert StepStatus.of(failed=failed, restarts=restarts) is status
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names")
+def test_a_pipe_where_a_run_belongs_is_a_sentence_and_nobody_waits_for_it(tmp_path):
+    os.mkfifo(tmp_path / "run.npz")
+    for read in (Records.load, Records.about):
+        with pytest.raises(DamagedRecords, match="not a run: it is no file"):
+            read(tmp_path / "run.npz")

@@ -1,14 +1,17 @@
 """From names to learners and networks: one registry each, which refuses what it does not know."""
 
 from contextlib import contextmanager
+from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
+from nmpcrl.learning import expected_sarsa
 from nmpcrl.learning.rollout import Persistent
-from nmpcrl.study import Experiment, ParameterError, paper, setup
-from nmpcrl.study.setup import LEARNERS, NETWORKS, controller_of, prepare
+from nmpcrl.study import Experiment, ParameterError, paper, run, setup
+from nmpcrl.study.setup import LEARNERS, NETWORKS, Entry, controller_of, prepare, step_size
 
 
 @contextmanager
@@ -77,7 +80,9 @@ def test_only_a_normalised_network_asks_for_a_solve_before_training(learner):
 
 def test_the_purposes_of_a_seed_draw_from_generators_of_their_own(monkeypatch):
     seen = []
-    monkeypatch.setitem(LEARNERS, "ES", lambda e, controller, rngs: seen.append(rngs))
+    learner = SimpleNamespace(bootstrap=None)
+    entry = Entry(lambda _, __, rngs: (seen.append(rngs), learner)[1])
+    monkeypatch.setitem(LEARNERS, "ES", entry)
     wanted = Experiment(episodes=1)
     prepare(wanted, controller_of(wanted))
     (rngs,) = seen
@@ -85,3 +90,46 @@ def test_the_purposes_of_a_seed_draw_from_generators_of_their_own(monkeypatch):
     assert rngs.network.normal() == np.random.default_rng(children[1]).normal()
     assert rngs.directions.normal() == np.random.default_rng(children[2]).normal()
     assert setup.Generators._fields == ("noise", "network", "directions")
+
+
+@pytest.mark.parametrize("field", ["beta", "zeta", "network"])
+def test_a_learner_that_reads_what_its_entry_does_not_name_is_refused(monkeypatch, field):
+    entry = Entry(lambda e, nmpc, _: expected_sarsa(nmpc, float(bool(getattr(e, field)))))
+    monkeypatch.setitem(LEARNERS, "new", entry)
+    wanted = replace(Experiment(episodes=1), learner="ES")
+    object.__setattr__(wanted, "learner", "new")
+    message = f"learner = 'new' reads {field}: its entry in LEARNERS needs '{field}' in `reads`"
+    with pytest.raises(ParameterError, match=message):
+        prepare(wanted, controller_of(wanted))
+
+
+def test_a_learner_that_holds_a_network_without_saying_so_is_refused(monkeypatch):
+    monkeypatch.setitem(LEARNERS, "DES", replace(LEARNERS["DES"], network=False))
+    wanted = Experiment("DES", episodes=1)
+    with pytest.raises(ParameterError, match="holds a network: its entry in LEARNERS needs"):
+        prepare(wanted, controller_of(wanted))
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_an_entry_names_fields_that_not_all_learners_read(name):
+    optional = {one.name for one in fields(Experiment) if one.metadata["optional"]}
+    assert set(LEARNERS[name].reads) <= optional
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_an_entry_says_how_many_solves_a_step_makes(name):
+    wanted = Experiment(name, episodes=2, steps=70)  # a network is fitted in the second
+    solves = run(wanted).steps["solves"]
+    assert solves[-1] == LEARNERS[name].solves + wanted.values_actions
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_an_entry_says_whether_theta_moves(name):
+    theta = run(Experiment(name, episodes=2, steps=70)).steps["theta"]
+    assert (theta[-1] != theta[0]).any() == LEARNERS[name].moves
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_the_step_size_of_every_learner_of_the_book_is_alpha(name):
+    moves = LEARNERS[name].moves
+    assert step_size(Experiment(name, alpha=3e-7).canonical) == (3e-7 if moves else paper.ALPHA)

@@ -18,6 +18,7 @@ import pytest
 
 from nmpcrl.control import Nmpc
 from nmpcrl.control.solvers import Fatrop
+from nmpcrl.learning import learners
 from nmpcrl.study import (
     Experiment,
     Records,
@@ -34,9 +35,10 @@ from nmpcrl.study.executor import ATTEMPTS, THREADS, Killed
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import key
 from nmpcrl.study.records import Stopped
-from nmpcrl.study.store import folder, name_of, path_of
+from nmpcrl.study.store import folder, is_stored, name_of, path_of
 
 QUICK = Experiment(learner="frozen", episodes=1, steps=3)
+LEARNING = Experiment(learner="ES", episodes=1, steps=3)
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
 
 
@@ -101,6 +103,47 @@ def test_a_run_of_other_versions_is_not_reused(monkeypatch, no_run):
     no_run()
     with pytest.raises(AssertionError, match="trained again"):
         fetch(QUICK)
+
+
+def of_edited_code(monkeypatch) -> Records:
+    """A run that is stored, in which every step of learning was three times as large."""
+    step = learners.semi_gradient_step
+    with monkeypatch.context() as edited:
+        edited.setattr(provenance, "sources_hash", lambda: "of an edit")
+        edited.setattr(
+            learners,
+            "semi_gradient_step",
+            lambda theta, delta, *rest: step(theta, 3 * delta, *rest),
+        )
+        return fetch(LEARNING)
+
+
+def test_a_run_of_edited_code_is_trained_again_when_the_edit_is_reverted(monkeypatch, capsys):
+    honest, wrong = run(LEARNING), of_edited_code(monkeypatch)
+    assert not np.array_equal(wrong.steps["theta"], honest.steps["theta"])
+    assert not is_stored(LEARNING)
+    assert_same_numbers(fetch(LEARNING), honest)
+    assert "holds a run of code that is neither this nor locked" in capsys.readouterr().err
+    path_of(LEARNING).unlink()
+    of_edited_code(monkeypatch)
+    assert_same_numbers(fetch_all([LEARNING], progress=False)[LEARNING], honest)
+
+
+def test_a_run_of_code_that_the_lock_has_or_had_is_read(monkeypatch, no_run, tmp_path):
+    monkeypatch.setattr(provenance, "LOCK", tmp_path / "sources.lock.json")
+    records = fetch(QUICK)
+    provenance.relock()
+    no_run()
+    for edit in ("one", "another"):
+        monkeypatch.setattr(provenance, "sources", lambda edit=edit: {"run.py": edit})
+        monkeypatch.setattr(
+            provenance, "sources_hash", lambda edit=edit: provenance.hash_of([edit])
+        )
+        provenance.relock()
+        assert_same_numbers(fetch(QUICK), records)
+    monkeypatch.setitem(provenance.EPOCHS, "study", 2)
+    provenance.relock()
+    assert not provenance.is_accepted(records.facts["sources"])
 
 
 def test_a_damaged_file_is_set_aside_and_the_run_done_again(runs, capsys):

@@ -21,12 +21,13 @@
 
   /* What a number can mean as it was typed: 2,600 is read with either comma, 20 % as 20 and as 0.2. */
   function meanings(typed, unit) {
-    let text = typed.trim().replaceAll("−", "-").replace(/[·×]/g, "*");
-    text = text.replace(/[⁻⁰¹²³⁴-⁹]+/g, (power) => `^${[...power].map((one) => "-0123456789"["⁻⁰¹²³⁴⁵⁶⁷⁸⁹".indexOf(one)]).join("")}`);
+    let text = typed.trim();
     if (unit && text.endsWith(unit)) text = text.slice(0, -unit.length);
     const share = text.endsWith("%");
     if (share) text = text.slice(0, -1);
-    const read = [text.replace(",", "."), text.replace(/,(?=\d{3}(?!\d))/g, "")].map((one) => formula.value(one, {}));
+    const texts = [text.replace(",", "."), text.replace(/,(?=\d{3}(?!\d))/g, "")].filter((one) => !one.includes(","));
+    const read = texts.map((one) => formula.value(one, {}));
+    if (!read.length) throw new SyntaxError("it has too many commas");
     return share ? [...read, ...read.map((value) => value / 100)] : read;
   }
 

@@ -7,6 +7,12 @@
   };
   const token = /\s*(?:(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\*\*|[-+*/^(),]))/y;
 
+  /* What is typed as it is printed, with a keyboard's signs: 2·10⁻⁷ as 2*10^-7. */
+  function plain(text) {
+    const signs = text.replaceAll("−", "-").replace(/[·×]/g, "*");
+    return signs.replace(/[⁻⁰¹²³⁴-⁹]+/g, (power) => `^${[...power].map((one) => "-0123456789"["⁻⁰¹²³⁴⁵⁶⁷⁸⁹".indexOf(one)]).join("")}`);
+  }
+
   function tokens(text) {
     const found = [];
     token.lastIndex = 0;
@@ -23,7 +29,7 @@
 
   /* The value of `text` for values of its variables, an object by name; throws a SyntaxError. */
   function value(text, variables) {
-    const rest = tokens(text.trim());
+    const rest = tokens(plain(text).trim());
     const next = (...signs) => signs.includes(rest[0]?.sign) && rest.shift().sign;
     const expect = (sign) => next(sign) || fail(`a "${sign}" is missing`);
 

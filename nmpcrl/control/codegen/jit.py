@@ -27,13 +27,16 @@ from nmpcrl import Vector
 from nmpcrl.control.codegen import folder, importing
 from nmpcrl.control.codegen.source import CannotCompile, returns, source
 
-COMPLETE = "complete"  # a file of this name says that everything in its folder is compiled
+COMPLETE = "complete"  # a file that says that everything in its folder is compiled: a checksum
 LOADING = threading.Lock()  # a package that one thread is importing is no package yet
 
 HEADER = """import math
 
 import numpy as np
 from numba import float64, njit, void
+from numba.types import Array
+
+given, given_matrix = (Array(float64, axes, "C", readonly=True) for axes in (1, 2))
 
 
 @njit({result}({arguments}), cache=True, error_model="numpy")
@@ -47,15 +50,15 @@ def compiled(function: ca.Function) -> Callable[..., Any]:
         CannotCompile: numba is missing, or an operation is not known.
     """
     returned = returns(function)
-    sizes = [function.size_in(i) for i in range(function.n_in())]
-    sizes += [] if returned else [function.size_out(i) for i in range(function.n_out())]
-    header = HEADER.format(
-        result="float64" if returned else "void",
-        arguments=", ".join("float64[::1]" if k == 1 else "float64[:, ::1]" for _, k in sizes),
-    )
+    inputs = [function.size2_in(i) for i in range(function.n_in())]
+    outputs = [] if returned else [function.size2_out(i) for i in range(function.n_out())]
+    kinds = ["given" if columns == 1 else "given_matrix" for columns in inputs]
+    kinds += ["float64[::1]" if columns == 1 else "float64[:, ::1]" for columns in outputs]
+    result = "float64" if returned else "void"
+    header = HEADER.format(result=result, arguments=", ".join(kinds))
     name = function.name()
-    result: Callable[..., Any] = getattr(load(name, {"__init__": header + source(function)}), name)
-    return result
+    made: Callable[..., Any] = getattr(load(name, {"__init__": header + source(function)}), name)
+    return made
 
 
 def callable_of(function: ca.Function) -> Callable[..., Any]:
@@ -102,6 +105,7 @@ def load(name: str, texts: Mapping[str, str], notice: str = "") -> ModuleType:
 
     Raises:
         CannotCompile: numba is not installed, or cannot compile this.
+        MemoryError: what is compiled cannot be loaded, though it is as it was written.
         RuntimeError: the texts do not fit each other.
     """
     if numba_version() is None:
@@ -122,6 +126,8 @@ def _load(package: str, texts: Mapping[str, str], notice: str) -> ModuleType:
             return _from_disk(folder.private(find()), package, texts, notice)
         except OSError as error:
             folder.say_once(error, f"machine code is kept {instead} until this process ends")
+        except MemoryError:
+            raise
         except Exception:  # of the text, or of what became of it on the disk: memory will tell
             break
     return _from_memory(package, texts, notice)
@@ -142,9 +148,13 @@ def _from_disk(parent: Path, package: str, texts: Mapping[str, str], notice: str
             raise ImportError("its text is another")
         if (place / COMPLETE).exists():
             return importing.from_folder(package, place)
-    except OSError:
+    except (OSError, MemoryError):
         raise
     except Exception as error:  # whatever a damaged file makes numba raise
+        if _is_as_compiled(place):
+            raise MemoryError(
+                f"{place} is whole and cannot be loaded ({error}): is there too little memory?"
+            ) from error
         print(f"{place} is damaged ({error}) and is compiled again", file=sys.stderr)
         shutil.rmtree(place)
         folder.write(place, texts)
@@ -160,8 +170,23 @@ def _from_disk(parent: Path, package: str, texts: Mapping[str, str], notice: str
             raise OSError(f"{place} was changed while it was compiled") from error
         raise
     with suppress(OSError):  # it is compiled, and the next process compiles it once more
-        (place / COMPLETE).touch()
+        (place / COMPLETE).write_text(_checksum(place))
     return module
+
+
+def _is_as_compiled(place: Path) -> bool:
+    """Whether a folder that is complete holds what was compiled."""
+    complete = place / COMPLETE
+    return complete.is_file() and complete.read_text("utf-8") == _checksum(place)
+
+
+def _checksum(place: Path) -> str:
+    """Of all that is in a folder but `COMPLETE`."""
+    hashed = hashlib.sha256()
+    for path in sorted(place.rglob("*")):
+        if path.is_file() and path.name != COMPLETE:
+            hashed.update(path.relative_to(place).as_posix().encode() + path.read_bytes())
+    return hashed.hexdigest()
 
 
 def _holds(place: Path, texts: Mapping[str, str]) -> bool:

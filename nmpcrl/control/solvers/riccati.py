@@ -101,7 +101,7 @@ class InteriorPoint:
             for state in np.flatnonzero(np.isfinite(limit))
         ]
         self.problem = (  # the first arguments of `kernel.solve`, u_0 free or fixed
-            task.target,
+            task.target.copy(),  # which may be written to, as compiled code wants it
             np.maximum(plant.lower, -UNBOUNDED),
             np.minimum(plant.upper, UNBOUNDED),
             np.reshape(np.transpose(task.discs), (-1, 3)).copy(),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.course import Outcome, choice, exercise, formula, function, number
+from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number
 from nmpcrl.learning.updates import (
     OVERSHOOT,
     auxiliary_step,
@@ -178,32 +178,34 @@ def search(answer: Any) -> Outcome:
             "seed": int(rng.integers(10**6)),
         }
 
-    def behaviour(start: Vector, rounds: int, seed: int) -> tuple[bool, ...]:
-        seen: list[tuple[float, ...]] = []
+    def seen(answer: Any, start: Vector, rounds: int, seed: int) -> dict[str, bool]:
+        tried: list[tuple[float, ...]] = []
+        costs: list[float] = []
 
         def flat(theta: Vector) -> float:
-            seen.append(tuple(theta))
+            tried.append(tuple(theta))
             return float(not np.array_equal(theta, start))
 
         def bowl(theta: Vector) -> float:
-            return float(theta @ theta)
+            costs.append(float(theta @ theta))
+            return costs[-1]
 
-        answer(flat, start, rounds, seed)
-        ends = [answer(bowl, start, rounds, one) for one in (seed, seed, seed + 1)]
-        return (
-            len(set(seen)) > 8 * (rounds - 1),
-            bool(np.array_equal(ends[0], ends[1]) and not np.array_equal(ends[0], ends[2])),
-            max(map(bowl, ends)) <= bowl(start),
-        )
-
-    return function(
-        behaviour,
-        lambda **_: (True, True, True),
-        draw,
-        mistakes={
-            "Every round draws the same steps.": lambda **_: (False, True, True),
-            "The same seed has to give the same result, and another seed another one.": (
-                lambda **_: (True, False, True)
+        stays = np.array_equal(answer(flat, start, rounds, seed), start)
+        ends, least = [], []
+        for one in (seed, seed, seed + 1):
+            costs.clear()
+            ends.append(answer(bowl, start, rounds, one))
+            least.append(min(costs, default=np.inf))
+        return {
+            "Every round draws the same steps.": len(set(tried)) > 8 * (rounds - 1),
+            "The same seed has to give the same result, and another seed another one.": bool(
+                np.array_equal(ends[0], ends[1]) and not np.array_equal(ends[0], ends[2])
             ),
-        },
-    )
+            "It met something better on its way than what it returns: keep the best.": stays
+            and all(float(end @ end) <= low for end, low in zip(ends, least, strict=True)),
+            "What it returns is worse than the start.": all(
+                float(end @ end) <= float(start @ start) for end in ends
+            ),
+        }
+
+    return behaves(answer, seen, draw)

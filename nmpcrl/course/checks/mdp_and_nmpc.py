@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.control import Nmpc
+from nmpcrl.control.task import overlap
 from nmpcrl.course import Outcome, choice, exercise, formula, function, number
 from nmpcrl.study import paper
 
@@ -17,7 +18,6 @@ def distance(answer: Any) -> Outcome:
         answer,
         radius * np.sqrt(1.21),
         unit="m",
-        tolerance=1e-3,
         mistakes={
             radius * 1.21: "The overlap has the square of the distance: take a square root.",
             radius: "That is where the overlap is 0; the NMPC wants it to be -0.21 or less.",
@@ -77,13 +77,12 @@ def apart(answer: Any) -> Outcome:
 
 @exercise
 def penalty(answer: Any) -> Outcome:
-    """Eq. (1.5), the part on obstacles, at random places between and inside them."""
+    """Eq. (1.5), the part on obstacles, among some that are so close that several are charged."""
     task = paper.task()
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
-        nearest = task.obstacles[rng.integers(len(task.obstacles))]
-        place = np.array([nearest.x, nearest.y]) + rng.uniform(-1.6, 1.6, 2)
-        return {"overlaps": task.overlap(np.append(place, 0.0))}
+        x, y = rng.normal(0, 1.1, (2, 4))
+        return {"overlaps": overlap(0.0, 0.0, x, y, task.discs[2])}
 
     def charge(overlaps: Any, *, margin: float = task.margin) -> Any:
         return task.penalty * np.maximum(0, overlaps + margin).sum()
@@ -99,6 +98,9 @@ def penalty(answer: Any) -> Outcome:
             ),
             "The larger of 0 and the rest is taken for each obstacle, before the sum.": (
                 lambda overlaps: task.penalty * max(0, (overlaps + task.margin).sum())
+            ),
+            "Where the margins of two obstacles are entered, both are charged.": (
+                lambda overlaps: task.penalty * max(0, overlaps.max() + task.margin)
             ),
             "The penalty begins before the circles touch: the 0.35 is missing.": (
                 lambda overlaps: charge(overlaps, margin=0.0)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.course import Outcome, choice, exercise, formula, function, number
+from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number
 
 Clock = Callable[[], float]  # makes one call and returns how long it took [s]
 
@@ -139,27 +139,18 @@ def speed_up(answer: Any) -> Outcome:
         size = 2 * int(rng.integers(3, 10)) + 1
         return {"old": np.exp(rng.normal(size=size)), "new": np.exp(rng.normal(size=size))}
 
-    def behaviour(old: Vector, new: Vector) -> tuple[bool, ...]:
+    def seen(answer: Any, old: Vector, new: Vector) -> dict[str, Any]:
         forth, back = answer(old, new), answer(new, old)
-        constant, doubled = answer(3 * new, new), answer(2 * old, new)
-        return (
-            bool(np.isclose(forth * back, 1)),
-            bool(np.isclose(constant, 3)),
-            bool(np.isclose(doubled, 2 * forth)),
-        )
+        return {
+            "Where the old one takes three times as long everywhere, the answer is 3.": np.isclose(
+                answer(3 * new, new), 3
+            ),
+            "Where the old one takes twice as long as before, the answer is twice as large.": (
+                np.isclose(answer(2 * old, new), 2 * forth)
+            ),
+            "Exchanged, it must give the inverse; here each is faster than the other.": np.isclose(
+                forth * back, 1
+            ),
+        }
 
-    return function(
-        behaviour,
-        lambda **_: (True, True, True),
-        draw,
-        mistakes={
-            "Exchanged, it must give the inverse; here each is faster than the other.": (
-                lambda **_: (False, True, True)
-            ),
-            "A factor is asked for: 3 where the old one takes three times as long everywhere, and "
-            "its inverse if they are exchanged.": lambda **_: (False, False, False),
-            "Where the old one takes three times as long everywhere, the answer is 3.": (
-                lambda **_: (True, False, False)
-            ),
-        },
-    )
+    return behaves(answer, seen, draw)

@@ -8,6 +8,7 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.bench import learners
 from nmpcrl.claims import rule
+from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.course import Outcome, choice, exercise, function, number
 from nmpcrl.study import paper
 
@@ -17,7 +18,7 @@ def enough(answer: Any) -> Outcome:
     """The least number of runs that the rule calls reproduced if all of them agree."""
     return number(
         answer,
-        next(n for n in range(1, 100) if rule.read(n, n) == rule.REPRODUCED),
+        next(n for n in range(1, 100) if rule.read(n, n) == REPRODUCED),
         tolerance=1e-3,
         mistakes={
             3: "With 3 of 3 the lower end is 3 / 6.84, below one half.",
@@ -31,9 +32,7 @@ def enough(answer: Any) -> Outcome:
 def missing(answer: Any) -> Outcome:
     """The most of twenty that may be missing if the others say yes."""
     asked = 20
-    reproduced = [
-        gone for gone in range(asked) if rule.read(asked - gone, asked) == rule.REPRODUCED
-    ]
+    reproduced = [gone for gone in range(asked) if rule.read(asked - gone, asked) == REPRODUCED]
     return number(
         answer,
         max(reproduced),

@@ -6,7 +6,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
-from nmpcrl.course import Outcome, choice, exercise, formula, function, number
+from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number
 
 
 @exercise
@@ -31,7 +31,6 @@ def golden(answer: Any) -> Outcome:
     return number(
         answer,
         (1 + 5**0.5) / 2,
-        tolerance=1e-3,
         mistakes={
             1.5: "That is after one step from V = 1: go on, or set V equal on both sides.",
             1.6: "That is after two steps from V = 1: go on, or set V equal on both sides.",
@@ -150,34 +149,24 @@ def residual(answer: Any) -> Outcome:
         gradient = -jacobian.T @ multipliers + (broken == "gradient")
         return {"gradient": gradient, "jacobian": jacobian, "g": g, "multipliers": multipliers}
 
-    def optimal(
-        gradient: Vector,
-        jacobian: Vector,
-        g: Vector,
-        multipliers: Vector,
-        *,
-        sign: bool = True,
-        complementarity: bool = True,
-    ) -> bool:
-        stationary = np.abs(gradient + jacobian.T @ multipliers).max() < 1e-9
-        signed = multipliers.min() >= 0 or not sign
-        complementary = np.abs(multipliers * g).max() < 1e-9 or not complementarity
-        return bool(stationary and g.max() <= 0 and signed and complementary)
-
-    def without(**dropped: Any) -> Any:
-        return lambda **given: optimal(**given, **dropped)
-
-    return function(
-        lambda **given: bool(abs(answer(**given)) < 1e-6),
-        optimal,
-        draw,
-        mistakes={
-            "It is 0 where an inactive constraint has a multiplier, and where one is negative.": (
-                without(sign=False, complementarity=False)
+    def seen(
+        answer: Any, gradient: Vector, jacobian: Vector, g: Vector, multipliers: Vector
+    ) -> dict[str, bool]:
+        found = float(answer(gradient, jacobian, g, multipliers))
+        is_zero = abs(found) < 1e-6
+        missed = {
+            "It is 0 where the gradients do not balance.": (
+                np.abs(gradient + jacobian.T @ multipliers).max() > 1e-9
             ),
+            "It is 0 where a constraint is violated.": g.max() > 0,
+            "It is 0 where a multiplier is negative.": multipliers.min() < 0,
             "It is 0 where a constraint far from active has a multiplier.": (
-                without(complementarity=False)
+                np.abs(multipliers * g).max() > 1e-9
             ),
-            "It is 0 where a multiplier is negative.": without(sign=False),
-        },
-    )
+        }
+        said = {why: not (wrong and is_zero) for why, wrong in missed.items()}
+        return said | {
+            f"At an optimum it gives {found:.3g} instead of 0.": any(missed.values()) or is_zero
+        }
+
+    return behaves(answer, seen, draw, times=40)

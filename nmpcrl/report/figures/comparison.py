@@ -29,7 +29,7 @@ def by_layout(
     """A share of every run, layout by layout and learner by learner, with interquartile means.
 
     Args:
-        runs: of `summary.table`.
+        runs: of `rows.table`.
         values: one a run; infinite ones, and what is not `seen`, are drawn at the edge.
         learners: in the order in which they are drawn.
         label: what the share is of.

@@ -12,12 +12,13 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.analysis.summary import RunSummary, experiment_of
+from nmpcrl.analysis.rows import experiment_of
+from nmpcrl.analysis.summary import Outline
 from nmpcrl.claims.by_runs import RunClaim, Values
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import WHOLE, groups
-from nmpcrl.claims.rule import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report.figures.axes import over_episodes, plain
 from nmpcrl.report.figures.sheet import in_words, sheet
 from nmpcrl.report.figures.style import LIMIT, LOOKS, headed, marked, page, subplots
@@ -175,7 +176,7 @@ def _strips(axes: Axes, claim: RunClaim, here: Values, base: Values) -> None:
 
 def _costs(
     axes: Axes,
-    summaries: Mapping[Experiment, RunSummary],
+    summaries: Mapping[Experiment, Outline],
     here: pd.DataFrame,
     base: pd.DataFrame,
     learners: Iterable[str],
@@ -195,9 +196,7 @@ def _costs(
     axes.legend(fontsize="small", frameon=True, framealpha=0.9, edgecolor="none")  # on the lines
 
 
-def _curves(
-    summaries: Mapping[Experiment, RunSummary], runs: pd.DataFrame
-) -> tuple[Vector, Matrix]:
+def _curves(summaries: Mapping[Experiment, Outline], runs: pd.DataFrame) -> tuple[Vector, Matrix]:
     """After which episodes, and the noise-free costs over theta_init's, shape (runs, rollouts).
 
     What a run did not reach, and a failed rollout, costs more than is drawn.

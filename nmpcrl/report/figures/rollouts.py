@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
-from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.analysis.summary import Outline
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ending
 from nmpcrl.control import Task
@@ -34,15 +34,15 @@ def controls(found: Evidence, layout: str) -> Figure:
     Rollouts whose inputs are not kept, as those of published runs, are left out.
     """
     drawn = _finished(part(found, SHOWN, layout))
-    drawn = drawn.where([summary.actions.size > 0 for summary in drawn.summaries.values()])
+    drawn = drawn.where([summary.actions is not None for summary in drawn.summaries.values()])
     plant = paper.nmpc(layout).plant
     figure, axes = _against_time(drawn, "actions", plant.action_names, 4.2)
     for i, row in enumerate(axes):
         for axis in row:
             axis.axhline(plant.lower[i], **LIMIT)
             axis.axhline(plant.upper[i], **LIMIT)
-    learned = _learned(drawn)
-    outside = sum(metrics.input_violations(d.actions, plant.lower, plant.upper) for d in learned)
+    learned = [one.actions for one in _learned(drawn) if one.actions is not None]
+    outside = sum(metrics.input_violations(one, plant.lower, plant.upper) for one in learned)
     verb = f"{outside} inputs leave" if outside else "all inputs keep within"
     title = f"In {len(learned)} rollouts of RDES and GES, {verb} their bounds"
     return sourced(figure, title if learned else "The inputs of no rollout are kept", drawn)
@@ -121,7 +121,7 @@ def _against_time(
     return figure, axes
 
 
-def _map(axis: Axes, task: Task, runs: Runs[RunSummary], *, names: bool = True) -> None:
+def _map(axis: Axes, task: Task, runs: Runs[Outline], *, names: bool = True) -> None:
     """Obstacles, start, target and trajectories; a mark where each ended."""
     draw_task(axis, task, labels=names)
     for learner in SHOWN:
@@ -133,7 +133,7 @@ def _map(axis: Axes, task: Task, runs: Runs[RunSummary], *, names: bool = True) 
     axis.set(xlim=(task.lower[0], task.upper[0]), ylim=(-3, 6))
 
 
-def _learned(drawn: Evidence) -> list[RunSummary]:
+def _learned(drawn: Evidence) -> list[Outline]:
     """Every run of the paper's two methods."""
     return [summary for e, summary in drawn.summaries.items() if e.learner in LEARNED]
 
@@ -143,7 +143,7 @@ def _finished(found: Evidence) -> Evidence:
     return found.where(found.runs.stopped == Stopped.FINISHED)
 
 
-def _endings(summaries: list[RunSummary]) -> str:
+def _endings(summaries: list[Outline]) -> str:
     """How many rollouts end in which way, the most common first."""
     ends = Counter(
         ending(one.states, one.name.task)

@@ -1,6 +1,7 @@
 """Figures of runs outside the study: another robot, another learner, another claim."""
 
 from collections.abc import Mapping
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis.trials import final_costs
-from nmpcrl.claims.rule import MAJORITY, REPRODUCED, Verdict
+from nmpcrl.claims.rule import MAJORITY
+from nmpcrl.claims.verdict import REPRODUCED, Verdict
 from nmpcrl.control import Task
 from nmpcrl.learning import Rollout
 from nmpcrl.report.figures.axes import below, draw_task, over_episodes
@@ -23,12 +25,13 @@ def trajectories(task: Task, rollouts: Mapping[str, Rollout]) -> Figure:
     """Closed loops without noise among the obstacles, each named with its cost."""
     figure, axes = subplots(height=3.7, tall=3.2)
     draw_task(axes, task)
-    lines: Any = zip(rollouts.items(), ((INK, "-"), (WINE, "--"), (TEAL, "-.")), strict=False)
-    for (name, rollout), (color, style) in lines:
-        label = f"{name}: {rollout.cost:.0f}"
+    for (name, rollout), style, color in zip(
+        rollouts.items(), cycle(("-", "--", "-.", ":")), cycle((INK, WINE, TEAL)), strict=False
+    ):
+        label = f"{name}: {_brief(rollout.cost)}"
         axes.plot(*rollout.states[:, :2].T, color=color, linestyle=style, lw=1.6, label=label)
     least = min(rollouts, key=lambda name: rollouts[name].cost)
-    axes.set_title(f"Lowest cost: {least}, {rollouts[least].cost:.0f}")
+    axes.set_title(f"Lowest cost: {least}, {_brief(rollouts[least].cost)}")
     axes.set(xlabel="x [m]", ylabel="y [m]")
     axes.margins(0.04)
     below(figure, axes.get_legend_handles_labels()[0])
@@ -46,7 +49,7 @@ def costs(rows: pd.DataFrame) -> Figure:
             axes.plot(run.episode, _known(run.cost), label=label, lw=1.1, **look.line)
     medians = final_costs(rows).median()
     least = str(medians.idxmin())
-    axes.set_title(f"{least} ends lowest: {medians[least]:.0f} (median)")
+    axes.set_title(f"{least} ends lowest: {_brief(medians[least])} (median)")
     axes.set_ylabel("cost without noise [-]")
     over_episodes(axes)
     below(figure, axes.get_legend_handles_labels()[0])
@@ -72,6 +75,11 @@ def shares(verdicts: Mapping[Any, Verdict], xlabel: str) -> Figure:
 
 
 BESIDE: dict[str, Any] = {"textcoords": "offset points", "va": "center"}
+
+
+def _brief(cost: float) -> str:
+    """A cost without decimals that say nothing, and with those of a small one."""
+    return f"{cost:.0f}" if abs(cost) >= 100 or not np.isfinite(cost) else f"{cost:.3g}"
 
 
 def _looks(names: Any) -> dict[str, Look]:

@@ -17,6 +17,7 @@ from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import WALL, problem_of
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.records import LAST
+from nmpcrl.study.setup import readers
 
 SCRIPTS = frame.scripts_of(
     "laboratory", *frame.MAP, "random.js", "network.js", "learning.js", "trainer.js", "graph.js",
@@ -84,7 +85,8 @@ def default(name: str) -> Any:
 def setting(name: str) -> dict[str, Any]:
     """What a page needs to know of a field of `Experiment`: its default, and what it may be."""
     one = next(one for one in fields(Experiment) if one.name == name)
-    allowed, read_by = one.metadata["allowed"], one.metadata.get("read_by", LEARNERS)
+    allowed = one.metadata["allowed"]
+    read_by = readers(name) if one.metadata["optional"] else LEARNERS
     found = {"name": name, "default": one.default, "help": one.metadata["help"]}
     found["read_by"] = [learner for learner in LEARNERS if learner in read_by]
     if allowed.choices:

@@ -177,3 +177,23 @@ def test_the_cache_is_where_the_user_wants_it(monkeypatch, chosen):
     places = {"XDG_CACHE_HOME": Path("/somewhere/nmpcrl"), "NMPCRL_CACHE": Path("/here")}
     name = next(iter(chosen), None)
     assert folder.chosen() == places.get(name, Path.home() / ".cache/nmpcrl")
+
+
+@pytest.mark.parametrize("error", [MemoryError(), ImportError("cannot map it")])
+def test_what_is_whole_and_cannot_be_loaded_stays(error, tmp_path, monkeypatch):
+    """A process with too little memory may not take from the others what they have compiled."""
+    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
+    texts = {"__init__": f"answer = 42  # after {type(error).__name__}\n"}
+    jit.load("whole", texts)
+    (complete,) = tmp_path.rglob(jit.COMPLETE)
+    sys.modules.pop(complete.parent.name)
+
+    def fails(*_):
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(jit.importing, "from_folder", fails)
+        with pytest.raises(MemoryError):
+            jit.load("whole", texts)
+    assert complete.is_file()
+    assert jit.load("whole", texts).answer == 42

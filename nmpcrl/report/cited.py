@@ -1,0 +1,71 @@
+"""Numbers that carry where they come from, in the page and for whoever points at them.
+
+`<data value="27" title="diverged: 720 runs published">27</data>`: what stands in `title` names the
+quantity, and two numbers of one quantity are one number, wherever they stand. A test collects them
+from all pages and puts them to `agreement.disagreements`.
+"""
+
+from dataclasses import dataclass
+from html import escape
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.bench.paired import Ratio
+
+
+class Count(NamedTuple):
+    """So many of so many."""
+
+    yes: int
+    of: int
+
+    def __str__(self) -> str:
+        return f"{int(self.yes)} of {int(self.of)}"
+
+    def __format__(self, form: str) -> str:
+        return format(str(self), form)
+
+
+@dataclass(frozen=True)
+class Cited:
+    """A number that carries what it is of into any text."""
+
+    value: Any
+    quantity: str
+
+    def __format__(self, form: str) -> str:
+        return cited(format(self.value, form), self.value, self.quantity)
+
+    def __str__(self) -> str:
+        return format(self)
+
+
+def went_wrong(learner: str, wrong: str, decay: str, layouts: str) -> str:
+    """The quantity of a count of published runs: "DES diverged, noise per step, layout A"."""
+    return f"runs of {learner} that {wrong}, noise per {decay}, {layouts}: published"
+
+
+def cited(text: str, value: Any, quantity: str) -> str:
+    """A number as a page shows it, in Markdown or HTML, with its value and what it is of.
+
+    Args:
+        text: as it is shown, "27 %".
+        value: which that is, to all digits, such as 0.2681.
+        quantity: what it is of, whose, and from where.
+    """
+    exact, what = escape(_exact(value)), escape(quantity)
+    return f'<data value="{exact}" title="{what}">{text}</data>'
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a number, an estimate or a count, and no text that holds one."""
+    known = int | float | np.number | Count | Estimate | Ratio
+    return isinstance(value, known) and not isinstance(value, bool | np.bool_)
+
+
+def _exact(value: Any) -> str:
+    if isinstance(value, Estimate | Ratio):
+        return f"{value.value!r} [{value.low!r}, {value.high!r}]"
+    return str(value) if isinstance(value, Count) else repr(float(value))

@@ -1,0 +1,52 @@
+"""The least value on a box: as a fine grid finds it, on networks and where it is known."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.learning import QNetwork
+from nmpcrl.learning.minimiser import minimiser
+
+LOWER, UPPER = np.array([0.0, -1.0]), np.array([0.6, 1.0])  # of the robot's inputs
+FINE = np.stack(np.meshgrid(*np.linspace(LOWER, UPPER, 201).T), -1).reshape(-1, 2)
+
+
+@pytest.mark.parametrize(
+    "least", [(0.13, 0.42), (0.0, -1.0), (0.6, 1.0), (0.6, 0.0), (0.301, -0.77)]
+)
+def test_the_least_value_of_a_bowl_is_found(least):
+    found = minimiser(lambda points: ((points - least) ** 2).sum(axis=1), LOWER, UPPER)
+    np.testing.assert_allclose(found, least, atol=0.01)
+
+
+def test_what_lies_outside_of_the_box_is_never_asked_for():
+    asked = []
+    minimiser(lambda points: (asked.append(points), points.sum(axis=1))[1], LOWER, UPPER)
+    assert (np.vstack(asked) >= LOWER).all()
+    assert (np.vstack(asked) <= UPPER).all()
+
+
+def test_a_box_may_have_any_number_of_sides():
+    (found,) = minimiser(lambda points: abs(points[:, 0] - 0.3), np.array([-1.0]), np.array([2.0]))
+    assert found == pytest.approx(0.3, abs=0.02)
+
+
+def test_the_best_action_of_a_network_is_that_of_a_fine_grid():
+    """Networks with weights up to three times as large as at the start, in states of the whole box.
+
+    What it misses is a share of how far the values lie apart.
+    """
+    missed = []
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        network = QNetwork(5, rng)
+        network._weights.mul_(float(rng.uniform(0.5, 3)))
+        state = rng.uniform([-3, -3, -np.pi], [9, 9, np.pi])
+
+        def values(actions, network=network, state=state):
+            return network.predict(np.hstack([np.tile(state, (len(actions), 1)), actions]))
+
+        fine = values(FINE)
+        best = values(minimiser(values, LOWER, UPPER)[None])[0]
+        missed.append((best - fine.min()) / np.ptp(fine))
+    assert np.mean(np.array(missed) < 1e-2) >= 0.97
+    assert max(missed) < 0.05
