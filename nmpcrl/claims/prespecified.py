@@ -92,18 +92,18 @@ SINCE = (  # in the order in which they were made
         "C1 depends on the decay, and not C6 alone; no outcome changed.",
     ),
     Decision(
-        "bd39257279",
-        "2026-11-23 03:27",
-        "after the verdicts had been seen, and before those of the new questions were",
+        "04d72040bf",
+        "2026-11-23 20:25",
+        "after the verdicts had been seen, in one commit with those of the new questions",
         "Each claim is judged as the paper makes it: C7 is asked of RDES alone, of which the paper"
         " says it, and C8 of both theorems that are cited; the same of all four learners are W7 and"
         " W9.",
         "C7 is asked of 120 runs and not of 480; no outcome changed.",
     ),
     Decision(
-        "815da09895",
-        "2026-11-23 03:58",
-        "after the verdicts had been seen, and before the learners were timed so",
+        "04d72040bf",
+        "2026-11-23 20:25",
+        "after the verdicts had been seen, in one commit with the new times",
         "A ratio of times is that of the sums over the same steps, so that the times of a table"
         " divide to it; it had been a median of ratios.",
         "C3 had been 0.63 and C4 1.00, on another machine as well; no outcome changed.",
