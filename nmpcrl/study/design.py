@@ -6,6 +6,7 @@ reading of the exploration decay, and seed. The variants change one other thing 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from types import MappingProxyType
 from typing import Any
 
@@ -18,7 +19,10 @@ from nmpcrl.study.sweeps import sweep
 LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too
 SEEDS = tuple(range(10))
 VARIED: dict[str, Any] = {"layout": ("A", "D"), "seed": tuple(range(5))}  # one open, one closing
-FRESH: dict[str, Any] = {"layouts": ("A", "B", "D"), "seeds": tuple(range(5))}
+FRESH: tuple[dict[str, Any], ...] = (  # every layout once, and that of the chapters as they need it
+    {"seeds": (0,)},
+    {"layouts": ("A",), "seeds": tuple(range(5))},
+)
 MAIN_TABLE = "main"
 IMITATING = tuple(name for name in PAPER if LEARNERS[name].network)
 BASELINES = {  # what the paper leaves open of DES, on every layout and in both readings
@@ -89,7 +93,8 @@ def main_table(
 
 def fresh(episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:
     """The part of the main table that `make book` trains on the reader's machine."""
-    return main_table(**FRESH, episodes=episodes)
+    parts = (main_table(**part, episodes=episodes) for part in FRESH)
+    return tuple(dict.fromkeys(chain.from_iterable(parts)))
 
 
 def controls(episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:

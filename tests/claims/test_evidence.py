@@ -54,11 +54,11 @@ def test_of_fresh_runs_all_are_trained_here(known):
 
 
 def test_the_published_runs_that_a_build_trains_again_are_those_of_the_design(monkeypatch):
-    runs = main_table(["ES", "frozen"], ["A", "F"], [0])
+    runs = main_table(["ES", "frozen"], ["A", "F"], [0, 1])
     monkeypatch.setattr(evidence, "load", lambda: published.Published(dict.fromkeys(runs)))
     again = evidence.repeatable(True, learners=["ES"], layouts=["A", "F"], seeds=[0, 1])
     assert set(again) == set(runs) & set(fresh())
-    assert {e.layout for e in again} == {"A"}
+    assert {(e.layout, e.seed) for e in again} == {("A", 0), ("A", 1), ("F", 0)}
     assert evidence.repeatable(True, learners=["ES"], layouts=["A"], seeds=[0], episodes=4) == ()
     assert evidence.repeatable(False, learners=["ES"], layouts=["A"], seeds=[0]) == ()
     with pytest.raises(ParameterError, match="repeat = 'no' must be true or false"):

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import asdict, replace
+from itertools import product
 
 import pytest
 
@@ -42,7 +43,9 @@ def test_what_is_trained_afresh_is_a_part_of_the_main_table_with_every_learner()
     fresh = set(design.fresh())
     assert fresh < set(design.main_table())
     assert {e.learner for e in fresh} == set(MAIN)
-    assert len({e.layout for e in fresh}) >= 3
+    assert {(e.learner, e.layout, e.decay) for e in fresh} == set(
+        product(MAIN, design.LAYOUTS, design.DECAYS)
+    )
     assert len({e.seed for e in fresh}) >= 5
 
 
