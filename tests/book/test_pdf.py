@@ -219,6 +219,22 @@ def test_pictures_and_formulas_are_tagged_with_words(book):
         assert all(words), kind
 
 
+LAST = """() => [...document.querySelectorAll(".bd-article")].flatMap(article => {
+  const chain = [];  // what ends a chapter, from outside in
+  for (let one = article; one; one = one.lastElementChild) chain.push(one);
+  return chain.filter(one => parseFloat(getComputedStyle(one).marginBottom) > 0)
+    .map(one => `${article.parentElement.id}: ${one.outerHTML.slice(0, 80)}`);
+})"""
+
+
+@pytest.mark.book
+def test_no_chapter_ends_in_a_margin_that_could_begin_an_empty_page(site, browser):
+    with browser.new_page() as tab:
+        tab.emulate_media(media="print")
+        tab.goto((site.parent / "pdf/book.html").as_uri())
+        assert tab.evaluate(LAST) == []
+
+
 @pytest.mark.book
 def test_no_page_is_blank_and_their_number_is_sane(site, texts):
     assert all(len(text.split()) > 15 for text in texts)
