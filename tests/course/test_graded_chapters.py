@@ -99,8 +99,8 @@ def test_nbgrader_gives_the_same_points(nbgrader, tmp_path):
     called(nbgrader, folder, "export", "--to", str(tmp_path / "theirs.csv"))
 
     shutil.rmtree(folder / "submitted")
-    every = [m for marks in grade(tmp_path / "in", folder, Limits()) for m in marks]
-    marks = [m for m in every if m.points is not None]
+    given = [m for marks in grade(tmp_path / "in", folder, Limits()) for m in marks]
+    marks = [m for m in given if m.points is not None]
     checks = {one.parts["check"][0].id: one.number for one in every if one.parts["check"]}
     with sqlite3.connect(folder / "gradebook.db") as book:
         theirs = {(who, checks[cell]): score for who, cell, score in book.execute(SCORES)}
