@@ -114,7 +114,7 @@ def _ended(words: list[str], log: int, work: Path, limits: Limits, until: float)
                 why = said[NO_MEMORY]
             time.sleep(SETTLE)
     finally:
-        _end(child)
+        _end(child, work.parent)
     code = child.returncode
     return why or said.get(code, f"it ended the process, with code {code}")
 
@@ -148,9 +148,19 @@ def _memory(pid: int) -> int:
     return total
 
 
-def _end(child: "subprocess.Popen[bytes]") -> None:
+def _strays(home: Path) -> list[psutil.Process]:
+    """Processes that began with the environment of a notebook, wherever they have gone since."""
+    found = []
+    for one in psutil.process_iter():
+        with contextlib.suppress(psutil.Error, OSError):
+            if one.environ().get("IPYTHONDIR") == str(home):
+                found.append(one)
+    return found
+
+
+def _end(child: "subprocess.Popen[bytes]", home: Path) -> None:
     """End a process, its group, and those that left the group."""
-    for one in _family(child.pid)[1:]:
+    for one in [*_family(child.pid)[1:], *_strays(home)]:
         with contextlib.suppress(psutil.Error):
             one.kill()
     with contextlib.suppress(ProcessLookupError, PermissionError):

@@ -46,11 +46,13 @@ def sit(steps: list[Step], asked: set[str], log: TextIO, cell: int, *, restored:
     """Execute the cells in their order; an error ends a cell, and not the notebook."""
     shell: Any = InteractiveShell.instance()
     shell.history_manager.enabled = False
-    home, names = Path.cwd(), shell.user_ns
+    home, names, process = Path.cwd(), shell.user_ns, os.getpid()
     ours = dict(names)  # as the chapter last bound them
     for step, following in zip(steps, [*steps[1:], END], strict=True):
         before = dict(names)
         error, right = _executed(shell, step, cell)
+        if os.getpid() != process:
+            os._exit(0)  # the cell was left by a copy of the process, which must not go on
         if not step.theirs:
             ours |= {name: v for name, v in names.items() if before.get(name, before) is not v}
         other = _rebound(names, ours) - asked if step.theirs else set()

@@ -3,6 +3,8 @@
 import time
 from dataclasses import replace
 
+import psutil
+import pytest
 from small_course import ASKED, solved_by_student
 
 from nmpcrl.course import confined, judging
@@ -56,6 +58,42 @@ def test_files_are_written_in_a_folder_that_is_thrown_away(submission, tmp_path,
     assert sat.ends["two-answer"]["error"][0] == "ZeroDivisionError"
     assert list(tmp_path.joinpath("here").iterdir()) == []
     assert edition_files(chapter) == {"of_the_chapter.txt", "published"}
+
+
+DAEMON = """import os, time
+from pathlib import Path
+if not os.fork():
+    os.setsid()
+    if os.fork():
+        os._exit(0)
+    os.chdir("/")
+    Path({file!r}).write_text(str(os.getpid()))
+    time.sleep(600)
+os.wait()
+while not Path({file!r}).exists() or not Path({file!r}).read_text():
+    time.sleep(0.01)
+"""
+
+
+def test_a_process_that_left_the_notebook_ends_with_it(submission, tmp_path):
+    file = tmp_path / "daemon"
+    chapter, handed = submission(solved_by_student(one=DAEMON.format(file=str(file))))
+    confined.run(chapter, handed.steps, Limits(), time.monotonic() + 60)
+    left = int(file.read_text())
+    until = time.monotonic() + 5
+    while psutil.pid_exists(left) and psutil.Process(left).status() != psutil.STATUS_ZOMBIE:
+        assert time.monotonic() < until, "the daemon goes on"
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["if os.fork(): os._exit(0)", "if os.fork(): time.sleep(1); os._exit(0)"],
+)
+def test_a_copy_that_goes_on_for_its_process_costs_the_exercise_that_made_it(line, submission):
+    chapter, handed = submission(solved_by_student(one=f"import os, time\n{line}"))
+    losses = judging.judged(chapter, handed, Limits())
+    assert [name for name in ASKED if losses[name]] == ["one"]
 
 
 def edition_files(chapter) -> set[str]:
