@@ -91,7 +91,7 @@ def test_a_process_that_left_the_notebook_ends_with_it(submission, tmp_path):
     ["if os.fork(): os._exit(0)", "if os.fork(): time.sleep(1); os._exit(0)"],
 )
 def test_a_copy_that_goes_on_for_its_process_costs_the_exercise_that_made_it(line, submission):
-    chapter, handed = submission(solved_by_student(one=f"import os, time\n{line}"))
+    chapter, handed = submission(solved_by_student(one=f"import os, time\nroot_of_one = 2\n{line}"))
     losses = judging.judged(chapter, handed, Limits())
     assert [name for name in ASKED if losses[name]] == ["one"]
 
