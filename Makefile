@@ -15,7 +15,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book pdf course smoke chapter lab study bench test test-site test-lab test-course test-fast check locks clean anew
+.PHONY: help book pdf course smoke chapter lab study bench test test-site test-lab test-course test-clusters test-fast check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -59,6 +59,9 @@ test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; n
 
 test-course: .venv/ready  ## Run every notebook of the course, as students and as teachers get it, and grade it
 	@$(PYTEST) -m course
+
+test-clusters: .venv/ready  ## The programs for clusters against a SLURM, which it installs as root, and an operator
+	@$(if $(filter-out 0,$(shell id -u)),sudo) .ci/clusters
 
 test-fast: .venv/ready  ## The fast tests: no book, no training
 	@$(BIN)/python -m pytest -m "not slow and not book and not slurm and not lab and not course"

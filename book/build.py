@@ -12,7 +12,8 @@ Each build has its own place, in the last column, and six steps, each a function
               the machine to itself. A build without `book/published` ends here, too
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
-              the published ones end the build, and so do verdicts, as `claims.agreement` says
+              the published ones end the build, and so do verdicts, as `claims.agreement` says.
+              What the live figures solve with is compiled meanwhile
 4. `execute`  the chapters with papermill, the exercises solved, two at a time, into PLACE/executed
 5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says, exercises
               unsolved, as `questions` says, the scripts of live figures, as `live` says, and
@@ -206,6 +207,27 @@ def require_published() -> None:
         published.load()
     except published.Damaged as error:
         raise Failure(str(error)) from error
+
+
+@contextmanager
+def compiling_for_pages() -> Iterator[None]:
+    """Compile what live figures solve with beside other work: two chapters would wait for it."""
+    with ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn")) as pool:
+        compiled = pool.submit(compile_for_pages)
+        yield
+        compiled.result()
+
+
+def compile_for_pages() -> None:
+    """Compile that module, unless it is kept; where it cannot be had, the figures say so."""
+    from nmpcrl.control.codegen.source import CannotCompile
+    from nmpcrl.learning import browser
+    from nmpcrl.study import Experiment
+    from nmpcrl.study.setup import controller_of
+
+    nmpc = controller_of(Experiment()).nmpc
+    with suppress(CannotCompile):
+        browser.module(nmpc.plant, nmpc.task)
 
 
 def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
@@ -456,7 +478,8 @@ def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool)
         shutil.rmtree(place / "html", ignore_errors=True)
         mirror(place, announcement)
         wanted = {n: tuple(dict.fromkeys(one for need in needs for one in need[n])) for n in NEEDS}
-        train(wanted["experiments"], wanted["summaries"])
+        with compiling_for_pages():
+            train(wanted["experiments"], wanted["summaries"])
         measure(wanted["beforehand"])
         execute_all(place, jobs)
         dress(place / "src", jobs)

@@ -17,6 +17,10 @@ from click.testing import CliRunner
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from papermill.cli import _resolve_type
 
+from nmpcrl.control.codegen.source import CannotCompile
+from nmpcrl.learning import browser
+from nmpcrl.study import paper
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -294,6 +298,20 @@ def test_the_chapter_that_judges_times_asks_only_for_theirs_beforehand():
     (call,) = needs["beforehand"]
     assert (call.func.__name__, call.args) == ("read_or_measure", ("smoke",))
     assert call.keywords == {"only": ["learning steps"], "calm": True}
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_what_live_figures_solve_with_is_compiled_ahead_if_it_can_be(known, monkeypatch):
+    asked = []
+
+    def module(plant, task):
+        asked.append((plant.n, tuple(task.start)))
+        if not known:
+            raise CannotCompile("tan")
+
+    monkeypatch.setattr(browser, "module", module)
+    build.compile_for_pages()
+    assert asked == [(3, paper.START)]
 
 
 def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):
