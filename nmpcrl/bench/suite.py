@@ -19,7 +19,7 @@ from nmpcrl.bench.paired import IDLE
 from nmpcrl.bench.processes import PROCESSES, at_once, first_calls, time_learners_afresh, whole_runs
 from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
-from nmpcrl.study import paper, place, provenance, store
+from nmpcrl.study import limits, paper, place, provenance, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import OneOf
@@ -195,6 +195,7 @@ def _empty() -> Bench:
 
 def _measured(kept: Bench, stages: Iterable[Stage], length: str, progress: bool) -> Bench:
     """`kept` with these stages measured; each is stored as soon as it is."""
+    limits.need_numba("what is measured is the machine code that it compiles")
     store.check_folder()
     bar = tqdm(list(stages), "benchmark", disable=not progress, leave=False)
     for name, stage in bar:

@@ -20,6 +20,7 @@ from nmpcrl.study import paper, provenance, store
 from nmpcrl.study.atomic import write_json
 from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.limits import need_numba
 from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import Whole
 from nmpcrl.study.place import check_folder
@@ -111,9 +112,11 @@ def sweep(problems: int, *, workers: int | None = None, progress: bool = True) -
     Raises:
         ParameterError: it is no number of problems.
         StoreError: the table could not be kept; nothing is solved.
+        Refusal: numba is not installed, and riccati solves nothing without it.
         RuntimeError: riccati could not be compiled, so that another solver would have been judged.
     """
     problems = PROBLEMS.check("problems", problems)
+    need_numba("a sweep is of riccati, which it compiles")
     check_folder()
     began, total = time.perf_counter(), Tally()
     compile_ahead([Experiment()])

@@ -25,12 +25,14 @@ def train(yes: bool, **fields: Any) -> None:
     from nmpcrl.commands.progress import fetched
     from nmpcrl.report.run import verdict
     from nmpcrl.study import Experiment
-    from nmpcrl.study.limits import estimate
+    from nmpcrl.study.limits import estimate, need_numba
     from nmpcrl.study.store import check_folder, path_of, size_of
 
     experiment = Experiment(**fields)
     path = path_of(experiment)
     if not path.is_file():
+        if experiment.box == "soft":
+            need_numba("only riccati, which it compiles, keeps to a soft box")
         estimate([experiment]).refuse(sure=yes or None, lift="--yes")
         check_folder(size_of(experiment))
     records = fetched(experiment)

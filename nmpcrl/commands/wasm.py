@@ -35,6 +35,10 @@ def wasm(of_plant: str, of_task: str | None, out: Path) -> None:
     Example:
       nmpcrl wasm --plant my_robot:plant --task my_robot:task --out robot.wasm
     """
+    from nmpcrl.study.limits import need_numba
+
+    need_numba("its LLVM compiles to WebAssembly")
+
     from nmpcrl.control import Plant, Task
     from nmpcrl.control.codegen.browser import FUNCTIONS
     from nmpcrl.control.codegen.source import CannotCompile

@@ -5,7 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.parameters import ParameterError, Refusal
+from nmpcrl.study.provenance import environment
 from nmpcrl.study.setup import LEARNERS, NETWORKS
 
 HOURS = 24.0  # of one core, that are begun without asking; the whole study takes about 5
@@ -112,3 +113,16 @@ def _size(experiment: Experiment) -> str:
     """What makes a run long and large."""
     e = experiment
     return f"episodes = {e.episodes}, steps = {e.steps} and horizon = {e.horizon}"
+
+
+def need_numba(why: str) -> None:
+    """Say before any work what would end it.
+
+    Args:
+        why: what needs machine code, as a clause.
+
+    Raises:
+        Refusal: numba is not installed.
+    """
+    if environment()["numba"] == "absent":
+        raise Refusal(f"numba is not installed, and {why}: `pip install numba`")

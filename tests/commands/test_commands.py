@@ -1,5 +1,6 @@
 """The command `nmpcrl`, used as a user would, on runs of a few short episodes."""
 
+import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -13,7 +14,7 @@ from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.commands import main
-from nmpcrl.study import Experiment, cluster, design, paper, sweep
+from nmpcrl.study import Experiment, cluster, design, limits, paper, sweep
 from nmpcrl.study.setup import LEARNERS
 from nmpcrl.study.sweeps import FIELDS
 
@@ -378,3 +379,24 @@ def test_a_study_without_numba_is_refused_in_a_sentence(monkeypatch, tmp_path):
     refused = CliRunner().invoke(main, ["verify", "--sample", "1"])
     assert refused.exit_code == 1
     assert "Error: numba is not installed, and without it riccati" in refused.output
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("bench", "--again", "--short"),
+        ("bench", "--sweep", "20"),
+        ("wasm",),
+        ("train", "--box", "soft", "--episodes", "1"),
+    ],
+    ids=" ".join,
+)
+def test_what_needs_machine_code_says_so_at_once_without_numba(words, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    monkeypatch.setattr(limits, "environment", lambda: {"numba": "absent"})
+    refused = CliRunner().invoke(main, words)
+    assert refused.exit_code == 1
+    (sentence,) = refused.output.strip().splitlines()
+    assert re.fullmatch(r"Error: numba is not installed, and .+: `pip install numba`", sentence)
+    assert not list(tmp_path.iterdir())
