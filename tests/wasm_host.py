@@ -25,7 +25,7 @@ NO_FINALIZER = ctypes.cast(None, ctypes.CFUNCTYPE(None, ctypes.c_void_p))
 @cache
 def machine_code(name: str) -> Any:
     """A function of `math` that wasmtime can call without Python in between."""
-    function, two = getattr(math, name), name == "pow"
+    function, two = getattr(math, name), name in ("atan2", "pow")
 
     if two:
 

@@ -23,6 +23,7 @@ define {result} @{name}({arguments}) {{
   store ptr null, ptr %error
   %bottom = load i32, ptr @bottom
   store i32 %bottom, ptr @heap
+  store i32 0, ptr @last
   %status = call i32 @"{symbol}"(ptr %result, ptr %error, {arguments})
   %failed = icmp ne i32 %status, 0
   br i1 %failed, label %fails, label %returns

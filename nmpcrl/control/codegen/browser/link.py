@@ -12,7 +12,10 @@ from dataclasses import dataclass
 
 PAGE = 65_536  # bytes of a page of memory
 STACK = 65_536  # bytes
-FUNCTIONS = ("cos", "log", "pow", "sin")  # what a module may import, from "env"
+FUNCTIONS = frozenset(  # what a module may import, from "env": JavaScript's Math has them
+    ("acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cos", "cosh", "exp", "expm1")
+    + ("log", "log1p", "pow", "sin", "sinh", "tan", "tanh")
+)
 
 MAGIC = b"\0asm\1\0\0\0"
 CUSTOM, TYPE, IMPORT, FUNCTION, MEMORY, GLOBAL, EXPORT, CODE, DATA, DATA_COUNT = (

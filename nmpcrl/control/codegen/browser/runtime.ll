@@ -1,10 +1,11 @@
 ; What numba's code calls and a browser does not have. Sizes are 64 bit as in numba, addresses 32.
 ;
-; Memory: [stack | constants | what the host reserves | scratch, given back at each call | end].
+; Memory: [stack | constants | what the host reserves | scratch, whole at the next call | end].
 
 @bottom = global i32 0   ; where scratch begins; `link` sets both
 @ceiling = global i32 0
 @heap = global i32 0     ; the first free byte of scratch
+@last = global i32 0     ; the array that ends there, or 0
 @fault = global i32 0    ; why a call was ended: 1 no memory, 2 a size, 3 an error of the function
 
 declare void @llvm.trap()
@@ -56,7 +57,10 @@ define i32 @why() {
   ret i32 %fault
 }
 
-; An array of numba's: { references, destructor, its argument, data, size }, and then the data.
+; An array of numba's: { references, destructor, its argument, data, size }, then our own two, the
+; array before it and whether it is given back, and then the data.
+%array_info = type { i64, ptr, ptr, ptr, i64, i32, i32 }
+
 define noalias ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %alignment) noinline {
   %from = load i32, ptr @heap
   %data = call i32 @after(i32 %from, i64 48)
@@ -64,18 +68,45 @@ define noalias ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %alignment) noinlin
   store i32 %next, ptr @heap
   %info = inttoptr i32 %from to ptr
   %array = inttoptr i32 %data to ptr
-  %destructor = getelementptr { i64, ptr, ptr, ptr, i64 }, ptr %info, i32 0, i32 1
-  %content = getelementptr { i64, ptr, ptr, ptr, i64 }, ptr %info, i32 0, i32 3
-  %length = getelementptr { i64, ptr, ptr, ptr, i64 }, ptr %info, i32 0, i32 4
+  %destructor = getelementptr %array_info, ptr %info, i32 0, i32 1
+  %content = getelementptr %array_info, ptr %info, i32 0, i32 3
+  %length = getelementptr %array_info, ptr %info, i32 0, i32 4
   store i64 1, ptr %info
   store ptr null, ptr %destructor
   store ptr %array, ptr %content
   store i64 %size, ptr %length
+  %before = getelementptr %array_info, ptr %info, i32 0, i32 5
+  %free = getelementptr %array_info, ptr %info, i32 0, i32 6
+  %last = load i32, ptr @last
+  store i32 %last, ptr %before
+  store i32 0, ptr %free
+  store i32 %from, ptr @last
   ret ptr %info
 }
 
-; Scratch is given back as a whole.
-define void @NRT_MemInfo_call_dtor(ptr %info) alwaysinline {
+; Nobody refers to an array any more. Scratch ends before all such arrays at its end.
+define void @NRT_MemInfo_call_dtor(ptr %info) noinline {
+begin:
+  %given = getelementptr %array_info, ptr %info, i32 0, i32 6
+  store i32 1, ptr %given
+  br label %look
+look:
+  %last = load i32, ptr @last
+  %none = icmp eq i32 %last, 0
+  br i1 %none, label %done, label %ask
+ask:
+  %array = inttoptr i32 %last to ptr
+  %free = getelementptr %array_info, ptr %array, i32 0, i32 6
+  %state = load i32, ptr %free
+  %in_use = icmp eq i32 %state, 0
+  br i1 %in_use, label %done, label %drop
+drop:
+  %before = getelementptr %array_info, ptr %array, i32 0, i32 5
+  %next = load i32, ptr %before
+  store i32 %next, ptr @last
+  store i32 %last, ptr @heap
+  br label %look
+done:
   ret void
 }
 
