@@ -4,6 +4,7 @@ import ast
 import re
 from pathlib import Path
 
+from nmpcrl import control
 from nmpcrl.study.departures import DEPARTURES
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -120,3 +121,17 @@ def test_every_departure_is_cited_where_it_is_made():
 def test_every_citation_of_a_departure_exists():
     for path in where_departures_are_cited():
         assert cited(path.read_text()) <= set(DEPARTURES), path
+
+
+def test_thresholds_and_the_controllers_face_are_asked_and_not_what_lies_behind_them():
+    behind = {
+        "claims/own_claims.py": "nmpcrl.claims.paper_claims",
+        "report/live/problem.py": "nmpcrl.control.",
+    }
+    wrong = {
+        path: found
+        for path, inner in behind.items()
+        if (found := {n for n in imports(ROOT / "nmpcrl" / path) if n.startswith(inner)})
+        - {f"nmpcrl.control.{name}" for name in control.__all__}
+    }
+    assert not wrong

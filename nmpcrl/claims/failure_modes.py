@@ -1,6 +1,6 @@
 """Failure modes: why a run went wrong, and how its last rollout ended, read off its summary.
 
-A run went wrong if it was stopped or diverged in training (`paper_claims.divergence`), or if its
+A run went wrong if it was stopped or diverged in training (`thresholds.divergence`), or if its
 final noise-free cost is above theta_init's by more than `BETTER`. Its cost rose between the last
 rollout without noise that was not above theta_init's by so much and the first that was; where none
 was, in its last episodes. In these some ten episodes the mechanisms are looked for in the order of
@@ -21,7 +21,7 @@ import pandas as pd
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.claims.paper_claims import BETTER, divergence, was_stopped
+from nmpcrl.claims.thresholds import BETTER, divergence, was_stopped
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper

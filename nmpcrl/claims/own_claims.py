@@ -1,6 +1,6 @@
 """What we add to the paper: learners that it does not have, compared with those that it has.
 
-Decided as the paper's claims are, by the thresholds of `paper_claims` and the rule of `rule`, and
+Decided as the paper's claims are, by `thresholds` and the rule of `rule`, and
 fixed with them before they were put to the study. A claim is judged wherever its learner was run.
 """
 
@@ -13,8 +13,8 @@ import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, probability_of_improvement
 from nmpcrl.claims.by_runs import AtMost, RunClaim, Values
-from nmpcrl.claims.paper_claims import BETTER, SAME_COST, cost_difference, cost_reduction
 from nmpcrl.claims.rule import Observations, Paths, arms, median, shown
+from nmpcrl.claims.thresholds import BETTER, SAME_COST, cost_difference, cost_reduction
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Verdict
 from nmpcrl.study.experiment import PAPER
 

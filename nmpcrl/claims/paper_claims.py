@@ -1,15 +1,10 @@
 """The paper's claims, one object each: a question, numbers, a border and the sentences about them.
 
-The thresholds below, and the rule in `rule` by which the answers of many runs become a verdict,
-were fixed while the study was being trained and before any claim was put to it, and are
-not to be moved after. A first study, of two seeds in layout A, had been seen by then.
-# departure P
-
-A run that got stuck, hit an obstacle, failed or left the box answers like any other: its cost is
-what it is, and infinite where a solve failed or training had to be stopped.
+Where a border lies is said in `thresholds`, and how the answers of many runs become a verdict in
+`rule`.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
@@ -17,41 +12,36 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.analysis import metrics
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.rows import THETA, experiment_of
 from nmpcrl.analysis.summary import SIZES
 from nmpcrl.claims.assumptions import TheoremClaim
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values, beside
 from nmpcrl.claims.rule import CELL, Assumption, Claim, Observations, Paths, arms, median, shown
+from nmpcrl.claims.thresholds import (
+    BETTER,
+    DIVERGED,
+    HALF,
+    MORE_ACCURATE,
+    NEAR_HALF,
+    NEAR_SAME_TIME,
+    SAME_COST,
+    SAME_PATH,
+    SAME_TIME,
+    UNSTABLE,
+    cost_difference,
+    cost_reduction,
+    divergence,
+    instability,
+    late_cost_range,
+    path_distance,
+    training_cost_ratio,
+    was_stopped,
+)
 from nmpcrl.claims.timing import TimeClaim
 from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
-from nmpcrl.study.experiment import PAPER, Experiment
+from nmpcrl.study.experiment import PAPER
 from nmpcrl.study.layouts import ARRIVED
-from nmpcrl.study.records import Column, Records, Stopped
-from nmpcrl.study.store import Runs
-
-# A run diverged if it had to be stopped, or if its training cost over the last 20 episodes has a
-# median above this multiple of the frozen arm's under the same noise.
-DIVERGED = 1.5
-# A run is unstable if it diverged, or if its noise-free cost ranges over more than this share of
-# theta_init's in the second half of training.
-UNSTABLE = 0.05
-# "Half the time" and "the same time": the ratio of the time of a step to that of ES.
-HALF = (0.4, 0.6)
-SAME_TIME = (0.9, 1.1)
-# Two policies are the same if their trajectories without noise stay this close [m] and their costs
-# differ by at most this share.
-SAME_PATH = 0.25
-SAME_COST = 0.01
-# theta makes the network more accurate if the held-out error falls to this multiple or below.
-MORE_ACCURATE = 0.8
-# Learning beats the frozen theta if the noise-free cost falls by at least this share.
-BETTER = 0.01
-
-# A ratio of times is near what is claimed, and the claim partly reproduced, within these.
-NEAR_HALF = (0.0, 1.0)
-NEAR_SAME_TIME = (0.8, 1.25)
 
 SOLVER = "ipopt"  # the paper's, with which C3 and C4 are judged
 TIMED: dict[str, Any] = {
@@ -61,91 +51,6 @@ TIMED: dict[str, Any] = {
     "test": "ratio of the sums over steps taken in turn, with its interval; see `timing`",
 }
 UP_TO = 60  # borders at which a claim is decided once more
-
-
-# Numbers of runs, one a row of `rows.table`
-
-
-def was_stopped(runs: pd.DataFrame) -> pd.Series:
-    """Whether training had to be stopped; False for a run that is missing."""
-    return runs.stopped.notna() & (runs.stopped != Stopped.FINISHED)
-
-
-def training_cost_ratio(runs: pd.DataFrame) -> pd.Series:
-    """Training cost over the frozen arm's; infinite where the run was stopped."""
-    return runs.cost_ratio.mask(was_stopped(runs), np.inf)
-
-
-def divergence(runs: pd.DataFrame) -> pd.Series:
-    """Which runs diverged (see `DIVERGED`); missing where there is nothing to compare them with."""
-    ratio = training_cost_ratio(runs)
-    return (ratio > DIVERGED).astype("boolean").where(ratio.notna())
-
-
-def late_cost_range(runs: pd.DataFrame) -> pd.Series:
-    """Range of the noise-free cost over theta_init's; infinite where the run diverged.
-
-    nan where it is not known whether it diverged.
-    """
-    gone = divergence(runs)
-    return runs.late_cost_range.mask(gone.fillna(False).astype(bool), np.inf).where(gone.notna())
-
-
-def instability(runs: pd.DataFrame) -> pd.Series:
-    """Which runs are unstable (see `UNSTABLE`); missing where that is not known."""
-    numbers = late_cost_range(runs)
-    return (numbers > UNSTABLE).astype("boolean").where(numbers.notna())
-
-
-def cost_reduction(runs: pd.DataFrame) -> pd.Series:
-    """Share of theta_init's noise-free cost by which each run's is lower in the end.
-
-    Minus infinity where a rollout failed, and where training had to be stopped.
-    """
-    return (1 - runs.final_cost / runs.initial_cost).mask(was_stopped(runs), -np.inf)
-
-
-def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
-    """Share of the reduction that is possible in its layout that each run achieves in the end.
-
-    1 is as good as what is possible and 0 as theta_init; nan where nothing is known to be possible.
-
-    Args:
-        runs: of `rows.table`.
-        possible: by which share of theta_init's noise-free cost it can be lowered, by layout.
-    """
-    known = {layout: share for layout, share in possible.items() if share > 0}
-    return cost_reduction(runs) / runs.layout.map(known).astype(float)
-
-
-def cost_difference(first: pd.DataFrame, second: pd.DataFrame) -> pd.Series:
-    """Final noise-free cost of the first arm minus the second's, in shares of theta_init's.
-
-    Two that failed cost the same.
-    """
-    more = (first.final_cost - second.final_cost) / first.initial_cost
-    return more.where(first.final_cost != second.final_cost, 0.0)
-
-
-def path_distance(first: Column | None, second: Column | None) -> float:
-    """Largest distance [m] of two trajectories at the same time; nan where one is missing."""
-    if first is None or second is None:
-        return np.nan
-    return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))
-
-
-def diverged(study: Runs[Records], experiment: Experiment, records: Records) -> bool:
-    """Whether a run is known to have diverged: see `DIVERGED`, and `divergence` for many."""
-    frozen = {name: getattr(experiment, name) for name in CELL}
-    (arm,) = study.select(learner="frozen", **frozen).values()
-    ratio = metrics.cost_ratio(*(metrics.training_cost(one) for one in (records, arm)))
-    runs = pd.DataFrame({"stopped": [records.facts["stopped"]], "cost_ratio": [ratio]})
-    return bool(divergence(runs).fillna(False).iloc[0])
-
-
-def unstable(study: Runs[Records], experiment: Experiment, records: Records) -> bool:
-    """Whether a run is known to be unstable: see `UNSTABLE`, and `instability` for many."""
-    return diverged(study, experiment, records) or metrics.late_cost_range(records) > UNSTABLE
 
 
 # C1, from Fig. 1

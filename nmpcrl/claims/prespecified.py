@@ -17,11 +17,11 @@ from typing import Any
 
 import nmpcrl
 from nmpcrl.analysis import metrics
-from nmpcrl.claims import paper_claims, rule
+from nmpcrl.claims import rule, thresholds
 
 ROOT = Path(nmpcrl.__file__).parents[1]
 HOMES = {  # where the thresholds stand, and the numbers of the rule for shares
-    paper_claims: (
+    thresholds: (
         "DIVERGED",
         "UNSTABLE",
         "HALF",

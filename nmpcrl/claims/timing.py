@@ -1,7 +1,7 @@
 """How a ratio of times becomes a verdict, on a machine that may be busy.
 
 The constants were fixed by the reasons below, before anything was judged with them; where a claim's
-borders lie was fixed with all thresholds, in `paper_claims`.
+borders lie was fixed with all thresholds, in `thresholds`.
 
 The interval of the ratio (`bench.paired`) decides, and it has to lie on one side of every border:
 

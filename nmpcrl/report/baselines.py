@@ -2,9 +2,9 @@
 
 import pandas as pd
 
-from nmpcrl.claims.paper_claims import divergence
 from nmpcrl.claims.robustness import groups, variant_changes
 from nmpcrl.claims.rule import Paths, arms
+from nmpcrl.claims.thresholds import divergence
 from nmpcrl.report.cited import Count
 from nmpcrl.report.text import SURE, listed
 from nmpcrl.study import design

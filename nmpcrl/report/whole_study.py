@@ -24,7 +24,7 @@ def went_wrong(wrong: Callable[[pd.DataFrame], pd.Series], learners: Sequence[st
     """In how many runs of the published main table each learner went wrong.
 
     Args:
-        wrong: which runs of a table did: `paper_claims.divergence` or `instability`.
+        wrong: which runs of a table did: `thresholds.divergence` or `instability`.
         learners: of which each has as many runs.
 
     Returns:

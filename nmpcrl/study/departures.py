@@ -153,7 +153,7 @@ DEPARTURES = {
     ),
     "P": Departure(
         gap="'Diverges', 'unstable' and 'the same policy' are not defined.",
-        reading="The thresholds at the top of `paper_claims.py` and the rule in `rule.py`, which"
+        reading="The thresholds in `thresholds.py` and the rule in `rule.py`, which"
         " were fixed before any claim was put to the study.",
         why="A verdict needs them.",
     ),

@@ -9,10 +9,11 @@ import pytest
 
 from nmpcrl.analysis.rows import as_text, experiment_of
 from nmpcrl.analysis.summary import SIZES
-from nmpcrl.claims import paper_claims
+from nmpcrl.claims import paper_claims, thresholds
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast
-from nmpcrl.claims.paper_claims import BY_RUNS, share_of_possible
+from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.rule import Observations, arms
+from nmpcrl.claims.thresholds import share_of_possible
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED
 from nmpcrl.claims.wider_claims import WIDER_CLAIMS
 from nmpcrl.study import Experiment
@@ -82,7 +83,7 @@ def test_the_measure_of_c7_answers_its_weaker_question(claim, seed):
 
 def test_c1_and_c2_ask_what_divergence_and_instability_say_of_each_run():
     runs = drawn(0)
-    for name, judged in (("C1", paper_claims.divergence), ("C2", paper_claims.instability)):
+    for name, judged in (("C1", thresholds.divergence), ("C2", thresholds.instability)):
         one, other = (judged(arm) for arm in arms(runs, *BY_RUNS[name].learners))
         expected = (one & ~other).dropna()
         answers = BY_RUNS[name].answers(BY_RUNS[name].measure(runs, {}))
@@ -94,7 +95,7 @@ def test_c5_is_asked_of_both_distances_at_once(seed):
     runs, c5 = drawn(seed), BY_RUNS["C5"]
     paths = rollouts(runs, seed)
     apart = paper_claims.policy_distances(runs, paths)
-    near = (apart.path <= paper_claims.SAME_PATH) & (apart.cost <= paper_claims.SAME_COST)
+    near = (apart.path <= thresholds.SAME_PATH) & (apart.cost <= thresholds.SAME_COST)
     assert c5.answers(c5.measure(runs, paths)).tolist() == (near & ~apart.failed).tolist()
 
 

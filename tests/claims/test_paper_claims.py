@@ -15,7 +15,7 @@ from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.rows import as_text, experiment_of, row, table
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.claims import own_claims, paper_claims
+from nmpcrl.claims import own_claims, paper_claims, thresholds
 from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS
 from nmpcrl.claims.by_runs import RunClaim
 from nmpcrl.claims.robustness import part_changes, variant_changes
@@ -131,8 +131,8 @@ def test_c2_asks_in_how_many_pairs_es_was_unstable_and_ges_was_not(es, ges, outc
 @pytest.mark.parametrize(
     ("columns", "diverged"),
     [
-        ({"cost_ratio": paper_claims.DIVERGED}, False),
-        ({"cost_ratio": np.nextafter(paper_claims.DIVERGED, 2)}, True),
+        ({"cost_ratio": thresholds.DIVERGED}, False),
+        ({"cost_ratio": np.nextafter(thresholds.DIVERGED, 2)}, True),
         ({"cost_ratio": np.inf}, True),
         ({"cost_ratio": 0.1, "stopped": "diverged: theta"}, True),
         ({"cost_ratio": np.nan, "stopped": "diverged: theta"}, True),
@@ -140,7 +140,7 @@ def test_c2_asks_in_how_many_pairs_es_was_unstable_and_ges_was_not(es, ges, outc
     ],
 )
 def test_a_run_diverged_if_it_was_stopped_or_cost_more_than_the_threshold(columns, diverged):
-    judged = paper_claims.divergence(study(of("DES", **columns), learners=("DES",)))
+    judged = thresholds.divergence(study(of("DES", **columns), learners=("DES",)))
     expected = pd.Series([diverged] * len(judged), dtype="boolean")
     pd.testing.assert_series_equal(judged, expected, check_names=False)
 
@@ -148,13 +148,13 @@ def test_a_run_diverged_if_it_was_stopped_or_cost_more_than_the_threshold(column
 @pytest.mark.parametrize(
     ("late_cost_range", "unstable"),
     [
-        (paper_claims.UNSTABLE, False),
-        (np.nextafter(paper_claims.UNSTABLE, 1), True),
+        (thresholds.UNSTABLE, False),
+        (np.nextafter(thresholds.UNSTABLE, 1), True),
         (np.inf, True),
     ],
 )
 def test_a_swing_of_exactly_the_threshold_is_stable(late_cost_range, unstable):
-    judged = paper_claims.instability(
+    judged = thresholds.instability(
         study(of("ES", late_cost_range=late_cost_range), learners=("ES",))
     )
     assert judged.unique().tolist() == [unstable]
@@ -226,9 +226,9 @@ def test_what_was_not_timed_with_the_paper_s_solver_is_not_decided(missing):
     ("apart", "final", "seeds", "outcome"),
     [
         (0.0, START_COST, SEEDS, REPRODUCED),
-        (paper_claims.SAME_PATH, START_COST * (1 - paper_claims.SAME_COST), SEEDS, REPRODUCED),
-        (paper_claims.SAME_PATH + 1e-9, START_COST, SEEDS, NOT),
-        (0.0, START_COST * (1 - paper_claims.SAME_COST) - 1e-9, SEEDS, NOT),
+        (thresholds.SAME_PATH, START_COST * (1 - thresholds.SAME_COST), SEEDS, REPRODUCED),
+        (thresholds.SAME_PATH + 1e-9, START_COST, SEEDS, NOT),
+        (0.0, START_COST * (1 - thresholds.SAME_COST) - 1e-9, SEEDS, NOT),
         (1.0, START_COST, SOME, PARTLY),
         (np.nan, np.inf, SEEDS, NOT),  # rollouts that failed
     ],
@@ -268,7 +268,7 @@ def test_a_path_that_is_not_there_is_no_answer():
 def test_robots_are_as_far_apart_as_they_ever_come_whatever_their_headings():
     one, other = np.zeros((2, 4, 3))
     other[2], other[3] = (3.0, 4.0, 0.0), (0.0, 0.0, 9.0)
-    assert paper_claims.path_distance(one, other) == 5
+    assert thresholds.path_distance(one, other) == 5
 
 
 # C6: the network
@@ -277,9 +277,9 @@ def test_robots_are_as_far_apart_as_they_ever_come_whatever_their_headings():
 @pytest.mark.parametrize(
     ("told", "seeds", "outcome"),
     [
-        (paper_claims.MORE_ACCURATE, SEEDS, REPRODUCED),
-        (np.nextafter(paper_claims.MORE_ACCURATE, 1), SOME, PARTLY),
-        (np.nextafter(paper_claims.MORE_ACCURATE, 1), SEEDS, NOT),
+        (thresholds.MORE_ACCURATE, SEEDS, REPRODUCED),
+        (np.nextafter(thresholds.MORE_ACCURATE, 1), SOME, PARTLY),
+        (np.nextafter(thresholds.MORE_ACCURATE, 1), SEEDS, NOT),
         (np.nan, SEEDS, UNDECIDABLE),
     ],
 )
@@ -378,8 +378,8 @@ def test_c8_counts_the_assumptions_of_each_theorem():
 @pytest.mark.parametrize(
     ("rdes", "ges", "outcome"),
     [
-        (900.0, START_COST * (1 - paper_claims.BETTER), REPRODUCED),
-        (900.0, START_COST * (1 - paper_claims.BETTER) + 1e-9, PARTLY),
+        (900.0, START_COST * (1 - thresholds.BETTER), REPRODUCED),
+        (900.0, START_COST * (1 - thresholds.BETTER) + 1e-9, PARTLY),
         (1000.0, 1100.0, NOT),
         (np.inf, np.inf, NOT),
     ],
@@ -490,8 +490,8 @@ def short():
 def test_a_run_is_judged_from_its_records_as_from_the_table(short):
     runs = table([summarise(records) for records in short.values()])
     for rule, measured in (
-        (paper_claims.diverged, paper_claims.divergence(runs)),
-        (paper_claims.unstable, paper_claims.instability(runs)),
+        (thresholds.diverged, thresholds.divergence(runs)),
+        (thresholds.unstable, thresholds.instability(runs)),
     ):
         judged = [rule(short, *pair) for pair in short.items()]
         assert judged == measured.tolist()
@@ -519,9 +519,9 @@ def test_a_run_is_judged_alike_where_its_frozen_arm_lost_late_episodes(dear, los
         changed = replace(records, steps=records.steps | steps)
         found[Experiment(learner, episodes=6, steps=6)] = changed
     runs = table([summarise(records) for records in found.values()])
-    assert paper_claims.divergence(runs)[runs.learner == "ES"].tolist() == [expected]
+    assert thresholds.divergence(runs)[runs.learner == "ES"].tolist() == [expected]
     (es, records), _ = found.items()
-    assert paper_claims.diverged(Runs(found), es, records) == (expected is True)
+    assert thresholds.diverged(Runs(found), es, records) == (expected is True)
 
 
 def test_a_row_of_the_table_names_its_experiment(short):
@@ -537,15 +537,15 @@ def test_a_row_of_the_table_names_its_experiment(short):
 @pytest.mark.parametrize(
     ("claim", "learner", "against", "border"),
     [
-        ("B1", "TDC", "GES", 1 + paper_claims.SAME_COST),
-        ("B2", "ES", "random", 1 - paper_claims.BETTER),
+        ("B1", "TDC", "GES", 1 + thresholds.SAME_COST),
+        ("B2", "ES", "random", 1 - thresholds.BETTER),
         (
             "B3",
             "matched",
             "GES",
-            1 + paper_claims.SAME_COST,
+            1 + thresholds.SAME_COST,
         ),
-        ("B4", "QL", "ES", 1 + paper_claims.SAME_COST),
+        ("B4", "QL", "ES", 1 + thresholds.SAME_COST),
     ],
 )
 def test_an_addition_holds_up_to_its_border_and_not_beyond(claim, learner, against, border):
@@ -559,7 +559,7 @@ def test_an_addition_holds_up_to_its_border_and_not_beyond(claim, learner, again
 
 
 def test_a_learner_that_ends_alike_may_not_end_at_a_lower_cost_either():
-    runs = study(of("matched", final_cost=(1 - paper_claims.SAME_COST) * START_COST - 1e-9))
+    runs = study(of("matched", final_cost=(1 - thresholds.SAME_COST) * START_COST - 1e-9))
     assert verdict_on("B3", runs).outcome == NOT
 
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
-from nmpcrl.claims import paper_claims
+from nmpcrl.claims import paper_claims, thresholds
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.rule import Assumption, Observations
@@ -164,7 +164,7 @@ def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
         for axis in drawing.axes[:-1]:
             places = points(axis)
             assert len(places) == LAYOUTS * SEEDS
-            alike = (places <= [paper_claims.SAME_PATH, paper_claims.SAME_COST]).all(axis=1)
+            alike = (places <= [thresholds.SAME_PATH, thresholds.SAME_COST]).all(axis=1)
             assert (alike == inside).all()
     np.testing.assert_allclose(points(drawn("C5", found).axes[0]), [[1.0, 0.1]] * 8)
 
@@ -174,7 +174,7 @@ def test_pairs_that_are_alike_lie_in_the_box_and_others_do_not(made_up):
 def test_a_pair_of_which_a_run_was_stopped_is_not_in_the_box(stopped, made_up):
     found = made_up(lambda e: {"reached": 40} if e.learner in stopped else {})
     for axis in drawn("C5", found).axes[:-1]:
-        assert (points(axis)[:, 1] > paper_claims.SAME_COST).all()
+        assert (points(axis)[:, 1] > thresholds.SAME_COST).all()
     assert verdict(found, "C5").counts["all"] == (0, CELLS)
 
 

@@ -4,7 +4,8 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims.halves import WHOLE, halves
-from nmpcrl.claims.paper_claims import CLAIMS, divergence, instability
+from nmpcrl.claims.paper_claims import CLAIMS
+from nmpcrl.claims.thresholds import divergence, instability
 from nmpcrl.report.whole_study import EVERY, everywhere, main_table, went_wrong
 from nmpcrl.study import design, paper
 

@@ -19,7 +19,7 @@ from nmpcrl import Vector
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, performance_profile
 from nmpcrl.bench.learners import ratio
-from nmpcrl.claims import paper_claims
+from nmpcrl.claims import paper_claims, thresholds
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.rule import Assumption
@@ -120,7 +120,7 @@ def same_policy(found: Evidence, verdict: Verdict) -> Figure:
 def held_out(found: Evidence, verdict: Verdict) -> Figure:
     """C6: the network's error on held-out pairs with theta as an input, over that without."""
     figure, panel, drawn = _measured(found, verdict)
-    limit = paper_claims.MORE_ACCURATE
+    limit = thresholds.MORE_ACCURATE
     finding = f"with θ as an input, the network's error is at most {limit} times as large"
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
@@ -177,7 +177,7 @@ def theorem(
 def gains(found: Evidence, verdict: Verdict) -> Figure:
     """C9: noise-free cost at the end over that at the start, of RDES and GES."""
     figure, panel, drawn = _measured(found, verdict, left=True)
-    finding = f"learning reduces the cost by {paper_claims.BETTER:.0%} or more"
+    finding = f"learning reduces the cost by {thresholds.BETTER:.0%} or more"
     return _finished(figure, panel, verdict, finding, "runs", drawn)
 
 
@@ -254,11 +254,11 @@ def _pairs(drawn: Evidence) -> pd.DataFrame:
 def _scatter(axis: Axes, pairs: pd.DataFrame, decay: str) -> None:
     """A letter a pair of one reading, in a panel that has room for both."""
     box = Rectangle(
-        (0, 0), paper_claims.SAME_PATH, paper_claims.SAME_COST, facecolor="0.88", edgecolor=INK
+        (0, 0), thresholds.SAME_PATH, thresholds.SAME_COST, facecolor="0.88", edgecolor=INK
     )
     axis.add_patch(box)
-    across = logarithmic(axis, "x", pairs.path.to_numpy(float), paper_claims.SAME_PATH)
-    up = logarithmic(axis, "y", pairs.cost.to_numpy(float), paper_claims.SAME_COST)
+    across = logarithmic(axis, "x", pairs.path.to_numpy(float), thresholds.SAME_PATH)
+    up = logarithmic(axis, "y", pairs.cost.to_numpy(float), thresholds.SAME_COST)
     for one in pairs[pairs.decay == decay].dropna(subset="cost").itertuples():
         letter = dots("GES", marker=f"${one.layout}$", markersize=5.5)
         axis.plot(across(one.path), up(one.cost), **letter)

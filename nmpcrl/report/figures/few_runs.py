@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
-from nmpcrl.claims.paper_claims import diverged, unstable
+from nmpcrl.claims.thresholds import diverged, unstable
 from nmpcrl.report.figures.axes import label_panel, one_entry_each
 from nmpcrl.report.figures.style import headed, page, subplots, thin
 from nmpcrl.study.experiment import Experiment

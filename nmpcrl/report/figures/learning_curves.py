@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
 from nmpcrl import Vector
 from nmpcrl.analysis.summary import Outline
 from nmpcrl.claims.evidence import Evidence
-from nmpcrl.claims.paper_claims import divergence, instability
+from nmpcrl.claims.thresholds import divergence, instability
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.report.figures.axes import label_panel, legend
 from nmpcrl.report.figures.panels import bundle, part, sourced

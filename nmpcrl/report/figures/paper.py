@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
-from nmpcrl.claims.paper_claims import diverged, path_distance, unstable
+from nmpcrl.claims.thresholds import diverged, path_distance, unstable
 from nmpcrl.report.figures.axes import below, label_panel
 from nmpcrl.report.figures.style import DECAY_TITLES, LIMIT, SUBTITLE, headed, page, subplots
 from nmpcrl.study import paper

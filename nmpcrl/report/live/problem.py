@@ -5,9 +5,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Task
-from nmpcrl.control.ocp import transcribe
-from nmpcrl.control.solvers.riccati import Riccati
+from nmpcrl.control import Nmpc, Riccati, Task
 from nmpcrl.study import paper
 
 ARGUMENTS = (
@@ -29,10 +27,17 @@ def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
     Raises:
         CannotCompile: as `Riccati.prepare`.
     """
-    options = {"fix_action": False, "ties_active": nmpc.ties_active}
-    ocp = transcribe(nmpc.plant, nmpc.task, longest, nmpc.gamma, nmpc.slack_weight, **options)
     solver = Riccati()
-    values = zip(ARGUMENTS, solver.prepare(ocp).problem, strict=True)
+    longer = Nmpc(
+        nmpc.plant,
+        nmpc.task,
+        longest,
+        nmpc.gamma,
+        nmpc.slack_weight,
+        solver,
+        ties_active=nmpc.ties_active,
+    )
+    values = zip(ARGUMENTS, solver.prepare(longer.ocp).problem, strict=True)
     plain = {name: np.asarray(value).tolist() for name, value in values}
     return plain | {"tolerance": solver.tolerance, "theta": 2 * nmpc.plant.n + nmpc.plant.m + 1}
 
