@@ -77,6 +77,15 @@ def long_runs(shared) -> dict[str, Path]:
 
 
 @pytest.fixture
+def runs(tmp_path, monkeypatch) -> Path:
+    """A folder of this test's own; and what is set for workers is unset after it."""
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    for name in executor.THREADS:
+        monkeypatch.setenv(name, os.environ.get(name, "1"))
+    return tmp_path / "runs"
+
+
+@pytest.fixture
 def trains_here(monkeypatch) -> None:
     """Where nobody names an executor, jobs are done in a thread: no process has to start."""
     monkeypatch.setattr(executor, "processes", lambda *_: ThreadPoolExecutor(1))

@@ -1,8 +1,9 @@
 """`nmpcrl grade`: points of the notebooks that students hand in."""
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -12,6 +13,8 @@ from nmpcrl.commands.tables import columns, counted, harmless
 if TYPE_CHECKING:
     from nmpcrl.course.grading import Mark
 
+Command = TypeVar("Command", bound=Callable[..., Any])
+
 FIELDS = ("student", "notebook", "exercise", "points", "of", "why")
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet computes begins so
 HEADER = ("student", "notebook", "points", "of", "by hand")
@@ -20,6 +23,12 @@ NO_SANDBOX = (
     "The notebooks ran with your rights: limits and a temporary folder are no sandbox."
     " See nmpcrl grade --help."
 )
+
+
+def number(name: str, least: int, default: int, text: str) -> Callable[[Command], Command]:
+    """An option that takes a whole number, `least` or more."""
+    kind = click.IntRange(least)
+    return click.option(name, type=kind, default=default, show_default=True, help=text)
 
 
 @click.command()
@@ -32,34 +41,10 @@ NO_SANDBOX = (
     show_default=True,
     help="What `make course` writes for graders.",
 )
-@click.option(
-    "--time-limit",
-    type=click.IntRange(1),
-    default=600,
-    show_default=True,
-    help="Seconds a notebook, all its runs together.",
-)
-@click.option(
-    "--cell-limit",
-    type=click.IntRange(1),
-    default=60,
-    show_default=True,
-    help="Seconds a cell of an exercise, or one that a student added.",
-)
-@click.option(
-    "--memory",
-    type=click.IntRange(100),
-    default=2000,
-    show_default=True,
-    help="Megabytes a notebook.",
-)
-@click.option(
-    "--workers",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    help="Notebooks at a time.",
-)
+@number("--time-limit", 1, 600, "Seconds a notebook, all its runs together.")
+@number("--cell-limit", 1, 60, "Seconds a cell of an exercise, or one that a student added.")
+@number("--memory", 100, 2000, "Megabytes a notebook.")
+@number("--workers", 1, 1, "Notebooks at a time.")
 def grade(
     folder: Path,
     out: Path,

@@ -21,7 +21,7 @@ from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import Failed, fetch_summaries
 from nmpcrl.analysis.summary import RunSummary, summarise
 from nmpcrl.study import Experiment, executor, fetch, provenance, run, store, sweep
-from nmpcrl.study.executor import THREADS, Killed
+from nmpcrl.study.executor import Killed
 
 QUICK = Experiment("frozen", episodes=2, steps=3, evaluate_every=1)
 SIX = sweep(learner="frozen", seed=tuple(range(6)), episodes=1, steps=2)
@@ -55,12 +55,8 @@ def note(what, experiment):
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch) -> Path:
-    """A folder of this test's own; and what is set for workers is unset after it."""
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    for name in THREADS:
-        monkeypatch.setenv(name, os.environ.get(name, "1"))
-    return tmp_path / "runs" / "summaries"
+def folder(runs) -> Path:
+    return runs / "summaries"
 
 
 @pytest.fixture

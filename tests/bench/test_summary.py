@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.bench import summary, targets
+from nmpcrl.bench.solves import LOOPS
 from nmpcrl.claims import published
 from nmpcrl.report import tables
 from nmpcrl.study import paper
@@ -27,6 +28,13 @@ def test_a_cold_solve_does_not_count(measured):
     table = summary.solvers(measured)
     assert table.loc[("with noise", "riccati"), "max"] == pytest.approx(40.0)
     assert table.loc[("with noise", "fatrop"), "times"] == pytest.approx(20.0)
+
+
+def test_one_solve_in_twenty_is_slower_than_p95():
+    times = np.arange(21) * 1e-6
+    loops = {"loop": np.repeat(list(LOOPS), 21), "seconds": np.tile(times, len(LOOPS))}
+    for _, row in summary.own_loop({"loop": loops}).iterrows():
+        assert row.to_dict() == pytest.approx({"median": 10.0, "p95": 19.0, "max": 20.0})
 
 
 def test_a_value_above_the_best_is_a_worse_minimum_and_no_value_a_failure(measured):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from raising import raising
 
 from nmpcrl.bench import sweep
 from nmpcrl.bench.sweep import SweepTable, Tally
@@ -26,8 +27,7 @@ def here(monkeypatch, tmp_path) -> Path:
     return tmp_path
 
 
-def unsolved(*_: object, **__: object) -> None:
-    raise SolverError("no optimum", START, THETA)
+unsolved = raising(SolverError("no optimum", START, THETA))
 
 
 def test_every_problem_is_counted_once(here, monkeypatch):

@@ -16,6 +16,7 @@ from bs4 import BeautifulSoup
 from click.testing import CliRunner
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from papermill.cli import _resolve_type
+from raising import raising
 
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
@@ -28,11 +29,8 @@ ROOT = Path(__file__).resolve().parents[2]
 def driver(monkeypatch):
     """The command; whatever it is asked, it may not come as far as building."""
 
-    def never(*_):
-        raise AssertionError("the driver went on to build")
-
     for step in ("mirror", "train", "execute_all", "dress", "render"):
-        monkeypatch.setattr(build, step, never)
+        monkeypatch.setattr(build, step, raising(AssertionError("the driver went on to build")))
     return lambda *arguments: CliRunner().invoke(build.main, arguments)
 
 

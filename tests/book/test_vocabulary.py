@@ -93,13 +93,20 @@ def words(metadata: object) -> list[str]:
     return [str(metadata)]
 
 
+def finder(pattern: str) -> re.Pattern[str]:
+    """Finds them as a part of a name, and not inside another word."""
+    return re.compile(rf"(?<![a-zA-Z])(?:{pattern})(?![a-zA-Z])", re.IGNORECASE)
+
+
+def without(allowed: str, text: str) -> str:
+    return re.sub(allowed, "", text, flags=re.IGNORECASE) if allowed else text
+
+
 def found(pattern: str, allowed: str) -> list[str]:
-    """Where an old word stands, also as a part of a name, and not in a context that is allowed."""
-    old = re.compile(rf"(?<![a-zA-Z])(?:{pattern})(?![a-zA-Z])", re.IGNORECASE)
-    lines = []
+    """Where an old word stands, and not in a context that is allowed."""
+    old, lines = finder(pattern), []
     for path in sources():
-        kept = re.sub(allowed, "", text(path), flags=re.IGNORECASE) if allowed else text(path)
-        hits = [line for line in kept.splitlines() if old.search(line)]
+        hits = [line for line in without(allowed, text(path)).splitlines() if old.search(line)]
         lines += [f"{path.relative_to(ROOT)}: {line.strip()[:120]}" for line in hits]
     return lines
 
@@ -125,7 +132,7 @@ def test_an_old_word_is_gone(better):
 
 def test_a_word_is_found_as_a_part_of_a_name_and_not_inside_another_word():
     pattern, allowed = OLD["rollout"]
-    old = re.compile(rf"(?<![a-zA-Z])(?:{pattern})(?![a-zA-Z])", re.IGNORECASE)
+    old = finder(pattern)
     for name in ("first_drive", "Drives without noise"):
         assert old.search(name)
     for name in ("driver", "overdrive"):
@@ -134,8 +141,7 @@ def test_a_word_is_found_as_a_part_of_a_name_and_not_inside_another_word():
 
 
 def test_captions_and_alternative_texts_call_a_panel_by_its_title_or_letter():
-    place = re.compile(rf"(?<![a-zA-Z])(?:{PLACES})(?![a-zA-Z])", re.IGNORECASE)
-    found = captions()
+    place, found = finder(PLACES), captions()
     assert len(found) > 50
     lines = [f"{where}: ...{hit[0]}..." for where, text in found if (hit := place.search(text))]
     assert not lines, "\n".join(lines)
@@ -155,7 +161,7 @@ def test_captions_and_alternative_texts_call_a_panel_by_its_title_or_letter():
 )
 def test_the_sentences_that_this_list_was_made_from_are_found(better, text):
     pattern, _ = OLD[better]
-    assert re.search(rf"(?<![a-zA-Z])(?:{pattern})(?![a-zA-Z])", text, re.IGNORECASE)
+    assert finder(pattern).search(text)
 
 
 @pytest.mark.parametrize(
@@ -170,6 +176,5 @@ def test_the_sentences_that_this_list_was_made_from_are_found(better, text):
 )
 def test_what_the_field_says_is_allowed(text):
     for pattern, allowed in OLD.values():
-        kept = re.sub(allowed, "", text, flags=re.IGNORECASE) if allowed else text
-        assert not re.search(rf"(?<![a-zA-Z])(?:{pattern})(?![a-zA-Z])", kept, re.IGNORECASE)
-    assert not re.search(rf"(?<![a-zA-Z])(?:{PLACES})(?![a-zA-Z])", text, re.IGNORECASE)
+        assert not finder(pattern).search(without(allowed, text))
+    assert not finder(PLACES).search(text)

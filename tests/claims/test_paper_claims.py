@@ -334,6 +334,7 @@ def test_a_wider_claim_asks_the_same_of_more_learners():
         assert (one.threshold, one.besides is None) == (made.threshold, made.besides is None)
         assert made.quotation
         assert not one.quotation
+        assert not one.implied  # the paper does not take it for granted: it does not say it
 
 
 @pytest.mark.parametrize("claim", paper_claims.CLAIMS.values(), ids=list(paper_claims.CLAIMS))

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from raising import raising
 
 from nmpcrl.analysis import summaries
 from nmpcrl.claims import publish, published, rule
@@ -64,10 +65,9 @@ def test_train_stores_a_run_that_runs_lists_and_evaluate_judges(command, tmp_pat
 def test_training_again_reads_the_stored_run(command, tmp_path, monkeypatch):
     assert command("train", "--learner", "frozen", "--episodes", "1").exit_code == 0
 
-    def refuse(*_, **__):
-        raise AssertionError("the run was trained a second time")
-
-    monkeypatch.setattr("nmpcrl.study.store.run", refuse)
+    monkeypatch.setattr(
+        "nmpcrl.study.store.run", raising(AssertionError("the run was trained a second time"))
+    )
     again = command("train", "--learner", "frozen", "--episodes", "1")
     assert again.exit_code == 0, again.output
 
@@ -307,10 +307,7 @@ def test_bench_publishes_the_verdicts_on_time_only_where_they_are_decided(
 def test_what_would_fail_at_the_end_of_a_study_is_refused_at_its_start(
     command, small, monkeypatch, words, sentence
 ):
-    def refuse(*_, **__):
-        raise AssertionError("work has begun")
-
-    monkeypatch.setattr(summaries, "fetch_summaries", refuse)
+    monkeypatch.setattr(summaries, "fetch_summaries", raising(AssertionError("work has begun")))
     refused = command("study", *words)
     assert refused.exit_code in (1, 2)
     assert sentence in refused.output

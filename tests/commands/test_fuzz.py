@@ -4,6 +4,7 @@ import random
 
 import click
 import pytest
+from raising import raising
 
 from nmpcrl.analysis import summaries
 from nmpcrl.bench import live, suite, sweep
@@ -27,8 +28,7 @@ class NotTrained(click.ClickException):
     """What stands in for work that takes long."""
 
 
-def refuse(*_, **__):
-    raise NotTrained("not here")
+refuse = raising(NotTrained("not here"))
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """`nmpcrl wasm` writes a module, or says in one sentence why not."""
 
 import pytest
+from raising import raising
 
 from nmpcrl.learning import browser
 
@@ -63,10 +64,9 @@ def test_what_cannot_be_compiled_ends_in_a_sentence(command, asked, arguments, s
 
 
 def test_what_the_compiler_says_is_said(command, monkeypatch, tmp_path):
-    def fails(*_):
-        raise RuntimeError("numba cannot compile these functions")
-
-    monkeypatch.setattr(browser, "module", fails)
+    monkeypatch.setattr(
+        browser, "module", raising(RuntimeError("numba cannot compile these functions"))
+    )
     result = command("wasm", "--out", str(tmp_path / "x.wasm"))
     assert result.exit_code == 1
     assert "numba cannot compile" in result.output

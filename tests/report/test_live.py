@@ -7,12 +7,14 @@ from base64 import b64decode
 
 import numpy as np
 import pytest
+from raising import raising
 
-from nmpcrl.control import Riccati
+from nmpcrl.control import Nmpc, Riccati
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
 from nmpcrl.report.live import closed_loop, frame
+from nmpcrl.report.live.problem import problem_of
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -58,6 +60,13 @@ def test_the_problem_is_the_one_that_the_controller_solves(nmpc, data):
     assert [problem["slack_weight"], problem["soft_box"], problem["tie"]] == [weight, soft, tie]
 
 
+def test_a_start_on_a_boundary_counts_as_with_the_controller(nmpc):
+    for active in (False, True):
+        here = Nmpc(nmpc.plant, nmpc.task, horizon=7, ties_active=active)
+        assert problem_of(here)["tie"] == Riccati().prepare(here.ocp).problem[-1]
+    assert problem_of(here)["tie"] != problem_of(nmpc)["tie"]
+
+
 def test_it_begins_with_the_chapters_parameters(nmpc, data):
     assert data["start"] == nmpc.task.start.tolist()
     assert data["theta"] == list(paper.THETA_INIT)
@@ -100,10 +109,7 @@ def test_without_scripts_it_is_hidden_and_a_notebook_that_shows_it_says_why(show
 
 
 def test_without_a_compiler_there_is_a_sentence(nmpc, monkeypatch):
-    def refuse(*_):
-        raise CannotCompile("numba is not installed")
-
-    monkeypatch.setattr(browser, "module", refuse)
+    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
     assert live.controller(nmpc, THETA, 130).data == (
         "<p>There is no live figure here: numba is not installed.</p>"
     )

@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from raising import raising
 
 from nmpcrl.bench import live as bench
 from nmpcrl.control.codegen.source import CannotCompile
@@ -105,10 +106,7 @@ def test_all_its_files_are_there_once(shown):
 
 
 def test_without_a_compiler_there_is_a_sentence(monkeypatch):
-    def refuse(*_):
-        raise CannotCompile("numba is not installed")
-
-    monkeypatch.setattr(browser, "module", refuse)
+    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
     assert "There is no live figure here" in live.laboratory().data
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from raising import raising
 
 from nmpcrl.analysis import two_state
 from nmpcrl.control.codegen.source import CannotCompile
@@ -46,10 +47,7 @@ def test_the_output_is_whole_and_loads_nothing(figure):
 
 @pytest.mark.parametrize("figure", FIGURES)
 def test_without_a_compiler_there_is_a_sentence(figure, monkeypatch):
-    def refuse(*_):
-        raise CannotCompile("numba is not installed")
-
-    monkeypatch.setattr(browser, "module", refuse)
+    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
     said = "<p>There is no live figure here: numba is not installed.</p>"
     assert FIGURES[figure][0]().data == said
 

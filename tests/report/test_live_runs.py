@@ -7,6 +7,7 @@ from base64 import b64decode
 
 import numpy as np
 import pytest
+from raising import raising
 
 from nmpcrl.claims import published
 from nmpcrl.claims.thetas import numbers_of
@@ -124,8 +125,5 @@ def test_the_output_is_whole(shown):
 
 
 def test_without_a_compiler_there_is_a_sentence(monkeypatch):
-    def refuse(*_):
-        raise CannotCompile("numba is not installed")
-
-    monkeypatch.setattr(browser, "module", refuse)
+    monkeypatch.setattr(browser, "module", raising(CannotCompile("numba is not installed")))
     assert "numba is not installed" in live.runs("ES", "GES").data

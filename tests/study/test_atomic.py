@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from raising import raising
 
 from nmpcrl.study.atomic import OLD, sweep, try_to_write, write_json, write_whole
 from nmpcrl.study.machine import host
@@ -79,11 +80,8 @@ def test_a_folder_is_swept_once_a_process(tmp_path, dead):
 def test_what_cannot_be_removed_hinders_nobody(tmp_path, dead, monkeypatch):
     left = half(tmp_path, f"{dead}-{host()}-0123")
 
-    def refuse(*_, **__):
-        raise PermissionError("not yours")
-
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "unlink", refuse)
+        patch.setattr(Path, "unlink", raising(PermissionError("not yours")))
         sweep(tmp_path)
     assert left.exists()
 

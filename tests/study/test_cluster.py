@@ -129,13 +129,7 @@ def page_commands() -> list[list[str]]:
 
 
 (WHOLE,) = blocks("toml")
-
-
-@pytest.fixture(autouse=True)
-def runs(tmp_path, monkeypatch) -> Path:
-    """A folder of this test's own."""
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    return tmp_path / "runs"
+pytestmark = pytest.mark.usefixtures("runs")
 
 
 @pytest.fixture(scope="module")

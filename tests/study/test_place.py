@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from raising import raising
 
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import fetch_summaries
@@ -47,10 +48,7 @@ def runs(tmp_path, monkeypatch) -> Path:
 @pytest.fixture
 def untrained(monkeypatch):
     """From here on, training is a mistake."""
-
-    def refuse(*_, **__):
-        raise AssertionError("a run was trained that could not be kept")
-
+    refuse = raising(AssertionError("a run was trained that could not be kept"))
     for module in (store, summaries):
         monkeypatch.setattr(module, "run", refuse)
         monkeypatch.setattr(module, "compile_ahead", refuse)
@@ -88,10 +86,7 @@ def test_what_is_no_folder_is_refused_before_any_work(runs, untrained, monkeypat
 
 @each_way
 def test_a_folder_that_cannot_be_made_is_refused_before_any_work(untrained, ask, monkeypatch):
-    def refuse(*_, **__):
-        raise PermissionError(errno.EACCES, "Permission denied")
-
-    monkeypatch.setattr(Path, "mkdir", refuse)
+    monkeypatch.setattr(Path, "mkdir", raising(PermissionError(errno.EACCES, "Permission denied")))
     with pytest.raises(
         StoreError, match=r"runs.*, cannot be made \(Permission denied\); correct that, or set NMPC"
     ):
@@ -155,10 +150,9 @@ def test_a_file_is_no_empty_folder(runs):
 
 
 def test_a_folder_that_nobody_may_read_is_no_empty_folder(runs, monkeypatch):
-    def refuse(_):
-        raise PermissionError(errno.EACCES, "Permission denied")
-
-    monkeypatch.setattr(Path, "iterdir", refuse)
+    monkeypatch.setattr(
+        Path, "iterdir", raising(PermissionError(errno.EACCES, "Permission denied"))
+    )
     with pytest.raises(StoreError, match=r"cannot be read \(Permission denied\)"):
         stored()
 
@@ -265,10 +259,9 @@ def test_a_temporary_folder_of_another_user_is_not_used(full, capsys, monkeypatc
 
 
 def test_a_study_goes_on_where_its_notes_cannot_be_written(runs, capsys, monkeypatch):
-    def refuse(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(summaries, "write_json", refuse)
+    monkeypatch.setattr(
+        summaries, "write_json", raising(OSError(errno.ENOSPC, "No space left on device"))
+    )
     monkeypatch.setattr(summaries, "run", lambda _: 1 / 0)
     with pytest.raises(summaries.Failed, match="1 of 1 runs failed"):
         fetch_here([QUICK])
@@ -359,13 +352,10 @@ def test_a_file_where_the_summaries_belong_is_refused_before_any_work(runs, untr
 def test_a_run_that_may_not_be_read_is_not_taken_for_a_damaged_one(untrained, monkeypatch):
     path = path_of(QUICK)
 
-    def refuse(*_, **__):
-        raise PermissionError(errno.EACCES, "Permission denied")
-
     path.parent.mkdir()
     path.write_text("whole, for all we know")
     with monkeypatch.context() as patch:
-        patch.setattr(np, "load", refuse)
+        patch.setattr(np, "load", raising(PermissionError(errno.EACCES, "Permission denied")))
         with pytest.raises(StoreError, match=r"cannot be read \(Permission denied\); correct that"):
             fetch(QUICK)
     assert path.read_text() == "whole, for all we know"

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from raising import raising
 
 from nmpcrl.study import DamagedRecords, Experiment, Records, archive
 from nmpcrl.study.records import (
@@ -105,10 +106,7 @@ def test_a_run_that_cannot_be_written_leaves_no_file(path, monkeypatch):
 def test_a_run_that_cannot_be_written_leaves_the_old_one(path, monkeypatch):
     example().save(path)
 
-    def disk_is_full(*_, **__):
-        raise OSError("no space left on device")
-
-    monkeypatch.setattr(np, "savez_compressed", disk_is_full)
+    monkeypatch.setattr(np, "savez_compressed", raising(OSError("no space left on device")))
     with pytest.raises(OSError, match="no space"):
         example(rows=4).save(path)
     assert_equal(Records.load(path), example())

@@ -9,11 +9,11 @@ import threading
 from pathlib import Path
 
 import pytest
+from raising import raising
 
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.study import Experiment, fetch, fetch_all, reservation, store, sweep
-from nmpcrl.study.executor import THREADS
 from nmpcrl.study.reservation import PLACE, Reservations, reservations
 from nmpcrl.study.store import path_of
 
@@ -21,13 +21,7 @@ QUICK = Experiment(learner="frozen", episodes=1, steps=3)
 FOUR = sweep(learner="frozen", seed=(0, 1, 2, 3), episodes=1, steps=2)
 
 
-@pytest.fixture(autouse=True)
-def runs(tmp_path, monkeypatch) -> Path:
-    """A folder of this test's own."""
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    for name in THREADS:
-        monkeypatch.setenv(name, os.environ.get(name, "1"))
-    return tmp_path / "runs"
+pytestmark = pytest.mark.usefixtures("runs")
 
 
 def test_what_one_is_at_another_cannot_have(runs):
@@ -115,10 +109,7 @@ def test_a_note_that_is_no_note_reserves_nothing(runs):
 
 
 def test_where_nothing_can_be_reserved_everything_is_free(runs, monkeypatch):
-    def refuse(*_, **__):
-        raise OSError("no locks here")
-
-    monkeypatch.setattr(reservation, "FileLock", refuse)
+    monkeypatch.setattr(reservation, "FileLock", raising(OSError("no locks here")))
     one, other = Reservations(runs), Reservations(runs)
     assert one.take(["a"]) == other.take(["a"]) == {"a"}
     assert one.taken(["a", "b"]) == {"a"}

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from raising import raising
 
 from nmpcrl.control import Nmpc
 from nmpcrl.control.solvers import Fatrop
@@ -31,7 +32,7 @@ from nmpcrl.study import (
     stored,
     sweep,
 )
-from nmpcrl.study.executor import ATTEMPTS, THREADS, Killed
+from nmpcrl.study.executor import ATTEMPTS, Killed
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import key
 from nmpcrl.study.records import Stopped
@@ -41,24 +42,16 @@ QUICK = Experiment(learner="frozen", episodes=1, steps=3)
 LEARNING = Experiment(learner="ES", episodes=1, steps=3)
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
 
-
-@pytest.fixture(autouse=True)
-def runs(tmp_path, monkeypatch) -> Path:
-    """A folder of this test's own; and what `fetch_all` sets for its workers is unset after it."""
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    for name in THREADS:
-        monkeypatch.setenv(name, os.environ.get(name, "1"))
-    return tmp_path / "runs"
+pytestmark = pytest.mark.usefixtures("runs")
 
 
 @pytest.fixture
 def no_run(monkeypatch):
     """From here on, training is a mistake."""
 
-    def refuse(*_, **__):
-        raise AssertionError("a stored run was trained again")
-
-    return lambda: monkeypatch.setattr(store, "run", refuse)
+    return lambda: monkeypatch.setattr(
+        store, "run", raising(AssertionError("a stored run was trained again"))
+    )
 
 
 def files(folder: Path) -> list[Path]:
