@@ -1,6 +1,9 @@
 """What a deck shows of a chapter, and what it says."""
 
+import re
+
 import build
+import course
 import deck
 import pytest
 import slides
@@ -72,3 +75,16 @@ def test_a_chapter_that_was_not_executed_is_refused_in_a_sentence(tmp_path):
 def test_a_package_that_lacks_is_refused_in_a_sentence(tmp_path):
     with pytest.raises(build.Failure, match=r"no_such_package of environment\.txt"):
         slides.copy("no_such_package", "", ("a",), tmp_path)
+
+
+RELATION = re.compile(r"=|&lt;|&gt;|\\(le|ge|leq|geq|approx|sim|in|leftarrow|to|min|max)\b")
+
+
+@pytest.mark.parametrize(("name", "source"), course.chapters().items())
+def test_every_formula_of_a_slide_says_what_it_is_equal_to(name, source):
+    """The sentence around it, which often has its left side, is for the speaker."""
+    markdown = [cell for cell in source.cells if cell.cell_type == "markdown"]
+    read = new_notebook(cells=markdown)
+    shown = [html for slide in deck.deck(name, read, read).slides for html in slide.shown]
+    for formula in re.findall(r"\\\[.*?\\\]", "".join(shown), flags=re.S):
+        assert RELATION.search(formula), formula

@@ -115,6 +115,19 @@ def test_the_notes_are_shown_by_a_key(shown):
 
 
 @pytest.mark.book
+def test_the_window_of_the_speaker_has_each_formula_once(shown):
+    tab = shown("solver")
+    tab.evaluate("Reveal.slide(Reveal.getSlides().findIndex(s => s.id === 'rows-2'))")
+    with tab.expect_popup() as opened:
+        tab.keyboard.press("s")
+    notes = opened.value.locator(".speaker-controls-notes .value")
+    notes.locator("mjx-container").first.wait_for()
+    assert notes.locator("mjx-container svg").first.bounding_box()["width"] > 5
+    for hidden in notes.locator("mjx-assistive-mml").all():
+        assert max(hidden.bounding_box()[side] for side in ("width", "height")) <= 1
+
+
+@pytest.mark.book
 @pytest.mark.parametrize("name", LIVE)
 def test_a_live_figure_works_on_its_slide_and_keeps_the_arrow_keys(shown, name):
     tab = shown(name)

@@ -16,6 +16,7 @@ async function begin() {
   if (location.search.includes("print-pdf")) {
     document.querySelectorAll("section:has(.live-figure)").forEach((slide) => slide.remove());
   }
+  document.querySelectorAll("aside.notes mjx-assistive-mml").forEach((formula) => formula.remove()); // seen there
   await Promise.all([...document.images].map((image) => image.decode().catch(() => {})));
   document.querySelectorAll(".slides > section").forEach(fit);
   await Reveal.initialize({
