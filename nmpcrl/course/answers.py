@@ -11,7 +11,7 @@ from nmpcrl.course.formulas import FormulaError, evaluated
 from nmpcrl.course.outcome import Outcome, Unsolved, refuse_unanswered
 from nmpcrl.study.parameters import shortened
 
-THOUSANDS = re.compile(r",(?=\d{3}(?!\d))")
+THOUSANDS = re.compile(r"(?<!\b0),(?=\d{3}(?!\d))")
 CASES = 8  # at which a formula is compared
 CLOSE = 1e-6  # relative, of two formulas
 
