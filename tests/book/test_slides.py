@@ -21,6 +21,39 @@ FRAGMENTS = "Reveal.getCurrentSlide().querySelectorAll('.fragment').length"
 each_chapter = pytest.mark.parametrize("name", [Path(name).stem for name in SOURCES])
 
 
+SMALL = """(() => {
+    const words = document.createTreeWalker(Reveal.getCurrentSlide(), NodeFilter.SHOW_TEXT);
+    const found = [];
+    while (words.nextNode()) {
+        const at = words.currentNode.parentElement, text = at.closest("text");
+        if (!words.currentNode.data.trim() || !at.getClientRects().length) continue;
+        if (at.closest("aside.notes, mjx-assistive-mml, option, title")) continue;
+        const scale = text ? text.getScreenCTM().a : 1;
+        const size = scale * parseFloat(getComputedStyle(at).fontSize);
+        if (size < 19.9) found.push([size, words.currentNode.data]);
+    }
+    return found;
+})()"""
+LETTERS = """[...Reveal.getCurrentSlide().querySelectorAll("img")].map((image) => [
+    image.getAttribute("src").replace(/.*files.|[.].*/g, ""),
+    Math.min(image.width / image.naturalWidth, image.height / image.naturalHeight)
+        * image.naturalWidth / 504 * 8])"""  # a figure is 504 pt wide, and its small letters 8 pt
+TALL = {  # figures of several rows, drawn for a page: at 20 px they would be higher than a slide
+    "01_mdp_and_nmpc/box-figure",
+    "01_mdp_and_nmpc/theta-figure",
+    "02_expected_sarsa/costs-figure",
+    "02_expected_sarsa/theta-figure",
+    "03_rdes/fig-paper",
+    "04_ges/fig-paper",
+    "05_results/fig4",
+    "06_what_the_paper_leaves_open/figure-borders",
+    "06_what_the_paper_leaves_open/figure-layouts",
+    "06_what_the_paper_leaves_open/figure-map",
+    "06_what_the_paper_leaves_open/figure-telling",
+    "06_what_the_paper_leaves_open/figure-theta-c",
+    "07_beyond/figure-trajectories",
+}
+
 SIZE = "[Reveal.getCurrentSlide()].flatMap(s => [s.scrollWidth, s.scrollHeight])"
 
 
@@ -92,14 +125,17 @@ def test_two_decks_are_the_same_bytes(decks):
 @pytest.mark.book
 @each_chapter
 def test_arrows_move_and_every_slide_fits_and_has_no_formula_in_error(shown, name):
-    tab = shown(name)
+    tab, small = shown(name), set()
     last = tab.evaluate("Reveal.getTotalSlides()") - 1
     for step in range(last + 1):
         assert tab.evaluate("Reveal.getIndices().h") == step
         slide = tab.evaluate(SIZE)
         assert max(slide[0] - 1280, slide[1] - 720) <= 0, (step, slide)
+        assert tab.evaluate(SMALL) == [], step
+        small |= {figure for figure, size in tab.evaluate(LETTERS) if size < 19.9}
         for _ in range(1 + tab.evaluate(FRAGMENTS)):
             tab.keyboard.press("ArrowRight")
+    assert small == {figure for figure in TALL if figure.startswith(name)}
     tab.keyboard.press("ArrowLeft")
     assert tab.evaluate("Reveal.getIndices().h") == last - 1
     assert tab.locator("mjx-container").count() > 0
@@ -136,6 +172,8 @@ def test_a_live_figure_works_on_its_slide_and_keeps_the_arrow_keys(shown, name):
     figure.wait_for()
     slider = figure.locator("input[type=range]").first
     before, where = slider.input_value(), tab.evaluate("Reveal.getIndices().h")
+    box = tab.locator("section.present .live-figure")
+    assert box.evaluate("b => b.scrollHeight <= b.clientHeight && b.scrollWidth <= b.clientWidth")
     slider.focus()
     tab.keyboard.press("ArrowRight")
     assert slider.input_value() != before

@@ -1,4 +1,5 @@
-// A deck: formulas are typeset, those that are too wide and slides that are too full get smaller letters, then it begins.
+// A deck: formulas are typeset, those that are too wide and slides that are too full get smaller letters or a second
+// slide, then it begins; a live figure gets letters with which it fits.
 "use strict";
 
 window.MathJax = {
@@ -7,7 +8,8 @@ window.MathJax = {
 };
 
 const SIZE = { width: 1280, height: 720 };
-const SMALLEST = 0.5; // of the letters of a slide
+const SMALLEST = 2 / 3; // of the letters of a slide: 20 px
+const LARGEST = "130%"; // of the letters of a live figure, over those of a page
 
 const dark = matchMedia("(prefers-color-scheme: dark)").matches;
 document.documentElement.dataset.theme = dark ? "dark" : "light"; // for live figures
@@ -32,13 +34,16 @@ async function begin() {
     keyboard: { 78: () => Reveal.configure({ showNotes: !Reveal.getConfig().showNotes }) }, // N
     plugins: [RevealNotes],
   });
+  document.documentElement.style.fontSize = LARGEST;
+  const seen = new ResizeObserver(() => document.querySelectorAll("section.present .live-figure").forEach(fitLive));
+  document.querySelectorAll(".live-figure figure").forEach((figure) => seen.observe(figure));
   document.documentElement.dataset.ready = "";
 }
 
 // Smaller letters, as long as `tooLarge()`.
 function shrink(element, tooLarge) {
   const whole = parseFloat(element.style.fontSize) || 100; // %
-  for (let size = 1; tooLarge() && size > SMALLEST; size -= 0.05) element.style.fontSize = `${whole * size}%`;
+  for (let size = 1; tooLarge() && size > SMALLEST; size -= 0.02) element.style.fontSize = `${whole * size}%`;
 }
 
 function fit(slide) {
@@ -46,6 +51,27 @@ function fit(slide) {
   for (const formula of slide.querySelectorAll("mjx-container[display]")) {
     shrink(formula, () => formula.offsetWidth > formula.parentElement.clientWidth);
   }
-  shrink(slide, () => slide.scrollHeight > SIZE.height || slide.scrollWidth > SIZE.width);
+  const tooLarge = () => slide.scrollHeight > SIZE.height || slide.scrollWidth > SIZE.width;
+  shrink(slide, tooLarge);
+  if (tooLarge()) divide(slide);
   slide.style.display = slide.style.width = "";
+}
+
+// Half of the rows of a table that is too long go to a slide after it.
+function divide(slide) {
+  const count = slide.querySelectorAll("tr:has(td)").length;
+  if (count < 2) return;
+  const next = slide.cloneNode(true);
+  next.id += "-more";
+  next.querySelectorAll("aside.notes, caption").forEach((part) => part.remove());
+  for (const [part, goes] of [[slide, (k) => k >= count / 2], [next, (k) => k < count / 2]]) {
+    [...part.querySelectorAll("tr:has(td)")].filter((_, k) => goes(k)).forEach((row) => row.remove());
+    part.style.fontSize = "";
+  }
+  slide.after(next);
+  [slide, next].forEach(fit);
+}
+
+function fitLive(box) {
+  shrink(document.documentElement, () => box.scrollHeight > box.clientHeight || box.scrollWidth > box.clientWidth);
 }
