@@ -14,6 +14,7 @@ from syllabus import Chapter, Section, chapters, declared, minutes
 from nmpcrl.course.exercises import Exercise
 
 UNIT = 90  # minutes
+QUESTIONS = 8  # minutes of each unit, at least, that nothing else takes
 PACE = 1.5  # minutes of a lecture for one of reading
 LIVE = 10  # minutes with a live figure
 
@@ -91,7 +92,7 @@ def _filled(
     unit: Unit, pages: list[str], ending: list[str], waiting: dict[str, list[Exercise]]
 ) -> Unit:
     """The unit with the exercises that fit, which wait no longer, and with its homework."""
-    solved, room = [], UNIT - unit.total
+    solved, room = [], UNIT - QUESTIONS - unit.total
     for page in pages:
         for one in tuple(waiting[page]):
             if one.about.minutes <= room:
