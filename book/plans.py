@@ -1,7 +1,8 @@
 """Plans for a course: the units that `syllabus.yml` declares, with minutes and exercises.
 
 Sections take longer to teach than to read. What is left of a unit goes to the exercises of its
-chapters in their order; those that do not fit are homework after the chapter's last unit.
+chapters in their order, at most half of them before a chapter's last unit; those that do not fit
+are homework after it.
 """
 
 import math
@@ -94,7 +95,8 @@ def _filled(
     """The unit with the exercises that fit, which wait no longer, and with its homework."""
     solved, room = [], UNIT - QUESTIONS - unit.total
     for page in pages:
-        for one in tuple(waiting[page]):
+        share = len(waiting[page]) if page in ending else len(waiting[page]) // 2
+        for one in waiting[page][:share]:
             if one.about.minutes <= room:
                 waiting[page].remove(one)
                 solved.append(one)
