@@ -21,7 +21,8 @@ from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.published import failure_modes_of
 from nmpcrl.control import differential_drive
 from nmpcrl.learning import browser as in_browser
-from nmpcrl.study import Experiment, Runs, design, executor, paper
+from nmpcrl.study import Experiment, Runs, design, paper
+from nmpcrl.study.storage import executor
 
 settings.register_profile("no clock", deadline=None)  # the machine may be busy
 settings.load_profile("no clock")

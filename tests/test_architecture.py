@@ -79,6 +79,23 @@ def test_imports_run_one_way_from_commands_to_control():
     assert not wrong
 
 
+def test_storage_knows_no_experiment():
+    """It runs any job and keeps any file, so it imports nothing of ours that lies outside it."""
+    wrong = {
+        place(path): outside
+        for path in MODULES
+        if place(path).startswith("study/storage/")
+        if (
+            outside := {
+                name
+                for name in imports(path)
+                if name.startswith("nmpcrl.") and not name.startswith("nmpcrl.study.storage")
+            }
+        )
+    }
+    assert not wrong
+
+
 def test_a_foreign_library_has_one_home():
     used = {place(path): {name.split(".")[0] for name in imports(path)} for path in MODULES}
     wrong = {

@@ -15,9 +15,10 @@ import numpy as np
 
 import nmpcrl
 from nmpcrl.bench.solves import closed_loop, watched
-from nmpcrl.study import Experiment, paper, place, run, store
-from nmpcrl.study.atomic import write_json
+from nmpcrl.study import Experiment, paper, run, store
 from nmpcrl.study.parameters import Refusal
+from nmpcrl.study.storage import place
+from nmpcrl.study.storage.atomic import write_json
 
 Live = dict[str, Any]  # numbers by what is measured; what could not be is absent
 

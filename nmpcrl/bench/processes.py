@@ -18,7 +18,7 @@ from nmpcrl.bench.learners import COMPARED
 from nmpcrl.bench.paired import Ratio, pooled
 from nmpcrl.bench.solves import Columns
 from nmpcrl.study import paper
-from nmpcrl.study.executor import THREADS
+from nmpcrl.study.storage.executor import THREADS
 from nmpcrl.study.store import fetch_all
 from nmpcrl.study.sweeps import sweep
 

@@ -32,7 +32,7 @@ from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.claims.wider_claims import judge_wider
 from nmpcrl.study import design
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.machine import fingerprint
+from nmpcrl.study.storage.machine import fingerprint
 
 SHARED = ["layout", "decay"]  # what runs here and published ones have in common
 

@@ -40,12 +40,12 @@ from nmpcrl.claims.failure_modes import (
 from nmpcrl.claims.prespecified import from_git
 from nmpcrl.claims.verdict import Halves, Outcome, Verdict
 from nmpcrl.study import design
-from nmpcrl.study.atomic import write_json
 from nmpcrl.study.experiment import Experiment, frozen_arm
-from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.parameters import Refusal, shortened
 from nmpcrl.study.provenance import EPOCHS, environment, hash_of, summary_key
 from nmpcrl.study.records import Column
+from nmpcrl.study.storage.atomic import write_json
+from nmpcrl.study.storage.machine import fingerprint
 
 FILES = ("runs.csv", "curves.npz", thetas.FILE, "verdicts.json", "timings.csv", "about.json")
 # Columns of `failure_modes`, and what may be in them; the frozen arms have none.

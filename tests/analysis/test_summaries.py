@@ -20,8 +20,9 @@ import pytest
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import Failed, fetch_summaries
 from nmpcrl.analysis.summary import RunSummary, summarise
-from nmpcrl.study import Experiment, executor, fetch, provenance, run, store, sweep
-from nmpcrl.study.executor import Killed
+from nmpcrl.study import Experiment, fetch, provenance, run, store, sweep
+from nmpcrl.study.storage import executor
+from nmpcrl.study.storage.executor import Killed
 
 QUICK = Experiment("frozen", episodes=2, steps=3, evaluate_every=1)
 SIX = sweep(learner="frozen", seed=tuple(range(6)), episodes=1, steps=2)

@@ -19,9 +19,9 @@ from nmpcrl.claims.published import FILES, Damaged, Published, load, publish
 from nmpcrl.claims.verdict import PARTLY, REPRODUCED, Verdict
 from nmpcrl.study import Experiment, design, paper, run, sweep
 from nmpcrl.study.experiment import frozen_arm
-from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import EPOCHS, environment
 from nmpcrl.study.provenance import summary_key as run_key
+from nmpcrl.study.storage.machine import fingerprint
 
 RUNS = (
     *sweep(learner=("ES", "frozen"), seed=(0, 1, 2, 3), episodes=4, steps=6, evaluate_every=2),

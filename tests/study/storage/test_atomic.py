@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from raising import raising
 
-from nmpcrl.study.atomic import OLD, sweep, try_to_write, write_json, write_whole
-from nmpcrl.study.machine import host
+from nmpcrl.study.storage.atomic import OLD, sweep, try_to_write, write_json, write_whole
+from nmpcrl.study.storage.machine import host
 
 
 @pytest.fixture

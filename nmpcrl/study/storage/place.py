@@ -10,8 +10,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from nmpcrl.study.archive import DamagedRecords
-from nmpcrl.study.atomic import sweep, try_to_write
+from nmpcrl.study.storage.archive import DamagedRecords
+from nmpcrl.study.storage.atomic import sweep, try_to_write
 
 UNREADABLE = (errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE)  # the file may yet be whole
 

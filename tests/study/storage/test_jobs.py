@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 
-from nmpcrl.study import executor
+from nmpcrl.study.storage import executor
 
 
 @pytest.mark.slow

@@ -7,10 +7,11 @@ import psutil
 import pytest
 
 from nmpcrl.analysis import summaries
-from nmpcrl.study import Experiment, ParameterError, workers
-from nmpcrl.study.executor import execute
+from nmpcrl.study import Experiment, ParameterError
 from nmpcrl.study.provenance import signature
-from nmpcrl.study.workers import MEMORY, check_workers, free_memory, told, usable_cores
+from nmpcrl.study.storage import workers
+from nmpcrl.study.storage.executor import execute
+from nmpcrl.study.storage.workers import MEMORY, check_workers, free_memory, told, usable_cores
 
 
 @pytest.fixture

@@ -41,7 +41,7 @@ def wait_alone():
 
 
 def nested():
-    from nmpcrl.study.executor import execute
+    from nmpcrl.study.storage.executor import execute
 
     jobs = {"deep": partial(job, os.environ["FOLDER"], "deep", wait_aside)}
     execute(jobs, lambda *_: "", workers=1, progress=False)
@@ -52,7 +52,7 @@ from functools import partial
 from pathlib import Path
 
 import jobs
-from nmpcrl.study.executor import execute
+from nmpcrl.study.storage.executor import execute
 
 folder = Path(os.environ["FOLDER"])
 

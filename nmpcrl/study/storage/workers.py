@@ -7,7 +7,7 @@ from pathlib import Path
 
 import psutil
 
-from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.storage.refusal import ParameterError
 
 MEMORY = 0.45e9  # [bytes]; what a worker has at the end of a full run of RDES, resident
 GROUP = Path("/proc/self/cgroup")  # where Linux says in which control group a process is

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from nmpcrl.study.outcome import Unsendable, pack, unpack
+from nmpcrl.study.storage.outcome import Unsendable, pack, unpack
 
 
 class Two(Exception):

@@ -13,8 +13,9 @@ from raising import raising
 
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import fetch_summaries
-from nmpcrl.study import Experiment, fetch, fetch_all, reservation, store, sweep
-from nmpcrl.study.reservation import PLACE, Reservations, reservations
+from nmpcrl.study import Experiment, fetch, fetch_all, store, sweep
+from nmpcrl.study.storage import reservation
+from nmpcrl.study.storage.reservation import PLACE, Reservations, reservations
 from nmpcrl.study.store import path_of
 
 QUICK = Experiment(learner="frozen", episodes=1, steps=3)
@@ -57,7 +58,7 @@ def test_a_process_has_one_set_of_reservations_in_a_folder_however_it_is_named(r
 HOLD = """
 import sys, time
 from pathlib import Path
-from nmpcrl.study.reservation import reservations
+from nmpcrl.study.storage.reservation import reservations
 
 print(*sorted(reservations(Path(sys.argv[1])).take(sys.argv[2:])), flush=True)
 time.sleep(600)

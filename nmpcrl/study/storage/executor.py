@@ -26,10 +26,10 @@ from typing import Any, TypeVar
 
 from tqdm import tqdm
 
-from nmpcrl.study.orphans import end_with_parent
-from nmpcrl.study.outcome import pack, unpack
-from nmpcrl.study.workers import check_workers as check_workers
-from nmpcrl.study.workers import told
+from nmpcrl.study.storage.orphans import end_with_parent
+from nmpcrl.study.storage.outcome import pack, unpack
+from nmpcrl.study.storage.workers import check_workers as check_workers
+from nmpcrl.study.storage.workers import told
 
 SPAWN = get_context("spawn")  # a fork would copy the threads' locks but not the threads
 ATTEMPTS = 3  # how often a job is begun whose worker is killed

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from nmpcrl.study.atomic import write_whole
+from nmpcrl.study.storage.atomic import write_whole
 
 Column = NDArray[Any]
 Tables = dict[str, dict[str, Column]]  # columns by name, by the name of their table

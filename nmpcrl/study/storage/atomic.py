@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
-from nmpcrl.study.machine import host, is_running
+from nmpcrl.study.storage.machine import host, is_running
 
 OLD = 3600.0  # age [s] beyond which nobody is still filling a file whose writer cannot be asked for
 BLOCK = 4096  # bytes that a folder must take before it is relied upon

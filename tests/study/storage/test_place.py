@@ -22,14 +22,13 @@ from nmpcrl.study import (
     Experiment,
     Records,
     StoreError,
-    archive,
     fetch,
     fetch_all,
-    place,
     store,
     stored,
 )
-from nmpcrl.study.place import check_folder, keep
+from nmpcrl.study.storage import archive, place
+from nmpcrl.study.storage.place import check_folder, keep
 from nmpcrl.study.store import path_of, size_of
 
 QUICK = Experiment(learner="frozen", episodes=2, steps=3, evaluate_every=1)
