@@ -2,7 +2,7 @@
 
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -16,11 +16,11 @@ torch.set_num_threads(1)  # matrices this small only get slower with more
 KEPT = 256  # rows: room for more predictions at once is made anew
 DRAWING = threading.Lock()  # torch draws first weights from one generator a process
 
-# In place, and its slope from what it made; that of a ReLU is its output's sign.
-Activation = tuple[Callable[[Tensor], Tensor], Callable[[Tensor], Tensor]]
+# In place, and its slope from what it made, put into `out`; that of a ReLU is its output's sign.
+Activation = tuple[Callable[[Tensor], Tensor], Callable[..., Tensor]]
 ACTIVATIONS: dict[str, Activation] = {
-    "relu": (Tensor.relu_, Tensor.sign),
-    "tanh": (Tensor.tanh_, lambda y: 1 - y * y),
+    "relu": (Tensor.relu_, torch.sign),
+    "tanh": (Tensor.tanh_, lambda y, out: torch.mul(y, y, out=out).neg_().add_(1)),
 }
 
 
@@ -48,34 +48,30 @@ class Predictor:
         self._activation = activation
         self._input_scale, self._target_scale = scales
         self._matrices = _matrices(weights, widths), _matrices(gradient, widths)
-        self._one = self._layers(_ones(1, widths[0] + 1))  # predicts a single value
-        self._rooms = {1: self._one}  # by the number of rows; of few, which are asked for often
+        self._rooms = dict[int, _Room]()  # by the number of rows; of few, which are asked for often
         self.fitted = False  # whether the weights know of a fit
 
     def predict(self, inputs: Vector) -> Vector:
         """The value of one input (k,) or of many (..., k); the result drops the last axis."""
         *shape, k = inputs.shape
         rows = inputs.reshape(-1, k)
-        layers = self._room(len(rows))
-        layers[0].x.numpy()[:, :-1] = rows / self._input_scale
-        value = _forward(layers, self._activation[0]).numpy().astype(float)
-        return value.reshape(shape) * self._target_scale
+        room = self._room(len(rows))
+        np.divide(rows, self._input_scale, out=room.inputs, casting="same_kind")
+        room.forward()
+        return room.values.astype(float).reshape(shape) * self._target_scale
 
-    def _room(self, rows: int) -> "Layers":
-        """Layers for so many rows, which are kept if they are small: to make them takes longer."""
+    def _room(self, rows: int) -> "_Room":
+        """Room for so many rows, which is kept if they are few: to make it takes longer."""
         if rows in self._rooms:
             return self._rooms[rows]
-        layers = self._layers(_ones(rows, self._widths[0] + 1))
+        room = self._room_of(_ones(rows, self._widths[0] + 1))
         if rows <= KEPT:
-            self._rooms[rows] = layers
-        return layers
+            self._rooms[rows] = room
+        return room
 
-    def _layers(self, x: Tensor) -> "Layers":
+    def _room_of(self, x: Tensor) -> "_Room":
         """The three layers, with room for the rows of `x`."""
-        (W1, W2, W3), (dW1, dW2, dW3) = self._matrices
-        first = _Layer(x, W1, dW1)
-        second = _Layer(first.y, W2, dW2)
-        return first, second, _Layer(second.y, W3, dW3)
+        return _Room(x, zip(*self._matrices, strict=True), self._activation)
 
 
 class QNetwork(Predictor):
@@ -129,8 +125,11 @@ class QNetwork(Predictor):
         weights = _first_weights(widths, seed=int(rng.integers(2**63)))
         gradient, self._mean, self._square = torch.zeros(3, len(weights), dtype=torch.float32)
         self._fits = torch.zeros((), dtype=torch.float32)
+        self._count = self._fits.numpy()  # that very number
         super().__init__(weights, gradient, widths, ACTIVATIONS[activation], scales)
-        self._batch = self._layers(torch.from_numpy(self._drawn[:, :-1]))  # looks at those rows
+        self._batch = self._room_of(torch.from_numpy(self._drawn[:, :-1]))  # looks at those rows
+        self._targets = self._drawn[:, -1:]
+        self._error = np.empty_like(self._targets)
 
     def __len__(self) -> int:
         """How many examples are remembered."""
@@ -157,16 +156,17 @@ class QNetwork(Predictor):
             raise ValueError(f"{len(self)} examples are too few for a batch of {batch}")
         rows = self._rng.choice(len(self), batch, replace=False)
         self._buffer.take(rows, axis=0, out=self._drawn, mode="clip")
-        activate, slope = self._activation
-        error = _forward(self._batch, activate).numpy() - self._drawn[:, -1:]
-        _backward(self._batch, slope, torch.from_numpy(2 / batch * error))
+        self._batch.forward()
+        error = np.subtract(self._batch.values, self._targets, out=self._error)
+        np.multiply(2 / batch, error, out=self._batch.slopes)
+        self._batch.backward()
         self._descend()
         self.fitted = True
         return float(np.vdot(error, error)) / batch * self._target_scale**2
 
     def _descend(self) -> None:
         """Adam: the kernel under torch.optim.Adam(fused=True), whose way there takes 100 us."""
-        self._fits += 1
+        self._count += 1
         torch._fused_adam_(
             [self._weights],
             [self._gradient],
@@ -226,38 +226,59 @@ class _Layer:
         self.x, self.W, self.dW = x, W, dW
         self.y = _ones(len(x), W.shape[1] + 1)
         self.out = self.y[:, :-1]
+        self.d, self._slope = torch.empty(2, *self.out.shape, dtype=torch.float32)
         self._x_transposed, self._W_transposed = x.T, W[:-1].T
 
     def forward(self) -> Tensor:
         """Compute `out` from `x`."""
         return torch.mm(self.x, self.W, out=self.out)
 
-    def backward(self, d: Tensor) -> Tensor:
-        """The loss's derivative in x, from d, that in `out`."""
-        return torch.mm(d, self._W_transposed)
+    def backward(self, before: "_Layer", slope: Callable[..., Tensor]) -> None:
+        """Compute the `d` of the layer before, where `d` is the loss's derivative in `out`."""
+        torch.mm(self.d, self._W_transposed, out=before.d)
+        before.d.mul_(slope(before.out, out=before._slope))
 
-    def differentiate(self, d: Tensor) -> None:
-        """Compute `dW` from d, the loss's derivative in `out`."""
-        torch.mm(self._x_transposed, d, out=self.dW)
-
-
-Layers = tuple[_Layer, _Layer, _Layer]
+    def differentiate(self) -> None:
+        """Compute `dW` from `d`."""
+        torch.mm(self._x_transposed, self.d, out=self.dW)
 
 
-def _forward(layers: Layers, activate: Callable[[Tensor], Tensor]) -> Tensor:
-    first, second, third = layers
-    activate(first.forward())
-    activate(second.forward())
-    return third.forward()
+class _Room:
+    """The layers for some rows, and what NumPy sees of them."""
 
+    def __init__(
+        self, x: Tensor, matrices: Iterable[tuple[Tensor, Tensor]], activation: Activation
+    ) -> None:
+        """Make room.
 
-def _backward(layers: Layers, slope: Callable[[Tensor], Tensor], d3: Tensor) -> None:
-    """Compute every layer's `dW` from d3, the loss's derivative in the output."""
-    first, second, third = layers
-    d2 = third.backward(d3).mul_(slope(second.out))
-    d1 = second.backward(d2).mul_(slope(first.out))
-    for layer, d in zip(layers, (d1, d2, d3), strict=True):
-        layer.differentiate(d)
+        Args:
+            x: the rows.
+            matrices: W and dW of each layer.
+            activation: of all layers but the last.
+        """
+        self._activate, self._slope = activation
+        self._layers: list[_Layer] = []
+        for W, dW in matrices:
+            self._layers.append(_Layer(x, W, dW))
+            x = self._layers[-1].y
+        self._pairs = [*pairwise(self._layers)]
+        first, last = self._layers[0], self._layers[-1]
+        self.inputs, self.values = first.x.numpy()[:, :-1], last.out.numpy()
+        self.slopes = last.d.numpy()  # the loss's derivative in the values
+
+    def forward(self) -> None:
+        """Compute `values` from `inputs`."""
+        *hidden, last = self._layers
+        for layer in hidden:
+            self._activate(layer.forward())
+        last.forward()
+
+    def backward(self) -> None:
+        """Compute every layer's `dW` from `slopes`."""
+        for before, layer in reversed(self._pairs):
+            layer.backward(before, self._slope)
+        for layer in self._layers:
+            layer.differentiate()
 
 
 def _ones(*shape: int) -> Tensor:

@@ -19,9 +19,12 @@ from nmpcrl.study.sweeps import sweep
 LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too
 SEEDS = tuple(range(10))
 VARIED: dict[str, Any] = {"layout": ("A", "D"), "seed": tuple(range(5))}  # one open, one closing
-FRESH: tuple[dict[str, Any], ...] = (  # every layout once, and that of the chapters as they need it
-    {"seeds": (0,)},
-    {"layouts": ("A",), "seeds": tuple(range(5))},
+# What a build trains again: all learners, in the chapters' layout in both readings and with as many
+# seeds as `claims.comparison.FEWEST`, and in every other layout in one reading and with one seed.
+FRESH: tuple[dict[str, Any], ...] = (
+    {"layouts": ("A",), "seeds": (0, 1, 2)},
+    {"layouts": ("B", "E"), "decays": ("step",), "seeds": (0,)},
+    {"layouts": ("C", "D", "F"), "decays": ("episode",), "seeds": (0,)},
 )
 MAIN_TABLE = "main"
 IMITATING = tuple(name for name in PAPER if LEARNERS[name].network)
@@ -84,11 +87,10 @@ def main_table(
     layouts: Sequence[str] = LAYOUTS,
     seeds: Sequence[int] = SEEDS,
     episodes: int = paper.EPISODES,
+    decays: Sequence[str] = tuple(DECAYS),
 ) -> tuple[Experiment, ...]:
     """Every learner in every layout, in both readings of the decay, with every seed."""
-    return sweep(
-        learner=learners, layout=layouts, decay=tuple(DECAYS), seed=seeds, episodes=episodes
-    )
+    return sweep(learner=learners, layout=layouts, decay=decays, seed=seeds, episodes=episodes)
 
 
 def fresh(episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:

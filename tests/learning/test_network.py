@@ -69,7 +69,7 @@ def learner_like(examples):
 
 def model_of(learner, activation=torch.nn.ReLU):
     """The same network of torch's modules, which autograd differentiates."""
-    layers = [layer.W.clone() for layer in learner._one]
+    layers = [W.clone() for W in learner._matrices[0]]
     linear = [torch.nn.Linear(len(W) - 1, W.shape[1]) for W in layers]
     for module, W in zip(linear, layers, strict=True):
         module.weight.data, module.bias.data = W[:-1].T.contiguous(), W[-1]
