@@ -28,12 +28,25 @@ settings.register_profile("no clock", deadline=None)  # the machine may be busy
 settings.load_profile("no clock")
 
 ROOT = Path(__file__).resolve().parent.parent
+NEEDS = {  # fixture -> the marker of a test that asks for it, directly or through others
+    "site": "built",
+    "browser": "browser",
+    "distributed_firefox": "browser",
+    "jupyter_lab": "lab",
+    "nbgrader": "network",
+}
 RUNS = Path(os.environ.get("NMPCRL_RUNS") or ROOT / "runs")  # before a test names others
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run"
     " --disable-background-networking --disable-component-update --disable-sync"
 )
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark a test with what it needs, so that none can forget to say so."""
+    for fixture in NEEDS.keys() & set(getattr(item, "fixturenames", ())):
+        item.add_marker(NEEDS[fixture])
 
 
 def missing(reason: str) -> None:

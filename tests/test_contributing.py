@@ -531,7 +531,6 @@ def test_what_was_added_works(failures, name):
 
 
 @pytest.mark.slow
-@pytest.mark.book
 def test_the_live_figure_that_was_added_solves_in_a_browser(scratch, failures, browser):
     assert "live figure" not in failures
     page = browser.new_page()

@@ -12,8 +12,6 @@ from nmpcrl.report.live.problem import problem_of
 from nmpcrl.study import Experiment, run
 from nmpcrl.study.setup import controller_of
 
-pytestmark = pytest.mark.book
-
 SCRIPTS = ("solver.js", "random.js", "network.js", "learning.js")
 BATCH, HIDDEN = 128, 64
 SIZES = (BATCH, BATCH + 1, 1000, 7800, 39_000)  # of buffers

@@ -98,7 +98,6 @@ def shown(decks, browser):
     assert wrong == []
 
 
-@pytest.mark.book
 @each_chapter
 def test_a_deck_has_a_title_and_eight_to_twenty_slides_and_says_what_pictures_show(decks, name):
     page = (decks / f"{name}.html").read_text()
@@ -112,7 +111,6 @@ def test_a_deck_has_a_title_and_eight_to_twenty_slides_and_says_what_pictures_sh
     assert "<h2></h2>" not in page
 
 
-@pytest.mark.book
 def test_two_decks_are_the_same_bytes(decks):
     again = decks.parent / "two"
     slides.make(SOURCES, ROOT / slides.EXECUTED, again)
@@ -122,7 +120,6 @@ def test_two_decks_are_the_same_bytes(decks):
         assert path.read_bytes() == (again / path.relative_to(decks)).read_bytes(), path
 
 
-@pytest.mark.book
 @each_chapter
 def test_arrows_move_and_every_slide_fits_and_has_no_formula_in_error(shown, name):
     tab, small = shown(name), set()
@@ -142,7 +139,6 @@ def test_arrows_move_and_every_slide_fits_and_has_no_formula_in_error(shown, nam
     assert tab.locator("[data-mjx-error], mjx-merror").count() == 0
 
 
-@pytest.mark.book
 def test_the_notes_are_shown_by_a_key(shown):
     tab = shown(LIVE[0])
     assert not tab.locator(".speaker-notes").is_visible()
@@ -150,7 +146,6 @@ def test_the_notes_are_shown_by_a_key(shown):
     assert "exercises, together" in tab.locator(".speaker-notes").inner_text()
 
 
-@pytest.mark.book
 def test_the_window_of_the_speaker_has_each_formula_once(shown):
     tab = shown("solver")
     tab.evaluate("Reveal.slide(Reveal.getSlides().findIndex(s => s.id === 'rows-2'))")
@@ -163,7 +158,6 @@ def test_the_window_of_the_speaker_has_each_formula_once(shown):
         assert max(hidden.bounding_box()[side] for side in ("width", "height")) <= 1
 
 
-@pytest.mark.book
 @pytest.mark.parametrize("name", LIVE)
 def test_a_live_figure_works_on_its_slide_and_keeps_the_arrow_keys(shown, name):
     tab = shown(name)
@@ -183,7 +177,6 @@ def test_a_live_figure_works_on_its_slide_and_keeps_the_arrow_keys(shown, name):
 PRINTED = "import sys, pathlib, slides; slides.printed([pathlib.Path(sys.argv[1])])"
 
 
-@pytest.mark.book
 def test_a_pdf_has_a_wide_page_for_each_slide_but_the_live_ones(decks):
     path = decks / f"{LIVE[0]}.html"
     run = [sys.executable, "-c", PRINTED, str(path)]  # another Chromium needs another process
