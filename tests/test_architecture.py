@@ -2,6 +2,7 @@
 
 import ast
 import re
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 from nmpcrl import control
@@ -77,6 +78,12 @@ def test_imports_run_one_way_from_commands_to_control():
         if room in ROOMS and (against := imported & set(ROOMS) - below(room)):
             wrong[place(path)] = against
     assert not wrong
+
+
+def test_no_file_imports_itself_through_others():
+    """Nor for its types alone; `prepare` raises `CycleError`, which names the files."""
+    files = {f"nmpcrl.{place(path)[:-3].replace('/', '.')}": path for path in MODULES}
+    TopologicalSorter({name: imports(path) & set(files) for name, path in files.items()}).prepare()
 
 
 def test_storage_knows_no_experiment():

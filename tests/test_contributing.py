@@ -140,7 +140,7 @@ def shy_deep_expected_sarsa(
     bootstrap = Imitation(network, with_theta=False, **options)
     return Learner("shy", bootstrap, semi_gradient(alpha / 3), nmpc.gamma)
 '''),
-        "nmpcrl/study/setup.py": both(
+        "nmpcrl/study/learners.py": both(
             imported(
                 "from nmpcrl.learning.learners import (\n    half_expected_sarsa,\n"
                 "    shy_deep_expected_sarsa,\n    slow_gradient_expected_sarsa,\n)"

@@ -34,7 +34,7 @@ from typing import Any
 
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.setup import LEARNERS
+from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.machine import fingerprint
 

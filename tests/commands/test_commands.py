@@ -16,7 +16,7 @@ from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, design, limits, paper, sweep
-from nmpcrl.study.setup import LEARNERS
+from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.sweeps import FIELDS
 
 WHOLE = len(design.whole_study())

@@ -8,8 +8,8 @@ import pytest
 
 from nmpcrl.study import Experiment, paper, provenance
 from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.provenance import ORIGINAL, changed, identity, key, sources, summary_key
-from nmpcrl.study.setup import LEARNERS
 from nmpcrl.study.storage import machine
 
 

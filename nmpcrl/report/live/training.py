@@ -16,8 +16,8 @@ from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import WALL, problem_of
 from nmpcrl.study import Experiment, paper
+from nmpcrl.study.learners import readers
 from nmpcrl.study.records import LAST
-from nmpcrl.study.setup import readers
 
 SCRIPTS = frame.scripts_of(
     "laboratory", *frame.MAP, "random.js", "network.js", "learning.js", "trainer.js", "graph.js",

@@ -14,7 +14,8 @@ from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import problem_of, surroundings
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.setup import DECAYS, controller_of
+from nmpcrl.study.learners import DECAYS
+from nmpcrl.study.setup import controller_of
 
 SCRIPTS = frame.scripts_of(
     "learners", *frame.MAP, "sliders.js", "charts.js", "random.js", "learning.js", "slices.js",
