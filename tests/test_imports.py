@@ -40,6 +40,7 @@ assert "QNetwork" in nmpcrl.learning.__all__
         ("import nmpcrl.analysis.metrics", []),
         ("import nmpcrl.analysis.summaries", []),
         ("import nmpcrl.bench", []),
+        ("import nmpcrl.claims.evidence", ["pandas", "scipy.stats"]),
         (NETWORK, ["torch"]),
         (TRAIN.format(learner="ES"), ["numba"]),
         (TRAIN.format(learner="RDES"), ["torch", "numba"]),

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -12,8 +12,10 @@ from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
 from nmpcrl.control.solvers import baselines
 from nmpcrl.control.solvers.riccati import Code, machine_code
-from nmpcrl.learning import QNetwork
 from nmpcrl.study import paper
+
+if TYPE_CHECKING:
+    from nmpcrl.learning import QNetwork
 
 Columns = dict[str, list[Any]]  # lists of one length, by name
 Solve = Callable[..., Any]  # (state, theta, warm_start) -> what has value and iterations
@@ -162,8 +164,10 @@ def watched() -> tuple[Nmpc, list[float]]:
     return nmpc, seconds
 
 
-def _network() -> QNetwork:
+def _network() -> "QNetwork":
     """RDES's network with an episode in its buffer."""
+    from nmpcrl.learning import QNetwork  # and torch, which who reads times does not need
+
     rng = np.random.default_rng(0)
     network = QNetwork(WIDTH, rng, learning_rate=paper.ZETA, batch=paper.BATCH)
     for row in rng.normal(size=(paper.STEPS, WIDTH)):

@@ -72,7 +72,7 @@ LENGTHS = {  # from the shortest
         episodes=1,
         problems=paper.STEPS,
         loops=10,
-        processes=PROCESSES,
+        processes=4,
         turns=paper.STEPS,
         rounds=2,
         mpcrl_steps=40,
@@ -81,7 +81,7 @@ LENGTHS = {  # from the shortest
         seeds=6,
         seed_run=100,
         firsts=3,
-        compile=True,
+        compile=False,
     ),
     "full": Length(
         episodes=4,
