@@ -17,6 +17,7 @@ from hypothesis import settings
 
 from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.bench.solves import transposed
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.published import failure_modes_of
 from nmpcrl.control import differential_drive
@@ -172,10 +173,6 @@ REST = 0.02  # [ms]
 HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}
 
 
-def transposed(names: tuple[str, ...], rows: list[tuple]) -> dict[str, list]:
-    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
-
-
 def learner(solver: str, name: str) -> tuple:
     solve, fit = 1e3 * SOLVERS[solver], FIT if name in ("RDES", "DES") else None
     step = SOLVES[name] * solve + (fit or 0.0) + REST
@@ -197,7 +194,7 @@ def measured() -> dict[str, dict]:
 MEASURED = {
     "about": {"length": "full", "key": "0", "date": "2026-01-01", "seconds": 60.0, "others": 0.1},
     "solves": transposed(
-        ("loop", "solver", "warm", "seconds", "iterations", "suboptimality"),
+        "loop solver warm seconds iterations suboptimality",
         [
             (loop, solver, t > 0, seconds if t else 10 * seconds, 5, 0.0)
             for loop in LOOPS
@@ -205,29 +202,16 @@ MEASURED = {
             for t in range(5)
         ],
     ),
-    "loop": transposed(("loop", "seconds"), [(loop, 40e-6) for loop in LOOPS for _ in range(5)]),
+    "loop": transposed("loop seconds", [(loop, 40e-6) for loop in LOOPS for _ in range(5)]),
     "parts": {"part": ["solve, compiled part", "step of the plant"], "seconds": [30e-6, 2e-6]},
     "scaling": transposed(
-        ("varied", "size", "seconds", "iterations"),
+        "varied size seconds iterations",
         growing("horizon", (5, 10, 20, 40, 80), 0.5e-6)
         + growing("obstacles", (1, 4, 8, 16, 32), 0.25e-6),
     ),
     "learners": transposed(
-        (
-            "solver",
-            "learner",
-            "solves",
-            "ms_per_step",
-            "ms_per_solve",
-            "ms_per_fit",
-            "ms_per_rest",
-            "hours",
-            "hours_paper",
-            "ratio",
-            "ratio_low",
-            "ratio_high",
-            "waited",
-        ),
+        "solver learner solves ms_per_step ms_per_solve ms_per_fit ms_per_rest hours hours_paper"
+        " ratio ratio_low ratio_high waited",
         [learner(solver, name) for solver in ("riccati", "fatrop", "ipopt") for name in SOLVES],
     ),
     "mpcrl": {"learner": ["mpcrl", "mpcrl", "ES", "ES"], "seconds": [0.01, 0.01, 1e-4, 1e-4]},
@@ -238,7 +222,7 @@ MEASURED = {
         "processor": [4.0, 4.0, 16.0, 16.0],
     },
     "episodes": transposed(
-        ("learner", "episode", "seconds", "memory"),
+        "learner episode seconds memory",
         [(name, k, 0.01 * k, 400_000_000) for name in SOLVES for k in range(1, 301)],
     ),
     "parallel": {"workers": [1, 2], "seconds": [20.0, 10.5], "runs": [4, 4], "episodes": [9, 9]},
