@@ -15,7 +15,7 @@ import course
 import nbformat
 import pytest
 
-from nmpcrl.course.confined import Limits
+from nmpcrl.course.execution import Limits
 from nmpcrl.course.exercises import exercises
 from nmpcrl.course.grading import grade
 
