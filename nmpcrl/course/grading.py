@@ -95,8 +95,8 @@ def _marks(path: Path, folder: Path, judge: Judge, limits: Limits) -> list[Mark]
             student,
             file.as_posix(),
             one.number,
-            None if not one.parts["check"] else 0 if lost[one.name] else one.about.points,
-            one.about.points,
+            None if not one.parts["check"] else 0 if lost[one.name] else one.about.worth,
+            one.about.worth,
             lost[one.name],
         )
         for one in chapter.exercises
