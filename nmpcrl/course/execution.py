@@ -52,7 +52,7 @@ class Process:
         os.set_blocking(self._to, False)
         words = map(str, (hears, says, limits.megabytes, seconds))
         own = {"MPLBACKEND": "Agg", "NMPCRL_STRICT": "1"}
-        own |= {"IPYTHONDIR": str(work.parent), "TMPDIR": str(work)}
+        own |= {"IPYTHONDIR": str(work.parent), "TMPDIR": str(work), "NMPCRL_DATA": "data"}
         self._child = subprocess.Popen(
             [sys.executable, "-m", "nmpcrl.course.cells", *words],
             pass_fds=[hears, says],

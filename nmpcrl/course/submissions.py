@@ -101,17 +101,17 @@ def notebook_of(path: Path) -> Notebook:
 
 
 def chapters(edition: Path) -> list[Chapter]:
-    """The chapters of an edition for graders.
+    """The chapters of an edition for graders, each an assignment in nbgrader's folder `source`.
 
     Raises:
         CannotGrade: the folder has none.
     """
     found = []
-    for path in sorted(edition.rglob("*.ipynb")):
+    for path in sorted((edition / "source").glob("*/*.ipynb")):
         notebook = notebook_of(path)
         for cell in notebook.cells:
             cell["source"] = SOLUTION.sub("", cell["source"])
-        data = path.parent / "data"
+        data = edition / "data"
         every = list(exercises(notebook))
         if any(c.metadata.nbgrader for one in every for c in one.parts["check"]):
             found.append(Chapter(path.stem, notebook, every, data if data.is_dir() else None))

@@ -20,7 +20,7 @@ from nmpcrl.course.exercises import HEAD, OURS, Exercise, Notebook, exercises
 CHECKS = "exercises-checks"  # the cell that imports them
 IMPORT = re.compile(r"^from (nmpcrl\.course\.checks) import (\w+) as check$", flags=re.M)
 CALL = re.compile(r"check\.(\w+)\((.*)\)", flags=re.S)
-LATER = "# The answer is checked when it is graded."
+LATER = "# This answer is checked when it is graded."  # in the place of a check, for students
 
 
 def varied(source: Notebook, secret: bytes) -> Notebook:
@@ -39,7 +39,9 @@ def varied(source: Notebook, secret: bytes) -> Notebook:
             continue
         (cell,) = one.parts["check"]
         called = CALL.fullmatch(cell.source)
-        check = getattr(checks, called[1]) if called else None
+        if called is None:
+            raise ValueError(f"exercise {one.number} does not call its check alone")
+        check = getattr(checks, called[1])
         numbers = getattr(check, "varied", {})
         one.text.metadata[OURS]["exercise"]["counts"] = bool(numbers)
         for name, within in numbers.items():
@@ -54,11 +56,20 @@ def varied(source: Notebook, secret: bytes) -> Notebook:
     return notebook
 
 
+def withhold(one: Exercise) -> None:
+    """Leave out the check of an exercise that counts because of a secret."""
+    if "counts" in one.text.metadata[OURS]["exercise"] and one.about.counts:
+        for cell in one.parts["check"]:
+            cell.source = LATER
+
+
 def _checks(notebook: Notebook) -> Any:
     """The module of a chapter's checks."""
-    code = next((cell.source for cell in notebook.cells if cell.id == CHECKS), "")
+    code = next(cell.source for cell in notebook.cells if cell.id == CHECKS)
     found = IMPORT.search(code)
-    return importlib.import_module(".".join(found.groups())) if found else None
+    if found is None:
+        raise ValueError(f"{code!r} does not import the checks of a chapter")
+    return importlib.import_module(".".join(found.groups()))
 
 
 def values(within: tuple[float, float, float]) -> list[str]:
@@ -91,14 +102,13 @@ def _replace(one: Exercise, printed: str, drawn: str) -> None:
 
 def without(code: str) -> str:
     """The code of a module of checks without those of which a number may be another."""
-    gone = [node for node in ast.parse(code).body if _is_varied(node)]
+    functions = [node for node in ast.parse(code).body if isinstance(node, ast.FunctionDef)]
+    gone = [node for node in functions if any(map(_is_varied, node.decorator_list))]
     lines = code.splitlines(keepends=True)
     for node in reversed(gone):
-        first = min(one.lineno for one in node.decorator_list)
-        del lines[first - 1 : node.end_lineno]
+        del lines[node.decorator_list[0].lineno - 1 : node.end_lineno]
     return "".join(lines)
 
 
-def _is_varied(node: ast.stmt) -> bool:
-    marks = node.decorator_list if isinstance(node, ast.FunctionDef) else []
-    return any(isinstance(m, ast.Call) and ast.unparse(m.func) == "varied" for m in marks)
+def _is_varied(mark: ast.expr) -> bool:
+    return isinstance(mark, ast.Call) and ast.unparse(mark.func) == "varied"

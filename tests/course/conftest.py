@@ -19,9 +19,10 @@ from nmpcrl.course.submissions import chapters, matched, notebook_of
 @pytest.fixture
 def edition(tmp_path) -> Path:
     """The edition for graders of the small chapter."""
-    place = tmp_path / "edition/source/nmpcrl"
-    (place / "data/published").mkdir(parents=True)
-    (place / "data/of_the_chapter.txt").write_text("4")
+    place, data = (tmp_path / "edition" / name for name in (f"source/{SMALL}", "data"))
+    place.mkdir(parents=True)
+    (data / "published").mkdir(parents=True)
+    (data / "of_the_chapter.txt").write_text("4")
     nbformat.write(editions.grader(small_chapter(), set()), place / f"{SMALL}.ipynb")
     return tmp_path / "edition"
 

@@ -124,7 +124,7 @@ def functions(edition):
     for number, name in enumerate(OF_FUNCTIONS, start=1):
         cells += exercise(number, name, "def {}(x, along):\n    return ...", "{}")
     source = new_notebook(cells=cells)
-    place = edition / f"source/nmpcrl/{SMALL}.ipynb"
+    place = edition / f"source/{SMALL}/{SMALL}.ipynb"
     nbformat.write(editions.grader(source, set()), place)
     return editions.student(source, set())
 

@@ -163,7 +163,7 @@ def test_a_folder_that_is_not_what_it_should_be_is_one_sentence(place, tmp_path,
 
 
 def test_a_chapter_that_fails_without_any_answer_is_refused_before_one_is_graded(edition, tmp_path):
-    place = edition / f"source/nmpcrl/{SMALL}.ipynb"
+    place = edition / f"source/{SMALL}/{SMALL}.ipynb"
     place.write_text(place.read_text().replace("four = 4.0", "four = 1 / 0"))
     (tmp_path / "in").mkdir()
     nbformat.write(solved_by_student(), tmp_path / f"in/{SMALL}.ipynb")
@@ -172,7 +172,6 @@ def test_a_chapter_that_fails_without_any_answer_is_refused_before_one_is_graded
 
 
 def test_what_a_chapter_trains_is_there_for_every_notebook(edition, tmp_path):
-    place = edition / f"source/nmpcrl/{SMALL}.ipynb"
     once = "from pathlib import Path\nassert not (new := Path('data/new')).exists()\nnew.touch()"
     (chapter,) = chapters(edition)
     cell_of(chapter.notebook, "between-1")["source"] = once
@@ -183,7 +182,7 @@ def test_what_a_chapter_trains_is_there_for_every_notebook(edition, tmp_path):
         "of_the_chapter.txt",
         "published",
     }
-    assert not (place.parent / "data/new").exists()
+    assert not (edition / "data/new").exists()
 
 
 def test_an_edition_that_is_not_there_is_refused(tmp_path):

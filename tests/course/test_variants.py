@@ -1,6 +1,7 @@
 """Other numbers from a secret: published answers do not fit, and those of the edition do."""
 
 import importlib
+import re
 from math import comb
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from nmpcrl.course import variants
 from nmpcrl.course.exercises import exercises
 from nmpcrl.course.variants import CHECKS, values, varied, without
 
+ROOT = Path(__file__).resolve().parents[2]
 SOURCES = course.chapters()
 VARIED = {  # by chapter
     "01_mdp_and_nmpc.ipynb": ["1.1"],
@@ -102,3 +104,11 @@ def test_students_get_no_check_of_an_exercise_that_counts(name):
     for one in exercises(SOURCES[name]):
         if one.parts["check"]:
             assert (function(one) in names) == (one.number not in VARIED[name])
+
+
+def test_the_page_for_teachers_names_the_exercises_that_count():
+    page = (ROOT / "book/teach.md").read_text()
+    (sentence,) = re.findall(r"\*\*Twenty exercises count\*\*[^:]*: (.*?\d)\. ", page)
+    assert re.split(", | and ", sentence) == sorted(
+        sum(VARIED.values(), []), key=lambda number: tuple(map(int, number.split(".")))
+    )
