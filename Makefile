@@ -26,8 +26,8 @@ book: .venv/ready  ## Train what is missing, execute every chapter, build _build
 pdf: .venv/ready  ## The built book as one PDF, _build/html/nmpcrl.pdf; needs a Chromium
 	@$(BIN)/python book/pdf.py
 
-course: .venv/ready  ## Notebooks for students, teachers and graders, and slides; the built book offers them
-	@$(BIN)/python book/course.py
+course: .venv/ready  ## Notebooks for students, teachers and graders, and slides; SECRET=FILE draws other numbers
+	@$(BIN)/python book/course.py $(if $(SECRET),--secret "$(SECRET)")
 
 smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/html
 	@$(BIN)/python book/build.py --smoke

@@ -1,6 +1,7 @@
 """Grading: what students hand in, run as strangers' code that hangs, ends or cheats."""
 
 import json
+from contextlib import closing
 
 import editions
 import nbformat
@@ -11,9 +12,10 @@ from small_course import ASKED, SMALL, cell_of, small_chapter, solved_by_student
 
 from nmpcrl.commands import main
 from nmpcrl.commands.grade import cell
-from nmpcrl.course.confined import Limits
+from nmpcrl.course.execution import Limits
 from nmpcrl.course.exercises import exercises
-from nmpcrl.course.grading import grade, rehearsed
+from nmpcrl.course.grading import grade
+from nmpcrl.course.judging import Judge
 from nmpcrl.course.submissions import CannotGrade, chapters
 
 POINTS = {f"1.{number}": number for number in range(1, len(ASKED) + 1)}
@@ -60,11 +62,11 @@ def test_an_answer_that_hangs_ends_the_process_or_takes_memory_costs_its_own_poi
         "four": GROWS,
         "six": "import sys\nsys.exit()",
     }
-    limits = ("--cell-limit", "3", "--memory", "600")
+    limits = ("--cell-limit", "6", "--memory", "600")
     rows = graded(*limits, one=solved_by_student(**fatal))["one"]
     assert points(rows) == expected("1.1", "1.2", "1.3", "1.4", "1.6")
     said = reasons(rows)
-    assert "a cell took longer than 3 s" in said["1.1"]
+    assert "a cell took longer than 6 s" in said["1.1"]
     assert "it ended the process" in said["1.2"]
     assert "it ended the process, with code -9" in said["1.3"]
     assert "it took more than 600 MB of memory" in said["1.4"]
@@ -161,7 +163,7 @@ def test_a_folder_that_is_not_what_it_should_be_is_one_sentence(place, tmp_path,
 
 
 def test_a_chapter_that_fails_without_any_answer_is_refused_before_one_is_graded(edition, tmp_path):
-    place = edition / f"source/nmpcrl/{SMALL}.ipynb"
+    place = edition / f"source/{SMALL}/{SMALL}.ipynb"
     place.write_text(place.read_text().replace("four = 4.0", "four = 1 / 0"))
     (tmp_path / "in").mkdir()
     nbformat.write(solved_by_student(), tmp_path / f"in/{SMALL}.ipynb")
@@ -170,17 +172,17 @@ def test_a_chapter_that_fails_without_any_answer_is_refused_before_one_is_graded
 
 
 def test_what_a_chapter_trains_is_there_for_every_notebook(edition, tmp_path):
-    place = edition / f"source/nmpcrl/{SMALL}.ipynb"
     once = "from pathlib import Path\nassert not (new := Path('data/new')).exists()\nnew.touch()"
     (chapter,) = chapters(edition)
     cell_of(chapter.notebook, "between-1")["source"] = once
-    ready = rehearsed(chapter, Limits(), tmp_path / "ready")
-    assert {path.name for path in ready.data.iterdir()} == {
+    with closing(Judge(chapter, Limits(), tmp_path / "ready")) as judge:
+        ready = {path.name for path in judge.chapter.data.iterdir()}
+    assert ready == {
         "new",
         "of_the_chapter.txt",
         "published",
     }
-    assert not (place.parent / "data/new").exists()
+    assert not (edition / "data/new").exists()
 
 
 def test_an_edition_that_is_not_there_is_refused(tmp_path):
