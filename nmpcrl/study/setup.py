@@ -182,6 +182,7 @@ def _network_learner(
         generators.network,
         learning_rate=experiment.zeta,
         batch=paper.BATCH,
+        hidden=paper.HIDDEN,
         **options,
     )
     return make(
