@@ -6,7 +6,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Riccati, Task
-from nmpcrl.control.solvers.charge import DISCS
+from nmpcrl.learning.browser import DISCS
 from nmpcrl.study import paper
 
 LONGEST = 20  # steps planned: a longer plan has several minima

@@ -7,7 +7,7 @@ from typing import Any
 from IPython.display import HTML
 
 from nmpcrl.control import Nmpc, Obstacle
-from nmpcrl.control.solvers.charge import LONGEST
+from nmpcrl.learning.browser import LONGEST
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.continuing import TEMPLATES
 from nmpcrl.report.finds import Find
