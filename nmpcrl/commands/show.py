@@ -34,7 +34,7 @@ def show(run: str, out: Path | None, kind: str | None, frozen: bool) -> None:
     """
     path = file_of(run)
     out, kind = _place(path, out, kind)
-    from nmpcrl.report.figures.run import run_page, write
+    from nmpcrl.report.figures.runs.run import run_page, write
     from nmpcrl.study.storage.atomic import write_whole
 
     records = records_of(path)

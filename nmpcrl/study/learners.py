@@ -103,6 +103,7 @@ def _network_learner(
         generators.network,
         learning_rate=settings.zeta,
         batch=paper.BATCH,
+        hidden=paper.HIDDEN,
         **options,
     )
     return make(

@@ -7,11 +7,12 @@ from typing import Any
 from IPython.display import HTML
 
 from nmpcrl.control import Nmpc, Obstacle
-from nmpcrl.control.solvers.charge import LONGEST
+from nmpcrl.learning.browser import LONGEST
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.continuing import TEMPLATES
 from nmpcrl.report.finds import Find
 from nmpcrl.report.live import frame
+from nmpcrl.report.live.algorithm import fixed
 from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import WALL, problem_of
@@ -60,6 +61,7 @@ def _data(nmpc: Nmpc, gallery: Iterable[Find]) -> dict[str, Any]:
         "steps": paper.STEPS,
         "evaluate_every": default("evaluate_every"),
         "last": LAST,
+        **fixed(),
         "overshoot": OVERSHOOT,
         "most": MOST_OBSTACLES,
         "radius": disc / 2,

@@ -10,6 +10,7 @@ from IPython.display import HTML
 from nmpcrl.control import Nmpc
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.live import frame
+from nmpcrl.report.live.algorithm import fixed
 from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import problem_of, surroundings
@@ -98,6 +99,7 @@ def settings(experiment: Experiment, learner: str, nmpc: Nmpc) -> dict[str, Any]
         "target": nmpc.task.target.tolist(),
         "discs": [list(disc) for disc in zip(*nmpc.task.discs, strict=True)],
         "horizon": own.horizon,
+        **fixed(),
     }
 
 

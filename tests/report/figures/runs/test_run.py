@@ -8,7 +8,7 @@ from legibility import flaws
 from matplotlib import pyplot as plt
 
 from nmpcrl.report.figures import sheet
-from nmpcrl.report.figures.run import run_page
+from nmpcrl.report.figures.runs.run import run_page
 from nmpcrl.report.run import finding
 from nmpcrl.study import Experiment, run
 from nmpcrl.study.experiment import frozen_arm

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
-from nmpcrl.report.figures import trials
+from nmpcrl.report.figures.runs import trials
 from nmpcrl.study import paper
 
 

@@ -8,7 +8,7 @@ from nmpcrl.analysis import metrics
 from nmpcrl.analysis.gradient_td import directions, dropped_curvature
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.two_state import Chain
-from nmpcrl.report.figures import few_runs, ges, rdes
+from nmpcrl.report.figures.learners import few_runs, ges, rdes
 from nmpcrl.study import Experiment, Runs, paper, run, sweep
 
 SMALL = {"episodes": 4, "steps": 45, "evaluate_every": 2}

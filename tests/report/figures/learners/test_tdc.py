@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.report.figures import tdc
+from nmpcrl.report.figures.learners import tdc
 from nmpcrl.study import Experiment
 
 EPISODES = 40

@@ -3,7 +3,7 @@
 import numpy as np
 
 from nmpcrl.analysis.policy_search import Found
-from nmpcrl.report.figures import policy_search
+from nmpcrl.report.figures.learners import policy_search
 from nmpcrl.study import paper
 
 THERE = np.linspace(paper.START, paper.TARGET, 30)  # a rollout that arrives ...

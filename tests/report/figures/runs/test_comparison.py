@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from nmpcrl.report.figures import comparison
+from nmpcrl.report.figures.runs import comparison
 from nmpcrl.report.figures.style import LOOKS
 
 RUNS = pd.DataFrame(

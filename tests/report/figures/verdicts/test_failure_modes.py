@@ -5,7 +5,7 @@ import pytest
 
 from nmpcrl.claims.failure_modes import OVER_PREDICTED, rise
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.figures import failure_modes
+from nmpcrl.report.figures.verdicts import failure_modes
 from nmpcrl.study import Experiment
 from nmpcrl.study.experiment import frozen_arm
 

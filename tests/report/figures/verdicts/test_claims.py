@@ -13,7 +13,7 @@ from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.rule import Assumption, Observations
 from nmpcrl.claims.verdict import Verdict
-from nmpcrl.report.figures import claims as figures
+from nmpcrl.report.figures.verdicts import claims as figures
 from nmpcrl.study import Experiment
 from nmpcrl.study.records import Records
 

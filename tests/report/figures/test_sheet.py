@@ -3,19 +3,22 @@
 import ast
 from base64 import b64decode
 from io import BytesIO
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from legibility import CONTRAST, contrast, flaws
-from test_figures import FIGURES
 
-from nmpcrl.report.figures import failure_modes, perturbed, sheet, style
+from nmpcrl.report.figures import sheet, style
 from nmpcrl.report.figures.axes import below, draw_task
+from nmpcrl.report.figures.runs import perturbed
+from nmpcrl.report.figures.verdicts import failure_modes
 from nmpcrl.study import Experiment, paper
 
 START = 1e-12
-TESTS = FIGURES.parents[2] / "tests/report"
+TESTS = Path(__file__).resolve().parent
+FIGURES = TESTS.parents[2] / "nmpcrl/report/figures"
 
 
 @sheet.page
@@ -56,10 +59,10 @@ def narrow(figure: sheet.Figure) -> sheet.Figure:
 
 def test_every_figure_function_is_drawn_by_a_test_of_this_folder():
     """And so it is looked at, wide and narrow: see `legible`."""
-    tests = "".join(path.read_text() for path in TESTS.glob("test_*.py"))
+    tests = "".join(path.read_text() for path in TESTS.rglob("test_*.py"))
     missing = [
         f"{path.stem}.{node.name}"
-        for path in FIGURES.glob("*.py")
+        for path in FIGURES.rglob("*.py")
         for node in ast.parse(path.read_text()).body
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
         if any(isinstance(one, ast.Name) and one.id == "page" for one in node.decorator_list)

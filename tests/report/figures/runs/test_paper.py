@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from nmpcrl.report.figures import paper as draw
+from nmpcrl.report.figures.runs import paper as draw
 from nmpcrl.study import Records, Runs, paper
 from nmpcrl.study.records import Stopped
 from nmpcrl.study.sweeps import paper_runs

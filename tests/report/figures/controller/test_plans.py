@@ -5,7 +5,9 @@ import pytest
 from matplotlib import pyplot
 
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
-from nmpcrl.report.figures import controller, expected_sarsa, sensitivity
+from nmpcrl.report.figures.controller import plans as draw
+from nmpcrl.report.figures.controller import sensitivity
+from nmpcrl.report.figures.learners import expected_sarsa
 from nmpcrl.study import Records, Runs, paper, sweep
 
 LEARNERS, DECAYS, EPISODES, STEPS = ("ES", "frozen"), ("step", "episode"), 4, 5
@@ -60,13 +62,13 @@ def test_the_closed_loop_is_drawn_with_its_plans_and_its_length(
     nmpc, theta, rollout, assert_readable, texts
 ):
     plan = nmpc.solve(nmpc.task.start, theta)
-    figure = controller.closed_loop(nmpc.task, rollout, [plan])
+    figure = draw.closed_loop(nmpc.task, rollout, [plan])
     assert_readable(figure)
     assert "at most 1.2 m make a trajectory of 0.5 m" in texts(figure)
 
 
 def test_every_obstacle_has_its_disc_and_its_circle(nmpc, rollout):
-    figure = controller.closed_loop(nmpc.task, rollout, [])
+    figure = draw.closed_loop(nmpc.task, rollout, [])
     assert sorted(patch.radius for patch in figure.axes[0].patches) == [1.0] * 4 + [1.25] * 4
 
 
@@ -78,7 +80,7 @@ def test_the_plan_that_ends_farthest_from_the_closed_loop_is_drawn_and_named(
     plans = [nmpc.solve(state, theta) for state in loop.states[:-4]]
     ends = np.array([plan.states[-1, :2] for plan in plans])
     apart = np.linalg.norm(ends - loop.states[4:, :2], axis=1)
-    figure = controller.receding_horizon(nmpc.task, loop, plans)
+    figure = draw.receding_horizon(nmpc.task, loop, plans)
     assert_readable(figure)
     assert f"A plan of 4 steps ends up to {apart.max():.2f} m from" in texts(figure)
     drawn = [line.get_xydata() for line in figure.axes[0].lines]
@@ -90,7 +92,7 @@ def test_the_title_says_whether_q_stays_above_v(lowest, says, assert_readable, t
     speeds, turn_rates = np.array([0.0, 0.6]), np.linspace(-1, 1, 3)
     values = np.array([[12.0, 11.0], [12.0, lowest], [12.0, 11.0]])
     policy = np.array([0.6, 0.0])
-    figure = controller.action_values(speeds, turn_rates, values, 10.0, policy)
+    figure = draw.action_values(speeds, turn_rates, values, 10.0, policy)
     assert_readable(figure)
     assert says in texts(figure)
 
@@ -101,7 +103,7 @@ def test_nine_panels_name_the_two_parameters_that_bend_the_trajectory_most(
     changes = {name: {"×¼": straight(1.5), "×4": straight(1.6)} for name in paper.THETA_NAMES}
     changes["c"] = {"−0.2": straight(1.5), "0.35": straight(3.0, cost=np.inf)}
     changes["nu"] = {"×¼": straight(0.5), "×4": straight(1.5)}
-    figure = controller.theta_effects(nmpc.task, straight(1.5), changes)
+    figure = draw.theta_effects(nmpc.task, straight(1.5), changes)
     assert_readable(figure)
     assert len(figure.axes) == 9
     assert texts(figure).startswith(r"$\theta_c$ and $\theta_\nu$ bend")
@@ -111,7 +113,7 @@ def test_nine_panels_name_the_two_parameters_that_bend_the_trajectory_most(
 def test_the_printed_box_says_how_near_the_robot_comes(nmpc, assert_readable, texts):
     stopped = straight(2.0)
     stopped.states[:, 0] = np.minimum(stopped.states[:, 0], 3.0)
-    figure = controller.printed_box(nmpc.task, straight(2.0), stopped, wall=3.0)
+    figure = draw.printed_box(nmpc.task, straight(2.0), stopped, wall=3.0)
     assert_readable(figure)
     assert "no nearer than 5.5 m" in texts(figure)
 
@@ -120,7 +122,7 @@ def test_the_penalty_figure_names_the_best_theta_c_and_leaves_failures_out(
     nmpc, assert_readable, texts
 ):
     theta_c, costs = np.array([0.001, 0.35, 0.5]), np.array([3.0, 1.0, np.inf])
-    figure = controller.penalty_gap(nmpc.task, theta_c, costs)
+    figure = draw.penalty_gap(nmpc.task, theta_c, costs)
     assert_readable(figure)
     assert "= 0.35 has the lowest cost" in texts(figure)
     assert np.isnan(figure.axes[1].lines[0].get_ydata()[-1])
@@ -190,5 +192,5 @@ def test_one_seed_and_one_decay_are_enough_for_every_figure_of_a_study(assert_re
 
 
 def test_a_figure_is_closed_so_that_a_notebook_shows_it_once(nmpc, rollout):
-    controller.closed_loop(nmpc.task, rollout, [])
+    draw.closed_loop(nmpc.task, rollout, [])
     assert pyplot.get_fignums() == []

@@ -14,8 +14,8 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import clearest_changes, robustness_map
-from nmpcrl.report.figures import layouts as figures
-from nmpcrl.report.figures import robustness as maps
+from nmpcrl.report.figures.verdicts import layouts as figures
+from nmpcrl.report.figures.verdicts import robustness as maps
 from nmpcrl.study import Experiment, design, paper
 from nmpcrl.study.experiment import MAIN as LEARNERS
 from nmpcrl.study.store import Runs

@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import pytest
 
 from nmpcrl.bench import summary
-from nmpcrl.report.figures import performance
+from nmpcrl.report.figures.speed import performance
 
 
 def learning_steps(measured):

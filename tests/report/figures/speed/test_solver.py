@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.report.figures import solver as draw
+from nmpcrl.report.figures.speed import solver as draw
 
 
 def iterates(*errors: float) -> pd.DataFrame:

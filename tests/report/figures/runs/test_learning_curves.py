@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.evidence import paths
-from nmpcrl.report.figures import learning_curves, panels, rollouts
+from nmpcrl.report.figures import panels
+from nmpcrl.report.figures.runs import learning_curves, rollouts
 from nmpcrl.study import Experiment, paper
 
 SEEDS = 4
