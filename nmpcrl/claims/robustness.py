@@ -70,11 +70,10 @@ def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame
         runs: as `robustness_map` takes them.
         variant: of the row.
     """
-    main = runs[runs.variant == design.MAIN_TABLE]
-    if variant not in design.VARIANTS:
+    main, changed = (runs[runs.variant == name] for name in (MAIN_TABLE, variant))
+    if changed.empty:
         field, value = _part(variant)
         return main[main[field] == value], main[main[field] != value]
-    changed = runs[runs.variant == variant]
     before = main.merge(changed[CELL].drop_duplicates(), on=CELL)
     kept = before[~before.learner.isin(changed.learner)]
     return pd.concat([changed, kept], ignore_index=True), before
@@ -107,7 +106,7 @@ def _part(variant: str) -> tuple[str, str]:
 COLUMNS = ("variant", "claim", "outcome", "base", "changes", "share", "base_share", "pairs", "p")
 
 
-def variant_changes(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFrame:
+def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     """The outcome of every claim in every variant, beside that of the main table's same cells.
 
     A learner of the paper that a variant does not run is one that it does not change, so its runs
@@ -117,24 +116,20 @@ def variant_changes(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) ->
     Args:
         runs: of `rows.table`, with a column `variant`.
         paths: as `judge` takes them, of the variants and of the main table.
-        base: the `variant` of the main table's rows.
 
     Returns:
         `COLUMNS`, one row a variant and claim, in order.
     """
     paper = runs[runs.learner.isin(PAPER)]
-    main = paper[paper.variant == base]
     rows = []
     bases: dict[Hashable, tuple[Verdict, ...]] = {}  # many variants have the same cells
-    for name, changed in paper[paper.variant != base].groupby("variant", sort=False):
-        cells = changed[CELL].drop_duplicates().sort_values(CELL)
-        before = main.merge(cells, on=CELL)
-        kept = before[~before.learner.isin(changed.learner)]
-        after = judge_runs(pd.concat([changed, kept], ignore_index=True), paths)
-        asked = tuple(cells.itertuples(index=False, name=None))
+    for name in paper.variant[paper.variant != MAIN_TABLE].unique():
+        after, before = groups(paper, name)
+        asked = frozenset(before[CELL].itertuples(index=False, name=None))
         bases[asked] = bases.get(asked) or judge_runs(before, paths)
-        for verdict, other in zip(after, bases[asked], strict=True):
-            if not changed.learner.isin(BY_RUNS[verdict.claim].learners).any():
+        changed = {*paper.learner[paper.variant == name]}
+        for verdict, other in zip(judge_runs(after, paths), bases[asked], strict=True):
+            if not changed & {*BY_RUNS[verdict.claim].learners}:
                 continue
             judged, compared = (Cell(v.outcome, *v.counts["all"]) for v in (verdict, other))
             rows.append(_row(str(name), verdict.claim, judged, compared))

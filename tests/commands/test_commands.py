@@ -32,7 +32,7 @@ def small(monkeypatch, measured):
     """A study of six short runs, judged by nobody, and times that nobody measured."""
     times = pd.DataFrame(measured["learners"])
     monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
-    monkeypatch.setattr(publish, "verdicts", lambda *_: ())
+    monkeypatch.setattr(publish, "rejudge", lambda: ())
     monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: times)
 
 

@@ -10,7 +10,7 @@ from nmpcrl.control import Nmpc, Obstacle
 from nmpcrl.learning.browser import LONGEST
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.continuing import TEMPLATES
-from nmpcrl.report.finds import Find
+from nmpcrl.report.examples import Example
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.algorithm import fixed
 from nmpcrl.report.live.looks import look
@@ -35,7 +35,7 @@ MOST = {"horizon": LONGEST, "episodes": 3000}  # of a page
 MOST_OBSTACLES = 8
 
 
-def laboratory(gallery: Iterable[Find] = ()) -> HTML:
+def laboratory(gallery: Iterable[Example] = ()) -> HTML:
     """Obstacles, start and target to be moved, settings of a run, and its training as it comes.
 
     Args:
@@ -45,7 +45,7 @@ def laboratory(gallery: Iterable[Find] = ()) -> HTML:
     return frame.solving("laboratory", nmpc, lambda: _data(nmpc, gallery), SCRIPTS, STYLES)
 
 
-def _data(nmpc: Nmpc, gallery: Iterable[Find]) -> dict[str, Any]:
+def _data(nmpc: Nmpc, gallery: Iterable[Example]) -> dict[str, Any]:
     (left, bottom), (right, top) = box = [paper.LOWER[:2], paper.UPPER[:2]]
     disc = Obstacle(0.0, 0.0).diameter
     return {

@@ -1,4 +1,4 @@
-"""A find is something to see in a page, with the settings that show it; two are made here."""
+"""An example is something to see in a page, with the settings that show it; two are made here."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,7 +20,7 @@ ASIDE = 0.01  # of a start, to either side of a tie [m]
 
 
 @dataclass(frozen=True)
-class Find:
+class Example:
     """Something to see."""
 
     title: str
@@ -36,13 +36,15 @@ class Find:
         return plain | {"layout": [list(one) for one in paper.centres_of(self.experiment.layout)]}
 
 
-def find(title: str, sentence: str, numbers: dict[str, float], experiment: Experiment) -> Find:
-    """A find whose `sentence` is filled with the `numbers` and the `learner`."""
+def example(
+    title: str, sentence: str, numbers: dict[str, float], experiment: Experiment
+) -> Example:
+    """An example whose `sentence` is filled with the `numbers` and the `learner`."""
     said = sentence.format(learner=experiment.learner, **numbers)
-    return Find(title, said, numbers, experiment)
+    return Example(title, said, numbers, experiment)
 
 
-def kink() -> Find:
+def kink() -> Example:
     """A start exactly on an obstacle's boundary, Xi + theta_c = 0."""
     theta = (*paper.THETA_INIT[:-1], 0.0)
     experiment = Experiment(layout=((0.0, 1.25),), start=(0.0, 0.0, 0.0), theta=theta)
@@ -53,10 +55,10 @@ def kink() -> Find:
         " a little above, {jump:.0f} more."
     )
     numbers = {"below": below, "above": above, "jump": above - below}
-    return find("A kink", sentence, numbers, experiment)
+    return example("A kink", sentence, numbers, experiment)
 
 
-def tie() -> Find:
+def tie() -> Example:
     """An obstacle between start and target, around which both ways have the same cost."""
     experiment = Experiment(
         layout=((3.0, 3.0),), start=(1.0, 3.0, 0.0), target=(6.0, 3.0, 0.0), horizon=20
@@ -77,7 +79,7 @@ def tie() -> Find:
         "between": first_rollout(experiment).cost,
         "apart": float(np.abs(one.states[:, 1] - other.states[:, 1]).max()),
     }
-    return find("A tie", sentence, numbers, experiment)
+    return example("A tie", sentence, numbers, experiment)
 
 
 def first_rollout(experiment: Experiment) -> Rollout:
