@@ -14,8 +14,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nmpcrl.claims.by_runs import RunClaim
 from nmpcrl.claims.paper_claims import BY_RUNS, judge_runs
-from nmpcrl.claims.rule import CELL, Paths
+from nmpcrl.claims.rule import CELL, Observations, Paths
 from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
@@ -125,19 +126,19 @@ def variant_changes(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) ->
     paper = runs[runs.learner.isin(PAPER)]
     main = paper[paper.variant == base]
     rows = []
-    bases: dict[Hashable, tuple[Verdict, ...]] = {}  # many variants have the same cells
+    bases: dict[Hashable, Cell] = {}  # many variants have the same cells
     for name, changed in paper[paper.variant != base].groupby("variant", sort=False):
         cells = changed[CELL].drop_duplicates().sort_values(CELL)
         before = main.merge(cells, on=CELL)
         kept = before[~before.learner.isin(changed.learner)]
-        after = judge_runs(pd.concat([changed, kept], ignore_index=True), paths)
+        after = pd.concat([changed, kept], ignore_index=True)
         asked = tuple(cells.itertuples(index=False, name=None))
-        bases[asked] = bases.get(asked) or judge_runs(before, paths)
-        for verdict, other in zip(after, bases[asked], strict=True):
-            if not changed.learner.isin(BY_RUNS[verdict.claim].learners).any():
+        for claim in BY_RUNS.values():
+            if not changed.learner.isin(claim.learners).any():
                 continue
-            judged, compared = (Cell(v.outcome, *v.counts["all"]) for v in (verdict, other))
-            rows.append(_row(str(name), verdict.claim, judged, compared))
+            at = asked, claim.name
+            bases[at] = bases.get(at) or _settled(claim, before, paths)
+            rows.append(_row(str(name), claim.name, _settled(claim, after, paths), bases[at]))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -175,6 +176,11 @@ class Cell(NamedTuple):
     def share(self) -> float:
         """Share of yes; nan without answers."""
         return self.yes / self.of if self.of else np.nan
+
+
+def _settled(claim: RunClaim, runs: pd.DataFrame, paths: Paths) -> Cell:
+    verdict = claim.settled(Observations(runs, paths))
+    return Cell(verdict.outcome, *verdict.counts["all"])
 
 
 def _row(variant: str, claim: str, judged: Cell, base: Cell) -> dict[str, Any]:
