@@ -50,12 +50,17 @@ class RunClaim(Claim):
     def judge(self, observed: Observations) -> Verdict:
         """The verdict, by the rule of `rule`."""
         found = (observed.runs, observed.paths)
+        verdict = self.settled(observed, self.evidence(*found))
+        return replace(verdict, each=self.each(*found) if self.each else "")
+
+    def settled(self, observed: Observations, evidence: str = "") -> Verdict:
+        """The verdict with its counts, without what else `judge` says of it, which takes longer."""
+        found = (observed.runs, observed.paths)
         answers, weaker = self.yes(self.measure(*found), self.threshold), None
         if self.besides:
             weaker, counts = answers, _long(self.besides(*found))
             answers = weaker & _known(counts == 0, counts)
-        verdict = settle(self, answers, self.evidence(*found), weaker=weaker, unit=self.unit)
-        return replace(verdict, each=self.each(*found) if self.each else "")
+        return settle(self, answers, evidence, weaker=weaker, unit=self.unit)
 
     def at_borders(self, values: Values, borders: Iterable[float]) -> pd.DataFrame:
         """What would become of the claim at other borders than its own, which stays where it is.

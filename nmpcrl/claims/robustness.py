@@ -14,8 +14,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from nmpcrl.claims.by_runs import RunClaim
 from nmpcrl.claims.paper_claims import BY_RUNS, judge_runs
-from nmpcrl.claims.rule import CELL, Paths
+from nmpcrl.claims.rule import CELL, Observations, Paths
 from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
@@ -122,17 +123,17 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     """
     paper = runs[runs.learner.isin(PAPER)]
     rows = []
-    bases: dict[Hashable, tuple[Verdict, ...]] = {}  # many variants have the same cells
+    bases: dict[Hashable, Cell] = {}  # many variants have the same cells
     for name in paper.variant[paper.variant != MAIN_TABLE].unique():
         after, before = groups(paper, name)
         asked = frozenset(before[CELL].itertuples(index=False, name=None))
-        bases[asked] = bases.get(asked) or judge_runs(before, paths)
         changed = {*paper.learner[paper.variant == name]}
-        for verdict, other in zip(judge_runs(after, paths), bases[asked], strict=True):
-            if not changed & {*BY_RUNS[verdict.claim].learners}:
+        for claim in BY_RUNS.values():
+            if not changed & {*claim.learners}:
                 continue
-            judged, compared = (Cell(v.outcome, *v.counts["all"]) for v in (verdict, other))
-            rows.append(_row(str(name), verdict.claim, judged, compared))
+            at = asked, claim.name
+            bases[at] = bases.get(at) or _settled(claim, before, paths)
+            rows.append(_row(str(name), claim.name, _settled(claim, after, paths), bases[at]))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -170,6 +171,11 @@ class Cell(NamedTuple):
     def share(self) -> float:
         """Share of yes; nan without answers."""
         return self.yes / self.of if self.of else np.nan
+
+
+def _settled(claim: RunClaim, runs: pd.DataFrame, paths: Paths) -> Cell:
+    verdict = claim.settled(Observations(runs, paths))
+    return Cell(verdict.outcome, *verdict.counts["all"])
 
 
 def _row(variant: str, claim: str, judged: Cell, base: Cell) -> dict[str, Any]:
