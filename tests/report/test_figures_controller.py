@@ -5,7 +5,7 @@ import pytest
 from matplotlib import pyplot
 
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
-from nmpcrl.report.figures import controller, expected_sarsa, sensitivity
+from nmpcrl.report.figures import controller, expected_sarsa, sensitivity, sheet
 from nmpcrl.study import Records, Runs, paper, sweep
 
 LEARNERS, DECAYS, EPISODES, STEPS = ("ES", "frozen"), ("step", "episode"), 4, 5
@@ -106,6 +106,9 @@ def test_nine_panels_name_the_two_parameters_that_bend_the_trajectory_most(
     assert len(figure.axes) == 9
     assert texts(figure).startswith(r"$\theta_c$ and $\theta_\nu$ bend")
     assert "0.35: fails" in [text.get_text() for text in figure.axes[8].texts]
+    low = figure.again(sheet.SLIDE)
+    assert len(low.axes) == 4
+    assert texts(low).startswith(r"$\theta_c$ and $\theta_\nu$ bend")
 
 
 def test_the_printed_box_says_how_near_the_robot_comes(nmpc, assert_readable, texts):
