@@ -132,9 +132,9 @@ def drawn(executed: Path) -> dict[str, bytes]:
         raise build.Failure(reason) from missing
 
 
-def decks(sources: dict[str, Any], place: Path) -> None:
-    """Write the slides of executed chapters to a folder, as PDFs, too."""
-    slides.printed(slides.make(sources, slides.EXECUTED, place))
+def decks(_: dict[str, Any], place: Path) -> None:
+    """Write the slides of the course's units to a folder, as PDFs, too."""
+    slides.printed(slides.make(slides.EXECUTED, place))
 
 
 SHOWN: dict[str, Callable[[dict[str, Any], Path], None]] = {  # of the last build, by folder

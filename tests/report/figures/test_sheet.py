@@ -94,6 +94,16 @@ def test_columns_stay_together_or_rows_do(options, expected):
     assert places(narrow(draw())) == expected
 
 
+def test_a_figure_that_is_too_high_for_a_slide_is_drawn_for_one(monkeypatch):
+    monkeypatch.setenv(sheet.FOR_PAGE, "1")
+    for height, expected in ((3.6, False), (5.0, True)):
+        figure = sheet.page(lambda high=height: sheet.subplots(2, 1, high)[0])()
+        drawn = shown(figure, monkeypatch)[sheet.MIME]
+        assert ("slide" in drawn) == expected
+        if expected:
+            assert (drawn["slide"]["width"], drawn["slide"]["height"]) == (672, 346)
+
+
 def test_a_mosaic_is_read_row_by_row_on_a_narrow_sheet():
     rows = (("all", "all"), ("left", "right"))
 

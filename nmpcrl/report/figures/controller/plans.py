@@ -12,6 +12,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control import Solution, Task
 from nmpcrl.learning.rollout import Rollout
 from nmpcrl.report.figures.axes import below, draw_task, map_grid
+from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import INK, SYMBOLS, TEAL, WINE, headed, page, shades, subplots
 
 
@@ -103,12 +104,21 @@ def theta_effects(
 ) -> Figure:
     """One panel a parameter: the trajectory of theta_init, and of two other values.
 
+    On a low sheet there are those four that bend it most.
+
     Args:
         task: of the rollouts.
         middle: the closed loop of theta_init.
         others: name of the parameter -> how it was changed -> closed loop; two changes each.
     """
-    figure, maps, grid = map_grid(list(others), 1.5, 0.5)
+    moved = {
+        name: max(_apart(middle, rollout) for rollout in changes.values())
+        for name, changes in others.items()
+    }
+    most = sorted(moved, key=lambda name: -moved[name])
+    if sheet().low:
+        others = {name: others[name] for name in others if name in most[:4]}
+    figure, maps, grid = map_grid(list(others), 1.5, 0.5, low=2)
     for name, changes in others.items():
         axes = maps[name]
         draw_task(axes, task, labels=False)
@@ -125,11 +135,7 @@ def theta_effects(
         axes.set_xlabel("x [m]")
     for axes in grid[:, 0]:
         axes.set_ylabel("y [m]")
-    moved = {
-        name: max(_apart(middle, rollout) for rollout in changes.values())
-        for name, changes in others.items()
-    }
-    first, second, *_ = sorted(moved, key=lambda name: -moved[name])
+    first, second, *_ = most
     return headed(figure, f"${SYMBOLS[first]}$ and ${SYMBOLS[second]}$ bend the trajectory most")
 
 

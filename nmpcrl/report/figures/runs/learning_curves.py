@@ -21,6 +21,7 @@ from nmpcrl.claims.thresholds import divergence, instability
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.report.figures.axes import label_panel, legend
 from nmpcrl.report.figures.panels import bundle, part, sourced
+from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import SUBTITLE, page, subplots
 from nmpcrl.report.tables import WORDS
 from nmpcrl.study.records import Column
@@ -84,18 +85,22 @@ def judged(summary: Outline) -> tuple[Vector, Vector]:
 
 @page
 def _learning_curves(drawn: Evidence, title: str) -> Figure:
-    """Cost of each training episode above, without noise below; a column a reading."""
+    """Cost of each training episode above, without noise below; a column a reading.
+
+    On a low sheet there is the cost without noise alone.
+    """
     learners, decays = drawn.summaries.values_of("learner"), drawn.summaries.values_of("decay")
+    rows = {"cost of a training episode\n/ at the start, without noise": trained}
+    if sheet().low:
+        rows.clear()
+    rows["cost without noise\n/ at the start"] = judged
     options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
-    figure, axes = subplots(2, len(decays), 5.4, **options)
-    for (above, below), decay in zip(axes.T, decays, strict=True):
-        runs = drawn.summaries.select(decay=decay)
-        _costs(above, runs, learners, trained)
-        _costs(below, runs, learners, judged)
-        label_panel(above, decay, xlabel="")
-        label_panel(below)
-    axes[0, 0].set_ylabel("cost of a training episode\n/ at the start, without noise")
-    axes[1, 0].set_ylabel("cost without noise\n/ at the start")
+    figure, axes = subplots(len(rows), len(decays), 5.4, **options)
+    for k, (label, curve) in enumerate(rows.items(), 1):
+        for axis, decay in zip(axes[k - 1], decays, strict=True):
+            _costs(axis, drawn.summaries.select(decay=decay), learners, curve)
+            label_panel(axis, decay if k == 1 else "", "episode" if k == len(rows) else "")
+        axes[k - 1, 0].set_ylabel(label)
     _cut(axes)
     legend(figure, learners)
     return sourced(figure, title, drawn)

@@ -89,7 +89,7 @@ def theta_c(found: Evidence) -> Figure:
             for run in list(runs.select(learner="frozen").values())[:1]:
                 shut = closes_at(paper.task(name), run.states[:, :2])
                 axes.axhline(shut, color=CLOSED, linewidth=0.9, linestyle=":")
-        row[0].set(ylabel=rf"$\theta_c$, decay per {decay}", ylim=SEEN)
+        row[0].set(ylabel=rf"$\theta_c$, per {decay}", ylim=SEEN)
     for axes, name in zip(grid[0], names, strict=True):
         axes.set_title(name, fontsize="medium")
     for axes in grid[-1]:
@@ -115,7 +115,7 @@ def borders(values: Mapping[str, Values], mark: str) -> Figure:
         values: of each claim's measure, over the main table.
         mark: where the runs come from.
     """
-    figure, panels, grid = map_grid(list(values), 2.1, 0.4, sharex=False, tall=5.6)
+    figure, panels, grid = map_grid(list(values), 2.1, 0.4, low=4, sharex=False, tall=5.6)
     for claim, measured in values.items():
         axes = panels[claim]
         asked = BY_RUNS[claim]

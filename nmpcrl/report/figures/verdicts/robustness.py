@@ -36,6 +36,7 @@ ABREAST = 3  # claims side by side on a narrow sheet
 LETTERS = -2.15  # where the letters of the departures stand, in widths of a cell
 FOLD = {False: 13, True: 10}  # characters of a line above a column, wide and narrow
 SMALL: dict[str, Any] = {"va": "center", "fontsize": "small"}
+FEW_ROWS = 10  # of the map on a low sheet
 MOST_COST = 1.5  # of theta_init's, that is drawn
 
 
@@ -43,10 +44,15 @@ MOST_COST = 1.5  # of theta_init's, that is drawn
 def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
     """What becomes of each claim in each row, framed where it is not what it is compared with.
 
+    On a low sheet the rows are those whose changes chance explains least.
+
     Args:
         judged: of `robustness_map`.
         mark: where the runs come from.
     """
+    finding = _changed(judged)
+    if sheet().low:
+        judged = _surest(judged)
     claims, rows = list(judged.claim.unique()), list(judged.variant.unique())
     letters = dict(zip(judged.variant, judged.departure, strict=True))
     height = dict(zip(rows, _heights([letters[row] for row in rows]), strict=True))
@@ -68,12 +74,14 @@ def verdict_map(judged: pd.DataFrame, mark: str) -> Figure:
             axes.text(i + 0.5, -0.8, head, ha="center", **(SMALL | {"va": "bottom"}))
         axes.set(xlim=(LETTERS, side), ylim=(last + 0.7, -5.2))
         axes.set_axis_off()
-    return marked(headed(figure, _changed(judged)), mark)
+    return marked(headed(figure, finding), mark)
 
 
 @page
 def clearest_changes(cells: pd.DataFrame, found: Evidence) -> Figure:
     """What lies behind some cells: a row each, the claim's measure and the costs of its runs.
+
+    On a low sheet there is the first alone.
 
     Args:
         cells: of `robustness.clearest_changes`.
@@ -83,6 +91,8 @@ def clearest_changes(cells: pd.DataFrame, found: Evidence) -> Figure:
         figure, axes = subplots(height=0.6)
         axes.set_axis_off()
         return headed(figure, "No verdict changes in what was run here")
+    if sheet().low:
+        cells = cells.head(1)
     figure, grid = subplots(len(cells), 2, 2.5 * len(cells) + 0.3, squeeze=False, rowwise=True)
     for (left, right), cell in zip(grid, cells.to_dict("records"), strict=True):
         here, base = groups(found.runs, cell["variant"])
@@ -104,6 +114,13 @@ def named(row: str) -> str:
     for word, symbol in SYMBOLS.items():
         row = row.replace(word, symbol)
     return row
+
+
+def _surest(judged: pd.DataFrame) -> pd.DataFrame:
+    """The whole table, and the rows with the changes that chance explains least."""
+    changed = judged[judged.changes.astype(bool)].sort_values("p", kind="stable")
+    kept = [WHOLE, *changed.variant.unique()[: FEW_ROWS - 1]]
+    return judged[judged.variant.isin(kept)]
 
 
 def _heights(letters: list[str]) -> list[float]:

@@ -5,6 +5,7 @@ import pytest
 from matplotlib import pyplot
 
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
+from nmpcrl.report.figures import sheet
 from nmpcrl.report.figures.controller import plans as draw
 from nmpcrl.report.figures.controller import sensitivity
 from nmpcrl.report.figures.learners import expected_sarsa
@@ -108,6 +109,9 @@ def test_nine_panels_name_the_two_parameters_that_bend_the_trajectory_most(
     assert len(figure.axes) == 9
     assert texts(figure).startswith(r"$\theta_c$ and $\theta_\nu$ bend")
     assert "0.35: fails" in [text.get_text() for text in figure.axes[8].texts]
+    low = figure.again(sheet.SLIDE)
+    assert len(low.axes) == 4
+    assert texts(low).startswith(r"$\theta_c$ and $\theta_\nu$ bend")
 
 
 def test_the_printed_box_says_how_near_the_robot_comes(nmpc, assert_readable, texts):
