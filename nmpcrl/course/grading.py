@@ -15,7 +15,8 @@ from functools import partial
 from pathlib import Path
 
 from nmpcrl.course.execution import Limits
-from nmpcrl.course.judging import Judge, losses
+from nmpcrl.course.judge import Judge
+from nmpcrl.course.judging import losses
 from nmpcrl.course.submissions import CannotGrade, Chapter, chapters, matched, notebook_of
 
 COPY = re.compile(r"(-Copy\d+| ?\(\d+\))$")

@@ -50,8 +50,8 @@ def encoded(value: Any, functions: Functions | None = None) -> Data:
     if hasattr(value, "__float__"):  # a fraction, say
         return ["one", float(value)]
     raise TypeError(
-        f"a value of the type {kind.__name__[:100]} is no answer: numbers, texts, arrays, lists, "
-        "tuples and dictionaries are"
+        f"an answer cannot hold a value of the type {kind.__name__[:100]}, but numbers, texts, "
+        "arrays, lists, tuples and dictionaries"
     )
 
 

@@ -12,7 +12,7 @@ from small_course import SMALL, small_chapter
 
 from nmpcrl.commands import main
 from nmpcrl.course.execution import Limits
-from nmpcrl.course.judging import Judge
+from nmpcrl.course.judge import Judge
 from nmpcrl.course.submissions import chapters, matched, notebook_of
 
 

@@ -50,6 +50,13 @@ def test_an_exercise_that_is_stopped_untouched_is_left_out_altogether(
     assert [name for name in ASKED if losses[name]] == ["two"]
 
 
+def test_the_time_of_a_notebook_holds_for_all_its_runs(submission, judge):
+    _, handed = submission(solved_by_student(three="import time\ntime.sleep(10**6)"))
+    losses = judging.losses(judge, handed, Limits(seconds=3))
+    assert losses["three"]
+    assert "the notebook took longer than 3 s" in losses["seven"]
+
+
 def test_files_are_written_in_a_folder_that_is_thrown_away(
     submission, judge, tmp_path, monkeypatch
 ):
