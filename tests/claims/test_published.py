@@ -283,6 +283,11 @@ def test_a_missing_file_is_said_in_a_sentence(known, folder, name):
     assert_refused(folder)
 
 
+def test_what_is_said_of_the_study_cannot_be_edited_unnoticed(known, folder):
+    (folder / "about.json").write_text(json.dumps({**known.about, "hours": 9.0}))
+    assert_refused(folder)
+
+
 def without(folder, columns) -> Published:
     """What is published, as it was before these columns came."""
     runs = pd.read_csv(folder / "runs.csv").drop(columns=columns)
