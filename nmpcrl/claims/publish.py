@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from nmpcrl.analysis.gradient_td import dropped_curvature
+from nmpcrl.analysis.policy_search import Search, search_all
 from nmpcrl.analysis.rows import cost_ratios, table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.processes import time_learners_repeatedly
@@ -17,7 +18,7 @@ from nmpcrl.claims.rule import Assumption, Paths
 from nmpcrl.claims.thetas import FOLLOWED
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.claims.wider_claims import WIDER_THAN, judge_wider
-from nmpcrl.study.design import MAIN_TABLE
+from nmpcrl.study.design import LAYOUTS, MAIN_TABLE
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.store import fetch_all
 
@@ -34,7 +35,9 @@ def publish_study(
         variants: the part of the study that each belongs to.
     """
     timings = time_learners_repeatedly()
-    return published.publish(runs, variants, verdicts(runs, variants, timings), timings)
+    searches = search_all(map(Search, LAYOUTS))
+    judged = verdicts(runs, variants, timings)
+    return published.publish(runs, variants, judged, timings, searches)
 
 
 def publish_timing() -> tuple[Verdict, ...]:
