@@ -7,14 +7,14 @@ noise. What it finds bounds the family's best from one side only; a longer searc
 
 import json
 import sys
+from bisect import bisect
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import cma
 import numpy as np
 
 from nmpcrl import Vector
@@ -28,6 +28,7 @@ from nmpcrl.study.storage.executor import execute
 
 BUDGET = 2000  # rollouts without noise that a search may make
 LEAST = 40  # rollouts: the first one and some generations
+CHECK = 200  # rollouts of a published search that a build makes again
 MOST = 100_000  # long before which a search has converged and ends by itself
 SPREAD = 0.3  # of the first rollouts, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
@@ -81,9 +82,15 @@ class Found:
         """Share of theta_init's cost that theta saves."""
         return 1 - self.cost / self.initial
 
+    def after(self, rollouts: int) -> float:
+        """The lowest cost of so many rollouts: that of a search with a smaller budget."""
+        return self.best[bisect(self.rollouts, rollouts) - 1]
+
 
 def search(wanted: Search) -> Found:
     """Look for the theta of least noise-free cost in a layout, from theta_init."""
+    import cma  # takes a second, and who reads a search needs none
+
     controller = Persistent(paper.nmpc(wanted.layout))
 
     def cost(scaled: Vector) -> float:
@@ -104,6 +111,11 @@ def search(wanted: Search) -> Found:
         tried += asked
         costs += found
     return _found(np.array(tried) * SCALE, np.array(costs))
+
+
+def to_make(wanted: Iterable[Search], known: Mapping[Search, Found]) -> tuple[Search, ...]:
+    """The searches that are not known, and of the others the beginning, as a check."""
+    return tuple(replace(one, budget=CHECK) if one in known else one for one in wanted)
 
 
 def search_all(
@@ -171,7 +183,7 @@ def _kept() -> dict[Search, Found]:
         kept = json.loads(path.read_text("utf-8"))
         if kept["key"] != _depends_on():
             return {}
-        return {Search(**one): Found(**_tuples(found)) for one, found in kept["searches"]}
+        return from_lists(kept["searches"])
     except FileNotFoundError:
         return {}
     except (OSError, ValueError, LookupError, TypeError) as error:
@@ -180,9 +192,18 @@ def _kept() -> dict[Search, Found]:
 
 
 def _keep(found: Mapping[Search, Found]) -> None:
-    searches = [[asdict(one), asdict(result)] for one, result in found.items()]
-    content = {"key": _depends_on(), "searches": searches}
+    content = {"key": _depends_on(), "searches": as_lists(found)}
     place.keep(_place(), lambda path: write_json(path, content))
+
+
+def as_lists(found: Mapping[Search, Found]) -> list[list[dict[str, Any]]]:
+    """Searches as JSON has them."""
+    return [[asdict(one), asdict(result)] for one, result in found.items()]
+
+
+def from_lists(kept: Iterable[tuple[dict[str, Any], dict[str, Any]]]) -> dict[Search, Found]:
+    """What `as_lists` was given."""
+    return {Search(**one): Found(**_tuples(found)) for one, found in kept}
 
 
 def _tuples(fields: Mapping[str, Any]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from nmpcrl.analysis.gradient_td import dropped_curvature
+from nmpcrl.analysis.policy_search import Search, search_all
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.processes import time_learners_repeatedly
 from nmpcrl.claims import published
@@ -14,7 +15,7 @@ from nmpcrl.claims.rule import Assumption
 from nmpcrl.claims.thetas import FOLLOWED
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.claims.wider_claims import WIDER_THAN, judge_wider
-from nmpcrl.study.design import MAIN_TABLE
+from nmpcrl.study.design import LAYOUTS, MAIN_TABLE
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.store import fetch_all
 
@@ -30,7 +31,8 @@ def publish_study(
         runs: all of `design.whole_study`.
         variants: the part of the study that each belongs to.
     """
-    return published.publish(runs, variants, timings=time_learners_repeatedly())
+    timings, searches = time_learners_repeatedly(), search_all(map(Search, LAYOUTS))
+    return published.publish(runs, variants, timings=timings, searches=searches)
 
 
 def publish_timing() -> tuple[Verdict, ...]:

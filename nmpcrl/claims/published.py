@@ -5,6 +5,7 @@
   theta of the rollouts without noise, and the states of the last one;
 - `thetas.npz`: theta after every episode, of the runs that a reader can follow (see `thetas`);
 - `verdicts.json`: what became of each claim;
+- `searches.json`: the best theta that `analysis.policy_search` finds in each layout;
 - `timings.csv`: of `time_learners`, on which the verdicts on time rest;
 - `about.json`: code, libraries and machine, and when the thresholds were fixed.
 """
@@ -17,12 +18,15 @@ from datetime import UTC, datetime
 from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 import nmpcrl
+from nmpcrl.analysis import policy_search
+from nmpcrl.analysis.policy_search import Found, Search
 from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, cost_ratios, experiment_of, row
 from nmpcrl.analysis.summary import Outline, RunSummary
 from nmpcrl.bench.learners import ratio
@@ -46,7 +50,10 @@ from nmpcrl.study.records import Column
 from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.machine import fingerprint
 
-FILES = ("runs.csv", "curves.npz", thetas.FILE, "verdicts.json", "timings.csv", "about.json")
+FILES = (
+    *("runs.csv", "curves.npz", thetas.FILE, "searches.json", "verdicts.json", "timings.csv"),
+    "about.json",
+)
 # Columns of `failure_modes`, and what may be in them; the frozen arms have none.
 WORDS = {
     "ending": {*Ending, ""},
@@ -79,6 +86,7 @@ class Published:
     verdicts: tuple[Verdict, ...] = ()
     timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
     about: Mapping[str, Any] = field(default_factory=dict)
+    searches: Mapping[Search, Found] = field(default_factory=dict)
 
     @cached_property
     def table(self) -> pd.DataFrame:
@@ -137,6 +145,7 @@ def publish(
     variants: Mapping[Experiment, str],
     verdicts: Sequence[Verdict] = (),
     timings: pd.DataFrame | None = None,
+    searches: Mapping[Search, Found] = MappingProxyType({}),
 ) -> Path:
     """Write all files anew; the same content gives the same bytes, but for the date.
 
@@ -145,6 +154,7 @@ def publish(
         variants: the part of the study that each belongs to.
         verdicts: on the claims, if they are judged already.
         timings: of `time_learners`, if there were any taken.
+        searches: for the best theta.
 
     Returns:
         Where they are.
@@ -158,8 +168,10 @@ def publish(
     curves: dict[str, Any] = _curves(list(summaries.values()))
     np.savez_compressed(folder / "curves.npz", **curves)
     thetas.save(folder, summaries, variants)
+    write_json(folder / "searches.json", policy_search.as_lists(searches))
     _write(folder, verdicts, pd.DataFrame() if timings is None else timings)
-    _seal(folder, made_here() | _timed(timings) | _effort(runs) | _fixed(folder))
+    searched = {"searches": made_here()} if searches else {}
+    _seal(folder, made_here() | _timed(timings) | _effort(runs) | searched | _fixed(folder))
     return folder
 
 
@@ -339,6 +351,7 @@ def _read(folder: Path) -> Published:
         tuple(_verdict(one) for one in verdicts),
         _timings(folder / "timings.csv"),
         about,
+        policy_search.from_lists(json.loads((folder / "searches.json").read_text("utf-8"))),
     )
 
 

@@ -9,8 +9,9 @@ import pytest
 
 from nmpcrl.analysis import policy_search
 from nmpcrl.analysis.policy_search import LEAST, SCALE, Found, Search, search_all
+from nmpcrl.claims import published
 from nmpcrl.learning.rollout import Persistent, evaluate
-from nmpcrl.study import ParameterError, StoreError, paper
+from nmpcrl.study import ParameterError, StoreError, design, paper
 
 BEST = np.array([0.5, 1.5, 0.1, 0.02, 0.08, 2.0, 0.3, 0.15, 0.3])  # of the bowl below
 FOUND = Found(paper.THETA_INIT, 40, (1, 7), (100.0, 80.0))
@@ -80,6 +81,29 @@ def test_the_same_search_finds_the_same_theta_and_another_seed_another():
     short = Search(budget=100)
     assert policy_search.search(short) == policy_search.search(short)
     assert policy_search.search(replace(short, seed=1)).theta != policy_search.search(short).theta
+
+
+@pytest.mark.usefixtures("bowl")
+def test_a_search_begins_as_one_with_a_smaller_budget():
+    """So that a build can check a published search by its beginning."""
+    long = policy_search.search(Search(budget=300))
+    for budget in (LEAST, 100, 200):
+        short = policy_search.search(Search(budget=budget))
+        assert short.cost == long.after(short.made) > long.cost
+    assert long.after(1) == long.initial
+    known, other = Search(budget=300), Search("B", budget=300)
+    assert policy_search.to_make([known, other], {known: long}) == (
+        replace(known, budget=policy_search.CHECK),
+        other,
+    )
+
+
+@pytest.mark.slow
+def test_the_published_searches_are_those_of_this_code():
+    searches = published.load().searches
+    assert set(searches) == set(map(Search, design.LAYOUTS))
+    found = policy_search.search(Search("D", budget=policy_search.CHECK))
+    assert found.cost == pytest.approx(searches[Search("D")].after(found.made), rel=1e-6)
 
 
 @pytest.mark.usefixtures("bowl")

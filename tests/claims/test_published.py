@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from nmpcrl.analysis.policy_search import Found, Search
 from nmpcrl.analysis.rows import row, table
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.claims import comparison, published, thetas
@@ -163,8 +164,16 @@ def test_where_no_folder_is_named_the_projects_own_is_read(monkeypatch):
     assert published.place().parts[-2:] == ("book", "published")
 
 
-def test_what_is_published_is_in_six_files(known, folder):
+def test_what_is_published_is_in_seven_files(known, folder):
     assert {path.name for path in folder.iterdir()} == set(FILES)
+    assert len(FILES) == 7
+
+
+def test_searches_are_published_as_they_were_found(summaries):
+    searches = {Search("B", budget=40): Found((0.1, 0.2), 31, (1, 7), (1 / 3, 0.1))}
+    publish(summaries, LABELS, VERDICTS, searches=searches)
+    assert load().searches == searches
+    assert load().about["searches"]["machine"] == published.made_here()["machine"]
 
 
 def test_the_summaries_are_read_bit_for_bit_and_in_order(known, summaries):
