@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-import build
 import pytest
+from driver import build
 from visits import TELEPHONES, VIEWS, look_at, opened
 
 pytestmark = pytest.mark.book

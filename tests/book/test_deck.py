@@ -2,11 +2,9 @@
 
 import re
 
-import build
-import course
-import deck
 import pytest
-import slides
+from driver import build
+from driver.course import course, deck, slides
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 

@@ -7,9 +7,8 @@ from html.parser import HTMLParser
 from importlib.util import find_spec
 from pathlib import Path
 
-import course
 import pytest
-import slides
+from driver.course import course, slides
 from pypdf import PdfReader
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -11,9 +11,9 @@ import venv
 from collections.abc import Mapping
 from pathlib import Path
 
-import course
 import nbformat
 import pytest
+from driver.course import course
 
 from nmpcrl.course.confined import Limits
 from nmpcrl.course.exercises import exercises

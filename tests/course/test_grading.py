@@ -2,10 +2,10 @@
 
 import json
 
-import editions
 import nbformat
 import pytest
 from click.testing import CliRunner
+from driver.course import editions
 from nbformat.v4 import new_code_cell
 from small_course import ASKED, SMALL, cell_of, small_chapter, solved_by_student
 

@@ -14,11 +14,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import build
-import deck
 import nbformat
-import pdf
-from deck import FILES
+
+from driver import build
+from driver.course import deck
+from driver.course.deck import FILES
+from driver.paper import pdf
 
 EXECUTED = Path("_build/executed")
 PACKAGES = {  # where its files are, and which of them a deck takes

@@ -18,10 +18,8 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import Any
 
-import live
-import pictures
-from blocks import Piece, blocks, inline
-
+from driver.course.blocks import Piece, blocks, inline
+from driver.page import live, pictures
 from nmpcrl.course.exercises import Exercise, exercises
 from nmpcrl.report.figures.sheet import MIME
 
