@@ -83,8 +83,7 @@ def shared(tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def long_runs(shared) -> dict[str, Path]:
     """What every edition of the course holds stored, as `make course` finds or trains it."""
-    import course
-    import offline
+    from driver.course import course, offline
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("NMPCRL_RUNS", str(RUNS if RUNS.is_dir() else shared / "long_runs"))

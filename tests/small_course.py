@@ -1,6 +1,6 @@
 """A chapter that takes no time to run, as a student gets it: exercises that all ask for a root."""
 
-import editions
+from driver.course import editions
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 SMALL = "01_small"

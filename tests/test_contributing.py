@@ -415,8 +415,8 @@ names["figure"].savefig("ends.svg")
 assert "theta ends in 1 places" in names["figure"].get_suptitle()
 """,
     "chapter": """
-import build
-import teaching
+from driver import build
+from driver.teaching import teaching
 
 assert build.ROOT.samefile(".")
 assert "08_again" in build.notebooks()

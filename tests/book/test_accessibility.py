@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-import build
 import pytest
+from driver import build
 from visits import TELEPHONES, VIEWS, look_at, opened
 
 PAGES = [*build.pages(), "search", "genindex", "prf-prf"]  # the last three are Sphinx's

@@ -1,8 +1,8 @@
 """What is repaired in a page's HTML so that it can be heard and worked without a mouse."""
 
-import accessible
 import pytest
 from bs4 import BeautifulSoup
+from driver.page import accessible
 
 PANDAS = """<article><table class="dataframe">
 <thead><tr><th></th><th>cost</th></tr><tr><th>layout</th><th></th></tr></thead>

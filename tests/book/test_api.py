@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-import build
-import enrich
 import pytest
-import reference
 from bs4 import BeautifulSoup
+from driver import build
+from driver.page import enrich, reference
 
 import nmpcrl.learning as learning
 from nmpcrl.control import Solution, Task

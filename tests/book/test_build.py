@@ -1,4 +1,4 @@
-"""The driver, book/build.py: what it refuses, and what it leaves behind when a step fails."""
+"""The build, book/driver/build.py: what it refuses, and what it leaves when a step fails."""
 
 import json
 import os
@@ -7,13 +7,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import build
 import nbformat
 import papermill
 import pytest
 import yaml
 from bs4 import BeautifulSoup
 from click.testing import CliRunner
+from driver import build
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from papermill.cli import _resolve_type
 from raising import raising
@@ -123,11 +123,12 @@ See [Chapter 1](one.ipynb).
 @pytest.fixture
 def small(tmp_path):
     """A copy of the driver with a book of one page and one chapter."""
-    shutil.copytree(ROOT / "book/_static", tmp_path / "book/_static")
+    for name in ("_static", "driver"):
+        shutil.copytree(ROOT / "book" / name, tmp_path / "book" / name)
     for name in (
         "_config.yml",
         "book/references.bib",
-        *(f"book/{one.name}" for one in (ROOT / "book").glob("*.py")),
+        "book/build.py",
     ):
         shutil.copy2(ROOT / name, tmp_path / name)
     (tmp_path / "nmpcrl").symlink_to(ROOT / "nmpcrl")

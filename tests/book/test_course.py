@@ -8,14 +8,11 @@ from base64 import b64encode
 from importlib.metadata import distributions, requires
 from pathlib import Path
 
-import course
-import editions
-import handout
 import nbformat
-import plans
 import pytest
-import syllabus
 from click.testing import CliRunner
+from driver.course import course, editions, handout
+from driver.teaching import plans, syllabus
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 from packaging.requirements import Requirement

@@ -3,14 +3,13 @@
 import re
 from dataclasses import replace
 
-import build
-import deck
 import nbformat
 import pytest
-import slides
+from driver import build
+from driver.course import deck, slides
+from driver.teaching.plans import LIVE, plan
+from driver.teaching.syllabus import BOOK, chapters
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
-from plans import LIVE, plan
-from syllabus import BOOK, chapters
 
 UNITS = {name: (text, unit) for name, text, unit in slides.units()}
 UNIT = plan(slides.PLAN)[0]

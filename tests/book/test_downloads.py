@@ -5,9 +5,8 @@ import re
 from pathlib import Path
 from zipfile import ZipFile
 
-import course
-import downloads
 import pytest
+from driver.course import course, downloads
 
 BOOK = Path(course.__file__).parent
 PLACE = '<p>Before.</p><div class="course-downloads" data-editions="student slides"></div><p>After.'

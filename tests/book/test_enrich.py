@@ -1,7 +1,7 @@
 """What the driver makes of plain sources, and that it leaves alone what it does not know."""
 
-import enrich
 import pytest
+from driver.page import enrich
 from hypothesis import given
 from hypothesis import strategies as st
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output

@@ -11,10 +11,10 @@ from pathlib import Path
 from time import sleep
 from typing import Any
 
-import build
-import enrich
 import nbformat
 import pytest
+from driver import build
+from driver.page import enrich
 from live_page import CHAPTERS, FRAMES
 
 from nmpcrl.learning import td_error

@@ -4,9 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
-import self_test
-import syllabus
 from axe_playwright_python.sync_playwright import Axe
+from driver.teaching import self_test, syllabus
 
 STATIC = Path(__file__).resolve().parents[2] / "book/_static"
 PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head><title>Path</title>

@@ -4,12 +4,12 @@ import re
 from collections import Counter
 from pathlib import Path
 
-import build
-import enrich
 import nbformat
 import pytest
 import yaml
 from bs4 import BeautifulSoup
+from driver import build
+from driver.page import enrich
 from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
 from pybtex.richtext import Text

@@ -3,12 +3,12 @@
 import json
 from pathlib import Path
 
-import live
 import nbformat
 import numpy as np
 import pytest
-import whole
 from bs4 import BeautifulSoup
+from driver.page import live
+from driver.paper import whole
 from live_python import assert_equal_to_python
 
 from nmpcrl.study import paper

@@ -3,10 +3,10 @@
 import re
 from collections.abc import Iterable
 
-import live
 import nbformat
 import numpy as np
 import pytest
+from driver.page import live
 from live_page import MOST, Tab
 
 from nmpcrl.claims import published

@@ -6,9 +6,9 @@ import shlex
 from importlib import import_module
 from pathlib import Path
 
-import build
 import click
 import pytest
+from driver import build
 
 from nmpcrl.commands import main
 from nmpcrl.study.departures import DEPARTURES

@@ -12,11 +12,11 @@ from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
 
-import build
-import enrich
 import nbformat
 import pytest
 import test_api
+from driver import build
+from driver.page import enrich
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from papermill.cli import papermill

@@ -2,10 +2,9 @@
 
 from types import SimpleNamespace
 
-import course
 import nbformat
-import offline
 import pytest
+from driver.course import course, offline
 from nbformat.v4 import new_code_cell, new_notebook
 
 from nmpcrl.analysis import summaries

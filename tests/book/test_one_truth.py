@@ -3,9 +3,9 @@
 import re
 from collections.abc import Iterator
 
-import build
 import pytest
 from bs4 import BeautifulSoup, Tag
+from driver import build
 
 from nmpcrl.claims import published
 from nmpcrl.claims.agreement import Statement, disagreements

@@ -5,13 +5,12 @@ import re
 from io import BytesIO
 from unicodedata import normalize
 
-import build
-import pdf
 import pytest
-import whole
 import yaml
 from bs4 import BeautifulSoup
 from click.testing import CliRunner
+from driver import build
+from driver.paper import pdf, whole
 from filelock import FileLock
 from pypdf import PdfReader
 

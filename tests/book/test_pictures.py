@@ -4,8 +4,8 @@ import re
 from base64 import b64encode
 from pathlib import Path
 
-import pictures
 import pytest
+from driver.page import pictures
 from markdown_it import MarkdownIt
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 

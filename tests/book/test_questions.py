@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
-import questions
 from axe_playwright_python.sync_playwright import Axe
+from driver.page import questions
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from nmpcrl.course import choice, formula, number

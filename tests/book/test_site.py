@@ -6,9 +6,9 @@ import re
 import threading
 from urllib.parse import unquote, urldefrag, urlsplit
 
-import build
 import pytest
 from bs4 import BeautifulSoup
+from driver import build
 from legibility import LETTERS, SHOWN
 
 PAGES = build.pages()

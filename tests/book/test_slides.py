@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-import slides
+from driver.course import slides
 from pypdf import PdfReader
 
 ROOT = Path(__file__).resolve().parents[2]

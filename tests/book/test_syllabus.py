@@ -4,13 +4,9 @@ import json
 import re
 from pathlib import Path
 
-import graph
-import plans
 import pytest
-import self_test
-import syllabus
-import teaching
 import yaml
+from driver.teaching import graph, plans, self_test, syllabus, teaching
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 BOOK = Path(__file__).resolve().parents[2] / "book"

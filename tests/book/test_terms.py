@@ -3,9 +3,9 @@
 import re
 from pathlib import Path
 
-import enrich
 import nbformat
 import pytest
+from driver.page import enrich
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 FIRST_CHAPTERS = ("01_mdp_and_nmpc", "02_expected_sarsa")

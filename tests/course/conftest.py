@@ -4,10 +4,10 @@ import csv
 from contextlib import closing
 from pathlib import Path
 
-import editions
 import nbformat
 import pytest
 from click.testing import CliRunner
+from driver.course import editions
 from small_course import SMALL, small_chapter
 
 from nmpcrl.commands import main

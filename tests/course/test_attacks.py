@@ -1,8 +1,8 @@
 """Code that is written to deceive the grader gets the points of what it answers, and no more."""
 
-import editions
 import nbformat
 import pytest
+from driver.course import editions
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from small_course import ASKED, SMALL, cell_of, exercise, solved_by_student
 

@@ -1,8 +1,8 @@
 """Marks that nbgrader and otter read."""
 
-import editions
 import nbformat
 import pytest
+from driver.course import editions
 from small_course import ASKED, cell_of, small_chapter
 
 

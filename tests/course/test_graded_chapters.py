@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
 
-import course
 import nbformat
 import pytest
+from driver.course import course
 
 from nmpcrl.course.execution import Limits
 from nmpcrl.course.exercises import exercises

@@ -4,11 +4,10 @@ import json
 from contextlib import closing
 from itertools import chain
 
-import course
-import editions
 import nbformat
 import pytest
 from click.testing import CliRunner
+from driver.course import course, editions
 from nbformat.v4 import new_code_cell, new_markdown_cell
 from small_course import ASKED, SMALL, cell_of, small_chapter, solved_by_student
 

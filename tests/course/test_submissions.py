@@ -1,6 +1,6 @@
 """What a student hands in, put into the chapter."""
 
-import editions
+from driver.course import editions
 from nbformat.v4 import new_code_cell
 from small_course import cell_of, small_chapter, solved_by_student
 

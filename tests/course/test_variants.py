@@ -5,10 +5,10 @@ import re
 from math import comb
 from pathlib import Path
 
-import course
 import nbformat
 import numpy as np
 import pytest
+from driver.course import course
 
 from nmpcrl.course import variants
 from nmpcrl.course.exercises import exercises

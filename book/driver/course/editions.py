@@ -12,13 +12,13 @@ from collections.abc import Collection
 from copy import deepcopy
 from typing import Any
 
-import autograded
-import syllabus
 from nbformat.v4 import new_code_cell, new_markdown_cell
-from plans import LIVE, lecture
-from syllabus import LIVE as LIVE_FIGURE
-from syllabus import Chapter
 
+from driver.course import autograded
+from driver.teaching import syllabus
+from driver.teaching.plans import LIVE, lecture
+from driver.teaching.syllabus import LIVE as LIVE_FIGURE
+from driver.teaching.syllabus import Chapter
 from nmpcrl.course.exercises import HEAD, Exercise, exercises, solved
 from nmpcrl.course.variants import withhold
 

@@ -10,8 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from syllabus import Chapter, Section, chapters, declared, minutes
-
+from driver.teaching.syllabus import Chapter, Section, chapters, declared, minutes
 from nmpcrl.course.exercises import Exercise
 
 UNIT = 90  # minutes

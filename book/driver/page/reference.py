@@ -27,7 +27,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 
-HERE = Path(__file__).resolve().parent
+HERE = Path(__file__).resolve().parents[2]
 NOTATION = "book/notation"
 EQUATION = re.compile(r"(?P<word>Eqs?\. )?\((?P<number>2[a-f]|\d\d?)\)")
 EQUATIONS = re.compile(r"Eqs?\. \((?:2[a-f]|\d\d?)\)(?:(?:, | and |, and )\((?:2[a-f]|\d\d?)\))*")

@@ -14,12 +14,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import build
-import deck
 import nbformat
-import pdf
-from deck import FILES
-from plans import Unit, plan
+
+from driver import build
+from driver.course import deck
+from driver.course.deck import FILES
+from driver.paper import pdf
+from driver.teaching.plans import Unit, plan
 
 EXECUTED = Path("_build/executed")
 TEXTS, PLAN = build.ROOT / "book/decks", "two-weeks"

@@ -21,11 +21,9 @@ from html import escape
 from itertools import chain
 from typing import Any
 
-import live
-import pictures
-from blocks import blocks, inline
-from plans import LIVE, UNIT, Unit
-
+from driver.course.blocks import blocks, inline
+from driver.page import live, pictures
+from driver.teaching.plans import LIVE, UNIT, Unit
 from nmpcrl.report import prose
 from nmpcrl.report.figures.sheet import MIME
 from nmpcrl.report.live import published_runs

@@ -12,13 +12,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import enrich
 import nbformat
 import yaml
 
+from driver.page import enrich
 from nmpcrl.course.exercises import Exercise, exercises
 
-BOOK = Path(__file__).resolve().parent
+BOOK = Path(__file__).resolve().parents[2]
 WORDS = 180  # read in a minute
 FORMULA, FIGURE, CODE = 30, 60, 30  # on top of the words [s]
 HEADING = re.compile(r"^(?=## )", flags=re.M)

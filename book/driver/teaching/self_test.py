@@ -8,8 +8,8 @@ import json
 import re
 from typing import Any
 
-from questions import PLACE
-from syllabus import chapters, declared
+from driver.page.questions import PLACE
+from driver.teaching.syllabus import chapters, declared
 
 QUESTION = """\
 ::::{{div}} exercise question

@@ -8,11 +8,22 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-import graph
 import yaml
-from plans import LIVE, PACE, UNIT, Unit, plan
-from self_test import self_test
-from syllabus import BOOK, FIGURE, FORMULA, WORDS, Chapter, chapters, declared, declared_of, label
+
+from driver.teaching import graph
+from driver.teaching.plans import LIVE, PACE, UNIT, Unit, plan
+from driver.teaching.self_test import self_test
+from driver.teaching.syllabus import (
+    BOOK,
+    FIGURE,
+    FORMULA,
+    WORDS,
+    Chapter,
+    chapters,
+    declared,
+    declared_of,
+    label,
+)
 
 PART = re.compile(r"<!-- syllabus: (?P<name>[\w-]+) ?(?P<of>[\w-]*) -->")
 HEADING = re.compile(r"^## +(?P<title>.+)$", flags=re.M)

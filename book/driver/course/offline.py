@@ -12,8 +12,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import build
-import editions
+from driver import build
+from driver.course import editions
 
 LONG = 10  # of a run [s], as `limits.seconds_of` has it: those whose learner fits a network
 

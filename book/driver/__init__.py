@@ -1,0 +1,1 @@
+"""The driver of the book: what the commands beside this folder do."""

@@ -1,0 +1,1 @@
+"""Editions of the chapters for students, teachers and graders, and their slides."""

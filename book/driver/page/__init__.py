@@ -1,0 +1,1 @@
+"""The pages of the built book: what they have beyond their sources."""

@@ -1,0 +1,1 @@
+"""How long chapters take and what they need, plans for a course, and a self-test."""
