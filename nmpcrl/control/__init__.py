@@ -2,7 +2,7 @@
 
 from nmpcrl.control.nmpc import Nmpc, PlanJacobian
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
-from nmpcrl.control.problem import Parameter, Problem, Soft
+from nmpcrl.control.problem import Parameter, Problem, Series, Soft
 from nmpcrl.control.solution import Solution, SolverError, Status
 from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati
 from nmpcrl.control.task import Obstacle, Task
@@ -17,6 +17,7 @@ __all__ = [
     "Plant",
     "Problem",
     "Riccati",
+    "Series",
     "Soft",
     "Solution",
     "SolverError",

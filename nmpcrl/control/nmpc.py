@@ -16,11 +16,12 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.ocp import Ocp, transcribe, transcribe_problem
 from nmpcrl.control.plant import Plant
-from nmpcrl.control.problem import Problem, discount, whole
+from nmpcrl.control.problem import Problem, discount
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, short
 from nmpcrl.control.solvers import Fatrop, Prepared, Riccati, Solver, solver_of
 from nmpcrl.control.task import Task
+from nmpcrl.control.vectors import whole
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
@@ -179,9 +180,13 @@ class Nmpc:
             raise ValueError(f"stage = {stage} must lie among 0, ..., {self.horizon}")
         return self._variant(solution).plan_jacobian(solution, stage)
 
-    def kkt_residual(self, solution: Solution) -> float:
-        """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`."""
-        return self._variant(solution).sensitivity.kkt_residual(*_point(solution))
+    def kkt_residual(self, solution: Solution, *, relative: bool = False) -> float:
+        """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`.
+
+        `relative` to the sizes of the plan and of its multipliers, whatever their units.
+        """
+        point = _point(solution)
+        return self._variant(solution).sensitivity.kkt_residual(*point, relative=relative)
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""

@@ -8,8 +8,6 @@
 f, l, V_f, V0 and h are written once, in CasADi's SX; all their derivatives follow from that.
 """
 
-import difflib
-import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.vectors import kept
-
-IF = "a Python `if`, `max` or `and` cannot wait for numbers: write ca.if_else(...), ca.fmax(...)"
-NAN = "math's functions make nan of a symbol: write ca.sin(x) for math.sin(x), and so on"
+from nmpcrl.control.blocks import Blocks, numbers
+from nmpcrl.control.expression import expression
+from nmpcrl.control.vectors import kept, whole
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,88 +43,11 @@ class Soft:
     )
 
 
-class Blocks(Mapping[str, tuple[int, ...]]):
-    """Named arrays, one after the other in a vector, each in the order of `np.ravel`."""
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Data of every stage, taken where `Nmpc.solve` is given none."""
 
-    def __init__(self, what: str, shapes: Mapping[str, tuple[int, ...]]) -> None:
-        self._what, self._shapes = what, dict(shapes)
-        sizes = [int(np.prod(shape)) for shape in self._shapes.values()]
-        ends = np.cumsum([0, *sizes]).tolist()
-        self.size: int = ends[-1]
-        self._places = dict(zip(self._shapes, map(slice, ends[:-1], ends[1:]), strict=True))
-
-    def __getitem__(self, name: str) -> tuple[int, ...]:
-        return self._shapes[self.known(name)]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._shapes)
-
-    def __len__(self) -> int:
-        return len(self._shapes)
-
-    def known(self, name: str) -> str:
-        """The name, if it is one.
-
-        Raises:
-            ValueError: it is none; with the nearest.
-        """
-        if name in self._shapes:
-            return name
-        near = difflib.get_close_matches(str(name), self._shapes, 1)
-        meant = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(
-            f"{self._what} has no {name!r}{meant} (it has {', '.join(self._shapes) or 'none'})"
-        )
-
-    def part(self, name: str, vector: Any) -> Any:
-        """The entries of one name in a vector, or in the last axis of an array."""
-        return vector[..., self._places[self.known(name)]]
-
-    def split(self, vector: Vector) -> dict[str, Any]:
-        """Every array by its name; a float where it is a single number."""
-        arrays = {name: self.part(name, vector).reshape(self[name]) for name in self}
-        return {name: a if a.shape else float(a) for name, a in arrays.items()}
-
-    def symbols(self, vector: ca.SX) -> "Symbols":
-        """The same of a vector of symbols, as a model reads them."""
-        return Symbols(self, vector)
-
-    def filled(self, base: Matrix, values: Mapping[str, Any]) -> Matrix:
-        """A copy of `base`, vectors along its last axis, with these arrays in their places.
-
-        Raises:
-            ValueError: a name or a shape is another, or a number is not finite.
-        """
-        copy = np.array(base, float)
-        for name, value in values.items():
-            shape, whole = self[name], (*copy.shape[:-1], *self[name])
-            array = _numbers(f"{self._what} {name}", value)
-            if array.shape not in (shape, whole):
-                either = f"{shape}" if whole == shape else f"{shape} or {whole}, a stage each"
-                raise ValueError(
-                    f"{self._what} {name!r} has shape {array.shape}; it must be {either}"
-                )
-            rows = array.reshape(*copy.shape[:-1], -1) if array.shape == whole else array.ravel()
-            copy[..., self._places[name]] = rows
-        return copy
-
-
-class Symbols(Mapping[str, ca.SX]):
-    """Symbols by name, in their shapes."""
-
-    def __init__(self, blocks: Blocks, vector: ca.SX) -> None:
-        self._blocks, self._vector = blocks, vector
-
-    def __getitem__(self, name: str) -> ca.SX:
-        shape = self._blocks[name]
-        part = self._vector[self._blocks._places[name]]
-        return ca.reshape(part, *shape[::-1]).T if len(shape) == 2 else part
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._blocks)
-
-    def __len__(self) -> int:
-        return len(self._blocks)
+    values: Any  # an array with an axis of N + 1 in front
 
 
 class Expressions(NamedTuple):
@@ -183,8 +103,8 @@ class Problem:
             lower: least input, a number or one an input.
             upper: largest input.
             gamma: discount factor, 0 < gamma <= 1.
-            data: what is known of every stage and not learned: by name, the array of one stage that
-                is taken where `Nmpc.solve` is given none.
+            data: what is known of every stage and not learned: by name, the array of one stage, or
+                a `Series` of all, that is taken where `Nmpc.solve` is given none.
 
         Raises:
             ValueError: something is no such thing; the message names it and says what to write.
@@ -199,7 +119,7 @@ class Problem:
             name: one if isinstance(one, Parameter) else Parameter(one)
             for name, one in theta.items()
         }
-        starts = {name: _numbers(f"theta {name}", one.start) for name, one in parameters.items()}
+        starts = {name: numbers(f"theta {name}", one.start) for name, one in parameters.items()}
         self.names = Blocks("theta", {name: start.shape for name, start in starts.items()})
         if not self.names.size:
             raise ValueError("theta is empty: name at least one parameter, or nothing is learned")
@@ -210,10 +130,17 @@ class Problem:
             for side in ("lower", "upper")
         )  # fmt: skip
         self._refuse_outside()
-        defaults = {name: _numbers(f"data {name}", one) for name, one in (data or {}).items()}
-        self.data_names = Blocks("data", {name: one.shape for name, one in defaults.items()})
-        one_stage = self.data_names.filled(np.zeros(self.data_names.size), defaults)
-        self.data: Matrix = np.tile(one_stage, (self.horizon + 1, 1))
+        defaults = {
+            name: numbers(f"data {name}", one.values if isinstance(one, Series) else one)
+            for name, one in (data or {}).items()
+        }
+        shapes = {
+            name: one.shape[isinstance((data or {})[name], Series) :]
+            for name, one in defaults.items()
+        }
+        self.data_names = Blocks("data", shapes)
+        empty: Matrix = np.zeros((self.horizon + 1, self.data_names.size))
+        self.data = self.data_names.filled(empty, defaults)
         self.data.setflags(write=False)
         self.soft = tuple(soft)
         self.expressions, sizes = self._written(model, stage, terminal, initial)
@@ -263,12 +190,12 @@ class Problem:
             last += (self.data_names.symbols(d),)
         arguments = {"x": x, "u": u, "theta": theta, "d": d}
         both, alone = ((x, u, *last), arguments), ((x, *last), {**arguments, "u": None})
-        next_x = _expression("model", model, *both, self.states, "state")
-        cost = _expression("stage", stage, *both, 1, "cost")
-        final = _expression("terminal", terminal, *alone, 1, "cost")
-        first = _expression("initial", initial, *alone, 1, "cost")
+        next_x = expression("model", model, *both, self.states, "state")
+        cost = expression("stage", stage, *both, 1, "cost")
+        final = expression("terminal", terminal, *alone, 1, "cost")
+        first = expression("initial", initial, *alone, 1, "cost")
         rows = [
-            _expression(f"soft[{k}]", one.row, *both, 0, "row") for k, one in enumerate(self.soft)
+            expression(f"soft[{k}]", one.row, *both, 0, "row") for k, one in enumerate(self.soft)
         ]
         found = Expressions(
             x, u, theta, d, next_x, cost, final, first, ca.vertcat(ca.SX(0, 1), *rows)
@@ -315,17 +242,6 @@ class Problem:
                 raise ValueError(f"theta {name!r} starts at {start}, outside {low} and {high}")
 
 
-def whole(name: str, number: Any) -> int:
-    """A whole number, 1 or more.
-
-    Raises:
-        ValueError: it is none.
-    """
-    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
-        raise ValueError(f"{name} = {number!r} must be a whole number, 1 or more")
-    return int(number)
-
-
 def discount(gamma: Any) -> float:
     """A discount factor.
 
@@ -335,21 +251,6 @@ def discount(gamma: Any) -> float:
     if not 0 < gamma <= 1:
         raise ValueError(f"gamma = {gamma} must lie in (0, 1]")
     return float(gamma)
-
-
-def _numbers(name: str, value: Any) -> Matrix:
-    """An array of at most two axes.
-
-    Raises:
-        ValueError: it holds something else than finite numbers.
-    """
-    try:
-        array = np.array(value, float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} = {value!r} must be a number or an array of numbers") from None
-    if array.size == 0 or not np.isfinite(array).all():
-        raise ValueError(f"{name} = {value!r} must hold finite numbers")
-    return array
 
 
 def _spread(name: str, bound: Any, start: Matrix) -> Vector:
@@ -398,79 +299,3 @@ def _each(parts: list[ca.SX]) -> Iterator[tuple[int, int]]:
     """(part, place) of every row."""
     owners = [k for k, part in enumerate(parts) for _ in range(part.numel())]
     return ((k, place) for place, k in enumerate(owners))
-
-
-def _expression(
-    name: str,
-    function: Callable[..., Any] | None,
-    arguments: tuple[Any, ...],
-    symbols: Mapping[str, Any],
-    size: int,
-    unit: str,
-) -> ca.SX:
-    """What a function of the user writes down: a column of `size` entries, of any size if 0.
-
-    Raises:
-        ValueError: it is no such expression.
-    """
-    if function is None:
-        return ca.SX(size, 1) if size > 1 else ca.SX(0)
-    signature = [key for key, one in symbols.items() if one is not None and one.numel()]
-    call = f"{name}({', '.join('th' if key == 'theta' else key for key in signature)})"
-    try:
-        inspect.signature(function).bind(*arguments)
-    except TypeError as error:
-        raise ValueError(f"{name} is called as {call}, and does not take that: {error}") from None
-    try:
-        written = _column(function(*arguments))
-    except ValueError:
-        raise
-    except Exception as error:
-        reason = str(error).strip().splitlines()[-1]
-        why = IF if "truth value" in reason else f"{reason} ({type(error).__name__})"
-        raise ValueError(f"{name} cannot be written down in symbols: {why}") from error
-    if written is None:
-        raise ValueError(
-            f"{name} must return a column of SX, as its arguments are: write ca.vertcat(...)"
-        )
-    if not written.numel() or size not in (0, written.numel()):
-        needed = f"{size} {unit}{'s' if size > 1 else ''}" if size else f"a {unit} or more"
-        raise ValueError(f"{name} returns {written.numel()} numbers; it must return {needed}")
-    _refuse_unusable(name, written, [one for one in symbols.values() if one is not None])
-    return written
-
-
-def _column(result: Any) -> ca.SX | None:
-    """A result as a column; None if it is none."""
-    if isinstance(result, ca.MX):
-        return None
-    if isinstance(result, list | tuple | np.ndarray):
-        result = ca.vertcat(*np.ravel(np.array(result, object)))
-    try:
-        written = ca.SX(result)
-    except NotImplementedError:
-        return None
-    return ca.densify(ca.vec(written)) if 1 in written.shape else None
-
-
-def _refuse_unusable(name: str, written: ca.SX, allowed: list[ca.SX]) -> None:
-    known = {one.__hash__() for vector in allowed for one in ca.vertsplit(vector)}
-    for symbol in ca.symvar(written):
-        if symbol.__hash__() not in known:
-            raise ValueError(
-                f"{name} uses {symbol}, which is none of its arguments: make it a parameter in"
-                " theta, or data"
-            )
-    flat = ca.Function("flat", ca.symvar(written), [written])
-    constants = (
-        flat.instruction_constant(k)
-        for k in range(flat.n_instructions())
-        if flat.instruction_id(k) == ca.OP_CONST
-    )
-    if any(np.isnan(one) for one in constants):
-        raise ValueError(f"{name} holds nan: {NAN}")
-    try:
-        ca.jacobian(written, ca.vertcat(*allowed))
-    except Exception as error:
-        reason = str(error).strip().splitlines()[-1]
-        raise ValueError(f"{name} cannot be differentiated by CasADi: {reason}") from error

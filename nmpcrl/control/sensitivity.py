@@ -73,21 +73,29 @@ class Sensitivity:
         right = np.vstack([l_zt, active_t])
         return l_tt, right, np.linalg.solve(kkt, right)
 
-    def kkt_residual(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> float:
+    def kkt_residual(
+        self, z: Vector, p: Vector, lam: Vector, nu: Vector, *, relative: bool = False
+    ) -> float:
         """The largest violation of the KKT conditions, 0 at an optimum.
 
         Stationarity counts relative to the largest multiplier; complementarity as the smaller of a
-        multiplier and its constraint's distance.
+        multiplier and its constraint's distance. Where it is to be `relative`, multipliers are
+        taken in parts of the largest, and distances in parts of the largest variable.
         """
         ocp = self._ocp
         g, slope = (part.full().ravel() for part in self._conditions(z, p, lam))
-        inequality = ~ocp.equality
+        inequality, largest = ~ocp.equality, max(1.0, np.abs(lam).max(), np.abs(nu).max())
+        slope = (slope + nu) / largest
+        lower, upper = ocp.lower, ocp.upper
+        if relative:
+            lam, nu, size = lam / largest, nu / largest, max(1.0, np.abs(z).max())
+            z, g, lower, upper = z / size, g / size, lower / size, upper / size
         violations = (
-            (slope + nu) / max(1.0, np.abs(lam).max(), np.abs(nu).max()),
+            slope,
             g[ocp.equality],
             np.minimum(-g, lam)[inequality],
-            np.minimum(z - ocp.lower, np.maximum(-nu, 0)),
-            np.minimum(ocp.upper - z, np.maximum(nu, 0)),
+            np.minimum(z - lower, np.maximum(-nu, 0)),
+            np.minimum(upper - z, np.maximum(nu, 0)),
         )
         return float(max(np.abs(violation).max(initial=0) for violation in violations))
 

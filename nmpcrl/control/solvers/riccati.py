@@ -29,6 +29,7 @@ PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
 COLD, SHIFTED, NEAR, SAME = map(int, Start)  # plain numbers, as machine code takes them
 SOLVED = float(End.SOLVED)  # as it returns them
 ENDS = {
+    End.SOLVED: "led through numbers that are absurd: is the period too long for the dynamics?",
     End.STALLED: "found no descent",
     End.LIMIT: "ran out of iterations",
     End.BROKEN: "met numbers that are not finite",
@@ -39,6 +40,7 @@ TEXTS = {  # compiled beside `model`; read with the other modules, so that an ed
     + ("rows", "rows_solve", "rows_slopes")
 }
 STAGES = ("codes", "kernel", "hessian")
+ABSURD = 1e24  # no value is larger
 UNBOUNDED = 1e20  # stands for an input without a bound
 
 Attempt = tuple[int, Vector, int]  # which `Start`, with which (z, lam, nu), iterations allowed
@@ -163,7 +165,7 @@ class Compiled(ABC):
             value, iterations, end, violation, error = self._code(
                 *arguments, start, limit, self._tolerance, point, out
             )
-            if end == SOLVED:
+            if end == SOLVED and value < ABSURD:
                 return Solution(
                     state,
                     theta,
