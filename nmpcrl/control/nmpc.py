@@ -20,13 +20,13 @@ from nmpcrl.control.problem import Problem, discount
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, short
 from nmpcrl.control.solvers import Fatrop, Prepared, Riccati, Solver, solver_of
+from nmpcrl.control.solvers.solver import FARTHEST
 from nmpcrl.control.task import Task
 from nmpcrl.control.vectors import whole
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
 
-FARTHEST = 1e9  # of a problem, whose units are not known
 
 DEFAULT = Riccati()
 HORIZON, GAMMA, SLACK_WEIGHT = 10, 0.97, 100.0

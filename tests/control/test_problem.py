@@ -5,10 +5,10 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from nmpcrl.control import Fatrop, Ipopt, Nmpc, Parameter, Problem, Riccati, Soft, SolverError
+from nmpcrl.control import Fatrop, Ipopt, Nmpc, Parameter, Problem, Riccati, Soft
+
+pytestmark = pytest.mark.usefixtures("interpreted")
 
 STEP = 1e-5
 
@@ -73,7 +73,7 @@ def drawn(problem, count, seed):
 
 
 def pressed(solution):
-    """Which rows and bounds hold as equalities; None if a multiplier leaves that in doubt."""
+    """Which rows and bounds hold as equalities; None if a multiplier leaves it in doubt."""
     m, ocp = solution.multipliers, solution.ocp
     weights = np.outer(ocp.gamma ** np.arange(len(ocp.states)), ocp.slack_weights)
     shares = np.concatenate([(m.obstacles / weights).ravel(), np.abs(m.inputs).ravel()])
@@ -119,10 +119,10 @@ def test_all_derivatives_are_finite_differences(problem, solvers, fixed):
         np.testing.assert_allclose(found, policy, atol=2e-5)
         for stage in (1, 3, 6):
             plan = nmpc.plan_jacobian(solution, stage)
-            states = differences(nmpc, solution, data, lambda s: s.states[stage], given)
+            states = differences(nmpc, solution, data, lambda s, i=stage: s.states[i], given)
             np.testing.assert_allclose(plan.states, states, atol=2e-5)
             if stage < 6:
-                inputs = differences(nmpc, solution, data, lambda s: s.inputs[stage], given)
+                inputs = differences(nmpc, solution, data, lambda s, i=stage: s.inputs[i], given)
                 np.testing.assert_allclose(plan.inputs, inputs, atol=2e-5)
         compared += 1
     assert compared >= 6

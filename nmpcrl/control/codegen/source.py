@@ -87,7 +87,7 @@ def source(
     names = [function.name_in(i) for i in range(function.n_in())]
     out = ca.Function(function.name(), *_expressions(function), names, function.name_out())
     returned = returns(function) if returned is None else returned
-    lines = [_line(out, k, returned, matrices) for k in range(out.n_instructions())]
+    lines = [_line(out, k, returned, matrices) for k in range(out.n_instructions())] or ["pass"]
     results = [] if returned else [f"{name}_" for name in out.name_out()]
     return "\n    ".join([f"def {out.name()}({', '.join(names + results)}):", *lines]) + "\n"
 

@@ -13,7 +13,7 @@ from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers.codes import Start
-from nmpcrl.control.solvers.solver import Solver
+from nmpcrl.control.solvers.solver import FARTHEST, LED_ASTRAY, Solver
 
 PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
 
@@ -134,6 +134,8 @@ class Program:
         z, lam, nu = (result[key].full().ravel() for key in ("x", "lam_g", "lam_x"))
         if not (stats["success"] and np.isfinite([z.sum(), lam.sum(), nu.sum()]).all()):
             raise SolverError(_status(self._name, stats), state, theta)
+        if np.abs(z[self._ocp.states]).max() > FARTHEST:
+            raise SolverError(f"{self._name} {LED_ASTRAY}", state, theta)
         z = np.clip(z, self._ocp.lower, self._ocp.upper)  # fatrop relaxes bounds by 1e-8
         self._settle_stage_zero(lam, nu, p)
         value, features = self._sensitivity.value_and_gradient(z, p, lam)

@@ -18,7 +18,7 @@ from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers import problem_stages
 from nmpcrl.control.solvers.codes import End, Start
-from nmpcrl.control.solvers.solver import TOLERANCE, Solver
+from nmpcrl.control.solvers.solver import LED_ASTRAY, TOLERANCE, Solver
 from nmpcrl.control.solvers.stages import write
 
 WARM_LIMIT = 40  # iterations from a warm start
@@ -29,7 +29,7 @@ PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
 COLD, SHIFTED, NEAR, SAME = map(int, Start)  # plain numbers, as machine code takes them
 SOLVED = float(End.SOLVED)  # as it returns them
 ENDS = {
-    End.SOLVED: "led through numbers that are absurd: is the period too long for the dynamics?",
+    End.SOLVED: LED_ASTRAY,
     End.STALLED: "found no descent",
     End.LIMIT: "ran out of iterations",
     End.BROKEN: "met numbers that are not finite",

@@ -1,8 +1,9 @@
 """A `Problem` solved by `kernel` and `rows`: the function that is called."""
 
+import numpy as np
 from numba import float64, int64, njit, types
 
-from .kernel import BROKEN, START_MU, initialise, iterate, options, vector
+from .kernel import START_MU, initialise, iterate, options, vector
 from .model import NX
 from .rows import (
     ABSURD,
@@ -29,7 +30,7 @@ def solve(
     """Solve a problem; see `ProblemPoint` for the arguments, and `solve.solve` for the rest.
 
     Returns value, iterations, the end, 0, and the relative error. A plan with a state beyond
-    `ABSURD` is none: its end is BROKEN.
+    `ABSURD` is none: its value is infinite.
     """
     task = scaled(theta, data, lower, upper, kind, discount, weights, factor, fixed)
     point, trial, duals, stages, step = allocate(len(discount) - 1)
@@ -44,5 +45,5 @@ def solve(
     )
     value, largest = write_solution(task, point, duals, stages, objective, factor, tie, out)
     if not largest <= ABSURD:
-        ended = BROKEN
+        value = np.inf
     return value, float(iterations), float(ended), 0.0, error

@@ -10,6 +10,8 @@ from nmpcrl.control.solution import Solution
 from nmpcrl.control.task import Task
 
 TOLERANCE = 1e-8  # what is taken where none is said
+FARTHEST = 1e9  # no plan goes through such a state
+LED_ASTRAY = "led through numbers that are absurd: is the period too long for the dynamics?"
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
 
 
