@@ -14,7 +14,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.control.ocp import Ocp, transcribe, transcribe_problem
+from nmpcrl.control.ocp import Indices, Ocp, transcribe, transcribe_problem
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem, discount
 from nmpcrl.control.sensitivity import Sensitivity
@@ -167,7 +167,7 @@ class Nmpc:
         In microseconds an input by riccati. At a bound or row that is just reached, where the
         policy has a kink, it lies between the derivatives of the two sides.
         """
-        return self.plan_jacobian(solution, 0).inputs
+        return self._variant(solution).inputs_jacobian(solution, 0)
 
     def plan_jacobian(self, solution: Solution, stage: int) -> PlanJacobian:
         """The derivatives in theta of the plan's state and input of a stage, 0, ..., N.
@@ -178,7 +178,10 @@ class Nmpc:
         """
         if not 0 <= stage <= self.horizon:
             raise ValueError(f"stage = {stage} must lie among 0, ..., {self.horizon}")
-        return self._variant(solution).plan_jacobian(solution, stage)
+        variant = self._variant(solution)
+        return PlanJacobian(
+            variant.states_jacobian(solution, stage), variant.inputs_jacobian(solution, stage)
+        )
 
     def kkt_residual(self, solution: Solution, *, relative: bool = False) -> float:
         """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`.
@@ -249,28 +252,29 @@ class _Variant:
             return self.sensitivity.hessian(*_point(solution)) @ vector
         return product
 
-    def plan_jacobian(self, solution: Solution, stage: int) -> PlanJacobian:
-        """As `Nmpc.plan_jacobian`; by dense algebra where there is no machine code."""
-        ocp = self.ocp
+    def inputs_jacobian(self, solution: Solution, stage: int) -> Matrix:
+        """d u_i / d theta; by dense algebra where there is no machine code."""
+        if stage == len(self.ocp.inputs):
+            return np.zeros((0, solution.theta.size))
+        return self._rows(solution, stage, self.ocp.inputs)
+
+    def states_jacobian(self, solution: Solution, stage: int) -> Matrix:
+        """d x_i / d theta, in the same way."""
+        return self._rows(solution, stage, self.ocp.states)
+
+    def _rows(self, solution: Solution, stage: int, part: Indices) -> Matrix:
+        """The gradients of the plan's entries at a stage, a sweep each."""
+        ocp, found = self.ocp, []
         states: Matrix = np.zeros(ocp.states.shape)
         inputs: Matrix = np.zeros(ocp.inputs.shape)
-        found: list[Vector] = []
-        for part in (states, inputs):
-            for k in range(part.shape[1] if stage < len(part) else 0):
-                part[stage, k] = 1.0
-                gradient = self._solver.plan_gradient(solution, states, inputs)
-                part[stage, k] = 0.0
-                if gradient is None:
-                    return self._dense_jacobian(solution, stage)
-                found.append(gradient)
-        n = states.shape[1]
-        rows = np.reshape(found, (-1, solution.theta.size))
-        return PlanJacobian(rows[:n], rows[n:])
-
-    def _dense_jacobian(self, solution: Solution, stage: int) -> PlanJacobian:
-        ocp, moved = self.ocp, self.sensitivity.plan(*_point(solution))
-        inputs = ocp.inputs[stage] if stage < len(ocp.inputs) else np.zeros(0, int)
-        return PlanJacobian(moved[ocp.states[stage]], moved[inputs])
+        chosen = states if part is ocp.states else inputs
+        for k in range(chosen.shape[1]):
+            chosen[stage] = np.arange(chosen.shape[1]) == k
+            gradient = self._solver.plan_gradient(solution, states, inputs)
+            if gradient is None:
+                return self.sensitivity.plan(*_point(solution))[part[stage]]
+            found.append(gradient)
+        return np.array(found)
 
     @cached_property
     def sensitivity(self) -> Sensitivity:

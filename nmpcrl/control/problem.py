@@ -141,7 +141,6 @@ class Problem:
         self.data_names = Blocks("data", shapes)
         empty: Matrix = np.zeros((self.horizon + 1, self.data_names.size))
         self.data = self.data_names.filled(empty, defaults)
-        self.data.setflags(write=False)
         self.soft = tuple(soft)
         self.expressions, sizes = self._written(model, stage, terminal, initial)
         self.weights = kept(_weights(self.soft, sizes))
