@@ -89,9 +89,7 @@ class Nmpc:
                 raise ValueError(f"slack_weight = {slack_weight} must be a positive number")
             if task.start.size != plant.n:
                 raise ValueError(f"the task has {task.start.size} states and the plant {plant.n}")
-            self.plant = plant
-            self.task = task
-            self.slack_weight = float(slack_weight)
+            self._plant, self._task, self._slack_weight = plant, task, float(slack_weight)
             self.solver.check(task)
             self.n, self.m, self.parameters = plant.n, plant.m, 2 * plant.n + plant.m + 1
             box = np.abs([task.lower, task.upper])
@@ -99,15 +97,6 @@ class Nmpc:
         self.lower, self.upper = plant.lower, plant.upper
         self._solves = self.solver  # or what took over
         self.ties_active = ties_active
-
-    def __getattr__(self, name: str) -> Any:
-        """Say what a `Problem` lacks."""
-        if name in ("plant", "task", "slack_weight"):
-            raise AttributeError(
-                f"an Nmpc of a Problem has no {name}: its model plans, and what is driven, from"
-                " where, and at which cost is said to train and evaluate"
-            )
-        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     def solve(
         self,
@@ -135,18 +124,18 @@ class Nmpc:
         began = time.perf_counter()
         state = _checked("state", state, self.n, self._far)
         theta = _checked("theta", theta, self.parameters)
-        more: dict[str, Any] = {}
+        known = None
         if self.problem is not None:
-            more["data"] = self.problem.stage_data(data)
+            known = self.problem.stage_data(data)
         elif data is not None:
             raise ValueError("data belong to a Problem: a task's target and obstacles stand still")
         if action is None:
-            return self._free.solve(state, theta, warm_start, began=began, **more)
+            return self._free.solve(state, theta, warm_start, began=began, data=known)
         action = _checked("action", action, self.m)
         if (action < self.lower).any() or (action > self.upper).any():
             bounds = f"{short(self.lower)} and {short(self.upper)}"
             raise ValueError(f"action {short(action)} must lie between {bounds}")
-        return self._fixed.solve(state, theta, warm_start, action, began=began, **more)
+        return self._fixed.solve(state, theta, warm_start, action, began=began, data=known)
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
@@ -196,8 +185,33 @@ class Nmpc:
         return np.minimum(np.maximum(action, self.lower), self.upper)
 
     @property
+    def plant(self) -> Plant:
+        """What predicts, where there is a task."""
+        self._refuse_problem("plant")
+        return self._plant
+
+    @property
+    def task(self) -> Task:
+        """Target, box and obstacles."""
+        self._refuse_problem("task")
+        return self._task
+
+    @property
+    def slack_weight(self) -> float:
+        """The price omega of a unit of each slack."""
+        self._refuse_problem("slack_weight")
+        return self._slack_weight
+
+    def _refuse_problem(self, name: str) -> None:
+        if self.problem is not None:
+            raise AttributeError(
+                f"an Nmpc of a Problem has no {name}: its model plans, and what is driven, from"
+                " where, and at which cost is said to train and evaluate"
+            )
+
+    @property
     def ocp(self) -> Any:
-        """The problem with u_0 free, in symbols: a `TaskOcp`, or a `ProblemOcp`."""
+        """The problem with u_0 free, in symbols, a `TaskOcp` or a `ProblemOcp`."""
         return self._free.ocp
 
     def _prepared(self, ocp: Ocp) -> Prepared:
@@ -272,7 +286,8 @@ class _Variant:
             chosen[stage] = np.arange(chosen.shape[1]) == k
             gradient = self._solver.plan_gradient(solution, states, inputs)
             if gradient is None:
-                return self.sensitivity.plan(*_point(solution))[part[stage]]
+                dense: Matrix = self.sensitivity.plan(*_point(solution))[part[stage]]
+                return dense
             found.append(gradient)
         return np.array(found)
 

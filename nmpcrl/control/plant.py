@@ -96,7 +96,9 @@ class Plant:
 
     def _written(self, state: ca.SX, action: ca.SX) -> ca.SX:
         """The dynamics as a column, which may have been written as a list."""
-        return column(self.dynamics(state, action))
+        written = column(self.dynamics(state, action))
+        assert written is not None  # or there would be no plant
+        return written
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.blocks import Blocks, numbers
+from nmpcrl.control.blocks import Blocks, Symbols, numbers
 from nmpcrl.control.expression import expression
 from nmpcrl.control.vectors import kept, whole
 
@@ -149,7 +149,7 @@ class Problem:
 
     @cached_property
     def scale(self) -> float:
-        """What riccati divides the objective by: half of the costs' largest curvature, or slope."""
+        """What riccati divides the objective by, half of the largest curvature or a slope."""
         e = self.expressions
         z, costs = ca.vertcat(e.x, e.u), e.stage + self.gamma**self.horizon * e.terminal
         sizes = ca.Function("sizes", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
@@ -184,7 +184,7 @@ class Problem:
         """The problem in symbols, and how many rows each `Soft` has."""
         x, u = ca.SX.sym("x", self.states), ca.SX.sym("u", self.inputs)
         theta, d = ca.SX.sym("theta", self.names.size), ca.SX.sym("d", self.data_names.size)
-        last = (self.names.symbols(theta),)
+        last: tuple[Symbols, ...] = (self.names.symbols(theta),)
         if self.data_names:
             last += (self.data_names.symbols(d),)
         arguments = {"x": x, "u": u, "theta": theta, "d": d}

@@ -43,6 +43,7 @@ def driven(
             "a Problem plans, and says neither what is driven nor from where nor at which cost:"
             " give plant=(state, action, rng) -> (next state, cost, end), and start="
         )
+    drive: Drive
     if plant is None or isinstance(plant, Plant):
         own, task = plant or nmpc.plant, nmpc.task
         if (own.n, own.m) != (nmpc.n, nmpc.m):
@@ -51,9 +52,10 @@ def driven(
                 f" {nmpc.m}"
             )
 
-        def drive(state: Vector, action: Vector, _: np.random.Generator) -> Step:
+        def as_task(state: Vector, action: Vector, _: np.random.Generator) -> Step:
             return own.step(state, action), task.stage_cost(state, action), False
 
+        drive = as_task
     else:
         drive = checked(plant, nmpc.n)
     if start is None:
