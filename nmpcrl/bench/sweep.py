@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Riccati, Solution, SolverError
+from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
 from nmpcrl.study import paper, provenance, store
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import need_numba
@@ -207,15 +207,15 @@ def judged(
         at_once=int(solution.restarts == 0),
         restarted=int(solution.restarts > 0),
         outside=int(not kept),
-        broken=int(not (_is_sound(solution) and np.isfinite(residual))),
+        broken=int(not (_is_sound(ours.plant, solution) and np.isfinite(residual))),
         kkt=residual,
     )
     return asked + found + (_against(ipopt, solution, action) if ipopt and kept else Tally())
 
 
-def _is_sound(solution: Solution) -> bool:
+def _is_sound(plant: Plant, solution: Solution) -> bool:
     """Whether all inputs are within their bounds and all numbers finite."""
-    plant, inputs = solution.ocp.plant, solution.inputs
+    inputs = solution.inputs
     finite = np.isfinite([solution.value, *solution.features, *solution.point]).all()
     return bool(finite and (plant.lower <= inputs).all() and (inputs <= plant.upper).all())
 

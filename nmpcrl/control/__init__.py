@@ -1,7 +1,8 @@
 """What the controller is: a plant, a task, and the NMPC that solves it. The only home of CasADi."""
 
-from nmpcrl.control.nmpc import Nmpc
+from nmpcrl.control.nmpc import Nmpc, PlanJacobian
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
+from nmpcrl.control.problem import Parameter, Problem, Series, Soft
 from nmpcrl.control.solution import Solution, SolverError, Status
 from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati
 from nmpcrl.control.task import Obstacle, Task
@@ -11,8 +12,13 @@ __all__ = [
     "Ipopt",
     "Nmpc",
     "Obstacle",
+    "Parameter",
+    "PlanJacobian",
     "Plant",
+    "Problem",
     "Riccati",
+    "Series",
+    "Soft",
     "Solution",
     "SolverError",
     "Status",

@@ -47,7 +47,7 @@ def texts(plant: Plant, task: Task) -> dict[str, str]:
     """What is compiled: the text of each module by its name."""
     here = files(riccati.__package__)
     return {
-        **riccati.TEXTS,
+        **{name: riccati.TEXTS[name] for name in (*riccati.STAGES, "solve", "hessian_times")},
         "model": stages.write(plant),
         "charge": _charge(plant, task),
         "entries": here.joinpath("entries.py").read_text("utf-8"),

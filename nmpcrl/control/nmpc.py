@@ -6,37 +6,51 @@
 
 import time
 import warnings
+from collections.abc import Mapping
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.control.ocp import Ocp, transcribe
+from nmpcrl.control.ocp import Indices, Ocp, transcribe, transcribe_problem
 from nmpcrl.control.plant import Plant
+from nmpcrl.control.problem import Problem, discount
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, short
 from nmpcrl.control.solvers import Fatrop, Prepared, Riccati, Solver, solver_of
+from nmpcrl.control.solvers.solver import FARTHEST
 from nmpcrl.control.task import Task
+from nmpcrl.control.vectors import whole
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
 
-DEFAULT = Riccati()
 
-__all__ = ["ABSURD", "Nmpc"]
+DEFAULT = Riccati()
+HORIZON, GAMMA, SLACK_WEIGHT = 10, 0.97, 100.0
+
+__all__ = ["ABSURD", "Nmpc", "PlanJacobian"]
+
+
+class PlanJacobian(NamedTuple):
+    """How one stage of a plan answers to theta."""
+
+    states: Matrix  # d x_i / d theta, shape (n, d)
+    inputs: Matrix  # d u_i / d theta, shape (m, d); (0, d) at stage N
 
 
 class Nmpc:
-    """Eq. (2) for one plant and one task, as a function of the state and of theta."""
+    """Eq. (2) for one plant and one task, or a `Problem`, as a function of state and theta."""
 
     def __init__(
         self,
-        plant: Plant,
-        task: Task,
-        horizon: int = 10,
-        gamma: float = 0.97,
-        slack_weight: float = 100.0,
+        plant: Plant | Problem,
+        task: Task | None = None,
+        horizon: int = HORIZON,
+        gamma: float = GAMMA,
+        slack_weight: float = SLACK_WEIGHT,
         solver: Solver | str = DEFAULT,
         *,
         ties_active: bool = False,
@@ -44,7 +58,8 @@ class Nmpc:
         """Check and keep the problem; it is transcribed at the first solve.
 
         Args:
-            plant: predicts; the robot of Eq. (18) in the paper.
+            plant: predicts; the robot of Eq. (18) in the paper. Or a `Problem`, which has a task,
+                horizon, gamma and weights of its own.
             task: target, box and obstacles.
             horizon: N, the number of planned inputs.
             gamma: discount factor, 0 < gamma <= 1.
@@ -55,21 +70,31 @@ class Nmpc:
             ties_active: whether a state exactly on an obstacle's boundary counts as in it: the
                 other side of a kink in theta_c.  # departure L
         """
-        if isinstance(horizon, bool) or not isinstance(horizon, int | np.integer) or horizon < 1:
-            raise ValueError(f"horizon = {horizon!r} must be a whole number, 1 or more")
-        if not 0 < gamma <= 1:
-            raise ValueError(f"gamma = {gamma} must lie in (0, 1]")
-        if not 0 < slack_weight < np.inf:
-            raise ValueError(f"slack_weight = {slack_weight} must be a positive number")
-        if task.start.size != plant.n:
-            raise ValueError(f"the task has {task.start.size} states and the plant {plant.n}")
-        self.plant = plant
-        self.task = task
-        self.horizon = int(horizon)
-        self.gamma = float(gamma)
-        self.slack_weight = float(slack_weight)
+        self.problem = plant if isinstance(plant, Problem) else None
         self.solver = solver_of(solver)
-        self.solver.check(task)
+        if isinstance(plant, Problem):
+            if task is not None or (horizon, gamma, slack_weight) != (HORIZON, GAMMA, SLACK_WEIGHT):
+                raise ValueError(
+                    "a Problem has its own costs, horizon, gamma and weights: write"
+                    " Nmpc(problem, solver=...)"
+                )
+            self.horizon, self.gamma = plant.horizon, plant.gamma
+            self.n, self.m, self.parameters = plant.states, plant.inputs, plant.names.size
+            self._far = FARTHEST
+        else:
+            if task is None:
+                raise ValueError("a plant needs a task: write Nmpc(plant, task)")
+            self.horizon, self.gamma = whole("horizon", horizon), discount(gamma)
+            if not 0 < slack_weight < np.inf:
+                raise ValueError(f"slack_weight = {slack_weight} must be a positive number")
+            if task.start.size != plant.n:
+                raise ValueError(f"the task has {task.start.size} states and the plant {plant.n}")
+            self._plant, self._task, self._slack_weight = plant, task, float(slack_weight)
+            self.solver.check(task)
+            self.n, self.m, self.parameters = plant.n, plant.m, 2 * plant.n + plant.m + 1
+            box = np.abs([task.lower, task.upper])
+            self._far = max(FAR, 100 * box[np.isfinite(box)].max(initial=0))
+        self.lower, self.upper = plant.lower, plant.upper
         self._solves = self.solver  # or what took over
         self.ties_active = ties_active
 
@@ -79,30 +104,38 @@ class Nmpc:
         theta: Vector,
         warm_start: Solution | None = None,
         action: Vector | None = None,
+        *,
+        data: Mapping[str, Any] | None = None,
     ) -> Solution:
         """Solve Eq. (2) from `state`: V_theta(s), or Q_theta(s, a) with u_0 = `action`.
 
         Args:
             state: plant state, shape (n,); (x [m], y [m], heading [rad]) for the robot.
-            theta: NMPC parameters, shape (2n + m + 1,).
+            theta: NMPC parameters, shape (2n + m + 1,), or that of a problem's theta.
             warm_start: an earlier solution to start from: as it is if it was solved in this state,
                 shifted by one stage if in another. Standing still at `state` if absent.
             action: the first input, shape (m,), within the plant's bounds; free if absent.
+            data: of a problem: arrays by name, each of one stage or with an axis of N + 1 in front.
 
         Raises:
             ValueError: an argument has the wrong shape, is not finite, or is absurdly large.
             SolverError: no optimum was found; carries the status, the state and theta.
         """
         began = time.perf_counter()
-        state = _checked("state", state, self.plant.n, FAR)
-        theta = _checked("theta", theta, 2 * self.plant.n + self.plant.m + 1)
+        state = _checked("state", state, self.n, self._far)
+        theta = _checked("theta", theta, self.parameters)
+        known = None
+        if self.problem is not None:
+            known = self.problem.stage_data(data)
+        elif data is not None:
+            raise ValueError("data belong to a Problem: a task's target and obstacles stand still")
         if action is None:
-            return self._free.solve(state, theta, warm_start, began=began)
-        action = _checked("action", action, self.plant.m)
-        if (action < self.plant.lower).any() or (action > self.plant.upper).any():
-            bounds = f"{short(self.plant.lower)} and {short(self.plant.upper)}"
+            return self._free.solve(state, theta, warm_start, began=began, data=known)
+        action = _checked("action", action, self.m)
+        if (action < self.lower).any() or (action > self.upper).any():
+            bounds = f"{short(self.lower)} and {short(self.upper)}"
             raise ValueError(f"action {short(action)} must lie between {bounds}")
-        return self._fixed.solve(state, theta, warm_start, action, began=began)
+        return self._fixed.solve(state, theta, warm_start, action, began=began, data=known)
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
@@ -117,13 +150,68 @@ class Nmpc:
         vector = _checked("vector", vector, solution.theta.size)
         return self._variant(solution).hessian_times(solution, vector)
 
-    def kkt_residual(self, solution: Solution) -> float:
-        """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`."""
-        return self._variant(solution).sensitivity.kkt_residual(*_point(solution))
+    def policy_jacobian(self, solution: Solution) -> Matrix:
+        """du_0 / dtheta, shape (m, d): how the policy answers to theta; 0 where u_0 is given.
+
+        In microseconds an input by riccati. At a bound or row that is just reached, where the
+        policy has a kink, it lies between the derivatives of the two sides.
+        """
+        return self._variant(solution).inputs_jacobian(solution, 0)
+
+    def plan_jacobian(self, solution: Solution, stage: int) -> PlanJacobian:
+        """The derivatives in theta of the plan's state and input of a stage, 0, ..., N.
+
+        Raises:
+            ValueError: there is no such stage.
+            numpy.linalg.LinAlgError: the optimum is not a strict one.
+        """
+        if not 0 <= stage <= self.horizon:
+            raise ValueError(f"stage = {stage} must lie among 0, ..., {self.horizon}")
+        variant = self._variant(solution)
+        return PlanJacobian(
+            variant.states_jacobian(solution, stage), variant.inputs_jacobian(solution, stage)
+        )
+
+    def kkt_residual(self, solution: Solution, *, relative: bool = False) -> float:
+        """How far `solution` is from satisfying the KKT conditions: see `Sensitivity`.
+
+        `relative` to the sizes of the plan and of its multipliers, whatever their units.
+        """
+        point = _point(solution)
+        return self._variant(solution).sensitivity.kkt_residual(*point, relative=relative)
+
+    def clip(self, action: Vector) -> Vector:
+        """The nearest action within the bounds, shape (m,)."""
+        return np.minimum(np.maximum(action, self.lower), self.upper)
 
     @property
-    def ocp(self) -> Ocp:
-        """Eq. (2) with u_0 free, in symbols."""
+    def plant(self) -> Plant:
+        """What predicts, where there is a task."""
+        self._refuse_problem("plant")
+        return self._plant
+
+    @property
+    def task(self) -> Task:
+        """Target, box and obstacles."""
+        self._refuse_problem("task")
+        return self._task
+
+    @property
+    def slack_weight(self) -> float:
+        """The price omega of a unit of each slack."""
+        self._refuse_problem("slack_weight")
+        return self._slack_weight
+
+    def _refuse_problem(self, name: str) -> None:
+        if self.problem is not None:
+            raise AttributeError(
+                f"an Nmpc of a Problem has no {name}: its model plans, and what is driven, from"
+                " where, and at which cost is said to train and evaluate"
+            )
+
+    @property
+    def ocp(self) -> Any:
+        """The problem with u_0 free, in symbols, a `TaskOcp` or a `ProblemOcp`."""
         return self._free.ocp
 
     def _prepared(self, ocp: Ocp) -> Prepared:
@@ -132,10 +220,11 @@ class Nmpc:
             return self._solves.prepare(ocp)
         except CannotCompile as error:
             instead = Fatrop(self.solver.tolerance)
-            try:
-                instead.check(self.task)
-            except ValueError as refusal:
-                raise ValueError(f"{error}, and {refusal}") from error
+            if self.problem is None:
+                try:
+                    instead.check(self.task)
+                except ValueError as refusal:
+                    raise ValueError(f"{error}, and {refusal}") from error
             warnings.warn(
                 f"{error}: {instead.name} solves instead of {self.solver.name}", stacklevel=2
             )
@@ -158,8 +247,15 @@ class _Variant:
     """Eq. (2) with u_0 free or fixed: transcribed, with its sensitivities and a solver."""
 
     def __init__(self, nmpc: Nmpc, *, fix_action: bool) -> None:
-        problem = (nmpc.plant, nmpc.task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
-        self.ocp = transcribe(*problem, fix_action=fix_action, ties_active=nmpc.ties_active)
+        self.ocp: Ocp
+        ties_active = nmpc.ties_active
+        if nmpc.problem is not None:
+            self.ocp = transcribe_problem(
+                nmpc.problem, fix_action=fix_action, ties_active=ties_active
+            )
+        else:
+            problem = (nmpc.plant, nmpc.task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
+            self.ocp = transcribe(*problem, fix_action=fix_action, ties_active=ties_active)
         self._solver = nmpc._prepared(self.ocp)
         self.solve = self._solver.solve
 
@@ -170,15 +266,40 @@ class _Variant:
             return self.sensitivity.hessian(*_point(solution)) @ vector
         return product
 
+    def inputs_jacobian(self, solution: Solution, stage: int) -> Matrix:
+        """d u_i / d theta; by dense algebra where there is no machine code."""
+        if stage == len(self.ocp.inputs):
+            return np.zeros((0, solution.theta.size))
+        return self._rows(solution, stage, self.ocp.inputs)
+
+    def states_jacobian(self, solution: Solution, stage: int) -> Matrix:
+        """d x_i / d theta, in the same way."""
+        return self._rows(solution, stage, self.ocp.states)
+
+    def _rows(self, solution: Solution, stage: int, part: Indices) -> Matrix:
+        """The gradients of the plan's entries at a stage, a sweep each."""
+        ocp, found = self.ocp, []
+        states: Matrix = np.zeros(ocp.states.shape)
+        inputs: Matrix = np.zeros(ocp.inputs.shape)
+        chosen = states if part is ocp.states else inputs
+        for k in range(chosen.shape[1]):
+            chosen[stage] = np.arange(chosen.shape[1]) == k
+            gradient = self._solver.plan_gradient(solution, states, inputs)
+            if gradient is None:
+                dense: Matrix = self.sensitivity.plan(*_point(solution))[part[stage]]
+                return dense
+            found.append(gradient)
+        return np.array(found)
+
     @cached_property
     def sensitivity(self) -> Sensitivity:
         return Sensitivity(self.ocp)
 
 
 def _point(solution: Solution) -> tuple[Vector, Vector, Vector, Vector]:
-    action = solution.action[: solution.ocp.fixed_action.size]
-    p = np.concatenate([solution.state, solution.theta, action])
-    return solution.primal, p, solution.constraint_duals, solution.bound_duals
+    return (
+        solution.primal, solution.parameters, solution.constraint_duals, solution.bound_duals,
+    )  # fmt: skip
 
 
 def _checked(name: str, vector: Vector, size: int, largest: float = ABSURD) -> Vector:

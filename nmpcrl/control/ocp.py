@@ -4,7 +4,9 @@ The decision variables are ordered by stage, z = (x_0, u_0, sigma_0, ..., x_N, s
 the constraints. That order is the block structure which a structure-exploiting solver needs.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 
 from nmpcrl import Vector
 from nmpcrl.control.plant import Plant
+from nmpcrl.control.problem import Problem
 from nmpcrl.control.task import Task, overlap
 
 Indices = NDArray[np.int_]
@@ -47,19 +50,17 @@ def terminal_cost(state: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
 
 
 @dataclass(frozen=True, eq=False)
-class Ocp:
-    """Eq. (2) as an NLP: min f(z; p) subject to lower <= z <= upper and Eqs. (2b), (2c), (2f).
+class Ocp(ABC):
+    """An optimal control problem as an NLP: min f(z; p), lower <= z <= upper, g(z; p) = 0 or <= 0.
 
     The constraints g(z; p) are equalities where `equality` is true, and g <= 0 elsewhere.
-    The parameter is p = (s, theta), or p = (s, theta, a) when the first input is fixed.
-    The index arrays say where in z and in g each part of the problem lies.
+    The parameter is p = (s, theta), then a where the first input is fixed, then data if there are.
+    The index arrays say where in z and in g each part of the problem lies. M rows h <= sigma, the
+    paper's obstacles, have a slack each.
     """
 
-    plant: Plant
-    task: Task
     gamma: float
-    slack_weight: float
-    ties_active: bool  # whether a start on an obstacle's boundary counts as in it  # departure L
+    ties_active: bool  # whether a start on a row's boundary counts as beyond it  # departure L
     variables: ca.SX  # z
     parameters: ca.SX  # p
     theta: ca.SX  # the part of p that is learned
@@ -81,6 +82,65 @@ class Ocp:
         """A start whose Xi + theta_c exceeds this is in the obstacle, not on its boundary."""
         return -TIE if self.ties_active else TIE
 
+    @property
+    @abstractmethod
+    def slack_weights(self) -> Any:
+        """What a unit of each slack of stage 0 costs: a number, or shape (M,)."""
+
+    @abstractmethod
+    def settled(self, p: Vector) -> tuple[Any, Vector]:
+        """The rows of stage 0 that no plan can change: which of the M, and h of those."""
+
+
+@dataclass(frozen=True, eq=False)
+class TaskOcp(Ocp):
+    """Eq. (2) of the paper."""
+
+    plant: Plant
+    task: Task
+    slack_weight: float
+
+    @property
+    def slack_weights(self) -> float:
+        """omega."""
+        return self.slack_weight
+
+    def settled(self, p: Vector) -> tuple[Any, Vector]:
+        """All of them: Xi(s) + theta_c."""
+        n, last = self.plant.n, self.plant.n + self.theta.numel()
+        return slice(None), self.task.overlap(p[:n]) + p[last - 1]
+
+
+@dataclass(frozen=True, eq=False)
+class ProblemOcp(Ocp):
+    """A `Problem`."""
+
+    problem: Problem
+
+    @property
+    def slack_weights(self) -> Vector:
+        """W, shape (M,)."""
+        return self.problem.weights
+
+    def settled(self, p: Vector) -> tuple[Any, Vector]:
+        """Those without u; all where u_0 is fixed. One that does not hold there is at -1."""
+        (which,) = np.nonzero(self.settled_rows)
+        return which, self._start_rows(p).full().ravel()[which]
+
+    @property
+    def settled_rows(self) -> NDArray[np.bool_]:
+        """Which rows of stage 0 no plan can change, shape (M,)."""
+        fixed = self.fixed_action.size > 0
+        return np.full(self.problem.weights.size, True) if fixed else ~self.problem.on_inputs
+
+    @cached_property
+    def _start_rows(self) -> ca.Function:
+        rows = self.constraints[self.obstacles[0].tolist()]
+        slacks = self.variables[self.slacks[0].tolist()]
+        others = self.variables[self.inputs[0].tolist()]
+        at_start = ca.substitute(rows + slacks, others, ca.SX.zeros(others.shape))
+        return ca.Function("start_rows", [self.parameters], [ca.densify(at_start)])
+
 
 def transcribe(
     plant: Plant,
@@ -91,7 +151,7 @@ def transcribe(
     *,
     fix_action: bool,
     ties_active: bool = False,
-) -> Ocp:
+) -> TaskOcp:
     """Write Eq. (2) by multiple shooting; with `fix_action`, add u_0 = a as a constraint.
 
     The box holds for the predicted states x_1, ..., x_N only: x_0 is given, and noise may have
@@ -134,28 +194,91 @@ def transcribe(
         tightened = ca.vertcat(ca.SX(0, 1), *xi) + weights.constraint
         constraints.add("obstacles", tightened - sigma[i], -np.inf, 0)
 
-    return Ocp(
+    return TaskOcp(
         plant=plant,
         task=task,
-        gamma=gamma,
         slack_weight=slack_weight,
-        ties_active=ties_active,
-        variables=variables.expression,
         parameters=ca.vertcat(state, theta, action),
         theta=theta,
-        objective=objective,
-        constraints=constraints.expression,
-        equality=constraints.lower == constraints.upper,
-        lower=variables.lower,
-        upper=variables.upper,
-        states=variables.where("states"),
-        inputs=variables.where("inputs"),
-        slacks=variables.where("slacks"),
-        initial=constraints.where("initial")[0],
-        fixed_action=constraints.where("fixed_action")[0],
-        dynamics=constraints.where("dynamics"),
-        obstacles=constraints.where("obstacles"),
+        **_parts(variables, constraints, objective, gamma, ties_active),
     )
+
+
+def transcribe_problem(
+    problem: Problem, *, fix_action: bool, ties_active: bool = False
+) -> ProblemOcp:
+    """Write a `Problem` by multiple shooting; with `fix_action`, add u_0 = a as a constraint.
+
+    As in `transcribe`, what concerns stage 0 alone is written in s, and in a where it is given. A
+    row that does not hold at a stage is -1 <= sigma there.
+    """
+    e, N = problem.expressions, problem.horizon
+    x = [ca.SX.sym(f"x_{i}", problem.states) for i in range(N + 1)]
+    u = [ca.SX.sym(f"u_{i}", problem.inputs) for i in range(N)]
+    sigma = [ca.SX.sym(f"sigma_{i}", problem.weights.size) for i in range(N + 1)]
+    state = ca.SX.sym("s", problem.states)
+    action = ca.SX.sym("a", problem.inputs if fix_action else 0)
+    theta = ca.SX.sym("theta", problem.names.size)
+    data = ca.SX.sym("d", problem.data_names.size, N + 1)
+
+    path = ca.Function("path", [e.x, e.u, e.theta, e.d], [e.next_x, e.stage, e.rows])
+    start = ca.Function("start", [e.x, e.theta, e.d], [e.initial])
+    final = ca.Function("final", [e.x, e.theta, e.d], [e.terminal])
+    variables, constraints = _Stack(), _Stack()
+    objective = start(state, theta, data[:, 0])
+    for i in range(N + 1):
+        d, last, free = data[:, i], i == N, fix_action and i == 0
+        variables.add("states", x[i], -np.inf, np.inf)
+        where = state if i == 0 else x[i]
+        given = ca.SX.zeros(problem.inputs) if last else action if free else u[i]
+        _, _, rows = path(where, given, theta, d)
+        if last:
+            objective += problem.gamma**i * final(x[i], theta, d)
+        else:
+            bounds = (-np.inf, np.inf) if free else (problem.lower, problem.upper)
+            variables.add("inputs", u[i], *bounds)
+            next_x, cost, _ = path(x[i], u[i], theta, d)
+            constraints.add("dynamics", x[i + 1] - next_x, 0, 0)
+            objective += problem.gamma**i * cost
+        variables.add("slacks", sigma[i], 0, np.inf)
+        objective += problem.gamma**i * ca.dot(problem.weights, sigma[i])
+        if i == 0:
+            constraints.add("initial", x[0] - state, 0, 0)
+            constraints.add("fixed_action", (u[0] - action) if fix_action else ca.SX(0, 1), 0, 0)
+        held = ca.vertcat(
+            ca.SX(0, 1), *(rows[j] if on else -1 for j, on in enumerate(problem.active[i]))
+        )
+        constraints.add("obstacles", held - sigma[i], -np.inf, 0)
+
+    return ProblemOcp(
+        problem=problem,
+        parameters=ca.vertcat(state, theta, action, ca.vec(data)),
+        theta=theta,
+        **_parts(variables, constraints, objective, problem.gamma, ties_active),
+    )
+
+
+def _parts(
+    variables: "_Stack", constraints: "_Stack", objective: ca.SX, gamma: float, ties_active: bool
+) -> dict[str, Any]:
+    """The fields of `Ocp` that follow from its stacks."""
+    return {
+        "gamma": gamma,
+        "ties_active": ties_active,
+        "variables": variables.expression,
+        "objective": objective,
+        "constraints": constraints.expression,
+        "equality": constraints.lower == constraints.upper,
+        "lower": variables.lower,
+        "upper": variables.upper,
+        "states": variables.where("states"),
+        "inputs": variables.where("inputs"),
+        "slacks": variables.where("slacks"),
+        "initial": constraints.where("initial")[0],
+        "fixed_action": constraints.where("fixed_action")[0],
+        "dynamics": constraints.where("dynamics"),
+        "obstacles": constraints.where("obstacles"),
+    }
 
 
 class _Stack:

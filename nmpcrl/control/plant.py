@@ -9,7 +9,8 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
-from nmpcrl.control.vectors import kept
+from nmpcrl.control.expression import column, expression
+from nmpcrl.control.vectors import kept, whole
 
 Dynamics = Callable[[ca.SX, ca.SX], ca.SX]
 
@@ -20,8 +21,12 @@ def unicycle(state: ca.SX, action: ca.SX) -> ca.SX:
     return ca.vertcat(speed * ca.cos(heading), speed * ca.sin(heading), turn_rate)
 
 
-def rk4(dynamics: Dynamics, state: ca.SX, action: ca.SX, period: float) -> ca.SX:
-    """One Runge-Kutta 4 step of length `period` [s] with the action held: Eq. (18)."""
+def rk4(dynamics: Dynamics, state: ca.SX, action: ca.SX, period: float, substeps: int = 1) -> ca.SX:
+    """One Runge-Kutta 4 step of length `period` [s] with the action held, Eq. (18); or several."""
+    if substeps > 1:
+        for _ in range(substeps):
+            state = rk4(dynamics, state, action, period / substeps)
+        return state
     k1 = dynamics(state, action)
     k2 = dynamics(state + period / 2 * k1, action)
     k3 = dynamics(state + period / 2 * k2, action)
@@ -31,7 +36,13 @@ def rk4(dynamics: Dynamics, state: ca.SX, action: ca.SX, period: float) -> ca.SX
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """A plant that is sampled every `period` seconds; the first two states are its position."""
+    """A plant that is sampled every `period` seconds.
+
+    Where a task has obstacles, the first two states are its position.
+
+    Raises:
+        ValueError: a field makes no sense, or the dynamics are no expression of their arguments.
+    """
 
     dynamics: Dynamics  # d state / dt as a CasADi expression of (state, action)
     state_names: tuple[str, ...]  # with units, as an axis shows them: ("x [m]", ...)
@@ -39,6 +50,7 @@ class Plant:
     lower: Vector  # smallest action, shape (m,)
     upper: Vector  # largest action, shape (m,)
     period: float = 0.2  # [s]
+    substeps: int = 1  # Runge-Kutta steps a period: more where the dynamics are faster than it
 
     def __post_init__(self) -> None:
         for side in ("lower", "upper"):
@@ -46,14 +58,16 @@ class Plant:
             if bound.shape != (self.m,) or np.isnan(bound).any():
                 raise ValueError(f"plant.{side} = {bound} must hold {self.m} numbers, one an input")
             object.__setattr__(self, side, bound)
-        if self.n < 2:
-            raise ValueError(
-                f"a plant's first two states are its position; {self.n} state is too few"
-            )
+        if not self.n:
+            raise ValueError("a plant needs a state: state_names is empty")
         if not (self.lower < self.upper).all():
             raise ValueError(f"plant.lower = {self.lower} must lie below upper = {self.upper}")
         if not 0 < self.period < np.inf:
             raise ValueError(f"plant.period = {self.period} must be a positive number of seconds")
+        whole("plant.substeps", self.substeps)
+        state, action = ca.SX.sym("state", self.n), ca.SX.sym("action", self.m)
+        symbols = {"state": state, "action": action}
+        expression("dynamics", self.dynamics, (state, action), symbols, self.n, "state")
 
     @property
     def n(self) -> int:
@@ -69,7 +83,7 @@ class Plant:
     def transition(self) -> ca.Function:
         """The discrete dynamics f(state, action) of Eq. (18), as a CasADi function."""
         state, action = ca.SX.sym("state", self.n), ca.SX.sym("action", self.m)
-        later = rk4(self.dynamics, state, action, self.period)
+        later = rk4(self._written, state, action, self.period, self.substeps)
         return ca.Function("f", [state, action], [later], ["state", "action"], ["later"])
 
     def step(self, state: Vector, action: Vector) -> Vector:
@@ -78,7 +92,13 @@ class Plant:
 
     @cached_property
     def _step(self) -> Callable[[Vector, Vector], Vector]:
-        return callable_of(self.transition)
+        return callable_of(self.transition, scalar=False)
+
+    def _written(self, state: ca.SX, action: ca.SX) -> ca.SX:
+        """The dynamics as a column, which may have been written as a list."""
+        written = column(self.dynamics(state, action))
+        assert written is not None  # or there would be no plant
+        return written
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""

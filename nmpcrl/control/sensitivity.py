@@ -51,6 +51,18 @@ class Sensitivity:
         Raises:
             numpy.linalg.LinAlgError: K is singular, so the optimum is not a strict one.
         """
+        l_tt, right, moved = self._moved(z, p, lam, nu)
+        result: Matrix = l_tt - right.T @ moved
+        return result
+
+    def plan(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> Matrix:
+        """dz/dtheta, shape (size of z, d): as `hessian`, and as it raises."""
+        return -self._moved(z, p, lam, nu)[2][: z.size]
+
+    def _moved(
+        self, z: Vector, p: Vector, lam: Vector, nu: Vector
+    ) -> tuple[Matrix, Matrix, Matrix]:
+        """L_theta theta, (L_z theta, A_theta), and K^-1 times the latter."""
         ocp = self._ocp
         g, l_zz, l_zt, l_tt, g_z, g_t = (b.full() for b in self._second_derivatives(z, p, lam))
         row = ocp.equality | (lam > np.abs(g.ravel()))
@@ -59,24 +71,31 @@ class Sensitivity:
         active_t = np.vstack([g_t[row], np.zeros((bound.sum(), len(l_tt)))])
         kkt = np.block([[l_zz, active.T], [active, np.zeros((len(active), len(active)))]])
         right = np.vstack([l_zt, active_t])
-        result: Matrix = l_tt - right.T @ np.linalg.solve(kkt, right)
-        return result
+        return l_tt, right, np.linalg.solve(kkt, right)
 
-    def kkt_residual(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> float:
+    def kkt_residual(
+        self, z: Vector, p: Vector, lam: Vector, nu: Vector, *, relative: bool = False
+    ) -> float:
         """The largest violation of the KKT conditions, 0 at an optimum.
 
         Stationarity counts relative to the largest multiplier; complementarity as the smaller of a
-        multiplier and its constraint's distance.
+        multiplier and its constraint's distance. Where it is to be `relative`, multipliers are
+        taken in parts of the largest, and distances in parts of the largest variable.
         """
         ocp = self._ocp
         g, slope = (part.full().ravel() for part in self._conditions(z, p, lam))
-        inequality = ~ocp.equality
+        inequality, largest = ~ocp.equality, max(1.0, np.abs(lam).max(), np.abs(nu).max())
+        slope = (slope + nu) / largest
+        lower, upper = ocp.lower, ocp.upper
+        if relative:
+            lam, nu, size = lam / largest, nu / largest, max(1.0, np.abs(z).max())
+            z, g, lower, upper = z / size, g / size, lower / size, upper / size
         violations = (
-            (slope + nu) / max(1.0, np.abs(lam).max(), np.abs(nu).max()),
+            slope,
             g[ocp.equality],
             np.minimum(-g, lam)[inequality],
-            np.minimum(z - ocp.lower, np.maximum(-nu, 0)),
-            np.minimum(ocp.upper - z, np.maximum(nu, 0)),
+            np.minimum(z - lower, np.maximum(-nu, 0)),
+            np.minimum(upper - z, np.maximum(nu, 0)),
         )
         return float(max(np.abs(violation).max(initial=0) for violation in violations))
 

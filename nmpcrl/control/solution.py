@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.ocp import Ocp
+from nmpcrl.control.ocp import Ocp, ProblemOcp
 
 
 class SolverError(RuntimeError):
@@ -63,11 +64,26 @@ class Solution:
     solver: str  # the name of what found it
     restarts: int = 0  # how often the solver had to begin again
     violation: float = 0.0  # how far the plan leaves the box, in the unit of the state
+    data: Matrix | None = None  # d_0, ..., d_N of a `Problem`, shape (N + 1, size)
 
     @property
     def status(self) -> Status:
         """Whether the requested start succeeded."""
         return Status.RESTARTED if self.restarts else Status.SOLVED
+
+    @property
+    def parameters(self) -> Vector:
+        """p of `ocp`."""
+        action = self.action[: self.ocp.fixed_action.size]
+        data = np.zeros(0) if self.data is None else self.data.ravel()
+        return np.concatenate([self.state, self.theta, action, data])
+
+    @property
+    def features_by_name(self) -> dict[str, Any]:
+        """The gradient in each parameter of a `Problem`, in its shape."""
+        if not isinstance(self.ocp, ProblemOcp):
+            raise ValueError("only the parameters of a `Problem` have names")
+        return self.ocp.problem.split(self.features)
 
     @property
     def primal(self) -> Vector:

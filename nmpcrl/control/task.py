@@ -40,7 +40,7 @@ class Task:
     target: Vector  # s_ref, shape (n,); the reference input is 0
     lower: Vector  # box on the state, shape (n,); -inf where free
     upper: Vector  # shape (n,)
-    obstacles: tuple[Obstacle, ...]
+    obstacles: tuple[Obstacle, ...] = ()
     weights: Vector = field(default_factory=lambda: np.array([1.0, 1.0, 0.1]))  # diagonal of Q
     robot_diameter: float = 0.5  # d_rob [m]
     near: float = 1.5  # d_t: closer than this the input is charged instead of the obstacles
@@ -66,6 +66,8 @@ class Task:
         if not self.target_may_lie_outside:
             self._refuse_outside("target")
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
+        if self.obstacles and self.start.size < 2:
+            raise ValueError("obstacles stand in a plane: a task with one state has none")
 
     def _refuse_outside(self, name: str) -> None:
         point = getattr(self, name)
@@ -80,6 +82,8 @@ class Task:
 
         Takes a state of shape (n,) and returns shape (M,), or states (..., n) and (..., M).
         """
+        if not self.obstacles:
+            return np.zeros((*np.shape(state)[:-1], 0))
         state = np.asarray(state)[..., None]
         return overlap(state[..., 0, :], state[..., 1, :], *self.discs)
 
@@ -112,7 +116,8 @@ class Task:
     def cost_of(self, state: ca.SX, action: ca.SX, target: Any, discs: tuple[Any, ...]) -> ca.SX:
         """Eq. (20) in symbols, for another target and other obstacles than the task's own."""
         away = state - target
-        xi = overlap(state[0], state[1], *discs)
+        plane = state if state.numel() > 1 else ca.vertcat(state, 0)  # where no obstacle stands
+        xi = overlap(plane[0], plane[1], *discs)
         upsilon = self.penalty * ca.sum1(ca.fmax(0, xi + self.margin))
         near = ca.norm_2(away) < self.near
         cost: ca.SX = ca.dot(self.weights, away**2) + ca.if_else(near, ca.norm_2(action), upsilon)

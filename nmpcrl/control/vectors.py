@@ -1,4 +1,4 @@
-"""Vectors that a description keeps for itself."""
+"""Numbers that a description keeps for itself."""
 
 from typing import Any
 
@@ -12,3 +12,14 @@ def kept(numbers: Any) -> Vector:
     copy = np.array(numbers, float)
     copy.setflags(write=False)
     return copy
+
+
+def whole(name: str, number: Any) -> int:
+    """A whole number, 1 or more.
+
+    Raises:
+        ValueError: it is none.
+    """
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
+        raise ValueError(f"{name} = {number!r} must be a whole number, 1 or more")
+    return int(number)

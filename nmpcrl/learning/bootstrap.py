@@ -23,6 +23,7 @@ class Transition:
     cost: float  # l(s, a)
     next_state: Vector  # s+, shape (n,)
     solution: Solution  # of the NMPC in s: its value is Q_theta(s, a)  # departure F
+    end: bool = False  # whether s+ ends the episode, and is worth 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,8 @@ class SecondSolve:
         Raises:
             SolverError: no optimum was found.
         """
+        if transition.end:
+            return Successor(0.0, np.zeros(theta.size))
         solution = self.nmpc.solve(transition.next_state, theta, transition.solution)
         return Successor(solution.value, solution.features, solution)
 
@@ -108,6 +111,7 @@ class Imitation:
             value = self._predict(transition, theta)
         if value is None:
             return None
+        value = 0.0 if transition.end else value
         return Successor(value, loss=loss, seconds=time.perf_counter() - began)
 
     def _fit(self) -> float:

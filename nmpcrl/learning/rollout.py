@@ -1,11 +1,13 @@
 """The closed loop without noise, by which theta is judged, and what a failed solve means in it."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Nmpc, Solution, SolverError
+from nmpcrl.control import Nmpc, Plant, Solution, SolverError
+from nmpcrl.learning.driven import Drive, driven
 
 
 @dataclass(frozen=True)
@@ -63,19 +65,31 @@ def persistent(controller: Nmpc | Persistent) -> Persistent:
     return Persistent(controller) if isinstance(controller, Nmpc) else controller
 
 
-def evaluate(controller: Nmpc | Persistent, theta: Vector, steps: int) -> Rollout:
+def evaluate(
+    controller: Nmpc | Persistent,
+    theta: Vector,
+    steps: int,
+    *,
+    plant: Plant | Drive | None = None,
+    start: Any = None,
+    rng: np.random.Generator | int = 0,
+) -> Rollout:
     """Follow the policy of theta, Eq. (4), from the start and without noise.
 
     A failed solve ends the rollout, which then says so and costs infinitely much.
 
     Args:
-        controller: acts; its plant and its task are the closed loop's.
-        theta: NMPC parameters, shape (2n + m + 1,).
+        controller: acts.
+        theta: NMPC parameters, shape (d,).
         steps: K + 1, the most states that are visited.
+        plant: what is driven, as in `train`; the plant that plans if absent.
+        start: a state or rng -> state; the task's if absent.
+        rng: for a plant or a start that draws.
     """
     controller = persistent(controller)
-    plant, task = controller.nmpc.plant, controller.nmpc.task
-    state, plan, failure = task.start, None, ""
+    nmpc, rng = controller.nmpc, np.random.default_rng(rng)
+    what = driven(nmpc, plant, start)
+    state, plan, failure, end = what.start(rng), None, "", False
     states, actions, costs = [], [], []
     for _ in range(steps):
         try:
@@ -85,11 +99,13 @@ def evaluate(controller: Nmpc | Persistent, theta: Vector, steps: int) -> Rollou
             break
         states.append(state)
         actions.append(plan.action)
-        costs.append(task.stage_cost(state, plan.action))
-        state = plant.step(state, plan.action)
+        state, cost, end = what.step(state, plan.action, rng)
+        costs.append(cost)
+        if end:
+            break
     return Rollout(
-        states=np.reshape(states, (-1, plant.n)),
-        actions=np.reshape(actions, (-1, plant.m)),
+        states=np.reshape(states, (-1, nmpc.n)),
+        actions=np.reshape(actions, (-1, nmpc.m)),
         costs=np.array(costs),
         failure=failure,
     )

@@ -3,15 +3,17 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Nmpc, Solution, SolverError
+from nmpcrl.control import Nmpc, Plant, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.solution import short
 from nmpcrl.learning.bootstrap import Transition
+from nmpcrl.learning.driven import Drive, Driven, driven
 from nmpcrl.learning.learners import Learner, Update, Weights
 from nmpcrl.learning.rollout import Persistent, persistent
 
@@ -39,6 +41,7 @@ class Step:
     solution: Solution | None = None  # whose value is learned; the plan, unless that is Q(s, a)
     update: Update | None = None
     failure: str = ""  # what the solver said, if it failed
+    end: bool = False  # whether the plant ended the episode
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +102,11 @@ def train(
     *,
     clipped: bool = True,
     constrained: bool = False,
+    plant: Plant | Drive | None = None,
+    start: Any = None,
+    rng: np.random.Generator | int = 0,
 ) -> Iterator[Step]:
-    """Algorithm 1: as many episodes and steps as `explore` has noise for.
+    """Algorithm 1: as many episodes, and at most as many steps, as `explore` has noise for.
 
     A solve that fails twice ends the episode, and learning goes on from the next one.
 
@@ -111,11 +117,19 @@ def train(
         explore: the noise.
         clipped: whether actions are kept in the action space.  # departure E
         constrained: whether Q(s, a) is solved for, with u_0 = a, instead of V(s).  # departure F
+        plant: what is driven: a `Plant`, whose cost is the task's, or a function (state, action,
+            rng) -> (next state, cost, end); the plant that plans if absent. The state in which an
+            episode ends is worth 0.
+        start: a state, or a function rng -> state; the task's if absent.
+        rng: for a plant or a start that draws.
 
     Raises:
+        ValueError: there is nothing to drive, as for a `Problem` without `plant` and `start`.
         Diverged: theta is no longer usable, or `PATIENCE` episodes in a row ended early.
     """
-    trainer = _Trainer(learner, persistent(controller), explore, clipped, constrained)
+    controller, rng = persistent(controller), np.random.default_rng(rng)
+    what = driven(controller.nmpc, plant, start)
+    trainer = _Trainer(learner, controller, explore, clipped, constrained, what, rng)
     failed = 0
     for episode in range(len(explore.scale)):
         failure = ""
@@ -138,13 +152,15 @@ class _Trainer:
     explore: Exploration
     clipped: bool
     constrained: bool
+    driven: Driven
+    rng: np.random.Generator
 
     def episode(self, episode: int, weights: Weights) -> Iterator[Step]:
         """The steps of one episode; the last one says so if a solve failed."""
         controller, constrained = self.controller, self.constrained
-        plant, task = controller.nmpc.plant, controller.nmpc.task
-        state, warm_start = task.start, None
-        nothing = np.full(plant.m, np.nan)
+        nmpc, rng = controller.nmpc, self.rng
+        state, warm_start = self.driven.start(rng), None
+        nothing = np.full(nmpc.m, np.nan)
         for t in range(self.explore.scale.shape[1]):
             try:
                 plan = controller.solve(state, weights.theta, warm_start)
@@ -152,22 +168,23 @@ class _Trainer:
                 yield Step(episode, t, state, weights, nothing, failure=str(error))
                 return
             action = self.explore(plan.action, episode, t)
-            action = plant.clip(action) if self.clipped else action  # departure E
-            next_state = plant.step(state, action)
-            cost = task.stage_cost(state, action)
+            action = nmpc.clip(action) if self.clipped else action  # departure E
+            next_state, cost, end = self.driven.step(state, action, rng)
             solution = None
             try:
                 solution = (
                     controller.solve(state, weights.theta, plan, action) if constrained else plan
                 )
-                transition = Transition(state, action, cost, next_state, solution)
+                transition = Transition(state, action, cost, next_state, solution, end)
                 update = self.learner.step(weights, transition)
             except SolverError as error:
                 what = (state, weights, action, cost, plan, solution)
                 yield Step(episode, t, *what, failure=str(error))
                 return
             weights = update.weights
-            yield Step(episode, t, state, weights, action, cost, plan, solution, update)
+            yield Step(episode, t, state, weights, action, cost, plan, solution, update, end=end)
+            if end:
+                return
             warm_start = (update.successor and update.successor.solution) or solution
             state = next_state
 

@@ -69,8 +69,10 @@ def _run(
     stopped, cost, began = str(Stopped.FINISHED), 0.0, time.perf_counter()
     named = solver = controller.nmpc.solver.name
     try:
-        options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
-        for step in train(learner, controller, weights, explore, **options):
+        clipped, constrained = experiment.clipped, experiment.values_actions
+        for step in train(
+            learner, controller, weights, explore, clipped=clipped, constrained=constrained
+        ):
             seconds = time.perf_counter() - began
             steps.append(_row(step, seconds))
             cost += step.cost

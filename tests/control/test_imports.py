@@ -9,8 +9,8 @@ import nmpcrl.control
 
 ROOT = Path(nmpcrl.control.__file__).parent
 FLOORS = (  # each may import from those before it, and from its own
-    ("codegen", "vectors"),
-    ("plant", "task", "ocp", "sensitivity", "solution"),
+    ("codegen", "vectors", "blocks", "expression"),
+    ("problem", "plant", "task", "ocp", "sensitivity", "solution"),
     ("solvers",),
     ("nmpc", "browser"),
 )

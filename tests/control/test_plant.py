@@ -92,7 +92,7 @@ def plant(**changed):
         ({"period": 0.0}, r"plant.period = 0.0 must be a positive number"),
         ({"period": np.inf}, r"plant.period = inf must be a positive number"),
         ({"period": np.nan}, r"plant.period = nan must be a positive number"),
-        ({"state_names": ("x",)}, "its position; 1 state is too few"),
+        ({"state_names": ("x",)}, "dynamics returns 2 numbers; it must return 1 state"),
     ],
 )
 def test_a_plant_refuses_nonsense_and_says_which(changed, message):

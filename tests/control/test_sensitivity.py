@@ -148,3 +148,40 @@ def test_the_kkt_residual_notices_what_is_not_a_solution(fatrop, theta, field, i
     solution = fatrop.solve(fatrop.task.start, theta)
     getattr(solution, field)[index] += by
     assert fatrop.kkt_residual(solution) > 1e-3
+
+
+def test_the_jacobian_of_the_policy_is_its_differences(robot, draw):
+    """And so is that of a later stage; with u_0 given, that of the policy is 0."""
+    compared = 0
+    for state, theta in draw(12, seed=17):
+        solution = robot.solve(state, theta)
+        if not same_side_throughout(robot, solution):
+            continue
+        for stage in (0, 4):
+            plan = robot.plan_jacobian(solution, stage)
+            for found, part in ((plan.states, "states"), (plan.inputs, "inputs")):
+                slope = differences(robot, solution, lambda s, p=part, i=stage: getattr(s, p)[i])
+                size = max(1.0, np.abs(slope).max())
+                np.testing.assert_allclose(found, slope.T, atol=1e-3 * size)
+        given = robot.solve(state, theta, solution, solution.action * 0.9)
+        np.testing.assert_allclose(robot.policy_jacobian(given), 0, atol=1e-10)
+        compared += 1
+    assert compared >= 4
+
+
+def test_the_jacobian_of_the_policy_is_that_of_the_dense_conditions(controllers, draw):
+    riccati, ipopt = controllers["riccati"], controllers["ipopt"]
+    for state, theta in draw(20, seed=18):
+        solution = riccati.solve(state, theta)
+        dense = ipopt.policy_jacobian(solution)
+        found = riccati.policy_jacobian(solution)
+        assert found.shape == (2, 9)
+        np.testing.assert_allclose(found, dense, atol=1e-4 * max(1.0, np.abs(dense).max()))
+
+
+def test_relative_to_its_plan_and_multipliers_a_solution_violates_less(robot, theta):
+    solution = robot.solve(robot.task.start, theta)
+    relative = robot.kkt_residual(solution, relative=True)
+    assert relative <= robot.kkt_residual(solution)
+    solution.primal[3] += 0.1
+    assert robot.kkt_residual(solution, relative=True) > 1e-3

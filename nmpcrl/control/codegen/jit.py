@@ -43,32 +43,32 @@ given, given_matrix = (Array(float64, axes, "C", readonly=True) for axes in (1, 
 """
 
 
-def compiled(function: ca.Function) -> Callable[..., Any]:
+def compiled(function: ca.Function, *, returned: bool | None = None) -> Callable[..., Any]:
     """`function` as machine code, called as `source` says, with contiguous arrays.
 
     Raises:
         CannotCompile: numba is missing, or an operation is not known.
     """
-    returned = returns(function)
+    returned = returns(function) if returned is None else returned
     inputs = [function.size2_in(i) for i in range(function.n_in())]
     outputs = [] if returned else [function.size2_out(i) for i in range(function.n_out())]
     kinds = ["given" if columns == 1 else "given_matrix" for columns in inputs]
     kinds += ["float64[::1]" if columns == 1 else "float64[:, ::1]" for columns in outputs]
     result = "float64" if returned else "void"
     header = HEADER.format(result=result, arguments=", ".join(kinds))
-    name = function.name()
-    made: Callable[..., Any] = getattr(load(name, {"__init__": header + source(function)}), name)
+    name, text = function.name(), source(function, returned=returned)
+    made: Callable[..., Any] = getattr(load(name, {"__init__": header + text}), name)
     return made
 
 
-def callable_of(function: ca.Function) -> Callable[..., Any]:
+def callable_of(function: ca.Function, *, scalar: bool | None = None) -> Callable[..., Any]:
     """`function` of vectors with one result, on NumPy: compiled if that can be done.
 
-    Returns a vector, or a float if the result is a scalar.
+    Returns a vector, or a float if the result is a scalar and not to be a vector of one.
     """
-    shape, scalar = function.size1_out(0), returns(function)
+    shape, scalar = function.size1_out(0), returns(function) if scalar is None else scalar
     try:
-        code = compiled(function)
+        code = compiled(function, returned=scalar)
     except CannotCompile:
         if scalar:
             return lambda *vectors: float(function(*vectors))

@@ -5,6 +5,7 @@ common subexpressions eliminated first, so numba compiles what a careful hand wo
 """
 
 import math
+from collections.abc import Collection
 
 import casadi as ca
 
@@ -65,11 +66,18 @@ class CannotCompile(Exception):
     """An expression holds what cannot be compiled, or numba is missing: the message says which."""
 
 
-def source(function: ca.Function) -> str:
+def source(
+    function: ca.Function, *, returned: bool | None = None, matrices: Collection[str] = ()
+) -> str:
     """The Python function of the same name, as text; needs `math` and NumPy as `np`.
 
     Vectors come as arrays (k,), matrices as (k, l). A single scalar result is returned; otherwise
     each result is written, zeros included, into an array that follows the arguments.
+
+    Args:
+        function: an SX function.
+        returned: whether the result is returned, if not as above.
+        matrices: results that are matrices even where they have a single column.
 
     Raises:
         CannotCompile: an operation is not known here, or the function is no expression of scalars.
@@ -78,8 +86,8 @@ def source(function: ca.Function) -> str:
         raise CannotCompile(f"{function.name()} is not an SX function")
     names = [function.name_in(i) for i in range(function.n_in())]
     out = ca.Function(function.name(), *_expressions(function), names, function.name_out())
-    returned = returns(function)
-    lines = [_line(out, k, returned=returned) for k in range(out.n_instructions())]
+    returned = returns(function) if returned is None else returned
+    lines = [_line(out, k, returned, matrices) for k in range(out.n_instructions())] or ["pass"]
     results = [] if returned else [f"{name}_" for name in out.name_out()]
     return "\n    ".join([f"def {out.name()}({', '.join(names + results)}):", *lines]) + "\n"
 
@@ -95,7 +103,7 @@ def _expressions(function: ca.Function) -> tuple[list[ca.SX], list[ca.SX]]:
     return arguments, ca.cse([ca.densify(result) for result in function.call(arguments)])
 
 
-def _line(function: ca.Function, k: int, *, returned: bool) -> str:
+def _line(function: ca.Function, k: int, returned: bool, matrices: Collection[str]) -> str:
     """Instruction k; work variables are called w0, w1, ..."""
     operation, into = function.instruction_id(k), function.instruction_output(k)
     of = function.instruction_input(k)
@@ -107,8 +115,9 @@ def _line(function: ca.Function, k: int, *, returned: bool) -> str:
     if operation == ca.OP_OUTPUT:
         if returned:
             return f"return w{of[0]}"
-        entry = _entry(function.sparsity_out(into[0]), into[1])
-        return f"{function.name_out(into[0])}_[{entry}] = w{of[0]}"
+        name = function.name_out(into[0])
+        entry = _entry(function.sparsity_out(into[0]), into[1], matrix=name in matrices)
+        return f"{name}_[{entry}] = w{of[0]}"
     template = UNARY.get(operation) or BINARY.get(operation)
     if template is None:
         raise CannotCompile(
@@ -121,10 +130,10 @@ def _number(value: float) -> str:
     return repr(value) if math.isfinite(value) else f"math.{value}".replace("math.-", "-math.")
 
 
-def _entry(sparsity: ca.Sparsity, nonzero: int) -> str:
+def _entry(sparsity: ca.Sparsity, nonzero: int, *, matrix: bool = False) -> str:
     """The index of a nonzero in the dense argument or result."""
     rows, columns = sparsity.get_triplet()
-    vector = sparsity.size2() == 1
+    vector = sparsity.size2() == 1 and not matrix
     return str(rows[nonzero]) if vector else f"{rows[nonzero]}, {columns[nonzero]}"
 
 

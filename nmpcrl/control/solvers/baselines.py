@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.ocp import Ocp, Theta, stage_cost, terminal_cost
+from nmpcrl.control.ocp import TaskOcp, Theta, stage_cost, terminal_cost
 from nmpcrl.control.solution import SolverError
 from nmpcrl.control.solvers.nlpsol import Ipopt
 from nmpcrl.control.task import overlap
@@ -34,7 +34,7 @@ class Plan(NamedTuple):
 Solve = Callable[[Vector, Vector, Plan | None], Plan]
 
 
-def mx(ocp: Ocp) -> Solve:
+def mx(ocp: TaskOcp) -> Solve:
     """A function of state, theta and the last plan that solves one NLP of matrix expressions."""
     variables = [ca.MX.sym(name, *shape) for name, shape in _shapes(ocp).items()]
     n, m = ocp.plant.n, ocp.plant.m
@@ -66,12 +66,12 @@ def mx(ocp: Ocp) -> Solve:
     return solve
 
 
-def rebuilt(ocp: Ocp) -> Solve:
+def rebuilt(ocp: TaskOcp) -> Solve:
     """A function of state, theta and the last plan that writes the problem anew at every call."""
     return partial(_solve_rebuilt, ocp)
 
 
-def _solve_rebuilt(ocp: Ocp, state: Vector, theta: Vector, last: Plan | None = None) -> Plan:
+def _solve_rebuilt(ocp: TaskOcp, state: Vector, theta: Vector, last: Plan | None = None) -> Plan:
     opti = ca.Opti()
     variables = [opti.variable(*shape) for shape in _shapes(ocp).values()]
     weights = opti.parameter(theta.size)
@@ -101,13 +101,15 @@ def _solve_rebuilt(ocp: Ocp, state: Vector, theta: Vector, last: Plan | None = N
     )
 
 
-def _shapes(ocp: Ocp) -> dict[str, tuple[int, int]]:
+def _shapes(ocp: TaskOcp) -> dict[str, tuple[int, int]]:
     """Rows and columns of the variables; a column a stage."""
     plant, N = ocp.plant, len(ocp.inputs)
     return {"x": (plant.n, N + 1), "u": (plant.m, N), "sigma": (len(ocp.task.obstacles), N + 1)}
 
 
-def _written(ocp: Ocp, variables: list[Any], state: Any, theta: Any) -> tuple[ca.MX, ca.MX, ca.MX]:
+def _written(
+    ocp: TaskOcp, variables: list[Any], state: Any, theta: Any
+) -> tuple[ca.MX, ca.MX, ca.MX]:
     """The objective, what is to be 0, and what is to be at most 0."""
     x, u, sigma = variables
     plant, task, N = ocp.plant, ocp.task, len(ocp.inputs)
@@ -124,7 +126,7 @@ def _written(ocp: Ocp, variables: list[Any], state: Any, theta: Any) -> tuple[ca
     return objective, ca.vertcat(*equal), ca.veccat(*below)
 
 
-def _bounds(ocp: Ocp) -> tuple[tuple[Matrix, ...], tuple[Matrix, ...]]:
+def _bounds(ocp: TaskOcp) -> tuple[tuple[Matrix, ...], tuple[Matrix, ...]]:
     """The least and the largest values of the variables; x_0 is free."""
     sides = []
     for box, inputs, slack, sign in (
@@ -138,7 +140,7 @@ def _bounds(ocp: Ocp) -> tuple[tuple[Matrix, ...], tuple[Matrix, ...]]:
     return sides[0], sides[1]
 
 
-def _start(ocp: Ocp, state: Vector, last: Plan | None) -> tuple[Matrix, ...]:
+def _start(ocp: TaskOcp, state: Vector, last: Plan | None) -> tuple[Matrix, ...]:
     """The last plan a stage later, its end twice; or standing still."""
     if last is not None:
         return tuple(np.hstack([part[:, 1:], part[:, -1:]]) for part in last.variables)

@@ -12,9 +12,10 @@ from numba import carray, float64, int32, njit, types
 
 from .charge import COLD_LIMIT, DISCS, LONGEST, RANDOM_INPUTS, WARM_LIMIT, charge
 from .codes import End, Start
-from .hessian import hessian_times
-from .kernel import options, solve
+from .hessian_times import hessian_times
+from .kernel import options
 from .model import NTHETA, NU, NX, transition
+from .solve import solve
 
 COLD, SHIFTED, NEAR, SAME = map(int, Start)
 SOLVED, UNKNOWN = int(End.SOLVED), -1

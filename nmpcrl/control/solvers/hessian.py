@@ -13,27 +13,8 @@ Source: the implicit function theorem at a solution of KKT, Nocedal and Wright (
 """
 
 import numpy as np
-from numba import njit, types
 
-from .kernel import (
-    PROBLEM,
-    SAME,
-    add,
-    allocate,
-    condense,
-    evaluate,
-    factorise,
-    initialise,
-    initialise_rows,
-    inlined,
-    linearise,
-    options,
-    rows_along,
-    scale_rows,
-    scaled,
-    sweep,
-    vector,
-)
+from .kernel import add, inlined
 from .model import (
     NTHETA,
     NU,
@@ -47,8 +28,6 @@ from .model import (
     terminal_gradient_along,
     terminal_mixed_hessian,
 )
-
-RIGID = 1e-12  # barrier parameter
 
 
 @inlined
@@ -108,36 +87,3 @@ def gradient_along(task, point, duals, step, slack_weight, factor, tie, w, out):
             add(out, 0, change, gradient)
             constraint_gradient_along(x, task.theta, task.discs[j], dx, w, gradient)
             add(out, 0, multiplier, gradient)
-
-
-SIGNATURE = types.boolean(*PROBLEM, vector, vector, vector)  # point, w, result
-
-
-@njit(SIGNATURE, cache=True, **options)
-def hessian_times(
-    target, lower, upper, discs, sides, discount, slack_weight, soft_box, tie,
-    state, theta, action, fixed, solved, w, out,
-):  # fmt: skip
-    """Put the product with w into `out`, shape (NTHETA,); see `InteriorPoint` for the rest.
-
-    Returns whether it could be formed: not where the solution is no strict minimum.
-    """
-    task, factor = scaled(
-        theta, target, lower, upper, discs, sides, discount, slack_weight, soft_box, fixed
-    )
-    N, M, rows = len(discount) - 1, len(discs), len(discs) + len(sides)
-    point, _, duals, stages, step = allocate(N, M, rows)
-    mu = RIGID
-    initialise(task, point, duals, state, action, SAME, mu, factor, solved)
-    evaluate(task, point, mu)
-    initialise_rows(task, point, duals, SAME, mu, factor, solved)
-    linearise(task, point, duals, stages)
-    condense(task, point, duals, stages, mu)
-    right_hand_side(task, point, duals, stages, w)
-    if not factorise(stages, 0.0, task.first, step):
-        return False
-    sweep(task, stages, step)
-    rows_along(task, stages, step.x, step.lam)
-    scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
-    gradient_along(task, point, duals, step, slack_weight, factor, tie, w, out)
-    return True

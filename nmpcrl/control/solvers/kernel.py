@@ -27,7 +27,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import float64, int64, njit, types
+from numba import float64, int64, njit
 
 from .codes import End, Start
 from .model import (
@@ -59,6 +59,7 @@ ROUNDING = 1e-14  # of the barrier function, relative
 ALMOST = 1.0 - 4e-16  # of W is the most for lam, or W - lam is rounded to 0
 SHORTEST = 1e-10  # step that the search tries
 LARGEST_DELTA = 1e12
+RIGID = 1e-12  # barrier parameter of a solution that is differentiated
 
 fast = {"contract", "arcp", "nsz", "reassoc", "afn"}  # not nnan, ninf: bad numbers must show
 options: dict[str, Any] = {"error_model": "numpy", "fastmath": fast}
@@ -411,7 +412,7 @@ def feedback(L, F, f, K, k):
 def newton_step(task, point, duals, stages, mu, step):
     """Step 6: the step; the primal and the dual length that stay inside bounds; the descent."""
     sweep(task, stages, step)
-    rows_along(task, stages, step.x, step.lam)
+    rows_along(task, stages, step)
     derivative = descent(task, point, stages, mu, step)
     scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
     tau = max(0.99, 1.0 - max(mu, 1e-5))
@@ -442,9 +443,9 @@ def sweep(task, stages, step):
 
 
 @inlined
-def rows_along(task, stages, dx, hx_dx):
-    """h_x dx of every row."""
-    obstacles = len(task.discs)
+def rows_along(task, stages, step):
+    """h_x dx of every row, in the place of its multiplier's step."""
+    dx, hx_dx, obstacles = step.x, step.lam, len(task.discs)
     for i in range(len(hx_dx)):
         for j in range(obstacles):
             total = 0.0
@@ -558,9 +559,15 @@ def scaled(theta, target, lower, upper, discs, sides, discount, slack_weight, so
 
 
 @inlined
+def slacks_of(task):
+    """The number of slacks of a stage."""
+    return len(task.discs)
+
+
+@inlined
 def offsets(task, stage):
     """Where the variables and the constraints of a stage begin in the vectors of `Ocp`."""
-    obstacles, later = len(task.discs), min(stage, 1)
+    obstacles, later = slacks_of(task), min(stage, 1)
     constraints = stage * (NX + obstacles) + later * (NX + task.first * NU)
     return stage * (NX + NU + obstacles), constraints
 
@@ -572,7 +579,7 @@ def initialise(task, point, duals, state, action, start, mu, factor, warm_start)
     ahead = 1 if start == SHIFTED else 0
     gain = task.rate[0] / task.rate[ahead] / factor
     variables, constraints = offsets(task, last)
-    nu = variables + NX + len(task.discs) + constraints + len(task.discs)
+    nu = variables + NX + constraints + 2 * slacks_of(task)
     for a in range(NX):
         point.x[0, a] = state[a]
     for i in range(last):
@@ -622,6 +629,7 @@ def recentre(task, point, duals, mu):
             if i >= task.first:
                 duals.below[i, a] = mu / (point.u[i, a] - task.lower[a])
                 duals.above[i, a] = mu / (task.upper[a] - point.u[i, a])
+    for i in range(len(duals.lam)):
         for j in range(duals.lam.shape[1]):
             duals.lam[i, j] = min(mu / point.slack[i, j], ALMOST * task.weights[i, j])
 
@@ -772,38 +780,3 @@ PROBLEM = (
     vector, vector, vector, matrix, matrix, vector, float64, int64, float64,  # see InteriorPoint
     vector, vector, vector, int64,  # state, theta, action, whether u_0 is the action
 )  # fmt: skip
-SIGNATURE = types.UniTuple(float64, 5)(
-    *PROBLEM,
-    int64, int64, float64,  # start, limit, tolerance
-    vector, vector,  # warm start and result
-)  # fmt: skip
-
-
-@njit(SIGNATURE, cache=True, **options)
-def solve(
-    target, lower, upper, discs, sides, discount, slack_weight, soft_box, tie,
-    state, theta, action, fixed, start, limit, tolerance, warm_start, out,
-):  # fmt: skip
-    """Solve Eq. (2); see `InteriorPoint` for the arguments.
-
-    Returns value, iterations, the end, the violation of the box, and the relative error; `out`
-    receives z, lam and nu in the order of `Ocp`, as `warm_start` has them, and then the gradient.
-    """
-    task, factor = scaled(
-        theta, target, lower, upper, discs, sides, discount, slack_weight, soft_box, fixed
-    )
-    N, M, rows = len(discount) - 1, len(discs), len(discs) + len(sides)
-    point, trial, duals, stages, step = allocate(N, M, rows)
-    mu = START_MU[start]
-    initialise(task, point, duals, state, action, start, mu, factor, warm_start)
-    for a in range(NX):
-        trial.x[0, a] = state[a]
-    objective, total = evaluate(task, point, mu)
-    initialise_rows(task, point, duals, start, mu, factor, warm_start)
-    point, objective, iterations, ended, error = iterate(
-        task, point, trial, duals, stages, step, mu, objective, total, limit, tolerance
-    )
-    value, violation = write_solution(
-        task, point, duals, stages, objective, factor, slack_weight, soft_box, tie, out
-    )
-    return value, float(iterations), float(ended), violation, error

@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 import casadi as ca
 import numpy as np
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers.codes import Start
-from nmpcrl.control.solvers.solver import Solver
+from nmpcrl.control.solvers.solver import FARTHEST, LED_ASTRAY, Solver
 
 PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
 
@@ -118,9 +118,10 @@ class Program:
         warm_start: Solution | None,
         *action: Vector,
         began: float,
+        data: Matrix | None = None,
     ) -> Solution:
         """Solve for p = (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
-        p = np.concatenate([state, theta, *action])
+        p = np.concatenate([state, theta, *action, *([] if data is None else [data.ravel()])])
         if warm_start is None:
             start, (z, lam, nu) = Start.COLD, self._standing(state)
         else:
@@ -133,8 +134,10 @@ class Program:
         z, lam, nu = (result[key].full().ravel() for key in ("x", "lam_g", "lam_x"))
         if not (stats["success"] and np.isfinite([z.sum(), lam.sum(), nu.sum()]).all()):
             raise SolverError(_status(self._name, stats), state, theta)
+        if np.abs(z[self._ocp.states]).max() > FARTHEST:
+            raise SolverError(f"{self._name} {LED_ASTRAY}", state, theta)
         z = np.clip(z, self._ocp.lower, self._ocp.upper)  # fatrop relaxes bounds by 1e-8
-        self._settle_stage_zero(lam, nu, state, theta)
+        self._settle_stage_zero(lam, nu, p)
         value, features = self._sensitivity.value_and_gradient(z, p, lam)
         return Solution(
             state=state,
@@ -146,10 +149,14 @@ class Program:
             point=np.concatenate([z, lam, nu]),
             ocp=self._ocp,
             solver=self._name,
+            data=data,
         )
 
     def hessian_times(self, solution: Solution, vector: Vector) -> None:
         """None: CasADi's solvers have the dense Hessian only."""
+
+    def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> None:
+        """None, as well."""
 
     def _standing(self, state: Vector) -> PrimalDual:
         """Stay at `state` for the whole horizon; slacks take up what overlaps there."""
@@ -180,16 +187,18 @@ class Program:
         nu[np.isinf(ocp.lower) & np.isinf(ocp.upper)] = 0  # fatrop hands these back as they came
         return z, lam, nu
 
-    def _settle_stage_zero(self, lam: Vector, nu: Vector, state: Vector, theta: Vector) -> None:
+    def _settle_stage_zero(self, lam: Vector, nu: Vector, p: Vector) -> None:
         """Choose the multipliers of the slacks of x_0 = s, which are not unique on a boundary.
 
         Nothing can be planned about x_0, so sigma_0 = max(0, Xi(s) + theta_c): its derivative in
         theta_c is omega inside an obstacle and 0 outside. On the boundary any number in between
         satisfies KKT and each solver returns another; here it is 0.  # departure L
         """
-        inside = self._ocp.task.overlap(state) + theta[-1] > self._ocp.tie
-        lam[self._ocp.obstacles[0]] = np.where(inside, self._ocp.slack_weight, 0.0)
-        nu[self._ocp.slacks[0]] = np.where(inside, 0.0, -self._ocp.slack_weight)
+        which, beyond = self._ocp.settled(p)
+        weights = np.broadcast_to(self._ocp.slack_weights, self._ocp.slacks.shape[1:])[which]
+        inside = beyond > self._ocp.tie
+        lam[self._ocp.obstacles[0][which]] = np.where(inside, weights, 0.0)
+        nu[self._ocp.slacks[0][which]] = np.where(inside, 0.0, -weights)
 
 
 def _function(ocp: Ocp, solver: Nlpsol, start: dict[str, Any]) -> ca.Function:

@@ -1,7 +1,8 @@
 """The solver of `kernel` compiled for a plant and called for one OCP: starts and second tries."""
 
 import time
-from collections.abc import Callable, Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
@@ -11,33 +12,40 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.jit import load
-from nmpcrl.control.ocp import Ocp
+from nmpcrl.control.ocp import Ocp, ProblemOcp, TaskOcp
 from nmpcrl.control.plant import Plant
+from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError, check_shape
+from nmpcrl.control.solvers import problem_stages
 from nmpcrl.control.solvers.codes import End, Start
-from nmpcrl.control.solvers.solver import TOLERANCE, Solver
+from nmpcrl.control.solvers.solver import LED_ASTRAY, TOLERANCE, Solver
 from nmpcrl.control.solvers.stages import write
 
 WARM_LIMIT = 40  # iterations from a warm start
 COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
+PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
 COLD, SHIFTED, NEAR, SAME = map(int, Start)  # plain numbers, as machine code takes them
 SOLVED = float(End.SOLVED)  # as it returns them
 ENDS = {
+    End.SOLVED: LED_ASTRAY,
     End.STALLED: "found no descent",
     End.LIMIT: "ran out of iterations",
     End.BROKEN: "met numbers that are not finite",
 }
 TEXTS = {  # compiled beside `model`; read with the other modules, so that an edit mixes nothing
     name: files(__package__).joinpath(f"{name}.py").read_text("utf-8")
-    for name in ("codes", "kernel", "hessian")
+    for name in ("codes", "kernel", "solve", "hessian", "hessian_times", "plan_slopes")
+    + ("rows", "rows_solve", "rows_slopes")
 }
+STAGES = ("codes", "kernel", "hessian")
+ABSURD = 1e24  # no value is larger
 UNBOUNDED = 1e20  # stands for an input without a bound
 
 
-class Problem(NamedTuple):
-    """The first arguments of `kernel.solve`, by name; u_0 is free or fixed."""
+class TaskArguments(NamedTuple):
+    """The first arguments of `solve.solve`, by name; u_0 is free or fixed."""
 
     target: Vector  # (n,)
     lower: Vector  # of the inputs, (m,)
@@ -62,24 +70,60 @@ class Code(NamedTuple):
 
 @cache
 def machine_code(plant: Plant) -> Code:
-    """`kernel.solve` and `hessian.hessian_times` compiled for a plant.
+    """`solve` and `hessian_times` compiled for a plant.
 
     Raises:
         CannotCompile: numba is missing, or the plant holds an operation that is not known.
     """
+    entries = ("hessian_times", "solve")
+    return Code(*_loaded(entries[::-1], {"model": write(plant)}, STAGES, NOTICE))
+
+
+@cache
+def plan_code(plant: Plant) -> Any:
+    """`plan_slopes` compiled for a plant, where its policy is differentiated."""
+    return _loaded(("plan_slopes",), {"model": write(plant)}, STAGES, PLAN_NOTICE)[0]
+
+
+@cache
+def problem_code(problem: Problem) -> Any:
+    """`rows_solve.solve` compiled for a problem.
+
+    Raises:
+        CannotCompile: as `machine_code`.
+    """
+    model = problem_stages.write(problem)
+    return _loaded(("solve",), model, ("codes", "kernel", "rows"), NOTICE, "rows_")[0]
+
+
+@cache
+def problem_slopes(problem: Problem) -> Any:
+    """`rows_slopes.slopes` compiled for a problem."""
+    model = problem_stages.write(problem)
+    return _loaded(("slopes",), model, ("codes", "kernel", "rows"), PLAN_NOTICE, "rows_")[0]
+
+
+def _loaded(
+    entries: tuple[str, ...],
+    model: Mapping[str, str],
+    beside: tuple[str, ...],
+    notice: str,
+    kind: str = "",
+) -> list[Any]:
+    """Functions that are called, each from the module of its name; compiled with a model."""
     texts = {
-        "__init__": "from .hessian import hessian_times\nfrom .kernel import solve\n",
-        "model": write(plant),
-        **TEXTS,
+        "__init__": "".join(f"from .{kind}{name} import {name}\n" for name in sorted(entries)),
+        **model,
+        **{name: TEXTS[name] for name in (*beside, *(kind + name for name in entries))},
     }
-    module = load("riccati", texts, NOTICE)
-    return Code(module.solve, module.hessian_times)
+    module = load("riccati", texts, notice)
+    return [getattr(module, name) for name in entries]
 
 
-def random_inputs(plant: Plant, seed: int, horizon: int) -> Matrix:
+def random_inputs(of: Plant | Problem, seed: int, horizon: int) -> Matrix:
     """Where a start begins that nothing else is known for, shape (horizon, m)."""
-    lower, upper = np.maximum(plant.lower, -1.0), np.minimum(plant.upper, 1.0)
-    return np.random.default_rng(seed).uniform(lower, upper, (horizon, plant.m))
+    lower, upper = np.maximum(of.lower, -1.0), np.minimum(of.upper, 1.0)
+    return np.random.default_rng(seed).uniform(lower, upper, (horizon, lower.size))
 
 
 @dataclass(frozen=True)
@@ -91,41 +135,31 @@ class Riccati(Solver):
 
     code: Callable[[Plant], Code] = field(default=machine_code, repr=False)
 
-    def prepare(self, ocp: Ocp) -> "InteriorPoint":
+    def prepare(self, ocp: Ocp) -> "Compiled":
         """Load the machine code, or compile it.
 
         Raises:
             CannotCompile: numba is missing, or the plant holds an operation that is not known.
         """
+        if isinstance(ocp, ProblemOcp):
+            return ProblemPoint(ocp, problem_code(ocp.problem), self.tolerance)
+        assert isinstance(ocp, TaskOcp)
         return InteriorPoint(ocp, self.code(ocp.plant), self.tolerance)
 
 
-class InteriorPoint:
+class Compiled(ABC):
     """An OCP and the code that solves it."""
 
-    def __init__(self, ocp: Ocp, code: Code, tolerance: float = TOLERANCE) -> None:
-        self._ocp, plant, task = ocp, ocp.plant, ocp.task
-        self._code = code
+    problem: tuple[Any, ...]  # the first arguments of the code, u_0 free or fixed
+
+    def __init__(self, ocp: Ocp, of: Plant | Problem, solve: Any, tolerance: float) -> None:
+        self._ocp, self._of = ocp, of
+        self._code = solve
         self._fixed = int(ocp.fixed_action.size > 0)
         self._standing = np.zeros(2 * ocp.lower.size + ocp.equality.size)
         self._size = self._standing.size + ocp.theta.numel()
-        self._no_action = np.zeros(plant.m)
-        sides = [
-            (state, sign, limit[state])
-            for sign, limit in ((-1.0, task.lower), (1.0, task.upper))
-            for state in np.flatnonzero(np.isfinite(limit))
-        ]
-        self.problem = Problem(
-            task.target.copy(),  # which may be written to, as compiled code wants it
-            np.maximum(plant.lower, -UNBOUNDED),
-            np.minimum(plant.upper, UNBOUNDED),
-            np.reshape(np.transpose(task.discs), (-1, 3)).copy(),
-            np.reshape(np.array(sides, float), (-1, 3)),
-            ocp.gamma ** np.arange(len(ocp.states), dtype=float),
-            ocp.slack_weight,
-            int(task.soft_box),
-            ocp.tie,
-        )
+        self._no_action = np.zeros(of.lower.size)
+        self._bounds = np.maximum(of.lower, -UNBOUNDED), np.minimum(of.upper, UNBOUNDED)
         self._tolerance = tolerance
 
     def solve(
@@ -135,16 +169,18 @@ class InteriorPoint:
         warm_start: Solution | None,
         *action: Vector,
         began: float,
+        data: Matrix | None = None,
     ) -> Solution:
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         given = action[0] if action else self._no_action
-        arguments = (*self.problem, state, theta, given, self._fixed)
+        problem = self.problem if data is None else (data, *self.problem[1:])
+        arguments = (*problem, state, theta, given, self._fixed)
         for restarts, (start, point, limit) in enumerate(self._starts(state, warm_start)):
             out = np.empty(self._size)
-            value, iterations, end, violation, error = self._code.solve(
+            value, iterations, end, violation, error = self._code(
                 *arguments, start, limit, self._tolerance, point, out
             )
-            if end == SOLVED:
+            if end == SOLVED and value < ABSURD:
                 return Solution(
                     state,
                     theta,
@@ -157,6 +193,7 @@ class InteriorPoint:
                     Riccati.name,
                     restarts,
                     violation,
+                    data,
                 )
         raise SolverError(
             f"{Riccati.name} found no optimum from {restarts + 1} starts (the last"
@@ -166,13 +203,19 @@ class InteriorPoint:
             theta,
         )
 
+    def _given(self, solution: Solution) -> tuple[Any, ...]:
+        """The arguments of a derivative at a solution."""
+        action = solution.action if self._fixed else self._no_action
+        problem = self.problem if solution.data is None else (solution.data, *self.problem[1:])
+        return (*problem, solution.state, solution.theta, action, self._fixed, solution.point)
+
+    @abstractmethod
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None at no strict minimum."""
-        action = solution.action if self._fixed else self._no_action
-        out = np.empty(vector.size)
-        arguments = (*self.problem, solution.state, solution.theta, action, self._fixed)
-        formed = self._code.hessian_times(*arguments, solution.point, vector, out)
-        return out if formed else None
+
+    @abstractmethod
+    def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> Vector | None:
+        """The gradient in theta of a weighted sum of the plan; None at no strict minimum."""
 
     def _starts(self, state: Vector, warm_start: Solution | None) -> Iterator[Attempt]:
         """The warm start, standing still, and random inputs."""
@@ -186,7 +229,7 @@ class InteriorPoint:
         yield COLD, self._standing, COLD_LIMIT
         for seed in range(PERTURBED):
             point = self._standing.copy()
-            point[self._ocp.inputs] = random_inputs(self._ocp.plant, seed, len(self._ocp.inputs))
+            point[self._ocp.inputs] = random_inputs(self._of, seed, len(self._ocp.inputs))
             yield COLD, point, COLD_LIMIT
 
     def _from(self, warm_start: Solution) -> Vector:
@@ -199,3 +242,75 @@ class InteriorPoint:
         lam = np.zeros(ocp.equality.size)
         lam[ocp.obstacles] = warm_start.constraint_duals[old.obstacles]
         return np.concatenate([z, lam, nu])
+
+
+class InteriorPoint(Compiled):
+    """Eq. (2) of the paper."""
+
+    def __init__(self, ocp: TaskOcp, code: Code, tolerance: float = TOLERANCE) -> None:
+        super().__init__(ocp, ocp.plant, code.solve, tolerance)
+        self._hessian_times = code.hessian_times
+        self._plant, task = ocp.plant, ocp.task
+        sides = [
+            (state, sign, limit[state])
+            for sign, limit in ((-1.0, task.lower), (1.0, task.upper))
+            for state in np.flatnonzero(np.isfinite(limit))
+        ]
+        self.problem = TaskArguments(
+            task.target.copy(),  # which may be written to, as compiled code wants it
+            *self._bounds,
+            np.reshape(np.transpose(task.discs), (-1, 3)).copy(),
+            np.reshape(np.array(sides, float), (-1, 3)),
+            ocp.gamma ** np.arange(len(ocp.states), dtype=float),
+            ocp.slack_weight,
+            int(task.soft_box),
+            ocp.tie,
+        )
+
+    def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
+        """As `Compiled` says."""
+        out = np.empty(vector.size)
+        formed = self._hessian_times(*self._given(solution), vector, out)
+        return out if formed else None
+
+    def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> Vector | None:
+        """As `Compiled` says."""
+        out = np.empty(solution.theta.size)
+        formed = plan_code(self._plant)(*self._given(solution), states, inputs, out)
+        return out if formed else None
+
+
+class ProblemPoint(Compiled):
+    """A `Problem`."""
+
+    def __init__(self, ocp: ProblemOcp, solve: Any, tolerance: float = TOLERANCE) -> None:
+        problem = ocp.problem
+        super().__init__(ocp, problem, solve, tolerance)
+        self._problem, self._tolerance = problem, tolerance
+        kind = problem.active.astype(np.int64)  # 1 where a plan can change a row, as `rows` says
+        kind[0] *= np.where(ocp.settled_rows, 2, 1)
+        self.problem = (
+            problem.data.copy(),
+            *self._bounds,
+            kind,
+            ocp.gamma ** np.arange(len(ocp.states), dtype=float),
+            problem.weights.copy(),
+            problem.scale,
+            ocp.tie,
+        )
+
+    def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
+        """As `Compiled` says."""
+        ocp = self._ocp
+        return self._slopes(
+            solution, vector, np.zeros(ocp.states.shape), np.zeros(ocp.inputs.shape)
+        )
+
+    def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> Vector | None:
+        """As `Compiled` says."""
+        return self._slopes(solution, np.zeros(solution.theta.size), states, inputs)
+
+    def _slopes(self, solution: Solution, *directions: Matrix) -> Vector | None:
+        out = np.empty(solution.theta.size)
+        formed = problem_slopes(self._problem)(*self._given(solution), *directions, out)
+        return out if formed else None

@@ -4,12 +4,14 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.solution import Solution
 from nmpcrl.control.task import Task
 
 TOLERANCE = 1e-8  # what is taken where none is said
+FARTHEST = 1e9  # no plan goes through such a state
+LED_ASTRAY = "led through numbers that are absurd: is the period too long for the dynamics?"
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
 
 
@@ -23,11 +25,15 @@ class Prepared(Protocol):
         warm_start: Solution | None,
         *action: Vector,
         began: float,
+        data: Matrix | None = None,
     ) -> Solution:
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None if it cannot be had fast."""
+
+    def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> Vector | None:
+        """The gradient in theta of the plan's sum with these weights, (N + 1, n) and (N, m)."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,10 @@ NX, NU, NTHETA = {sizes}
 '''
 
 
+RETURNED = ("stage_cost", "terminal_cost", "constraint")
+MATRICES = ("A", "B", "Q", "S", "R", "hxx")
+
+
 def write(plant: Plant) -> str:
     """The text of the module `model` for `plant`.
 
@@ -31,7 +35,9 @@ def write(plant: Plant) -> str:
     sizes = (plant.n, plant.m, 2 * plant.n + plant.m + 1)
     header = HEADER.format(about=", ".join(plant.state_names), sizes=sizes)
     bodies = [
-        f'@njit(error_model="numpy", forceinline=True)\n{source(f)}' for f in functions(plant)
+        '@njit(error_model="numpy", forceinline=True)\n'
+        + source(f, returned=f.name() in RETURNED, matrices=MATRICES)
+        for f in functions(plant)
     ]
     return "\n\n".join([header, *bodies])
 
@@ -49,7 +55,8 @@ def functions(plant: Plant) -> list[ca.Function]:
     next_x = plant.transition(x, u)
     cost = stage_cost(x, u, weights, target)
     terminal = terminal_cost(x, weights, target)
-    constraint = overlap(x[0], x[1], disc[0], disc[1], disc[2]) + weights.constraint
+    plane = x if n > 1 else ca.vertcat(x, 0)  # where no obstacle stands
+    constraint = overlap(plane[0], plane[1], disc[0], disc[1], disc[2]) + weights.constraint
     lagrangian = discount * cost + ca.dot(costate, next_x)
     hessian, _ = ca.hessian(lagrangian, ca.vertcat(x, u))
     expand = {

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.control.ocp import Ocp
+from nmpcrl.control.ocp import TaskOcp
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.solution import Solution
 from nmpcrl.control.solvers.codes import End
@@ -29,7 +29,9 @@ def interpreted(plant: Plant) -> ModuleType:
     """
     plain = ModuleType("riccati")
     names = vars(plain)
-    names.update(machine_code(plant).solve.py_func.__globals__)
+    solve = machine_code(plant).solve.py_func
+    names.update(solve.__globals__["iterate"].py_func.__globals__)
+    names.update(solve.__globals__)
     for name, found in list(names.items()):
         if hasattr(found, "py_func"):
             names[name] = FunctionType(found.py_func.__code__, names, name)
@@ -37,7 +39,7 @@ def interpreted(plant: Plant) -> ModuleType:
 
 
 def trace(
-    ocp: Ocp,
+    ocp: TaskOcp,
     state: Vector,
     theta: Vector,
     warm_start: Solution | None = None,

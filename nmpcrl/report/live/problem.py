@@ -16,7 +16,7 @@ WALL, AROUND = 0.5, 1.5  # of the map, beyond a wall and beyond an obstacle's ci
 
 
 def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
-    """What the module is given of a problem: `riccati.Problem`, and sizes; u_0 is free.
+    """What the module is given of a problem: `riccati.TaskArguments`, and sizes; u_0 is free.
 
     Args:
         nmpc: the problem.

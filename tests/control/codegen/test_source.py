@@ -150,3 +150,19 @@ def test_the_compiled_stages_are_casadis(plant):
         code(*arguments, *out)
         for found, right in zip(out, exact, strict=True):
             np.testing.assert_allclose(found, right.reshape(found.shape), rtol=1e-13, atol=1e-14)
+
+
+def test_a_single_number_may_be_written_and_a_single_column_be_a_matrix():
+    """A plant with one state has a transition that is no scalar, and one input a Jacobian."""
+    x = ca.SX.sym("x", 2)
+    one = ca.Function("one", [x], [x[0] * x[1]], ["x"], ["y"])
+    assert "y_[0] = w" in source(one, returned=False)
+    assert "return w" in source(one)
+    both = ca.Function("both", [x], [x, x[0]], ["x"], ["y", "B"])
+    assert "B_[0, 0] = w" in source(both, matrices=("B",))
+
+
+def test_a_function_without_results_does_nothing():
+    x = ca.SX.sym("x", 2)
+    empty = ca.Function("empty", [x], [ca.SX(0, 1), ca.SX(0, 1)], ["x"], ["h", "hx"])
+    assert source(empty) == "def empty(x, h_, hx_):\n    pass\n"

@@ -1,0 +1,109 @@
+"""Named arrays that share one vector."""
+
+import difflib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+
+
+class Blocks(Mapping[str, tuple[int, ...]]):
+    """Named arrays, one after the other in a vector, each in the order of `np.ravel`."""
+
+    def __init__(self, what: str, shapes: Mapping[str, tuple[int, ...]]) -> None:
+        self._what, self._shapes = what, dict(shapes)
+        sizes = [int(np.prod(shape)) for shape in self._shapes.values()]
+        ends = np.cumsum([0, *sizes]).tolist()
+        self.size: int = ends[-1]
+        self._places = dict(zip(self._shapes, map(slice, ends[:-1], ends[1:]), strict=True))
+
+    def __getitem__(self, name: str) -> tuple[int, ...]:
+        return self._shapes[self.known(name)]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._shapes)
+
+    def __len__(self) -> int:
+        return len(self._shapes)
+
+    def known(self, name: str) -> str:
+        """The name, if it is one.
+
+        Raises:
+            ValueError: it is none; with the nearest.
+        """
+        if name in self._shapes:
+            return name
+        near = difflib.get_close_matches(str(name), self._shapes, 1)
+        meant = f"; did you mean {near[0]!r}?" if near else ""
+        raise ValueError(
+            f"{self._what} has no {name!r}{meant} (it has {', '.join(self._shapes) or 'none'})"
+        )
+
+    def part(self, name: str, vector: Any) -> Any:
+        """The entries of one name in a vector, or in the last axis of an array."""
+        return vector[..., self._places[self.known(name)]]
+
+    def split(self, vector: Vector) -> dict[str, Any]:
+        """Every array by its name; a float where it is a single number."""
+        arrays = {name: self.part(name, vector).reshape(self[name]) for name in self}
+        return {name: a if a.shape else float(a) for name, a in arrays.items()}
+
+    def symbols(self, vector: ca.SX) -> "Symbols":
+        """The same of a vector of symbols, as a model reads them."""
+        return Symbols(self, vector)
+
+    def filled(self, base: Matrix, values: Mapping[str, Any]) -> Matrix:
+        """A copy of `base`, vectors along its last axis, with these arrays in their places.
+
+        Raises:
+            ValueError: a name or a shape is another, or a number is not finite.
+        """
+        copy = np.array(base, float)
+        for name, value in values.items():
+            shape, whole = self[name], (*copy.shape[:-1], *self[name])
+            array = numbers(f"{self._what} {name}", value)
+            if array.shape not in (shape, whole):
+                either = f"{shape}" if whole == shape else f"{shape} or {whole}, a stage each"
+                raise ValueError(
+                    f"{self._what} {name!r} has shape {array.shape}; it must be {either}"
+                )
+            rows = array.reshape(*copy.shape[:-1], -1) if array.shape == whole else array.ravel()
+            copy[..., self._places[name]] = rows
+        return copy
+
+
+class Symbols(Mapping[str, ca.SX]):
+    """Symbols by name, in their shapes."""
+
+    def __init__(self, blocks: Blocks, vector: ca.SX) -> None:
+        self._blocks, self._vector = blocks, vector
+
+    def __getitem__(self, name: str) -> ca.SX:
+        shape = self._blocks[name]
+        part = self._vector[self._blocks._places[name]]
+        return ca.reshape(part, *shape[::-1]).T if len(shape) == 2 else part
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._blocks)
+
+    def __len__(self) -> int:
+        return len(self._blocks)
+
+
+def numbers(name: str, value: Any) -> Matrix:
+    """An array of at most two axes.
+
+    Raises:
+        ValueError: it holds something else than finite numbers.
+    """
+    try:
+        array = np.array(value, float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {value!r} must be a number or an array of numbers") from None
+    if array.size == 0 or not np.isfinite(array).all():
+        raise ValueError(f"{name} = {value!r} must hold finite numbers")
+    return array

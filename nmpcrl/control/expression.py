@@ -1,0 +1,99 @@
+"""What a function of the user writes down in symbols, looked through before anything is solved."""
+
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+IF = "a Python `if`, `max` or `and` cannot wait for numbers: write ca.if_else(...), ca.fmax(...)"
+NAN = "math's functions make nan of a symbol: write ca.sin(x) for math.sin(x), and so on"
+
+
+def expression(
+    name: str,
+    function: Callable[..., Any] | None,
+    arguments: tuple[Any, ...],
+    symbols: Mapping[str, Any],
+    size: int,
+    unit: str,
+) -> ca.SX:
+    """What a function of the user writes down: a column of `size` entries, of any size if 0.
+
+    Raises:
+        ValueError: it is no such expression.
+    """
+    if function is None:
+        return ca.SX(size, 1) if size > 1 else ca.SX(0)
+    signature = [key for key, one in symbols.items() if one is not None and one.numel()]
+    call = f"{name}({', '.join('th' if key == 'theta' else key for key in signature)})"
+    if not callable(function):
+        raise ValueError(f"{name} = {function!r} must be a function, called as {call}")
+    wrong = _mismatch(function, arguments)
+    if wrong:
+        raise ValueError(f"{name} is called as {call}, and does not take that: {wrong}")
+    try:
+        written = column(function(*arguments))
+    except ValueError:
+        raise
+    except Exception as error:
+        reason = str(error).strip().splitlines()[-1]
+        why = IF if "truth value" in reason else f"{reason} ({type(error).__name__})"
+        raise ValueError(f"{name} cannot be written down in symbols: {why}") from error
+    if written is None:
+        raise ValueError(
+            f"{name} must return a column of SX, as its arguments are: write ca.vertcat(...)"
+        )
+    if not written.numel() or size not in (0, written.numel()):
+        needed = f"{size} {unit}{'s' if size > 1 else ''}" if size else f"a {unit} or more"
+        raise ValueError(f"{name} returns {written.numel()} numbers; it must return {needed}")
+    _refuse_unusable(name, written, [one for one in symbols.values() if one is not None])
+    return written
+
+
+def _mismatch(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
+    """Why a function cannot be called with these; "" if it can, or does not say what it takes."""
+    try:
+        inspect.signature(function).bind(*arguments)
+    except ValueError:
+        return ""
+    except TypeError as error:
+        return str(error)
+    return ""
+
+
+def column(result: Any) -> ca.SX | None:
+    """A result as a column; None if it is none."""
+    if isinstance(result, ca.MX):
+        return None
+    if isinstance(result, list | tuple | np.ndarray):
+        result = ca.vertcat(*np.ravel(np.array(result, object)))
+    try:
+        written = ca.SX(result)
+    except NotImplementedError:
+        return None
+    return ca.densify(ca.vec(written)) if 1 in written.shape else None
+
+
+def _refuse_unusable(name: str, written: ca.SX, allowed: list[ca.SX]) -> None:
+    known = {one.__hash__() for vector in allowed for one in ca.vertsplit(vector)}
+    for symbol in ca.symvar(written):
+        if symbol.__hash__() not in known:
+            raise ValueError(
+                f"{name} uses {symbol}, which is none of its arguments: make it a parameter in"
+                " theta, or data"
+            )
+    flat = ca.Function("flat", ca.symvar(written), [written])
+    constants = (
+        flat.instruction_constant(k)
+        for k in range(flat.n_instructions())
+        if flat.instruction_id(k) == ca.OP_CONST
+    )
+    if any(np.isnan(one) for one in constants):
+        raise ValueError(f"{name} holds nan: {NAN}")
+    try:
+        ca.jacobian(written, ca.vertcat(*allowed))
+    except Exception as error:
+        reason = str(error).strip().splitlines()[-1]
+        raise ValueError(f"{name} cannot be differentiated by CasADi: {reason}") from error

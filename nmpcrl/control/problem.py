@@ -1,0 +1,300 @@
+"""Optimal control in which any symbol can be learned: `Problem`, given to `Nmpc`.
+
+    min   V0(s, theta) + sum_i gamma^i l(x_i, u_i, theta, d_i) + gamma^N V_f(x_N, theta, d_N)
+          + sum_i gamma^i W' sigma_i
+    s.t.  x_0 = s,  x_{i+1} = f(x_i, u_i, theta, d_i),  lower <= u_i <= upper,
+          h(x_i, u_i, theta, d_i) <= sigma_i,  sigma_i >= 0
+
+f, l, V_f, V0 and h are written once, in CasADi's SX; all their derivatives follow from that.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control.blocks import Blocks, Symbols, numbers
+from nmpcrl.control.expression import expression
+from nmpcrl.control.vectors import kept, whole
+
+
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """Numbers that are learned: where they start and, for learners that project, their bounds."""
+
+    start: Any  # a number or an array
+    lower: Any = -np.inf  # a number, or one for each
+    upper: Any = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Soft:
+    """Rows h <= sigma, sigma >= 0, whose slacks cost `weight` each, discounted."""
+
+    row: Callable[..., Any]  # (x, u, th) -> h, a number or a column; with d where there are data
+    weight: Any = 1.0  # W > 0, a number, or one a row
+    stages: Any = (
+        None  # among 0, ..., N: an index, a slice or a list; all that are possible if None
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Data of every stage, taken where `Nmpc.solve` is given none."""
+
+    values: Any  # an array with an axis of N + 1 in front
+
+
+class Expressions(NamedTuple):
+    """A problem in symbols."""
+
+    x: ca.SX
+    u: ca.SX
+    theta: ca.SX
+    d: ca.SX  # of one stage
+    next_x: ca.SX
+    stage: ca.SX
+    terminal: ca.SX
+    initial: ca.SX
+    rows: ca.SX  # h, shape (M,)
+
+
+class Problem:
+    """What an NMPC minimises, in symbols of which each may be learned."""
+
+    def __init__(
+        self,
+        *,
+        states: int,
+        inputs: int,
+        horizon: int,
+        theta: Mapping[str, Any],
+        model: Callable[..., Any],
+        stage: Callable[..., Any],
+        terminal: Callable[..., Any] | None = None,
+        initial: Callable[..., Any] | None = None,
+        soft: Sequence[Soft] = (),
+        lower: Any = -np.inf,
+        upper: Any = np.inf,
+        gamma: float = 1.0,
+        data: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Write the problem down in symbols and look through it.
+
+        The functions take SX and return SX: `x` and `u` are columns, `th["A"]` is the parameter of
+        that name in its shape. Where there are data, `d["price"]` is that of the stage, and `d` is
+        the last argument of all of them.
+
+        Args:
+            states: n.
+            inputs: m.
+            horizon: N, the number of planned inputs.
+            theta: what is learned: by name, an array to start from, or a `Parameter`.
+            model: (x, u, th) -> x+, a discrete-time map; `rk4` makes one of a derivative.
+            stage: (x, u, th) -> l.
+            terminal: (x, th) -> V_f, 0 if absent.
+            initial: (x, th) -> V0 of the state in which the plan begins, 0 if absent.
+            soft: rows that may be violated at a price.
+            lower: least input, a number or one an input.
+            upper: largest input.
+            gamma: discount factor, 0 < gamma <= 1.
+            data: what is known of every stage and not learned: by name, the array of one stage, or
+                a `Series` of all, that is taken where `Nmpc.solve` is given none.
+
+        Raises:
+            ValueError: something is no such thing; the message names it and says what to write.
+        """
+        self.states, self.inputs, self.horizon = (
+            whole(name, number)
+            for name, number in (("states", states), ("inputs", inputs), ("horizon", horizon))
+        )
+        self.gamma = discount(gamma)
+        self.lower, self.upper = _bounds(lower, upper, self.inputs)
+        parameters = {
+            name: one if isinstance(one, Parameter) else Parameter(one)
+            for name, one in theta.items()
+        }
+        starts = {name: numbers(f"theta {name}", one.start) for name, one in parameters.items()}
+        self.names = Blocks("theta", {name: start.shape for name, start in starts.items()})
+        if not self.names.size:
+            raise ValueError("theta is empty: name at least one parameter, or nothing is learned")
+        self.theta = kept(self.names.filled(np.zeros(self.names.size), starts))
+        self.theta_lower, self.theta_upper = (
+            kept(np.concatenate([_spread(name, getattr(parameters[name], side), starts[name])
+                                 for name in parameters]))
+            for side in ("lower", "upper")
+        )  # fmt: skip
+        self._refuse_outside()
+        defaults = {
+            name: numbers(f"data {name}", one.values if isinstance(one, Series) else one)
+            for name, one in (data or {}).items()
+        }
+        shapes = {
+            name: one.shape[isinstance((data or {})[name], Series) :]
+            for name, one in defaults.items()
+        }
+        self.data_names = Blocks("data", shapes)
+        empty: Matrix = np.zeros((self.horizon + 1, self.data_names.size))
+        self.data = self.data_names.filled(empty, defaults)
+        self.soft = tuple(soft)
+        self.expressions, sizes = self._written(model, stage, terminal, initial)
+        self.weights = kept(_weights(self.soft, sizes))
+        self.on_inputs = _depends(self.expressions.rows, self.expressions.u)
+        self.active = self._active(sizes)
+
+    @cached_property
+    def scale(self) -> float:
+        """What riccati divides the objective by, half of the largest curvature or a slope."""
+        e = self.expressions
+        z, costs = ca.vertcat(e.x, e.u), e.stage + self.gamma**self.horizon * e.terminal
+        sizes = ca.Function("sizes", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
+        still = np.clip(np.zeros(self.inputs), self.lower, self.upper)
+        curvature, slope = sizes(np.zeros(self.states), still, self.theta, self.data[0])
+        found = max(np.abs(curvature.full()).max() / 2, np.abs(slope.full()).max())
+        return float(found) if 0 < found < np.inf else 1.0
+
+    def split(self, theta: Vector) -> dict[str, Any]:
+        """A vector in the order of theta, or of its gradient, by name."""
+        return self.names.split(np.asarray(theta, float))
+
+    def vector(self, **values: Any) -> Vector:
+        """theta with these parameters, and the others as they start."""
+        return self.names.filled(self.theta, values)
+
+    def stage_data(self, values: Mapping[str, Any] | None) -> Matrix:
+        """d_0, ..., d_N, shape (N + 1, size): those given, the others as in the problem.
+
+        Raises:
+            ValueError: a name is unknown, or a shape neither that of a stage nor of all.
+        """
+        return self.data if values is None else self.data_names.filled(self.data, values)
+
+    def _written(
+        self,
+        model: Callable[..., Any],
+        stage: Callable[..., Any],
+        terminal: Callable[..., Any] | None,
+        initial: Callable[..., Any] | None,
+    ) -> tuple[Expressions, list[int]]:
+        """The problem in symbols, and how many rows each `Soft` has."""
+        x, u = ca.SX.sym("x", self.states), ca.SX.sym("u", self.inputs)
+        theta, d = ca.SX.sym("theta", self.names.size), ca.SX.sym("d", self.data_names.size)
+        last: tuple[Symbols, ...] = (self.names.symbols(theta),)
+        if self.data_names:
+            last += (self.data_names.symbols(d),)
+        arguments = {"x": x, "u": u, "theta": theta, "d": d}
+        both, alone = ((x, u, *last), arguments), ((x, *last), {**arguments, "u": None})
+        next_x = expression("model", model, *both, self.states, "state")
+        cost = expression("stage", stage, *both, 1, "cost")
+        final = expression("terminal", terminal, *alone, 1, "cost")
+        first = expression("initial", initial, *alone, 1, "cost")
+        rows = [
+            expression(f"soft[{k}]", one.row, *both, 0, "row") for k, one in enumerate(self.soft)
+        ]
+        found = Expressions(
+            x, u, theta, d, next_x, cost, final, first, ca.vertcat(ca.SX(0, 1), *rows)
+        )
+        idle = ~_depends(found.rows, ca.vertcat(x, u))
+        for k, place in _each(rows):
+            if idle[place]:
+                raise ValueError(
+                    f"soft[{k}] has a row that depends on neither x nor u: no plan can change it"
+                )
+        return found, [row.numel() for row in rows]
+
+    def _active(self, sizes: list[int]) -> NDArray[np.bool_]:
+        """Which row holds at which stage, shape (N + 1, M)."""
+        stages = np.arange(self.horizon + 1)
+        active = np.zeros((stages.size, sum(sizes)), bool)
+        ends = np.cumsum([0, *sizes])
+        for k, (one, place) in enumerate(
+            zip(self.soft, map(slice, ends[:-1], ends[1:]), strict=True)
+        ):
+            on_inputs = self.on_inputs[place].any()
+            try:
+                chosen = stages if one.stages is None else np.atleast_1d(stages[one.stages])
+            except (IndexError, TypeError) as error:
+                raise ValueError(
+                    f"soft[{k}].stages = {one.stages!r} must lie among 0, ..., {self.horizon}"
+                ) from error
+            if on_inputs and one.stages is None:
+                chosen = stages[:-1]
+            if on_inputs and self.horizon in chosen:
+                raise ValueError(
+                    f"soft[{k}] depends on u, and there is no input at stage {self.horizon}:"
+                    " leave that stage out"
+                )
+            active[chosen, place] = True
+        return active
+
+    def _refuse_outside(self) -> None:
+        for name in self.names:
+            low, start, high = (
+                self.names.part(name, v) for v in (self.theta_lower, self.theta, self.theta_upper)
+            )
+            if not ((low <= start) & (start <= high)).all():
+                raise ValueError(f"theta {name!r} starts at {start}, outside {low} and {high}")
+
+
+def discount(gamma: Any) -> float:
+    """A discount factor.
+
+    Raises:
+        ValueError: it does not lie in (0, 1].
+    """
+    if not 0 < gamma <= 1:
+        raise ValueError(f"gamma = {gamma} must lie in (0, 1]")
+    return float(gamma)
+
+
+def _spread(name: str, bound: Any, start: Matrix) -> Vector:
+    try:
+        return np.broadcast_to(np.asarray(bound, float), start.shape).ravel()
+    except ValueError:
+        raise ValueError(
+            f"theta {name!r} has shape {start.shape} and a bound of shape {np.shape(bound)}"
+        ) from None
+
+
+def _bounds(lower: Any, upper: Any, inputs: int) -> tuple[Vector, Vector]:
+    sides = []
+    for name, value in (("lower", lower), ("upper", upper)):
+        side = np.array(value, float)
+        if side.shape not in ((), (1,), (inputs,)) or np.isnan(side).any():
+            raise ValueError(f"{name} = {value!r} must hold {inputs} numbers, one an input")
+        sides.append(kept(np.broadcast_to(side, inputs)))
+    if not (sides[0] < sides[1]).all():
+        raise ValueError(
+            f"lower = {sides[0]} must lie below upper = {sides[1]}, or no input is allowed"
+        )
+    return sides[0], sides[1]
+
+
+def _weights(soft: tuple[Soft, ...], sizes: list[int]) -> Vector:
+    found = [np.zeros(0)]
+    for k, (one, size) in enumerate(zip(soft, sizes, strict=True)):
+        weight = np.array(one.weight, float)
+        if weight.shape not in ((), (1,), (size,)):
+            raise ValueError(f"soft[{k}] has {size} rows and {weight.size} weights")
+        if not ((weight > 0) & np.isfinite(weight)).all():
+            raise ValueError(f"soft[{k}].weight = {one.weight} must be positive")
+        found.append(np.broadcast_to(weight, size))
+    return np.concatenate(found)
+
+
+def _depends(rows: ca.SX, variables: ca.SX) -> NDArray[np.bool_]:
+    """Which rows depend on any of these."""
+    if not rows.numel() or not variables.numel():
+        return np.zeros(rows.numel(), bool)
+    return np.array(ca.which_depends(rows, variables, 1, True), bool)
+
+
+def _each(parts: list[ca.SX]) -> Iterator[tuple[int, int]]:
+    """(part, place) of every row."""
+    owners = [k for k, part in enumerate(parts) for _ in range(part.numel())]
+    return ((k, place) for place, k in enumerate(owners))

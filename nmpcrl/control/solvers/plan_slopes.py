@@ -1,0 +1,65 @@
+"""The gradient in theta of a weighted sum of Eq. (2)'s plan, at a solution: see `rows_slopes`."""
+
+import numpy as np
+from numba import njit, types
+
+from .hessian import gradient_along
+from .kernel import (
+    PROBLEM,
+    RIGID,
+    SAME,
+    allocate,
+    condense,
+    evaluate,
+    factorise,
+    initialise,
+    initialise_rows,
+    linearise,
+    matrix,
+    options,
+    rows_along,
+    scale_rows,
+    scaled,
+    sweep,
+    vector,
+)
+from .model import NTHETA, NU, NX
+
+SIGNATURE = types.boolean(*PROBLEM, vector, matrix, matrix, vector)
+
+
+@njit(SIGNATURE, cache=True, **options)
+def plan_slopes(
+    target, lower, upper, discs, sides, discount, slack_weight, soft_box, tie,
+    state, theta, action, fixed, solved, of_states, of_inputs, out,
+):  # fmt: skip
+    """Put the gradient into `out`, shape (NTHETA,); whether it could be formed, as `slopes` says.
+
+    `of_states` (N + 1, NX) and `of_inputs` (N, NU) are the sum's weights.
+    """
+    task, factor = scaled(
+        theta, target, lower, upper, discs, sides, discount, slack_weight, soft_box, fixed
+    )
+    N, M, rows = len(discount) - 1, len(discs), len(discs) + len(sides)
+    point, _, duals, stages, step = allocate(N, M, rows)
+    mu = RIGID
+    initialise(task, point, duals, state, action, SAME, mu, factor, solved)
+    evaluate(task, point, mu)
+    initialise_rows(task, point, duals, SAME, mu, factor, solved)
+    linearise(task, point, duals, stages)
+    condense(task, point, duals, stages, mu)
+    for i in range(N + 1):
+        for a in range(NX):
+            stages.q[i, a] = of_states[i, a] / factor
+        for a in range(NU if i < N else 0):
+            stages.r[i, a] = of_inputs[i, a] / factor
+        for j in range(rows if i < N else 0):
+            stages.off[i, j] = 0.0
+    if not factorise(stages, 0.0, task.first, step):
+        return False
+    sweep(task, stages, step)
+    rows_along(task, stages, step)
+    scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
+    still = np.zeros(NTHETA)
+    gradient_along(task, point, duals, step, slack_weight, factor, tie, still, out)
+    return True

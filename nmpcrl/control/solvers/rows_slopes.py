@@ -1,0 +1,169 @@
+"""Second derivatives of a `Problem`'s value, and first ones of its plan, at a solution.
+
+If theta moves along w, the solution moves along (dx, du, dp, dlam), which solves Newton's system of
+`kernel` with what w adds to KKT's violation on the right: K step + G w = 0. The value's Hessian is
+then the change of its gradient along (step, w), L_tt w + G' step. A weighted sum s'(x, u) of the
+plan changes by -s' K^-1 G w, so its gradient in theta is G' step with K step + s = 0: the same
+sweep from the other side, one for each number of the plan and not one for each parameter.
+
+See `hessian` for the barrier parameter and the source. The dynamics' share of G w, f_theta w, is
+taken up by a `drift` of the states in which no input moves.
+"""
+
+import numpy as np
+from numba import njit, types
+
+from .expressions import (
+    NROWS,
+    initial_along,
+    last_along,
+    last_mixed,
+    stage_along,
+    stage_mixed,
+)
+from .kernel import (
+    RIGID,
+    SAME,
+    add,
+    factorise,
+    initialise,
+    inlined,
+    matrix,
+    options,
+    scale_rows,
+    sweep,
+    vector,
+)
+from .model import NTHETA, NU, NX
+from .rows import (
+    PLANNED,
+    PROBLEM,
+    allocate,
+    condense,
+    evaluate,
+    hold,
+    initialise_rows,
+    linearise,
+    rows_along,
+    scaled,
+    settle,
+)
+
+
+@inlined
+def right_hand_side(task, point, duals, stages, w, drift):
+    """G w as q, r and `off`, and as the drift, after `condense`."""
+    last = len(point.u)
+    held, h, f = np.empty(NROWS), np.empty(NROWS), np.empty(NX)
+    for a in range(NX):
+        drift[0, a] = 0.0
+    for i in range(last + 1):
+        hold(task, duals, i, held)
+        q, rate, data = stages.q[i], task.rate[i : i + 1], task.data[i]
+        if i < last:
+            stage_mixed(
+                point.x[i], point.u[i], task.theta, data, rate, stages.p[i + 1], held, w,
+                q, stages.r[i], f, h,
+            )  # fmt: skip
+            for a in range(NX):
+                drift[i + 1, a] = f[a]
+                for b in range(NX):
+                    drift[i + 1, a] += stages.A[i, a, b] * drift[i, b]
+        else:
+            last_mixed(point.x[i], task.theta, data, rate, held, w, q, h)
+        for j in range(NROWS):
+            off = h[j] if task.kind[i, j] == PLANNED else 0.0
+            stages.off[i, j] = off
+            pull = stages.stiff[i, j] * off
+            for a in range(NX):
+                q[a] += pull * stages.hx[i, j, a]
+            if i < last:
+                for a in range(NU):
+                    stages.r[i, a] += pull * stages.hu[i, j, a]
+        for b in range(NX):
+            for a in range(NX):
+                q[a] += stages.Q[i, a, b] * drift[i, b]
+            if i < last:
+                for a in range(NU):
+                    stages.r[i, a] += stages.S[i, a, b] * drift[i, b]
+
+
+@inlined
+def costates_along(stages, step, dp):
+    """How the costates change along the step, before the drift is added to it."""
+    last = len(step.u)
+    for i in range(last, -1, -1):
+        for a in range(NX):
+            total = stages.q[i, a]
+            for b in range(NX):
+                total += stages.Q[i, a, b] * step.x[i, b]
+            if i < last:
+                for b in range(NU):
+                    total += stages.S[i, b, a] * step.u[i, b]
+                for b in range(NX):
+                    total += stages.A[i, b, a] * dp[i + 1, b]
+            dp[i, a] = total
+
+
+@inlined
+def gradient_along(task, point, duals, stages, step, dp, factor, tie, w, out):
+    """The derivative of the value's gradient along the step and w."""
+    last = len(point.u)
+    gradient, held, h = np.empty(NTHETA), np.empty(NROWS), np.empty(NROWS)
+    initial_along(point.x[0], task.theta, task.data[0], w, gradient)
+    for a in range(NTHETA):
+        out[a] = gradient[a]
+    for i in range(last + 1):
+        hold(task, duals, i, held)
+        if i == 0:
+            settle(task, point, tie, h, held)
+        rate, data, dlam = task.rate[i : i + 1], task.data[i], step.lam[i]
+        if i < last:
+            stage_along(
+                point.x[i], point.u[i], task.theta, data, rate, stages.p[i + 1], held,
+                step.x[i], step.u[i], dp[i + 1], dlam, w, gradient,
+            )  # fmt: skip
+        else:
+            last_along(point.x[i], task.theta, data, rate, held, step.x[i], dlam, w, gradient)
+        add(out, 0, factor, gradient)
+
+
+SIGNATURE = types.boolean(*PROBLEM, vector, vector, matrix, matrix, vector)
+
+
+@njit(SIGNATURE, cache=True, **options)
+def slopes(
+    data, lower, upper, kind, discount, weights, factor, tie,
+    state, theta, action, fixed, solved, w, of_states, of_inputs, out,
+):  # fmt: skip
+    """The Hessian times w, plus the gradient of a weighted sum of the plan, shape (NTHETA,).
+
+    `of_states` (N + 1, NX) and `of_inputs` (N, NU) are the sum's weights. Returns whether it could
+    be formed: not where the solution is no strict minimum.
+    """
+    task = scaled(theta, data, lower, upper, kind, discount, weights, factor, fixed)
+    N, mu = len(discount) - 1, RIGID
+    point, _, duals, stages, step = allocate(N)
+    drift, dp = np.empty((N + 1, NX)), np.empty((N + 1, NX))
+    initialise(task, point, duals, state, action, SAME, mu, factor, solved)
+    evaluate(task, point, mu)
+    initialise_rows(task, point, duals, SAME, mu, factor, solved)
+    linearise(task, point, duals, stages)
+    condense(task, point, duals, stages, mu)
+    right_hand_side(task, point, duals, stages, w, drift)
+    for i in range(N + 1):
+        for a in range(NX):
+            stages.q[i, a] += of_states[i, a] / factor
+        for a in range(NU if i < N else 0):
+            stages.r[i, a] += of_inputs[i, a] / factor
+    if not factorise(stages, 0.0, task.first, step):
+        return False
+    sweep(task, stages, step)
+    costates_along(stages, step, dp)
+    for i in range(N + 1):
+        for a in range(NX):
+            step.x[i, a] += drift[i, a]
+    rows_along(task, stages, step)
+    scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
+    gradient_along(task, point, duals, stages, step, dp, factor, tie, w, out)
+    return True

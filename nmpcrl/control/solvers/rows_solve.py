@@ -1,0 +1,49 @@
+"""A `Problem` solved by `kernel` and `rows`: the function that is called."""
+
+import numpy as np
+from numba import float64, int64, njit, types
+
+from .kernel import START_MU, initialise, iterate, options, vector
+from .model import NX
+from .rows import (
+    ABSURD,
+    PROBLEM,
+    allocate,
+    evaluate,
+    initialise_rows,
+    scaled,
+    write_solution,
+)
+
+SIGNATURE = types.UniTuple(float64, 5)(
+    *PROBLEM,
+    int64, int64, float64,  # start, limit, tolerance
+    vector, vector,  # warm start and result
+)  # fmt: skip
+
+
+@njit(SIGNATURE, cache=True, **options)
+def solve(
+    data, lower, upper, kind, discount, weights, factor, tie,
+    state, theta, action, fixed, start, limit, tolerance, warm_start, out,
+):  # fmt: skip
+    """Solve a problem; see `ProblemPoint` for the arguments, and `solve.solve` for the rest.
+
+    Returns value, iterations, the end, 0, and the relative error. A plan with a state beyond
+    `ABSURD` is none: its value is infinite.
+    """
+    task = scaled(theta, data, lower, upper, kind, discount, weights, factor, fixed)
+    point, trial, duals, stages, step = allocate(len(discount) - 1)
+    mu = START_MU[start]
+    initialise(task, point, duals, state, action, start, mu, factor, warm_start)
+    for a in range(NX):
+        trial.x[0, a] = state[a]
+    objective, total = evaluate(task, point, mu)
+    initialise_rows(task, point, duals, start, mu, factor, warm_start)
+    point, objective, iterations, ended, error = iterate(
+        task, point, trial, duals, stages, step, mu, objective, total, limit, tolerance
+    )
+    value, largest = write_solution(task, point, duals, stages, objective, factor, tie, out)
+    if not largest <= ABSURD:
+        value = np.inf
+    return value, float(iterations), float(ended), 0.0, error

@@ -1,0 +1,120 @@
+"""What is driven need not be what plans: other plants, costs, starts and ends."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from nmpcrl.control import Ipopt, Nmpc, Plant, Problem, differential_drive
+from nmpcrl.learning import Exploration, Weights, evaluate, expected_sarsa, train
+from nmpcrl.study import paper
+
+THETA = np.array(paper.THETA_INIT)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Nmpc:
+    return paper.nmpc()
+
+
+@pytest.fixture(scope="module")
+def tank() -> Nmpc:
+    """One state that is no position; the gain of the model is learned, and wrong at first."""
+    problem = Problem(
+        states=1,
+        inputs=1,
+        horizon=5,
+        gamma=0.9,
+        theta={"gain": 0.5},
+        model=lambda x, u, th: 0.9 * x + th["gain"] * u,
+        stage=lambda x, u, th: ca.sumsqr(x - 1) + 0.1 * ca.sumsqr(u),
+        lower=-1,
+        upper=1,
+    )
+    return Nmpc(problem, solver=Ipopt())
+
+
+def filling(state, action, rng):
+    """The tank as it is: another gain, a disturbance, a cost of its own, and an end."""
+    later = 0.9 * state + 0.3 * action + rng.normal(scale=0.01, size=1)
+    return later, abs(state[0] - 1), later[0] > 0.9
+
+
+def noise(episodes, steps, inputs):
+    return Exploration.draw(np.random.default_rng(0), (episodes, steps, inputs), deviation=0.1)
+
+
+def test_the_plant_that_plans_is_driven_if_no_other_is_given(robot):
+    steps = list(train(expected_sarsa(robot, 1e-7), robot, Weights(THETA, THETA), noise(1, 5, 2)))
+    same = list(
+        train(
+            expected_sarsa(robot, 1e-7), robot, Weights(THETA, THETA), noise(1, 5, 2),
+            plant=robot.plant, start=robot.task.start,
+        )
+    )  # fmt: skip
+    for one, other in zip(steps, same, strict=True):
+        np.testing.assert_array_equal(one.weights.theta, other.weights.theta)
+        assert one.cost == other.cost
+
+
+def test_another_plant_is_driven_at_the_tasks_cost(robot):
+    slow = differential_drive(period=0.1)
+    rollout = evaluate(robot, THETA, 5, plant=slow)
+    np.testing.assert_array_equal(
+        rollout.states[1], slow.step(robot.task.start, rollout.actions[0])
+    )
+    assert rollout.costs[0] == robot.task.stage_cost(robot.task.start, rollout.actions[0])
+
+
+def test_a_function_drives_charges_and_ends(tank):
+    theta = tank.problem.theta
+    rollout = evaluate(tank, theta, 50, plant=filling, start=[0.0], rng=3)
+    assert len(rollout.costs) < 50
+    np.testing.assert_allclose(rollout.costs, np.abs(rollout.states[:, 0] - 1))
+    again = evaluate(tank, theta, 50, plant=filling, start=[0.0], rng=3)
+    np.testing.assert_array_equal(rollout.states, again.states)
+
+
+def test_a_state_in_which_an_episode_ends_is_worth_nothing(tank):
+    weights, learner = Weights(tank.problem.theta, np.zeros(1)), expected_sarsa(tank, 1e-3)
+    options = {"plant": filling, "start": lambda rng: rng.uniform(0, 0.5, 1), "rng": 1}
+    steps = list(train(learner, tank, weights, noise(3, 60, 1), **options))
+    last = [step for step in steps if step.end]
+    assert [step.episode for step in last] == [0, 1, 2]
+    assert len(steps) < 180
+    starts = {step.state[0] for step in steps if step.time == 0}
+    assert len(starts) == 3
+    for step in last:
+        assert step.update.delta == pytest.approx(step.cost - step.solution.value)
+
+
+@pytest.mark.parametrize("missing", ["plant", "start"])
+def test_a_problem_says_that_it_only_plans(tank, missing):
+    options = {"plant": filling, "start": [0.0]}
+    del options[missing]
+    with pytest.raises(ValueError, match="a Problem plans, and says neither what is driven"):
+        evaluate(tank, tank.problem.theta, 5, **options)
+    with pytest.raises(AttributeError, match="an Nmpc of a Problem has no task"):
+        _ = tank.task
+
+
+@pytest.mark.parametrize(
+    ("plant", "message"),
+    [
+        (
+            lambda state, action: (state, 0, False),
+            r"plant is called as plant\(state",
+        ),
+        (lambda state, action, rng: state, r"returns \(next state, cost, end\)"),
+        (lambda state, action, rng: ([1, 2], 0, False), "a state is 1 finite numbers"),
+        (lambda state, action, rng: (np.nan * state, 0, False), "plant returned .nan."),
+    ],
+)
+def test_what_is_no_plant_is_refused(tank, plant, message):
+    with pytest.raises(ValueError, match=message):
+        evaluate(tank, tank.problem.theta, 5, plant=plant, start=[0.0])
+
+
+def test_a_plant_of_another_size_is_refused(robot):
+    plant = Plant(lambda s, a: [a, a, a], ("a", "b", "c"), ("u",), [-1], [1])
+    with pytest.raises(ValueError, match=r"the plant has 3 states and 1 inputs, and the plan 3"):
+        evaluate(robot, THETA, 1, plant=plant)
