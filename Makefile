@@ -26,8 +26,8 @@ book: .venv/ready  ## Train what is missing, execute every chapter, build _build
 pdf: .venv/ready  ## The built book as one PDF, _build/html/nmpcrl.pdf; needs a Chromium
 	@$(BIN)/python book/pdf.py
 
-course: .venv/ready  ## Notebooks for students, teachers and graders, and slides; the built book offers them
-	@$(BIN)/python book/course.py
+course: .venv/ready  ## Notebooks for students, teachers and graders, and slides; SECRET=FILE draws other numbers
+	@$(BIN)/python book/course.py $(if $(SECRET),--secret "$(SECRET)")
 
 smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/html
 	@$(BIN)/python book/build.py --smoke
@@ -49,10 +49,10 @@ bench: .venv/ready  ## Measure how long solves, steps and runs take, and print w
 PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
 
 test: .venv/ready  ## All tests of the library, its commands and the sources of the book
-	@$(PYTEST) -m "not book and not lab and not course"
+	@$(PYTEST) -m "not built and not lab and not course"
 
 test-site: .venv/ready  ## The built book in browsers; needs a built book, a Chromium and a Firefox
-	@$(PYTEST) -m "book and not lab and not course"
+	@$(PYTEST) -m "built and not lab and not course"
 
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
 	@$(BIN)/python -m pytest -m lab
@@ -64,7 +64,7 @@ test-clusters: .venv/ready  ## The programs for clusters against a SLURM, which 
 	@$(if $(filter-out 0,$(shell id -u)),sudo) .ci/clusters
 
 test-fast: .venv/ready  ## The fast tests: no book, no training
-	@$(BIN)/python -m pytest -m "not slow and not book and not slurm and not lab and not course"
+	@$(BIN)/python -m pytest -m "not slow and not built and not browser and not slurm and not lab and not course"
 
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks
 	@$(BIN)/ruff check .

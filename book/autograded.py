@@ -16,7 +16,11 @@ Notebook = Any
 
 SCHEMA = 3  # of nbgrader's metadata
 LOCKED = ("setup", "exercises-checks")  # cells without which no check says anything
-NBGRADER_CONFIG = """c = get_config()  # noqa: F821
+NBGRADER_CONFIG = """import os
+from pathlib import Path
+
+os.environ["NMPCRL_DATA"] = str(Path(__file__).resolve().parent / "data")  # of all assignments
+c = get_config()  # noqa: F821
 c.CourseDirectory.course_id = "nmpcrl"
 c.ClearSolutions.code_stub = {"python": ""}  # the dots, or the bug, stand above the solution
 c.ExecutePreprocessor.timeout = 120  # [s] of one cell
@@ -48,7 +52,7 @@ def for_nbgrader(source: Notebook) -> Notebook:
 def _worth(one: Exercise) -> list[tuple[Cell, int]]:
     """The checks of an exercise, and the points: all of them are the first one's."""
     checks = one.parts["check"]
-    return [(cell, 0 if cell is not checks[0] else one.about.points) for cell in checks]
+    return [(cell, 0 if cell is not checks[0] else one.about.worth) for cell in checks]
 
 
 def _mark(cell: Cell, *, points: int | None = None, **kind: bool) -> None:
@@ -79,7 +83,7 @@ def for_otter(source: Notebook) -> Notebook:
 
 def _enclose(notebook: Notebook, one: Exercise) -> None:
     """Put the raw cells of otter around a question, its answers and its tests."""
-    about = f"name: {one.name}\npoints: {one.about.points}"
+    about = f"name: {one.name}\npoints: {one.about.worth}"
     around = {
         "QUESTION": (one.text, one.parts["check"][-1], f"\n{about}"),
         "SOLUTION": (one.parts["answer"][0], one.parts["answer"][-1], ""),

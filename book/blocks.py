@@ -10,9 +10,8 @@ from markdown_it.token import Token
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 ANCHOR = re.compile(r'<a id="[^"]*"></a>\n?')
-SENTENCE = re.compile(r".*?[.:!?](?=\s+[A-Z$*`]|$)", flags=re.S)  # the first of a paragraph
 
-Piece = tuple[str, str]  # "title", "lead", "shown" or "said", and its HTML
+Piece = tuple[str, str]  # "table", "quote" or "text", and its HTML; "image", its address and words
 
 
 def _formula(tex: str, options: dict[str, Any]) -> str:
@@ -37,19 +36,20 @@ def _rendered(tokens: list[Token]) -> str:
 
 
 def blocks(markdown: str) -> Iterator[Piece]:
-    """The blocks of a text, and the first sentence where one begins with a paragraph."""
+    """The blocks of a text."""
     block: list[Token] = []
-    leads = True
     for token in MARKDOWN.parse(ANCHOR.sub("", markdown)):
         block.append(token)
-        if token.level > 0 or token.nesting > 0:
-            continue
-        if block[0].type == "heading_open":
-            yield "title", _rendered(block[1:-1])
-        elif block[0].type == "paragraph_open":
-            if leads and (first := SENTENCE.match(block[1].content)):
-                yield "lead", f"<p>{inline(first[0])}</p>"
-            yield "said", _rendered(block)
-        else:
-            yield "shown", _rendered(block)
-        leads, block = block[0].type == "heading_open", []
+        if token.level == 0 and token.nesting <= 0:
+            yield _piece(block)
+            block = []
+
+
+def _piece(block: list[Token]) -> Piece:
+    kind = block[0].type.removesuffix("_open")
+    if kind == "paragraph" and [one.type for one in block[1].children or []] == ["image"]:
+        (image,) = block[1].children or []
+        return "image", f"{image.attrs['src']} {image.content}"
+    if kind == "blockquote":
+        return "quote", _rendered(block[1:-1])
+    return ("table" if kind == "table" else "text"), _rendered(block)

@@ -2,9 +2,10 @@
 
     python book/course.py              _build/course/student, instructor, grader and slides
     python book/course.py --otter      the third for otter in place of nbgrader
+    python book/course.py --secret F   exercises with other numbers, drawn from what a file holds
 
-The folder `grader` is one of a course of nbgrader's, with one assignment, `nmpcrl`; it is for
-teachers alone, and `nmpcrl grade` reads it.
+The folder `grader` is one of a course of nbgrader's, with an assignment for each chapter, which
+share the data; it is for teachers alone, and `nmpcrl grade` reads it.
 
 Each folder can be handed out as it is. The first three hold the chapters that have exercises, the
 library as a wheel, what to install with it and how, as `handout` says, the published study, and the
@@ -24,7 +25,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import autograded
 import build
@@ -37,6 +38,7 @@ import offline
 import pictures
 import slides
 
+from nmpcrl.course import variants
 from nmpcrl.course.exercises import exercises
 
 ROOT = build.ROOT
@@ -46,7 +48,6 @@ EDITIONS: dict[str, Callable[..., Any]] = {
     "instructor": editions.teacher,
     "grader": editions.grader,
 }
-WITHIN = {"grader": "source/nmpcrl"}  # where in its folder an edition is, if not there itself
 SINCE_1980 = "315532800"  # the earliest time that a ZIP file, so a wheel, can hold [s]
 WHEEL = ("--no-deps", "--no-build-isolation", "--no-index", "--quiet")
 PACKAGED = ("pyproject.toml", "LICENSE")
@@ -58,12 +59,19 @@ def chapters() -> dict[str, Any]:
     return {name: notebook for name, notebook in read.items() if any(exercises(notebook))}
 
 
-def wheel(place: Path) -> Path:
-    """The library as a wheel at `place`, without a network, the same bytes every time."""
+def wheel(place: Path, *, withheld: bool = False) -> Path:
+    """The library as a wheel at `place`, without a network, the same bytes every time.
+
+    Args:
+        place: a folder.
+        withheld: without the checks of exercises whose numbers may be others.
+    """
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / "source"
         ignored = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / "nmpcrl", source / "nmpcrl", ignore=ignored)
+        for path in (source / "nmpcrl/course/checks").glob("*.py") if withheld else ():
+            path.write_text(variants.without(path.read_text("utf-8")), "utf-8")
         for name in PACKAGED:
             shutil.copy2(ROOT / name, source)
         command = [sys.executable, "-m", "pip", "wheel", *WHEEL, "-w", str(place), str(source)]
@@ -72,7 +80,9 @@ def wheel(place: Path) -> Path:
     return made
 
 
-def edition(name: str, place: Path, runs: Mapping[str, Path], *, otter: bool = False) -> None:
+def edition(
+    name: str, place: Path, runs: Mapping[str, Path], *, otter: bool = False, secret: bytes = b""
+) -> None:
     """Write one edition to a folder, which is made anew.
 
     Args:
@@ -80,16 +90,25 @@ def edition(name: str, place: Path, runs: Mapping[str, Path], *, otter: bool = F
         place: the folder.
         runs: what else it holds, as `offline.stored` has it.
         otter: mark the notebooks of graders for otter.
+        secret: from which other numbers are drawn; if empty, exercises are those of the book.
     """
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
-    library = wheel(place).name
+    library = wheel(place, withheld=bool(secret) and name == "student").name
     sources = chapters()
     make = partial(EDITIONS[name], otter=True) if otter else EDITIONS[name]
+    assignments = name == "grader" and not otter
+    files = {f: f"source/{Path(f).stem}/{f}" if assignments else f for f in sources}
     for file, source in sources.items():
-        nbformat.write(make(source, set(sources)), place / file)
+        path = place / files[file]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        given = variants.varied(source, secret) if secret else source
+        nbformat.write(make(given, set(sources)), path)
+    if assignments:
+        (place / "nbgrader_config.py").write_text(autograded.NBGRADER_CONFIG)
     (place / "requirements.txt").write_text(handout.requirements(library))
-    (place / "README.md").write_text(handout.readme(name, library, first=next(iter(sources))))
+    readme = handout.readme(name, library, first=next(iter(files.values())))
+    (place / "README.md").write_text(readme)
     for data in ("published", "_static/live"):
         shutil.copytree(ROOT / "book" / data, place / "data" / Path(data).name)
     offline.copy(runs, place)
@@ -113,9 +132,9 @@ def drawn(executed: Path) -> dict[str, bytes]:
         raise build.Failure(reason) from missing
 
 
-def decks(sources: dict[str, Any], place: Path) -> None:
-    """Write the slides of executed chapters to a folder, as PDFs, too."""
-    slides.printed(slides.make(sources, slides.EXECUTED, place))
+def decks(_: dict[str, Any], place: Path) -> None:
+    """Write the slides of the course's units to a folder, as PDFs, too."""
+    slides.printed(slides.make(slides.EXECUTED, place))
 
 
 SHOWN: dict[str, Callable[[dict[str, Any], Path], None]] = {  # of the last build, by folder
@@ -136,19 +155,26 @@ def is_whole(name: str, sources: dict[str, Any]) -> bool:
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--otter", is_flag=True, help="An edition for graders with otter, too.")
-def main(otter: bool) -> None:
+@click.option(
+    "--secret",
+    type=click.File("rb"),
+    help="A file from which other numbers are drawn; the built book offers no such edition.",
+)
+def main(otter: bool, secret: BinaryIO | None) -> None:
     """Write the editions to _build/course."""
+    drawn_from = secret.read() if secret else b""
+    if secret and not drawn_from:
+        raise click.BadParameter("The file is empty.", param_hint="--secret")
     os.chdir(ROOT)
     sources = chapters()
     runs = offline.stored(sources)
     for name in EDITIONS:
-        edition(name, PLACE / name / WITHIN.get(name, ""), runs)
+        edition(name, PLACE / name, runs, secret=drawn_from)
     if otter:
-        edition("grader", PLACE / "otter", runs, otter=True)
-    (PLACE / "grader/nbgrader_config.py").write_text(autograded.NBGRADER_CONFIG)
+        edition("grader", PLACE / "otter", runs, otter=True, secret=drawn_from)
     whole = [*EDITIONS, *(name for name in SHOWN if is_whole(name, sources))]
     made = [PLACE / name for name in whole] + [PLACE / "otter"] * otter
-    if (SITE / "index.html").exists():
+    if (SITE / "index.html").exists() and not secret:
         offered = [PLACE / name for name in whole if name in downloads.CONTENTS]
         made += downloads.offer(offered, SITE)
     for path in made:

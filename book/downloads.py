@@ -16,7 +16,7 @@ CONTENTS = {  # in words, by edition
     "student": "Notebooks for students, with empty answers",
     "instructor": "Notebooks for teachers, with solutions, notes, and the figures as SVG and PDF",
     "grader": "Notebooks for graders, marked for nbgrader",
-    "slides": "Slides, a deck for each chapter",
+    "slides": "Slides, a deck for each unit of two weeks",
 }
 WITHOUT_RUNS = ("instructor", "grader")  # but with their summaries
 PLACE = re.compile(

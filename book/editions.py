@@ -20,6 +20,7 @@ from syllabus import LIVE as LIVE_FIGURE
 from syllabus import Chapter
 
 from nmpcrl.course.exercises import HEAD, Exercise, exercises, solved
+from nmpcrl.course.variants import withhold
 
 Notebook = Any
 
@@ -41,10 +42,11 @@ one sentence; nothing else depends on it. Everything runs without a network, fro
 SETUP = """import os
 from pathlib import Path
 
-if not Path("data/published").is_dir():
+data = Path(os.environ.get("NMPCRL_DATA", "data"))
+if not (data / "published").is_dir():
     raise FileNotFoundError("There is no folder `data` here: keep it beside the notebooks.")
 folders = {"PUBLISHED": "published", "RUNS": "runs", "LIVE": "live"}
-os.environ |= {f"NMPCRL_{name}": f"data/{folder}" for name, folder in folders.items()}
+os.environ |= {f"NMPCRL_{name}": str(data / folder) for name, folder in folders.items()}
 os.environ["NMPCRL_STRICT"] = "1"  # an answer that is missing or wrong fails"""
 COLUMNS = "| exercise | kind | level | minutes | points | goal |\n|---|---|---|---|---|---|"
 TIMES = "| section | reading | lecture | live figures |\n|---|---:|---:|---:|"
@@ -63,6 +65,7 @@ def student(source: Notebook, pages: Collection[str]) -> Notebook:
         for cell in one.parts["check"]:
             cell.metadata |= {"editable": False, "deletable": False}
             cell.metadata["tags"] = [*cell.metadata["tags"], "raises-exception"]
+        withhold(one)
         _drop(notebook, one.parts["solution"])
         one.text.metadata["nmpcrl"]["exercise"].pop("mistakes", None)
     return _edition(notebook, pages)
@@ -150,10 +153,10 @@ def _note(exercise: Exercise) -> str:
 def _table(every: list[Exercise]) -> str:
     rows = [
         f"| {one.number} | {one.about.kind} | {one.about.level} | {one.about.minutes} "
-        f"| {one.about.points} | {one.about.goal} |"
+        f"| {one.about.worth or 'practice'} | {one.about.goal} |"
         for one in every
     ]
-    minutes, points = (sum(getattr(o.about, k) for o in every) for k in ("minutes", "points"))
+    minutes, points = (sum(getattr(o.about, k) for o in every) for k in ("minutes", "worth"))
     total = f"Together {minutes} minutes and {points} points."
     return "\n".join(
         ["**For the teacher: the exercises of this chapter.**\n", COLUMNS, *rows, "", total]

@@ -53,7 +53,8 @@ PURPOSES = {  # title, and what is to be done with it
     ),
     "grader": (
         "Reinforcement learning on nonlinear MPC: notebooks for graders",
-        "These have the solutions: do not hand them out. `nmpcrl grade` reads this folder.\n",
+        "These have the solutions: do not hand them out. `nmpcrl grade` reads this folder; for\n"
+        "nbgrader it is a course with an assignment for each chapter.\n",
     ),
 }
 GIGABYTES = 1.3  # of all that is installed, measured on Linux

@@ -1,4 +1,4 @@
-"""A deck for each chapter that has exercises, from its own cells: part of `make course`.
+"""A deck for each unit of the course that has a text in `book/decks`: part of `make course`.
 
 It shows figures, numbers and equations as the last build of the book has them, and needs no
 network: reveal.js and MathJax are copied from the packages sphinx-revealjs and
@@ -8,7 +8,7 @@ and `?print-pdf` prints.
 
 import re
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from html import escape
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,8 +19,10 @@ import deck
 import nbformat
 import pdf
 from deck import FILES
+from plans import Unit, plan
 
 EXECUTED = Path("_build/executed")
+TEXTS, PLAN = build.ROOT / "book/decks", "two-weeks"
 PACKAGES = {  # where its files are, and which of them a deck takes
     "sphinx_revealjs": (
         "_static/revealjs",
@@ -54,8 +56,18 @@ PAGE = """<!DOCTYPE html>
 """
 
 
-def make(chapters: dict[str, Any], executed: Path, place: Path) -> list[Path]:
-    """Write a deck for each of these sources to a folder, which is made anew; the decks.
+def units() -> Iterator[tuple[str, str, Unit]]:
+    """Each unit of the plan that has a text: the name of its deck, the text, and the unit."""
+    texts = {path.stem: path.read_text("utf-8") for path in sorted(TEXTS.glob("*.md"))}
+    named = {text.partition("\n")[0].removeprefix("# "): name for name, text in texts.items()}
+    for unit in plan(PLAN):
+        if unit.title in named:
+            name = named[unit.title]
+            yield name, texts[name], unit
+
+
+def make(executed: Path, place: Path) -> list[Path]:
+    """Write a deck for each unit to a folder, which is made anew; the decks.
 
     Raises:
         build.Failure: a chapter was not executed, or a package is not installed.
@@ -66,23 +78,24 @@ def make(chapters: dict[str, Any], executed: Path, place: Path) -> list[Path]:
         copy(package, folder, names, place / FILES)
     for name in OWN:
         shutil.copyfile(build.ROOT / "book/_static/deck" / name, place / FILES / name)
-    return [write(name, source, executed, place) for name, source in chapters.items()]
+    return [write(name, text, unit, executed, place) for name, text, unit in units()]
 
 
-def write(name: str, source: Any, executed: Path, place: Path) -> Path:
+def write(name: str, text: str, unit: Unit, executed: Path, place: Path) -> Path:
     """Write one deck and the files that it alone needs, or the live figures share."""
-    if not (executed / name).exists():
-        raise build.Failure(f"Slides show what {name} computes: `make book` executes it.")
+    chapter = executed / f"{unit.sections[0].page}.ipynb"
+    if not chapter.exists():
+        raise build.Failure(f"Slides show what {chapter.name} computes: `make book` executes it.")
     try:
-        made = deck.deck(Path(name).stem, source, nbformat.read(executed / name, 4))
-    except deck.Unexecuted as error:
-        raise build.Failure(f"{name}: {error}; `make book` builds it anew.") from error
+        made = deck.deck(text, unit, nbformat.read(chapter, 4))
+    except deck.NotThere as error:
+        raise build.Failure(f"book/decks/{name}.md: {error}; is the last build older?") from error
     for path, data in made.files.items():
         target = place / FILES / path
         target.parent.mkdir(exist_ok=True)
         target.write_bytes(data)
     page = PAGE.format(title=escape(made.title, False), slides=made.html(), files=FILES)
-    target = (place / name).with_suffix(".html")
+    target = place / f"{name}.html"
     target.write_text(page, "utf-8")
     return target
 

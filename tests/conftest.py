@@ -17,22 +17,37 @@ from hypothesis import settings
 
 from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.bench.solves import transposed
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.published import failure_modes_of
 from nmpcrl.control import differential_drive
 from nmpcrl.learning import browser as in_browser
-from nmpcrl.study import Experiment, Runs, design, executor, paper
+from nmpcrl.study import Experiment, Runs, design, paper
+from nmpcrl.study.storage import executor
 
 settings.register_profile("no clock", deadline=None)  # the machine may be busy
 settings.load_profile("no clock")
 
 ROOT = Path(__file__).resolve().parent.parent
+NEEDS = {  # fixture -> the marker of a test that asks for it, directly or through others
+    "site": "built",
+    "browser": "browser",
+    "distributed_firefox": "browser",
+    "jupyter_lab": "lab",
+    "nbgrader": "network",
+}
 RUNS = Path(os.environ.get("NMPCRL_RUNS") or ROOT / "runs")  # before a test names others
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
     "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run"
     " --disable-background-networking --disable-component-update --disable-sync"
 )
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark a test with what it needs, so that none can forget to say so."""
+    for fixture in NEEDS.keys() & set(getattr(item, "fixturenames", ())):
+        item.add_marker(NEEDS[fixture])
 
 
 def missing(reason: str) -> None:
@@ -158,10 +173,6 @@ REST = 0.02  # [ms]
 HOURS = {"ES": 18.0, "GES": 18.0, "RDES": 9.0}
 
 
-def transposed(names: tuple[str, ...], rows: list[tuple]) -> dict[str, list]:
-    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
-
-
 def learner(solver: str, name: str) -> tuple:
     solve, fit = 1e3 * SOLVERS[solver], FIT if name in ("RDES", "DES") else None
     step = SOLVES[name] * solve + (fit or 0.0) + REST
@@ -183,7 +194,7 @@ def measured() -> dict[str, dict]:
 MEASURED = {
     "about": {"length": "full", "key": "0", "date": "2026-01-01", "seconds": 60.0, "others": 0.1},
     "solves": transposed(
-        ("loop", "solver", "warm", "seconds", "iterations", "suboptimality"),
+        "loop solver warm seconds iterations suboptimality",
         [
             (loop, solver, t > 0, seconds if t else 10 * seconds, 5, 0.0)
             for loop in LOOPS
@@ -191,29 +202,16 @@ MEASURED = {
             for t in range(5)
         ],
     ),
-    "loop": transposed(("loop", "seconds"), [(loop, 40e-6) for loop in LOOPS for _ in range(5)]),
+    "loop": transposed("loop seconds", [(loop, 40e-6) for loop in LOOPS for _ in range(5)]),
     "parts": {"part": ["solve, compiled part", "step of the plant"], "seconds": [30e-6, 2e-6]},
     "scaling": transposed(
-        ("varied", "size", "seconds", "iterations"),
+        "varied size seconds iterations",
         growing("horizon", (5, 10, 20, 40, 80), 0.5e-6)
         + growing("obstacles", (1, 4, 8, 16, 32), 0.25e-6),
     ),
     "learners": transposed(
-        (
-            "solver",
-            "learner",
-            "solves",
-            "ms_per_step",
-            "ms_per_solve",
-            "ms_per_fit",
-            "ms_per_rest",
-            "hours",
-            "hours_paper",
-            "ratio",
-            "ratio_low",
-            "ratio_high",
-            "waited",
-        ),
+        "solver learner solves ms_per_step ms_per_solve ms_per_fit ms_per_rest hours hours_paper"
+        " ratio ratio_low ratio_high waited",
         [learner(solver, name) for solver in ("riccati", "fatrop", "ipopt") for name in SOLVES],
     ),
     "mpcrl": {"learner": ["mpcrl", "mpcrl", "ES", "ES"], "seconds": [0.01, 0.01, 1e-4, 1e-4]},
@@ -224,7 +222,7 @@ MEASURED = {
         "processor": [4.0, 4.0, 16.0, 16.0],
     },
     "episodes": transposed(
-        ("learner", "episode", "seconds", "memory"),
+        "learner episode seconds memory",
         [(name, k, 0.01 * k, 400_000_000) for name in SOLVES for k in range(1, 301)],
     ),
     "parallel": {"workers": [1, 2], "seconds": [20.0, 10.5], "runs": [4, 4], "episodes": [9, 9]},

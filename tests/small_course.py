@@ -11,15 +11,16 @@ check = SimpleNamespace(**{{name: exercise(lambda a: number(a, 2)) for name in {
 SOLUTION = "<details><summary>Solution</summary>\n\n```python\n{}\n```\n\n</details>"
 
 
-def exercise(number, name):
-    """The cells of an exercise that asks for a root."""
+def exercise(number, name, answer="root_of_{} = ...", asked="root_of_{}"):
+    """The cells of an exercise that asks for a root, or for something else."""
+    answer, asked = answer.format(name), asked.format(name)
     about = {"kind": "by hand", "level": 1, "minutes": 1, "points": number, "goal": "a root"}
     head = f'<a id="ex-{name}"></a>\n**Exercise 1.{number}.** What is the root of `four`?'
     code = f"import math\nroot_of_{name} = math.sqrt(four)"
     return [
         new_markdown_cell(head, id=f"{name}-text", metadata={"nmpcrl": {"exercise": about}}),
-        tagged("answer", new_code_cell(f"root_of_{name} = ...", id=f"{name}-answer")),
-        tagged("check", new_code_cell(f"check.{name}(root_of_{name})", id=f"{name}-check")),
+        tagged("answer", new_code_cell(answer, id=f"{name}-answer")),
+        tagged("check", new_code_cell(f"check.{name}({asked})", id=f"{name}-check")),
         tagged("solution", new_markdown_cell(SOLUTION.format(code), id=f"{name}-solution")),
     ]
 

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 from nmpcrl import control
@@ -76,6 +77,29 @@ def test_imports_run_one_way_from_commands_to_control():
         imported = {name.split(".")[1] for name in imports(path) if name.startswith("nmpcrl.")}
         if room in ROOMS and (against := imported & set(ROOMS) - below(room)):
             wrong[place(path)] = against
+    assert not wrong
+
+
+def test_no_file_imports_itself_through_others():
+    """Nor for its types alone; `prepare` raises `CycleError`, which names the files."""
+    files = {f"nmpcrl.{place(path)[:-3].replace('/', '.')}": path for path in MODULES}
+    TopologicalSorter({name: imports(path) & set(files) for name, path in files.items()}).prepare()
+
+
+def test_storage_knows_no_experiment():
+    """It runs any job and keeps any file, so it imports nothing of ours that lies outside it."""
+    wrong = {
+        place(path): outside
+        for path in MODULES
+        if place(path).startswith("study/storage/")
+        if (
+            outside := {
+                name
+                for name in imports(path)
+                if name.startswith("nmpcrl.") and not name.startswith("nmpcrl.study.storage")
+            }
+        )
+    }
     assert not wrong
 
 

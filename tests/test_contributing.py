@@ -140,7 +140,7 @@ def shy_deep_expected_sarsa(
     bootstrap = Imitation(network, with_theta=False, **options)
     return Learner("shy", bootstrap, semi_gradient(alpha / 3), nmpc.gamma)
 '''),
-        "nmpcrl/study/setup.py": both(
+        "nmpcrl/study/learners.py": both(
             imported(
                 "from nmpcrl.learning.learners import (\n    half_expected_sarsa,\n"
                 "    shy_deep_expected_sarsa,\n    slow_gradient_expected_sarsa,\n)"
@@ -226,7 +226,7 @@ def largest_reduction(cost: Vector) -> float:
         ),
     },
     "figure": {
-        "nmpcrl/report/figures/ends.py": added('''"""Where theta ends."""
+        "nmpcrl/report/figures/runs/ends.py": added('''"""Where theta ends."""
 
 from matplotlib.figure import Figure
 
@@ -246,7 +246,7 @@ def ends(runs: Runs[Records]) -> Figure:
     return headed(figure, f"theta ends in {len(runs)} places")
 '''),
         "book/02_expected_sarsa.ipynb": shown(
-            "from nmpcrl.report.figures.ends import ends\n\nends(runs)"
+            "from nmpcrl.report.figures.runs.ends import ends\n\nends(runs)"
         ),
     },
     "chapter": {
@@ -359,7 +359,7 @@ import numpy as np
 from nmpcrl.bench.learners import time_learners
 from nmpcrl.claims import published
 from nmpcrl.control.solvers.relay import Relay
-from nmpcrl.report.figures import claims
+from nmpcrl.report.figures.verdicts import claims
 from nmpcrl.study import Experiment, paper, run
 
 theta = np.array(paper.THETA_INIT)
@@ -531,7 +531,6 @@ def test_what_was_added_works(failures, name):
 
 
 @pytest.mark.slow
-@pytest.mark.book
 def test_the_live_figure_that_was_added_solves_in_a_browser(scratch, failures, browser):
     assert "live figure" not in failures
     page = browser.new_page()

@@ -19,11 +19,12 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.learning.rollout import Persistent, evaluate
-from nmpcrl.study import paper, place, store
-from nmpcrl.study.atomic import write_json
-from nmpcrl.study.executor import execute
+from nmpcrl.study import paper, store
 from nmpcrl.study.parameters import LARGEST_SEED, Allowed, OneOf, Whole
 from nmpcrl.study.provenance import epochs, versions
+from nmpcrl.study.storage import place
+from nmpcrl.study.storage.atomic import write_json
+from nmpcrl.study.storage.executor import execute
 
 BUDGET = 2000  # rollouts without noise that a search may make
 LEAST = 40  # rollouts: the first one and some generations

@@ -15,9 +15,7 @@ from typing import Any
 
 from nmpcrl.analysis.summary import RunSummary, summarise
 from nmpcrl.control import Riccati
-from nmpcrl.study import place, store
-from nmpcrl.study.atomic import write_json
-from nmpcrl.study.executor import execute
+from nmpcrl.study import store
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import seconds_of
 from nmpcrl.study.provenance import (
@@ -28,9 +26,12 @@ from nmpcrl.study.provenance import (
     warn_of_changes,
 )
 from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
-from nmpcrl.study.reservation import reservations
 from nmpcrl.study.run import run
 from nmpcrl.study.setup import compile_ahead
+from nmpcrl.study.storage import place
+from nmpcrl.study.storage.atomic import write_json
+from nmpcrl.study.storage.executor import execute
+from nmpcrl.study.storage.reservation import reservations
 from nmpcrl.study.store import Runs
 
 FOLDER = "summaries"  # among the runs

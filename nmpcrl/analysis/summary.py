@@ -17,7 +17,6 @@ from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
-from nmpcrl.study.archive import Column, Field, Form, Forms, load_about, load_arrays, save_arrays
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import (
     INPUTS,
@@ -28,6 +27,15 @@ from nmpcrl.study.records import (
     named_in,
 )
 from nmpcrl.study.setup import controller_of
+from nmpcrl.study.storage.archive import (
+    Column,
+    Field,
+    Form,
+    Forms,
+    load_about,
+    load_arrays,
+    save_arrays,
+)
 
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
 IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6

@@ -10,7 +10,7 @@ import pandas as pd
 
 from nmpcrl import Matrix
 from nmpcrl.bench.paired import TURN, Ratio, paired_ratio
-from nmpcrl.bench.solves import Columns
+from nmpcrl.bench.solves import Columns, transposed
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Step, train
@@ -29,16 +29,15 @@ def against_mpcrl(rounds: int, steps: int) -> Columns:
     Returns:
         A row a round and learner: learner ("ES" or "mpcrl"), seconds. No rows without mpcrl.
     """
-    columns: Columns = {"learner": [], "seconds": []}
+    rows: list[tuple[str, float]] = []
     try:
         from nmpcrl.bench.baseline_mpcrl import time_mpcrl
     except ImportError:
-        return columns
+        rounds = 0
     for _ in range(rounds):
-        for learner, times in (("mpcrl", time_mpcrl(steps)), ("ES", _time_es(steps))):
-            columns["learner"] += [learner] * len(times)
-            columns["seconds"] += times
-    return columns
+        rows += [("mpcrl", seconds) for seconds in time_mpcrl(steps)]
+        rows += [("ES", seconds) for seconds in _time_es(steps)]
+    return transposed("learner seconds", rows)
 
 
 def _time_es(steps: int, episodes: int = 5) -> list[float]:

@@ -15,9 +15,10 @@ import numpy as np
 
 import nmpcrl
 from nmpcrl.bench.solves import closed_loop, watched
-from nmpcrl.study import Experiment, paper, place, run, store
-from nmpcrl.study.atomic import write_json
+from nmpcrl.study import Experiment, paper, run, store
 from nmpcrl.study.parameters import Refusal
+from nmpcrl.study.storage import place
+from nmpcrl.study.storage.atomic import write_json
 
 Live = dict[str, Any]  # numbers by what is measured; what could not be is absent
 
@@ -72,7 +73,8 @@ TRAIN = f"""([learner, layout, episodes]) => new Promise((done, failed) => {{
   const of = Object.fromEntries(data.fields.map((field) => [field.name, field.default]))
   const settings = {{
     ...of, learner, episodes, steps, theta, w, start, target, seed: 0, decayRate: of.decay_rate,
-    thetaSet: data.theta_set, evaluateEvery: data.evaluate_every,
+    thetaSet: data.theta_set, evaluateEvery: data.evaluate_every, limits: data.limits,
+    network: data.network,
     discs: data.layouts[layout].map((centre) => [...centre, data.clearance]),
   }}
   const began = performance.now(), module = window.nmpcrl.module
@@ -81,10 +83,11 @@ TRAIN = f"""([learner, layout, episodes]) => new Promise((done, failed) => {{
 }})"""
 
 FIT = f"""async ([turns, fits]) => {{
-  const {{ solver, module, network, generator }} = window.nmpcrl, {{ problem, theta }} = {DATA}
+  const {{ solver, module, network, generator }} = window.nmpcrl
+  const data = {DATA}, {{ problem, theta }} = data
   const {{ wasm }} = await solver(module, problem)
   const inputs = problem.target.length + problem.lower.length + theta.length
-  const one = network(wasm, inputs, generator(0), 0.01)
+  const one = network(wasm, {{ inputs, ...data.network, rate: 0.01 }}, generator(0))
   for (let k = 0; k < {EXAMPLES}; k++) {{
     one.remember(Array.from({{ length: inputs }}, (_, i) => Math.sin(k * (i + 1))), k)
   }}

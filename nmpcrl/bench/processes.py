@@ -16,9 +16,9 @@ import pandas as pd
 
 from nmpcrl.bench.learners import COMPARED
 from nmpcrl.bench.paired import Ratio, pooled
-from nmpcrl.bench.solves import Columns
+from nmpcrl.bench.solves import Columns, transposed
 from nmpcrl.study import paper
-from nmpcrl.study.executor import THREADS
+from nmpcrl.study.storage.executor import THREADS
 from nmpcrl.study.store import fetch_all
 from nmpcrl.study.sweeps import sweep
 
@@ -35,20 +35,18 @@ def whole_runs(learners: tuple[str, ...], episodes: int) -> tuple[Columns, Colum
         worked); and a row a learner and episode: learner, episode, seconds (from the start of the
         run), memory (resident, in bytes).
     """
-    totals: Columns = {"learner": [], "episodes": [], "seconds": [], "processor": []}
-    progress: Columns = {"learner": [], "episode": [], "seconds": [], "memory": []}
+    totals, progress = [], []
     for learner in learners:
         measured, _ = _alone("run", learner, str(episodes))
-        done = len(measured["seconds"])
-        _add(totals, learner, done, measured["total"], measured["processor"])
-        for k in range(done):
-            _add(progress, learner, k + 1, measured["seconds"][k], measured["memory"][k])
-    return totals, progress
-
-
-def _add(columns: Columns, *row: Any) -> None:
-    for column, value in zip(columns.values(), row, strict=True):
-        column.append(value)
+        seconds, memory = measured["seconds"], measured["memory"]
+        totals.append((learner, len(seconds), measured["total"], measured["processor"]))
+        progress += [
+            (learner, k + 1, *one) for k, one in enumerate(zip(seconds, memory, strict=True))
+        ]
+    return (
+        transposed("learner episodes seconds processor", totals),
+        transposed("learner episode seconds memory", progress),
+    )
 
 
 def at_once(runs: int, episodes: int) -> Columns:
@@ -56,17 +54,15 @@ def at_once(runs: int, episodes: int) -> Columns:
 
     The start of the processes counts. No rows where no runs are asked for.
     """
-    columns: Columns = {"workers": [], "seconds": [], "runs": [], "episodes": []}
-    if not runs:
-        return columns
-    experiments = sweep(learner="ES", seed=tuple(range(runs)), episodes=episodes)
-    for workers in sorted({1, os.cpu_count() or 1}):
+    rows = []
+    experiments = sweep(learner="ES", seed=tuple(range(runs)), episodes=episodes) if runs else ()
+    for workers in sorted({1, os.cpu_count() or 1}) if runs else ():
         with tempfile.TemporaryDirectory() as folder, _environment(NMPCRL_RUNS=folder):
             began = time.perf_counter()
             fetch_all(experiments, workers=workers, progress=False)
             seconds = time.perf_counter() - began
-        _add(columns, workers, seconds, runs, episodes)
-    return columns
+        rows.append((workers, seconds, runs, episodes))
+    return transposed("workers seconds runs episodes", rows)
 
 
 def first_calls(times: int, *, compile_too: bool) -> Columns:
@@ -76,15 +72,15 @@ def first_calls(times: int, *, compile_too: bool) -> Columns:
         A row a process: cached, solve, step (seconds, as `fresh_process.first_call`), process
         (seconds from its start to its end), notice (whether it said that it compiles).
     """
-    columns: Columns = {"cached": [], "solve": [], "step": [], "process": [], "notice": []}
+    rows = []
     with tempfile.TemporaryDirectory() as folder:
         for cached in [False] * compile_too + [True] * times:
             with _environment(**({"NMPCRL_CACHE": folder} if compile_too else {})):
                 began = time.perf_counter()
                 measured, said = _alone("first")
                 process = time.perf_counter() - began
-            _add(columns, cached, *measured.values(), process, "Compiling" in said)
-    return columns
+            rows.append((cached, *measured.values(), process, "Compiling" in said))
+    return transposed("cached solve step process notice", rows)
 
 
 def time_learners_afresh(processes: int = PROCESSES, steps: int = paper.STEPS) -> pd.DataFrame:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.bench.solves import THETA, Columns
+from nmpcrl.bench.solves import THETA, Columns, transposed
 from nmpcrl.control import Nmpc, Obstacle, Solution, SolverError
 from nmpcrl.study import paper
 
@@ -30,7 +30,7 @@ def solve_times(episodes: int, steps: int) -> Columns:
     rng = np.random.default_rng(3)
     problems = [("horizon", size, paper.nmpc(horizon=size)) for size in HORIZONS]
     problems += [("obstacles", size, _crowded(size)) for size in OBSTACLES]
-    columns: Columns = {"varied": [], "size": [], "seconds": [], "iterations": []}
+    rows = []
     for _ in range(episodes):
         states = [nmpc.task.start for _, _, nmpc in problems]
         plans: list[Solution | None] = [None] * len(problems)
@@ -41,12 +41,9 @@ def solve_times(episodes: int, steps: int) -> Columns:
                 plan = nmpc.solve(states[i], THETA, plans[i])
                 seconds = time.perf_counter() - began
                 states[i], plans[i] = nmpc.plant.step(states[i], plan.action), plan
-                for name, value in zip(
-                    columns, (varied, size, seconds, plan.iterations), strict=True
-                ):
-                    if t:  # the first solve of an episode is cold
-                        columns[name].append(value)
-    return columns
+                if t:  # the first solve of an episode is cold
+                    rows.append((varied, size, seconds, plan.iterations))
+    return transposed("varied size seconds iterations", rows)
 
 
 def _crowded(count: int) -> Nmpc:

@@ -1,7 +1,7 @@
 """How long one solve takes: every solver on the same problems, and the default in its own loop."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,12 @@ THETA = np.array(paper.THETA_INIT)
 LOOPS = {"without noise": 0.0, "with noise": paper.NOISE}  # that of training's first episode
 WIDTH = 3 + 2 + len(THETA)  # of the input of RDES's network: (s, a, theta)
 STRETCH = 26  # problems that a solver is given at a time: then its code is in the caches, as in use
+
+
+def transposed(names: str, rows: Iterable[tuple[Any, ...]]) -> Columns:
+    """Rows as columns with these names, written between blanks."""
+    listed = list(rows)
+    return {name: [row[i] for row in listed] for i, name in enumerate(names.split())}
 
 
 def columns_of(table: pd.DataFrame) -> Columns:
@@ -61,8 +67,7 @@ def interleaved(episodes: int, steps: int) -> Columns:
         for _ in range(episodes):
             states = [state for state, _, _ in closed_loop(paper.nmpc(), noise, rng, steps)]
             rows += [(loop, *row) for row in _episode(states, named, rng)]
-    names = ("loop", "solver", "warm", "seconds", "iterations", "suboptimality")
-    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
+    return transposed("loop solver warm seconds iterations suboptimality", rows)
 
 
 def _episode(
@@ -92,13 +97,11 @@ def _episode(
 def own_loop(episodes: int, steps: int) -> Columns:
     """The default solver alone with the plant, the loops in turn: seconds of each warm solve."""
     nmpc, rng = paper.nmpc(), np.random.default_rng(1)
-    columns: Columns = {"loop": [], "seconds": []}
+    rows = []
     for _ in range(episodes):
         for loop, noise in LOOPS.items():
-            times = [seconds for _, _, seconds in closed_loop(nmpc, noise, rng, steps)][1:]
-            columns["loop"] += [loop] * len(times)
-            columns["seconds"] += times
-    return columns
+            rows += [(loop, took) for _, _, took in closed_loop(nmpc, noise, rng, steps)][1:]
+    return transposed("loop seconds", rows)
 
 
 def closed_loop(

@@ -19,10 +19,11 @@ from nmpcrl.bench.paired import IDLE
 from nmpcrl.bench.processes import PROCESSES, at_once, first_calls, time_learners_afresh, whole_runs
 from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
-from nmpcrl.study import limits, paper, place, provenance, store
-from nmpcrl.study.atomic import write_json
-from nmpcrl.study.machine import machine
+from nmpcrl.study import limits, paper, provenance, store
 from nmpcrl.study.parameters import OneOf
+from nmpcrl.study.storage import place
+from nmpcrl.study.storage.atomic import write_json
+from nmpcrl.study.storage.machine import machine
 
 Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
 Stage = tuple[str, Callable[[], Bench]]

@@ -17,15 +17,15 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Riccati, Solution, SolverError
 from nmpcrl.study import paper, provenance, store
-from nmpcrl.study.atomic import write_json
-from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import need_numba
-from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import Whole
-from nmpcrl.study.place import check_folder
-from nmpcrl.study.place import keep as keep_file
 from nmpcrl.study.setup import compile_ahead
+from nmpcrl.study.storage.atomic import write_json
+from nmpcrl.study.storage.executor import execute
+from nmpcrl.study.storage.machine import machine
+from nmpcrl.study.storage.place import check_folder
+from nmpcrl.study.storage.place import keep as keep_file
 
 SEED = 2025
 PROBLEMS = Whole(1, 10**9)  # that a sweep may have

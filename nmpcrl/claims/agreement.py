@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from nmpcrl.analysis.rows import cost_ratios, row, table
+from nmpcrl.analysis.rows import row, table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.comparison import nearly_equal, unequal
 from nmpcrl.claims.own_claims import judge_own
@@ -32,7 +32,7 @@ from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.claims.wider_claims import judge_wider
 from nmpcrl.study import design
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.machine import fingerprint
+from nmpcrl.study.storage.machine import fingerprint
 
 SHARED = ["layout", "decay"]  # what runs here and published ones have in common
 
@@ -125,17 +125,13 @@ def _in_both(
     paths = {e: one.states for e, one in mine.items()}
     here = table(mine)
     cells = set(here[SHARED].itertuples(index=False, name=None))
-    theirs = [
-        e
+    shared = [
+        part == design.MAIN_TABLE and tuple(getattr(e, name) for name in SHARED) in cells
         for e, part in published.variants.items()
-        if part == design.MAIN_TABLE and tuple(getattr(e, name) for name in SHARED) in cells
     ]
-    if not theirs:
+    if not any(shared):
         return (), ()
-    ratios = cost_ratios(published.rows)
-    there = pd.DataFrame([published.rows[e] | {"cost_ratio": ratios[e]} for e in theirs])
-    their_paths = {e: published.summaries[e].states for e in theirs}
-    return _judged(here, paths), _judged(there, their_paths)
+    return _judged(here, paths), _judged(published.table[shared], published.paths)
 
 
 def of_times(timings: pd.DataFrame, published: Published) -> tuple[str, ...]:

@@ -10,9 +10,9 @@ from nmpcrl.analysis.rows import FIELDS, THETA, row
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.published import Published
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import environment, summary_key
 from nmpcrl.study.records import Column
+from nmpcrl.study.storage.machine import fingerprint
 
 SEEDLESS = [name for name in FIELDS if name != "seed"]  # what a cell shares
 CELL = ("learner", "layout", "decay")  # of these, what a table of contradictions shows

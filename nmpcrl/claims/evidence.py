@@ -22,9 +22,10 @@ from nmpcrl.claims.published import failure_modes_of, load
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
+from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.parameters import OneOf, Truth
 from nmpcrl.study.records import Column, Stopped
-from nmpcrl.study.setup import LEARNERS, controller_of
+from nmpcrl.study.setup import controller_of
 from nmpcrl.study.store import Runs
 
 SOURCES = ("published", "fresh")

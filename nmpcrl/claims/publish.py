@@ -1,20 +1,17 @@
-"""The whole study judged: everything that `published` keeps, from the summaries of all runs."""
+"""The study published and judged: verdicts are made from what is published alone."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-import pandas as pd
-
 from nmpcrl.analysis.gradient_td import dropped_curvature
 from nmpcrl.analysis.policy_search import Search, search_all
-from nmpcrl.analysis.rows import cost_ratios, table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.processes import time_learners_repeatedly
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import audit
 from nmpcrl.claims.own_claims import judge_own
 from nmpcrl.claims.paper_claims import judge, judge_times
-from nmpcrl.claims.rule import Assumption, Paths
+from nmpcrl.claims.rule import Assumption
 from nmpcrl.claims.thetas import FOLLOWED
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.claims.wider_claims import WIDER_THAN, judge_wider
@@ -28,16 +25,14 @@ AUDITED = Experiment("GES")  # whose whole run C8 is measured in
 def publish_study(
     runs: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
 ) -> Path:
-    """Judge the study, and write `book/published` anew.
+    """Write `book/published` anew, with the times of learning steps here; `rejudge` judges it.
 
     Args:
         runs: all of `design.whole_study`.
         variants: the part of the study that each belongs to.
     """
-    timings = time_learners_repeatedly()
-    searches = search_all(map(Search, LAYOUTS))
-    judged = verdicts(runs, variants, timings)
-    return published.publish(runs, variants, judged, timings, searches)
+    timings, searches = time_learners_repeatedly(), search_all(map(Search, LAYOUTS))
+    return published.publish(runs, variants, timings=timings, searches=searches)
 
 
 def publish_timing() -> tuple[Verdict, ...]:
@@ -95,41 +90,17 @@ def judge_published(
 ) -> tuple[Verdict, ...]:
     """The verdicts on what is published, from its tables alone.
 
+    They come in the order of the paper's claims, each wider one after the one it widens, and ours.
+
     Args:
         found: what is published.
         assumptions: of `audit`, for C8; without them its published verdict stays.
     """
-    rows = pd.DataFrame(list(found.rows.values()))
-    ratios = cost_ratios(found.rows)
-    paths = {e: one.states for e, one in found.summaries.items()}
-    rows["cost_ratio"] = [ratios[e] for e in found.rows]
-    made = _verdicts(rows, paths, found.timings, tuple(assumptions))
-    kept = {v.claim: v for v in found.verdicts if not assumptions}
-    return tuple(kept.get(v.claim, v) if v.claim == "C8" else v for v in made)
-
-
-def verdicts(
-    runs: Mapping[Experiment, RunSummary],
-    variants: Mapping[Experiment, str],
-    timings: pd.DataFrame,
-) -> tuple[Verdict, ...]:
-    """The verdicts on the paper's claims, on the wider ones and on our own."""
-    rows = table(runs).assign(variant=[variants[e] for e in runs])
-    study = fetch_all([AUDITED], progress=False)
-    assumptions = audit(study, dropped_curvature(study[AUDITED]))
-    return _verdicts(rows, {e: one.states for e, one in runs.items()}, timings, assumptions)
-
-
-def _verdicts(
-    rows: pd.DataFrame,
-    paths: Paths,
-    timings: pd.DataFrame,
-    assumptions: tuple[Assumption, ...],
-) -> tuple[Verdict, ...]:
-    """All verdicts in the order of the paper's claims, each wider one after the one it widens."""
+    rows, paths, given = found.table, found.paths, tuple(assumptions)
     main = rows[rows.variant == MAIN_TABLE]
     added = rows[rows.variant.isin([MAIN_TABLE, "controls"])]
-    claimed = judge(main, paths=paths, timings=timings, assumptions=assumptions)
+    claimed = judge(main, paths=paths, timings=found.timings, assumptions=given)
     wider = {WIDER_THAN[v.claim]: v for v in judge_wider(main, paths)}
     ordered = [v for one in claimed for v in (one, wider.get(one.claim)) if v]
-    return (*ordered, *judge_own(added))
+    kept = {v.claim: v for v in found.verdicts if v.claim == "C8" and not given}
+    return (*(kept.get(v.claim, v) for v in ordered), *judge_own(added))

@@ -15,7 +15,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
-from functools import cache
+from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
@@ -27,7 +27,7 @@ import pandas as pd
 import nmpcrl
 from nmpcrl.analysis import policy_search
 from nmpcrl.analysis.policy_search import Found, Search
-from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, experiment_of, row
+from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, cost_ratios, experiment_of, row
 from nmpcrl.analysis.summary import Outline, RunSummary
 from nmpcrl.bench.learners import ratio
 from nmpcrl.bench.paired import Ratio
@@ -41,15 +41,14 @@ from nmpcrl.claims.failure_modes import (
     failure_modes,
     went_wrong,
 )
-from nmpcrl.claims.prespecified import from_git
 from nmpcrl.claims.verdict import Halves, Outcome, Verdict
 from nmpcrl.study import design
-from nmpcrl.study.atomic import write_json
 from nmpcrl.study.experiment import Experiment, frozen_arm
-from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.parameters import Refusal, shortened
 from nmpcrl.study.provenance import EPOCHS, environment, hash_of, summary_key
 from nmpcrl.study.records import Column
+from nmpcrl.study.storage.atomic import write_json
+from nmpcrl.study.storage.machine import fingerprint
 
 FILES = (
     *("runs.csv", "curves.npz", thetas.FILE, "searches.json", "verdicts.json", "timings.csv"),
@@ -88,6 +87,19 @@ class Published:
     timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
     about: Mapping[str, Any] = field(default_factory=dict)
     searches: Mapping[Search, Found] = field(default_factory=dict)
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """All rows, with `cost_ratio` as `rows.table` has it."""
+        ratios = cost_ratios(self.rows)
+        return pd.DataFrame(
+            [row | {"cost_ratio": ratios[e]} for e, row in self.rows.items()],
+        )
+
+    @property
+    def paths(self) -> dict[Experiment, Column]:
+        """States of each run's last rollout, as `paper_claims.judge` takes them."""
+        return {e: one.states for e, one in self.summaries.items()}
 
     @property
     def main(self) -> pd.DataFrame:
@@ -131,7 +143,7 @@ def _restore() -> str:
 def publish(
     summaries: Mapping[Experiment, RunSummary],
     variants: Mapping[Experiment, str],
-    verdicts: Sequence[Verdict],
+    verdicts: Sequence[Verdict] = (),
     timings: pd.DataFrame | None = None,
     searches: Mapping[Search, Found] = MappingProxyType({}),
 ) -> Path:
@@ -140,7 +152,7 @@ def publish(
     Args:
         summaries: the runs.
         variants: the part of the study that each belongs to.
-        verdicts: on the claims.
+        verdicts: on the claims, if they are judged already.
         timings: of `time_learners`, if there were any taken.
         searches: for the best theta.
 
@@ -158,16 +170,8 @@ def publish(
     thetas.save(folder, summaries, variants)
     write_json(folder / "searches.json", policy_search.as_lists(searches))
     _write(folder, verdicts, pd.DataFrame() if timings is None else timings)
-    about = (
-        made_here()
-        | _timed(timings)
-        | ({"searches": made_here()} if searches else {})
-        | {
-            "runs": runs.variant.value_counts(sort=False).to_dict(),
-            "hours": float(runs.seconds.sum() / 3600),
-        }
-    )
-    _seal(folder, about)
+    made = _timed(timings) | ({"searches": made_here()} if searches else {})
+    _seal(folder, made_here() | made | _effort(runs) | _fixed(folder))
     return folder
 
 
@@ -224,12 +228,8 @@ def extend(summaries: Mapping[Experiment, RunSummary], variants: Mapping[Experim
     with (folder / "runs.csv").open("a", encoding="utf-8") as table:
         runs.to_csv(table, index=False, header=False)
     np.savez_compressed(folder / "curves.npz", **joined)
-    counts, hours = (
-        runs.variant.value_counts(sort=False).to_dict(),
-        float(runs.seconds.sum() / 3600),
-    )
-    addition = made_here() | {"runs": counts, "hours": hours}
-    about = {**found.about, "runs": {**found.about["runs"], **counts}}
+    addition = made_here() | _effort(runs)
+    about = {**found.about, "runs": found.about["runs"] | addition["runs"]}
     _seal(folder, about | {"additions": [*found.about.get("additions", []), addition]})
     return folder
 
@@ -242,6 +242,20 @@ def made_here() -> dict[str, Any]:
         "versions": environment(),
         "machine": fingerprint(),
     }
+
+
+def _effort(runs: pd.DataFrame) -> dict[str, Any]:
+    """How many runs each part of the study has, and how long all took."""
+    counts = runs.variant.value_counts(sort=False).to_dict()
+    return {"runs": counts, "hours": float(runs.seconds.sum() / 3600)}
+
+
+def _fixed(folder: Path) -> dict[str, Any]:
+    """When the thresholds were fixed, as what was published before says it; else nothing."""
+    try:
+        return {"fixed": json.loads((folder / "about.json").read_text("utf-8"))["fixed"]}
+    except (OSError, ValueError, LookupError):
+        return {}
 
 
 def _row_beside(
@@ -348,13 +362,8 @@ def _sums(folder: Path) -> dict[str, str]:
 
 
 def _seal(folder: Path, about: Mapping[str, Any]) -> None:
-    """Write about.json, by which the other files and itself are known again.
-
-    It says when the thresholds were fixed, too: what git says, else what was known.
-    """
-    known = from_git()
-    since = {"fixed": known.facts} if known else {}
-    sealed = {**about, **since, "files": _sums(folder)}
+    """Write about.json, by which the other files and itself are known again."""
+    sealed = {**about, "files": _sums(folder)}
     write_json(folder / "about.json", sealed | {"seal": _sealed(sealed)}, indent=1)
     _load.cache_clear()
 

@@ -71,11 +71,10 @@ def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame
         runs: as `robustness_map` takes them.
         variant: of the row.
     """
-    main = runs[runs.variant == design.MAIN_TABLE]
-    if variant not in design.VARIANTS:
+    main, changed = (runs[runs.variant == name] for name in (MAIN_TABLE, variant))
+    if changed.empty:
         field, value = _part(variant)
         return main[main[field] == value], main[main[field] != value]
-    changed = runs[runs.variant == variant]
     before = main.merge(changed[CELL].drop_duplicates(), on=CELL)
     kept = before[~before.learner.isin(changed.learner)]
     return pd.concat([changed, kept], ignore_index=True), before
@@ -108,7 +107,7 @@ def _part(variant: str) -> tuple[str, str]:
 COLUMNS = ("variant", "claim", "outcome", "base", "changes", "share", "base_share", "pairs", "p")
 
 
-def variant_changes(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) -> pd.DataFrame:
+def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     """The outcome of every claim in every variant, beside that of the main table's same cells.
 
     A learner of the paper that a variant does not run is one that it does not change, so its runs
@@ -118,23 +117,19 @@ def variant_changes(runs: pd.DataFrame, paths: Paths, base: str = MAIN_TABLE) ->
     Args:
         runs: of `rows.table`, with a column `variant`.
         paths: as `judge` takes them, of the variants and of the main table.
-        base: the `variant` of the main table's rows.
 
     Returns:
         `COLUMNS`, one row a variant and claim, in order.
     """
     paper = runs[runs.learner.isin(PAPER)]
-    main = paper[paper.variant == base]
     rows = []
     bases: dict[Hashable, Cell] = {}  # many variants have the same cells
-    for name, changed in paper[paper.variant != base].groupby("variant", sort=False):
-        cells = changed[CELL].drop_duplicates().sort_values(CELL)
-        before = main.merge(cells, on=CELL)
-        kept = before[~before.learner.isin(changed.learner)]
-        after = pd.concat([changed, kept], ignore_index=True)
-        asked = tuple(cells.itertuples(index=False, name=None))
+    for name in paper.variant[paper.variant != MAIN_TABLE].unique():
+        after, before = groups(paper, name)
+        asked = frozenset(before[CELL].itertuples(index=False, name=None))
+        changed = {*paper.learner[paper.variant == name]}
         for claim in BY_RUNS.values():
-            if not changed.learner.isin(claim.learners).any():
+            if not changed & {*claim.learners}:
                 continue
             at = asked, claim.name
             bases[at] = bases.get(at) or _settled(claim, before, paths)

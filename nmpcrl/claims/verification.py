@@ -18,11 +18,11 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.comparison import comparable, unequal
 from nmpcrl.claims.published import Published
 from nmpcrl.study import provenance
-from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import seconds_of
-from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.setup import compile_ahead
+from nmpcrl.study.storage.executor import execute
+from nmpcrl.study.storage.machine import fingerprint
 
 Row = Mapping[str, Any]
 

@@ -36,7 +36,7 @@ def clean(yes: bool, only: tuple[str, ...], runs: bool) -> None:
     from nmpcrl.analysis import summaries
     from nmpcrl.study import store
     from nmpcrl.study.cleaning import leftovers, remove
-    from nmpcrl.study.place import refuse_file
+    from nmpcrl.study.storage.place import refuse_file
 
     refuse_file()
 

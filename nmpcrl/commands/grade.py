@@ -63,9 +63,11 @@ def grade(
     time, takes too much memory or ends the process, its exercise gets no points,
     and the others run again without it. Projects are left to you.
 
-    This is no sandbox for hostile code: a notebook has your rights, reads your
-    files, reaches your network, and can lie about its points. Where you do not
-    trust one, run this command as another user in a container that has no network
+    Checks run in another process, which gets plain values from the notebook: what
+    it changes in its own memory wins no points. This is no sandbox all the same: a
+    notebook has your rights, so hostile code reads your files, the solutions among
+    them, reaches your network, and can attack your other processes. Where you do
+    not trust one, run this command as another user in a container that has no network
     and no files but these, from an image in which nmpcrl is installed:
 
     \b
@@ -81,7 +83,7 @@ def grade(
       nmpcrl grade . --out grades.csv --time-limit 300
     """
     from nmpcrl.course import grading
-    from nmpcrl.course.confined import Limits
+    from nmpcrl.course.execution import Limits
 
     limits = Limits(time_limit, cell_limit, memory)
     rows = []

@@ -9,9 +9,9 @@ import click
 from nmpcrl.commands.tables import harmless
 
 SAID = (  # errors whose message is a sentence for the reader, and where they are defined
-    ("nmpcrl.study.parameters", "Refusal"),
+    ("nmpcrl.study.storage.refusal", "Refusal"),
     ("nmpcrl.study.records", "DamagedRecords"),
-    ("nmpcrl.study.place", "StoreError"),
+    ("nmpcrl.study.storage.place", "StoreError"),
     ("nmpcrl.study.cluster", "NoCluster"),
     ("nmpcrl.bench.sweep", "DamagedSweep"),
     ("nmpcrl.analysis.summaries", "Failed"),

@@ -34,8 +34,8 @@ def show(run: str, out: Path | None, kind: str | None, frozen: bool) -> None:
     """
     path = file_of(run)
     out, kind = _place(path, out, kind)
-    from nmpcrl.report.figures.run import run_page, write
-    from nmpcrl.study.atomic import write_whole
+    from nmpcrl.report.figures.runs.run import run_page, write
+    from nmpcrl.study.storage.atomic import write_whole
 
     records = records_of(path)
     figure = run_page(records, _frozen_arm(records, train=frozen))

@@ -49,7 +49,7 @@ def study(
     from nmpcrl.analysis import summaries
     from nmpcrl.study import cluster
     from nmpcrl.study.limits import estimate
-    from nmpcrl.study.place import refuse_file
+    from nmpcrl.study.storage.place import refuse_file
 
     if judge:
         _judge()

@@ -10,8 +10,8 @@ def check(workers: int | None, *, sure: bool) -> None:
         ParameterError: it is no number of workers.
         click.ClickException: there is no room for them.
     """
-    from nmpcrl.study.executor import check_workers
     from nmpcrl.study.parameters import ParameterError
+    from nmpcrl.study.storage.executor import check_workers
 
     if workers is None:
         return

@@ -2,7 +2,7 @@
 
 from nmpcrl.course.answers import choice, formula, number
 from nmpcrl.course.behaviour import behaves, function, holds
-from nmpcrl.course.outcome import Outcome, Unsolved, exercise
+from nmpcrl.course.outcome import Outcome, Unsolved, exercise, varied
 
 __all__ = [
     "Outcome",
@@ -14,4 +14,5 @@ __all__ = [
     "function",
     "holds",
     "number",
+    "varied",
 ]

@@ -45,6 +45,7 @@ class About:
     points: int
     goal: str  # what one can do after it
     mistakes: tuple[str, ...] = ()  # common ones, for whoever teaches
+    counts: bool = True  # if not, it is practice: others have published its answer
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -55,13 +56,18 @@ class About:
             raise NoExercise("minutes and points must be 1 or more, and the goal a sentence")
 
     @property
+    def worth(self) -> int:
+        """The points that it counts."""
+        return self.points if self.counts else 0
+
+    @property
     def line(self) -> str:
         """What a reader sees of it, such as "By hand · level 1 of 3 · 5 minutes · 1 point"."""
         kind = self.kind[0].upper() + self.kind[1:]
-        counted = [f"{self.minutes} minute", f"{self.points} point"]
-        numbers = (self.minutes, self.points)
-        plural = [words + ("s" if n > 1 else "") for words, n in zip(counted, numbers, strict=True)]
-        return " · ".join([kind, f"level {self.level} of {LEVELS[-1]}", *plural])
+        counted = {"minute": self.minutes} | ({"point": self.points} if self.counts else {})
+        plural = [f"{n} {word}" + ("s" if n > 1 else "") for word, n in counted.items()]
+        practice = [] if self.counts else ["practice"]
+        return " · ".join([kind, f"level {self.level} of {LEVELS[-1]}", *plural, *practice])
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,20 +1,23 @@
 """Points of what students hand in: each notebook in a process of its own, with limits.
 
-This is no sandbox. A notebook runs with the rights of whoever grades, and can read their files.
+The checks run in another process, so no notebook can change what they say. This is no sandbox all
+the same: a notebook runs with the rights of whoever grades, reads their files, and could reach
+their processes.
 """
 
 import re
 import tempfile
-import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from nmpcrl.course import confined
-from nmpcrl.course.confined import Limits
-from nmpcrl.course.judging import judged
-from nmpcrl.course.submissions import CannotGrade, Chapter, chapters, notebook_of, taken
+from nmpcrl.course.execution import Limits
+from nmpcrl.course.judge import Judge
+from nmpcrl.course.judging import losses
+from nmpcrl.course.submissions import CannotGrade, Chapter, chapters, matched, notebook_of
 
 COPY = re.compile(r"(-Copy\d+| ?\(\d+\))$")
 
@@ -32,7 +35,7 @@ class Mark:
 
 
 def grade(folder: Path, edition: Path, limits: Limits, workers: int = 1) -> Iterator[list[Mark]]:
-    """Marks of every notebook below a folder, in the order of their paths.
+    """Marks of every notebook below a folder, chapter by chapter, in the order of their paths.
 
     Args:
         folder: of a folder for each student, or of notebooks whose names end in the chapter's.
@@ -55,20 +58,17 @@ def _graded(
     folder: Path, of: Mapping[Path, Chapter | None], limits: Limits, workers: int
 ) -> Iterator[list[Mark]]:
     """The marks of each notebook."""
-    asked = {chapter for chapter in of.values() if chapter}
-    with tempfile.TemporaryDirectory() as place, ThreadPoolExecutor(workers) as threads:
-        ready = dict(
-            zip(
-                asked,
-                threads.map(lambda c: rehearsed(c, limits, Path(place) / c.name), asked),
-                strict=True,
-            )
-        )
-
-        def marks(path: Path, chapter: Chapter | None) -> list[Mark]:
-            return list(_marks(path, path.relative_to(folder), chapter and ready[chapter], limits))
-
-        yield from threads.map(marks, of.keys(), of.values())
+    strangers = [path for path, chapter in of.items() if chapter is None]
+    yield from ([_unknown(path.relative_to(folder))] for path in strangers)
+    with ThreadPoolExecutor(workers) as threads:
+        for chapter in dict.fromkeys(chapter for chapter in of.values() if chapter):
+            paths = [path for path, its in of.items() if its is chapter]
+            with (
+                tempfile.TemporaryDirectory() as place,
+                closing(Judge(chapter, limits, Path(place) / "data")) as judge,
+            ):
+                marks = partial(_marks, folder=folder, judge=judge, limits=limits)
+                yield from threads.map(marks, paths)
 
 
 def _stem(file: Path) -> str:
@@ -76,46 +76,32 @@ def _stem(file: Path) -> str:
     return COPY.sub("", file.stem)
 
 
-def rehearsed(chapter: Chapter, limits: Limits, place: Path) -> Chapter:
-    """The chapter with data that hold what it trains, so that no notebook trains that again.
-
-    Args:
-        chapter: of an edition for graders.
-        limits: as for a notebook that is handed in.
-        place: a new folder for the data.
-
-    Raises:
-        CannotGrade: it fails, or does not reach its end, although nobody has answered anything.
-    """
-    steps = taken(chapter, chapter.notebook).steps
-    until = time.monotonic() + limits.seconds
-    sat = confined.run(chapter, steps, limits, until, kept=place)
-    for step in steps:
-        if step.name not in sat.ends:
-            raise CannotGrade(f"{chapter.name} itself was stopped on this computer: {sat.why}")
-        if (error := sat.ends[step.name]["error"]) and not step.group:
-            raise CannotGrade(f"{chapter.name} itself fails with {error[0]}: {error[1]}")
-    return replace(chapter, data=place if place.is_dir() else None)
+def _unknown(file: Path) -> Mark:
+    why = "The name of the file does not end in that of a chapter."
+    return Mark(_student(file, file.stem), file.as_posix(), "", None, 0, why)
 
 
-def _marks(path: Path, file: Path, chapter: Chapter | None, limits: Limits) -> Iterator[Mark]:
-    """The marks of one notebook, or why it has none."""
-    if chapter is None:
-        why = "The name of the file does not end in that of a chapter."
-        yield Mark(_student(file, file.stem), file.as_posix(), "", None, 0, why)
-        return
-    stem = _stem(file)
+def _marks(path: Path, folder: Path, judge: Judge, limits: Limits) -> list[Mark]:
+    """The marks of one notebook."""
+    file, stem, chapter = path.relative_to(folder), _stem(path), judge.chapter
     student = _student(file, stem.removesuffix(chapter.name).rstrip("_- ") or stem)
     try:
-        submission = taken(chapter, notebook_of(path))
+        submission = matched(chapter, notebook_of(path))
     except (CannotGrade, OSError) as error:
-        losses = {one.name: str(error) for one in chapter.exercises}
+        lost = {one.name: str(error) for one in chapter.exercises}
     else:
-        losses = judged(chapter, submission, limits)
-    for one in chapter.exercises:
-        why, points = losses[one.name], one.about.points
-        got = None if not one.parts["check"] else 0 if why else points
-        yield Mark(student, file.as_posix(), one.number, got, points, why)
+        lost = losses(judge, submission, limits)
+    return [
+        Mark(
+            student,
+            file.as_posix(),
+            one.number,
+            None if not one.parts["check"] else 0 if lost[one.name] else one.about.worth,
+            one.about.worth,
+            lost[one.name],
+        )
+        for one in chapter.exercises
+    ]
 
 
 def _student(file: Path, alone: str) -> str:

@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, ParamSpec
+from typing import Any, ParamSpec, TypeVar
 
 from nmpcrl.study.parameters import Refusal
 
@@ -19,6 +19,7 @@ STRICT = bool(os.environ.get("NMPCRL_STRICT"))  # no answer can change it later
 UNANSWERED = "Not answered yet: put your answer where the dots are, run that cell, then this one."
 
 P = ParamSpec("P")
+Check = TypeVar("Check", bound=Callable[..., Any])
 
 
 class Unsolved(Refusal):
@@ -61,3 +62,18 @@ def exercise(check: Callable[P, Outcome]) -> Callable[P, Outcome]:
             return Outcome(str(unsolved), right=False)
 
     return said
+
+
+def varied(**numbers: tuple[float, float, float]) -> Callable[[Check], Check]:
+    """A check of which a number of the question may have another value, as `variants` draws it.
+
+    Args:
+        numbers: of an argument, whose default the question prints, the least value, the largest
+            one, and the step between two.
+    """
+
+    def marked(check: Check) -> Check:
+        vars(check)["varied"] = numbers
+        return check
+
+    return marked

@@ -17,7 +17,6 @@ from nmpcrl.course.exercises import HEAD, Cell, Exercise, Notebook, exercises
 from nmpcrl.study.parameters import Refusal
 
 SOLUTION = re.compile(r"\n### BEGIN SOLUTION\n.*?\n### END SOLUTION", flags=re.S)
-CHECKS = "exercises-checks"  # the cell that imports them
 
 
 class CannotGrade(Refusal):
@@ -51,8 +50,7 @@ class Chapter:
     @cached_property
     def asked(self) -> set[str]:
         """The names that answers bind."""
-        tables = [symtable(code, name, "exec") for name, code in self.blanks.items()]
-        return {one.get_name() for t in tables for one in t.get_symbols() if one.is_assigned()}
+        return set().union(*(_names_in(code, bound=True) for code in self.blanks.values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +61,8 @@ class Step:
     code: str
     group: str = ""  # its exercise; the cell alone if a student added it elsewhere; else empty
     theirs: bool = False  # a student wrote it
+    check: bool = False  # it is not for the notebook's process, but for the judge's
+    answers: tuple[str, ...] = ()  # the names of answers that a check takes
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +71,12 @@ class Submission:
 
     steps: list[Step]
     remarks: dict[str, str] = field(default_factory=dict)  # by the name of an exercise
+
+
+def _names_in(code: str, *, bound: bool = False) -> set[str]:
+    """The names in a code, or those that it binds."""
+    symbols = symtable(code, "<cell>", "exec").get_symbols()
+    return {one.get_name() for one in symbols if one.is_assigned() or not bound}
 
 
 def notebook_of(path: Path) -> Notebook:
@@ -95,17 +101,17 @@ def notebook_of(path: Path) -> Notebook:
 
 
 def chapters(edition: Path) -> list[Chapter]:
-    """The chapters of an edition for graders.
+    """The chapters of an edition for graders, each an assignment in nbgrader's folder `source`.
 
     Raises:
         CannotGrade: the folder has none.
     """
     found = []
-    for path in sorted(edition.rglob("*.ipynb")):
+    for path in sorted((edition / "source").glob("*/*.ipynb")):
         notebook = notebook_of(path)
         for cell in notebook.cells:
             cell["source"] = SOLUTION.sub("", cell["source"])
-        data = path.parent / "data"
+        data = edition / "data"
         every = list(exercises(notebook))
         if any(c.metadata.nbgrader for one in every for c in one.parts["check"]):
             found.append(Chapter(path.stem, notebook, every, data if data.is_dir() else None))
@@ -114,11 +120,10 @@ def chapters(edition: Path) -> list[Chapter]:
     return found
 
 
-def taken(chapter: Chapter, notebook: Notebook) -> Submission:
+def matched(chapter: Chapter, notebook: Notebook) -> Submission:
     """A student's answers and own cells in a chapter."""
     answers, added = _theirs(chapter, notebook)
     owner = {cell.id: one for one in chapter.exercises for cell in _cells(one)}
-    imports = next((c.source for c in chapter.notebook.cells if c.id == CHECKS), "")
     steps, remarks = [_added(cell, "") for cell in added[""]], {}
     for cell in chapter.notebook.cells:
         one = owner.get(cell.id)
@@ -127,9 +132,9 @@ def taken(chapter: Chapter, notebook: Notebook) -> Submission:
             code, theirs = answers.get(cell.id, cell.source), cell.id in chapter.blanks
             if theirs and cell.id not in answers:
                 remarks[name] = "The answer cell is missing."
-            if one and cell in one.parts["check"]:
-                code = f"{imports}\n{code}"  # whatever `check` has come to be
-            steps.append(Step(cell.id, code, name, theirs))
+            check = one is not None and cell in one.parts["check"]
+            taken = tuple(sorted(chapter.asked & _names_in(code))) if check else ()
+            steps.append(Step(cell.id, code, name, theirs, check, taken))
         steps += [_added(one_more, name) for one_more in added[cell.id]]
     return Submission(steps, remarks)
 

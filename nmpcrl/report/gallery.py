@@ -1,4 +1,4 @@
-"""Six finds for the laboratory, four of them picked from the published runs.
+"""Six examples for the laboratory, four of them picked from the published runs.
 
 They illustrate, and are evidence for no claim. The criteria were written down first, and two were
 changed after a first look: runs that overshoot come from all published runs, because the main
@@ -17,7 +17,7 @@ the same experiment, and rounds otherwise.
   in it the first seed of which one run went wrong and the other did not; of the one that did, a
   theta that had moved must have been judged, or there is nothing to show.
 
-The others are `finds.kink` and `finds.tie`.
+The others are `examples.kink` and `examples.tie`.
 """
 
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.failure_modes import Mechanism
 from nmpcrl.claims.published import Published
 from nmpcrl.learning.updates import OVERSHOOT
-from nmpcrl.report.finds import SETTINGS, Find, find, first_rollout, kink, tie
+from nmpcrl.report.examples import SETTINGS, Example, example, first_rollout, kink, tie
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Stopped
 
@@ -40,8 +40,8 @@ REPEATED = ("ES", "GES", "TDC", "QL")  # by a page
 Row = dict[str, Any]  # of `runs.csv`
 
 
-def gallery(study: Published) -> tuple[Find, ...]:
-    """The six finds, without those of which the study has no run."""
+def gallery(study: Published) -> tuple[Example, ...]:
+    """The six examples, without those of which the study has no run."""
     repeated = [row for e, row in study.rows.items() if _is_repeated(e)]
     six = (
         closed_gap(repeated),
@@ -54,7 +54,7 @@ def gallery(study: Published) -> tuple[Find, ...]:
     return tuple(one for one in six if one)
 
 
-def closed_gap(rows: list[Row]) -> Find | None:
+def closed_gap(rows: list[Row]) -> Example | None:
     """theta_c grows until no plan fits through a gap that the first rollout goes through."""
     closed = [row for row in rows if row["mechanism"] == Mechanism.GAP]
     closed = [row for row in closed if isfinite(row["final_cost"])]
@@ -72,10 +72,10 @@ def closed_gap(rows: list[Row]) -> Find | None:
         "first": row["initial_cost"],
         "last": row["final_cost"],
     }
-    return find("A gap that closes", sentence, numbers, experiment)
+    return example("A gap that closes", sentence, numbers, experiment)
 
 
-def overshoot(rows: list[Row]) -> Find | None:
+def overshoot(rows: list[Row]) -> Example | None:
     """Steps so long that the TD error grows."""
     row = max(rows, key=lambda row: row["over"], default={"over": 0})
     if not row["over"]:
@@ -92,10 +92,10 @@ def overshoot(rows: list[Row]) -> Find | None:
         "first": row["initial_cost"],
         "last": row["final_cost"],
     }
-    return find("A run that overshoots", sentence, numbers, experiment_of(row))
+    return example("A run that overshoots", sentence, numbers, experiment_of(row))
 
 
-def one_fails(study: Published, wrong: str, well: str) -> Find | None:
+def one_fails(study: Published, wrong: str, well: str) -> Example | None:
     """A layout in which one of two learners goes wrong more often than the other."""
     pair = next(_pairs(study, wrong, well), None)
     if pair is None:
@@ -119,7 +119,7 @@ def one_fails(study: Published, wrong: str, well: str) -> Find | None:
         "other": other["final_cost"],
         "episode": ceil(one["steps_done"] / experiment.steps),
     }
-    return find(f"{wrong} fails, {well} does not", sentence, numbers, experiment)
+    return example(f"{wrong} fails, {well} does not", sentence, numbers, experiment)
 
 
 def _pairs(

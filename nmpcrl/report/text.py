@@ -142,17 +142,24 @@ def agreement(found: Sequence[Verdict], known: Iterable[Verdict], mark: str) -> 
         mark: what the page's own rest on, "180 runs trained for this page, 540 published".
     """
     there = {v.claim: v for v in known}
+    other = [f"{v.claim} {v.words}" for v in _otherwise(found, there)]
+    said = _compared(found, len(other), listed(other))
+    return f"Judged alone, the runs of this page ({mark}) give the published outcome {said}."
+
+
+def _otherwise(found: Sequence[Verdict], there: Mapping[str, Verdict]) -> list[Verdict]:
+    """The verdicts that are decided, and not as the others on the same claims."""
+    return [v for v in found if v.outcome not in (UNDECIDABLE, there[v.claim].outcome)]
+
+
+def _compared(found: Sequence[Verdict], count: int, other: str) -> str:
+    """Of how many claims there is the outcome that is asked for, `count` others, or none."""
     undecided = [v.claim for v in found if v.outcome == UNDECIDABLE]
-    other = [
-        f"{v.claim} {v.words}"
-        for v in found
-        if v.outcome not in (UNDECIDABLE, there[v.claim].outcome)
-    ]
-    same = len(found) - len(undecided) - len(other)
-    parts = [f"the published outcome for {number(same)} of {number(len(found))} claims"]
-    parts += [f"another one for {number(len(other))} ({listed(other)})"] * bool(other)
+    same = len(found) - len(undecided) - count
+    parts = [f"for {number(same)} of {number(len(found))} claims"]
+    parts += [f"another one for {number(count)} ({other})"] * bool(count)
     parts += [f"none for {number(len(undecided))} ({listed(undecided)})"] * bool(undecided)
-    return f"Judged alone, the runs of this page ({mark}) give {listed(parts)}."
+    return listed(parts)
 
 
 def repeated(found: Repeated) -> str:
@@ -160,21 +167,15 @@ def repeated(found: Repeated) -> str:
     if not found.runs:
         return "No published run was trained again here."
     there = {v.claim: v for v in found.there}
-    undecided = [v.claim for v in found.here if v.outcome == UNDECIDABLE]
     other = [
         f"{v.claim}: {v.words} here, {there[v.claim].words} there"
-        for v in found.here
-        if v.outcome not in (UNDECIDABLE, there[v.claim].outcome)
+        for v in _otherwise(found.here, there)
     ]
-    same = len(found.here) - len(undecided) - len(other)
-    parts = [f"for {number(same)} of {number(len(found.here))} claims"]
-    parts += [f"another one for {number(len(other))} ({'; '.join(other)})"] * bool(other)
-    parts += [f"none for {number(len(undecided))} ({listed(undecided)})"] * bool(undecided)
     return (
         f"Of {found.runs} published runs that were trained again on this machine, {found.equal}"
         f" have the published numbers in every digit, and {found.close} more to six digits."
         " Judged alone, they give the outcome of the published runs in the same layouts and"
-        f" readings {listed(parts)}."
+        f" readings {_compared(found.here, len(other), '; '.join(other))}."
     )
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from nmpcrl.study.archive import ABOUT
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.provenance import key
+from nmpcrl.study.storage.archive import ABOUT
 
 RUN = re.compile(r"[A-Za-z]+-\w+-[a-z]+-seed\d+-\d+ep-[0-9a-f]{10}")  # what a run's file is called
 HALF = re.compile(r"\.half-.*\.tmp")

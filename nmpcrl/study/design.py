@@ -12,8 +12,8 @@ from typing import Any
 
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import MAIN, PAPER, Experiment, frozen_arm
+from nmpcrl.study.learners import DECAYS, LEARNERS
 from nmpcrl.study.replicas import perturbed
-from nmpcrl.study.setup import DECAYS, LEARNERS
 from nmpcrl.study.sweeps import sweep
 
 LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too

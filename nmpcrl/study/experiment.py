@@ -9,6 +9,7 @@ from nmpcrl.control import Task, solvers
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Layout, Pose, short_name
+from nmpcrl.study.learners import DECAYS, LEARNERS, NETWORKS
 from nmpcrl.study.parameters import (
     LARGEST_SEED,
     Allowed,
@@ -19,7 +20,6 @@ from nmpcrl.study.parameters import (
     Truth,
     Whole,
 )
-from nmpcrl.study.setup import DECAYS, LEARNERS, NETWORKS
 
 PAPER = ("ES", "DES", "RDES", "GES")  # the paper's learners
 MAIN = (*PAPER, "TDC", "frozen")  # of the main table

@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.learners import LEARNERS, NETWORKS
 from nmpcrl.study.parameters import ParameterError, Refusal
 from nmpcrl.study.provenance import environment
-from nmpcrl.study.setup import LEARNERS, NETWORKS
 
 HOURS = 24.0  # of one core, that are begun without asking; the whole study takes about 5
 MEMORY = 4e9  # bytes that a run may take

@@ -27,6 +27,7 @@ STEPS = 130  # an episode runs over t = 0, ..., K with K = 129
 EPISODES = 300
 SLACK_WEIGHT = 100.0  # omega
 BATCH = 128
+HIDDEN = 64  # neurons in each of the two hidden layers
 NOISE = 1.0  # standard deviation of epsilon: Table I gives it as the law of rho  # departure D
 DECAY_RATE = 0.99  # c_epsilon, which is not given  # departure C
 

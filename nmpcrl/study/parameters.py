@@ -11,22 +11,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from nmpcrl.control.nmpc import ABSURD
+from nmpcrl.study.storage.refusal import ParameterError as ParameterError
+from nmpcrl.study.storage.refusal import Refusal as Refusal
 
 LARGEST_SEED = 2**31 - 1  # what every generator takes, whichever library's
 MOST_VALUES = 10_000  # of an axis
 LONGEST = 100  # characters of a value in a message
-
-
-class Refusal(ValueError):
-    """What was asked for cannot be done; the message is one sentence that says why."""
-
-    def _render_traceback_(self) -> list[str]:
-        """What IPython shows in the place of a traceback, and so Jupyter and papermill."""
-        return [f"{type(self).__name__}: {self}"]
-
-
-class ParameterError(Refusal):
-    """A parameter is not what it may be; the message names it, its value and what is allowed."""
 
 
 class Allowed(Protocol):

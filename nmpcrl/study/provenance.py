@@ -33,10 +33,10 @@ from pathlib import Path
 from typing import Any
 
 from nmpcrl.study import paper
-from nmpcrl.study.atomic import write_json
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.machine import fingerprint
-from nmpcrl.study.setup import LEARNERS
+from nmpcrl.study.learners import LEARNERS
+from nmpcrl.study.storage.atomic import write_json
+from nmpcrl.study.storage.machine import fingerprint
 
 # Raised by hand where an edit of the room changes a number; then every run is trained anew.
 EPOCHS = {"control": 1, "learning": 1, "study": 1, "analysis": 1}

@@ -13,7 +13,8 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.study import paper
-from nmpcrl.study.archive import (
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.storage.archive import (
     Column,
     DamagedRecords,
     Field,
@@ -23,7 +24,6 @@ from nmpcrl.study.archive import (
     load_arrays,
     save_arrays,
 )
-from nmpcrl.study.experiment import Experiment
 
 __all__ = ["Column", "DamagedRecords", "Records", "StepStatus", "Stopped", "Table", "final_cost"]
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.setup import LEARNERS
+from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.sweeps import paper_runs
 
 PERTURBATION = 1e-12  # added to theta_x at the start

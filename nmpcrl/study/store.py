@@ -13,10 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from nmpcrl.study.executor import execute
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.geometry import short_name
-from nmpcrl.study.place import StoreError, check_folder, folder, keep, refusal, say, set_aside
 from nmpcrl.study.provenance import (
     before,
     identity,
@@ -27,9 +25,19 @@ from nmpcrl.study.provenance import (
     warn_of_changes,
 )
 from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
-from nmpcrl.study.reservation import reservations, reserved
 from nmpcrl.study.run import run
 from nmpcrl.study.setup import compile_ahead
+from nmpcrl.study.storage.executor import execute
+from nmpcrl.study.storage.place import (
+    StoreError,
+    check_folder,
+    folder,
+    keep,
+    refusal,
+    say,
+    set_aside,
+)
+from nmpcrl.study.storage.reservation import reservations, reserved
 
 __all__ = [
     "Runs",

@@ -9,8 +9,8 @@ from typing import Any
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.geometry import Centres, are_centres
+from nmpcrl.study.learners import DECAYS
 from nmpcrl.study.parameters import Allowed, ParameterError, Several, is_list, shown
-from nmpcrl.study.setup import DECAYS
 
 VECTORS = ("theta", "start", "target")  # fields of which a list is one value
 MOST_RUNS = 10_000  # of a sweep: more than five times the whole study

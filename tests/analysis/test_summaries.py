@@ -9,8 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,8 +19,9 @@ import pytest
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import Failed, fetch_summaries
 from nmpcrl.analysis.summary import RunSummary, summarise
-from nmpcrl.study import Experiment, executor, fetch, provenance, run, store, sweep
-from nmpcrl.study.executor import Killed
+from nmpcrl.study import Experiment, fetch, provenance, run, store, sweep
+from nmpcrl.study.storage import executor
+from nmpcrl.study.storage.executor import Killed
 
 QUICK = Experiment("frozen", episodes=2, steps=3, evaluate_every=1)
 SIX = sweep(learner="frozen", seed=tuple(range(6)), episodes=1, steps=2)
@@ -41,7 +41,7 @@ def make(experiment, *expected):
     first = f"began {{experiment.seed}} " not in LOG.read_text()
     note("began", experiment)
     time.sleep({pause})
-    if experiment.seed in {killed} and (first or {always}):
+    if experiment.seed in {killed} and first:
         os.kill(os.getpid(), signal.{by})
     made = summaries.make(experiment, *expected)
     note("ended", experiment)
@@ -69,18 +69,17 @@ def trained(monkeypatch) -> list[Experiment]:
 
 @pytest.fixture
 def workers(tmp_path, monkeypatch):
-    """Let workers note what they do, and let the runs of some seeds kill them, once or always."""
+    """Let workers note what they do, and let the runs of some seeds kill them, once."""
 
     def watch(
         killed: tuple[int, ...] = (),
         *,
         by: str = "SIGKILL",
-        always: bool = False,
         pause: float = 0,
     ) -> Path:
         log = tmp_path / "log"
         log.touch()
-        text = MADE_ELSEWHERE.format(log=str(log), killed=killed, by=by, always=always, pause=pause)
+        text = MADE_ELSEWHERE.format(log=str(log), killed=killed, by=by, pause=pause)
         (tmp_path / "made_elsewhere.py").write_text(text)
         monkeypatch.syspath_prepend(tmp_path)
         monkeypatch.delitem(sys.modules, "made_elsewhere", raising=False)
@@ -174,16 +173,6 @@ def test_a_stored_run_that_is_damaged_is_trained_again(trained):
     store.path_of(QUICK).write_bytes(b"")
     assert_same_summary(here([QUICK])[QUICK], summarise(run(QUICK)))
     assert trained == [QUICK]
-
-
-def test_a_damaged_summary_is_put_aside_and_made_again(folder, trained, capsys):
-    first = here([QUICK])
-    path = summaries.path_of(QUICK)
-    path.write_bytes(path.read_bytes()[:-200])
-    assert_same_summary(here([QUICK])[QUICK], first[QUICK])
-    assert trained == [QUICK, QUICK]
-    assert sorted(p.suffix for p in folder.iterdir()) == [".damaged", ".npz"]
-    assert "is kept as" in capsys.readouterr().err
 
 
 def rewritten(path: Path, change) -> None:
@@ -326,48 +315,6 @@ def test_nothing_to_do_needs_nobody(capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.slow
-def test_a_killed_worker_is_replaced_and_what_had_ended_is_not_done_again(workers):
-    log = workers(killed=(3,))
-    study = fetch_summaries(SIX, workers=1, progress=False)
-    assert list(study) == list(SIX)
-    assert times(log, "began") == [0, 1, 2, 3, 3, 4, 5]
-    assert times(log, "ended") == [0, 1, 2, 3, 4, 5]
-
-
-@pytest.mark.slow
-def test_a_run_that_always_kills_its_worker_is_a_failure_like_any_other(workers, folder):
-    log = workers(killed=(1,), always=True)
-    with pytest.raises(Failed, match="1 of 3 runs failed"):
-        fetch_summaries(THREE, workers=1, progress=False)
-    assert [summaries.is_stored(e) for e in THREE] == [True, False, True]
-    assert times(log, "ended") == [0, 2]
-    (note,) = folder.glob("*.failed.json")
-    assert "killed" in json.loads(note.read_text())["reason"]
-
-
-class Breaking(Executor):
-    """Loses the worker of the second run; all runs have ended before anyone looks."""
-
-    def __init__(self) -> None:
-        self.submitted = 0
-
-    def submit(self, function, /, *arguments, **options):
-        future: Future = Future()
-        self.submitted += 1
-        if self.submitted == 2:
-            future.set_exception(BrokenProcessPool("a worker was killed"))
-        else:
-            future.set_result(function(*arguments, **options))
-        return future
-
-
-def test_what_an_executor_of_the_callers_loses_is_a_failure_and_the_rest_is_kept():
-    with pytest.raises(Failed, match=r"1 of 3 runs failed.*BrokenProcessPool"):
-        fetch_summaries(THREE, executor=Breaking(), progress=False)
-    assert [summaries.is_stored(e) for e in THREE] == [True, False, True]
-
-
 def test_a_worker_with_other_code_trains_nothing(monkeypatch, trained):
     """A worker of a cluster may join late; so each compares signatures before each run."""
     make = summaries.make
@@ -490,16 +437,3 @@ def wait_until(holds, seconds: float = 240.0):
     while not holds():
         assert time.monotonic() < end, "this was waited for in vain"
         time.sleep(0.02)
-
-
-def test_two_who_ask_at_once_have_each_run_trained_once(folder, trained):
-    """Two calls at once train each run once, and both end well."""
-    studies = []
-    threads = [threading.Thread(target=lambda: studies.append(here(THREE))) for _ in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert [list(study) for study in studies] == [list(THREE)] * 2
-    assert {path.suffix for path in folder.iterdir()} == {".npz"}
-    assert sorted(e.seed for e in trained) == [0, 1, 2]

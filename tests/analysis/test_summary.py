@@ -8,6 +8,7 @@ import pytest
 from nmpcrl.analysis import metrics, rows
 from nmpcrl.analysis.rows import experiment_of, row, table, tidy
 from nmpcrl.analysis.summary import RunSummary, summarise
+from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.records import DamagedRecords, Records
@@ -52,6 +53,7 @@ def test_every_state_in_an_obstacle_is_counted_by_how_far_it_is_in():
     state = np.array([at(xi) for xi in (-0.1, 0.005, 0.05, 0.06, 0.5, 0.0)])
     steps, n = run(replace(SHORT, learner="frozen", episodes=2, steps=3)).steps, len(state)
     steps |= {"state": state, "action": np.tile([0.7, 0.0], (n, 1))}
+    steps |= {"alpha_phi2": np.array([0.1, OVERSHOOT, 9.0, 3.0, 2.5, 1.0])}
     evaluations = {
         "episode": np.array([0, 2]),
         "theta": np.ones((2, 9)),
@@ -65,6 +67,7 @@ def test_every_state_in_an_obstacle_is_counted_by_how_far_it_is_in():
     np.testing.assert_array_equal(found.episodes["inside"], [[1, 1, 0], [0, 1, 1]])
     np.testing.assert_allclose(found.episodes["overlap"], [0.05, 0.5])
     np.testing.assert_array_equal(found.episodes["inputs"], [3, 3])
+    np.testing.assert_array_equal(found.episodes["over"], [1, 2])
     np.testing.assert_array_equal(found.evaluations["inside"], [[1, 1, 0], [0, 1, 1]])
     assert np.isnan(found.evaluations["distance"][1])
     summary = row(found)

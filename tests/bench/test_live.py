@@ -58,7 +58,7 @@ fetch("http://localhost:9/").catch(() => 0)
 
 
 @pytest.fixture
-def site(tmp_path):
+def pages(tmp_path):
     """Two pages with a live figure that answers as ours do, and one without."""
     folder = tmp_path / "html/book"
     (folder / "_static/live").mkdir(parents=True)
@@ -86,20 +86,19 @@ def test_ratios_are_medians_of_turns_so_that_one_disturbed_turn_changes_nothing(
     assert weight.measured == "150 kB (01.html)"  # the laboratory is no chapter
 
 
-def test_a_page_weighs_its_figures_and_each_of_its_files_once(site):
-    (site / "book/03.html").write_text(PAGE)
+def test_a_page_weighs_its_figures_and_each_of_its_files_once(pages):
+    (pages / "book/03.html").write_text(PAGE)
     inside = PAGE[PAGE.index("<figure") : PAGE.index("</figure>") + len("</figure>")]
-    assert live.weight(site / "book/03.html") == len(inside) + len(SCRIPT)
+    assert live.weight(pages / "book/03.html") == len(inside) + len(SCRIPT)
 
 
-@pytest.mark.book
-def test_all_is_measured_in_a_real_browser_and_stored(site, browser, tmp_path, monkeypatch):
+def test_all_is_measured_in_a_real_browser_and_stored(pages, browser, tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
     trained = []
     monkeypatch.setattr(live, "run", trained.append)
     monkeypatch.setattr(live, "TURNS", 2)
     monkeypatch.setattr(live, "chromium", lambda: nullcontext(browser))
-    found = live.measure(site)
+    found = live.measure(pages)
     assert found == live.stored()
     assert set(found) == {*MET, "date"}
     assert set(found["weights"]) == {"01.html", live.LABORATORY}
@@ -112,16 +111,16 @@ def test_all_is_measured_in_a_real_browser_and_stored(site, browser, tmp_path, m
     assert "not measured" not in [one.outcome for one in live_targets(found)]
 
 
-def test_without_pages_playwright_or_chromium_it_is_one_sentence(site, tmp_path, monkeypatch):
+def test_without_pages_playwright_or_chromium_it_is_one_sentence(pages, tmp_path, monkeypatch):
     with pytest.raises(Refusal, match="no page with a live figure is built in"):
         live.measure(tmp_path)
     with monkeypatch.context() as patch:
         patch.setitem(sys.modules, "playwright.sync_api", None)
         with pytest.raises(Refusal, match="playwright, which is not installed"):
-            live.measure(site)
+            live.measure(pages)
     monkeypatch.setattr(live.shutil, "which", lambda _: None)
     with pytest.raises(Refusal, match="in Chromium: none of chromium"):
-        live.measure(site)
+        live.measure(pages)
 
 
 def test_what_is_stored_may_be_damaged(tmp_path, monkeypatch):

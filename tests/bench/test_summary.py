@@ -89,6 +89,13 @@ def test_quadratic_growth_is_seen(measured):
     assert len(missed(measured)) == 2
 
 
+def test_growth_beside_a_large_cost_of_every_call_is_seen_by_what_one_more_adds(measured):
+    grown = measured["scaling"]
+    grown["seconds"] = [1e-3 + 1e-8 * size**2 for size in grown["size"]]
+    assert summary.most_per_part(measured, "horizon") == pytest.approx(1.0)
+    assert len(missed(measured)) == 2
+
+
 def model(**changed) -> summary.Saving:
     """Two solvers; a fit takes longer beside the slow one, which gains less from a warm start."""
     parts = {

@@ -12,7 +12,8 @@ from raising import raising
 from nmpcrl.bench import sweep
 from nmpcrl.bench.sweep import SweepTable, Tally
 from nmpcrl.control import Nmpc, SolverError
-from nmpcrl.study import ParameterError, StoreError, executor, paper
+from nmpcrl.study import ParameterError, StoreError, paper
+from nmpcrl.study.storage import executor
 
 ROOT = Path(__file__).resolve().parents[2]
 START, THETA = np.array(paper.START), np.array(paper.THETA_INIT)

@@ -6,8 +6,6 @@ import build
 import pytest
 from visits import TELEPHONES, VIEWS, look_at, opened
 
-pytestmark = pytest.mark.book
-
 PAGES = [*build.pages(), "search", "genindex", "prf-prf"]  # the last three are Sphinx's
 each_page = pytest.mark.parametrize("page", PAGES)
 

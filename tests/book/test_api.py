@@ -191,7 +191,6 @@ def article(site: Path, page: str) -> BeautifulSoup:
     return BeautifulSoup((site / f"book/{page}.html").read_text(), "html.parser").article
 
 
-@pytest.mark.book
 def test_each_function_of_the_notation_leads_to_its_entry(site):
     rows = article(site, "notation").select("tr")
     numbered = [row for row in rows if re.match(r"\((\d+[a-f]?)\)", row.get_text().strip())]
@@ -203,7 +202,6 @@ def test_each_function_of_the_notation_leads_to_its_entry(site):
             assert target.endswith(f".{code.get_text().rpartition('.')[2]}")
 
 
-@pytest.mark.book
 def test_an_equation_of_a_docstring_leads_to_its_row(site):
     entry = article(site, "api_learning").find(id="nmpcrl.learning.td_error").find_parent("dl")
     assert [link["href"] for link in entry.select("dd a[href*=notation]")] == [
@@ -213,7 +211,6 @@ def test_an_equation_of_a_docstring_leads_to_its_row(site):
     assert article(site, "notation").find(id="paper-11").get_text().strip() == "(11)"
 
 
-@pytest.mark.book
 def test_what_an_entry_shows_is_what_the_library_has(site):
     shown = article(site, "api_learning")
     for name in learning.__all__:
@@ -222,7 +219,6 @@ def test_what_an_entry_shows_is_what_the_library_has(site):
     assert signature.startswith("td_error(cost: float, gamma: float, q: float, q_next: float)")
 
 
-@pytest.mark.book
 def test_no_private_name_has_an_entry(site):
     for page in PAGES:
         for entry in article(site, page).select("dt.sig[id]"):
@@ -230,7 +226,6 @@ def test_no_private_name_has_an_entry(site):
             assert last == "__call__" or not last.startswith("_"), entry["id"]
 
 
-@pytest.mark.book
 def test_chapters_lead_to_the_library(site):
     links = article(site, "02_expected_sarsa").select("a[href^=api_] code")
     assert "td_error" in {code.get_text() for code in links}

@@ -168,7 +168,7 @@ def run(place: Path, *arguments: str) -> subprocess.CompletedProcess:
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_a_whole_build_ends_with_the_path_of_the_book(small):
     result = run(small)
     assert result.returncode == 0, result.stderr
@@ -179,7 +179,7 @@ def test_a_whole_build_ends_with_the_path_of_the_book(small):
     assert "_repository" not in (small / "_build/html/book/intro.html").read_text()
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_a_build_that_failed_goes_on_where_it_was_and_one_that_is_done_begins_anew(small):
     save(small, new_code_cell("open('executions', 'a').write('x')"))
     intro, executions = small / "book/intro.md", small / "executions"
@@ -195,7 +195,7 @@ def test_a_build_that_failed_goes_on_where_it_was_and_one_that_is_done_begins_an
     assert executions.read_text() == "xx"
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_what_was_executed_before_a_source_was_changed_is_executed_again(small):
     save(small, new_code_cell("open('executions', 'a').write('x')"))
     (small / "book/intro.md").write_text("[nowhere](nowhere.md)\n")
@@ -205,7 +205,7 @@ def test_what_was_executed_before_a_source_was_changed_is_executed_again(small):
     assert (small / "executions").read_text() == "xy"
 
 
-@pytest.mark.book
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows has ports only")
 def test_no_port_that_another_program_may_take_leads_to_a_kernel(small):
     save(small, new_code_cell("import ipykernel\nprint(ipykernel.get_connection_info())"))
@@ -223,7 +223,7 @@ def test_no_two_kernels_share_the_files_through_which_they_are_talked_to():
     assert not any(place.parent.exists() for place in places)
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(small):
     assert run(small, "--smoke").returncode == 0
     assert not (small / "_build/html").exists()
@@ -233,7 +233,7 @@ def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(
     assert executed.cells[-1].outputs[0].text == f"{build.SMOKE['episodes']}\n"
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_a_page_offers_its_executed_notebook_and_links_to_a_repository_that_is_set(small):
     config = yaml.safe_load((small / "_config.yml").read_text())
     config["repository"]["url"] = "https://github.com/us/book"
@@ -247,7 +247,7 @@ def test_a_page_offers_its_executed_notebook_and_links_to_a_repository_that_is_s
     assert "github.com/us/book" in (small / "_build/html/book/intro.html").read_text()
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_one_chapter_is_built_apart_with_the_given_parameters(small):
     result = run(small, "--chapter", "one", "-p", "episodes", "7")
     assert result.stdout.splitlines()[-1] == "_build/chapter/one/html/book/one.html"
@@ -257,7 +257,7 @@ def test_one_chapter_is_built_apart_with_the_given_parameters(small):
     )
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_a_cell_that_fails_is_named_and_no_older_book_survives(small):
     (small / "_build/html").mkdir(parents=True)
     write(small, "1 / 0")
@@ -269,7 +269,7 @@ def test_a_cell_that_fails_is_named_and_no_older_book_survives(small):
     assert not (small / "_build/html").exists()
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(small):
     (small / "_build/html").mkdir(parents=True)
     (small / "book/intro.md").write_text("# A small book\n\nSee [the other](#two).\n")
@@ -347,7 +347,7 @@ def exercise(code: str) -> list:
     ]
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_a_page_has_an_empty_answer_a_place_for_it_and_the_folded_solution(small):
     save(small, *exercise("d = 1.375"))
     result = run(small)
@@ -366,7 +366,7 @@ def test_a_page_has_an_empty_answer_a_place_for_it_and_the_folded_solution(small
     assert "Right" not in nbformat.writes(offered)
 
 
-@pytest.mark.book
+@pytest.mark.slow
 def test_a_solution_that_its_check_refuses_ends_the_build(small):
     save(small, *exercise("d = 1.25"))
     result = run(small)
@@ -374,7 +374,7 @@ def test_a_solution_that_its_check_refuses_ends_the_build(small):
     assert "Unsolved: That is where the overlap is 0" in result.stderr
 
 
-@pytest.mark.book
+@pytest.mark.slow
 @pytest.mark.parametrize("answer", ["d = ...", "d = 1.25"])
 def test_papermill_runs_a_chapter_to_its_end_whatever_the_answers_are(answer, small, monkeypatch):
     monkeypatch.delenv("NMPCRL_STRICT", raising=False)

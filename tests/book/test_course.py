@@ -21,6 +21,7 @@ from nbformat.v4 import new_code_cell, new_notebook, new_output
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from nmpcrl.course import variants
 from nmpcrl.course.exercises import exercises, solved
 from nmpcrl.report.figures.sheet import MIME
 
@@ -228,7 +229,6 @@ def test_whoever_makes_a_course_without_a_built_book_is_told_by_the_exit_code_to
     monkeypatch.setattr(course, "EDITIONS", {})
     monkeypatch.setattr(course.offline, "stored", lambda sources: {})
     monkeypatch.setattr(course, "is_whole", lambda name, sources: whole)
-    (tmp_path / "grader").mkdir()
     assert CliRunner().invoke(course.main).exit_code == code
 
 
@@ -268,6 +268,38 @@ def test_two_builds_give_the_same_bytes(tmp_path):
     assert {path.parts[0] for path in files} == set(course.EDITIONS)
     assert all(Path(edition, *runs) in files for edition in course.EDITIONS)
     assert not any(b"/" + b"work/" in data or str(ROOT).encode() in data for data in files.values())
+
+
+@pytest.mark.slow
+def test_with_a_secret_students_get_neither_an_answer_that_counts_nor_its_check(tmp_path):
+    secret = b"\x00\xffa secret"
+    course.edition("student", tmp_path / "student", {}, secret=secret)
+    (wheel,) = (tmp_path / "student").glob("*.whl")
+    files = zipfile.ZipFile(wheel)
+    library = "".join(files.read(name).decode() for name in files.namelist() if "checks" in name)
+    others = 0
+    for name, source in SOURCES.items():
+        mine = nbformat.read(tmp_path / "student" / name, 4)
+        solutions = {one.name: one for one in exercises(variants.varied(source, secret))}
+        for one in exercises(mine):
+            if not one.parts["check"] or not one.about.counts:
+                continue
+            others += 1
+            (check,) = solutions[one.name].parts["check"]
+            called = check.source.removeprefix("check.").partition("(")[0]
+            assert f"def {called}(answer: Any, *" not in library
+            assert [cell.source for cell in one.parts["check"]] == [variants.LATER]
+            asked = "\n".join(cell.source for cell in cells_of(one))
+            for value in filter(None, map(value_of, solutions[one.name].answers)):
+                assert not re.search(rf"(?<![\d.]){re.escape(value)}(?![\d.])", asked)
+    assert others == 20
+    assert secret not in b"".join(p.read_bytes() for p in tmp_path.rglob("*") if p.is_file())
+
+
+def test_a_secret_that_is_empty_is_refused(tmp_path):
+    (tmp_path / "secret").touch()
+    refused = CliRunner().invoke(course.main, ["--secret", str(tmp_path / "secret")])
+    assert "The file is empty" in refused.output
 
 
 def executed(edition: str, name: str, folder: Path, runs, monkeypatch):

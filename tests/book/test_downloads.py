@@ -95,7 +95,6 @@ def test_a_site_without_the_files_links_to_none_of_them(small):
 
 
 @pytest.mark.parametrize("page", ["teach", "learn_alone"])
-@pytest.mark.book
 def test_the_built_page_has_a_place_for_links_and_each_leads_to_a_file(site, page):
     text = (site / f"book/{page}.html").read_text()
     (place,) = downloads.PLACE.finditer(text)

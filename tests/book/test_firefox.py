@@ -13,8 +13,6 @@ from nmpcrl.analysis.two_state import Chain, follow
 from nmpcrl.learning.learners import gradient_td
 from nmpcrl.study import Experiment, run
 
-pytestmark = pytest.mark.book
-
 MIDDLE = """(figure, name) => {
   const handle = figure.querySelector(`[aria-label="${name}"]`)
   handle.closest("svg, label").scrollIntoView({block: "center"})

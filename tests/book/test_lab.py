@@ -20,8 +20,6 @@ from live_page import CHAPTERS, FRAMES
 from nmpcrl.learning import td_error
 from nmpcrl.study import paper
 
-pytestmark = pytest.mark.lab
-
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = list(build.notebooks())
 LAYOUT = "D"  # of chapter 2, where its numbers are not those of the default

@@ -21,8 +21,6 @@ PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head><title>Path</t
 SCRIPTS = ("exercises/words", "exercises/formula", "exercises/exercises", "path")
 FULL = 'Storage.prototype.setItem = () => { throw new Error("full"); };'
 
-pytestmark = pytest.mark.book
-
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):

@@ -140,7 +140,6 @@ def test_the_page_of_references_has_what_is_cited_as_the_bibliography_has_it():
         assert plain == written[key]
 
 
-@pytest.mark.book
 @each_page
 def test_the_page_numbers_and_names_what_the_source_does(site, page):
     """Sphinx numbers and names by itself; so the words of a link are the same in both."""

@@ -58,14 +58,12 @@ def test_two_pages_share_a_file_only_if_it_is_the_same(tmp_path):
         live.share(figure_of("a", "c"), Path("book/02.ipynb"), tmp_path)
 
 
-@pytest.mark.book
 def test_the_page_finds_what_python_finds(tab):
     shown = tab.shown()
     assert shown["given"]["theta"] == list(paper.THETA_INIT)
     assert_equal_to_python(shown)
 
 
-@pytest.mark.book
 def test_it_finds_what_python_finds_after_every_kind_of_change(tab):
     tab.drag("Obstacle 2", (20, -35))
     tab.drag("Robot, start", (60, 90))
@@ -83,7 +81,6 @@ def test_it_finds_what_python_finds_after_every_kind_of_change(tab):
     assert_equal_to_python(shown)
 
 
-@pytest.mark.book
 def test_an_obstacle_follows_the_mouse_and_the_trajectory_avoids_it(tab):
     before, place = tab.shown(), tab.middle("Obstacle 1")
     tab.drag("Obstacle 1", (40, 30))
@@ -100,7 +97,6 @@ def test_an_obstacle_follows_the_mouse_and_the_trajectory_avoids_it(tab):
     assert away.min() > 1.2
 
 
-@pytest.mark.book
 def test_a_finger_drags_as_the_mouse_does(opened):
     tab = opened(FIGURE, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
     tab.begun()
@@ -112,7 +108,6 @@ def test_a_finger_drags_as_the_mouse_does(opened):
     assert after[0] == pytest.approx(before[0], abs=0.05)
 
 
-@pytest.mark.book
 @pytest.mark.parametrize(("by", "moves"), [((0, -160), False), ((3, 160), False), ((-45, 2), True)])
 def test_a_swipe_from_a_slider_scrolls_the_page_or_moves_the_slider(opened, by, moves):
     tab = opened(FIGURE, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
@@ -128,7 +123,6 @@ def test_a_swipe_from_a_slider_scrolls_the_page_or_moves_the_slider(opened, by, 
     assert (abs(slider.bounding_box()["y"] - box["y"]) > 50) != moves
 
 
-@pytest.mark.book
 def test_nothing_lies_on_the_sliders_on_a_telephone(opened):
     tab = opened(FIGURE, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
     for slider in tab.begun().figure.locator("input[type=range]").all():
@@ -138,7 +132,6 @@ def test_nothing_lies_on_the_sliders_on_a_telephone(opened):
         assert slider.evaluate(COVERED) == []
 
 
-@pytest.mark.book
 def test_the_keyboard_reaches_and_moves_every_handle(tab):
     tab.handle("Obstacle 1").focus()
     names = []
@@ -154,7 +147,6 @@ def test_the_keyboard_reaches_and_moves_every_handle(tab):
     assert_equal_to_python(shown)
 
 
-@pytest.mark.book
 def test_shift_makes_larger_steps_and_the_page_does_not_scroll(tab):
     tab.see()
     scrolled = tab.page.evaluate("scrollY")
@@ -165,7 +157,6 @@ def test_shift_makes_larger_steps_and_the_page_does_not_scroll(tab):
     assert tab.handle("Obstacle 4").get_attribute("aria-valuetext") == "x 6.90 m, y \u22120.20 m"
 
 
-@pytest.mark.book
 def test_a_click_moves_what_was_clicked_before(tab):
     tab.see()
     tab.page.mouse.click(*tab.middle("Obstacle 2"))
@@ -178,7 +169,6 @@ def test_a_click_moves_what_was_clicked_before(tab):
     assert tab.shown() == moved
 
 
-@pytest.mark.book
 def test_nothing_leaves_the_map_and_the_robot_stays_in_its_box(tab):
     tab.press("Robot, start", *["Shift+ArrowLeft"] * 4)
     tab.press("Obstacle 3", *["Shift+ArrowUp"] * 20)
@@ -188,7 +178,6 @@ def test_nothing_leaves_the_map_and_the_robot_stays_in_its_box(tab):
     assert given["discs"][2][1] == pytest.approx(data["view"][1] + data["view"][3])
 
 
-@pytest.mark.book
 @pytest.mark.parametrize("k", range(9))
 def test_each_slider_moves_its_own_component_of_theta(tab, k):
     slider = tab.figure.locator("input[type=range]").nth(k)
@@ -199,7 +188,6 @@ def test_each_slider_moves_its_own_component_of_theta(tab, k):
     assert moved[k] > 0
 
 
-@pytest.mark.book
 def test_reset_restores_the_beginning_in_every_digit(tab):
     before = tab.shown()
     tab.drag("Robot, start", (30, 60))
@@ -209,7 +197,6 @@ def test_reset_restores_the_beginning_in_every_digit(tab):
     assert tab.shown() == before
 
 
-@pytest.mark.book
 def test_a_screen_reader_is_told_the_results_once_nothing_changes(tab):
     status = tab.figure.locator("[role=status]")
     tab.press("Obstacle 2", "Shift+ArrowUp")
@@ -220,7 +207,6 @@ def test_a_screen_reader_is_told_the_results_once_nothing_changes(tab):
         assert f"{number:.1f}" in status.inner_text()
 
 
-@pytest.mark.book
 def test_a_loop_that_ends_early_says_so(opened):
     tab = opened(FIGURE, script=FAILS_AT_20)
     tab.begun()
@@ -229,7 +215,6 @@ def test_a_loop_that_ends_early_says_so(opened):
     assert len(tab.shown()["found"]["states"]) == 20
 
 
-@pytest.mark.book
 def test_the_book_as_one_document_leaves_live_figures_out(site):
     document = whole.document(site, site.parent / "pdf/book.html", "")
     assert "live.controller(nmpc" in BeautifulSoup(document, "html.parser").get_text()

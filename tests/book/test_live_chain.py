@@ -20,8 +20,6 @@ MOVES = """figure => {
 }"""
 AT = "([figure, at]) => figure.shown.given.at >= at"
 
-pytestmark = pytest.mark.book
-
 
 def rules(given: dict) -> dict:
     alpha, beta, gamma = given["alpha"], given["beta"], given["gamma"]

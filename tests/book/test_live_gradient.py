@@ -8,7 +8,6 @@ import pytest
 from nmpcrl.control import Obstacle
 from nmpcrl.study import paper
 
-pytestmark = pytest.mark.book
 FIGURE = "gradient"
 CURVES = "figure => new Promise(done => {{ {} }})".format(
     "const look = () => figure.shown.found.all ? done(figure.shown.found.all)"

@@ -5,7 +5,6 @@ import pytest
 
 from nmpcrl.study import paper
 
-pytestmark = pytest.mark.book
 FIGURE = "kink"
 WALK = "d, distance of the robot from the nearest boundary, negative inside"
 NMPC, THETA = paper.nmpc("A"), np.array(paper.THETA_INIT)

@@ -15,7 +15,6 @@ from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.experiment import frozen_arm
 
 FIGURE = "laboratory"
-pytestmark = pytest.mark.book
 FINISHED = """() => {
   const { runs } = document.querySelector("figure.live").shown
   return runs.length && runs.every(run => ["finished", "diverged", "stopped"].includes(run.state))

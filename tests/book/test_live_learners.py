@@ -15,8 +15,6 @@ PICTURES = """figure => {
     .observe(figure.querySelector(".sides"), {subtree: true, childList: true})
 }"""
 
-pytestmark = pytest.mark.book
-
 
 def assert_equal_to_python(shown: dict, episodes: int, **changes) -> None:
     """The weights of both learners after so many episodes."""

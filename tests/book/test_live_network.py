@@ -8,14 +8,13 @@ import pytest
 
 from nmpcrl.learning.network import QNetwork
 from nmpcrl.report.live import frame, noise, two_learners
+from nmpcrl.report.live.algorithm import fixed
 from nmpcrl.report.live.problem import problem_of
-from nmpcrl.study import Experiment, run
+from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.setup import controller_of
 
-pytestmark = pytest.mark.book
-
 SCRIPTS = ("solver.js", "random.js", "network.js", "learning.js")
-BATCH, HIDDEN = 128, 64
+BATCH, HIDDEN = paper.BATCH, paper.HIDDEN
 SIZES = (BATCH, BATCH + 1, 1000, 7800, 39_000)  # of buffers
 SEEDS = (0, 1, 2, 7, 2**31 - 1)
 DRAWN = """([seeds, sizes, inputs, batch]) => seeds.map(seed => {
@@ -30,6 +29,26 @@ TRAINED = """async ({ module, problem, settings, widths }) => {
   const noise = normal(settings.seed, count, widths)
   return Array.from(train(nmpc, settings, noise), ({ theta, nextValue }) => ({ theta, nextValue }))
 }"""
+
+
+FAILING = """settings => {  // no solve finds a plan
+  const noise = new Float64Array(2 * settings.episodes * settings.steps)
+  const problem = { lower: [-1, -1], upper: [1, 1], discount: [1, 0.9] }
+  const nmpc = { problem, rules: {}, solve: () => null }
+  return Array.from(window.nmpcrl.train(nmpc, settings, noise), ({ diverged }) => diverged)
+}"""
+ABSURD = """settings => {  // every update moves theta by a half
+  const noise = new Float64Array(2 * settings.episodes * settings.steps)
+  const problem = { lower: [-1, -1], upper: [1, 1], discount: [1, 0.9] }
+  const plan = { action: [0, 0], value: 1, features: [1] }
+  const rules = { tdError: () => 1, semiGradient: ([theta]) => [theta + 0.5] }
+  const nmpc = { problem, rules, solve: () => plan, cost: () => 1, step: (state) => state }
+  return Array.from(window.nmpcrl.train(nmpc, settings, noise), ({ diverged }) => diverged)
+}"""
+SHORT = {
+    "learner": "ES", "alpha": 1, "decay": "step", "decayRate": 1, "episodes": 12, "steps": 1,
+    "theta": [1], "w": [0], "start": [0], "target": [0], "discs": [], "horizon": 1,
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -67,11 +86,34 @@ def test_mini_batches_are_those_of_numpy(page):
                 assert chosen == rng.choice(size, batch, replace=False).tolist()
 
 
+def test_a_divergence_is_what_the_library_calls_one(page):
+    """The page holds no number of its own: with others it ends elsewhere."""
+    limits = fixed()["limits"]
+    for patience in (limits["patience"], 3):
+        given = SHORT | {"limits": limits | {"patience": patience}}
+        assert page.evaluate(FAILING, given) == [False] * (patience - 1) + [True]
+    for absurd in (2.4, 4.0):
+        given = SHORT | {"limits": limits | {"absurd": absurd}}
+        moved = int((absurd - 1) / 0.5)
+        assert page.evaluate(ABSURD, given) == [False] * moved + [True]
+    assert page.evaluate(ABSURD, SHORT | {"limits": limits}) == [False] * SHORT["episodes"]
+
+
+def test_a_network_of_another_size_is_that_of_the_library(page, robot_module, monkeypatch):
+    monkeypatch.setattr(paper, "BATCH", 16)
+    monkeypatch.setattr(paper, "HIDDEN", 8)
+    assert_a_run_is_that_of_the_library(page, robot_module, Experiment("RDES", episodes=1))
+
+
 @pytest.mark.parametrize("learner", ["DES", "RDES"])
 @pytest.mark.parametrize(("layout", "decay", "seed"), [("A", "step", 0), ("C", "episode", 1)])
 def test_a_run_is_that_of_the_library(page, robot_module, learner, layout, decay, seed):
     """Equal until the first fit, then to single precision; 4e-7 is the farthest seen so early."""
     experiment = Experiment(learner=learner, layout=layout, decay=decay, seed=seed, episodes=3)
+    assert_a_run_is_that_of_the_library(page, robot_module, experiment)
+
+
+def assert_a_run_is_that_of_the_library(page, robot_module, experiment: Experiment) -> None:
     nmpc = controller_of(experiment).nmpc
     given = {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")}
     found = page.evaluate(
@@ -79,14 +121,16 @@ def test_a_run_is_that_of_the_library(page, robot_module, learner, layout, decay
         {
             "module": b64encode(gzip.compress(robot_module)).decode(),
             "problem": problem_of(nmpc),
-            "settings": two_learners.settings(experiment, learner, nmpc) | given,
+            "settings": two_learners.settings(experiment, experiment.learner, nmpc) | given,
             "widths": noise.widths(),
         },
     )
     expected = run(experiment).steps
+    before = paper.BATCH - 1  # steps without a fit
     theta = np.array([step["theta"] for step in found])
-    np.testing.assert_array_equal(theta[: BATCH - 1], expected["theta"][: BATCH - 1])
+    np.testing.assert_array_equal(theta[:before], expected["theta"][:before])
     values = np.array([step["nextValue"] for step in found])
-    assert np.isnan(values[: BATCH - 1]).all()
+    assert np.isnan(values[:before]).all()
+    assert np.isfinite(values[before:]).any()
     for these, those in ((theta, expected["theta"]), (values, expected["next_value"])):
         np.testing.assert_allclose(these, those, rtol=0, atol=1e-5 * np.nanmax(np.abs(those)))

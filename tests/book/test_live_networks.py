@@ -10,7 +10,6 @@ from nmpcrl.study import Experiment, paper, run
 
 FIGURE = "networks"
 TRAINED = "([figure, count]) => figure.shown.found.every(one => one.episode >= count)"
-pytestmark = pytest.mark.book
 
 
 def assert_equal_to_python(shown: dict, episodes: int, **changes) -> None:

@@ -4,7 +4,6 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from live_page import ALSO, CHAPTERS, MOST, loaded
 
-pytestmark = pytest.mark.book
 FIRST = {chapter: figure for figure, chapter in reversed(CHAPTERS.items())}  # of each chapter
 IN_ORDER = """() => [...document.querySelectorAll("article figure img, figure.live")]
     .map(one => one.matches("img") ? "picture" : one.dataset.figure)"""

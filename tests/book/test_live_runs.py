@@ -84,7 +84,6 @@ def test_the_files_of_runs_are_written_if_a_figure_asks_for_them(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"runs_{k}.js" for k in "ABCDEF"]
 
 
-@pytest.mark.book
 def test_it_begins_with_published_numbers_and_has_loaded_no_further_runs(tab, known):
     shown = tab.shown()
     assert shown["given"]["episode"] == 300
@@ -93,7 +92,6 @@ def test_it_begins_with_published_numbers_and_has_loaded_no_further_runs(tab, kn
     assert further(tab.requests) == []
 
 
-@pytest.mark.book
 def test_every_choice_shows_its_published_run_whose_trajectory_the_page_solves(tab, known):
     chosen = {"Learner": "GES", "Beside_it": "TDC", "Layout": "D", "Noise_decays": "episode"}
     shown = choose(tab, **chosen, Seed="7")
@@ -109,7 +107,6 @@ def test_every_choice_shows_its_published_run_whose_trajectory_the_page_solves(t
     assert further(tab.requests) == ["runs_D.js"]
 
 
-@pytest.mark.book
 def test_keys_move_episode_by_episode(tab, known):
     tab.press(SLIDER, "ArrowLeft", "ArrowLeft", "ArrowLeft")
     shown = tab.shown()
@@ -127,7 +124,6 @@ def test_keys_move_episode_by_episode(tab, known):
     assert float(x) == 0
 
 
-@pytest.mark.book
 def test_a_click_on_the_slider_moves_there(tab):
     tab.handle(SLIDER).scroll_into_view_if_needed()
     box = tab.handle(SLIDER).bounding_box()
@@ -135,7 +131,6 @@ def test_a_click_on_the_slider_moves_there(tab):
     assert tab.shown()["given"]["episode"] == pytest.approx(150, abs=2)
 
 
-@pytest.mark.book
 def test_play_goes_from_the_first_episode_on_until_it_is_paused(tab):
     tab.click("Play")
     tab.page.wait_for_function(f"({HOLDS})(document.querySelector('[data-figure=runs]')) === 3")
@@ -150,7 +145,6 @@ def test_play_goes_from_the_first_episode_on_until_it_is_paused(tab):
     assert tab.figure.get_by_role("button", name="Play", exact=True).count() == 1
 
 
-@pytest.mark.book
 def test_the_slider_takes_over_from_play(tab):
     tab.press(SLIDER, "Home")
     tab.click("Play")
@@ -159,7 +153,6 @@ def test_the_slider_takes_over_from_play(tab):
     assert tab.shown()["given"]["episode"] == 299
 
 
-@pytest.mark.book
 def test_one_run_may_be_shown_alone_beside_the_frozen_arm(tab):
     shown = choose(tab, Beside_it="")
     assert [one["learner"] for one in shown["found"]] == ["ES", "frozen"]
@@ -167,7 +160,6 @@ def test_one_run_may_be_shown_alone_beside_the_frozen_arm(tab):
     assert tab.figure.locator(".key span").all_inner_texts() == ["ES", "frozen arm"]
 
 
-@pytest.mark.book
 def test_a_run_that_was_stopped_ends_where_it_was(tab, known):
     e = Experiment("DES", layout="A", decay="step", seed=1)
     count = len(known.summaries[e].evaluations["cost"])
@@ -182,14 +174,12 @@ def test_a_run_that_was_stopped_ends_where_it_was(tab, known):
     assert_equal_to_published(shown, known)
 
 
-@pytest.mark.book
 def test_a_layout_whose_runs_cannot_be_loaded_says_so(opened):
     tab = opened(FIGURE, script=LOSES_C)
     tab.begun().figure.get_by_label("Layout", exact=True).select_option("C")
     tab.figure.get_by_text("could not be loaded").wait_for()
 
 
-@pytest.mark.book
 def test_a_run_that_was_not_made_is_named(opened):
     tab = opened(FIGURE, chapter="07_beyond").begun()
     shown = choose(tab, Learner="QL", Layout="B")
@@ -197,7 +187,6 @@ def test_a_run_that_was_not_made_is_named(opened):
     assert "There is no run of Q-learning in layout B" in tab.figure.inner_text()
 
 
-@pytest.mark.book
 def test_a_notebook_has_one_seed_in_one_layout_and_asks_for_nothing(browser, site, tmp_path):
     notebook = nbformat.read(site / "book/05_results.ipynb", 4)
     (html,) = [text for text in live.shown(notebook) if live.ASKS in text]
@@ -215,7 +204,6 @@ def test_a_notebook_has_one_seed_in_one_layout_and_asks_for_nothing(browser, sit
     page.close()
 
 
-@pytest.mark.book
 @pytest.mark.parametrize("chapter", CHAPTERS)
 def test_what_a_page_loads_at_first_is_light(site, chapter):
     text = (site / f"book/{chapter}.html").read_text()

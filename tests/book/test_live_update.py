@@ -6,7 +6,6 @@ import pytest
 from nmpcrl.learning import semi_gradient_step, td_error
 from nmpcrl.study import paper
 
-pytestmark = pytest.mark.book
 FIGURE = "update"
 ALPHA, SPEED, TURN = (
     "alpha, step size",

@@ -355,7 +355,6 @@ def test_whatever_a_chapter_is_given_it_takes_little_or_refuses_in_a_sentence(dr
 
 
 @pytest.mark.slow
-@pytest.mark.book
 @pytest.mark.parametrize(
     ("name", "words", "said"),
     [

@@ -14,8 +14,6 @@ from nmpcrl.report import halves
 from nmpcrl.report.prose import filled
 from nmpcrl.report.tables import BADGES, WORDS
 
-pytestmark = pytest.mark.book
-
 PAGES = build.pages()
 each_page = pytest.mark.parametrize("page", PAGES)
 

@@ -189,7 +189,6 @@ def flat(entries: list) -> list[str]:
     return [title for titles in nested for title in titles]
 
 
-@pytest.mark.book
 def test_the_outline_has_every_part_chapter_and_section_in_their_order(book, headings):
     titles = flat(book.outline)
     parts = yaml.safe_load((build.ROOT / "_toc.yml").read_text())["parts"]
@@ -198,7 +197,6 @@ def test_the_outline_has_every_part_chapter_and_section_in_their_order(book, hea
     assert [one for one in headings if one not in rest] == []
 
 
-@pytest.mark.book
 def test_the_file_is_tagged_and_says_what_it_is(book):
     root = book.root_object
     assert root["/MarkInfo"]["/Marked"]
@@ -209,7 +207,6 @@ def test_the_file_is_tagged_and_says_what_it_is(book):
     assert book.metadata.creation_date
 
 
-@pytest.mark.book
 def test_pictures_and_formulas_are_tagged_with_words(book):
     objects = map(book.get_object, range(1, book.trailer["/Size"]))
     tags = [one for one in objects if isinstance(one, dict) and one.get("/Type") == "/StructElem"]
@@ -227,7 +224,6 @@ LAST = """() => [...document.querySelectorAll(".bd-article")].flatMap(article =>
 })"""
 
 
-@pytest.mark.book
 def test_no_chapter_ends_in_a_margin_that_could_begin_an_empty_page(site, browser):
     with browser.new_page() as tab:
         tab.emulate_media(media="print")
@@ -235,7 +231,6 @@ def test_no_chapter_ends_in_a_margin_that_could_begin_an_empty_page(site, browse
         assert tab.evaluate(LAST) == []
 
 
-@pytest.mark.book
 def test_no_page_is_blank_and_their_number_is_sane(site, texts):
     assert all(len(text.split()) > 15 for text in texts)
     words = sum(
@@ -245,7 +240,6 @@ def test_no_page_is_blank_and_their_number_is_sane(site, texts):
     assert words / 500 < len(texts) < words / 100
 
 
-@pytest.mark.book
 def test_what_is_folded_on_the_page_can_be_read(site, texts):
     page = BeautifulSoup((site / "book/04_ges.html").read_text(), "html.parser")
     solutions = page.select(".solution, details.hide")
@@ -260,7 +254,6 @@ def test_what_is_folded_on_the_page_can_be_read(site, texts):
         assert "".join(longest.split()).removeprefix("Solution") in text
 
 
-@pytest.mark.book
 def test_no_formula_is_left_as_it_is_typed(texts):
     for text in texts:
         assert not re.search(
@@ -268,7 +261,6 @@ def test_no_formula_is_left_as_it_is_typed(texts):
         )
 
 
-@pytest.mark.book
 def test_links_between_pages_lead_within_the_file_and_none_to_the_disk(book):
     links = [
         note.get_object()
@@ -284,7 +276,6 @@ def test_links_between_pages_lead_within_the_file_and_none_to_the_disk(book):
     assert all(re.match("https?://", address) for address in outer)
 
 
-@pytest.mark.book
 def test_the_table_of_contents_says_on_which_page_a_chapter_begins(book, texts):
     contents = " ".join(" ".join(texts[1:10]).split())
     for entry in book.outline:
@@ -294,7 +285,6 @@ def test_the_table_of_contents_says_on_which_page_a_chapter_begins(book, texts):
                 assert f"{one.title} {page}" in contents
 
 
-@pytest.mark.book
 @pytest.mark.parametrize("page", ["book/04_ges", "book/05_results"])
 def test_a_page_of_the_site_is_printed_open_light_and_without_the_sidebar(site, browser, page):
     tab = browser.new_page(color_scheme="dark")

@@ -123,7 +123,6 @@ def answered(tab, name: str, answer: str) -> str:
     return said(tab, name).inner_text()
 
 
-@pytest.mark.book
 @pytest.mark.parametrize(
     ("name", "answer", "what"),
     [
@@ -152,7 +151,6 @@ def test_a_typed_answer_is_judged_as_the_notebook_judges_it(tab, name, answer, w
     assert verdict == ("right" if what.startswith("Right") else "wrong")
 
 
-@pytest.mark.book
 @pytest.mark.parametrize(
     ("name", "right", "answer", "what"),
     [
@@ -181,7 +179,6 @@ FORMULAS = (
 )  # fmt: skip
 
 
-@pytest.mark.book
 def test_the_page_reads_formulas_as_the_library_does(tab):
     values = {"x": 1.25, "y": 0.75}
     there = tab.evaluate(
@@ -191,7 +188,6 @@ def test_the_page_reads_formulas_as_the_library_does(tab):
     assert there == pytest.approx([evaluated(one, values) for one in FORMULAS], rel=1e-12)
 
 
-@pytest.mark.book
 def test_the_keyboard_alone_chooses_and_checks(tab):
     tab.locator("#answer-reason-a").focus()
     tab.keyboard.press("Space")
@@ -204,13 +200,11 @@ def test_the_keyboard_alone_chooses_and_checks(tab):
     assert said(tab, "reason").inner_text() == "Right: it is b."
 
 
-@pytest.mark.book
 def test_nothing_chosen_is_no_miss_of_a_letter(tab):
     tab.locator('[data-exercise="reason"]').get_by_role("button", name="Check").click()
     assert said(tab, "reason").inner_text().startswith("Choose one")
 
 
-@pytest.mark.book
 def test_each_miss_opens_the_next_hint_and_says_so(tab):
     opened = "[...document.querySelectorAll('details[open] summary')].map(one => one.innerText)"
     assert tab.evaluate(opened) == []
@@ -221,7 +215,6 @@ def test_each_miss_opens_the_next_hint_and_says_so(tab):
     assert "next hint" not in answered(tab, "weight", "1")
 
 
-@pytest.mark.book
 def test_answers_and_progress_are_kept_until_they_are_reset(tab):
     answered(tab, "weight", "2.5")
     answered(tab, "path", "x")
@@ -240,7 +233,6 @@ def test_answers_and_progress_are_kept_until_they_are_reset(tab):
     assert tab.evaluate("localStorage.getItem('nmpcrl.exercises')") == "{}"
 
 
-@pytest.mark.book
 @pytest.mark.parametrize("stored", ["{", "3", "[]", '{"weight": 3}', '{"weight": {}}'])
 def test_what_is_stored_may_be_spoilt(tab, stored):
     tab.evaluate("stored => localStorage.setItem('nmpcrl.exercises', stored)", stored)
@@ -248,7 +240,6 @@ def test_what_is_stored_may_be_spoilt(tab, stored):
     assert answered(tab, "weight", "2.5") == "Right: 2.5 kg."
 
 
-@pytest.mark.book
 def test_a_browser_that_keeps_nothing_says_so(tab):
     tab.add_init_script("Storage.prototype.setItem = () => { throw new Error('full') }")
     tab.reload()
@@ -257,7 +248,6 @@ def test_a_browser_that_keeps_nothing_says_so(tab):
     assert "keeps nothing" in tab.locator(".exercise-progress").inner_text()
 
 
-@pytest.mark.book
 def test_what_is_said_is_announced_and_every_field_has_a_name(tab):
     assert said(tab, "weight").get_attribute("role") == "status"
     assert tab.get_by_role("textbox", name="Your answer", exact=True).count() == 2
@@ -266,7 +256,6 @@ def test_what_is_said_is_announced_and_every_field_has_a_name(tab):
     assert tab.get_by_role("form", name="Exercise 1.2").count() == 1
 
 
-@pytest.mark.book
 @pytest.mark.parametrize("width", [390, 1400])
 def test_no_rule_of_accessibility_is_broken(tab, width):
     tab.set_viewport_size({"width": width, "height": 900})
@@ -277,7 +266,6 @@ def test_no_rule_of_accessibility_is_broken(tab, width):
     assert tab.evaluate("document.documentElement.scrollWidth") <= width
 
 
-@pytest.mark.book
 def test_without_scripts_and_on_paper_there_is_no_place_to_type(browser, address, tab):
     without = browser.new_context(java_script_enabled=False)
     page = without.new_page()

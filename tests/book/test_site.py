@@ -11,8 +11,6 @@ import pytest
 from bs4 import BeautifulSoup
 from legibility import LETTERS, SHOWN
 
-pytestmark = pytest.mark.book
-
 PAGES = build.pages()
 LOADED = {  # what a browser fetches by itself
     "script": "src",

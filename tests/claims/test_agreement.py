@@ -13,7 +13,7 @@ from nmpcrl.claims.paper_claims import judge_times
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import design
-from nmpcrl.study.machine import fingerprint
+from nmpcrl.study.storage.machine import fingerprint
 
 
 def verdict(outcome: Outcome, interval: tuple[float, float] | None = None) -> Verdict:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from typing import Any
@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from quiet_rows import START_COST, quiet_row
 
 from nmpcrl.analysis.metrics import TOUCH
-from nmpcrl.analysis.rows import as_text, experiment_of, row, table
+from nmpcrl.analysis.rows import experiment_of, row, table
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.claims import own_claims, paper_claims, thresholds
@@ -25,34 +26,21 @@ from nmpcrl.claims.wider_claims import WIDER_CLAIMS, WIDER_THAN, judge_wider
 from nmpcrl.study import Experiment, Runs, paper, run
 from nmpcrl.study.experiment import LEARNERS, PAPER
 
-START_COST = 1000.0  # noise-free cost of theta_init
 SEEDS = range(5)
 PLACE = np.zeros((3, 3))  # a rollout that stands still
 
 Changes = Callable[[Experiment], dict[str, Any]]
 
 
-def summary(experiment: Experiment) -> dict[str, Any]:
-    """The row of a run in which nothing happened."""
-    fields = {name: as_text(value) for name, value in asdict(experiment).items()}
-    still = {"stopped": "finished", "initial_cost": START_COST, "final_cost": START_COST}
-    still |= {"late_cost_range": 0.0, "cost_ratio": 1.0, "inputs": 0, "outside": 0, "distance": 0.1}
-    still |= {"steps_done": 39_000, "worst_overlap": 0.0, "eval_worst_overlap": 0.0}
-    for name, size in product(("inside", "eval_inside"), ("small", "medium", "large")):
-        still[f"{name}_{size}"] = 0
-    still |= {"imitation_with": 0.5, "imitation_without": 1.0}
-    return fields | still | {f"theta_{i}": value for i, value in enumerate(experiment.theta)}
-
-
 def study(
     changes: Changes = lambda _: {}, *, learners=LEARNERS, layouts=("A",), **fields
 ) -> pd.DataFrame:
-    """Runs with both readings and five seeds; `changes` says what is unlike `summary` in each."""
+    """Runs with both readings and five seeds; `changes` says what is unlike in each."""
     named = [
         Experiment(learner, seed=seed, layout=layout, decay=decay, **fields)
         for learner, layout, decay, seed in product(learners, layouts, ("step", "episode"), SEEDS)
     ]
-    return pd.DataFrame([summary(one) | changes(one) for one in named])
+    return pd.DataFrame([quiet_row(one, **changes(one)) for one in named])
 
 
 def of(learner: str, seeds=SEEDS, **columns: Any) -> Changes:
@@ -620,23 +608,6 @@ def test_a_variant_changes_the_claims_whose_outcome_it_changes():
     assert one(frame, "hot", "C2").p == 1
 
 
-def test_a_variant_is_held_against_the_main_table_in_its_own_cells():
-    main = study(
-        lambda e: BAD if e.learner == "DES" and e.layout == "B" else {}, layouts=("A", "B")
-    )
-    runs = varied(main, soft=study(learners=PAPER, layouts=("A",), box="soft"))
-    cell = one(variant_changes(runs, paths(runs)), "soft", "C1")
-    assert (cell.base, cell.outcome, cell.pairs) == (NOT, NOT, 10)
-
-
-def test_a_learner_that_a_variant_does_not_change_is_taken_from_the_main_table():
-    main = study(of("ES", **SWAYING))
-    runs = varied(main, slow=study(of("GES", **SWAYING), learners=("GES",), beta=1e-6))
-    frame = variant_changes(runs, paths(runs))
-    assert (one(frame, "slow", "C2").base, one(frame, "slow", "C2").outcome) == (REPRODUCED, NOT)
-    assert (one(frame, "slow", "C9").base, one(frame, "slow", "C9").outcome) == (NOT, NOT)
-
-
 def test_a_claim_about_learners_that_a_variant_does_not_change_cannot_change():
     runs = varied(study(), slow=study(learners=("GES",), beta=1e-6))
     assert set(variant_changes(runs, paths(runs)).claim) == {"C2", "C5", "C9"}
@@ -700,4 +671,4 @@ def test_a_setting_is_judged_at_a_time():
 def test_nudged_runs_keep_every_digit_of_their_theta():
     theta = tuple(np.nextafter(paper.THETA_INIT, 9))
     perturbed = replace(Experiment(), theta=tuple(map(float, theta)))
-    assert experiment_of(summary(perturbed)) == perturbed
+    assert experiment_of(quiet_row(perturbed)) == perturbed

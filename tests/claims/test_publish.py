@@ -4,6 +4,8 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims import publish, published
+from nmpcrl.claims.assumptions import THEOREMS
+from nmpcrl.claims.rule import Assumption
 from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.study import Experiment
 
@@ -35,6 +37,19 @@ def test_verdicts_on_time_are_published_if_all_are_decided(monkeypatch, width, o
 def test_what_is_published_gives_its_verdicts_again_without_a_run():
     found = published.load()
     assert publish.judge_published(found) == found.verdicts
+
+
+def test_verdicts_are_published_in_the_place_of_those_that_were_there(monkeypatch):
+    kept, study = [], {publish.AUDITED: "records"}
+    monkeypatch.setattr(publish, "fetch_all", lambda *_, **__: study)
+    monkeypatch.setattr(publish, "dropped_curvature", lambda records: f"of {records}")
+    held = Assumption("a finite MDP", "it is not", holds=False, by=THEOREMS)
+    monkeypatch.setattr(publish, "audit", lambda *given: (held,) * (given == (study, "of records")))
+    monkeypatch.setattr(publish.published, "republish", kept.append)
+    judged = publish.rejudge()
+    assert kept == [judged]
+    (c8,) = [one for one in judged if one.claim == "C8"]
+    assert "a finite MDP" in c8.evidence
 
 
 def test_each_wider_verdict_follows_the_one_it_widens():

@@ -12,7 +12,7 @@ from nmpcrl.claims import published, verification
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.verification import CannotRelock, relock, sample
 from nmpcrl.study import provenance, sweep
-from nmpcrl.study.executor import THREADS
+from nmpcrl.study.storage.executor import THREADS
 
 SHORT = {"episodes": 2, "steps": 3, "evaluate_every": 1}
 MAIN = sweep(learner=("ES", "GES"), seed=(0, 1, 2), **SHORT)

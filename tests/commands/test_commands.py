@@ -16,7 +16,7 @@ from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, design, limits, paper, sweep
-from nmpcrl.study.setup import LEARNERS
+from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.sweeps import FIELDS
 
 WHOLE = len(design.whole_study())
@@ -32,7 +32,7 @@ def small(monkeypatch, measured):
     """A study of six short runs, judged by nobody, and times that nobody measured."""
     times = pd.DataFrame(measured["learners"])
     monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
-    monkeypatch.setattr(publish, "verdicts", lambda *_: ())
+    monkeypatch.setattr(publish, "rejudge", lambda: ())
     monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: times)
 
 

@@ -55,7 +55,7 @@ def fast(command, monkeypatch, tmp_path):
     ):
         monkeypatch.setattr(place, name, refuse)
     monkeypatch.setattr(
-        "nmpcrl.report.figures.run.run_page", lambda *_: refuse()
+        "nmpcrl.report.figures.runs.run.run_page", lambda *_: refuse()
     )  # a second each; tests of their own draw it
     return command
 

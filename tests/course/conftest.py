@@ -1,6 +1,7 @@
 """Grades of what students hand in."""
 
 import csv
+from contextlib import closing
 from pathlib import Path
 
 import editions
@@ -10,25 +11,25 @@ from click.testing import CliRunner
 from small_course import SMALL, small_chapter
 
 from nmpcrl.commands import main
-from nmpcrl.course import grading
-from nmpcrl.course.submissions import chapters, notebook_of, taken
+from nmpcrl.course.execution import Limits
+from nmpcrl.course.judge import Judge
+from nmpcrl.course.submissions import chapters, matched, notebook_of
 
 
 @pytest.fixture
 def edition(tmp_path) -> Path:
     """The edition for graders of the small chapter."""
-    place = tmp_path / "edition/source/nmpcrl"
-    (place / "data/published").mkdir(parents=True)
-    (place / "data/of_the_chapter.txt").write_text("4")
+    place, data = (tmp_path / "edition" / name for name in (f"source/{SMALL}", "data"))
+    place.mkdir(parents=True)
+    (data / "published").mkdir(parents=True)
+    (data / "of_the_chapter.txt").write_text("4")
     nbformat.write(editions.grader(small_chapter(), set()), place / f"{SMALL}.ipynb")
     return tmp_path / "edition"
 
 
 @pytest.fixture
-def graded(tmp_path, edition, monkeypatch):
+def graded(tmp_path, edition):
     """By student, the rows of the CSV file by exercise."""
-
-    monkeypatch.setattr(grading, "rehearsed", lambda chapter, *_: chapter)  # it trains nothing
 
     def grade(*words, name=SMALL, **handed):
         for student, notebook in handed.items():
@@ -49,6 +50,14 @@ def graded(tmp_path, edition, monkeypatch):
 
 
 @pytest.fixture
+def judge(edition, tmp_path):
+    """What makes the checks of the small chapter."""
+    (chapter,) = chapters(edition)
+    with closing(Judge(chapter, Limits(), tmp_path / "data-of-judge")) as made:
+        yield made
+
+
+@pytest.fixture
 def submission(edition):
     """A chapter, and what a student hands in for it."""
 
@@ -56,6 +65,6 @@ def submission(edition):
         (chapter,) = chapters(edition)
         path = edition / "handed-in.ipynb"
         path.write_text(nbformat.writes(notebook))
-        return chapter, taken(chapter, notebook_of(path))
+        return chapter, matched(chapter, notebook_of(path))
 
     return made

@@ -472,19 +472,47 @@ def test_right_answers_are_right_and_wrong_ones_are_met_with_a_sentence(check):
                 check.__wrapped__(answer, *known(check))
 
 
-def test_every_exercise_is_tried_here_or_marked_by_hand():
-    called, by_hand = set(), []
+@cache
+def texts() -> dict[str, str]:
+    """What each exercise asks, by the name of its check, or by its number if it has none."""
+    found = {}
     for path in BOOK.glob("*.ipynb"):
         notebook = nbformat.read(path, 4)
         source = "\n".join(cell.source for cell in notebook.cells)
         module = re.search(r"from nmpcrl\.course\.checks import (\w+) as check", source)
         for one in exercises(notebook):
-            if one.parts["check"]:
-                (cell,) = one.parts["check"]
-                called.add(f"{module[1]}.{CALLED.search(cell.source)[1]}")
-            else:
-                by_hand.append(one.number)
-    assert sorted(by_hand) == BY_HAND
-    assert called == {named(check) for check in CHECKS}
-    assert len(called) + len(by_hand) == 71
+            calls = [CALLED.search(cell.source)[1] for cell in one.parts["check"]]
+            found[f"{module[1]}.{calls[0]}" if calls else one.number] = one.text.source
+    return found
+
+
+def rounded(number: float, text: str) -> float:
+    """A number as a text asks for it, at worst; to three digits if it says nothing."""
+    if found := re.search(r"within (\d+) %", text):
+        return number * (1 + 0.0099 * int(found[1]))
+    if "to the centimetre" in text:
+        return round(number, 2)
+    if found := re.search(r"\b(two|three|four) digits( after the point)?", text):
+        digits = {"two": 2, "three": 3, "four": 4}[found[1]]
+        return round(number, digits) if found[2] else float(f"{number:.{digits}g}")
+    return float(f"{number:.3g}")
+
+
+def test_a_numeric_exercise_says_a_precision_that_its_check_accepts_or_has_an_exact_answer():
+    numeric = 0
+    for check, (right, _) in CHECKS.items():
+        about = check.__wrapped__(right[0], *known(check)).page or {}
+        if about.get("kind") == "number":
+            numeric += 1
+            expected, text = about["expected"], texts()[named(check)]
+            given = rounded(expected, text)
+            assert abs(given - expected) <= about["within"], (named(check), text)
+            if not re.search("digits|centimetre|within", text):
+                assert given == pytest.approx(expected, rel=1e-9), (named(check), text)
+    assert numeric > 20
+
+
+def test_every_exercise_is_tried_here_or_marked_by_hand():
+    assert set(texts()) == {named(check) for check in CHECKS} | set(BY_HAND)
+    assert len(texts()) == 71
     assert all(len(right) >= 2 and len(wrong) >= 3 for right, wrong in CHECKS.values())

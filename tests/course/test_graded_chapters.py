@@ -9,15 +9,17 @@ import subprocess
 import sys
 import venv
 from collections.abc import Mapping
+from copy import deepcopy
 from pathlib import Path
 
 import course
 import nbformat
 import pytest
 
-from nmpcrl.course.confined import Limits
+from nmpcrl.course.execution import Limits
 from nmpcrl.course.exercises import exercises
 from nmpcrl.course.grading import grade
+from nmpcrl.course.variants import varied
 
 CHAPTER = "01_mdp_and_nmpc"
 SOURCES = course.chapters()
@@ -32,14 +34,12 @@ where auto_score is not null"""
 pytestmark = pytest.mark.course
 
 
-def for_graders(folder: Path, name: str, runs: Mapping[str, Path]) -> Path:
+def for_graders(folder: Path, name: str, runs: Mapping[str, Path], secret: bytes = b"") -> None:
     """The edition for graders with one chapter."""
-    place = folder / course.WITHIN["grader"]
-    course.edition("grader", place, runs)
-    for path in place.glob("*.ipynb"):
-        if path.name != name:
-            path.unlink()
-    return place
+    course.edition("grader", folder, runs, secret=secret)
+    for place in (folder / "source").iterdir():
+        if place.name != Path(name).stem:
+            shutil.rmtree(place)
 
 
 def answered(notebook, every):
@@ -63,6 +63,22 @@ def test_all_solutions_of_a_chapter_have_all_points(name, long_runs, tmp_path):
     assert len(checked) == len(marks) - 1  # the project
 
 
+def test_with_a_secret_its_own_solutions_have_all_points_and_published_ones_none(tmp_path):
+    name, secret = f"{CHAPTER}.ipynb", b"a secret"
+    for_graders(tmp_path / "grader", name, {}, secret)
+    other = varied(SOURCES[name], secret)
+    student = course.EDITIONS["student"](other, set(SOURCES))
+    for who, source in {"own": other, "published": SOURCES[name]}.items():
+        (tmp_path / "in" / who).mkdir(parents=True)
+        notebook = answered(deepcopy(student), exercises(source))
+        nbformat.write(notebook, tmp_path / "in" / who / name)
+    own, published = grade(tmp_path / "in", tmp_path / "grader", Limits(seconds=1800))
+    worth = {mark.exercise: mark.of for mark in own if mark.points is not None}
+    assert {number for number, of in worth.items() if of} == {"1.1"}
+    assert {m.exercise: m.points for m in own if m.points is not None} == worth
+    assert sum(mark.points or 0 for mark in published) == 0
+
+
 @pytest.fixture(scope="session")
 def nbgrader(request) -> Path:
     """A Python that has nbgrader, from the registry, once in pytest's own cache."""
@@ -82,23 +98,20 @@ def nbgrader(request) -> Path:
 
 def test_nbgrader_gives_the_same_points(nbgrader, tmp_path):
     name, folder = f"{CHAPTER}.ipynb", tmp_path / "grader"
-    place = for_graders(folder, name, {})  # this chapter needs none
-    (folder / "nbgrader_config.py").write_text(course.autograded.NBGRADER_CONFIG)
-    called(nbgrader, folder, "generate_assignment", "nmpcrl")
-    released = folder / "release/nmpcrl" / name
+    for_graders(folder, name, {})  # this chapter needs none
+    called(nbgrader, folder, "generate_assignment", CHAPTER)
+    released = folder / "release" / CHAPTER / name
     assert "SOLUTION" not in released.read_text()
     assert "MARK SCHEME" not in released.read_text()
     every = list(exercises(SOURCES[name]))
     for student, solved in {"untouched": [], "half": every[:3], "perfect": every}.items():
-        submitted = folder / "submitted" / student / "nmpcrl"
-        shutil.copytree(place, submitted, symlinks=True)
+        submitted = folder / "submitted" / student / CHAPTER
         for path in (submitted / name, tmp_path / "in" / student / name):
             path.parent.mkdir(parents=True, exist_ok=True)
             nbformat.write(answered(nbformat.read(released, 4), solved), path)
-    called(nbgrader, folder, "autograde", "nmpcrl")
+    called(nbgrader, folder, "autograde", CHAPTER)
     called(nbgrader, folder, "export", "--to", str(tmp_path / "theirs.csv"))
 
-    shutil.rmtree(folder / "submitted")
     given = [m for marks in grade(tmp_path / "in", folder, Limits()) for m in marks]
     marks = [m for m in given if m.points is not None]
     checks = {one.parts["check"][0].id: one.number for one in every if one.parts["check"]}

@@ -7,55 +7,67 @@ import psutil
 import pytest
 from small_course import ASKED, solved_by_student
 
-from nmpcrl.course import confined, judging
-from nmpcrl.course.confined import Limits, Sat
+from nmpcrl.course import judging
+from nmpcrl.course.execution import Limits
+from nmpcrl.course.judging import Run
 
 
 def test_where_the_chapter_itself_is_stopped_the_last_answer_before_it_is_taken_out(
-    submission, monkeypatch
+    submission, judge, monkeypatch
 ):
-    chapter, handed = submission(solved_by_student())
+    _, handed = submission(solved_by_student())
     codes = []
 
-    def ends_between(chapter, steps, limits, until, *, restored):
+    def ends_between(judge, steps, limits, until, *, restored):
         code = {step.name: step.code for step in steps}
         codes.append(code)
         names = list(code)
         if "2" in code["two-answer"]:  # as if it had left a timer running
             names = names[: names.index("between-2")]
-        return Sat({n: {"error": None, "right": True, "rebound": []} for n in names}, "it ended")
+        return Run(dict.fromkeys(names, ""), dict.fromkeys(names, ""), why="it ended")
 
-    monkeypatch.setattr(confined, "run", ends_between)
-    losses = judging.judged(chapter, handed, Limits())
+    monkeypatch.setattr(judging, "run", ends_between)
+    losses = judging.losses(judge, handed, Limits())
     assert [name for name in ASKED if losses[name]] == ["two"]
     assert len(codes) == 2
     changed = {name for name, code in codes[1].items() if code != codes[0][name]}
     assert changed == {"two-answer"}
 
 
-def test_an_exercise_that_is_stopped_untouched_is_left_out_altogether(submission, monkeypatch):
-    chapter, handed = submission(solved_by_student())
+def test_an_exercise_that_is_stopped_untouched_is_left_out_altogether(
+    submission, judge, monkeypatch
+):
+    _, handed = submission(solved_by_student())
 
-    def ends_in_its_check(chapter, steps, limits, until, *, restored):
+    def ends_in_its_check(judge, steps, limits, until, *, restored):
         names = [step.name for step in steps]
         if "two-check" in names:
             names = names[: names.index("two-check")]
-        return Sat({n: {"error": None, "right": True, "rebound": []} for n in names}, "it ended")
+        return Run(dict.fromkeys(names, ""), dict.fromkeys(names, ""), why="it ended")
 
-    monkeypatch.setattr(confined, "run", ends_in_its_check)
-    losses = judging.judged(chapter, handed, Limits())
+    monkeypatch.setattr(judging, "run", ends_in_its_check)
+    losses = judging.losses(judge, handed, Limits())
     assert [name for name in ASKED if losses[name]] == ["two"]
 
 
-def test_files_are_written_in_a_folder_that_is_thrown_away(submission, tmp_path, monkeypatch):
+def test_the_time_of_a_notebook_holds_for_all_its_runs(submission, judge):
+    _, handed = submission(solved_by_student(three="import time\ntime.sleep(10**6)"))
+    losses = judging.losses(judge, handed, Limits(seconds=3))
+    assert losses["three"]
+    assert "the notebook took longer than 3 s" in losses["seven"]
+
+
+def test_files_are_written_in_a_folder_that_is_thrown_away(
+    submission, judge, tmp_path, monkeypatch
+):
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     code = "from pathlib import Path\nPath('left.txt').write_text(str(Path.cwd()))"
     chapter, handed = submission(solved_by_student(one=code))
     steps = [replace(step, code="1 / 0") if step.group == "two" else step for step in handed.steps]
-    sat = confined.run(chapter, steps, Limits(), time.monotonic() + 60)
-    assert sat.ends["one-answer"]["error"] is None
-    assert sat.ends["two-answer"]["error"][0] == "ZeroDivisionError"
+    made = judging.run(judge, steps, Limits(), time.monotonic() + 60)
+    assert made.errors["one-answer"] == ""
+    assert made.errors["two-answer"].startswith("ZeroDivisionError")
     assert list(tmp_path.joinpath("here").iterdir()) == []
     assert edition_files(chapter) == {"of_the_chapter.txt", "published"}
 
@@ -75,10 +87,10 @@ while not Path({file!r}).exists() or not Path({file!r}).read_text():
 """
 
 
-def test_a_process_that_left_the_notebook_ends_with_it(submission, tmp_path):
+def test_a_process_that_left_the_notebook_ends_with_it(submission, judge, tmp_path):
     file = tmp_path / "daemon"
-    chapter, handed = submission(solved_by_student(one=DAEMON.format(file=str(file))))
-    confined.run(chapter, handed.steps, Limits(), time.monotonic() + 60)
+    _, handed = submission(solved_by_student(one=DAEMON.format(file=str(file))))
+    judging.run(judge, handed.steps, Limits(), time.monotonic() + 60)
     left = int(file.read_text())
     until = time.monotonic() + 5
     while psutil.pid_exists(left) and psutil.Process(left).status() != psutil.STATUS_ZOMBIE:
@@ -90,9 +102,11 @@ def test_a_process_that_left_the_notebook_ends_with_it(submission, tmp_path):
     "line",
     ["if os.fork(): os._exit(0)", "if os.fork(): time.sleep(1); os._exit(0)"],
 )
-def test_a_copy_that_goes_on_for_its_process_costs_the_exercise_that_made_it(line, submission):
-    chapter, handed = submission(solved_by_student(one=f"import os, time\nroot_of_one = 2\n{line}"))
-    losses = judging.judged(chapter, handed, Limits())
+def test_a_copy_that_goes_on_for_its_process_costs_the_exercise_that_made_it(
+    line, submission, judge
+):
+    _, handed = submission(solved_by_student(one=f"import os, time\nroot_of_one = 2\n{line}"))
+    losses = judging.losses(judge, handed, Limits())
     assert [name for name in ASKED if losses[name]] == ["one"]
 
 

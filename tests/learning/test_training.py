@@ -19,7 +19,8 @@ from nmpcrl.learning.training import (
     train,
 )
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.setup import DECAYS, prepare
+from nmpcrl.study.learners import DECAYS
+from nmpcrl.study.setup import prepare
 
 THETA = np.array(paper.THETA_INIT)
 

@@ -39,6 +39,8 @@ def legible(seen, monkeypatch) -> Iterator[None]:
         assert isinstance(figure, sheet.Drawn), "it has no narrow version"
         assert not flaws(figure)
         assert not flaws(figure.again(sheet.NARROW))
+        if figure.get_figheight() > sheet.SLIDE.height:
+            assert not flaws(figure.again(sheet.SLIDE))
 
 
 @pytest.fixture(scope="session")

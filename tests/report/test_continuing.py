@@ -17,8 +17,8 @@ from nmpcrl.commands import main
 from nmpcrl.commands.fields import joined
 from nmpcrl.report.continuing import TEMPLATES, changed, code, command
 from nmpcrl.study import Experiment, Records, run
+from nmpcrl.study.learners import NETWORKS
 from nmpcrl.study.provenance import key
-from nmpcrl.study.setup import NETWORKS
 from nmpcrl.study.store import path_of
 
 ROOT = Path(__file__).resolve().parents[2]

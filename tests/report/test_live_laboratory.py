@@ -11,12 +11,12 @@ from nmpcrl.bench import live as bench
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
-from nmpcrl.report.finds import Find
+from nmpcrl.report.examples import Example
 from nmpcrl.report.live import frame, noise, training
 from nmpcrl.report.live.looks import look
 from nmpcrl.study import Experiment, ParameterError, paper
 
-FIND = Find("One", "See.", {}, Experiment(seed=3))
+FIND = Example("One", "See.", {}, Experiment(seed=3))
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,12 @@ from raising import raising
 
 from nmpcrl.analysis import two_state
 from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.learning import browser
+from nmpcrl.control.nmpc import ABSURD
+from nmpcrl.learning import browser, training
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.report import live
 from nmpcrl.report.figures.style import LOOKS
-from nmpcrl.report.live import two_learners, two_states
+from nmpcrl.report.live import frame, two_learners, two_states
 from nmpcrl.report.live.looks import look
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.setup import prepare
@@ -84,6 +85,19 @@ def test_both_learners_begin_as_the_experiment_does(figure):
         assert settings["horizon"] == 7
         assert settings["beta"] == paper.BETA
         assert settings["zeta"] == paper.ZETA
+        assert settings["limits"] == {"absurd": ABSURD, "patience": training.PATIENCE}
+        assert settings["network"] == {"hidden": paper.HIDDEN, "batch": paper.BATCH}
+
+
+def test_no_script_holds_a_number_of_the_library():
+    """They are data, so that a change in Python is one in the page."""
+    numbers = (ABSURD, training.PATIENCE, paper.HIDDEN, paper.BATCH, browser.DISCS)
+    texts = {path.name: path.read_text() for path in frame.folder().glob("*.js")}
+    for name in ("learning.js", "network.js", "solver.js"):
+        found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e\d+)?\b", texts[name])
+        assert not set(map(float, found)) & set(map(float, numbers)), name
+    for name, text in texts.items():
+        assert not re.search(r"\b(ABSURD|PATIENCE|HIDDEN|BATCH|DISCS)\b", text), name
 
 
 def test_networks_are_fitted_for_sixty_episodes_at_most(monkeypatch):

@@ -9,7 +9,7 @@ from nmpcrl.claims.comparison import FEWEST
 from nmpcrl.study import Experiment, design, paper
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import MAIN, frozen_arm
-from nmpcrl.study.setup import DECAYS
+from nmpcrl.study.learners import DECAYS
 
 
 @pytest.fixture(scope="module")

@@ -15,9 +15,10 @@ from nmpcrl.control.codegen import jit
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, ParameterError, paper, paper_runs, run, sweep
 from nmpcrl.study.experiment import PAPER, frozen_arm
+from nmpcrl.study.learners import DECAYS, LEARNERS
 from nmpcrl.study.provenance import key
 from nmpcrl.study.records import Records, StepStatus
-from nmpcrl.study.setup import DECAYS, LEARNERS, prepare
+from nmpcrl.study.setup import prepare
 
 RUN = import_module("nmpcrl.study.run")  # the module; its name in the package is the function
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}

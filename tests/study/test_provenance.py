@@ -6,10 +6,11 @@ from dataclasses import fields, replace
 
 import pytest
 
-from nmpcrl.study import Experiment, machine, paper, provenance
+from nmpcrl.study import Experiment, paper, provenance
 from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.provenance import ORIGINAL, changed, identity, key, sources, summary_key
-from nmpcrl.study.setup import LEARNERS
+from nmpcrl.study.storage import machine
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +67,7 @@ NO_NUMBERS = [
     ("learning/updates.py", "q_next: float) -> float", "q_next: object) -> object"),
     ("learning/__init__.py", '"td_error",', '"td_error", "another",'),
     ("control/ocp.py", "# z\n", "# the variables\n"),
-    ("study/executor.py", "ATTEMPTS = 3", "ATTEMPTS = 4"),
+    ("study/storage/executor.py", "ATTEMPTS = 3", "ATTEMPTS = 4"),
     ("study/departures.py", "A slip of the index.", "A slip of an index."),
     ("claims/rule.py", "MAJORITY = 0.5", "MAJORITY = 0.6"),
 ]
@@ -145,6 +146,28 @@ def test_the_papers_run_of_es_is_named_by_versions_and_epochs_alone():
 def test_a_key_depends_on_what_differs_from_the_original(other, names):
     assert identity(Experiment(**other)) == names
     assert key(Experiment(**other)) != key(Experiment())
+
+
+@pytest.mark.parametrize(
+    ("fields", "begins"),
+    [
+        ({}, "9e79cb1f74"),
+        (
+            {"learner": "RDES", "layout": "B", "seed": 7, "decay": "episode", "gated": False},
+            "da885a4823",
+        ),
+        (
+            {"learner": "GES", "layout": "0.5,2.2 3,0.5", "beta": 2e-8, "box": "soft"},
+            "3f1e689524",
+        ),
+        ({"learner": "TDC", "beta_tdc": 1e-7, "horizon": 20, "solver": "fatrop"}, "1a87ffe9e9"),
+    ],
+)
+def test_stored_runs_keep_their_keys(monkeypatch, fields, begins):
+    """Those of the first epoch and of libraries that are all of version 1."""
+    monkeypatch.setattr(provenance, "_version", lambda _: "1")
+    monkeypatch.setattr(provenance, "EPOCHS", dict.fromkeys(provenance.EPOCHS, 1))
+    assert key(Experiment(**fields))[:10] == begins
 
 
 def test_a_run_and_its_summary_have_keys_of_their_own():

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from raising import raising
 
-from nmpcrl.study import DamagedRecords, Experiment, Records, archive
+from nmpcrl.study import DamagedRecords, Experiment, Records
 from nmpcrl.study.records import (
     LAST,
     StepStatus,
@@ -23,6 +23,7 @@ from nmpcrl.study.records import (
     final_cost,
     step_fields,
 )
+from nmpcrl.study.storage import archive
 
 EXPERIMENT = Experiment("ES", seed=3, episodes=40, steps=10, evaluate_every=20)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.summary import RunSummary, separation, summarise
-from nmpcrl.report.figures import perturbed
+from nmpcrl.report.figures.runs import perturbed
 from nmpcrl.study import replicas
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.run import run

@@ -11,7 +11,8 @@ from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.learning import expected_sarsa
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, ParameterError, paper, run, setup
-from nmpcrl.study.setup import LEARNERS, NETWORKS, Entry, controller_of, prepare, step_size
+from nmpcrl.study.learners import LEARNERS, NETWORKS, Entry
+from nmpcrl.study.setup import controller_of, prepare, step_size
 
 
 @contextmanager

@@ -32,10 +32,10 @@ from nmpcrl.study import (
     stored,
     sweep,
 )
-from nmpcrl.study.executor import ATTEMPTS, Killed
-from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import key
 from nmpcrl.study.records import Stopped
+from nmpcrl.study.storage.executor import ATTEMPTS, Killed
+from nmpcrl.study.storage.machine import fingerprint
 from nmpcrl.study.store import folder, is_stored, name_of, path_of
 
 QUICK = Experiment(learner="frozen", episodes=1, steps=3)

@@ -27,9 +27,9 @@ from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import RunSummary, _forms
 from nmpcrl.study import DamagedRecords, Experiment, Records, fetch, fetch_all, store, stored
-from nmpcrl.study.atomic import sweep
 from nmpcrl.study.records import evaluation_fields, step_fields
-from nmpcrl.study.reservation import PLACE
+from nmpcrl.study.storage.atomic import sweep
+from nmpcrl.study.storage.reservation import PLACE
 
 EXPERIMENTS = tuple(
     Experiment(learner, seed=seed, episodes=2, steps=3, evaluate_every=1)

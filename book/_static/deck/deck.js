@@ -9,7 +9,7 @@ window.MathJax = {
 
 const SIZE = { width: 1280, height: 720 };
 const SMALLEST = 2 / 3; // of the letters of a slide: 20 px
-const LARGEST = "130%"; // of the letters of a live figure, over those of a page
+const LARGEST = 150, LEAST = 125; // of the letters of a live figure, over those of a page, which has 16 px [%]
 
 const dark = matchMedia("(prefers-color-scheme: dark)").matches;
 document.documentElement.dataset.theme = dark ? "dark" : "light"; // for live figures
@@ -34,8 +34,8 @@ async function begin() {
     keyboard: { 78: () => Reveal.configure({ showNotes: !Reveal.getConfig().showNotes }) }, // N
     plugins: [RevealNotes],
   });
-  document.documentElement.style.fontSize = LARGEST;
-  const seen = new ResizeObserver(() => document.querySelectorAll("section.present .live-figure").forEach(fitLive));
+  Reveal.on("slidechanged", fitLive);
+  const seen = new ResizeObserver(fitLive);
   document.querySelectorAll(".live-figure figure").forEach((figure) => seen.observe(figure));
   document.documentElement.dataset.ready = "";
 }
@@ -72,6 +72,11 @@ function divide(slide) {
   [slide, next].forEach(fit);
 }
 
-function fitLive(box) {
-  shrink(document.documentElement, () => box.scrollHeight > box.clientHeight || box.scrollWidth > box.clientWidth);
+// The largest letters with which the live figure that is seen fits; its sizes are in rem.
+function fitLive() {
+  const box = document.querySelector("section.present .live-figure");
+  if (!box) return;
+  const whole = document.documentElement.style;
+  const tooLarge = () => box.scrollHeight > box.clientHeight || box.scrollWidth > box.clientWidth;
+  for (let size = LARGEST; size === LARGEST || (tooLarge() && size >= LEAST); size -= 1) whole.fontSize = `${size}%`;
 }

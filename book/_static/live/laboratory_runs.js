@@ -9,7 +9,7 @@
   function learned(given, data) {
     return {
       learner: given.learner, alpha: given.alpha, beta: given.learner === "TDC" ? given.beta_tdc : given.beta,
-      zeta: given.zeta,
+      zeta: given.zeta, limits: data.limits, network: data.network,
       decay: given.decay, decayRate: given.decay_rate, episodes: given.episodes, seed: given.seed,
       steps: data.steps, theta: given.theta, w: data.w, thetaSet: data.theta_set, evaluateEvery: data.evaluate_every,
       start: given.start, target: given.target, horizon: given.horizon,

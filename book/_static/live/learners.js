@@ -6,7 +6,7 @@
   "use strict";
 
   const {
-    add, solver, slider, choice, normal, learner, sideBySide, slices, learnersShown: shown,
+    add, solver, slider, choice, normal, judgeOf, learner, sideBySide, slices, learnersShown: shown,
     parts: shared, words: { learners: words },
   } = window.nmpcrl;
   const still = matchMedia("(prefers-reduced-motion: reduce)");
@@ -33,11 +33,8 @@
   async function build(figure, data, nmpc) {
     const each = Object.values(data.settings), own = words.of[figure.dataset.figure];
     const solvers = await Promise.all(each.map(() => solver(window.nmpcrl.module, data.problem)));
-    const [{ episodes, steps, start, target, discs, horizon }] = each; // the same for both
-    const judge = (theta) => {
-      const { states, cost, failed } = nmpc.rollout({ start, target, discs, horizon, theta }, steps);
-      return { theta, states, cost: failed ? Infinity : cost };
-    };
+    const [{ episodes, steps }] = each; // the same for both
+    const judge = judgeOf(nmpc, each[0]);
     let begun = null; // both learners, from what was given
 
     function anew(given) {

@@ -1,12 +1,9 @@
 // Algorithm 1 in this page, as nmpcrl/learning/training.py has it, on the compiled solver and update rules.
 //
 // `settings`: { learner, alpha, beta, zeta, decay, decayRate, seed, episodes, steps, theta, w, thetaSet,
-// evaluateEvery, start, target, discs, horizon }; `noise` holds epsilon, shape (episodes, steps, m).
+// evaluateEvery, start, target, discs, horizon, limits: { absurd, patience }, network: { hidden, batch } }; `noise` holds epsilon, shape (episodes, steps, m).
 (function learning() {
   "use strict";
-
-  const ABSURD = 1e6; // no theta or w beyond this
-  const PATIENCE = 10; // so many episodes in a row that a failed solve ended are a divergence
 
   // ---- Where the value of the next state comes from: { value, features, warm }, of which `warm` is what the next
   // solve starts from, and `value` null if there is nothing to go by yet; null where a solve failed
@@ -17,10 +14,10 @@
   };
 
   // A network imitates the NMPC's value: remember, fit, predict.
-  const imitation = (withTheta) => ({ problem, wasm }, { seed, zeta }) => {
+  const imitation = (withTheta) => ({ problem, wasm }, { seed, zeta, network: sizes }) => {
     const { network, generator } = self.nmpcrl;
     const inputs = problem.target.length + problem.lower.length + (withTheta ? problem.theta : 0);
-    const imitator = network(wasm, inputs, generator(seed), zeta);
+    const imitator = network(wasm, { inputs, ...sizes, rate: zeta }, generator(seed));
     const input = (state, action, theta) => [...state, ...action, ...(withTheta ? theta : [])];
     return ({ here: { state, theta }, action, solution, next }) => {
       imitator.remember(input(state, action, theta), solution.value);
@@ -80,8 +77,8 @@
   // ---- Training
 
   const squared = (vector) => vector.reduce((sum, each) => sum + each * each, 0);
-  const small = (vector) => vector.reduce((sum, each) => sum + Math.abs(each), 0) <= ABSURD;
-  const absurd = ({ theta, w }) => !(small(theta) && small(w));
+  const size = (vector) => vector.reduce((sum, each) => sum + Math.abs(each), 0);
+  const absurd = ({ theta, w }, { absurd: most }) => !(size(theta) <= most && size(w) <= most);
 
   function learnerOf(nmpc, settings) {
     const { rule, bootstrap = secondSolve, constrained = false } = LEARNERS[settings.learner];
@@ -129,14 +126,14 @@
   // Algorithm 1, step by step: { episode, time, state, action, cost, value, features, nextValue, delta, phi2, theta,
   // w, failed, diverged }, theta and w after the step. What is diverged is the last.
   function* train(nmpc, settings, noise) {
-    const explore = explorer(nmpc, settings, noise), learner = learnerOf(nmpc, settings);
+    const explore = explorer(nmpc, settings, noise), learner = learnerOf(nmpc, settings), { limits } = settings;
     let weights = { theta: settings.theta, w: settings.w }, failures = 0;
     for (let episode = 0; episode < settings.episodes; episode++) {
       let failed = false;
       for (const step of steps(nmpc, settings, learner, explore, episode, weights)) {
         ({ failed } = step);
         weights = { theta: step.theta, w: step.w };
-        const diverged = absurd(weights) || (failed && failures + 1 === PATIENCE);
+        const diverged = absurd(weights, limits) || (failed && failures + 1 === limits.patience);
         yield { ...step, diverged };
         if (diverged) return;
       }
@@ -144,26 +141,36 @@
     }
   }
 
-  // A run, as nmpcrl/study/run.py has it: what each episode did, and before them what theta does at first.
-  // { episode, cost, alphaPhi2 (the largest), theta, diverged, judged: { cost, states } or null }
-  function* run(nmpc, settings, noise) {
-    const judge = (theta) => {
-      const { start, target, discs, horizon } = settings;
-      const { states, cost, failed } = nmpc.rollout({ start, target, discs, horizon, theta }, settings.steps);
-      return { states, cost: failed ? Infinity : cost };
-    };
-    const { theta, episodes, alpha } = settings;
-    yield { episode: 0, cost: NaN, alphaPhi2: NaN, theta, diverged: false, judged: judge(theta) };
+  // What a policy does without noise: (theta) => { cost, states }.
+  const judgeOf = (nmpc, { start, target, discs, horizon, steps: count }) => (theta) => {
+    const { states, cost, failed } = nmpc.rollout({ start, target, discs, horizon, theta }, count);
+    return { states, cost: failed ? Infinity : cost };
+  };
+
+  // The account of a run, as nmpcrl/study/run.py has it, fed step by step: what the episode did so far.
+  // { episode, cost, alphaPhi2 (the largest), theta, diverged, ended, judged: { cost, states } or null }
+  function account(settings, judge) {
+    const { alpha, episodes, evaluateEvery, limits } = settings;
     let cost = 0, phi2 = 0;
-    for (const step of train(nmpc, settings, noise)) {
+    return (step) => {
+      const { theta, diverged } = step, episode = step.episode + 1;
       cost += step.cost;
       phi2 = Math.max(phi2, step.phi2 || 0);
-      if (!step.failed && !step.diverged && step.time < settings.steps - 1) continue;
-      const episode = step.episode + 1;
-      const due = episode % settings.evaluateEvery === 0 || episode === episodes;
-      const judged = due && !absurd(step) ? judge(step.theta) : null;
-      yield { episode, cost, alphaPhi2: alpha * phi2, theta: step.theta, diverged: step.diverged, judged };
-      cost = phi2 = 0;
+      const row = { episode, cost, alphaPhi2: alpha * phi2, theta, diverged };
+      const ended = step.failed || diverged || step.time === settings.steps - 1;
+      const due = ended && (episode % evaluateEvery === 0 || episode === episodes);
+      if (ended) cost = phi2 = 0;
+      return { ...row, ended, judged: due && !absurd(step, limits) ? judge(theta) : null };
+    };
+  }
+
+  // A run: the account of each episode, and before them what theta does at first.
+  function* run(nmpc, settings, noise) {
+    const judge = judgeOf(nmpc, settings), accounted = account(settings, judge), { theta } = settings;
+    yield { episode: 0, cost: NaN, alphaPhi2: NaN, theta, diverged: false, judged: judge(theta) };
+    for (const step of train(nmpc, settings, noise)) {
+      const row = accounted(step);
+      if (row.ended) yield row;
     }
   }
 
@@ -174,6 +181,6 @@
   }
 
   self.nmpcrl = {
-    ...self.nmpcrl, train, run, finalCost, sources: [...(self.nmpcrl?.sources ?? []), learning],
+    ...self.nmpcrl, train, run, account, judgeOf, finalCost, sources: [...(self.nmpcrl?.sources ?? []), learning],
   };
 })();

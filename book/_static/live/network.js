@@ -3,8 +3,6 @@
 (function imitating() {
   "use strict";
 
-  const HIDDEN = 64, BATCH = 128; // neurons of a hidden layer; examples of a fit
-
   // ---- torch's generator: MT19937 (Matsumoto and Nishimura 1998)
   const SIZE = 624, MIDDLE = 397, UPPER = 0x80000000, LOWER = 0x7fffffff;
 
@@ -54,9 +52,9 @@
 
   // ---- The network of a run
 
-  // Learns in place. `generator` draws first weights and mini-batches; the arithmetic is that of `wasm`.
-  function network(wasm, inputs, generator, rate) {
-    const weights = firstWeights([inputs, HIDDEN, HIDDEN, 1], generator.integer63());
+  // Learns in place. `hidden` neurons in each of two layers, `batch` examples a fit; `generator` draws first weights and mini-batches; the arithmetic is that of `wasm`.
+  function network(wasm, { inputs, hidden, batch, rate }, generator) {
+    const weights = firstWeights([inputs, hidden, hidden, 1], generator.integer63());
     const mean = new Float32Array(weights.length), square = new Float32Array(weights.length);
     const examples = []; // rows of input, 1, target
     let fits = 0;
@@ -77,22 +75,22 @@
 
     // One Adam step on a mini-batch; its loss before the step.
     function fit() {
-      const rows = new Float32Array(BATCH * (inputs + 2));
-      generator.choice(examples.length, BATCH).forEach((row, k) => rows.set(examples[row], k * (inputs + 2)));
+      const rows = new Float32Array(batch * (inputs + 2));
+      generator.choice(examples.length, batch).forEach((row, k) => rows.set(examples[row], k * (inputs + 2)));
       fits += 1;
       return called([rows, weights, mean, square], (places) => (
-        wasm.network_fit(inputs, HIDDEN, BATCH, ...places, rate, fits)
+        wasm.network_fit(inputs, hidden, batch, ...places, rate, fits)
       ));
     }
 
     const predict = (input) => called([Float32Array.of(...input, 1), weights], (places) => (
-      wasm.network_predict(inputs, HIDDEN, ...places)
+      wasm.network_predict(inputs, hidden, ...places)
     ));
 
     return {
       weights, // now
       remember: (input, target) => examples.push(Float32Array.of(...input, 1, target)),
-      ready: () => examples.length >= BATCH,
+      ready: () => examples.length >= batch,
       fit,
       predict,
     };

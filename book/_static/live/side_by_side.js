@@ -2,7 +2,7 @@
 (() => {
   "use strict";
 
-  const { train } = window.nmpcrl;
+  const { train, account } = window.nmpcrl;
 
   // What a step took for the value of the next state, minus what it was: as `online_error` of analysis/metrics.py.
   // `step` solved in that state, with `theta`; its value is carried back to the theta of the step `before`.
@@ -17,34 +17,28 @@
   // What a learner has done so far. `costs` are those without noise: { episode, cost, states }; `gauge` is the
   // largest alpha ||phi||^2 of the episode; `errors` are of the next value, the root mean square of each episode.
   function learner(nmpc, settings, noise, judge) {
-    const { episodes, steps, evaluateEvery, alpha } = settings;
-    const training = train(nmpc, settings, noise);
+    const { learner: name, theta: first, w } = settings;
+    const training = train(nmpc, settings, noise), accounted = account(settings, judge);
     const now = {
-      learner: settings.learner, theta: settings.theta, w: settings.w, episode: 0, step: null, over: false,
-      gauge: NaN, gauges: [], errors: [], diverged: false, costs: [{ episode: 0, ...judge(settings.theta) }],
+      learner: name, theta: first, w, episode: 0, step: null, over: false,
+      gauge: NaN, gauges: [], errors: [], diverged: false, costs: [{ episode: 0, theta: first, ...judge(first) }],
     };
-    let highest = 0; // as `gauge`, and 0 where an episode begins
     let before = null, errors = []; // the step before; of this episode
-
-    function ended() {
-      now.episode += 1;
-      now.gauges.push(highest);
-      highest = 0;
-      now.errors.push(rootMeanSquare(errors));
-      errors = [];
-      now.over = now.diverged || now.episode === episodes;
-      const due = now.episode % evaluateEvery === 0 || now.episode === episodes;
-      if (due && !now.diverged) now.costs.push({ episode: now.episode, ...judge(now.theta) });
-    }
 
     function advance() {
       const step = training.next().value, { theta: given } = now;
       const error = predictionError(before, step, given);
       if (Number.isFinite(error)) errors.push(error);
       before = { ...step, given };
-      Object.assign(now, { step, theta: step.theta, w: step.w, diverged: step.diverged });
-      highest = now.gauge = Math.max(highest, alpha * step.phi2 || 0);
-      if (step.failed || step.diverged || step.time === steps - 1) ended();
+      const { episode, theta, diverged, alphaPhi2: gauge, ended, judged } = accounted(step);
+      Object.assign(now, { step, theta, w: step.w, diverged, gauge });
+      if (!ended) return;
+      now.episode = episode;
+      now.gauges.push(gauge);
+      now.errors.push(rootMeanSquare(errors));
+      errors = [];
+      now.over = diverged || episode === settings.episodes;
+      if (judged) now.costs.push({ episode, theta, ...judged });
     }
     return { now, advance };
   }

@@ -8,8 +8,6 @@
   const FREE = 0, FIXED = 1; // u_0
   const NOTHING = -1; // no earlier solution
   const SOLVED = 0, FORMED = 1;
-  const DISCS = 16; // at most
-  const LONGEST_VECTOR = 16; // of an update rule
 
   // The bytes that were packed: gzip, then base64.
   async function unpack(packed) {
@@ -23,7 +21,7 @@
     return made.instance.exports;
   }
 
-  // Everything that is solved, with up to DISCS obstacles and as many planned inputs as
+  // Everything that is solved, with up to `problem.most_discs` obstacles and as many planned inputs as
   // `problem.discount` has room for. What is asked is { state, theta, discs, horizon }, and a `target`
   // if it is not the problem's.
   async function solver(packed, problem) {
@@ -38,11 +36,11 @@
     const size = (fixed) => 2 * N * m + 3 * (N + 1) * (n + count) + fixed * m + d; // of a plan's numbers
 
     const target = filled(problem.target), lower = filled(problem.lower), upper = filled(problem.upper);
-    const discs = room(3 * DISCS), sides = filled(problem.sides.flat());
+    const discs = room(3 * problem.most_discs), sides = filled(problem.sides.flat());
     const discount = filled(problem.discount);
     const state = room(n), next = room(n), theta = room(d), action = room(m), report = room(5);
     const vector = room(d), product = room(d);
-    let N = problem.discount.length - 1, count = DISCS; // of what is asked; at most so many
+    let N = problem.discount.length - 1, count = problem.most_discs; // of what is asked; at most so many
     const plan = room(size(FIXED));
 
     function ask(given) {
@@ -146,12 +144,12 @@
       return found;
     }
 
-    return { problem, wasm, solve, rollout, step, cost, hessianTimes, rules: rules(wasm, room) };
+    return { problem, wasm, solve, rollout, step, cost, hessianTimes, rules: rules(wasm, room, d) };
   }
 
-  // The update rules, as nmpcrl/learning/rules.py describes them: vectors in, vectors out.
-  function rules(wasm, room) {
-    const given = Array.from({ length: 4 }, () => room(LONGEST_VECTOR)), out = room(LONGEST_VECTOR);
+  // The update rules, as nmpcrl/learning/rules.py describes them: vectors in, vectors out, no longer than theta.
+  function rules(wasm, room, longest) {
+    const given = Array.from({ length: 4 }, () => room(longest)), out = room(longest);
     const rule = (name) => (...values) => {
       let vectors = 0, d = 0;
       const placed = values.map((value) => {

@@ -35,6 +35,21 @@ TEXTS = {  # compiled beside `model`; read with the other modules, so that an ed
 }
 UNBOUNDED = 1e20  # stands for an input without a bound
 
+
+class Problem(NamedTuple):
+    """The first arguments of `kernel.solve`, by name; u_0 is free or fixed."""
+
+    target: Vector  # (n,)
+    lower: Vector  # of the inputs, (m,)
+    upper: Vector
+    discs: Matrix  # x, y and the distance that each obstacle keeps [m], (obstacles, 3)
+    sides: Matrix  # of the box: which state, its sign and its limit, (sides, 3)
+    discount: Vector  # gamma^0, ..., gamma^N
+    slack_weight: float
+    soft_box: int
+    tie: float
+
+
 Attempt = tuple[int, Vector, int]  # which `Start`, with which (z, lam, nu), iterations allowed
 
 
@@ -100,7 +115,7 @@ class InteriorPoint:
             for sign, limit in ((-1.0, task.lower), (1.0, task.upper))
             for state in np.flatnonzero(np.isfinite(limit))
         ]
-        self.problem = (  # the first arguments of `kernel.solve`, u_0 free or fixed
+        self.problem = Problem(
             task.target.copy(),  # which may be written to, as compiled code wants it
             np.maximum(plant.lower, -UNBOUNDED),
             np.minimum(plant.upper, UNBOUNDED),

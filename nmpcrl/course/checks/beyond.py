@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number
+from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number, varied
 from nmpcrl.learning.updates import (
     OVERSHOOT,
     auxiliary_step,
@@ -16,44 +16,48 @@ from nmpcrl.learning.updates import (
 )
 
 
+@varied(w=(0.02, 0.08, 0.01))
 @exercise
-def correction(answer: Any) -> Outcome:
-    """h for Q = theta^2 x at theta = 2, x = 1, delta = 1 and w = 0.1."""
-    phi, hessian, w = 2 * 2.0, 2.0, np.array([0.1])
-    h = curvature_correction(1.0, np.array([phi]), w, hessian * w)
+def correction(answer: Any, *, w: float = 0.1) -> Outcome:
+    """h for Q = theta^2 x at theta = 2, x = 1 and delta = 1."""
+    phi, hessian, along = 2 * 2.0, 2.0, np.array([w])
+    h = float(curvature_correction(1.0, np.array([phi]), along, hessian * along)[0])
     return number(
         answer,
-        float(h[0]),
+        h,
         tolerance=0.01,
         mistakes={
-            0.2: "phi w is not small here: delta - phi w stands in the first factor.",
-            1.2: "The Hessian is multiplied by w.",
-            0.24: "The Hessian of theta^2 x in theta is 2 x, whatever theta is.",
-            0.06: "The second derivative of theta^2 x is 2 x, not x.",
+            hessian * w: "phi w is not small here: delta - phi w stands in the first factor.",
+            h / w: "The Hessian is multiplied by w.",
+            2 * h: "The Hessian of theta^2 x in theta is 2 x, whatever theta is.",
+            h / 2: "The second derivative of theta^2 x is 2 x, not x.",
         },
     )
 
 
+@varied(millions=(4.4, 9.6, 0.2))
 @exercise
-def fast(answer: Any) -> Outcome:
+def fast(answer: Any, *, millions: float = 3.8) -> Outcome:
     """The largest beta with which beta |phi|^2 does not overshoot, at the largest |phi|^2."""
-    largest = 4 * 3.8e6
+    largest = 4 * millions * 1e6
     return number(
         answer,
         OVERSHOOT / largest,
         tolerance=0.05,
         mistakes={
-            OVERSHOOT / 3.8e6: "It has to hold at the end, too, where the norm is larger.",
+            OVERSHOOT
+            / (millions * 1e6): "It has to hold at the end, too, where the norm is larger.",
             1 / largest: "At most 2, not 1: a step of 2 still does not grow.",
             OVERSHOOT / (4 * largest): "The squared norm grows fourfold, not the norm.",
         },
     )
 
 
+@varied(final=(3720, 3980, 20))
 @exercise
-def share(answer: Any) -> Outcome:
+def share(answer: Any, *, final: float = 3700) -> Outcome:
     """What was gained over what could be gained."""
-    initial, best, final = 4000.0, 3600.0, 3700.0
+    initial, best = 4000.0, 3600.0
     return number(
         answer,
         (initial - final) / (initial - best),

@@ -6,14 +6,15 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
-from nmpcrl.course import Outcome, choice, exercise, function, number
+from nmpcrl.course import Outcome, choice, exercise, function, number, varied
 from nmpcrl.study import paper
 
 
+@varied(theta=(4, 15, 1))
 @exercise
-def multiplier(answer: Any) -> Outcome:
-    """Of min x^2 subject to theta - x <= 0 at theta = 3: where the Lagrangian is stationary."""
-    x = 3.0
+def multiplier(answer: Any, *, theta: float = 3) -> Outcome:
+    """Of min x^2 subject to theta - x <= 0: where the Lagrangian is stationary."""
+    x = theta
     return number(
         answer,
         2 * x,
@@ -44,18 +45,19 @@ def alpha(answer: Any, features: Vector) -> Outcome:
     )
 
 
+@varied(steps=(135, 185, 5))
 @exercise
-def solves(answer: Any) -> Outcome:
+def solves(answer: Any, *, steps: int = paper.STEPS) -> Outcome:
     """Of one episode with central differences: two a component, and those of Expected Sarsa."""
     components = len(paper.THETA_INIT)
     return number(
         answer,
-        (2 + 2 * components) * paper.STEPS,
+        (2 + 2 * components) * steps,
         tolerance=1e-4,
         mistakes={
-            2 * paper.STEPS: "That is with the envelope theorem; differences need more solves.",
-            2 * components * paper.STEPS: "The values of s and of the next state are needed, too.",
-            (2 + components) * paper.STEPS: "Central differences take two solves a component.",
+            2 * steps: "That is with the envelope theorem; differences need more solves.",
+            2 * components * steps: "The values of s and of the next state are needed, too.",
+            (2 + components) * steps: "Central differences take two solves a component.",
         },
     )
 
@@ -126,8 +128,9 @@ def _by_hand(theta: Vector, states: Vector, inputs: Vector, target: Vector, gamm
     return result
 
 
+@varied(late=(30, 50, 5))
 @exercise
-def saved(answer: Any) -> Outcome:
+def saved(answer: Any, *, late: int = 20) -> Outcome:
     """The late training cost of a run beside that of its frozen arm at the same time."""
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
@@ -139,22 +142,22 @@ def saved(answer: Any) -> Outcome:
 
     return function(
         answer,
-        lambda training, frozen: 1 - training[-20:].mean() / frozen[-20:].mean(),
+        lambda training, frozen: 1 - training[-late:].mean() / frozen[-late:].mean(),
         draw,
         tolerance=2e-3,  # the mean of the ratios is as good as the ratio of the means
         mistakes={
             "A frozen arm with itself still saves something: compare the last episodes of both "
             "runs, in which the noise is the same.": (
-                lambda training, frozen: 1 - training[-20:].mean() / training[:20].mean()
+                lambda training, frozen: 1 - training[-late:].mean() / training[:late].mean()
             ),
             "The first episodes of the frozen arm have more noise than the last ones of the run: "
             "compare both at the same time.": (
-                lambda training, frozen: 1 - training[-20:].mean() / frozen[:20].mean()
+                lambda training, frozen: 1 - training[-late:].mean() / frozen[:late].mean()
             ),
             "Over all episodes most of the cost is from before anything was learned: take the "
-            "last 20.": lambda training, frozen: 1 - training.mean() / frozen.mean(),
+            f"last {late}.": lambda training, frozen: 1 - training.mean() / frozen.mean(),
             "That is the share which is left; what was saved is the rest.": (
-                lambda training, frozen: training[-20:].mean() / frozen[-20:].mean()
+                lambda training, frozen: training[-late:].mean() / frozen[-late:].mean()
             ),
         },
     )

@@ -7,32 +7,34 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.two_state import Chain, expected_matrix
-from nmpcrl.course import Outcome, choice, exercise, function, number
+from nmpcrl.course import Outcome, choice, exercise, function, number, varied
 from nmpcrl.learning.learners import semi_gradient
 from nmpcrl.learning.updates import curvature_correction, gradient_td_step
 from nmpcrl.study import paper
 
 
+@varied(gamma=(0.1, 0.35, 0.01))
 @exercise
-def factor(answer: Any) -> Outcome:
+def factor(answer: Any, *, gamma: float = 0.4) -> Outcome:
     """By which one expected semi-gradient step multiplies theta."""
-    chain, step = Chain(gamma=0.4), 0.1
+    chain, step = Chain(gamma=gamma), 0.1
     return number(
         answer,
         float(expected_matrix(chain, semi_gradient(step))[0, 0]),
         tolerance=1e-3,
         mistakes={
-            -0.02: "That is by how much theta changes; by which factor is it multiplied?",
-            1.02: "Look at the sign of 2 gamma - 1.",
+            step * (2 * gamma - 1): "That is by how much theta changes; by which factor is it "
+            "multiplied?",
+            1 - step * (2 * gamma - 1): "Look at the sign of 2 gamma - 1.",
             1 + step * (chain.gamma - 1): "The value of the second state is 2 theta.",
         },
     )
 
 
+@varied(gamma=(0.6, 0.88, 0.02))
 @exercise
-def ratio(answer: Any) -> Outcome:
+def ratio(answer: Any, *, gamma: float = 0.9) -> Outcome:
     """Where the trace of the matrix changes its sign, for a tiny alpha."""
-    gamma = 0.9
     return number(
         answer,
         2 * gamma - 1,
@@ -43,10 +45,10 @@ def ratio(answer: Any) -> Outcome:
     )
 
 
+@varied(kappa=(0.6, 0.88, 0.02))
 @exercise
-def parallel(answer: Any) -> Outcome:
+def parallel(answer: Any, *, kappa: float = 0.9) -> Outcome:
     """1 - gamma kappa."""
-    kappa = 0.9
     return number(
         answer,
         1 - paper.GAMMA * kappa,

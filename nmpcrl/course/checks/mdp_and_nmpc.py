@@ -6,23 +6,26 @@ import numpy as np
 
 from nmpcrl.control import Nmpc
 from nmpcrl.control.task import overlap
-from nmpcrl.course import Outcome, choice, exercise, formula, function, number
+from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
 from nmpcrl.study import paper
 
 
+@varied(theta_c=(0.3, 0.9, 0.05))
 @exercise
-def distance(answer: Any) -> Outcome:
-    """Where the overlap, Eq. (1.4), is -0.21."""
+def distance(answer: Any, *, theta_c: float = 0.21) -> Outcome:
+    """Where the overlap, Eq. (1.4), is minus theta_c."""
     radius = 2.5 / 2
     return number(
         answer,
-        radius * np.sqrt(1.21),
+        radius * np.sqrt(1 + theta_c),
         unit="m",
         mistakes={
-            radius * 1.21: "The overlap has the square of the distance: take a square root.",
-            radius: "That is where the overlap is 0; the NMPC wants it to be -0.21 or less.",
-            radius * np.sqrt(0.79): "There the robot is inside: the overlap is +0.21.",
-            2.5 * np.sqrt(1.21): "Eq. (1.4) has the sum of two diameters, and a factor of 4.",
+            radius
+            * (1 + theta_c): "The overlap has the square of the distance: take a square root.",
+            radius: f"That is where the overlap is 0; the NMPC wants it to be -{theta_c} or less.",
+            radius * np.sqrt(1 - theta_c): f"There the robot is inside: the overlap is +{theta_c}.",
+            2.5
+            * np.sqrt(1 + theta_c): "Eq. (1.4) has the sum of two diameters, and a factor of 4.",
         },
     )
 

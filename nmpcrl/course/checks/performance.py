@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number
+from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number, varied
 
 Clock = Callable[[], float]  # makes one call and returns how long it took [s]
 
@@ -26,10 +26,10 @@ def ratio(answer: Any) -> Outcome:
     )
 
 
+@varied(before=(0.75, 0.95, 0.05))
 @exercise
-def faster(answer: Any) -> Outcome:
+def faster(answer: Any, *, before: float = 0.7) -> Outcome:
     """The ratio with solves half as long, from the ratio before."""
-    before = 0.7
     fit = 2 * before - 1  # in solves
     return number(
         answer,
@@ -43,10 +43,11 @@ def faster(answer: Any) -> Outcome:
     )
 
 
+@varied(times=(2, 8, 1))
 @exercise
-def amdahl(answer: Any) -> Outcome:
-    """Of a step of which four fifths become ten times as fast."""
-    part, times = 0.8, 10.0
+def amdahl(answer: Any, *, times: float = 10) -> Outcome:
+    """Of a step of which four fifths become many times as fast."""
+    part = 0.8
     return number(
         answer,
         1 / (1 - part + part / times),

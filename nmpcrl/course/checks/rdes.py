@@ -5,14 +5,15 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.course import Outcome, choice, exercise, formula, function, number
+from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
 from nmpcrl.study import paper
 
 
+@varied(high=(1500, 2400, 50))
 @exercise
-def floor(answer: Any) -> Outcome:
-    """The standard deviation of one example at 1000 and three at 1400."""
-    values = np.array([1000.0, 1400.0, 1400.0, 1400.0])
+def floor(answer: Any, *, high: float = 1400) -> Outcome:
+    """The standard deviation of one example at 1000 and three that are higher."""
+    values = np.array([1000.0, high, high, high])
     errors = values - values.mean()
     return number(
         answer,
@@ -20,17 +21,19 @@ def floor(answer: Any) -> Outcome:
         mistakes={
             float(np.mean(errors**2)): "That is the mean square: take its root.",
             float(np.abs(errors).mean()): "That is the mean of the absolute errors.",
-            200.0: "The examples are not as many of each kind: the best prediction is not 1200.",
+            (high - 1000) / 2: "The examples are not as many of each kind: the best prediction is "
+            f"not {(high + 1000) / 2:g}.",
             0.0: "Both values belong to the same input, and one prediction cannot be both.",
             float(values.mean()): "That is the best prediction; by how much is it wrong?",
         },
     )
 
 
+@varied(error=(25, 60, 1))
 @exercise
-def astray(answer: Any) -> Outcome:
+def astray(answer: Any, *, error: float = 20) -> Outcome:
     """alpha times gamma times the error times phi_x, once in each step of an episode."""
-    error, phi = 20.0, 1800.0
+    phi = 1800.0
     step = paper.ALPHA * paper.GAMMA * error * phi
     whole = paper.STEPS * step
     return number(
@@ -47,15 +50,16 @@ def astray(answer: Any) -> Outcome:
     )
 
 
+@varied(part=(0.65, 0.9, 0.05))
 @exercise
-def share(answer: Any) -> Outcome:
-    """The share r with (1 + r) / 2 = 0.6."""
+def share(answer: Any, *, part: float = 0.6) -> Outcome:
+    """The share r with (1 + r) / 2 = part."""
     return number(
         answer,
-        2 * 0.6 - 1,
+        2 * part - 1,
         mistakes={
-            1.2: "A step of RDES has a solve as well: one solve and a fit, against two solves.",
-            0.1: "A step of ES takes two solves, so 0.6 of it is 1.2 solves.",
+            2 * part: "A step of RDES has a solve as well: one solve and a fit, against two.",
+            part - 0.5: f"A step of ES takes two solves: {part} of it is {2 * part:g} solves.",
         },
     )
 

@@ -9,7 +9,7 @@ from nmpcrl import Vector
 from nmpcrl.bench import learners
 from nmpcrl.claims import rule
 from nmpcrl.claims.verdict import REPRODUCED
-from nmpcrl.course import Outcome, choice, exercise, function, number
+from nmpcrl.course import Outcome, choice, exercise, function, number, varied
 from nmpcrl.study import paper
 
 
@@ -45,18 +45,19 @@ def missing(answer: Any) -> Outcome:
     )
 
 
+@varied(worst=(45, 100, 1))
 @exercise
-def mean(answer: Any) -> Outcome:
-    """Of nineteen ones and one forty."""
-    late = np.array([1.0] * 19 + [40.0])
+def mean(answer: Any, *, worst: float = 40) -> Outcome:
+    """Of nineteen ones and one that is far larger."""
+    late = np.array([1.0] * 19 + [worst])
     return number(
         answer,
         float(late.mean()),
         tolerance=2e-3,
         mistakes={
             1.0: "That is the median, which forgives the one episode.",
-            2.0: "The other 19 episodes count, too.",
-            40.0: "That is the largest of the 20.",
+            worst / 20: "The other 19 episodes count, too.",
+            worst: "That is the largest of the 20.",
         },
     )
 

@@ -6,13 +6,13 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
-from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number
+from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number, varied
 
 
+@varied(weight=(90, 200, 5))
 @exercise
-def price(answer: Any) -> Outcome:
+def price(answer: Any, *, weight: float = 80) -> Outcome:
     """Half of W: sigma and s are equal where h = 0."""
-    weight = 80.0
     return number(
         answer,
         weight / 2,
@@ -57,17 +57,19 @@ def dense(answer: Any, nmpc: Nmpc) -> Outcome:
     )
 
 
+@varied(edge=(4, 9, 1))
 @exercise
-def exact(answer: Any) -> Outcome:
-    """The minimiser of x^2 + W max(0, 3 - x)."""
+def exact(answer: Any, *, edge: float = 3) -> Outcome:
+    """The minimiser of x^2 + W max(0, edge - x)."""
+    beyond = f"For a large W that lies beyond {edge}, where nothing is charged any more."
     return formula(
         answer,
-        lambda W: min(W / 2, 3.0),
-        {"W": (1, 12)},
+        lambda W: min(W / 2, edge),
+        {"W": (1, 4 * edge)},
         mistakes={
-            "For a small W it pays to violate the constraint.": lambda W: 3.0,
-            "For a large W that lies beyond 3, where nothing is charged any more.": lambda W: W / 2,
-            "That is how much of the constraint is violated.": lambda W: max(3 - W / 2, 0.0),
+            "For a small W it pays to violate the constraint.": lambda W: edge,
+            beyond: lambda W: W / 2,
+            "That is how much of the constraint is violated.": lambda W: max(edge - W / 2, 0.0),
         },
     )
 

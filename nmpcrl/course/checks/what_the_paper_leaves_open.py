@@ -7,21 +7,21 @@ from scipy.stats import fisher_exact
 
 from nmpcrl import Vector
 from nmpcrl.claims.rule import read
-from nmpcrl.course import Outcome, choice, exercise, function, number
+from nmpcrl.course import Outcome, choice, exercise, function, number, varied
 
 RADIUS = 2.5 / 2  # [m] of the circle on which the overlap is 0
 
 
+@varied(apart=(2.9, 3.6, 0.05))
 @exercise
-def gap(answer: Any) -> Outcome:
+def gap(answer: Any, *, apart: float = 2.8) -> Outcome:
     """The theta_c at which the circles around two centres touch."""
-    apart = 2.8
     return number(
         answer,
         (apart / 2.5) ** 2 - 1,
         tolerance=0.02,
         mistakes={
-            (apart / 1.25) ** 2 - 1: "Each of the two obstacles takes its part of the 2.8 m.",
+            (apart / 1.25) ** 2 - 1: f"Each of the two takes its part of the {apart} m.",
             apart / 2.5 - 1: "The square is missing: theta_c stands below a root.",
             (apart / 2.5) ** 2: "That is 1 + theta_c.",
         },
@@ -61,10 +61,11 @@ def fisher(answer: Any) -> Outcome:
     )
 
 
+@varied(cells=(20, 110, 5))
 @exercise
-def smallest(answer: Any) -> Outcome:
+def smallest(answer: Any, *, cells: int = 120) -> Outcome:
     """That at least one of many cells has a small p."""
-    cells, small = 120, 0.01
+    small = 0.01
     return number(
         answer,
         1 - (1 - small) ** cells,

@@ -53,7 +53,7 @@ def draw_task(axes: Axes, task: Task, *, labels: bool = True) -> None:
 
 
 def map_grid(
-    names: Sequence[str], row: float, rest: float, **options: Any
+    names: Sequence[str], row: float, rest: float, *, low: int = 3, **options: Any
 ) -> tuple[Figure, dict[str, Axes], Any]:
     """A map for each name, to one scale; what is left over in the last row is hidden.
 
@@ -61,12 +61,15 @@ def map_grid(
         names: of the layouts.
         row: height of a row of maps [inches].
         rest: height of what stands above and below them [inches].
+        low: how many stand side by side on a low sheet.
         options: of `subplots`.
 
     Returns:
         The figure, the map of each name, and all maps row by row.
     """
     columns = min(MAPS[sheet().narrow], len(names))
+    if sheet().low:
+        columns = min(low, len(names))
     rows = -(-len(names) // columns)
     tall = NARROW_ROW * row * rows + rest + 0.5
     options = {"squeeze": False, "sharex": True, "sharey": True, "tall": tall} | options

@@ -1,7 +1,8 @@
-"""What a figure is drawn on, wide or narrow, and how a notebook shows it.
+"""What a figure is drawn on, wide or narrow or low, and how a notebook shows it.
 
 A function that `page` decorates draws on a sheet as wide as the book's text. The figure that it
-returns can call it again for a narrow one, whose panels stand below each other: for a telephone.
+returns can call it again for a narrow one, whose panels stand below each other: for a telephone;
+and, if it is too high for that, for one as low as a slide is.
 """
 
 import os
@@ -53,9 +54,16 @@ class Sheet:
 
     width: float  # inches
     narrow: bool = False
+    height: float = np.inf  # inches, at most
+
+    @property
+    def low(self) -> bool:
+        """Whether there is no room for many rows."""
+        return bool(np.isfinite(self.height))
 
 
 WIDE, NARROW = Sheet(7.0), Sheet(3.6, narrow=True)
+SLIDE = Sheet(7.0, height=3.6)  # on 1280 pixels, "small" letters are 20 of them
 _open: ContextVar[Sheet | None] = ContextVar("sheet", default=None)
 
 
@@ -98,12 +106,18 @@ class Drawn(Figure):
             shown[MIME] = {"finding": self.finding, "wide": self._file()}
             shown[MIME]["pdf"] = b64encode(self.written("pdf")).decode()
             if self.again is not None:
-                narrow = self.again(NARROW)
-                assert isinstance(narrow, Drawn)
-                shown[MIME]["narrow"] = narrow._file()
-                if shown[MIME]["narrow"].pop("heavy", None):
-                    shown[MIME]["narrow"]["png"] = narrow._png()
+                shown[MIME]["narrow"] = self._on(NARROW)
+                if self.get_figheight() > SLIDE.height:
+                    shown[MIME]["slide"] = self._on(SLIDE)
         display(shown, raw=True)  # type: ignore[no-untyped-call]
+
+    def _on(self, other: Sheet) -> dict[str, Any]:
+        """The file of the figure on another sheet: SVG, or PNG where that is heavy."""
+        assert self.again
+        drawn = self.again(other)
+        assert isinstance(drawn, Drawn)
+        file = drawn._file()
+        return file | {"png": drawn._png()} if file.pop("heavy", None) else file
 
     def _file(self) -> dict[str, Any]:
         """The size of the figure in a browser's pixels, and its SVG, light or "heavy"."""
@@ -148,6 +162,7 @@ def subplots(
     """A figure as wide as the sheet, and its axes as `plt.subplots` returns them.
 
     On a narrow sheet the columns of panels stand below each other, `across` of them side by side.
+    On a low one they are lower.
 
     Args:
         rows: of panels.
@@ -171,7 +186,7 @@ def subplots(
     if narrow:
         stacked = rows * -(-columns // across)
         height = tall or REST + stacked * min(TALL, (height - REST / 2) / rows)
-    figure.set_size_inches(sheet().width, height)
+    figure.set_size_inches(sheet().width, min(height, sheet().height))
     figure.panels, figure.across = panels, across
     if not squeeze:
         return figure, panels

@@ -6,11 +6,9 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Riccati, Task
+from nmpcrl.learning.browser import DISCS
 from nmpcrl.study import paper
 
-ARGUMENTS = (
-    "target", "lower", "upper", "discs", "sides", "discount", "slack_weight", "soft_box", "tie",
-)  # fmt: skip
 LONGEST = 20  # steps planned: a longer plan has several minima
 CLOSE = 1.2  # beside the circle of one obstacle, seen close [m]
 WIDE = 2.4  # the map of one obstacle, over its height
@@ -18,7 +16,7 @@ WALL, AROUND = 0.5, 1.5  # of the map, beyond a wall and beyond an obstacle's ci
 
 
 def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
-    """What the module is given of a problem, under the names of `solvers.entries`; u_0 is free.
+    """What the module is given of a problem: `riccati.Problem`, and sizes; u_0 is free.
 
     Args:
         nmpc: the problem.
@@ -37,9 +35,12 @@ def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
         solver,
         ties_active=nmpc.ties_active,
     )
-    values = zip(ARGUMENTS, solver.prepare(longer.ocp).problem, strict=True)
-    plain = {name: np.asarray(value).tolist() for name, value in values}
-    return plain | {"tolerance": solver.tolerance, "theta": 2 * nmpc.plant.n + nmpc.plant.m + 1}
+    problem = solver.prepare(longer.ocp).problem._asdict()
+    return {name: np.asarray(value).tolist() for name, value in problem.items()} | {
+        "tolerance": solver.tolerance,
+        "theta": 2 * nmpc.plant.n + nmpc.plant.m + 1,
+        "most_discs": DISCS,
+    }
 
 
 def begin(nmpc: Nmpc, state: Vector, theta: Vector) -> dict[str, Any]:

@@ -7,17 +7,18 @@ from typing import Any
 from IPython.display import HTML
 
 from nmpcrl.control import Nmpc, Obstacle
-from nmpcrl.control.solvers.charge import LONGEST
+from nmpcrl.learning.browser import LONGEST
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.continuing import TEMPLATES
-from nmpcrl.report.finds import Find
+from nmpcrl.report.examples import Example
 from nmpcrl.report.live import frame
+from nmpcrl.report.live.algorithm import fixed
 from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import WALL, problem_of
 from nmpcrl.study import Experiment, paper
+from nmpcrl.study.learners import readers
 from nmpcrl.study.records import LAST
-from nmpcrl.study.setup import readers
 
 SCRIPTS = frame.scripts_of(
     "laboratory", *frame.MAP, "random.js", "network.js", "learning.js", "trainer.js", "graph.js",
@@ -34,7 +35,7 @@ MOST = {"horizon": LONGEST, "episodes": 3000}  # of a page
 MOST_OBSTACLES = 8
 
 
-def laboratory(gallery: Iterable[Find] = ()) -> HTML:
+def laboratory(gallery: Iterable[Example] = ()) -> HTML:
     """Obstacles, start and target to be moved, settings of a run, and its training as it comes.
 
     Args:
@@ -44,7 +45,7 @@ def laboratory(gallery: Iterable[Find] = ()) -> HTML:
     return frame.solving("laboratory", nmpc, lambda: _data(nmpc, gallery), SCRIPTS, STYLES)
 
 
-def _data(nmpc: Nmpc, gallery: Iterable[Find]) -> dict[str, Any]:
+def _data(nmpc: Nmpc, gallery: Iterable[Example]) -> dict[str, Any]:
     (left, bottom), (right, top) = box = [paper.LOWER[:2], paper.UPPER[:2]]
     disc = Obstacle(0.0, 0.0).diameter
     return {
@@ -60,6 +61,7 @@ def _data(nmpc: Nmpc, gallery: Iterable[Find]) -> dict[str, Any]:
         "steps": paper.STEPS,
         "evaluate_every": default("evaluate_every"),
         "last": LAST,
+        **fixed(),
         "overshoot": OVERSHOOT,
         "most": MOST_OBSTACLES,
         "radius": disc / 2,

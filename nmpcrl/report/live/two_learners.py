@@ -10,11 +10,13 @@ from IPython.display import HTML
 from nmpcrl.control import Nmpc
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.live import frame
+from nmpcrl.report.live.algorithm import fixed
 from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import problem_of, surroundings
 from nmpcrl.study import Experiment, paper
-from nmpcrl.study.setup import DECAYS, controller_of
+from nmpcrl.study.learners import DECAYS
+from nmpcrl.study.setup import controller_of
 
 SCRIPTS = frame.scripts_of(
     "learners", *frame.MAP, "sliders.js", "charts.js", "random.js", "learning.js", "slices.js",
@@ -97,6 +99,7 @@ def settings(experiment: Experiment, learner: str, nmpc: Nmpc) -> dict[str, Any]
         "target": nmpc.task.target.tolist(),
         "discs": [list(disc) for disc in zip(*nmpc.task.discs, strict=True)],
         "horizon": own.horizon,
+        **fixed(),
     }
 
 

@@ -1,0 +1,1 @@
+"""The controller: its plans, its action values, and the gradient of its value."""

@@ -1,0 +1,1 @@
+"""What a learner does, from the few runs that a chapter trains."""

@@ -1,0 +1,143 @@
+"""Figs. 1 and 2 of the paper, over seeds and layouts.
+
+Costs are drawn in units of theta_init's cost without noise, so that layouts compare. What was cut
+short, or never reached because the run was stopped, cost infinitely much: it counts in median and
+quartiles, and leaves its panel through the upper edge.
+"""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
+
+from nmpcrl import Vector
+from nmpcrl.analysis.summary import Outline
+from nmpcrl.claims.evidence import Evidence
+from nmpcrl.claims.thresholds import divergence, instability
+from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
+from nmpcrl.report.figures.axes import label_panel, legend
+from nmpcrl.report.figures.panels import bundle, part, sourced
+from nmpcrl.report.figures.sheet import sheet
+from nmpcrl.report.figures.style import SUBTITLE, page, subplots
+from nmpcrl.report.tables import WORDS
+from nmpcrl.study.records import Column
+from nmpcrl.study.store import Runs
+
+CEILING = 4.0  # times theta_init's cost without noise, where the panels end
+Curve = Callable[[Outline], tuple[Vector, Vector]]  # episodes and costs
+
+
+def figure_1(found: Evidence, layout: str) -> Figure:
+    """Fig. 1 of the paper: DES against RDES."""
+    drawn = part(found, ("DES", "RDES", "frozen"), layout)
+    counts = _counted(drawn, divergence, ("DES", "RDES"))
+    result: Figure = _learning_curves(drawn, f"Divergence in layout {layout}: {counts} runs")
+    return result
+
+
+def figure_2(found: Evidence, layout: str) -> Figure:
+    """Fig. 2 of the paper: ES against GES."""
+    drawn = part(found, ("ES", "GES", "frozen"), layout)
+    counts = _counted(drawn, instability, ("ES", "GES"))
+    result: Figure = _learning_curves(drawn, f"Instability in layout {layout}: {counts} runs")
+    return result
+
+
+@page
+def by_layout(found: Evidence, learners: tuple[str, ...], verdict: Verdict) -> Figure:
+    """Cost without noise in every layout, a row a reading, and what the claim came to there."""
+    drawn = part(found, learners)
+    layouts, decays = found.summaries.values_of("layout"), found.summaries.values_of("decay")
+    options: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False, "across": 3}
+    figure, axes = subplots(len(decays), len(layouts), 1.6 * len(decays) + 1.1, **options)
+    for column, layout in zip(axes.T, layouts, strict=True):
+        for axis, decay in zip(column, decays, strict=True):
+            runs = drawn.summaries.select(layout=layout, decay=decay)
+            _costs(axis, runs, learners, judged)
+        label_panel(column[-1])
+        word = WORDS[verdict.by_layout.get(layout, UNDECIDABLE)]
+        column[0].set_title(f"{layout}: {word}", **SUBTITLE)
+    axes[0, 0].xaxis.set_major_locator(MaxNLocator(2, integer=True))
+    for axis, decay in zip(axes[:, 0], decays, strict=True):
+        axis.set_ylabel(f"cost / at the start\n(noise per {decay})", fontsize="small")
+    _cut(axes)
+    legend(figure, learners)
+    return sourced(figure, f"Does {verdict.claim} hold? {_spelled(verdict)}", drawn)
+
+
+def trained(summary: Outline) -> tuple[Vector, Vector]:
+    """Cost of each episode of training, noise included, in units of the start's without noise."""
+    cost = np.nan_to_num(summary.episodes["cost"], nan=np.inf)
+    return np.arange(1.0, cost.size + 1), cost / summary.evaluations["cost"][0]
+
+
+def judged(summary: Outline) -> tuple[Vector, Vector]:
+    """Cost of each rollout without noise, in units of the first; infinite where training ended."""
+    episodes, every = summary.experiment["episodes"], summary.experiment["evaluate_every"]
+    due = np.unique([*range(0, episodes + 1, every), episodes]).astype(float)
+    known = dict(zip(summary.evaluations["episode"], summary.evaluations["cost"], strict=True))
+    return due, np.array([known.get(k, np.inf) for k in due]) / known[0]
+
+
+@page
+def _learning_curves(drawn: Evidence, title: str) -> Figure:
+    """Cost of each training episode above, without noise below; a column a reading.
+
+    On a low sheet there is the cost without noise alone.
+    """
+    learners, decays = drawn.summaries.values_of("learner"), drawn.summaries.values_of("decay")
+    rows = {"cost of a training episode\n/ at the start, without noise": trained}
+    if sheet().low:
+        rows.clear()
+    rows["cost without noise\n/ at the start"] = judged
+    options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
+    figure, axes = subplots(len(rows), len(decays), 5.4, **options)
+    for k, (label, curve) in enumerate(rows.items(), 1):
+        for axis, decay in zip(axes[k - 1], decays, strict=True):
+            _costs(axis, drawn.summaries.select(decay=decay), learners, curve)
+            label_panel(axis, decay if k == 1 else "", "episode" if k == len(rows) else "")
+        axes[k - 1, 0].set_ylabel(label)
+    _cut(axes)
+    legend(figure, learners)
+    return sourced(figure, title, drawn)
+
+
+def _costs(axis: Axes, runs: Runs[Outline], learners: Iterable[str], curve: Curve) -> None:
+    """Every learner's runs on a logarithmic axis of cost that ends at `CEILING`."""
+    for learner in learners:
+        curves = [curve(summary) for summary in runs.select(learner=learner).values()]
+        if curves:
+            costs = np.array([cost for _, cost in curves])
+            bundle(axis, curves[0][0], np.minimum(costs, 2 * CEILING), learner)
+    axis.set_yscale("log")
+    axis.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+    axis.yaxis.set_minor_locator(NullLocator())
+    axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def _cut(axes: Column) -> None:
+    """End the panels at `CEILING`, once all is drawn that may stretch them."""
+    for axis in axes.flat:
+        axis.set_ylim(None, min(CEILING, axis.get_ylim()[1]))
+
+
+def _spelled(verdict: Verdict) -> str:
+    """The layouts by outcome: "no in A and D, yes in B"."""
+    found: dict[str, list[str]] = {}
+    for layout, outcome in verdict.by_layout.items():
+        found.setdefault(WORDS[outcome], []).append(layout)
+    return "; ".join(f"{word} in {', '.join(layouts)}" for word, layouts in found.items())
+
+
+def _counted(
+    drawn: Evidence, measure: Callable[[pd.DataFrame], pd.Series], learners: tuple[str, ...]
+) -> str:
+    """In how many of each learner's runs a measure of `claims` holds."""
+    judged_runs = {name: measure(drawn.runs[drawn.runs.learner == name]) for name in learners}
+    return ", ".join(
+        f"{name} in {holds.sum()} of {len(holds)}" for name, holds in judged_runs.items()
+    )

@@ -1,0 +1,1 @@
+"""How fast: the solver, learning steps and whole runs."""

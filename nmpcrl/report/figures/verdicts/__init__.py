@@ -1,0 +1,1 @@
+"""Verdicts: each claim, why runs went wrong, and where a verdict changes."""

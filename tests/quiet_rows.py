@@ -1,0 +1,28 @@
+"""Rows of `rows.table` for runs in which nothing happened, but for what a test says."""
+
+from dataclasses import asdict
+from typing import Any
+
+from nmpcrl.analysis.rows import EVAL_INSIDE, INSIDE, THETA, as_text
+from nmpcrl.study import Experiment
+
+START_COST = 1000.0  # noise-free cost of theta_init
+QUIET = {
+    "stopped": "finished",
+    "initial_cost": START_COST,
+    "final_cost": START_COST,
+    "late_cost_range": 0.0,
+    "cost_ratio": 1.0,
+    "steps_done": 39_000,
+    "distance": 0.1,
+    "imitation_with": 0.5,
+    "imitation_without": 1.0,
+}
+NONE = ("inputs", "outside", "worst_overlap", "eval_worst_overlap", *INSIDE, *EVAL_INSIDE)
+
+
+def quiet_row(experiment: Experiment, **unlike: Any) -> dict[str, Any]:
+    """The row of a run in which nothing happened but what is said."""
+    fields = {name: as_text(value) for name, value in asdict(experiment).items()}
+    theta = dict(zip(THETA, experiment.theta, strict=True))
+    return fields | QUIET | dict.fromkeys(NONE, 0) | theta | unlike

@@ -1,0 +1,172 @@
+"""The figures of chapters 3 and 4, and what they compute from records."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from nmpcrl.analysis import metrics
+from nmpcrl.analysis.gradient_td import directions, dropped_curvature
+from nmpcrl.analysis.imitation import imitate
+from nmpcrl.analysis.two_state import Chain
+from nmpcrl.report.figures.learners import few_runs, ges, rdes
+from nmpcrl.study import Experiment, Runs, paper, run, sweep
+
+SMALL = {"episodes": 4, "steps": 45, "evaluate_every": 2}
+
+
+@pytest.fixture(scope="module")
+def study():
+    """All five learners, both readings of the decay, four short episodes."""
+    learners = ("ES", "DES", "RDES", "GES", "frozen")
+    experiments = sweep(learner=learners, decay=("step", "episode"), **SMALL)
+    return Runs({experiment: run(experiment) for experiment in experiments})
+
+
+def one(study, learner, decay="step"):
+    (records,) = study.select(learner=learner, decay=decay).values()
+    return records
+
+
+def heading(figure: Figure) -> str:
+    return figure.get_suptitle() or figure.axes[0].get_title(loc="left")
+
+
+def test_the_value_that_es_solved_for_is_the_one_the_next_step_carries_back(study):
+    records = one(study, "ES")
+    error = metrics.online_error(records)
+    plain = records.steps["next_value"][:-1] - records.steps["value"][1:]
+    assert np.nanmedian(np.abs(error)) < 1e-2 * np.nanmedian(np.abs(plain))
+
+
+def test_the_last_step_of_an_episode_has_no_online_error(study):
+    error = metrics.online_error(one(study, "ES"))
+    last = one(study, "ES").steps["time"] == SMALL["steps"] - 1
+    assert np.isnan(error[last]).all()
+    assert np.isfinite(error[~last]).all()
+
+
+def test_theta_before_is_theta_after_shifted_by_a_step(study):
+    before = metrics.theta_before(one(study, "ES"))
+    np.testing.assert_array_equal(before[0], paper.THETA_INIT)
+    np.testing.assert_array_equal(before[1:], one(study, "ES").steps["theta"][:-1])
+
+
+def test_a_summary_by_episode_skips_what_is_not_known(study):
+    records = one(study, "ES")
+    column = records.steps["episode"].astype(float)
+    column[records.steps["episode"] == 1] = np.nan
+    np.testing.assert_array_equal(metrics.by_episode(records, column, np.max), [0, np.nan, 2, 3])
+
+
+def test_the_correction_of_ges_is_gamma_times_w_phi_times_the_next_features(study):
+    """Against a second solve in the next state, at steps where the features are smooth."""
+    records = one(study, "GES")
+    parts, before = directions(records), metrics.theta_before(records)
+    nmpc, steps = paper.nmpc(), records.steps
+    for k in (10, 20, 30):
+        solution = nmpc.solve(steps["state"][k], before[k])
+        after = nmpc.solve(steps["state"][k + 1], before[k], solution)
+        expected = paper.GAMMA * parts.predicted[k] * after.features
+        np.testing.assert_allclose(parts.correction[k], expected, rtol=1e-3, atol=1e-3)
+
+
+def test_es_has_no_correction(study):
+    parts = directions(one(study, "ES"))
+    assert parts.share < 1e-6
+    assert parts.net == pytest.approx(1)
+
+
+def test_a_target_runs_ahead_where_the_next_features_are_longer(study):
+    records = one(study, "frozen")
+    features = np.ones_like(records.steps["features"])
+    features[1::2] *= 3
+    made_up = type(records)(
+        records.experiment, {**records.steps, "features": features}, records.evaluations, {}
+    )
+    ahead = metrics.next_over_this(made_up)
+    np.testing.assert_allclose(np.unique(ahead.round(9)), [0.97 / 3, 0.97 * 3], rtol=1e-6)
+    assert metrics.parallel_share(made_up) == 1
+
+
+@pytest.mark.parametrize(
+    ("draw", "words"),
+    [
+        (few_runs.figure_1, "Divergence: DES in 0 of 2, RDES in 0 of 2 runs"),
+        (few_runs.figure_2, "Instability: ES in"),
+        (rdes.online_errors, "the next value is off by"),
+        (ges.overshoots, "In the median run, no step of ES or GES is above 2"),
+        (ges.corrections, "times as long as δφ"),
+    ],
+)
+def test_a_figure_of_the_study_says_what_it_found(study, draw, words):
+    figure = draw(study)
+    assert words in heading(figure)
+    for axes in figure.axes:
+        assert axes.get_xlabel() or axes.get_shared_x_axes().get_siblings(axes)
+    assert any("[" in axes.get_ylabel() for axes in figure.axes)
+
+
+def test_each_run_has_its_line_in_figure_1(study):
+    figure = few_runs.figure_1(study)
+    lines = [line for line in figure.axes[0].lines if len(line.get_xdata())]
+    assert len(lines) == 3  # DES, RDES and frozen, one seed
+    assert all(len(line.get_xdata()) == SMALL["episodes"] for line in lines)
+
+
+def test_a_run_that_was_stopped_early_can_be_drawn(study):
+    full = one(study, "DES")
+    steps = {name: column[:60].copy() for name, column in full.steps.items()}
+    steps["status"][-1] = 2
+    for name in ("value", "next_value", "delta", "features", "alpha_phi2"):
+        steps[name][-1] = np.nan
+    evaluations = {name: column[:1] for name, column in full.evaluations.items()}
+    stopped = type(full)(full.experiment, steps, evaluations, {"stopped": "diverged"})
+    runs = {e: stopped if r is full else r for e, r in study.items()}
+    figure = few_runs.figure_1(Runs(runs))
+    assert heading(figure).startswith("Divergence: DES in 1 of 2")
+    rdes.online_errors(Runs(runs))
+
+
+def test_the_chain_s_figure_names_the_ratio_from_which_gradient_td_converges():
+    figure = ges.on_the_chain(Chain(), 0.1, (0.1, 4.0), updates=50)
+    assert heading(figure) == "Gradient TD converges once β is above 1.03 α"
+
+
+def test_the_name_of_the_paper_s_ratio_lies_on_no_curve():
+    figure = ges.on_the_chain(Chain(), 0.1, (0.1, 4.0), updates=50)
+    figure.draw_without_rendering()
+    right = figure.axes[1]
+    radius = max(right.get_lines(), key=lambda line: len(line.get_xdata()))
+    name = right.texts[0].get_window_extent()
+    assert not name.count_contains(right.transData.transform(radius.get_xydata()))
+
+
+def test_no_line_strikes_the_legend_of_the_corrections(study):
+    figure = ges.corrections(study)
+    figure.draw_without_rendering()
+    assert figure.legends[0].get_window_extent().y1 < figure.axes[0].get_window_extent().y0
+
+
+def test_the_gate_s_figure_says_how_far_theta_x_fell():
+    literal, gated = (run(Experiment("RDES", episodes=2, gated=g)) for g in (False, True))
+    figure = rdes.literal_and_gated(literal, gated)
+    lowest = literal.steps["theta"][: paper.BATCH - 1, 0].min()
+    assert f"{lowest:.2f}" in heading(figure)
+
+
+def test_the_networks_figure_counts_the_runs_that_theta_helped(study):
+    imitations = [imitate(one(study, "ES", decay), fits=5) for decay in ("step", "episode")]
+    helped = sum(i.ratio < 1 for i in imitations)
+    assert f"in {helped} of 2 runs" in heading(rdes.held_out_errors(imitations))
+
+
+def test_the_curvature_s_figure_gives_the_median(study):
+    measured = dropped_curvature(one(study, "GES"), samples=10)
+    assert f"{np.median(measured.ratio):.1%}" in heading(ges.curvatures((measured,)))
+
+
+def test_the_figures_are_closed(study):
+    import matplotlib.pyplot as plt
+
+    few_runs.figure_1(study)
+    assert not plt.get_fignums()

@@ -1,0 +1,227 @@
+"""Figures 1 to 4 over seeds: titles follow from the runs, every run has its line, none is lost."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from nmpcrl.claims import paper_claims
+from nmpcrl.claims.evidence import paths
+from nmpcrl.report.figures import panels
+from nmpcrl.report.figures.runs import learning_curves, rollouts
+from nmpcrl.study import Experiment, paper
+
+SEEDS = 4
+FAST = np.ones((5, 2))  # 1 m/s, and the robot's bound is 0.6
+
+
+def title(figure: Figure) -> str:
+    return figure.get_suptitle()
+
+
+def heads(figure: Figure) -> list[str]:
+    """What stands above the panels."""
+    return [title for axis in figure.axes if (title := axis.get_title(loc="left"))]
+
+
+def thin(axis) -> list:
+    """The lines of single runs."""
+    return [line for line in axis.get_lines() if line.get_linewidth() == 0.5]
+
+
+def thick(axis) -> list:
+    """The medians."""
+    return [line for line in axis.get_lines() if line.get_linewidth() == 1.6]
+
+
+def des_fails(experiment: Experiment) -> dict:
+    """DES costs twice as much in layout A, and was stopped half-way where noise is per episode."""
+    if experiment.learner != "DES" or experiment.layout != "A":
+        return {}
+    return {"training": 2.0, "reached": 150 if experiment.decay == "episode" else None}
+
+
+def standing(states: np.ndarray) -> np.ndarray:
+    """The same rollout, but the robot stays at the second place."""
+    stuck = states.copy()
+    stuck[2:] = stuck[1]
+    return stuck
+
+
+# Curves
+
+
+def test_costs_are_in_units_of_the_start_without_noise(made_up):
+    run = next(iter(made_up(lambda e: {"end": 0.8, "training": 1.5}).summaries.values()))
+    np.testing.assert_allclose(learning_curves.trained(run)[1], 1.5)
+    np.testing.assert_allclose(learning_curves.judged(run)[1], [1.0, *[0.8] * 30])
+
+
+def test_what_was_cut_short_or_never_reached_costs_infinitely_much(made_up):
+    run = next(iter(made_up(lambda e: {"reached": 100}).summaries.values()))
+    run.episodes["cost"][3] = np.nan
+    episodes, cost = learning_curves.trained(run)
+    assert episodes[np.isinf(cost)].tolist() == [4, *range(101, 301)]
+    due, judged = learning_curves.judged(run)
+    assert due.tolist() == list(range(0, 301, 10))
+    assert due[np.isinf(judged)].tolist() == list(range(110, 301, 10))
+
+
+def test_every_run_of_figure_1_has_a_line_and_every_learner_a_median(made_up):
+    figure = learning_curves.figure_1(made_up(), "A")
+    for axis in figure.axes:
+        assert len(thin(axis)) == 3 * SEEDS  # DES, RDES and frozen
+        assert len(thick(axis)) == 3
+
+
+def test_figures_1_and_2_count_what_the_claims_count(made_up):
+    found = made_up(des_fails)
+    assert title(learning_curves.figure_1(found, "A")) == (
+        "Divergence in layout A: DES in 8 of 8, RDES in 0 of 8 runs"
+    )
+    assert "DES in 0 of 8" in title(learning_curves.figure_1(found, "D"))
+    swinging = made_up(lambda e: {"swing": 0.1 * (e.learner == "ES")})
+    assert title(learning_curves.figure_2(swinging, "A")) == (
+        "Instability in layout A: ES in 8 of 8, GES in 0 of 8 runs"
+    )
+
+
+def test_a_median_leaves_its_panel_when_most_runs_were_stopped(made_up):
+    figure = learning_curves.figure_1(made_up(des_fails), "A")
+    for axis in (figure.axes[1], figure.axes[3]):  # noise per episode: above and below
+        assert axis.get_ylim()[1] <= learning_curves.CEILING
+        (des, *others) = (line.get_ydata()[-1] for line in thick(axis))
+        assert des > learning_curves.CEILING
+        assert max(others) < learning_curves.CEILING
+
+
+def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
+    found = made_up(lambda e: {"end": 0.6 + 0.1 * e.seed}, seeds=(0, 1, 2, 3, 4))
+    figure = learning_curves.figure_2(found, "A")
+    band = figure.axes[2].collections[0].get_paths()[0].vertices[:, 1]  # of ES, without noise
+    assert band.min() == pytest.approx(0.7)
+    assert band.max() == pytest.approx(1.0)
+    assert thick(figure.axes[2])[0].get_ydata()[-1] == pytest.approx(0.8)
+
+
+@pytest.mark.slow
+def test_every_layout_has_its_column_headed_by_its_verdict(made_up):
+    found = made_up(des_fails)
+    (c1, *_) = paper_claims.judge_runs(found.runs, paths(found))
+    figure = learning_curves.by_layout(found, ("DES", "RDES"), c1)
+    assert heads(figure) == ["A: yes", "D: no"]
+    assert title(figure) == "Does C1 hold? yes in A; no in D"
+    assert all(len(thin(axis)) == 2 * SEEDS for axis in figure.axes)
+
+
+def test_learners_that_were_not_run_leave_their_panels_empty(made_up):
+    found = made_up()
+    only = found.where(found.runs.learner.isin(("GES", "frozen")))
+    (c1, *_) = paper_claims.judge_runs(only.runs, paths(only))
+    figure = learning_curves.by_layout(only, ("DES", "RDES"), c1)
+    assert heads(figure) == ["A: open", "D: open"]
+    assert title(learning_curves.figure_1(only, "A")).endswith("DES in 0 of 0, RDES in 0 of 0 runs")
+
+
+# Rollouts
+
+
+@pytest.mark.parametrize("draw", [rollouts.controls, rollouts.states])
+def test_every_rollout_has_its_line_against_time(draw, made_up):
+    figure = draw(made_up(), "A")
+    assert {axis.get_xlabel() for axis in figure.axes} == {"", "time [s]"}
+    for axis in figure.axes:
+        assert len(thin(axis)) == 3 * SEEDS
+    labels = {axis.get_ylabel() for axis in figure.axes}
+    assert all("[" in label for label in labels if label)
+
+
+def test_inputs_that_leave_their_bounds_are_counted(made_up):
+    assert title(rollouts.controls(made_up(), "A")) == (
+        "In 16 rollouts of RDES and GES, all inputs keep within their bounds"
+    )
+    found = made_up(lambda e: {"actions": FAST} if (e.learner, e.seed) == ("GES", 0) else {})
+    assert "10 inputs leave their bounds" in title(rollouts.controls(found, "A"))
+
+
+def test_rollouts_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
+    published = {"actions": None}
+    found = made_up(lambda e: published if e.seed else {})
+    figure = rollouts.controls(found, "A")
+    assert title(figure).startswith("In 4 rollouts")
+    assert all(len(thin(axis)) == 3 for axis in figure.axes)
+    nowhere = rollouts.controls(made_up(lambda e: published), "A")
+    assert title(nowhere) == "The inputs of no rollout are kept"
+
+
+def test_those_that_arrive_are_counted_and_those_that_were_stopped_are_not_drawn(made_up):
+    states = made_up().summaries[Experiment("RDES")].states
+
+    def unlike(experiment: Experiment) -> dict:
+        if (experiment.learner, experiment.seed) == ("RDES", 0):
+            return {"states": standing(states)}
+        return {"reached": 50} if (experiment.learner, experiment.seed) == ("RDES", 1) else {}
+
+    found = made_up(unlike)
+    assert title(rollouts.states(found, "A")) == (
+        "In layout A, 12 of 14 rollouts of RDES and GES end at the target"
+    )
+    figure = rollouts.paths(found, "A")
+    assert title(figure) == "In layout A: 12 arrived, 2 stuck, 2 stopped in training"
+    ends = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 5]
+    assert len(ends) == 3 * SEEDS - 1
+    assert (
+        title(rollouts.maps(found)) == "In all layouts: 24 arrived, 4 stuck, 4 stopped in training"
+    )
+
+
+def test_a_rollout_that_failed_is_drawn_as_far_as_it_got(made_up):
+    broken = made_up().summaries[Experiment("GES")].states.copy()
+    broken[3:] = np.nan
+    found = made_up(lambda e: {"states": broken} if e.learner == "GES" else {})
+    assert "8 failed" in title(rollouts.paths(found, "A"))
+    figure = rollouts.paths(found, "A")
+    assert sum(len(line.get_xdata()) == 3 for line in figure.axes[0].get_lines()) == SEEDS
+    assert "8 of 16 rollouts" in title(rollouts.states(found, "A"))
+
+
+def test_every_layout_has_its_map(made_up):
+    figure = rollouts.maps(made_up(layouts=("A", "B", "D", "E"), seeds=(0,)))
+    assert heads(figure) == ["A", "B", "D", "E"]
+
+
+# All of them
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "draw",
+    [
+        learning_curves.figure_1,
+        learning_curves.figure_2,
+        rollouts.controls,
+        rollouts.states,
+        rollouts.paths,
+        lambda found, _: rollouts.maps(found),
+    ],
+)
+def test_a_figure_says_where_its_runs_come_from_and_is_closed(draw, made_up, source_of):
+    found = made_up(source=lambda e: "fresh" if e.seed == 0 else "published", layouts=("A",))
+    mark = source_of(draw(found, "A"))
+    assert "6 runs trained for this page, 18 runs published" in mark
+    assert not plt.get_fignums()
+
+
+def test_a_part_has_the_learners_asked_for_and_one_layout_or_all(made_up):
+    found = made_up()
+    assert set(panels.part(found, ("ES", "GES")).runs.learner) == {"ES", "GES"}
+    assert panels.part(found, ("ES",)).summaries.values_of("layout") == ("A", "D")
+    assert panels.part(found, ("ES",), "D").summaries.values_of("layout") == ("D",)
+
+
+def test_the_target_of_the_drawn_rollout_is_the_task_s(made_up):
+    """What the tests above call arriving is arriving in every layout that they draw."""
+    states = made_up().summaries[Experiment("GES")].states
+    for name in ("A", "B", "D", "E"):
+        assert paper.task(name).distance(states[-1]) == 0
+        assert paper.task(name).overlap(states).max() < 0

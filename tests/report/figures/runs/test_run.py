@@ -1,0 +1,90 @@
+"""One run on one page, wide and narrow."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from legibility import flaws
+from matplotlib import pyplot as plt
+
+from nmpcrl.report.figures import sheet
+from nmpcrl.report.figures.runs.run import run_page
+from nmpcrl.report.run import finding
+from nmpcrl.study import Experiment, run
+from nmpcrl.study.experiment import frozen_arm
+
+SHORT = {"steps": 5, "evaluate_every": 1}
+RUNS = {
+    "ES": Experiment(episodes=3, **SHORT),
+    "RDES": Experiment("RDES", episodes=3, **SHORT),
+    "GES": Experiment("GES", episodes=3, **SHORT),
+    "frozen": Experiment("frozen", episodes=3, **SHORT),
+    "one episode": Experiment(episodes=1, **SHORT),
+    "diverged": Experiment(episodes=3, alpha=1e-2, **SHORT),
+    "other layout": Experiment(episodes=3, layout="B", **SHORT),
+    "drawn": Experiment(episodes=3, layout=((0.5, 2.2), (3, 7)), target=(6, 8, 0), **SHORT),
+}
+
+
+@pytest.fixture(scope="module")
+def known():
+    return {name: run(experiment) for name, experiment in RUNS.items()}
+
+
+def titles(figure) -> list[str]:
+    return [axes.get_title(loc="left") for axes in figure.axes]
+
+
+@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("with_arm", [False, True])
+def test_every_run_has_a_page_whose_titles_state_what_is_seen(known, name, with_arm, tmp_path):
+    records = known[name]
+    arm = run(frozen_arm(RUNS[name])) if with_arm else None
+    figure = run_page(records, arm)
+    assert figure.get_suptitle() == finding(records)
+    for kind in ("svg", "png"):
+        figure.savefig(tmp_path / f"page.{kind}")
+    assert len(figure.axes) == 5
+    assert all(titles(figure))
+    assert not plt.get_fignums()
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_any_run_can_be_read_wide_and_on_a_telephone(known, name):
+    wide = run_page(known[name], run(frozen_arm(RUNS[name])))
+    narrow = wide.again(sheet.NARROW)
+    assert not flaws(wide)
+    assert not flaws(narrow)
+    assert titles(narrow) == titles(wide)
+    assert [axes.get_subplotspec().rowspan.start for axes in narrow.axes] == [0, 1, 2, 3, 4]
+    assert {axes.get_subplotspec().colspan.stop for axes in narrow.axes} == {1}
+
+
+def test_a_legend_of_a_narrow_page_lies_on_no_obstacle_and_no_line(known):
+    figure = run_page(known["ES"]).again(sheet.NARROW)
+    figure.draw_without_rendering()
+    on_map, on_theta = (axes.get_legend().get_window_extent() for axes in figure.axes[:2])
+    obstacles = [patch.get_window_extent() for patch in figure.axes[0].patches]
+    assert on_map.y1 < min(box.y0 for box in obstacles)
+    lines = [line.get_window_extent() for line in figure.axes[1].get_lines()]
+    assert on_theta.y0 > max(box.y1 for box in lines)
+
+
+def test_steps_above_2_are_counted_in_the_title(known):
+    records = known["ES"]
+    alpha_phi2 = np.where(np.arange(15) < 4, 3.0, 0.5)
+    figure = run_page(replace(records, steps=records.steps | {"alpha_phi2": alpha_phi2}))
+    assert "4 of 15 steps above 2" in titles(figure)
+    assert "None of 15 steps above 2" in titles(run_page(known["one episode"])) + titles(
+        run_page(known["GES"])
+    )
+
+
+def test_the_frozen_arm_is_drawn_beside_the_costs_only_if_it_is_there(known):
+    without, with_arm = run_page(known["ES"]), run_page(known["ES"], known["frozen"])
+    assert "the frozen arm is not stored" in without.get_supxlabel()
+    assert "the frozen arm is not stored" not in with_arm.get_supxlabel()
+    assert "the frozen arm is not stored" not in run_page(known["frozen"]).get_supxlabel()
+    lines = [len(figure.axes[3].get_lines()) for figure in (without, with_arm)]
+    assert lines == [1, 2]
+    assert any("times the frozen arm" in title for title in titles(with_arm))

@@ -1,0 +1,301 @@
+"""A figure is drawn wide and narrow by one function, is read in words, and can be seen."""
+
+import ast
+from base64 import b64decode
+from io import BytesIO
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from legibility import CONTRAST, contrast, flaws
+
+from nmpcrl.report.figures import sheet, style
+from nmpcrl.report.figures.axes import below, draw_task
+from nmpcrl.report.figures.runs import perturbed
+from nmpcrl.report.figures.verdicts import failure_modes
+from nmpcrl.study import Experiment, paper
+
+START = 1e-12
+TESTS = Path(__file__).resolve().parent
+FIGURES = TESTS.parents[2] / "nmpcrl/report/figures"
+
+
+@sheet.page
+def bars(count: int = 3) -> sheet.Figure:
+    """Some panels beside each other that share an axis."""
+    figure, panels = sheet.subplots(1, count, sharey=True, squeeze=False)
+    for panel in panels.flat:
+        panel.plot([0, 1], [0, 1], color="black")
+    panels[0, 0].set_ylabel("height [m]")
+    return style.headed(figure, r"$\theta_x$ grows")
+
+
+@sheet.page
+def outer() -> sheet.Figure:
+    return bars(1)
+
+
+def places(figure: sheet.Figure) -> list[tuple[int, int]]:
+    """Row and column of each panel."""
+    specs = [axes.get_subplotspec() for axes in figure.axes]
+    return [(spec.rowspan.start, spec.colspan.start) for spec in specs]
+
+
+def shown(figure: sheet.Figure, monkeypatch) -> dict:
+    """What a notebook is given to display."""
+    bundles = []
+    monkeypatch.setattr(sheet, "display", lambda data, raw: bundles.append(data))
+    figure._ipython_display_()
+    return bundles[0]
+
+
+def narrow(figure: sheet.Figure) -> sheet.Figure:
+    return figure.again(sheet.NARROW)
+
+
+# Wide and narrow
+
+
+def test_every_figure_function_is_drawn_by_a_test_of_this_folder():
+    """And so it is looked at, wide and narrow: see `legible`."""
+    tests = "".join(path.read_text() for path in TESTS.rglob("test_*.py"))
+    missing = [
+        f"{path.stem}.{node.name}"
+        for path in FIGURES.rglob("*.py")
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
+        if any(isinstance(one, ast.Name) and one.id == "page" for one in node.decorator_list)
+        if f"{node.name}(" not in tests and f".{node.name}" not in tests
+    ]
+    assert not missing
+
+
+def test_panels_beside_each_other_stand_below_each_other_on_a_narrow_sheet():
+    wide = bars()
+    assert places(wide) == [(0, 0), (0, 1), (0, 2)]
+    assert places(narrow(wide)) == [(0, 0), (1, 0), (2, 0)]
+    assert wide.get_size_inches()[0] == sheet.WIDE.width
+    assert narrow(wide).get_size_inches()[0] == sheet.NARROW.width
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({}, [(0, 0), (2, 0), (4, 0), (1, 0), (3, 0), (5, 0)]),
+        ({"rowwise": True}, [(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (5, 0)]),
+        ({"across": 2}, [(0, 0), (0, 1), (2, 0), (1, 0), (1, 1), (3, 0)]),
+        ({"across": 3}, [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]),
+    ],
+)
+def test_columns_stay_together_or_rows_do(options, expected):
+    draw = sheet.page(lambda: sheet.subplots(2, 3, **options)[0])
+    assert places(draw()) == [(i, j) for i in (0, 1) for j in (0, 1, 2)]
+    assert places(narrow(draw())) == expected
+
+
+def test_a_figure_that_is_too_high_for_a_slide_is_drawn_for_one(monkeypatch):
+    monkeypatch.setenv(sheet.FOR_PAGE, "1")
+    for height, expected in ((3.6, False), (5.0, True)):
+        figure = sheet.page(lambda high=height: sheet.subplots(2, 1, high)[0])()
+        drawn = shown(figure, monkeypatch)[sheet.MIME]
+        assert ("slide" in drawn) == expected
+        if expected:
+            assert (drawn["slide"]["width"], drawn["slide"]["height"]) == (672, 346)
+
+
+def test_a_mosaic_is_read_row_by_row_on_a_narrow_sheet():
+    rows = (("all", "all"), ("left", "right"))
+
+    @sheet.page
+    def draw() -> sheet.Figure:
+        figure, panels = sheet.mosaic(rows, (2, 1), 4.0, (1.5, 1.0, 1.0))
+        assert list(panels) == ["all", "left", "right"]
+        return figure
+
+    assert places(draw()) == [(0, 0), (1, 0), (1, 1)]
+    assert places(narrow(draw())) == [(0, 0), (1, 0), (2, 0)]
+    assert draw().get_size_inches().tolist() == [sheet.WIDE.width, 4.0]
+    assert narrow(draw()).get_size_inches().tolist() == [sheet.NARROW.width, 3.5 + sheet.REST]
+
+
+def test_what_a_panel_said_for_those_beside_it_each_says_for_itself_below():
+    wide = bars()
+    assert [axes.get_ylabel() for axes in wide.axes] == ["height [m]", "", ""]
+    assert [axes.get_ylabel() for axes in narrow(wide).axes] == ["height [m]"] * 3
+    for axes in narrow(wide).axes:
+        assert axes.yaxis.get_tick_params()["labelleft"]
+
+
+def test_a_figure_that_is_a_part_of_another_is_drawn_on_its_sheet():
+    assert outer().get_size_inches()[0] == sheet.WIDE.width
+    assert narrow(outer()).get_size_inches()[0] == sheet.NARROW.width
+
+
+def test_a_legend_has_as_many_columns_as_there_is_room_for():
+    labels = ["a line that has a name", "another line", "a third one", "and one more line of them"]
+
+    def draw() -> sheet.Figure:
+        figure, axes = sheet.subplots()
+        below(figure, [axes.plot([0, 1], color="black", label=label)[0] for label in labels])
+        return style.headed(figure, "Four lines")
+
+    wide = sheet.page(draw)()
+    assert wide.legends[0]._ncols > narrow(wide).legends[0]._ncols
+    assert not flaws(wide)
+    assert not flaws(narrow(wide))
+
+
+def test_a_title_is_broken_where_the_sheet_ends_and_never_inside_a_formula():
+    finding = r"Of many rollouts in many layouts, most end with $\theta_c = d_o + 1$ or above it"
+    wide = sheet.page(lambda: style.headed(sheet.subplots()[0], finding))()
+    assert wide.finding == finding.replace("$", "").replace("\\", "")
+    below_each_other = narrow(wide)
+    below_each_other.draw_without_rendering()
+    lines = below_each_other._suptitle._get_wrapped_text().split("\n")
+    assert len(lines) > 1
+    assert all(line.count("$") % 2 == 0 for line in lines)
+
+
+def test_perturbed_replicas_that_come_apart_are_named():
+    together, apart = np.full(40, START / 2), np.geomspace(START, 1e-3, 40)
+    found = {Experiment("ES"): together, Experiment("RDES"): apart}
+    title = perturbed.replicas(found, together, START).get_suptitle()
+    assert title == "A difference of 1e-12 grows in runs of RDES"
+    found = {Experiment("ES", decay="episode"): together}
+    assert "none end further apart" in perturbed.replicas(found, together, START).get_suptitle()
+
+
+# In words, and in files
+
+
+@pytest.mark.parametrize(
+    ("title", "words"),
+    [
+        (r"$\theta_x$ moves most, by up to 0.89", "theta_x moves most, by up to 0.89"),
+        (r"$\theta_{\varphi_f}$ and $\theta_\varphi$", "theta_phi_f and theta_phi"),
+        (r"near $\theta_c = d_o$", "near theta_c = d_o"),
+        (r"$\theta_\mathrm{init}$", "theta_init"),
+        (r"like $N^{1.02}$", "like N^1.02"),
+        (r"largest $\alpha\,\|\phi\|^2$", "largest alpha ||phi||^2"),
+        (r"$\beta$ = $2.5 \cdot 10^{-7}$", "beta = 2.5 times 10^-7"),
+        ("6 of 6 verdicts\nstay", "6 of 6 verdicts stay"),
+    ],
+)
+def test_a_title_is_read_in_words(title, words):
+    assert sheet.in_words(title) == words
+
+
+def test_without_a_title_of_its_own_a_figure_finds_what_its_panels_do():
+    figure, (left, right) = sheet.subplots(1, 2)
+    left.set_title("It falls", loc="left")
+    right.set_title("it rises", loc="left")
+    assert figure.finding == "It falls; it rises"
+
+
+@pytest.mark.parametrize("kind", ["svg", "pdf", "png"])
+def test_the_same_figure_gives_the_same_bytes(kind):
+    assert bars().written(kind) == bars().written(kind)
+
+
+def test_a_title_above_a_map_with_equal_scales_is_within_the_figure():
+    figure, axes = sheet.subplots(height=3.7)
+    draw_task(axes, paper.task("A"))
+    axes.plot([-2.5, 8.5], [1.5, 2], label="a line")
+    axes.set_title("It goes on", loc="left")
+    below(figure, *axes.get_legend_handles_labels())
+    image = plt.imread(BytesIO(figure.written("png")))
+    assert (image[:3] == 1).all()
+
+
+def test_a_notebook_is_shown_the_wide_figure_alone(monkeypatch):
+    monkeypatch.delenv(sheet.FOR_PAGE, raising=False)
+    bundle = shown(bars(), monkeypatch)
+    assert set(bundle) == {"text/plain", "image/png"}
+    assert bundle["text/plain"] == "theta_x grows"
+    assert b64decode(bundle["image/png"]) == bars().written("png")
+
+
+def test_a_page_is_given_the_finding_and_both_sizes(monkeypatch):
+    monkeypatch.setenv(sheet.FOR_PAGE, "1")
+    page = shown(bars(), monkeypatch)[sheet.MIME]
+    assert page["finding"] == "theta_x grows"
+    assert page == shown(bars(), monkeypatch)[sheet.MIME]
+    assert page["wide"]["svg"] != page["narrow"]["svg"]
+    assert (page["wide"]["width"], page["narrow"]["width"]) == (672, 346)
+    assert "png" not in page["narrow"]
+    assert b64decode(page["pdf"]).startswith(b"%PDF")
+
+
+def test_what_would_be_a_heavy_svg_is_a_png(monkeypatch):
+    monkeypatch.setenv(sheet.FOR_PAGE, "1")
+    monkeypatch.setattr(sheet, "HEAVY", 1000)
+    page = shown(bars(), monkeypatch)[sheet.MIME]
+    assert "svg" not in page["wide"]
+    assert page["wide"]["heavy"].startswith("<?xml")  # for whoever teaches
+    assert set(page["narrow"]) == {"width", "height", "png"}
+    assert b64decode(page["narrow"]["png"]).startswith(b"\x89PNG")
+
+
+# What can be seen
+
+
+@pytest.mark.parametrize("name", style.LOOKS)
+def test_a_learner_s_line_can_be_seen_on_white(name):
+    assert contrast(style.LOOKS[name].color) >= CONTRAST
+
+
+@pytest.mark.parametrize("count", [1, 4, 9])
+def test_colours_in_an_order_can_all_be_seen(count):
+    shades = [contrast(color) for color in style.shades(count)]
+    assert min(shades) >= CONTRAST
+    assert shades == sorted(shades, reverse=True)
+
+
+def test_learners_are_told_apart_without_colour():
+    for part in ("linestyle", "marker"):
+        assert len({str(getattr(look, part)) for look in style.LOOKS.values()}) == len(style.LOOKS)
+
+
+def test_no_colour_with_its_hatching_means_two_things():
+    parts = [*style.STEP_PARTS.values(), *(one for kind in failure_modes.PATTERNS for one in kind)]
+    assert len(set(parts)) == len(parts)
+    learners = {look.color for look in style.LOOKS.values()}
+    assert not learners & {color for color, _ in parts}
+
+
+def test_contrast_is_that_of_wcag():
+    assert contrast("black") == pytest.approx(21)
+    assert contrast("white") == pytest.approx(1)
+    assert contrast("#767676") == pytest.approx(4.54, abs=0.01)
+    assert contrast("black", 0.5) == pytest.approx(contrast("0.5"))
+
+
+# The looking itself
+
+
+def test_what_cannot_be_read_is_found():
+    figure, axes = sheet.subplots()
+    style.headed(figure, "A figure")
+    axes.plot([0, 1], color="#dddddd")
+    axes.text(0.5, 0.5, "tiny", fontsize=4)
+    axes.text(0.1, 0.1, "one label")
+    axes.text(0.1, 0.1, "another label")
+    axes.text(5.0, 0.2, "far away").set_in_layout(False)
+    axes.set(xlim=(0, 1), ylim=(0, 1), xlabel="episode")
+    axes.set_xticks([0, 0.5])
+    found = " / ".join(flaws(figure))
+    assert "'tiny' is small" in found
+    assert "'one label' lies on 'another label'" in found
+    assert "'far away' leaves the canvas" in found
+    assert "#dddddd is pale" in found
+    assert "episode 0.5 is none" in found
+    assert found.count("/") == 4
+
+
+def test_single_runs_may_be_faint_behind_their_median():
+    figure, axes = sheet.subplots()
+    axes.plot(np.ones((2, 3)), color="#0072B2", alpha=0.3)
+    assert flaws(figure)
+    axes.plot([1, 2], color="#0072B2")
+    assert not flaws(figure)

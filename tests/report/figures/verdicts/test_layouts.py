@@ -1,0 +1,223 @@
+"""Layouts and robustness analysis: titles follow from the runs, and nothing is left undrawn."""
+
+from dataclasses import asdict
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from nmpcrl.analysis.rows import table
+from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.claims.evidence import Evidence, paths
+from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.robustness import clearest_changes, robustness_map
+from nmpcrl.report.figures import sheet
+from nmpcrl.report.figures.verdicts import layouts as figures
+from nmpcrl.report.figures.verdicts import robustness as maps
+from nmpcrl.study import Experiment, design, paper
+from nmpcrl.study.experiment import MAIN as LEARNERS
+from nmpcrl.study.store import Runs
+
+VARIANT = "Q(s, a)"
+SEEDS = (0, 1, 2, 3, 4)
+START_COST = 1000.0
+# Between the last two obstacles of layout A, whose gap closes at theta_c = 0.36.
+WAY = np.array([[-2.5, 1.5, 0.0], [5.5, 0.5, 0.0], [7.5, 2.5, 0.0], [8.5, 2.0, 0.0]])
+
+
+def run(experiment: Experiment, gain: float, theta_c: float) -> RunSummary:
+    """A run that takes a share off the cost and ends with this theta_c; nothing goes wrong."""
+    count = experiment.episodes
+    known = dict.fromkeys(("cost", "delta", "loss", "bias", "error", "iterations", "seconds"), 1.0)
+    known |= dict.fromkeys(("failed", "restarts", "outside", "inputs", "over"), 0)
+    known |= {"steps": 130, "overlap": -0.1, "alpha_phi2": 0.4}
+    episodes = {name: np.full(count, value) for name, value in known.items()}
+    episodes |= {"theta": np.tile(paper.THETA_INIT, (count, 1)), "w": np.zeros((count, 9))}
+    episodes["inside"] = np.zeros((count, 3), int)
+    theta = np.tile(paper.THETA_INIT, (4, 1))
+    theta[:, -1] = np.linspace(theta[0, -1], theta_c, 4)
+    evaluations = {
+        "episode": np.linspace(0, count, 4).astype(int),
+        "theta": theta,
+        "cost": START_COST * np.array([1.0, 1 - gain, 1 - gain, 1 - gain]),
+        "inside": np.zeros((4, 3), int),
+        "overlap": np.full(4, -0.1),
+        "distance": np.zeros(4),
+    }
+    facts = {"stopped": "finished", "seconds": 1.0}
+    return RunSummary(asdict(experiment), episodes, evaluations, WAY, np.zeros((4, 2)), facts)
+
+
+def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
+    """Two layouts, in which learners save a tenth, and a variant in which they save `gained`."""
+    parts = dict.fromkeys(
+        design.main_table(LEARNERS, ("A", "D"), SEEDS, episodes), design.MAIN_TABLE
+    )
+    parts |= {e: VARIANT for e in design.variant(VARIANT, episodes) if e not in parts}
+    summaries = {}
+    for experiment, part in parts.items():
+        learned = experiment.learner != "frozen"
+        gain = learned * (gained if part == VARIANT else 0.1)
+        summaries[experiment] = run(experiment, gain, 0.35 if learned else paper.THETA_INIT[-1])
+    runs = table(summaries).assign(variant=list(parts.values()), source="published")
+    return Evidence(Runs(summaries), runs)
+
+
+@pytest.fixture(scope="module")
+def changing() -> tuple[Evidence, pd.DataFrame]:
+    """A study in which C9 changes in the row of the variant, and its map."""
+    found = study(gained=-0.2)
+    return found, robustness_map(found.runs, paths(found))
+
+
+def title(figure: Figure) -> str:
+    return figure.get_suptitle()
+
+
+def frames(figure: Figure) -> list[Rectangle]:
+    (axes,) = figure.axes
+    black = to_rgba("black")
+    return [p for p in axes.patches if p.get_edgecolor() == black and not p.get_fill()]
+
+
+def written(figure: Figure) -> list[str]:
+    texts = [text.get_text() for axes in figure.axes for text in axes.texts]
+    return [text for text in texts if text]
+
+
+def test_a_layout_is_called_by_the_narrowest_gap_of_its_rollout():
+    figure = figures.layouts({"A": WAY, "D": WAY})
+    names = [axes.get_title("left") for axes in figure.axes if axes.get_visible()]
+    assert names[0] == "A: open, +0.01 m"
+    closing = sum("closing" in name for name in names)
+    assert f"In {closing} of 2 layouts" in title(figure)
+
+
+def test_only_narrow_gaps_are_drawn_from_centre_to_centre():
+    figure = figures.layouts({"A": WAY})
+    x, y, _ = paper.task("A").discs
+    gap = [line for line in figure.axes[0].get_lines() if line.get_color() == figures.OPEN]
+    ends = {tuple(np.round(line.get_xydata().ravel(), 6)) for line in gap}
+    assert (x[2], y[2], x[3], y[3]) in ends
+    assert all(abs(line.get_ydata()[1]) < 3 for line in gap)  # no wall is near
+
+
+def test_the_map_has_a_frame_and_an_arrow_for_every_change(changing):
+    found, rows = changing
+    figure = maps.verdict_map(rows, found.mark)
+    changes = int(rows.changes.sum())
+    assert changes > 0
+    assert len(frames(figure)) == changes
+    arrows = [text for text in written(figure) if "→" in text]
+    assert len(arrows) == changes
+    assert "yes → no" in arrows
+    assert title(figure).startswith(f"{changes} of ")
+
+
+def test_on_a_slide_the_map_has_the_rows_whose_changes_chance_explains_least(changing):
+    found, rows = changing
+    figure = maps.verdict_map(rows, found.mark)
+    low = written(figure.again(sheet.SLIDE))
+    surest = rows[rows.changes.astype(bool)].sort_values("p", kind="stable").variant.iloc[0]
+    assert maps.named(surest) in low
+    assert len(low) < len(written(figure))
+    assert title(figure.again(sheet.SLIDE)) == title(figure)
+
+
+def test_every_cell_of_the_map_has_a_word_and_every_row_a_name(changing):
+    found, rows = changing
+    texts = written(maps.verdict_map(rows, found.mark))
+    cells = [text for text in texts if text.startswith(("yes", "partly", "no", "open"))]
+    assert len(cells) == len(rows)
+    assert {maps.named(name) for name in rows.variant} <= set(texts)
+    assert {"B", "C", "F"} <= set(texts)  # of the layouts, the decays and the variant
+
+
+def test_the_title_of_the_map_names_the_claims_that_never_change(changing):
+    found, rows = changing
+    changed_claims = set(rows.claim[rows.changes.astype(bool)])
+    never = title(maps.verdict_map(rows, found.mark)).partition("those on ")[2]
+    assert not any(claim in never for claim in changed_claims)
+    assert "C7" in never
+
+
+def test_the_clearest_changes_are_drawn_a_row_a_cell_with_every_run_in_it(changing):
+    found, rows = changing
+    cells = clearest_changes(rows)
+    figure = maps.clearest_changes(cells, found)
+    assert len(figure.axes) == 2 * len(cells)
+    assert cells.claim.iloc[0] in title(figure)
+    assert maps.named(cells.variant.iloc[0]) in title(figure)
+    for axes, claim, variant in zip(figure.axes[::2], cells.claim, cells.variant, strict=True):
+        drawn = sum(
+            line.get_marker() not in ("None", "") and len(line.get_xdata())
+            for line in axes.get_lines()
+        )
+        groups = maps.groups(found.runs, variant)
+        values = [BY_RUNS[claim].measure(runs, paths(found)) for runs in groups]
+        assert drawn == sum(int(one.notna().sum().sum()) for one in values)
+
+
+def test_what_is_infinite_is_drawn_at_the_edge(changing):
+    found, rows = changing
+    changed = found.runs.assign(
+        stopped=found.runs.stopped.where(found.runs.variant != VARIANT, "diverged")
+    )
+    figure = maps.clearest_changes(
+        clearest_changes(rows).head(1), Evidence(found.summaries, changed)
+    )
+    for line in figure.axes[0].get_lines():
+        assert np.isfinite(line.get_ydata()).all()
+
+
+def test_where_nothing_changes_the_figure_says_so():
+    found = study()
+    cells = clearest_changes(robustness_map(found.runs, paths(found)))
+    assert title(maps.clearest_changes(cells, found)) == "No verdict changes in what was run here"
+
+
+def test_a_study_that_is_too_short_has_a_map_on_which_all_is_open():
+    found = study(episodes=4)
+    rows = robustness_map(found.runs, paths(found))
+    figure = maps.verdict_map(rows, found.mark)
+    assert title(figure) == "0 of 0 decided verdicts change"
+    assert not frames(figure)
+
+
+def test_theta_c_has_a_line_a_run_and_counts_where_they_end():
+    found = study().main
+    figure = figures.theta_c(found)
+    learned = found.runs.learner.isin(figures.LEARNING)
+    lines = [
+        line for axes in figure.axes for line in axes.get_lines() if len(line.get_xdata()) == 4
+    ]
+    assert len(lines) == learned.sum()
+    assert f"Of {learned.sum()} runs, {learned.sum()} end" in title(figure)
+    assert "and 0 far above" in title(figure)
+
+
+def values(found: Evidence) -> dict[str, pd.DataFrame]:
+    return {claim: one.measure(found.runs, paths(found)) for claim, one in BY_RUNS.items()}
+
+
+def test_the_borders_are_drawn_where_they_were_fixed():
+    figure = figures.borders(values(study().main), "")
+    for axes, claim in zip(figure.axes, BY_RUNS.values(), strict=True):
+        assert any(list(line.get_xdata()) == [claim.threshold] * 2 for line in axes.get_lines())
+    assert "verdicts stay" in title(figure)
+
+
+def test_a_claim_keeps_its_verdict_between_the_borders_named():
+    outcome = ["no", "no", "yes", "yes", "yes", "no", "yes"]
+    curve = pd.DataFrame({"border": np.arange(1.0, 8.0), "outcome": outcome})
+    assert figures.same_verdict(curve, 4.0) == (3.0, 5.0)
+    assert figures.same_verdict(curve, 1.0) == (1.0, 2.0)
+    assert figures.same_verdict(curve, 7.0) == (7.0, 7.0)
+
+
+def test_of_a_study_that_is_too_short_no_border_is_known():
+    figure = figures.borders(values(study(episodes=4).main), "")
+    assert figure.axes[0].get_title("left") == "C1: not decidable"
