@@ -170,8 +170,8 @@ def publish(
     thetas.save(folder, summaries, variants)
     write_json(folder / "searches.json", policy_search.as_lists(searches))
     _write(folder, verdicts, pd.DataFrame() if timings is None else timings)
-    searched = {"searches": made_here()} if searches else {}
-    _seal(folder, made_here() | _timed(timings) | _effort(runs) | searched | _fixed(folder))
+    made = _timed(timings) | ({"searches": made_here()} if searches else {})
+    _seal(folder, made_here() | made | _effort(runs) | _fixed(folder))
     return folder
 
 

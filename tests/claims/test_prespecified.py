@@ -1,4 +1,4 @@
-"""When the thresholds were fixed: what is published of it, held against the history."""
+"""When the thresholds were fixed: what is published of it, compared with the history."""
 
 import ast
 import re
