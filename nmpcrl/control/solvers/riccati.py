@@ -150,7 +150,7 @@ class Riccati(Solver):
 class Compiled(ABC):
     """An OCP and the code that solves it."""
 
-    problem: tuple[Any, ...]  # the first arguments of the code, u_0 free or fixed
+    problem: Any  # the first arguments of the code, a tuple; u_0 free or fixed
 
     def __init__(self, ocp: Ocp, of: Plant | Problem, solve: Any, tolerance: float) -> None:
         self._ocp, self._of = ocp, of

@@ -6,7 +6,6 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Riccati, Task
-from nmpcrl.control.solvers.riccati import TaskArguments
 from nmpcrl.learning.browser import DISCS
 from nmpcrl.study import paper
 
@@ -36,7 +35,7 @@ def problem_of(nmpc: Nmpc, longest: int = LONGEST) -> dict[str, Any]:
         solver,
         ties_active=nmpc.ties_active,
     )
-    problem = TaskArguments(*solver.prepare(longer.ocp).problem)._asdict()
+    problem = solver.prepare(longer.ocp).problem._asdict()
     return {name: np.asarray(value).tolist() for name, value in problem.items()} | {
         "tolerance": solver.tolerance,
         "theta": 2 * nmpc.plant.n + nmpc.plant.m + 1,
