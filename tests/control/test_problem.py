@@ -1,4 +1,4 @@
-"""`Problem`: any symbol learned, held against closed forms, finite differences and dense KKT."""
+"""`Problem`: any symbol learned, compared with closed forms, finite differences and dense KKT."""
 
 import math
 

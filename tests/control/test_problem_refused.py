@@ -89,7 +89,7 @@ def test_a_controller_that_is_none():
 @pytest.mark.usefixtures("interpreted")
 @pytest.mark.parametrize("solver", [Riccati(), Ipopt()])
 def test_a_plan_that_leaves_all_numbers_is_no_solution(solver):
-    """A model that blows up from anywhere, however cheap that is said to be."""
+    """A model that blows up from anywhere, however low its cost is said to be."""
     wild = problem(
         model=lambda x, u, th: 1e5 * x + u, stage=lambda x, u, th: th["alpha"] * ca.sumsqr(u)
     )
