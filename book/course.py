@@ -1,6 +1,11 @@
 """Make the editions for a course: `driver.course.course` says how."""
 
-from driver.course.course import main
+import os
+
+from driver.project import ENVIRONMENT
 
 if __name__ == "__main__":
+    os.environ |= ENVIRONMENT
+    from driver.course.course import main
+
     main()
