@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -234,7 +234,7 @@ def make(experiment: Experiment, expected: str, *, afresh: bool = False) -> RunS
     records = None if afresh else _stored_run(experiment)
     if records is None:
         records = run(experiment)
-        records.facts.update(provenance(experiment))
+        records = replace(records, facts={**records.facts, **provenance(experiment)})
     if other := store.solved_by_another(experiment, records.facts):
         raise OtherSolver(f"it was {other}")
     return summarise(records)

@@ -4,9 +4,10 @@ A run's records take megabytes, most of them noise, and are trained again in sec
 takes a hundredth of that and is enough for every figure, verdict and mechanism of the study.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NotRequired, cast
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import (
     INPUTS,
     STATES,
+    About,
+    Facts,
     Records,
     StepStatus,
     most_evaluations,
@@ -54,12 +57,18 @@ class Outline:
     evaluations: dict[str, Column]
     states: Column  # of the last rollout without noise, shape (K + 1, n); nan after a failed solve
     actions: Column | None  # shape (K + 1, m); None where they are not known
-    facts: dict[str, Any]
+    facts: Mapping[str, Any]
 
     @property
     def name(self) -> Experiment:
         """The experiment as the value that names the run."""
         return Experiment(**self.experiment)
+
+
+class SummaryFacts(Facts):
+    """Those of the records, and what C6 asks for."""
+
+    imitation: NotRequired[dict[str, float]]  # the error of a network, with theta and without
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +89,7 @@ class RunSummary(Outline):
     """
 
     actions: Column
-    facts: dict[str, Any]  # those of the records, and `imitation` where C6 asks for it
+    facts: SummaryFacts
 
     def save(self, path: Path) -> None:
         """Write the whole file beside `path`, then rename it into place.
@@ -111,10 +120,10 @@ class RunSummary(Outline):
         )
 
     @staticmethod
-    def about(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    def about(path: Path) -> About:
         """The experiment's fields and the facts, as `Records.about`."""
         about = load_about(path, _forms)
-        return about["experiment"], about["facts"]
+        return About(about["experiment"], about["facts"])
 
 
 def _forms(about: dict[str, Any]) -> Forms:
@@ -140,7 +149,7 @@ def summarise(records: Records) -> RunSummary:
     """The summary of a run; for a whole run of RDES also how well networks imitate it."""
     experiment = Experiment(**records.experiment)
     nmpc = controller_of(experiment).nmpc
-    facts = dict(records.facts)
+    facts = cast(SummaryFacts, dict(records.facts))
     if experiment.learner == IMITATED and experiment.episodes >= paper.EPISODES:
         imitation = imitate(records)
         facts["imitation"] = {

@@ -5,12 +5,15 @@ from dataclasses import dataclass, fields
 from math import isfinite
 from pathlib import Path
 from textwrap import shorten
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from nmpcrl.commands.fields import Conditions
 from nmpcrl.commands.tables import columns, counted, duration, size
+
+if TYPE_CHECKING:
+    from nmpcrl.study.records import Facts
 
 SHOWN = ("learner", "layout", "decay", "seed", "episodes")  # fields in the table
 MEASURED = ("run", "cost", "minutes", "size", "stopped")  # what else runs can be sorted by
@@ -23,7 +26,7 @@ class Row:
 
     path: Path
     fields: dict[str, Any]
-    facts: dict[str, Any]
+    facts: "Facts"
     bytes: int
 
     def value(self, column: str) -> Any:

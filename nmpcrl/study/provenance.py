@@ -30,13 +30,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.storage.atomic import write_json
-from nmpcrl.study.storage.machine import fingerprint
+from nmpcrl.study.storage.machine import Fingerprint, fingerprint
 
 # Raised by hand where an edit of the room changes a number; then every run is trained anew.
 EPOCHS = {"control": 1, "learning": 1, "study": 1, "analysis": 1}
@@ -99,6 +99,15 @@ UNCOUNTED = ("__future__", "collections.abc", "typing")  # modules that no numbe
 PARSING = threading.Lock()  # Python 3.11 fails where two threads parse at once
 
 
+class Provenance(TypedDict):
+    """Where a run was made, and what its numbers depend on."""
+
+    versions: dict[str, str]  # as `environment` has them
+    machine: Fingerprint
+    key: str
+    sources: str  # `sources_hash`
+
+
 def before() -> dict[str, Any]:
     """The fields of an experiment but the layout, with what all runs had before each was one."""
     return {name: value for name, value in ORIGINAL.items() if name != "obstacles"}
@@ -142,8 +151,8 @@ def environment() -> dict[str, str]:
     return {"python": platform.python_version(), **libraries}
 
 
-def provenance(experiment: Experiment) -> dict[str, Any]:
-    """The facts that say where a run was made, and what its numbers depend on."""
+def provenance(experiment: Experiment) -> Provenance:
+    """That of a run that is made here and now."""
     return {
         "versions": environment(),
         "machine": fingerprint(),

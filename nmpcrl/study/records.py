@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NotRequired, TypedDict
 
 import numpy as np
 
@@ -24,18 +24,23 @@ from nmpcrl.study.storage.archive import (
     load_arrays,
     save_arrays,
 )
+from nmpcrl.study.storage.machine import Fingerprint
 
-__all__ = ["Column", "DamagedRecords", "Records", "StepStatus", "Stopped", "Table", "final_cost"]
+__all__ = [
+    "About",
+    "Column",
+    "DamagedRecords",
+    "Facts",
+    "Records",
+    "StepStatus",
+    "Stopped",
+    "Table",
+    "final_cost",
+]
 
 LAST = 3  # rollouts that the final cost averages
 STATES = len(paper.START)  # n of the robot
 INPUTS = len(paper.THETA_INIT) - 2 * STATES - 1  # m of the robot
-FACTS: dict[str, Any] = {  # which every run has
-    "stopped": str,
-    "solver": str,
-    "seconds": int | float,
-    "final_cost": int | float,
-}
 
 
 class Stopped(StrEnum):
@@ -43,6 +48,26 @@ class Stopped(StrEnum):
 
     FINISHED = "finished"
     DIVERGED = "diverged"
+
+
+class Facts(TypedDict):
+    """What a run says of itself."""
+
+    stopped: str  # how training ended, as `Stopped` has it
+    solver: str  # what solved
+    seconds: float
+    final_cost: float
+    versions: NotRequired[dict[str, str]]  # when stored, that of `provenance`, as all below
+    machine: NotRequired[Fingerprint]
+    key: NotRequired[str]
+    sources: NotRequired[str]
+
+
+class About(NamedTuple):
+    """What a file says that it holds."""
+
+    experiment: dict[str, Any]  # the fields of the Experiment, as the code that wrote it had them
+    facts: Facts
 
 
 class StepStatus(IntEnum):
@@ -167,7 +192,7 @@ class Records:
     experiment: dict[str, Any]  # the fields of the Experiment
     steps: dict[str, Column]
     evaluations: dict[str, Column]
-    facts: dict[str, Any]  # stopped, solver, seconds, final_cost; when stored those of `provenance`
+    facts: Facts
 
     def save(self, path: Path) -> None:
         """Write the whole file beside `path`, then rename it into place.
@@ -190,7 +215,7 @@ class Records:
         return cls(about["experiment"], tables["steps"], tables["evaluations"], about["facts"])
 
     @staticmethod
-    def about(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    def about(path: Path) -> About:
         """The experiment's fields and the facts, without reading the tables.
 
         Raises:
@@ -198,19 +223,20 @@ class Records:
             DamagedRecords: it does not say what a run says, or has other columns.
         """
         about = load_about(path, _forms)
-        return about["experiment"], about["facts"]
+        return About(about["experiment"], about["facts"])
 
 
 def named_in(about: dict[str, Any]) -> Experiment:
-    """The experiment of a file, which also has all `FACTS`.
+    """The experiment of a file, which also has the `Facts` that every run has.
 
     Raises:
         ValueError: it does not name one, or a fact is missing.
     """
     try:
         experiment = Experiment(**about["experiment"])
-        for fact, kind in FACTS.items():
-            if not isinstance(about["facts"][fact], kind):
+        for fact in Facts.__required_keys__:
+            kind = Facts.__annotations__[fact]
+            if not isinstance(about["facts"][fact], int | float if kind is float else kind):
                 raise ValueError(f"its {fact} is {about['facts'][fact]!r}")
     except (LookupError, TypeError) as error:
         raise ValueError("it does not say which run it is, or what became of it") from error

@@ -16,6 +16,7 @@ from nmpcrl.learning.training import Diverged, Step, absurd, train
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import (
     EvaluationRow,
+    Facts,
     Records,
     StepRow,
     StepStatus,
@@ -91,7 +92,7 @@ def _run(
         stopped = f"{Stopped.DIVERGED}: {error}"
     table, judged = steps.columns(), evaluations.columns()
     table["alpha_phi2"] = step_size(experiment) * (table["features"] ** 2).sum(axis=1)
-    facts = {
+    facts: Facts = {
         "stopped": stopped,
         "solver": solver,  # what solved: fatrop where riccati was not to be had, if only once
         "seconds": float(table["seconds"].sum()),

@@ -9,6 +9,7 @@ import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -24,7 +25,7 @@ from nmpcrl.study.provenance import (
     provenance,
     warn_of_changes,
 )
-from nmpcrl.study.records import DamagedRecords, Records, most_evaluations
+from nmpcrl.study.records import About, DamagedRecords, Facts, Records, most_evaluations
 from nmpcrl.study.run import run
 from nmpcrl.study.setup import compile_ahead
 from nmpcrl.study.storage.executor import execute
@@ -217,23 +218,21 @@ def _read_or_train(experiment: Experiment, **options: Any) -> tuple[Records, boo
     except DamagedRecords as error:
         set_aside(path, error)
     records = run(experiment, **options)
-    records.facts.update(provenance(experiment))
+    records = replace(records, facts={**records.facts, **provenance(experiment)})
     if other := solved_by_another(experiment, records.facts):
         say(f"{experiment} is not stored: it was {other}")
         return records, False
     return records, keep(path, records.save)
 
 
-def solved_by_another(experiment: Experiment, facts: Mapping[str, Any]) -> str:
+def solved_by_another(experiment: Experiment, facts: Facts) -> str:
     """By which solver a run was solved, if not by the one that its experiment names."""
     solver = facts["solver"]
     same = solver == experiment.solver
     return "" if same else f"solved by {solver} and not by {experiment.solver}"
 
 
-def check_run(
-    path: Path, experiment: Experiment, fields: Mapping[str, Any], facts: Mapping[str, Any]
-) -> None:
+def check_run(path: Path, experiment: Experiment, fields: Mapping[str, Any], facts: Facts) -> None:
     """See that a file is of the run asked for.
 
     Args:
@@ -264,7 +263,7 @@ def is_stored(experiment: Experiment) -> bool:
 def is_there(
     path: Path,
     experiment: Experiment,
-    about: Callable[[Path], tuple[dict[str, Any], dict[str, Any]]],
+    about: Callable[[Path], About],
 ) -> bool:
     """Whether a file says that it is of a run; `about` reads that."""
     try:
@@ -274,7 +273,7 @@ def is_there(
     return True
 
 
-def stored() -> dict[Path, tuple[dict[str, Any], dict[str, Any]]]:
+def stored() -> dict[Path, About]:
     """Every run in the folder: its experiment's fields and its facts, by path.
 
     Raises:
@@ -289,17 +288,17 @@ def stored() -> dict[Path, tuple[dict[str, Any], dict[str, Any]]]:
     whole = {}
     for path in filter(lambda path: path.suffix == ".npz", paths):
         try:
-            fields, facts = Records.about(path)
-            _check_name(path, fields, facts)
-            whole[path] = fields, facts
+            about = Records.about(path)
+            _check_name(path, about)
+            whole[path] = about
         except (FileNotFoundError, DamagedRecords) as error:
             say(f"{error}; it is ignored")
     return whole
 
 
-def _check_name(path: Path, fields: Mapping[str, Any], facts: Mapping[str, Any]) -> None:
+def _check_name(path: Path, about: About) -> None:
     """See that a file which has the name of a run has that of its own."""
-    own = f"{name_of(Experiment(**fields))}-{facts.get('key', '')[:10]}"
+    own = f"{name_of(Experiment(**about.experiment))}-{about.facts.get('key', '')[:10]}"
     if re.fullmatch(r".*-seed\d+-\d+ep-[0-9a-f]{10}", path.stem) and path.stem != own:
         raise DamagedRecords(f"{path} holds another run, {own}")
 

@@ -5,7 +5,7 @@ import platform
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import NotRequired, TypedDict, cast
 
 import psutil
 
@@ -25,8 +25,25 @@ SETTINGS = (  # environment variables by which the same code gives other last di
 )
 
 
-def machine() -> dict[str, Any]:
+class Machine(TypedDict):
     """What a reader has to know of it."""
+
+    processor: str
+    architecture: str
+    cores: int | None
+    system: str
+
+
+class Fingerprint(Machine):
+    """All of it on which last digits depend."""
+
+    library: str  # of C
+    abilities: str  # a hash of what its processor can do
+    settings: NotRequired[dict[str, str]]  # what `SETTINGS` say, where one of them is set
+
+
+def machine() -> Machine:
+    """This one, in short."""
     return {
         "processor": _processor(),
         "architecture": platform.machine(),
@@ -35,22 +52,26 @@ def machine() -> dict[str, Any]:
     }
 
 
-def fingerprint() -> dict[str, Any]:
+def fingerprint() -> Fingerprint:
     """`machine`, with the abilities of its processor, its C library, and what `SETTINGS` say.
 
     Machine code is made for the first, and processors of one name may differ in them; sines and
-    cosines come from the second. "settings" is there only where one of them is set.
+    cosines come from the second.
     """
     settings = {name: os.environ[name] for name in SETTINGS if os.environ.get(name)}
-    return {**_fingerprint(), **({"settings": settings} if settings else {})}
+    known = _fingerprint().copy()
+    if settings:
+        known["settings"] = settings
+    return known
 
 
 @cache
-def _fingerprint() -> dict[str, Any]:
+def _fingerprint() -> Fingerprint:
     kept = ("flags", "Features", "cpu family", "model\t")
     told = sorted({line for line in _cpuinfo() if line.startswith(kept)})
     abilities = sha256("\n".join(told).encode()).hexdigest()[:16]
-    return {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities}
+    found = {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities}
+    return cast(Fingerprint, found)
 
 
 @cache

@@ -91,3 +91,12 @@ def test_a_folder_where_a_file_should_be_stays_and_nothing_else_is_left(tmp_path
     with pytest.raises(IsADirectoryError):
         write_json(tmp_path / "one.json", [])
     assert list(tmp_path.iterdir()) == [tmp_path / "one.json"]
+
+
+def test_who_reads_a_file_meanwhile_sees_all_of_the_one_before(tmp_path):
+    path = tmp_path / "file"
+    path.write_bytes(b"before")
+    with path.open("rb") as reader:
+        write_whole(path, lambda file: file.write(b"after"))
+        assert reader.read() == b"before"
+    assert path.read_bytes() == b"after"
