@@ -52,8 +52,10 @@ def driven(
                 f" {nmpc.m}"
             )
 
+        advance, charge = own.step, task.stage_cost
+
         def as_task(state: Vector, action: Vector, _: np.random.Generator) -> Step:
-            return own.step(state, action), task.stage_cost(state, action), False
+            return advance(state, action), charge(state, action), False
 
         drive = as_task
     else:

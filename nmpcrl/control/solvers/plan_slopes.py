@@ -13,9 +13,10 @@ from .kernel import (
     evaluate,
     factorise,
     initialise,
-    initialise_rows,
+    inlined,
     linearise,
     matrix,
+    offsets,
     options,
     rows_along,
     scale_rows,
@@ -24,6 +25,27 @@ from .kernel import (
     vector,
 )
 from .model import NTHETA, NU, NX
+
+
+@inlined
+def restore_rows(task, duals, factor, solved):
+    """The rows' multipliers as they were solved for, upon which the costates depend."""
+    last, obstacles = len(duals.lam), len(task.discs)
+    variables, constraints = offsets(task, last)
+    lam = variables + NX + obstacles
+    nu = lam + constraints + obstacles
+    for i in range(last):
+        variables, constraints = offsets(task, i + 1)
+        row = lam + constraints + (NX if i + 1 < last else 0)
+        for j in range(duals.lam.shape[1]):
+            weight = task.weights[i, j]
+            if j < obstacles:
+                old = solved[row + j] / factor
+            else:
+                side = task.sides[j - obstacles]
+                old = side[1] * solved[nu + variables + int(side[0])] / factor
+            duals.lam[i, j] = min(max(old, 1e-12 * weight), (1.0 - 1e-12) * weight)
+
 
 SIGNATURE = types.boolean(*PROBLEM, vector, matrix, matrix, vector)
 
@@ -45,7 +67,7 @@ def plan_slopes(
     mu = RIGID
     initialise(task, point, duals, state, action, SAME, mu, factor, solved)
     evaluate(task, point, mu)
-    initialise_rows(task, point, duals, SAME, mu, factor, solved)
+    restore_rows(task, duals, factor, solved)
     linearise(task, point, duals, stages)
     condense(task, point, duals, stages, mu)
     for i in range(N + 1):

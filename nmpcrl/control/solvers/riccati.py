@@ -40,6 +40,7 @@ TEXTS = {  # compiled beside `model`; read with the other modules, so that an ed
     + ("rows", "rows_solve", "rows_slopes")
 }
 STAGES = ("codes", "kernel", "hessian")
+NAME = "riccati"
 ABSURD = 1e24  # no value is larger
 UNBOUNDED = 1e20  # stands for an input without a bound
 
@@ -130,7 +131,7 @@ def random_inputs(of: Plant | Problem, seed: int, horizon: int) -> Matrix:
 class Riccati(Solver):
     """The interior point of `kernel`, compiled for a plant at its first solve."""
 
-    name: ClassVar[str] = "riccati"
+    name: ClassVar[str] = NAME
     prices_box: ClassVar[bool] = True
 
     code: Callable[[Plant], Code] = field(default=machine_code, repr=False)
@@ -157,7 +158,8 @@ class Compiled(ABC):
         self._code = solve
         self._fixed = int(ocp.fixed_action.size > 0)
         self._standing = np.zeros(2 * ocp.lower.size + ocp.equality.size)
-        self._size = self._standing.size + ocp.theta.numel()
+        self._split = self._standing.size  # where a solution's gradient begins
+        self._size = self._split + ocp.theta.numel()
         self._no_action = np.zeros(of.lower.size)
         self._bounds = np.maximum(of.lower, -UNBOUNDED), np.minimum(of.upper, UNBOUNDED)
         self._tolerance = tolerance
@@ -174,23 +176,23 @@ class Compiled(ABC):
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         given = action[0] if action else self._no_action
         problem = self.problem if data is None else (data, *self.problem[1:])
-        arguments = (*problem, state, theta, given, self._fixed)
+        code, fixed, tolerance, split = self._code, self._fixed, self._tolerance, self._split
         for restarts, (start, point, limit) in enumerate(self._starts(state, warm_start)):
             out = np.empty(self._size)
-            value, iterations, end, violation, error = self._code(
-                *arguments, start, limit, self._tolerance, point, out
+            value, iterations, end, violation, error = code(
+                *problem, state, theta, given, fixed, start, limit, tolerance, point, out
             )
             if end == SOLVED and value < ABSURD:
                 return Solution(
                     state,
                     theta,
                     value,
-                    out[self._standing.size :],
+                    out[split:],
                     int(iterations),
                     time.perf_counter() - began,
-                    out[: self._standing.size],
+                    out[:split],
                     self._ocp,
-                    Riccati.name,
+                    NAME,
                     restarts,
                     violation,
                     data,

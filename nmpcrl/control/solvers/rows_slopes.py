@@ -29,6 +29,7 @@ from .kernel import (
     initialise,
     inlined,
     matrix,
+    offsets,
     options,
     scale_rows,
     sweep,
@@ -42,12 +43,25 @@ from .rows import (
     condense,
     evaluate,
     hold,
-    initialise_rows,
     linearise,
+    place_of_rows,
     rows_along,
     scaled,
     settle,
 )
+
+
+@inlined
+def restore_rows(task, duals, factor, solved):
+    """The rows' multipliers as they were solved for, upon which the costates depend."""
+    last = len(duals.lam) - 1
+    lam = offsets(task, last)[0] + NX + NROWS
+    for i in range(last + 1):
+        row = lam + place_of_rows(task, i, last)
+        for j in range(NROWS):
+            weight = task.weights[i, j]
+            old = solved[row + j] / factor if task.kind[i, j] == PLANNED else 0.0
+            duals.lam[i, j] = min(max(old, 1e-12 * weight), (1.0 - 1e-12) * weight)
 
 
 @inlined
@@ -147,7 +161,7 @@ def slopes(
     drift, dp = np.empty((N + 1, NX)), np.empty((N + 1, NX))
     initialise(task, point, duals, state, action, SAME, mu, factor, solved)
     evaluate(task, point, mu)
-    initialise_rows(task, point, duals, SAME, mu, factor, solved)
+    restore_rows(task, duals, factor, solved)
     linearise(task, point, duals, stages)
     condense(task, point, duals, stages, mu)
     right_hand_side(task, point, duals, stages, w, drift)
