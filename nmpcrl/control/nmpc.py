@@ -205,7 +205,7 @@ class Nmpc:
     def _refuse_problem(self, name: str) -> None:
         if self.problem is not None:
             raise AttributeError(
-                f"an Nmpc of a Problem has no {name}: its model plans, and what is driven, from"
+                f"an Nmpc of a Problem has no {name}: its model plans, and the environment, from"
                 " where, and at which cost is said to train and evaluate"
             )
 

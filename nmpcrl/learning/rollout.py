@@ -7,7 +7,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc, Plant, Solution, SolverError
-from nmpcrl.learning.driven import Drive, driven
+from nmpcrl.learning.environment import StepFunction, environment
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def evaluate(
     theta: Vector,
     steps: int,
     *,
-    plant: Plant | Drive | None = None,
+    plant: Plant | StepFunction | None = None,
     start: Any = None,
     rng: np.random.Generator | int = 0,
 ) -> Rollout:
@@ -82,14 +82,14 @@ def evaluate(
         controller: acts.
         theta: NMPC parameters, shape (d,).
         steps: K + 1, the most states that are visited.
-        plant: what is driven, as in `train`; the plant that plans if absent.
+        plant: the environment, as in `train`; the plant that plans if absent.
         start: a state or rng -> state; the task's if absent.
         rng: for a plant or a start that draws.
     """
     controller = persistent(controller)
     nmpc, rng = controller.nmpc, np.random.default_rng(rng)
-    what = driven(nmpc, plant, start)
-    state, plan, failure, end = what.start(rng), None, "", False
+    around = environment(nmpc, plant, start)
+    state, plan, failure, end = around.start(rng), None, "", False
     states, actions, costs = [], [], []
     for _ in range(steps):
         try:
@@ -99,7 +99,7 @@ def evaluate(
             break
         states.append(state)
         actions.append(plan.action)
-        state, cost, end = what.step(state, plan.action, rng)
+        state, cost, end = around.step(state, plan.action, rng)
         costs.append(cost)
         if end:
             break

@@ -13,7 +13,7 @@ from nmpcrl.control import Nmpc, Plant, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.solution import short
 from nmpcrl.learning.bootstrap import Transition
-from nmpcrl.learning.driven import Drive, Driven, driven
+from nmpcrl.learning.environment import Environment, StepFunction, environment
 from nmpcrl.learning.learners import Learner, Update, Weights
 from nmpcrl.learning.rollout import Persistent, persistent
 
@@ -102,7 +102,7 @@ def train(
     *,
     clipped: bool = True,
     constrained: bool = False,
-    plant: Plant | Drive | None = None,
+    plant: Plant | StepFunction | None = None,
     start: Any = None,
     rng: np.random.Generator | int = 0,
 ) -> Iterator[Step]:
@@ -117,19 +117,19 @@ def train(
         explore: the noise.
         clipped: whether actions are kept in the action space.  # departure E
         constrained: whether Q(s, a) is solved for, with u_0 = a, instead of V(s).  # departure F
-        plant: what is driven: a `Plant`, whose cost is the task's, or a function (state, action,
+        plant: the environment: a `Plant`, whose cost is the task's, or a function (state, action,
             rng) -> (next state, cost, end); the plant that plans if absent. The state in which an
             episode ends is worth 0.
         start: a state, or a function rng -> state; the task's if absent.
         rng: for a plant or a start that draws.
 
     Raises:
-        ValueError: there is nothing to drive, as for a `Problem` without `plant` and `start`.
+        ValueError: there is no environment, as for a `Problem` without `plant` and `start`.
         Diverged: theta is no longer usable, or `PATIENCE` episodes in a row ended early.
     """
     controller, rng = persistent(controller), np.random.default_rng(rng)
-    what = driven(controller.nmpc, plant, start)
-    trainer = _Trainer(learner, controller, explore, clipped, constrained, what, rng)
+    around = environment(controller.nmpc, plant, start)
+    trainer = _Trainer(learner, controller, explore, clipped, constrained, around, rng)
     failed = 0
     for episode in range(len(explore.scale)):
         failure = ""
@@ -152,14 +152,14 @@ class _Trainer:
     explore: Exploration
     clipped: bool
     constrained: bool
-    driven: Driven
+    environment: Environment
     rng: np.random.Generator
 
     def episode(self, episode: int, weights: Weights) -> Iterator[Step]:
         """The steps of one episode; the last one says so if a solve failed."""
         controller, constrained = self.controller, self.constrained
         nmpc, rng = controller.nmpc, self.rng
-        state, warm_start = self.driven.start(rng), None
+        state, warm_start = self.environment.start(rng), None
         nothing = np.full(nmpc.m, np.nan)
         for t in range(self.explore.scale.shape[1]):
             try:
@@ -169,7 +169,7 @@ class _Trainer:
                 return
             action = self.explore(plan.action, episode, t)
             action = nmpc.clip(action) if self.clipped else action  # departure E
-            next_state, cost, end = self.driven.step(state, action, rng)
+            next_state, cost, end = self.environment.step(state, action, rng)
             solution = None
             try:
                 solution = (

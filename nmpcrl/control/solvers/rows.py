@@ -28,6 +28,7 @@ from .expressions import (
 )
 from .kernel import (
     COLD,
+    INSIDE,
     SHIFTED,
     Duals,
     Point,
@@ -254,7 +255,7 @@ def initialise_rows(task, point, duals, start, mu, factor, warm_start):
                 old = gain * warm_start[lam + place_of_rows(task, source, last) + j]
                 middle = max(old, middle) if point.h[i, j] < 0.0 else min(old, middle)
             weight = task.weights[i, j]
-            duals.lam[i, j] = min(max(middle, 1e-12 * weight), (1.0 - 1e-12) * weight)
+            duals.lam[i, j] = min(max(middle, INSIDE * weight), (1.0 - INSIDE) * weight)
 
 
 @inlined

@@ -1,4 +1,4 @@
-"""What is driven need not be what plans: other plants, costs, starts and ends."""
+"""The environment need not be what plans: other plants, costs, starts and ends."""
 
 import casadi as ca
 import numpy as np
@@ -43,7 +43,7 @@ def noise(episodes, steps, inputs):
     return Exploration.draw(np.random.default_rng(0), (episodes, steps, inputs), deviation=0.1)
 
 
-def test_the_plant_that_plans_is_driven_if_no_other_is_given(robot):
+def test_the_plant_that_plans_is_the_environment_if_no_other_is_given(robot):
     steps = list(train(expected_sarsa(robot, 1e-7), robot, Weights(THETA, THETA), noise(1, 5, 2)))
     same = list(
         train(
@@ -56,7 +56,7 @@ def test_the_plant_that_plans_is_driven_if_no_other_is_given(robot):
         assert one.cost == other.cost
 
 
-def test_another_plant_is_driven_at_the_tasks_cost(robot):
+def test_another_plant_is_charged_the_tasks_cost(robot):
     slow = differential_drive(period=0.1)
     rollout = evaluate(robot, THETA, 5, plant=slow)
     np.testing.assert_array_equal(
@@ -65,7 +65,7 @@ def test_another_plant_is_driven_at_the_tasks_cost(robot):
     assert rollout.costs[0] == robot.task.stage_cost(robot.task.start, rollout.actions[0])
 
 
-def test_a_function_drives_charges_and_ends(tank):
+def test_a_function_steps_charges_and_ends(tank):
     theta = tank.problem.theta
     rollout = evaluate(tank, theta, 50, plant=filling, start=[0.0], rng=3)
     assert len(rollout.costs) < 50
@@ -91,7 +91,7 @@ def test_a_state_in_which_an_episode_ends_is_worth_nothing(tank):
 def test_a_problem_says_that_it_only_plans(tank, missing):
     options = {"plant": filling, "start": [0.0]}
     del options[missing]
-    with pytest.raises(ValueError, match="a Problem plans, and says neither what is driven"):
+    with pytest.raises(ValueError, match="a Problem plans, and says nothing of the environment"):
         evaluate(tank, tank.problem.theta, 5, **options)
     with pytest.raises(AttributeError, match="an Nmpc of a Problem has no task"):
         _ = tank.task

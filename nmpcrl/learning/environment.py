@@ -1,4 +1,4 @@
-"""What is driven: it need not be what the NMPC plans with."""
+"""The environment that a controller acts in: it need not be what the NMPC plans with."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant
 
 Step = tuple[Vector, float, bool]  # next state, cost l(s, a), whether the episode ends there
-Drive = Callable[[Vector, Vector, np.random.Generator], Step]
+StepFunction = Callable[[Vector, Vector, np.random.Generator], Step]
 
 
 @dataclass(frozen=True, eq=False)
-class Driven:
+class Environment:
     """A plant with its cost and its start."""
 
-    step: Drive
+    step: StepFunction
     start: Callable[[np.random.Generator], Vector]
 
 
-def driven(
+def environment(
     nmpc: Nmpc,
-    plant: Plant | Drive | None = None,
+    plant: Plant | StepFunction | None = None,
     start: Vector | Callable[[np.random.Generator], Vector] | None = None,
-) -> Driven:
-    """What an NMPC drives.
+) -> Environment:
+    """The environment of an NMPC.
 
     Args:
         nmpc: has bounds, and where it has a task a start and the cost of Eq. (20).
@@ -40,10 +40,10 @@ def driven(
     """
     if nmpc.problem is not None and (start is None or plant is None or isinstance(plant, Plant)):
         raise ValueError(
-            "a Problem plans, and says neither what is driven nor from where nor at which cost:"
+            "a Problem plans, and says nothing of the environment, its start and its cost:"
             " give plant=(state, action, rng) -> (next state, cost, end), and start="
         )
-    drive: Drive
+    step: StepFunction
     if plant is None or isinstance(plant, Plant):
         own, task = plant or nmpc.plant, nmpc.task
         if (own.n, own.m) != (nmpc.n, nmpc.m):
@@ -57,12 +57,12 @@ def driven(
         def as_task(state: Vector, action: Vector, _: np.random.Generator) -> Step:
             return advance(state, action), charge(state, action), False
 
-        drive = as_task
+        step = as_task
     else:
-        drive = checked(plant, nmpc.n)
+        step = checked(plant, nmpc.n)
     if start is None:
         start = nmpc.task.start
-    return Driven(drive, start if callable(start) else always(start))
+    return Environment(step, start if callable(start) else always(start))
 
 
 def always(start: Any) -> Callable[[np.random.Generator], Vector]:
@@ -71,14 +71,14 @@ def always(start: Any) -> Callable[[np.random.Generator], Vector]:
     return lambda _: state
 
 
-def checked(plant: Drive, states: int) -> Drive:
+def checked(plant: StepFunction, states: int) -> StepFunction:
     """A plant of the user, whose results are looked at.
 
     Raises:
-        ValueError: when it is driven: a next state of another size, or that is not finite.
+        ValueError: when it is called: a next state of another size, or that is not finite.
     """
 
-    def drive(state: Vector, action: Vector, rng: np.random.Generator) -> Step:
+    def step(state: Vector, action: Vector, rng: np.random.Generator) -> Step:
         try:
             later, cost, end = plant(state, action, rng)
         except (TypeError, ValueError) as error:
@@ -91,4 +91,4 @@ def checked(plant: Drive, states: int) -> Drive:
             raise ValueError(f"plant returned {later}; a state is {states} finite numbers")
         return later, float(cost), bool(end)
 
-    return drive
+    return step
