@@ -40,14 +40,14 @@ FAILING = """settings => {  // no solve finds a plan
 ABSURD = """settings => {  // every update moves theta by a half
   const noise = new Float64Array(2 * settings.episodes * settings.steps)
   const problem = { lower: [-1, -1], upper: [1, 1], discount: [1, 0.9] }
-  const plan = { action: [0, 0], value: 1, features: [1] }
-  const rules = { tdError: () => 1, semiGradient: ([theta]) => [theta + 0.5] }
+  const plan = { action: [0, 0], value: 1, features: [1, 1] }
+  const rules = { tdError: () => 1, semiGradient: ([theta, other]) => [theta + 0.5, other] }
   const nmpc = { problem, rules, solve: () => plan, cost: () => 1, step: (state) => state }
   return Array.from(window.nmpcrl.train(nmpc, settings, noise), ({ diverged }) => diverged)
 }"""
 SHORT = {
     "learner": "ES", "alpha": 1, "decay": "step", "decayRate": 1, "episodes": 12, "steps": 1,
-    "theta": [1], "w": [0], "start": [0], "target": [0], "discs": [], "horizon": 1,
+    "theta": [1, -1], "w": [0, 0], "start": [0], "target": [0], "discs": [], "horizon": 1,
 }  # fmt: skip
 
 

@@ -177,8 +177,8 @@
     }
 
     const follow = address(data, read, open, (damaged) => {
-      open(settings.defaults(data));
-      problem.lines = [[words.damaged(damaged)]];
+      change({}); // what is set stays, and the address says that again
+      problem.lines = [[words.damaged(...damaged, data)]];
     });
 
     function show(given) {

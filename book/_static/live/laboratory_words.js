@@ -5,6 +5,8 @@
   const { words } = window.nmpcrl;
   const { fixed } = words.parts;
   const percent = (share) => `${fixed(100 * Math.abs(share), 1)} %`;
+  const LONG = 60; // letters of a link that are repeated
+  const short = (text) => (text.length > LONG ? `${text.slice(0, LONG)}…` : text);
   const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
 
   words.laboratory = {
@@ -88,7 +90,23 @@
     ],
     atStart: "with θ at the start",
     ofRun: (number) => `with the last θ of run ${number}`,
-    damaged: (name) => `This link is damaged at “${name}”, so the laboratory begins with the paper's settings.`,
+    // What a link may say of a setting.
+    allowed: (name, { fields, most, theta, limits }) => {
+      const field = fields.find((each) => each.name === name);
+      if (field?.choices) return `${words.laboratory.names[name]}: one of ${field.choices.join(", ")}, please.`;
+      if (field) return words.laboratory.refused(name, field);
+      const places = {
+        layout: `Obstacles: 1 to ${most} pairs x,y on the map with ; between them, please.`,
+        start: "Start: x,y,heading within the walls and one turn, please.",
+        target: "Target: x,y,heading within the walls and one turn, please.",
+        theta: `θ: ${theta.length} numbers from ${-limits.absurd} to ${limits.absurd}, please.`,
+      };
+      return Object.hasOwn(places, name) ? places[name] : "No setting has this name.";
+    },
+    damaged: (name, text, data) => (
+      `This link is not read, and what is set stays: it says “${short(`${name}=${text}`)}”. `
+      + words.laboratory.allowed(name, data)
+    ),
     failed: (why) => `this browser could not train: ${why}`,
     armFailed: (why) => `this browser could not train its frozen arm: ${why}`,
     noWorker: "it did not start a worker",

@@ -77,8 +77,7 @@
   // ---- Training
 
   const squared = (vector) => vector.reduce((sum, each) => sum + each * each, 0);
-  const size = (vector) => vector.reduce((sum, each) => sum + Math.abs(each), 0);
-  const absurd = ({ theta, w }, { absurd: most }) => !(size(theta) <= most && size(w) <= most);
+  const absurd = ({ theta, w }, limits) => ![...theta, ...w].every((each) => Math.abs(each) <= limits.absurd);
 
   function learnerOf(nmpc, settings) {
     const { rule, bootstrap = secondSolve, constrained = false } = LEARNERS[settings.learner];

@@ -76,9 +76,12 @@
     subscripts.reduce((above, text) => add(above, "sub", {}, text), whole);
   }
 
-  // A text in which {c} stands for the symbol of c.
+  // A text in which {c} stands for the symbol of c; braces around anything else are letters.
   function write(parent, text) {
-    text.split(/[{}]/).forEach((piece, k) => (k % 2 ? symbol(parent, piece) : parent.append(piece)));
+    text.split(/\{(\w+)\}/).forEach((piece, k) => {
+      if (k % 2 && Object.hasOwn(words.symbols, piece)) symbol(parent, piece);
+      else parent.append(k % 2 ? `{${piece}}` : piece);
+    });
   }
 
   // Lines of texts and numbers in turn. A screen reader is given them once nothing changes any more.

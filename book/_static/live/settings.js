@@ -28,18 +28,20 @@
   }
 
   // The layout, a pose or theta of a link; undefined if it is none.
-  function place(name, text, { most, view: [left, bottom, width, height], box, theta }) {
+  function place(name, text, { most, view: [left, bottom, width, height], box, theta, limits }) {
     const found = rows(text), [first] = found;
     if (found.flat().some((number) => !Number.isFinite(number))) return undefined;
     if (name === "layout") {
       const map = [[left, bottom], [left + width, bottom + height]];
       return found.length <= most && found.every((row) => row.length === 2 && within(row, map)) ? found : undefined;
     }
-    if (name === "theta") return first.length === theta.length ? first : undefined;
+    if (name === "theta") {
+      return first.length === theta.length && first.every((each) => Math.abs(each) <= limits.absurd) ? first : undefined;
+    }
     return first.length === 3 && within(first, box) && Math.abs(first[2]) <= TURN ? first : undefined;
   }
 
-  // What a link's fragment says; { damaged } if any of it makes no sense, null if it is no link of ours.
+  // What a link's fragment says; { damaged: [name, text] } of what makes no sense, null if it is no link of ours.
   function read(fragment, data) {
     if (!fragment.includes("=")) return null;
     const found = defaults(data);
@@ -47,7 +49,7 @@
       const [name, text = ""] = part.split("=").map(decoded), field = data.fields.find((each) => each.name === name);
       const known = field || name === "layout" || name === "theta" || POSES.includes(name);
       const value = known && (field ? parsed(text, field) : place(name, text, data));
-      if (value === undefined || !known) return { damaged: name };
+      if (value === undefined || !known) return { damaged: [name, text] };
       found[name] = value;
     }
     return found;

@@ -10,7 +10,7 @@ from nmpcrl.study import paper
 class Limits(TypedDict):
     """When a run is a divergence."""
 
-    absurd: float  # the largest sum of |theta|, and of |w|
+    absurd: float  # the largest size of a component of theta or w
     patience: int  # so many episodes in a row that a failed solve ended
 
 
