@@ -1,11 +1,6 @@
 """Make the editions for a course: `driver.course.course` says how."""
 
-import os
-
-from driver.project import ENVIRONMENT
+from driver.course.course import main
 
 if __name__ == "__main__":
-    os.environ |= ENVIRONMENT
-    from driver.course.course import main
-
     main()

@@ -2,19 +2,13 @@
 
 import ast
 import re
-import subprocess
-import sys
-from collections.abc import Mapping
 from graphlib import TopologicalSorter
 from pathlib import Path
-
-import pytest
 
 from nmpcrl import control
 from nmpcrl.study.departures import DEPARTURES
 
 ROOT = Path(__file__).resolve().parent.parent
-BOOK = ROOT / "book/driver"
 MODULES = sorted((ROOT / "nmpcrl").rglob("*.py"))
 ROOMS = {  # each may import those that it names, and what they may
     "control": (),
@@ -26,14 +20,6 @@ ROOMS = {  # each may import those that it names, and what they may
     "report": ("claims",),
     "course": ("claims",),
     "commands": ("report", "course"),
-}
-DRIVER = {  # the same of the rooms and modules of book/driver
-    "project": (),
-    "page": ("project",),
-    "teaching": ("page",),
-    "build": ("teaching",),
-    "paper": ("project",),
-    "course": ("build", "paper"),
 }
 DISK = {"io", "json", "os", "pathlib", "pickle", "shutil", "sqlite3", "tempfile"}
 HOMES = {  # foreign library -> where alone it may be imported
@@ -79,9 +65,9 @@ def cited(text: str) -> set[str]:
     return {letter for group in groups for letter in re.findall(r"[A-Z]", group)}
 
 
-def below(room: str, rooms: Mapping[str, tuple[str, ...]] = ROOMS) -> set[str]:
+def below(room: str) -> set[str]:
     """The rooms that a room may import, directly or through others."""
-    return {room}.union(*(below(one, rooms) for one in rooms[room]))
+    return {room}.union(*map(below, ROOMS[room]))
 
 
 def test_every_module_is_in_a_room():
@@ -97,25 +83,6 @@ def test_imports_run_one_way_from_commands_to_control():
         if room in ROOMS and (against := imported & set(ROOMS) - below(room)):
             wrong[place(path)] = against
     assert not wrong
-
-
-def test_the_rooms_of_the_driver_import_one_way_too():
-    wrong = {}
-    for path in sorted(BOOK.rglob("*.py")):
-        room = path.relative_to(BOOK).parts[0].removesuffix(".py")
-        imported = {name.split(".")[1] for name in imports(path) if name.startswith("driver.")}
-        if room != "__init__" and (against := imported - below(room, DRIVER)):
-            wrong[path.name] = against
-    assert not wrong
-
-
-@pytest.mark.slow
-def test_to_import_the_driver_sets_nothing_in_the_environment():
-    modules = [path.relative_to(BOOK.parent) for path in BOOK.rglob("*.py")]
-    names = [".".join(path.with_suffix("").parts) for path in modules]
-    code = f"import os\nbefore = dict(os.environ)\nimport {', '.join(names)}\n"
-    command = [sys.executable, "-c", f"{code}assert dict(os.environ) == before"]
-    subprocess.run(command, check=True, cwd=BOOK.parent)
 
 
 def test_no_file_imports_itself_through_others():

@@ -415,10 +415,10 @@ names["figure"].savefig("ends.svg")
 assert "theta ends in 1 places" in names["figure"].get_suptitle()
 """,
     "chapter": """
-from driver import build, project
+from driver import build
 from driver.teaching import teaching
 
-assert project.ROOT.samefile(".")
+assert build.ROOT.samefile(".")
 assert "08_again" in build.notebooks()
 assert "Again" in teaching.filled("<!-- syllabus: graph -->")
 assert build.ask(build.known("08_again"), {"layout": "D"}).keys() == set(build.NEEDS)

@@ -25,9 +25,16 @@ PLACE/html is removed first and put there last: it exists only if everything wen
 executed before something went wrong is not executed again, as long as nothing it rests on changed.
 """
 
+import os
+
+# One thread a process, kernels included, and before NumPy or torch is imported.
+os.environ |= {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+os.environ |= {"PYDEVD_DISABLE_FILE_VALIDATION": "1", "NO_COLOR": "1"}
+os.environ["NMPCRL_STRICT"] = "1"  # a solution that its check refuses ends the build
+os.environ["NMPCRL_FIGURES_FOR_PAGE"] = "1"  # narrow, too, for telephones: `pictures`
+
 import difflib
 import logging
-import os
 import re
 import shutil
 import subprocess
@@ -42,7 +49,7 @@ from hashlib import sha256
 from importlib.resources import as_file, files
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import click
 import nbformat
@@ -53,7 +60,6 @@ from tqdm import tqdm
 from traitlets.config import Config
 
 from driver.page import accessible, enrich, live, pictures, questions
-from driver.project import ROOT, Failure, reported, shown
 from driver.teaching import teaching
 from nmpcrl.course import exercises
 from nmpcrl.study.provenance import hash_of
@@ -62,6 +68,7 @@ logging.getLogger("papermill").setLevel(logging.ERROR)  # a page without paramet
 
 Given = dict[str, Any]  # parameters of a chapter by name
 
+ROOT = Path(__file__).resolve().parents[2]
 SMOKE = {"episodes": 4, "length": "smoke", "layouts": ["A", "D"], "seeds": [0, 1], "budget": 40}
 BUTTONS = ("use_repository_button", "use_edit_page_button", "use_issues_button")
 INDEX = """<!DOCTYPE html>
@@ -71,6 +78,28 @@ INDEX = """<!DOCTYPE html>
 <body><a href="{page}.html">{title}</a></body>
 </html>
 """
+
+
+class Failure(click.ClickException):
+    """A sentence for the reader; the details are in a log."""
+
+    def show(self, file: IO[Any] | None = None) -> None:
+        click.echo(self.message, file=sys.stderr)
+
+
+@contextmanager
+def reported(log: Path) -> Iterator[None]:
+    """Turn an error that no step foresaw into a sentence and a log."""
+    try:
+        yield
+    except Failure:
+        raise
+    except Exception as error:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        log.write_text(traceback.format_exc())
+        raise Failure(
+            f"The build failed with {type(error).__name__}: {error} (all of it: {shown(log)})"
+        ) from error
 
 
 def pages() -> list[str]:
@@ -406,6 +435,10 @@ def warnings(log: Path, most: int = 20) -> str:
 def in_cell(place: re.Match[str]) -> str:
     """MyST-NB counts 10000 lines a cell, from cell 1: name the cell, from 0, and the line."""
     return f".ipynb, cell {int(place[1]) - 1}, line {int(place[2])}:"
+
+
+def shown(path: Path) -> str:
+    return os.path.relpath(path, ROOT)
 
 
 def values(

@@ -13,7 +13,7 @@ import pytest
 import yaml
 from bs4 import BeautifulSoup
 from click.testing import CliRunner
-from driver import build, project
+from driver import build
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from papermill.cli import _resolve_type
 from raising import raising
@@ -322,7 +322,7 @@ def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):
     monkeypatch.setattr(summary, "learners", lambda measured: measured["learners"])
     monkeypatch.setattr(agreement, "of_times", lambda timings, known: (timings,))
     build.measure((lambda: None, lambda: {"solves": {}}))
-    with pytest.raises(project.Failure, match="contradict the published ones:\nC3 is so"):
+    with pytest.raises(build.Failure, match="contradict the published ones:\nC3 is so"):
         build.measure((lambda: {"learners": "C3 is so here"},))
 
 
@@ -330,7 +330,7 @@ def test_verdicts_of_runs_are_held_against_the_published_ones_before_a_chapter_r
     from nmpcrl.claims import agreement
 
     monkeypatch.setattr(agreement, "of_runs", lambda fresh, known: ("C1 is so here",))
-    with pytest.raises(project.Failure, match="C1 is so here"):
+    with pytest.raises(build.Failure, match="C1 is so here"):
         build.train((), ())
 
 

@@ -15,7 +15,7 @@ from textwrap import dedent
 import nbformat
 import pytest
 import test_api
-from driver import build, project
+from driver import build
 from driver.page import enrich
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -256,7 +256,7 @@ def test_the_second_code_cell_refuses_parameters_that_make_no_sense(name):
     nonsense = {"episodes": 0, "seeds": "[3]", "layout": "nowhere"}
     for parameter in build.parameters(path):
         if parameter in nonsense:
-            with pytest.raises(project.Failure, match=parameter):
+            with pytest.raises(build.Failure, match=parameter):
                 build.ask(path, {parameter: nonsense[parameter]})
 
 
@@ -344,7 +344,7 @@ def test_whatever_a_chapter_is_given_it_takes_little_or_refuses_in_a_sentence(dr
     name, values = drawn
     try:
         needs = build.ask(ROOT / f"book/{name}.ipynb", values)
-    except project.Failure as refusal:
+    except build.Failure as refusal:
         said = refusal.message
         assert "\n" not in said
         assert len(said) < 400

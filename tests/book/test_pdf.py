@@ -9,7 +9,7 @@ import pytest
 import yaml
 from bs4 import BeautifulSoup
 from click.testing import CliRunner
-from driver import build, project
+from driver import build
 from driver.paper import pdf, whole
 from filelock import FileLock
 from pypdf import PdfReader
@@ -88,7 +88,7 @@ def small(tmp_path, monkeypatch):
     """A site of two pages, with the settings it was made from."""
     (tmp_path / "_toc.yml").write_text(TOC)
     (tmp_path / "_config.yml").write_text(CONFIG)
-    (tmp_path / "CITATION.cff").write_text((project.ROOT / "CITATION.cff").read_text())
+    (tmp_path / "CITATION.cff").write_text((build.ROOT / "CITATION.cff").read_text())
     site = tmp_path / "_build/html"
     (site / "book").mkdir(parents=True)
     for name, number in (("one", ""), ("other", "1. ")):
@@ -190,7 +190,7 @@ def flat(entries: list) -> list[str]:
 
 def test_the_outline_has_every_part_chapter_and_section_in_their_order(book, headings):
     titles = flat(book.outline)
-    parts = yaml.safe_load((project.ROOT / "_toc.yml").read_text())["parts"]
+    parts = yaml.safe_load((build.ROOT / "_toc.yml").read_text())["parts"]
     assert {part["caption"] for part in parts} <= set(titles)
     rest = iter(titles)
     assert [one for one in headings if one not in rest] == []

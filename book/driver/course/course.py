@@ -33,10 +33,10 @@ import nbformat
 from driver import build
 from driver.course import autograded, downloads, editions, handout, offline, slides
 from driver.page import pictures
-from driver.project import ROOT, Failure
 from nmpcrl.course import variants
 from nmpcrl.course.exercises import exercises
 
+ROOT = build.ROOT
 PLACE, SITE = Path("_build/course"), Path("_build/html")
 EDITIONS: dict[str, Callable[..., Any]] = {
     "student": editions.student,
@@ -124,7 +124,7 @@ def drawn(executed: Path) -> dict[str, bytes]:
         return pictures.vectors(nbformat.read(executed, 4))
     except (FileNotFoundError, KeyError) as missing:
         reason = f"Figures are those of an executed {executed.name}: `make book` executes it."
-        raise Failure(reason) from missing
+        raise build.Failure(reason) from missing
 
 
 def decks(_: dict[str, Any], place: Path) -> None:
@@ -142,7 +142,7 @@ def is_whole(name: str, sources: dict[str, Any]) -> bool:
     """Make one of `SHOWN`, or say why it is not whole; the notebooks need none of them."""
     try:
         SHOWN[name](sources, PLACE / name)
-    except Failure as reason:
+    except build.Failure as reason:
         click.echo(f"{PLACE / name} is not whole. {reason.message}")
         return False
     return True

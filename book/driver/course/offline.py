@@ -14,7 +14,6 @@ from typing import Any
 
 from driver import build
 from driver.course import editions
-from driver.project import ROOT
 
 LONG = 10  # of a run [s], as `limits.seconds_of` has it: those whose learner fits a network
 
@@ -41,7 +40,7 @@ def needed(files: Iterable[str]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """The runs, and the runs of which the summaries, are to be stored."""
     from nmpcrl.study.limits import seconds_of
 
-    asked = [build.ask(path, given(path)) for path in (ROOT / "book" / f for f in files)]
+    asked = [build.ask(path, given(path)) for path in (build.ROOT / "book" / f for f in files)]
     whole, summarised = (
         tuple(dict.fromkeys(one for needs in asked for one in needs[what]))
         for what in ("experiments", "summaries")

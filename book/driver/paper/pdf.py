@@ -30,8 +30,8 @@ import yaml
 from pypdf import PdfReader, PdfWriter
 from pypdf.generic import NameObject, TextStringObject
 
+from driver.build import ROOT, Failure, reported, shown
 from driver.paper import whole
-from driver.project import ROOT, Failure, reported, shown
 from nmpcrl import __version__
 
 logging.getLogger("pypdf").setLevel(logging.ERROR)  # a profile of colours that is copied is no news

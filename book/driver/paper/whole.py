@@ -19,7 +19,7 @@ from urllib.parse import unquote, urldefrag, urlsplit
 import yaml
 from bs4 import BeautifulSoup, Tag
 
-from driver.project import ROOT
+from driver.build import ROOT
 
 Element = Any  # Beautiful Soup's, a dictionary of attributes among other things
 
