@@ -1,4 +1,4 @@
-"""Print the built book as one PDF: `driver.paper.pdf` says how."""
+"""Print the built book as one PDF: `driver/paper/pdf.py` says how."""
 
 from driver.paper.pdf import main
 

@@ -415,13 +415,14 @@ names["figure"].savefig("ends.svg")
 assert "theta ends in 1 places" in names["figure"].get_suptitle()
 """,
     "chapter": """
-from driver import build
+from driver import project
+from driver.build import chapters
 from driver.teaching import teaching
 
-assert build.ROOT.samefile(".")
-assert "08_again" in build.notebooks()
+assert project.ROOT.samefile(".")
+assert "08_again" in project.notebooks()
 assert "Again" in teaching.filled("<!-- syllabus: graph -->")
-assert build.ask(build.known("08_again"), {"layout": "D"}).keys() == set(build.NEEDS)
+assert chapters.ask(chapters.known("08_again"), {"layout": "D"}).keys() == set(chapters.NEEDS)
 """,
     "live figure": """
 from pathlib import Path

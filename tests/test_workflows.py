@@ -14,7 +14,7 @@ from nmpcrl.commands import main
 ROOT = Path(__file__).resolve().parents[1]
 PATHS = sorted((ROOT / ".github/workflows").glob("*.yml"))
 TARGETS = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), flags=re.M)
-DRIVER = (ROOT / "book/driver/build.py").read_text()
+DRIVER = "".join(path.read_text() for path in (ROOT / "book/driver/build").glob("*.py"))
 
 each_workflow = pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 

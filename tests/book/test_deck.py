@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import nbformat
 import pytest
-from driver import build
+from driver import project
 from driver.course import deck, slides
 from driver.teaching.plans import LIVE, plan
-from driver.teaching.syllabus import BOOK, chapters
+from driver.teaching.syllabus import chapters
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 UNITS = {name: (text, unit) for name, text, unit in slides.units()}
@@ -173,7 +173,7 @@ def test_no_number_is_typed_on_a_slide(text, unit):
 def test_a_deck_names_what_its_chapter_has_and_every_live_figure_of_the_unit(text, unit):
     page = unit.sections[0].page
     assert {one.page for one in unit.sections} == {page}
-    notebook = nbformat.read(BOOK / f"{page}.ipynb", 4)
+    notebook = nbformat.read(project.ROOT / "book" / f"{page}.ipynb", 4)
     sources = "".join(cell.source for cell in notebook.cells)
     cells = {cell.id: cell for cell in notebook.cells}
     shown = REFERENCE.findall(text)
@@ -188,17 +188,17 @@ def test_a_deck_names_what_its_chapter_has_and_every_live_figure_of_the_unit(tex
 
 
 def test_a_chapter_that_was_not_executed_is_refused_in_a_sentence(tmp_path):
-    with pytest.raises(build.Failure, match=rf"{PAGE}.ipynb computes: `make book`"):
+    with pytest.raises(project.Failure, match=rf"{PAGE}.ipynb computes: `make book`"):
         slides.write("01", "", UNIT, tmp_path, tmp_path)
 
 
 def test_a_deck_that_is_newer_than_the_build_is_refused_in_a_sentence(tmp_path):
     nbformat.write(executed(), tmp_path / f"{PAGE}.ipynb")
     text = "# A\n\n## It moves\n\n![](#new)\n\n## What was seen\n\n- All."
-    with pytest.raises(build.Failure, match=r"decks/01.md: .* has no cell new"):
+    with pytest.raises(project.Failure, match=r"decks/01.md: .* has no cell new"):
         slides.write("01", text, replace(UNIT), tmp_path, tmp_path)
 
 
 def test_a_package_that_lacks_is_refused_in_a_sentence(tmp_path):
-    with pytest.raises(build.Failure, match=r"no_such_package of environment\.txt"):
+    with pytest.raises(project.Failure, match=r"no_such_package of environment\.txt"):
         slides.copy("no_such_package", "", ("a",), tmp_path)

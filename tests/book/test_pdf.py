@@ -9,7 +9,7 @@ import pytest
 import yaml
 from bs4 import BeautifulSoup
 from click.testing import CliRunner
-from driver import build
+from driver import project
 from driver.paper import pdf, whole
 from filelock import FileLock
 from pypdf import PdfReader
@@ -88,12 +88,12 @@ def small(tmp_path, monkeypatch):
     """A site of two pages, with the settings it was made from."""
     (tmp_path / "_toc.yml").write_text(TOC)
     (tmp_path / "_config.yml").write_text(CONFIG)
-    (tmp_path / "CITATION.cff").write_text((build.ROOT / "CITATION.cff").read_text())
+    (tmp_path / "CITATION.cff").write_text((project.ROOT / "CITATION.cff").read_text())
     site = tmp_path / "_build/html"
     (site / "book").mkdir(parents=True)
     for name, number in (("one", ""), ("other", "1. ")):
         (site / f"book/{name}.html").write_text(PAGE.format(banner="", number=number))
-    monkeypatch.setattr(whole, "ROOT", tmp_path)
+    monkeypatch.setattr(project, "ROOT", tmp_path)
     return site
 
 
@@ -174,7 +174,7 @@ def texts(book, shared) -> list[str]:
 def headings(site) -> list[str]:
     """Of all chapters and their sections, as the site has them."""
     found = []
-    for name in build.pages():
+    for name in project.pages():
         article = BeautifulSoup((site / f"{name}.html").read_text(), "html.parser").article
         for mark in article.select(".headerlink"):
             mark.decompose()
@@ -190,7 +190,7 @@ def flat(entries: list) -> list[str]:
 
 def test_the_outline_has_every_part_chapter_and_section_in_their_order(book, headings):
     titles = flat(book.outline)
-    parts = yaml.safe_load((build.ROOT / "_toc.yml").read_text())["parts"]
+    parts = yaml.safe_load((project.ROOT / "_toc.yml").read_text())["parts"]
     assert {part["caption"] for part in parts} <= set(titles)
     rest = iter(titles)
     assert [one for one in headings if one not in rest] == []
@@ -234,7 +234,7 @@ def test_no_page_is_blank_and_their_number_is_sane(site, texts):
     assert all(len(text.split()) > 15 for text in texts)
     words = sum(
         len(BeautifulSoup((site / f"{name}.html").read_text(), "html.parser").article.text.split())
-        for name in build.pages()
+        for name in project.pages()
     )
     assert words / 500 < len(texts) < words / 100
 

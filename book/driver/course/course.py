@@ -30,13 +30,12 @@ from typing import Any, BinaryIO
 import click
 import nbformat
 
-from driver import build
 from driver.course import autograded, downloads, editions, handout, offline, slides
 from driver.page import pictures
+from driver.project import ROOT, Failure, notebooks
 from nmpcrl.course import variants
 from nmpcrl.course.exercises import exercises
 
-ROOT = build.ROOT
 PLACE, SITE = Path("_build/course"), Path("_build/html")
 EDITIONS: dict[str, Callable[..., Any]] = {
     "student": editions.student,
@@ -50,7 +49,7 @@ PACKAGED = ("pyproject.toml", "LICENSE")
 
 def chapters() -> dict[str, Any]:
     """The notebooks that have exercises, by file name, in the order of _toc.yml."""
-    read = {path.name: nbformat.read(ROOT / path, 4) for path in build.notebooks().values()}
+    read = {path.name: nbformat.read(ROOT / path, 4) for path in notebooks().values()}
     return {name: notebook for name, notebook in read.items() if any(exercises(notebook))}
 
 
@@ -124,7 +123,7 @@ def drawn(executed: Path) -> dict[str, bytes]:
         return pictures.vectors(nbformat.read(executed, 4))
     except (FileNotFoundError, KeyError) as missing:
         reason = f"Figures are those of an executed {executed.name}: `make book` executes it."
-        raise build.Failure(reason) from missing
+        raise Failure(reason) from missing
 
 
 def decks(_: dict[str, Any], place: Path) -> None:
@@ -142,7 +141,7 @@ def is_whole(name: str, sources: dict[str, Any]) -> bool:
     """Make one of `SHOWN`, or say why it is not whole; the notebooks need none of them."""
     try:
         SHOWN[name](sources, PLACE / name)
-    except build.Failure as reason:
+    except Failure as reason:
         click.echo(f"{PLACE / name} is not whole. {reason.message}")
         return False
     return True

@@ -12,7 +12,8 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-ROOT = Path(__file__).resolve().parents[3]
+from driver.project import ROOT
+
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 BESIDE = ("ipykernel", "papermill")  # what an edition needs beside the library
 CPU = "--extra-index-url https://download.pytorch.org/whl/cpu"  # torch without CUDA

@@ -16,14 +16,14 @@ from typing import Any
 
 import nbformat
 
-from driver import build
 from driver.course import deck
 from driver.course.deck import FILES
 from driver.paper import pdf
+from driver.project import ROOT, Failure
 from driver.teaching.plans import Unit, plan
 
 EXECUTED = Path("_build/executed")
-TEXTS, PLAN = build.ROOT / "book/decks", "two-weeks"
+TEXTS, PLAN = ROOT / "book/decks", "two-weeks"
 PACKAGES = {  # where its files are, and which of them a deck takes
     "sphinx_revealjs": (
         "_static/revealjs",
@@ -71,14 +71,14 @@ def make(executed: Path, place: Path) -> list[Path]:
     """Write a deck for each unit to a folder, which is made anew; the decks.
 
     Raises:
-        build.Failure: a chapter was not executed, or a package is not installed.
+        Failure: a chapter was not executed, or a package is not installed.
     """
     shutil.rmtree(place, ignore_errors=True)
     (place / FILES).mkdir(parents=True)
     for package, (folder, names) in PACKAGES.items():
         copy(package, folder, names, place / FILES)
     for name in OWN:
-        shutil.copyfile(build.ROOT / "book/_static/deck" / name, place / FILES / name)
+        shutil.copyfile(ROOT / "book/_static/deck" / name, place / FILES / name)
     return [write(name, text, unit, executed, place) for name, text, unit in units()]
 
 
@@ -86,11 +86,11 @@ def write(name: str, text: str, unit: Unit, executed: Path, place: Path) -> Path
     """Write one deck and the files that it alone needs, or the live figures share."""
     chapter = executed / f"{unit.sections[0].page}.ipynb"
     if not chapter.exists():
-        raise build.Failure(f"Slides show what {chapter.name} computes: `make book` executes it.")
+        raise Failure(f"Slides show what {chapter.name} computes: `make book` executes it.")
     try:
         made = deck.deck(text, unit, nbformat.read(chapter, 4))
     except deck.NotThere as error:
-        raise build.Failure(f"book/decks/{name}.md: {error}; is the last build older?") from error
+        raise Failure(f"book/decks/{name}.md: {error}; is the last build older?") from error
     for path, data in made.files.items():
         target = place / FILES / path
         target.parent.mkdir(exist_ok=True)
@@ -105,7 +105,7 @@ def copy(package: str, folder: str, names: Iterable[str], place: Path) -> None:
     """Copy files of an installed package, without importing it."""
     found = find_spec(package)
     if found is None or not found.submodule_search_locations:
-        raise build.Failure(f"Slides need the package {package} of environment.txt.")
+        raise Failure(f"Slides need the package {package} of environment.txt.")
     for name in names:
         source = Path(found.submodule_search_locations[0]) / folder / name
         target = f"{package}-LICENSE" if source.name == "LICENSE" else source.name
