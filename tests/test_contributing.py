@@ -24,7 +24,14 @@ TEXT = (ROOT / "CONTRIBUTING.md").read_text()
 CELLS = re.findall(r"^\| an? ([\w ]+) \| (.*?) \| ?(.*?) ?\|$", TEXT, flags=re.M)
 FILES = {name: re.findall(r"`([^`]+)`", files) for name, files, _ in CELLS}
 LOCK = {name: lock for name, _, lock in CELLS}
-COPIED = ("nmpcrl", "book", "_toc.yml", "tests/test_architecture.py", "tests/book")
+COPIED = (
+    "nmpcrl",
+    "book",
+    "_toc.yml",
+    "pyproject.toml",
+    "tests/test_architecture.py",
+    "tests/book",
+)
 IGNORED = shutil.ignore_patterns("__pycache__", "published")
 
 Edit = Callable[[Path], None]  # of the file at this path
