@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from driver.project import from_yaml
+from driver.project import from_yaml, listed
 from driver.teaching import graph
 from driver.teaching.declared import declared
 from driver.teaching.plans import LIVE, PACE, UNIT, Unit, plan
@@ -54,11 +54,6 @@ def head(chapter: Chapter) -> str:
     alone = [one.link for one in chapter.alone]
     also = f"; {listed(alone)} need{'s' * (len(alone) == 1)} nothing before" if alone else ""
     return f"{{.chapter-head}}\n{', '.join(times)}; needs: {needs}{also}."
-
-
-def listed(words: list[str]) -> str:
-    *most, last = words or [""]
-    return f"{', '.join(most)} and {last}" if most else last
 
 
 def overview(name: str) -> str:
