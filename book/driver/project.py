@@ -3,7 +3,7 @@
 import os
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -55,3 +55,9 @@ def notebooks() -> dict[str, Path]:
     """The pages that are notebooks: name -> path from the root."""
     paths = [Path(f"{page}.ipynb") for page in pages()]
     return {path.stem: path for path in paths if (ROOT / path).exists()}
+
+
+def listed(words: Iterable[str]) -> str:
+    """Words as a list in a sentence."""
+    *most, last = list(words) or [""]
+    return f"{', '.join(most)} and {last}" if most else last

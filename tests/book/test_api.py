@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
+import nbformat
 import pytest
 from bs4 import BeautifulSoup
 from driver import project
@@ -113,6 +114,22 @@ def test_no_property_begins_with_what_napoleon_takes_for_a_type():
             marks = map(ast.unparse, getattr(node, "decorator_list", []))
             if any("property" in mark for mark in marks):
                 assert ": " not in (ast.get_docstring(node) or "").split("\n")[0], node.name
+
+
+def imports(notebook: Path) -> set[str]:
+    """What a notebook imports: modules, and names with the module that they come from."""
+    cells = [cell for cell in nbformat.read(notebook, 4).cells if cell.cell_type == "code"]
+    nodes = [node for cell in cells for node in ast.walk(ast.parse(cell.source))]
+    found = {one.name for node in nodes if isinstance(node, ast.Import) for one in node.names}
+    chosen = [node for node in nodes if isinstance(node, ast.ImportFrom)]
+    return found | {f"{node.module}.{one.name}" for node in chosen for one in node.names}
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "book").glob("your_*.ipynb")), ids=lambda p: p.stem)
+def test_a_notebook_of_ones_own_uses_public_names_only(page):
+    homes = {module(name) for name in LISTED}
+    known = {"numpy", "pandas", "casadi", "io.StringIO", "IPython.display.HTML"}
+    assert imports(page) - set(LISTED) - homes <= known
 
 
 def paths() -> set[str]:

@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 from driver.course import course, editions, handout
 from driver.teaching import plans, syllabus
+from driver.teaching.declared import declared
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 from packaging.requirements import Requirement
@@ -131,16 +132,16 @@ def test_a_note_before_each_live_figure_says_to_teachers_where_it_helps(name):
     figures = [k for k, cell in enumerate(cells) if syllabus.LIVE.search(cell.source)]
     assert len(figures) == sum(one.live for one in syllabus.chapters()[Path(name).stem].sections)
     for k in figures:
-        said = syllabus.declared()["live"][cells[k].id]
+        said = declared().live[cells[k].id]
         assert cells[k - 1].source == f"> **For the teacher.** {said}"
         assert said.endswith(".")
 
 
 def test_the_syllabus_says_where_a_live_figure_helps_for_those_that_there_are():
     every = {cell.id for notebook in SOURCES.values() for cell in notebook.cells}
-    assert set(syllabus.declared()["live"]) <= every
+    assert set(declared().live) <= every
     with pytest.raises(syllabus.Unknown, match="new-live"):
-        syllabus.helps("new-live")
+        declared().helps("new-live")
 
 
 WHEEL = "nmpcrl-0.1.0-py3-none-any.whl"

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from driver.teaching import self_test, syllabus
+from driver.teaching import self_test
+from driver.teaching.declared import declared
 
 STATIC = Path(__file__).resolve().parents[2] / "book/_static"
 PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head><title>Path</title>
@@ -24,7 +25,7 @@ FULL = 'Storage.prototype.setItem = () => { throw new Error("full"); };'
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
     scripts = "".join(f'<script src="{STATIC.as_uri()}/{name}.js"></script>' for name in SCRIPTS)
-    asked = syllabus.declared()["self-test"][:2]
+    asked = declared().self_test[:2]
     places = [self_test.question(k, one).split("\n\n")[2] for k, one in enumerate(asked, 1)]
     answer = '<details class="folded"><summary>Answer</summary></details>'
     more = "".join(f'<div class="exercise">How?</div>{place}{answer}' for place in places)

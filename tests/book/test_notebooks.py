@@ -14,7 +14,6 @@ from textwrap import dedent
 
 import nbformat
 import pytest
-import test_api
 from driver import project
 from driver.build import book, chapters
 from driver.page import enrich
@@ -484,28 +483,6 @@ def test_the_commands_of_the_try_box_are_accepted(name, monkeypatch):
         chapter, given = chapter_and_parameters(words)
         chapters.refuse_unknown(chapters.known(chapter), given)
         chapters.ask(chapters.known(chapter), given)
-
-
-def imports(name: str) -> set[str]:
-    """What a notebook imports: modules, and names with the module that they come from."""
-    found = set()
-    for cell in code(name):
-        for node in ast.walk(ast.parse(cell.source)):
-            if isinstance(node, ast.Import):
-                found |= {one.name for one in node.names}
-            if isinstance(node, ast.ImportFrom):
-                found |= {f"{node.module}.{one.name}" for one in node.names}
-    return found
-
-
-@each_own
-def test_a_notebook_of_ones_own_uses_public_names_only(name):
-    ours = {one for one in imports(name) if one.startswith("nmpcrl")}
-    modules = {one for one in test_api.LISTED if one.startswith("nmpcrl")}
-    homes = {one.rpartition(".")[0] for one in modules}
-    assert ours - modules - homes == set()
-    known = {"numpy", "pandas", "casadi", "io.StringIO", "IPython.display.HTML"}
-    assert imports(name) - ours <= known
 
 
 @each_own

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 import yaml
 from driver.teaching import graph, plans, self_test, syllabus, teaching
+from driver.teaching.declared import declared
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 CHAPTERS = syllabus.chapters()
-PLANS = syllabus.declared()["plans"]
+PLANS = declared().plans
 SECTIONS = {one.label for chapter in CHAPTERS.values() for one in chapter.sections}
 LABELS = SECTIONS | {syllabus.label(page, "Exercises") for page in CHAPTERS}
 
@@ -85,9 +86,9 @@ def test_no_two_sections_have_one_label():
 
 
 def test_the_syllabus_knows_every_numbered_chapter_and_no_other():
-    assert set(syllabus.declared()["chapters"]) == set(CHAPTERS)
+    assert set(declared().chapters) == set(CHAPTERS)
     with pytest.raises(syllabus.Unknown, match="does not say what 99_more needs"):
-        syllabus.declared_of("99_more")
+        declared().place("99_more")
     with pytest.raises(syllabus.Unknown, match="04_ges has no section 'Nothing'"):
         CHAPTERS["04_ges"].section("Nothing")
 
@@ -124,7 +125,7 @@ def test_the_seminar_takes_what_the_page_and_the_plans_say():
     assert sum(steps) == plans.UNIT
     for name in PLANS:
         (unit,) = (one for one in plans.plan(name) if one.title.startswith("Seminar"))
-        assert unit.discussion[0] == sum(steps[3:])
+        assert unit.discussion.minutes == sum(steps[3:])
     assert f"and {sum(steps[3:])} minutes remain" in seminar
 
 
@@ -179,13 +180,13 @@ def test_a_page_names_parts_that_exist_and_all_are_filled(page):
 
 
 def test_the_self_test_has_ten_questions_with_one_right_answer_each():
-    asked = syllabus.declared()["self-test"]
+    asked = declared().self_test
     assert len(asked) == 10
-    assert {one["right"] for one in asked} == {"a", "b", "c"}
+    assert {one.right for one in asked} == {"a", "b", "c"}
     for number, one in enumerate(asked, 1):
         text = self_test.question(number, one)
         data = json.loads(re.search(r'json">(.*)</script>', text)[1])
-        assert data["right"] in data["why"] == {k: why for k, (_, why) in one["choices"].items()}
+        assert data["right"] in data["why"] == {k: why for k, (_, why) in one.choices.items()}
         assert "Read: " in text
 
 
@@ -197,10 +198,9 @@ def test_the_entry_for_bibtex_says_what_the_citation_file_does():
 
 def test_a_graph_puts_each_chapter_below_what_it_needs_and_drops_what_follows():
     needs = {"a": [], "b": ["a"], "c": ["a", "b"]}
-    assert graph.layers(needs) == [["a"], ["b"], ["c"]]
-    assert graph.reduced(needs) == {"a": [], "b": ["a"], "c": ["b"]}
+    assert graph.arranged(needs) == ([["a"], ["b"], ["c"]], {"a": [], "b": ["a"], "c": ["b"]})
     with pytest.raises(ValueError, match="need each other"):
-        graph.layers({"a": ["b"], "b": ["a"]})
+        graph.arranged({"a": ["b"], "b": ["a"]})
 
 
 def test_the_graph_names_every_chapter_and_says_in_words_what_needs_what():

@@ -10,7 +10,7 @@ import nbformat
 import papermill
 import yaml
 
-from driver.project import Failure, notebooks
+from driver.project import Failure, listed, notebooks
 
 Given = dict[str, Any]  # parameters of a chapter by name
 NEEDS = ("experiments", "summaries", "beforehand")
@@ -66,11 +66,6 @@ def ask(notebook: Path, given: Given) -> dict[str, tuple[Any, ...]]:
 def nearest(name: str, names: Iterable[str]) -> str:
     close = difflib.get_close_matches(name, names, n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""
-
-
-def listed(names: Iterable[str]) -> str:
-    *most, last = names
-    return f"{', '.join(most)} and {last}" if most else last
 
 
 def values(

@@ -244,7 +244,7 @@ def _exercises(unit: Unit) -> Slide:
         for one, where in kinds
     ]
     shown = ['<table class="exercises">', HEADS, *rows, "</table>"] * bool(rows)
-    others = {"Discussion": unit.discussion[1], "At home": unit.besides}
+    others = {"Discussion": unit.discussion.about, "At home": unit.besides}
     shown += [f"<p>{name}: {inline(text)}</p>" for name, text in others.items() if text]
     wrong = chain.from_iterable(
         [f"<li>Exercise {one.number}: {inline(mistake)}</li>" for mistake in one.about.mistakes]

@@ -16,6 +16,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell
 
 from driver.course import autograded
 from driver.teaching import syllabus
+from driver.teaching.declared import declared
 from driver.teaching.plans import LIVE, lecture
 from driver.teaching.syllabus import LIVE as LIVE_FIGURE
 from driver.teaching.syllabus import Chapter
@@ -81,7 +82,7 @@ def teacher(source: Notebook, pages: Collection[str]) -> Notebook:
         for cell in one.parts["answer"]:
             del cell.metadata["nmpcrl"]
     for cell in [cell for cell in notebook.cells if LIVE_FIGURE.search(cell.source)]:
-        note = f"> **For the teacher.** {syllabus.helps(cell.id)}"
+        note = f"> **For the teacher.** {declared().helps(cell.id)}"
         _insert(notebook, notebook.cells.index(cell), note, f"{cell.id}-note")
     if every:
         _insert(notebook, 1, _table(every), "exercises-table")

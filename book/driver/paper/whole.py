@@ -18,7 +18,7 @@ from urllib.parse import unquote, urldefrag, urlsplit
 
 from bs4 import BeautifulSoup, Tag
 
-from driver.project import from_yaml
+from driver.project import from_yaml, listed
 
 Element = Any  # Beautiful Soup's, a dictionary of attributes among other things
 
@@ -182,13 +182,11 @@ def quoted(text: str) -> str:
 
 def cover(config: dict[str, str], version: str, warning: str, site: str) -> str:
     (paper,) = from_yaml("CITATION.cff")["references"]
-    names = [f"{one['given-names']} {one['family-names']}" for one in paper["authors"]]
+    names = listed(f"{one['given-names']} {one['family-names']}" for one in paper["authors"])
     number = f'<a href="{paper["url"]}">{paper["identifiers"][0]["value"]}</a>'
-    *most, last = names
-    authors = f"{', '.join(most)} and {last}"
     return COVER.format(
         title=escape(config["title"]),
-        cited=CITED.format(authors=escape(authors), title=escape(paper["title"]), number=number),
+        cited=CITED.format(authors=escape(names), title=escape(paper["title"]), number=number),
         author=escape(config["author"]),
         warning=escape(warning),
         picture=f"{site}/_static/closed_loop.svg",

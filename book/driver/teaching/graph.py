@@ -2,6 +2,8 @@
 
 from html import escape
 
+import networkx as nx
+
 WIDTH, HEIGHT, GAP = 150, 44, 40  # of a node, and between two rows
 MARGIN = 12
 
@@ -15,8 +17,8 @@ def svg(names: dict[str, tuple[str, str]], needs: Needs) -> str:
         names: number and short title of a chapter, by page; each row keeps their order.
         needs: the pages that a page needs.
     """
-    needs = reduced(needs)
-    rows = layers({page: needs[page] for page in names})
+    rows, shown = arranged({page: needs[page] for page in names})
+    needs = {page: shown[page] for page in needs}
     widest = max(map(len, rows))
     size = (widest * (WIDTH + MARGIN) + MARGIN, len(rows) * (HEIGHT + GAP) - GAP + 2 * MARGIN)
     at = {
@@ -42,34 +44,20 @@ def svg(names: dict[str, tuple[str, str]], needs: Needs) -> str:
     )
 
 
-def layers(needs: Needs) -> list[list[str]]:
-    """Rows of pages; each needs only rows before its own.
+def arranged(needs: Needs) -> tuple[list[list[str]], Needs]:
+    """Rows of pages, each of which needs only rows before it, and needs that follow from no others.
 
     Raises:
         ValueError: pages need each other in a circle.
     """
-    rows: list[list[str]] = []
-    placed: set[str] = set()
-    while len(placed) < len(needs):
-        row = [page for page in needs if page not in placed and set(needs[page]) <= placed]
-        if not row:
-            raise ValueError(f"{sorted(set(needs) - placed)} need each other")
-        rows.append(row)
-        placed |= set(row)
-    return rows
-
-
-def reduced(needs: Needs) -> Needs:
-    """The needs that do not follow from others."""
-    return {
-        page: [one for one in wanted if not any(one in behind(other, needs) for other in wanted)]
-        for page, wanted in needs.items()
-    }
-
-
-def behind(page: str, needs: Needs) -> set[str]:
-    """All that a page needs, and what these need."""
-    return set(needs[page]).union(*(behind(one, needs) for one in needs[page]))
+    whole = nx.DiGraph()
+    whole.add_nodes_from(needs)
+    whole.add_edges_from((other, page) for page, others in needs.items() for other in others)
+    if not nx.is_directed_acyclic_graph(whole):
+        raise ValueError(f"{sorted(page for page, _ in nx.find_cycle(whole))} need each other")
+    edges, order = nx.transitive_reduction(whole).edges, list(needs)
+    rows = [sorted(row, key=order.index) for row in nx.topological_generations(whole)]
+    return rows, {page: [one for one in needs[page] if (one, page) in edges] for page in needs}
 
 
 def _line(start: tuple[float, float], end: tuple[float, float]) -> str:

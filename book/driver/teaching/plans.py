@@ -7,10 +7,10 @@ are homework after it.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
-from driver.teaching.syllabus import Chapter, Section, chapters, declared, minutes
+from driver.teaching.declared import Discussion, Lesson, declared
+from driver.teaching.syllabus import Chapter, Section, chapters, minutes
 from nmpcrl.course.exercises import Exercise
 
 UNIT = 90  # minutes
@@ -27,7 +27,7 @@ class Unit:
     goals: tuple[str, ...]
     sections: tuple[Section, ...]
     exercises: tuple[Exercise, ...]
-    discussion: tuple[int, str]  # minutes, and what about
+    discussion: Discussion
     homework: tuple[Exercise, ...]
     besides: str  # other homework
     left_out: tuple[Section, ...]  # of the chapters that end here
@@ -44,7 +44,7 @@ class Unit:
             "lecture": lecture(self.sections),
             "live figures": LIVE * sum(one.live for one in self.sections),
             "exercises": sum(one.about.minutes for one in self.exercises),
-            "discussion": self.discussion[0],
+            "discussion": self.discussion.minutes,
         }
 
     @property
@@ -59,25 +59,24 @@ def lecture(sections: Sequence[Section]) -> int:
 
 def plan(name: str) -> list[Unit]:
     """The units of a plan in their order."""
-    return list(_units(declared()["plans"][name]))
+    return list(_units(declared().plans[name]))
 
 
-def _units(units: list[dict[str, Any]]) -> Iterator[Unit]:
-    taught = [_sections(unit["sections"]) for unit in units]
+def _units(lessons: Sequence[Lesson]) -> Iterator[Unit]:
+    taught = [_sections(lesson) for lesson in lessons]
     covered = {one.label for sections in taught for one in sections}
-    last = {page: k for k, unit in enumerate(units) for page in unit["sections"]}
+    last = {page: k for k, lesson in enumerate(lessons) for page in lesson.sections}
     waiting = {page: _to_solve(chapters()[page]) for page in last}
-    for k, (unit, sections) in enumerate(zip(units, taught, strict=True)):
-        ending = [page for page in unit["sections"] if last[page] == k]
-        discussion = unit.get("discussion", {"minutes": 0, "about": ""})
+    for k, (lesson, sections) in enumerate(zip(lessons, taught, strict=True)):
+        ending = [page for page in lesson.sections if last[page] == k]
         begun = Unit(
-            title=unit["title"],
-            goals=tuple(unit["goals"]),
+            title=lesson.title,
+            goals=tuple(lesson.goals),
             sections=sections,
             exercises=(),
-            discussion=(discussion["minutes"], discussion["about"]),
+            discussion=lesson.discussion,
             homework=(),
-            besides=unit.get("homework", ""),
+            besides=lesson.homework,
             left_out=tuple(
                 one
                 for page in ending
@@ -85,7 +84,7 @@ def _units(units: list[dict[str, Any]]) -> Iterator[Unit]:
                 if one.label not in covered
             ),
         )
-        yield _filled(begun, list(unit["sections"]), ending, waiting)
+        yield _filled(begun, list(lesson.sections), ending, waiting)
 
 
 def _filled(
@@ -101,10 +100,10 @@ def _filled(
                 solved.append(one)
                 room -= one.about.minutes
     later = [one for page in ending for one in waiting[page]]
-    return Unit(**(vars(unit) | {"exercises": tuple(solved), "homework": tuple(later)}))
+    return replace(unit, exercises=tuple(solved), homework=tuple(later))
 
 
-def _sections(wanted: dict[str, Any]) -> tuple[Section, ...]:
+def _sections(lesson: Lesson) -> tuple[Section, ...]:
     """The sections of a unit; "all" means each one of a chapter.
 
     Raises:
@@ -113,7 +112,7 @@ def _sections(wanted: dict[str, Any]) -> tuple[Section, ...]:
     known = chapters()
     return tuple(
         one
-        for page, titles in wanted.items()
+        for page, titles in lesson.sections.items()
         for one in (known[page].sections if titles == "all" else map(known[page].section, titles))
     )
 

@@ -6,10 +6,10 @@ paper there are the question, its choices, and the answer.
 
 import json
 import re
-from typing import Any
 
 from driver.page.questions import PLACE
-from driver.teaching.syllabus import chapters, declared
+from driver.teaching.declared import Question, declared
+from driver.teaching.syllabus import chapters
 
 QUESTION = """\
 ::::{{div}} exercise question
@@ -29,23 +29,23 @@ QUESTION = """\
 
 def self_test() -> str:
     """All questions, as MyST."""
-    return "\n\n".join(question(k, one) for k, one in enumerate(declared()["self-test"], 1))
+    return "\n\n".join(question(k, one) for k, one in enumerate(declared().self_test, 1))
 
 
-def question(number: int, asked: dict[str, Any]) -> str:
+def question(number: int, asked: Question) -> str:
     """One question, as MyST."""
-    right, choices = asked["right"], asked["choices"]
-    why = {letter: sentence for letter, (_, sentence) in choices.items()}
-    data = {"kind": "choice", "said": f"Right: {why[right]}", "right": right, "why": why}
+    why = {letter: sentence for letter, (_, sentence) in asked.choices.items()}
+    said = f"Right: {why[asked.right]}"
+    data = {"kind": "choice", "said": said, "right": asked.right, "why": why}
     given = json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")
     return QUESTION.format(
         number=number,
-        asks=asked["asks"],
-        choices="\n".join(f"- **{key}.** {text}" for key, (text, _) in choices.items()),
+        asks=asked.asks,
+        choices="\n".join(f"- **{key}.** {text}" for key, (text, _) in asked.choices.items()),
         place=PLACE.format(name=f"self-test-{number}", number=number, data=given),
-        right=right,
-        why=why[right],
-        read=to_read(asked["read"]),
+        right=asked.right,
+        why=why[asked.right],
+        read=to_read(asked.read),
     )
 
 

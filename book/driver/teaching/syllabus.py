@@ -16,6 +16,7 @@ import nbformat
 
 from driver.page import enrich
 from driver.project import ROOT, from_yaml
+from driver.teaching.declared import Unknown, declared
 from nmpcrl.course.exercises import Exercise, exercises
 
 WORDS = 180  # read in a minute
@@ -23,10 +24,6 @@ FORMULA, FIGURE, CODE = 30, 60, 30  # on top of the words [s]
 HEADING = re.compile(r"^(?=## )", flags=re.M)
 LIVE = re.compile(r"\blive\.\w+\(")
 NOT_READ = ("Exercises", "What we saw")  # counted by themselves, or repeated
-
-
-class Unknown(ValueError):
-    """The syllabus names what is not there, or lacks a chapter; the message says which."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +58,13 @@ class Chapter:
     @property
     def needs(self) -> tuple[Section, ...]:
         """The sections of other chapters that it needs."""
-        wanted = declared_of(self.page)["needs"].items()
+        wanted = declared().place(self.page).needs.items()
         return tuple(chapters()[page].section(one) for page, titles in wanted for one in titles)
 
     @property
     def alone(self) -> tuple[Section, ...]:
         """Those of its sections that need nothing."""
-        return tuple(map(self.section, declared_of(self.page).get("alone", ())))
+        return tuple(map(self.section, declared().place(self.page).alone))
 
     @property
     def link(self) -> str:
@@ -124,40 +121,6 @@ def chapters() -> dict[str, Chapter]:
         page: chapter(page, number, nbformat.read(ROOT / "book" / f"{page}.ipynb", 4))
         for number, page in enumerate(pages, 1)
     }
-
-
-@cache
-def declared() -> dict[str, Any]:
-    """What `syllabus.yml` says."""
-    found: dict[str, Any] = from_yaml("book/syllabus.yml")
-    return found
-
-
-def declared_of(page: str) -> dict[str, Any]:
-    """What `syllabus.yml` says of a chapter.
-
-    Raises:
-        Unknown: nothing.
-    """
-    found: dict[str, Any] | None = declared()["chapters"].get(page)
-    if found is None:
-        raise Unknown(f"book/syllabus.yml does not say what {page} needs")
-    return found
-
-
-def helps(figure: str) -> str:
-    """Where a live figure helps, for whoever teaches.
-
-    Args:
-        figure: the name of its cell.
-
-    Raises:
-        Unknown: `syllabus.yml` does not say.
-    """
-    said: dict[str, str] = declared()["live"]
-    if figure not in said:
-        raise Unknown(f"book/syllabus.yml does not say where the live figure {figure} helps")
-    return said[figure]
 
 
 def _sections(page: str, notebook: Any) -> Iterator[Section]:

@@ -8,8 +8,9 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from driver.project import from_yaml
+from driver.project import from_yaml, listed
 from driver.teaching import graph
+from driver.teaching.declared import declared
 from driver.teaching.plans import LIVE, PACE, UNIT, Unit, plan
 from driver.teaching.self_test import self_test
 from driver.teaching.syllabus import (
@@ -18,8 +19,6 @@ from driver.teaching.syllabus import (
     WORDS,
     Chapter,
     chapters,
-    declared,
-    declared_of,
     label,
 )
 
@@ -57,11 +56,6 @@ def head(chapter: Chapter) -> str:
     return f"{{.chapter-head}}\n{', '.join(times)}; needs: {needs}{also}."
 
 
-def listed(words: list[str]) -> str:
-    *most, last = words or [""]
-    return f"{', '.join(most)} and {last}" if most else last
-
-
 def overview(name: str) -> str:
     """The units of a plan as a table."""
     units = plan(name)
@@ -91,7 +85,7 @@ def _unit(number: int, unit: Unit) -> str:
         f"Sections, {spent['lecture']} min": _linked(unit.sections),
         f"Live figure, {spent['live figures']} min": _linked(unit.live),
         f"Exercises, {spent['exercises']} min": _exercises(unit.exercises),
-        f"Discussion, {spent['discussion']} min": unit.discussion[1],
+        f"Discussion, {spent['discussion']} min": unit.discussion.about,
         "Homework": " ".join(filter(None, [*homework, unit.besides])),
         "Left out of the course": _linked(unit.left_out),
     }
@@ -147,19 +141,19 @@ def _needs(chapter: Chapter) -> str:
 
 def drawn() -> str:
     """The graph of chapters."""
-    said = declared()["chapters"]
-    names = {page: (str(chapters()[page].number), one["short"]) for page, one in said.items()}
-    edges = {page: list(declared_of(page)["needs"]) for page in chapters()}
+    said = declared().chapters
+    names = {page: (str(chapters()[page].number), one.short) for page, one in said.items()}
+    edges = {page: list(declared().place(page).needs) for page in chapters()}
     return graph.svg(names, edges)
 
 
 def path() -> str:
     """The steps of "Learn alone"; `book/_static/path.js` gives each a box to check."""
     parts = []
-    for part in declared()["path"]:
-        steps = [*part.get("steps", ()), *(s for p in part.get("chapters", ()) for s in _steps(p))]
+    for part in declared().path:
+        steps = [*part.steps, *(s for p in part.chapters for s in _steps(p))]
         lines = "\n".join(f"- {step}" for step in steps)
-        parts.append(f"## {part['title']}\n\n::::{{div}} path\n{lines}\n::::")
+        parts.append(f"## {part.title}\n\n::::{{div}} path\n{lines}\n::::")
     return "\n\n".join(parts)
 
 
