@@ -1,11 +1,6 @@
-"""Print the built book as one PDF: `driver.paper.pdf` says how."""
+"""Print the built book as one PDF: `driver/paper/pdf.py` says how."""
 
-import os
-
-from driver.project import ENVIRONMENT
+from driver.paper.pdf import main
 
 if __name__ == "__main__":
-    os.environ |= ENVIRONMENT
-    from driver.paper.pdf import main
-
     main()

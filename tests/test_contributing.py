@@ -24,7 +24,14 @@ TEXT = (ROOT / "CONTRIBUTING.md").read_text()
 CELLS = re.findall(r"^\| an? ([\w ]+) \| (.*?) \| ?(.*?) ?\|$", TEXT, flags=re.M)
 FILES = {name: re.findall(r"`([^`]+)`", files) for name, files, _ in CELLS}
 LOCK = {name: lock for name, _, lock in CELLS}
-COPIED = ("nmpcrl", "book", "_toc.yml", "tests/test_architecture.py", "tests/book")
+COPIED = (
+    "nmpcrl",
+    "book",
+    "_toc.yml",
+    "pyproject.toml",
+    "tests/test_architecture.py",
+    "tests/book",
+)
 IGNORED = shutil.ignore_patterns("__pycache__", "published")
 
 Edit = Callable[[Path], None]  # of the file at this path
@@ -415,13 +422,14 @@ names["figure"].savefig("ends.svg")
 assert "theta ends in 1 places" in names["figure"].get_suptitle()
 """,
     "chapter": """
-from driver import build, project
+from driver import project
+from driver.build import chapters
 from driver.teaching import teaching
 
 assert project.ROOT.samefile(".")
-assert "08_again" in build.notebooks()
+assert "08_again" in project.notebooks()
 assert "Again" in teaching.filled("<!-- syllabus: graph -->")
-assert build.ask(build.known("08_again"), {"layout": "D"}).keys() == set(build.NEEDS)
+assert chapters.ask(chapters.known("08_again"), {"layout": "D"}).keys() == set(chapters.NEEDS)
 """,
     "live figure": """
 from pathlib import Path

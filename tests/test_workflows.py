@@ -1,7 +1,9 @@
 """The workflows call what is there, and keep what the build writes."""
 
+import os
 import re
 import shlex
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -14,14 +16,17 @@ from nmpcrl.commands import main
 ROOT = Path(__file__).resolve().parents[1]
 PATHS = sorted((ROOT / ".github/workflows").glob("*.yml"))
 TARGETS = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), flags=re.M)
-DRIVER = (ROOT / "book/driver/build.py").read_text()
+DRIVER = "".join(path.read_text() for path in (ROOT / "book/driver/build").glob("*.py"))
 
 each_workflow = pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 
 
+def jobs(path: Path) -> list[dict]:
+    return list(yaml.safe_load(path.read_text())["jobs"].values())
+
+
 def steps(path: Path) -> list[dict]:
-    jobs = yaml.safe_load(path.read_text())["jobs"].values()
-    return [step for job in jobs for step in job["steps"]]
+    return [step for job in jobs(path) for step in job["steps"]]
 
 
 @each_workflow
@@ -55,3 +60,21 @@ def test_artifacts_are_kept_from_where_they_are_written(path, monkeypatch):
 def test_actions_of_others_are_named_by_a_hash_that_nobody_can_move(path):
     for step in steps(path):
         assert re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", step.get("uses", f"a@{'0' * 40}"))
+
+
+LINUX = {"${{ matrix.os == 'ubuntu-latest' && '1' || '' }}": "1"}  # what an expression is there
+
+
+@each_workflow
+def test_what_is_installed_on_linux_is_known_by_its_hash_and_from_one_index(path):
+    assert "EXTRA_INDEX" not in path.read_text()
+    for job in jobs(path):
+        if any("run" in step for step in job["steps"]):
+            locked = LINUX.get(job["env"]["LOCKED"], job["env"]["LOCKED"])
+            made = subprocess.check_output(
+                ["make", "--dry-run", ".venv/ready"],
+                cwd=ROOT,
+                env=os.environ | {"LOCKED": locked},
+                text=True,
+            )
+            assert "--require-hashes -r locks/python" in made

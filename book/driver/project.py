@@ -1,4 +1,4 @@
-"""What every room of the driver needs: where the project is, how it fails, and its environment."""
+"""The project on this disk, the pages of its book, and how a command of the driver fails."""
 
 import os
 import sys
@@ -9,15 +9,9 @@ from pathlib import Path
 from typing import IO, Any
 
 import click
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
-ENVIRONMENT = {  # of a command and of the kernels that it starts, set before NumPy is imported
-    **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
-    "PYDEVD_DISABLE_FILE_VALIDATION": "1",
-    "NO_COLOR": "1",
-    "NMPCRL_STRICT": "1",  # a solution that its check refuses ends the build
-    "NMPCRL_FIGURES_FOR_PAGE": "1",  # narrow, too, for telephones: `pictures`
-}
 
 
 class Failure(click.ClickException):
@@ -43,5 +37,21 @@ def reported(log: Path) -> Iterator[None]:
 
 
 def shown(path: Path) -> str:
-    """A path from the root of the project."""
     return os.path.relpath(path, ROOT)
+
+
+def from_yaml(name: str) -> Any:
+    """A file of the project in YAML, or in JSON."""
+    return yaml.safe_load((ROOT / name).read_text("utf-8"))
+
+
+def pages() -> list[str]:
+    """The pages of _toc.yml in their order, without suffix."""
+    toc = from_yaml("_toc.yml")
+    return [toc["root"], *(page["file"] for part in toc["parts"] for page in part["chapters"])]
+
+
+def notebooks() -> dict[str, Path]:
+    """The pages that are notebooks: name -> path from the root."""
+    paths = [Path(f"{page}.ipynb") for page in pages()]
+    return {path.stem: path for path in paths if (ROOT / path).exists()}

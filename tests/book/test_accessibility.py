@@ -3,10 +3,10 @@
 from dataclasses import dataclass, field
 
 import pytest
-from driver import build
+from driver import project
 from visits import TELEPHONES, VIEWS, look_at, opened
 
-PAGES = [*build.pages(), "search", "genindex", "prf-prf"]  # the last three are Sphinx's
+PAGES = [*project.pages(), "search", "genindex", "prf-prf"]  # the last three are Sphinx's
 each_page = pytest.mark.parametrize("page", PAGES)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from bs4 import BeautifulSoup
-from driver import build
+from driver import project
 from driver.page import enrich, reference
 
 import nmpcrl.learning as learning
@@ -79,7 +79,7 @@ def test_no_name_has_two_entries():
 
 
 def test_every_page_is_in_the_table_of_contents():
-    assert set(PAGES) == {Path(page).stem for page in build.pages() if "/api" in page}
+    assert set(PAGES) == {Path(page).stem for page in project.pages() if "/api" in page}
 
 
 @pytest.mark.parametrize("room", EXPORTING)

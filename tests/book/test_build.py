@@ -1,6 +1,7 @@
-"""The build, book/driver/build.py: what it refuses, and what it leaves when a step fails."""
+"""The build, book/driver/build: what it refuses, and what it leaves when a step fails."""
 
 import json
+import math
 import os
 import shutil
 import subprocess
@@ -13,9 +14,9 @@ import pytest
 import yaml
 from bs4 import BeautifulSoup
 from click.testing import CliRunner
-from driver import build, project
+from driver import project
+from driver.build import book, chapters, execute, train
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
-from papermill.cli import _resolve_type
 from raising import raising
 
 from nmpcrl.control.codegen.source import CannotCompile
@@ -30,8 +31,8 @@ def driver(monkeypatch):
     """The command; whatever it is asked, it may not come as far as building."""
 
     for step in ("mirror", "train", "execute_all", "dress", "render"):
-        monkeypatch.setattr(build, step, raising(AssertionError("the driver went on to build")))
-    return lambda *arguments: CliRunner().invoke(build.main, arguments)
+        monkeypatch.setattr(book, step, raising(AssertionError("the driver went on to build")))
+    return lambda *arguments: CliRunner().invoke(book.main, arguments)
 
 
 def refused(result) -> str:
@@ -107,7 +108,7 @@ def test_yaml_that_is_no_mapping_is_refused(driver):
 
 
 def test_values_are_read_as_papermill_reads_them():
-    given = build.values([("a", "1"), ("b", "[3]"), ("c", "1e-7")], [("d", "1")], ["{e: [3]}"])
+    given = chapters.values([("a", "1"), ("b", "[3]"), ("c", "1e-7")], [("d", "1")], ["{e: [3]}"])
     assert given == {"a": 1, "b": "[3]", "c": 1e-7, "d": "1", "e": [3]}
 
 
@@ -217,7 +218,7 @@ def test_no_port_that_another_program_may_take_leads_to_a_kernel(small):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has ports only")
 def test_no_two_kernels_share_the_files_through_which_they_are_talked_to():
-    with build.sockets() as one, build.sockets() as other:
+    with execute.sockets() as one, execute.sockets() as other:
         places = [Path(each.KernelManager.ip) for each in (one, other)]
         assert len({place.parent for place in places}) == 2
         assert all(place.parent.is_dir() and not any(place.parent.iterdir()) for place in places)
@@ -231,7 +232,7 @@ def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(
     pages = [small / f"_build/smoke/html/book/{page}.html" for page in ("intro", "one")]
     assert all("A smoke build" in page.read_text() for page in pages)
     executed = nbformat.read(small / "_build/smoke/executed/one.ipynb", 4)
-    assert executed.cells[-1].outputs[0].text == f"{build.SMOKE['episodes']}\n"
+    assert executed.cells[-1].outputs[0].text == f"{book.SMOKE['episodes']}\n"
 
 
 @pytest.mark.slow
@@ -282,7 +283,7 @@ def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(sm
 
 
 def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
-    needs = build.ask(ROOT / "book/performance.ipynb", {"length": "smoke"})
+    needs = chapters.ask(ROOT / "book/performance.ipynb", {"length": "smoke"})
     assert not needs["experiments"]
     assert not needs["summaries"]
     (call,) = needs["beforehand"]
@@ -292,8 +293,8 @@ def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
 
 def test_the_chapter_that_judges_times_asks_only_for_theirs_beforehand():
     chapter = ROOT / "book/05_results.ipynb"
-    given = {name: build.SMOKE[name] for name in build.parameters(chapter) if name in build.SMOKE}
-    needs = build.ask(chapter, given)
+    given = {name: book.SMOKE[name] for name in chapters.parameters(chapter) if name in book.SMOKE}
+    needs = chapters.ask(chapter, given)
     (call,) = needs["beforehand"]
     assert (call.func.__name__, call.args) == ("read_or_measure", ("smoke",))
     assert call.keywords == {"only": ["learning steps"], "calm": True}
@@ -309,7 +310,7 @@ def test_what_live_figures_solve_with_is_compiled_ahead_if_it_can_be(known, monk
             raise CannotCompile("tan")
 
     monkeypatch.setattr(browser, "module", module)
-    build.compile_for_pages()
+    train.compile_for_pages()
     assert asked == [(3, paper.START)]
 
 
@@ -321,9 +322,9 @@ def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):
     monkeypatch.setattr(published, "load", published.Published)
     monkeypatch.setattr(summary, "learners", lambda measured: measured["learners"])
     monkeypatch.setattr(agreement, "of_times", lambda timings, known: (timings,))
-    build.measure((lambda: None, lambda: {"solves": {}}))
+    train.measure((lambda: None, lambda: {"solves": {}}))
     with pytest.raises(project.Failure, match="contradict the published ones:\nC3 is so"):
-        build.measure((lambda: {"learners": "C3 is so here"},))
+        train.measure((lambda: {"learners": "C3 is so here"},))
 
 
 def test_verdicts_of_runs_are_held_against_the_published_ones_before_a_chapter_runs(monkeypatch):
@@ -331,7 +332,7 @@ def test_verdicts_of_runs_are_held_against_the_published_ones_before_a_chapter_r
 
     monkeypatch.setattr(agreement, "of_runs", lambda fresh, known: ("C1 is so here",))
     with pytest.raises(project.Failure, match="C1 is so here"):
-        build.train((), ())
+        train.train((), ())
 
 
 def exercise(code: str) -> list:
@@ -377,8 +378,7 @@ def test_a_solution_that_its_check_refuses_ends_the_build(small):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("answer", ["d = ...", "d = 1.25"])
-def test_papermill_runs_a_chapter_to_its_end_whatever_the_answers_are(answer, small, monkeypatch):
-    monkeypatch.delenv("NMPCRL_STRICT", raising=False)
+def test_papermill_runs_a_chapter_to_its_end_whatever_the_answers_are(answer, small):
     cells = exercise("d = 1.375")
     cells[1].source = answer
     save(small, *cells, new_code_cell("print(episodes)"))
@@ -390,10 +390,45 @@ def test_papermill_runs_a_chapter_to_its_end_whatever_the_answers_are(answer, sm
     assert last.outputs[0].text == "2\n"
 
 
-@pytest.mark.parametrize(
-    "text", ["True", "False", "None", "3", "-3", "3.5", "1e-7", "nan", "A", "true", "[0]", ""]
-)
-def test_a_parameter_is_what_papermill_takes_it_for(text):
-    mine, theirs = build.typed(text), _resolve_type(text)
-    assert type(mine) is type(theirs)
-    assert mine == theirs or text == "nan"
+@pytest.mark.parametrize("value", [True, False, None, 3, -3, 3.5, 1e-7, math.nan, "A", "true", ""])
+def test_a_parameter_is_what_papermill_takes_it_for(value):
+    taken = chapters.typed(str(value))
+    assert type(taken) is type(value)
+    assert taken == value or math.isnan(value)
+
+
+IMPORTS = """
+import os
+from importlib import import_module
+from pkgutil import walk_packages
+
+before = dict(os.environ)
+import driver
+
+for found in walk_packages(driver.__path__, "driver."):
+    import_module(found.name)
+assert {**os.environ} == before, {**os.environ}.items() - before.items()
+"""
+
+
+@pytest.mark.slow
+def test_no_module_of_the_driver_changes_the_environment_of_who_imports_it():
+    done = subprocess.run(
+        [sys.executable, "-c", IMPORTS],
+        env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'book'}"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_a_chapter_runs_on_one_thread_strictly_and_its_figures_are_for_a_page(small, monkeypatch):
+    names = ("OMP_NUM_THREADS", "NMPCRL_STRICT", "NMPCRL_FIGURES_FOR_PAGE")
+    for name in names:
+        monkeypatch.delenv(name, raising=False)
+    save(small, new_code_cell(f"import os\nprint(*[os.environ[name] for name in {names}])"))
+    assert run(small).returncode == 0
+    executed = nbformat.read(small / "_build/executed/one.ipynb", 4)
+    assert executed.cells[-1].outputs[0].text == "1 1 1\n"

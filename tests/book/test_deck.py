@@ -8,7 +8,7 @@ import pytest
 from driver import project
 from driver.course import deck, slides
 from driver.teaching.plans import LIVE, plan
-from driver.teaching.syllabus import BOOK, chapters
+from driver.teaching.syllabus import chapters
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 UNITS = {name: (text, unit) for name, text, unit in slides.units()}
@@ -173,7 +173,7 @@ def test_no_number_is_typed_on_a_slide(text, unit):
 def test_a_deck_names_what_its_chapter_has_and_every_live_figure_of_the_unit(text, unit):
     page = unit.sections[0].page
     assert {one.page for one in unit.sections} == {page}
-    notebook = nbformat.read(BOOK / f"{page}.ipynb", 4)
+    notebook = nbformat.read(project.ROOT / "book" / f"{page}.ipynb", 4)
     sources = "".join(cell.source for cell in notebook.cells)
     cells = {cell.id: cell for cell in notebook.cells}
     shown = REFERENCE.findall(text)

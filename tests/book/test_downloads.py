@@ -6,9 +6,10 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+from driver import project
 from driver.course import course, downloads
 
-BOOK = Path(course.__file__).parent
+BOOK = project.ROOT / "book"
 PLACE = '<p>Before.</p><div class="course-downloads" data-editions="student slides"></div><p>After.'
 
 

@@ -13,7 +13,8 @@ from typing import Any
 
 import nbformat
 import pytest
-from driver import build
+from driver import project
+from driver.build import book, chapters, execute, train
 from driver.page import enrich
 from live_page import CHAPTERS, FRAMES
 
@@ -21,7 +22,7 @@ from nmpcrl.learning import td_error
 from nmpcrl.study import paper
 
 ROOT = Path(__file__).resolve().parents[2]
-NOTEBOOKS = list(build.notebooks())
+NOTEBOOKS = list(project.notebooks())
 LAYOUT = "D"  # of chapter 2, where its numbers are not those of the default
 SETTINGS = {  # all cells at once, and no request to another host; the rest is as it comes
     "notebook-extension/tracker": {"windowingMode": "none"},
@@ -70,19 +71,19 @@ def folder(tmp_path_factory) -> Iterator[Path]:
     for state in ("source", "executed", "src/book"):
         (place / state).mkdir(parents=True)
     jobs: dict[Path, dict[str, Any]] = {}
-    for path in build.notebooks().values():
+    for path in project.notebooks().values():
         nbformat.write(nbformat.read(ROOT / path, 4), place / "source" / path.name)
-        names = build.parameters(ROOT / path)
-        jobs[path] = {name: build.SMOKE[name] for name in names if name in build.SMOKE}
-    jobs[build.known("02_expected_sarsa")]["layout"] = LAYOUT
+        names = chapters.parameters(ROOT / path)
+        jobs[path] = {name: book.SMOKE[name] for name in names if name in book.SMOKE}
+    jobs[chapters.known("02_expected_sarsa")]["layout"] = LAYOUT
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
         patch.setenv("NMPCRL_RUNS", str(place / "runs"))
-        needs = [build.ask(notebook, given) for notebook, given in jobs.items()]
-        build.train(*(sum((need[what] for need in needs), ()) for what in build.NEEDS[:2]))
+        needs = [chapters.ask(notebook, given) for notebook, given in jobs.items()]
+        train.train(*(sum((need[what] for need in needs), ()) for what in chapters.NEEDS[:2]))
         for call in [call for need in needs for call in need["beforehand"]]:
             call()
-        build.execute_all(place, jobs)
+        execute.execute_all(place, jobs)
         yield place
 
 

@@ -8,7 +8,7 @@ import nbformat
 import pytest
 import yaml
 from bs4 import BeautifulSoup
-from driver import build
+from driver import project
 from driver.page import enrich
 from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
@@ -34,7 +34,7 @@ def source(page: str) -> str:
     return "\n\n".join(cell.source for cell in nbformat.read(path, as_version=4).cells)
 
 
-SOURCES = {Path(page).stem: source(page) for page in build.pages()}
+SOURCES = {Path(page).stem: source(page) for page in project.pages()}
 LABELS = {page: re.findall(r'<a id="([^"]+)"></a>', text) for page, text in SOURCES.items()}
 each_page = pytest.mark.parametrize("page", SOURCES)
 

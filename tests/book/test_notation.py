@@ -8,7 +8,8 @@ from pathlib import Path
 
 import click
 import pytest
-from driver import build
+from driver import project
+from driver.build import chapters
 
 from nmpcrl.commands import main
 from nmpcrl.study.departures import DEPARTURES
@@ -106,7 +107,9 @@ def test_the_parameters_of_the_chapters_are_those_that_they_declare():
     pages = r"\d\d_\w+|solver|performance|paper_and_book|your_\w+"
     rows = re.findall(rf"^\| `({pages})` \| (.*) \|$", REPRODUCE, flags=re.M)
     listed = {chapter: re.findall(r"`(\w+)`", cell) for chapter, cell in rows}
-    declared = {name: build.parameters(ROOT / path) for name, path in build.notebooks().items()}
+    declared = {
+        name: chapters.parameters(ROOT / path) for name, path in project.notebooks().items()
+    }
     assert listed == {name: parameters for name, parameters in declared.items() if parameters}
 
 

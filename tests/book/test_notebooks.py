@@ -15,7 +15,8 @@ from textwrap import dedent
 import nbformat
 import pytest
 import test_api
-from driver import build, project
+from driver import project
+from driver.build import book, chapters
 from driver.page import enrich
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -79,7 +80,7 @@ def test_the_chapters_are_there_and_in_the_table_of_contents():
     assert [name[:2] for name in numbered] == [f"{i:02}" for i in range(1, len(numbered) + 1)]
     assert len(numbered) >= 7
     assert last == "solver"
-    assert set(NOTEBOOKS) == set(build.notebooks())
+    assert set(NOTEBOOKS) == set(project.notebooks())
 
 
 @each_notebook
@@ -254,16 +255,16 @@ def test_the_first_code_cell_and_no_other_holds_the_parameters(name):
 def test_the_second_code_cell_refuses_parameters_that_make_no_sense(name):
     path = ROOT / f"book/{name}.ipynb"
     nonsense = {"episodes": 0, "seeds": "[3]", "layout": "nowhere"}
-    for parameter in build.parameters(path):
+    for parameter in chapters.parameters(path):
         if parameter in nonsense:
             with pytest.raises(project.Failure, match=parameter):
-                build.ask(path, {parameter: nonsense[parameter]})
+                chapters.ask(path, {parameter: nonsense[parameter]})
 
 
 @each_given
 def test_the_parameters_are_declared_in_the_metadata_and_all_are_checked(name):
     """The second cell refuses names that it does not check, so it may leave none out."""
-    declared = build.parameters(ROOT / f"book/{name}.ipynb")
+    declared = chapters.parameters(ROOT / f"book/{name}.ipynb")
     assert NOTEBOOKS[name].metadata.nmpcrl.parameters == declared
     assert not code(name)[0].source.startswith(INJECTED)
     shown: dict = {}
@@ -271,7 +272,7 @@ def test_the_parameters_are_declared_in_the_metadata_and_all_are_checked(name):
     check = chapter.check
     try:
         chapter.check = lambda **given: shown.update(checked=given)
-        build.ask(ROOT / f"book/{name}.ipynb", {})
+        chapters.ask(ROOT / f"book/{name}.ipynb", {})
     finally:
         chapter.check = check
     assert shown["checked"] == {one: shown[one] for one in declared}
@@ -280,7 +281,7 @@ def test_the_parameters_are_declared_in_the_metadata_and_all_are_checked(name):
 def test_a_notebook_without_parameters_declares_none():
     for name in set(NOTEBOOKS) - set(GIVEN):
         assert "nmpcrl" not in NOTEBOOKS[name].metadata
-        assert build.parameters(ROOT / f"book/{name}.ipynb") == []
+        assert chapters.parameters(ROOT / f"book/{name}.ipynb") == []
 
 
 MAY_BE = {  # what is drawn for a parameter, so that it is sometimes right
@@ -316,7 +317,7 @@ ANYTHING = st.recursive(  # that JSON or YAML can hold
 def asked(draw):
     """A chapter and what it is given, some of it right."""
     name = draw(st.sampled_from(GIVEN))
-    names = st.sampled_from(build.parameters(ROOT / f"book/{name}.ipynb"))
+    names = st.sampled_from(chapters.parameters(ROOT / f"book/{name}.ipynb"))
     chosen = draw(st.lists(names, unique=True, min_size=1))
     values = {one: draw(MAY_BE[one] | MAY_BE[one] | MAY_BE[one] | ANYTHING) for one in chosen}
     if draw(st.integers(0, 9)) == 0:
@@ -327,8 +328,8 @@ def asked(draw):
 @pytest.fixture
 def read_once(monkeypatch):
     """Notebooks that nobody writes are read, by nbformat and by papermill, once."""
-    monkeypatch.setattr(build.nbformat, "read", cache(nbformat.read))
-    monkeypatch.setattr(build, "parameters", cache(build.parameters))
+    monkeypatch.setattr(chapters.nbformat, "read", cache(nbformat.read))
+    monkeypatch.setattr(chapters, "parameters", cache(chapters.parameters))
 
 
 @pytest.mark.slow
@@ -343,7 +344,7 @@ def read_once(monkeypatch):
 def test_whatever_a_chapter_is_given_it_takes_little_or_refuses_in_a_sentence(drawn):
     name, values = drawn
     try:
-        needs = build.ask(ROOT / f"book/{name}.ipynb", values)
+        needs = chapters.ask(ROOT / f"book/{name}.ipynb", values)
     except project.Failure as refusal:
         said = refusal.message
         assert "\n" not in said
@@ -468,10 +469,10 @@ def chapter_and_parameters(words: list[str]) -> tuple[str, dict]:
     if words[0] == "papermill":
         given = papermill.make_context("papermill", words[1:]).params
         pairs, raw, texts = (given[f"parameters{suffix}"] for suffix in ("", "_raw", "_yaml"))
-        return given["notebook_path"], build.values(pairs, raw, texts)
+        return given["notebook_path"], chapters.values(pairs, raw, texts)
     named = dict(word.split("=", 1) for word in words[2:])
-    given = build.main.make_context("build", shlex.split(named.get("P", ""))).params
-    return named["CHAPTER"], build.values(given["pairs"], given["raw"], given["texts"])
+    given = book.main.make_context("build", shlex.split(named.get("P", ""))).params
+    return named["CHAPTER"], chapters.values(given["pairs"], given["raw"], given["texts"])
 
 
 @pytest.mark.parametrize("name", [*CHAPTERS, *OWN])
@@ -481,8 +482,8 @@ def test_the_commands_of_the_try_box_are_accepted(name, monkeypatch):
     assert any(words[0] == "papermill" for words in lines)
     for words in lines:
         chapter, given = chapter_and_parameters(words)
-        build.refuse_unknown(build.known(chapter), given)
-        build.ask(build.known(chapter), given)
+        chapters.refuse_unknown(chapters.known(chapter), given)
+        chapters.ask(chapters.known(chapter), given)
 
 
 def imports(name: str) -> set[str]:

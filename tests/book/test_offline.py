@@ -28,7 +28,7 @@ def chapter(tmp_path, monkeypatch) -> str:
     about = nbformat.read(next((course.ROOT / "book").glob("*.ipynb")), 4).metadata
     notebook = new_notebook(cells=cells, metadata=about)
     nbformat.write(notebook, tmp_path / "book/asks.ipynb")
-    monkeypatch.setattr(offline.build, "ROOT", tmp_path)
+    monkeypatch.setattr(offline, "ROOT", tmp_path)
     monkeypatch.setattr(offline.editions, "OFFLINE", {"study": "GES", "length": 1, "budget": 3})
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
     return "asks.ipynb"

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 from bs4 import BeautifulSoup, Tag
-from driver import build
+from driver import project
 
 from nmpcrl.claims import published
 from nmpcrl.claims.agreement import Statement, disagreements
@@ -14,7 +14,7 @@ from nmpcrl.report import halves
 from nmpcrl.report.prose import filled
 from nmpcrl.report.tables import BADGES, WORDS
 
-PAGES = build.pages()
+PAGES = project.pages()
 each_page = pytest.mark.parametrize("page", PAGES)
 
 CLAIM = r"[BCW]\d"

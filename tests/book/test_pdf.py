@@ -9,7 +9,7 @@ import pytest
 import yaml
 from bs4 import BeautifulSoup
 from click.testing import CliRunner
-from driver import build, project
+from driver import project
 from driver.paper import pdf, whole
 from filelock import FileLock
 from pypdf import PdfReader
@@ -93,7 +93,7 @@ def small(tmp_path, monkeypatch):
     (site / "book").mkdir(parents=True)
     for name, number in (("one", ""), ("other", "1. ")):
         (site / f"book/{name}.html").write_text(PAGE.format(banner="", number=number))
-    monkeypatch.setattr(whole, "ROOT", tmp_path)
+    monkeypatch.setattr(project, "ROOT", tmp_path)
     return site
 
 
@@ -174,7 +174,7 @@ def texts(book, shared) -> list[str]:
 def headings(site) -> list[str]:
     """Of all chapters and their sections, as the site has them."""
     found = []
-    for name in build.pages():
+    for name in project.pages():
         article = BeautifulSoup((site / f"{name}.html").read_text(), "html.parser").article
         for mark in article.select(".headerlink"):
             mark.decompose()
@@ -234,7 +234,7 @@ def test_no_page_is_blank_and_their_number_is_sane(site, texts):
     assert all(len(text.split()) > 15 for text in texts)
     words = sum(
         len(BeautifulSoup((site / f"{name}.html").read_text(), "html.parser").article.text.split())
-        for name in build.pages()
+        for name in project.pages()
     )
     assert words / 500 < len(texts) < words / 100
 

@@ -2,20 +2,25 @@
 
 import re
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 
+from nmpcrl import learning
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import published
 from nmpcrl.claims.paper_claims import BY_TIME, CLAIMS
 from nmpcrl.claims.timing import decide
 from nmpcrl.claims.verdict import UNDECIDABLE
+from nmpcrl.control import Nmpc
 from nmpcrl.study import design
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text()
+EXAMPLES = re.findall(r"^```python\n(.*?)^```$", README, flags=re.M | re.S)
 COUNTED = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
 
@@ -118,13 +123,23 @@ def test_seconds_of_a_run_are_those_of_the_published_steps_and_name_their_proces
 
 
 def test_the_example_trains_a_plant_of_the_readers_own_as_the_text_says(capsys):
-    (example,) = re.findall(r"^```python\n(.*?)^```$", README, flags=re.M | re.S)
     names: dict = {}
-    exec(example, names)
+    exec(EXAMPLES[0], names)
     before, after = map(float, re.findall(r"cost without noise: (\d+)", capsys.readouterr().out))
     said = re.search(r"the cost without noise from (\d+) to (\d+)\.", README)
     np.testing.assert_allclose([before, after], [float(cost) for cost in said.groups()], atol=1)
     assert names["explore"].scale.shape == (40, 60)  # "Forty episodes of 60 steps"
+
+
+def test_the_second_example_learns_each_parameter_of_its_problem(capsys):
+    names = {"ca": ca, "np": np, "Nmpc": partial(Nmpc, solver="fatrop")}  # which compiles nothing
+    names |= {name: getattr(learning, name) for name in ("Exploration", "Weights", "train")}
+    exec(EXAMPLES[1], names)
+    learned, problem = names["last"].weights.theta, names["problem"]
+    assert set(problem.split(learned)) == {"A", "B", "b", "margin"}
+    assert all((learned != problem.theta).reshape(-1)[:4])
+    assert np.isfinite(learned).all()
+    assert "margin" in capsys.readouterr().out
 
 
 def test_the_layout_names_every_room_and_the_way_of_imports():

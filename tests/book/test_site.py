@@ -8,10 +8,10 @@ from urllib.parse import unquote, urldefrag, urlsplit
 
 import pytest
 from bs4 import BeautifulSoup
-from driver import build
+from driver import project
 from legibility import LETTERS, SHOWN
 
-PAGES = build.pages()
+PAGES = project.pages()
 LOADED = {  # what a browser fetches by itself
     "script": "src",
     "img": "src",

@@ -30,10 +30,9 @@ from typing import Any, BinaryIO
 import click
 import nbformat
 
-from driver import build
 from driver.course import autograded, downloads, editions, handout, offline, slides
 from driver.page import pictures
-from driver.project import ROOT, Failure
+from driver.project import ROOT, Failure, notebooks
 from nmpcrl.course import variants
 from nmpcrl.course.exercises import exercises
 
@@ -50,7 +49,7 @@ PACKAGED = ("pyproject.toml", "LICENSE")
 
 def chapters() -> dict[str, Any]:
     """The notebooks that have exercises, by file name, in the order of _toc.yml."""
-    read = {path.name: nbformat.read(ROOT / path, 4) for path in build.notebooks().values()}
+    read = {path.name: nbformat.read(ROOT / path, 4) for path in notebooks().values()}
     return {name: notebook for name, notebook in read.items() if any(exercises(notebook))}
 
 

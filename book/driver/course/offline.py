@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from driver import build
+from driver.build import chapters, train
 from driver.course import editions
 from driver.project import ROOT
 
@@ -22,14 +22,14 @@ LONG = 10  # of a run [s], as `limits.seconds_of` has it: those whose learner fi
 def stored(files: Iterable[str]) -> dict[str, Path]:
     """What the chapters in these files need stored: path in the folder of an edition -> file.
 
-    Examples are not compared with the published study as `build.train` does: they are those of
+    Examples are not compared with the published study as `train.train` does: they are those of
     its runs that went wrong, and no sample of it.
     """
     from nmpcrl.analysis import summaries  # only here: a mistake elsewhere should not wait for it
     from nmpcrl.study import store
 
     whole, summarised = needed(files)
-    build.train(whole, summarised)
+    train.train(whole, summarised)
     summarised = tuple(summaries.fetch_summaries((*summarised, *examples())))
     paths = [*map(store.path_of, whole), *map(summaries.path_of, summarised)]
     # what another solver had to solve is not stored; a notebook does that again
@@ -41,7 +41,7 @@ def needed(files: Iterable[str]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """The runs, and the runs of which the summaries, are to be stored."""
     from nmpcrl.study.limits import seconds_of
 
-    asked = [build.ask(path, given(path)) for path in (ROOT / "book" / f for f in files)]
+    asked = [chapters.ask(path, given(path)) for path in (ROOT / "book" / f for f in files)]
     whole, summarised = (
         tuple(dict.fromkeys(one for needs in asked for one in needs[what]))
         for what in ("experiments", "summaries")
@@ -58,7 +58,7 @@ def examples() -> tuple[Any, ...]:
 
 def given(notebook: Path) -> dict[str, Any]:
     """The parameters of a chapter that its editions change."""
-    names = build.parameters(notebook)
+    names = chapters.parameters(notebook)
     return {name: value for name, value in editions.OFFLINE.items() if name in names}
 
 

@@ -20,14 +20,14 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 from enum import Enum
-from pathlib import Path
 from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 
-HERE = Path(__file__).resolve().parents[2]
+from driver.project import ROOT
+
 NOTATION = "book/notation"
 EQUATION = re.compile(r"(?P<word>Eqs?\. )?\((?P<number>2[a-f]|\d\d?)\)")
 EQUATIONS = re.compile(r"Eqs?\. \((?:2[a-f]|\d\d?)\)(?:(?:, | and |, and )\((?:2[a-f]|\d\d?)\))*")
@@ -36,7 +36,7 @@ DEPARTURES = re.compile(r"\s*# (?P<words>departures? [A-Z](?:(?:, | and )[A-Z])*
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Document the library that lies beside the book, whichever is installed."""
-    sys.path.insert(0, str((HERE.parent / "nmpcrl").resolve().parent))
+    sys.path.insert(0, str((ROOT / "nmpcrl").resolve().parent))
     app.connect("source-read", each_module)
     app.connect("autodoc-process-signature", as_written)
     app.connect("autodoc-skip-member", without_others)
@@ -64,7 +64,7 @@ PACKAGE = re.compile(r"^\.\. automodules:: ([\w.]+)$", flags=re.M)
 
 def modules(package: str) -> list[str]:
     """The public modules of a package."""
-    folder = HERE.parent / package.replace(".", "/")
+    folder = ROOT / package.replace(".", "/")
     return sorted(f"{package}.{path.stem}" for path in folder.glob("[a-z]*.py"))
 
 

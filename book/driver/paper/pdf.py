@@ -26,12 +26,11 @@ from pathlib import Path
 from typing import Any
 
 import click
-import yaml
 from pypdf import PdfReader, PdfWriter
 from pypdf.generic import NameObject, TextStringObject
 
 from driver.paper import whole
-from driver.project import ROOT, Failure, reported, shown
+from driver.project import ROOT, Failure, from_yaml, reported, shown
 from nmpcrl import __version__
 
 logging.getLogger("pypdf").setLevel(logging.ERROR)  # a profile of colours that is copied is no news
@@ -89,7 +88,7 @@ def version() -> tuple[str, datetime]:
         found = subprocess.check_output(command, text=True, stderr=subprocess.DEVNULL)
         commit, date = found.split()
     except (OSError, subprocess.CalledProcessError):
-        about = yaml.safe_load((ROOT / "book/published/about.json").read_text("utf-8"))
+        about = from_yaml("book/published/about.json")
         commit, date = "", about["date"]
     when = datetime.fromisoformat(date)
     words = f"Version {__version__}, {when.day} {when:%B %Y}"
@@ -127,7 +126,7 @@ def numbers(pdf: bytes) -> dict[str, int]:
 
 def described(pdf: bytes, headings: list[str], date: datetime) -> bytes:
     """A PDF that says what it is, what its headings are, and which of its pictures are formulas."""
-    config = yaml.safe_load((ROOT / "_config.yml").read_text("utf-8"))
+    config = from_yaml("_config.yml")
     writer = PdfWriter(clone_from=BytesIO(pdf))
     about = {"/Title": config["title"], "/Author": config["author"]}
     when = f"D:{date:%Y%m%d%H%M%S}"

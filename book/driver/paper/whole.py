@@ -16,10 +16,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urldefrag, urlsplit
 
-import yaml
 from bs4 import BeautifulSoup, Tag
 
-from driver.project import ROOT
+from driver.project import from_yaml
 
 Element = Any  # Beautiful Soup's, a dictionary of attributes among other things
 
@@ -96,7 +95,7 @@ class Page:
 
 def read(site: Path) -> Iterator[Page]:
     """The pages in the order of _toc.yml."""
-    toc = yaml.safe_load((ROOT / "_toc.yml").read_text("utf-8"))
+    toc = from_yaml("_toc.yml")
     yield page(site, toc["root"], "", 1)
     for part in toc["parts"]:
         captions = [part["caption"]] + [""] * len(part["chapters"])
@@ -139,7 +138,7 @@ def document(site: Path, target: Path, version: str) -> str:
     """The book as one document, whose place will be `target`."""
     pages = list(read(site))
     names = [page.name for page in pages]
-    config = yaml.safe_load((ROOT / "_config.yml").read_text("utf-8"))
+    config = from_yaml("_config.yml")
     for one in pages:
         adapt(one, site, target, names)
     return DOCUMENT.format(
@@ -182,7 +181,7 @@ def quoted(text: str) -> str:
 
 
 def cover(config: dict[str, str], version: str, warning: str, site: str) -> str:
-    (paper,) = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))["references"]
+    (paper,) = from_yaml("CITATION.cff")["references"]
     names = [f"{one['given-names']} {one['family-names']}" for one in paper["authors"]]
     number = f'<a href="{paper["url"]}">{paper["identifiers"][0]["value"]}</a>'
     *most, last = names

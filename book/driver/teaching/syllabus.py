@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
-import yaml
 
 from driver.page import enrich
+from driver.project import ROOT, from_yaml
 from nmpcrl.course.exercises import Exercise, exercises
 
-BOOK = Path(__file__).resolve().parents[2]
 WORDS = 180  # read in a minute
 FORMULA, FIGURE, CODE = 30, 60, 30  # on top of the words [s]
 HEADING = re.compile(r"^(?=## )", flags=re.M)
@@ -118,11 +117,11 @@ def chapter(page: str, number: int, notebook: Any) -> Chapter:
 @cache
 def chapters() -> dict[str, Chapter]:
     """The numbered chapters by page, in the order of _toc.yml."""
-    parts = yaml.safe_load((BOOK.parent / "_toc.yml").read_text("utf-8"))["parts"]
+    parts = from_yaml("_toc.yml")["parts"]
     numbered = [one["file"] for part in parts if part.get("numbered") for one in part["chapters"]]
     pages = [Path(file).name for file in numbered]
     return {
-        page: chapter(page, number, nbformat.read(BOOK / f"{page}.ipynb", 4))
+        page: chapter(page, number, nbformat.read(ROOT / "book" / f"{page}.ipynb", 4))
         for number, page in enumerate(pages, 1)
     }
 
@@ -130,7 +129,7 @@ def chapters() -> dict[str, Chapter]:
 @cache
 def declared() -> dict[str, Any]:
     """What `syllabus.yml` says."""
-    found: dict[str, Any] = yaml.safe_load((BOOK / "syllabus.yml").read_text("utf-8"))
+    found: dict[str, Any] = from_yaml("book/syllabus.yml")
     return found
 
 

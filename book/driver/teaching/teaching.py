@@ -8,13 +8,11 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-import yaml
-
+from driver.project import from_yaml
 from driver.teaching import graph
 from driver.teaching.plans import LIVE, PACE, UNIT, Unit, plan
 from driver.teaching.self_test import self_test
 from driver.teaching.syllabus import (
-    BOOK,
     FIGURE,
     FORMULA,
     WORDS,
@@ -178,7 +176,7 @@ def _steps(page: str) -> list[str]:
 
 def citation() -> str:
     """The entry of CITATION.cff for BibTeX."""
-    entry = yaml.safe_load((BOOK.parent / "CITATION.cff").read_text("utf-8"))
+    entry = from_yaml("CITATION.cff")
     fields = {
         "author": " and ".join(f"{{{one['name']}}}" for one in entry["authors"]),
         "title": f"{{{entry['title']}}}",

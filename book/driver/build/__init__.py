@@ -1,0 +1,1 @@
+"""The book built from its sources, step by step."""

@@ -1,0 +1,32 @@
+"""What the pages of a build have beyond their sources and outputs."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import nbformat
+
+from driver.page import enrich, live, pictures, questions
+from driver.project import notebooks
+from driver.teaching import teaching
+
+
+def dress(source: Path, executed: Iterable[Path]) -> None:
+    """Give the pages of the mirror what they have beyond their sources."""
+    read = {path: nbformat.read(source / path, 4) for path in notebooks().values()}
+
+    def output(page: str, tag: str) -> str:
+        return enrich.output(read[Path("book") / page], tag)
+
+    (source / "book" / pictures.FOLDER).mkdir(exist_ok=True)
+    live.add_runs(read.values(), source / "book/_static/live")
+    for path in source.glob("book/*.md"):
+        text = pictures.beside(path.read_text("utf-8"), path.parent)
+        path.write_text(teaching.filled(enrich.page(text, output)))
+    for path, notebook in read.items():
+        live.share(notebook, path, source / "book/_static/live")
+        download = path.name if path in executed else ""
+        dressed = enrich.notebook(questions.placed(notebook), download)
+        teaching.headed(dressed, path.stem)
+        for name, data in pictures.placed(dressed).items():
+            (source / "book" / pictures.FOLDER / name).write_bytes(data)
+        nbformat.write(dressed, source / path)

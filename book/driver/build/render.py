@@ -1,0 +1,65 @@
+"""The pages as a site, by Jupyter Book."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+
+from driver.page import accessible, enrich, pictures
+from driver.project import ROOT, Failure, from_yaml, pages, shown
+from nmpcrl.course import exercises
+
+INDEX = """<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{title}</title>
+<meta http-equiv="refresh" content="0; url={page}.html"></head>
+<body><a href="{page}.html">{title}</a></body>
+</html>
+"""
+
+
+def render(place: Path, strict: bool) -> None:
+    """Run Jupyter Book on the mirror and put the result at PLACE/html, if it is whole.
+
+    The executed notebooks lie beside their pages.
+    """
+    work, log = place / "render", place / "logs/render.log"
+    shutil.rmtree(work, ignore_errors=True)  # a remembered page would not repeat its warnings
+    log.parent.mkdir(parents=True, exist_ok=True)
+    command = ["jupyter-book", "build", str(place / "src"), "--path-output", str(work)]
+    command[0] = str(Path(sys.executable).with_name(command[0]))
+    strictness = ["-W", "-n", "--keep-going"] if strict else []
+    with log.open("w") as out:
+        result = subprocess.run(
+            command + strictness,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            env=os.environ | {"NO_COLOR": "1"},
+        )
+    if result.returncode:
+        raise Failure(f"Jupyter Book refused the pages (all of it: {shown(log)}):\n{warnings(log)}")
+    for path in (place / "executed").glob("*.ipynb"):
+        notebook = pictures.plain(enrich.download(exercises.reopened(nbformat.read(path, 4))))
+        nbformat.write(notebook, work / "_build/html/book" / path.name)
+    accessible.site(work / "_build/html")
+    (work / "_build/html").rename(place / "html")
+    title = from_yaml("_config.yml")["title"]
+    (place / "html/index.html").write_text(INDEX.format(title=title, page=pages()[0]))
+
+
+def warnings(log: Path, most: int = 20) -> str:
+    """The lines of a Sphinx log that say what is wrong, or its end if none does."""
+    text = re.sub(r"\x1b\[[0-9;]*m", "", log.read_text("utf-8")).replace(f"{ROOT}/", "")
+    text = re.sub(r"\.ipynb:(\d+)(\d{4}):", in_cell, text)
+    lines = text.splitlines()
+    wrong = [line for line in lines if "WARNING: " in line or "ERROR: " in line]
+    return "\n".join(f"  {line}" for line in (wrong[:most] or lines[-most:]))
+
+
+def in_cell(place: re.Match[str]) -> str:
+    """MyST-NB counts 10000 lines a cell, from cell 1: name the cell, from 0, and the line."""
+    return f".ipynb, cell {int(place[1]) - 1}, line {int(place[2])}:"
