@@ -6,8 +6,6 @@ from typing import Any
 
 import click
 
-from nmpcrl.commands.tables import harmless
-
 SAID = (  # errors whose message is a sentence for the reader, and where they are defined
     ("nmpcrl.study.storage.refusal", "Refusal"),
     ("nmpcrl.study.records", "DamagedRecords"),
@@ -36,6 +34,8 @@ class Commands(click.Group):
             said = sentence(error)
             if said is None:
                 raise
+            from nmpcrl.study.storage.place import harmless
+
             raise click.ClickException(harmless(said)) from None
 
 
