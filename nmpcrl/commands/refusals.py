@@ -31,11 +31,14 @@ class Commands(click.Group):
         try:
             return super().invoke(ctx)
         except Exception as error:
-            said = sentence(error)
+            said = error.message if isinstance(error, click.ClickException) else sentence(error)
             if said is None:
                 raise
             from nmpcrl.study.storage.place import harmless
 
+            if isinstance(error, click.ClickException):
+                error.message = harmless(said)
+                raise
             raise click.ClickException(harmless(said)) from None
 
 
