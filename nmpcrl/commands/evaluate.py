@@ -3,7 +3,6 @@
 import click
 
 from nmpcrl.commands.names import RunName, file_of, records_of
-from nmpcrl.commands.tables import harmless
 
 
 @click.command()
@@ -18,6 +17,7 @@ def evaluate(run: str) -> None:
       nmpcrl evaluate GES-A-step-seed0
     """
     from nmpcrl.report.run import figures, verdict
+    from nmpcrl.study.storage.place import harmless
 
     records = records_of(file_of(run))
     click.echo(harmless(verdict(records)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from nmpcrl.commands.places import NewFile
-from nmpcrl.commands.tables import columns, counted, harmless
+from nmpcrl.commands.tables import columns, counted
 
 if TYPE_CHECKING:
     from nmpcrl.course.grading import Mark
@@ -84,6 +84,7 @@ def grade(
     """
     from nmpcrl.course import grading
     from nmpcrl.course.execution import Limits
+    from nmpcrl.study.storage.place import harmless
 
     limits = Limits(time_limit, cell_limit, memory)
     rows = []

@@ -6,8 +6,6 @@ from typing import Any
 
 import click
 
-from nmpcrl.commands.tables import harmless
-
 SAID = (  # errors whose message is a sentence for the reader, and where they are defined
     ("nmpcrl.study.storage.refusal", "Refusal"),
     ("nmpcrl.study.records", "DamagedRecords"),
@@ -33,8 +31,13 @@ class Commands(click.Group):
         try:
             return super().invoke(ctx)
         except Exception as error:
-            said = sentence(error)
+            said = error.message if isinstance(error, click.ClickException) else sentence(error)
             if said is None:
+                raise
+            from nmpcrl.study.storage.place import harmless
+
+            if isinstance(error, click.ClickException):
+                error.message = harmless(said)
                 raise
             raise click.ClickException(harmless(said)) from None
 

@@ -1,18 +1,12 @@
 """Text in columns, and counts, sizes and times as people write them."""
 
-import re
 from collections.abc import Sequence
-
-CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]")
-
-
-def harmless(text: str) -> str:
-    """A text of a file's, of which nothing is a command to the terminal."""
-    return CONTROL.sub("?", text)
 
 
 def columns(rows: Sequence[Sequence[str]], right: frozenset[int] = frozenset()) -> list[str]:
     """Rows of words in columns: those in `right` aligned right, the others left."""
+    from nmpcrl.study.storage.place import harmless
+
     rows = [list(map(harmless, row)) for row in rows]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [

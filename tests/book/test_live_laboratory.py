@@ -117,14 +117,16 @@ def assert_command(tab, experiment: Experiment) -> None:
 
 def test_noise_is_that_of_numpy(tab):
     """In every bit; the tail to the digits in which one machine's logarithm is another's."""
+    tails = 0  # a seed has none in 1 of 150
     for seed in (0, 7, 2**31 - 1, np.random.default_rng().integers(2**31)):
         found = np.array(tab.page.evaluate(DRAWN, [int(seed), 20_000]))
         generator = np.random.default_rng(np.random.SeedSequence(int(seed)).spawn(3)[0])
         expected = generator.normal(scale=1.0, size=20_000)
         tail = np.abs(expected) > 3.6541
-        assert tail.any()
+        tails += tail.sum()
         assert (found == expected)[~tail].all()
         np.testing.assert_allclose(found, expected, rtol=1e-15)
+    assert tails
 
 
 def test_twenty_episodes_of_each_learner_are_those_of_python(tab):

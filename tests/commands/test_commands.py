@@ -1,6 +1,9 @@
 """The command `nmpcrl`, used as a user would, on runs of a few short episodes."""
 
+import os
 import re
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -397,3 +400,12 @@ def test_what_needs_machine_code_says_so_at_once_without_numba(words, monkeypatc
     (sentence,) = refused.output.strip().splitlines()
     assert re.fullmatch(r"Error: numba is not installed, and .+: `pip install numba`", sentence)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", sorted(main.commands))
+def test_every_command_explains_itself_where_a_terminal_knows_no_letters_but_ascii(command):
+    words = [sys.executable, "-m", "nmpcrl", command, "--help"]
+    plain = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run(words, capture_output=True, env=plain, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.startswith(b"Usage: ")

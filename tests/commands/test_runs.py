@@ -239,7 +239,9 @@ def test_nothing_in_a_file_is_a_command_to_the_terminal(tmp_path, monkeypatch):
     records = fetch_all([Experiment(**SHORT)], progress=False)[Experiment(**SHORT)]
     records.facts["stopped"] = "diverged: \x1b[31mred\x1b]0;title\x07"
     records.save(store.path_of(Experiment(**SHORT)))
-    for words in (("runs",), ("evaluate", "ES"), ("compare", "ES", "ES")):
+    (tmp_path / "none\x1b[31m\x07.npz").write_text("damaged")
+    asked = ("runs", "evaluate ES", "compare ES ES", "clean", "evaluate non", "show nobody")
+    for words in map(str.split, asked):
         said = CliRunner().invoke(main, words).output
         assert "\x1b" not in said
         assert "\x07" not in said

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import shutil
 import stat
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 from nmpcrl.study.storage.archive import DamagedRecords
 from nmpcrl.study.storage.atomic import sweep, try_to_write
 
+CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]")
 UNREADABLE = (errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE)  # the file may yet be whole
 
 
@@ -68,7 +70,12 @@ def check_folder(needed: int = 0, place: Path | None = None) -> None:
 def say(sentence: str) -> None:
     """Print a sentence on standard error; no study fails because that cannot be written."""
     with suppress(OSError, ValueError):  # a log on a full disk, a terminal that was closed
-        print(sentence, file=sys.stderr, flush=True)
+        print(harmless(sentence), file=sys.stderr, flush=True)
+
+
+def harmless(text: str) -> str:
+    """A text of a file's, of which nothing is a command to the terminal."""
+    return CONTROL.sub("?", text)
 
 
 def refusal(why: str, place: Path | None = None) -> str:
