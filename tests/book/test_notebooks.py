@@ -22,6 +22,7 @@ from hypothesis import strategies as st
 from papermill.cli import papermill
 
 from nmpcrl.course.exercises import KINDS, exercises
+from nmpcrl.report.prose import listing
 from nmpcrl.study import chapter, paper
 from nmpcrl.study.chapter import INJECTED
 from nmpcrl.study.experiment import MAIN
@@ -221,6 +222,13 @@ def test_what_vs_code_cannot_show_is_found(text, found):
 def test_html_in_prose_is_what_every_editor_shows(name):
     elements = set(re.findall(r"</?([a-z]+)[ >]", re.sub(r"`[^`]*`", "", prose(name))))
     assert elements <= {"a", "details", "summary", "br", "code", "sup", "sub"}
+
+
+@each_notebook
+def test_a_notebook_shows_definitions_that_are_there(name):
+    every = "\n".join(cell.source for cell in code(name))
+    for shown in re.findall(r'source\("([\w.]+:[\w.]+)"', every):
+        assert "```python" in listing(shown)
 
 
 @each_notebook

@@ -34,6 +34,11 @@ KERNEL = {  # the environment of what executes a chapter
 }
 
 
+def size(job: tuple[Path, Given]) -> int:
+    """Bytes of a notebook: the larger ones take longer, and are begun first."""
+    return job[0].stat().st_size
+
+
 def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
     """Execute notebooks (path -> given parameters), and put them into the mirror."""
     executed, logs = place / "executed", place / "logs"
@@ -49,7 +54,7 @@ def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
             pool.submit(
                 execute, notebook, executed / notebook.name, logs / f"{notebook.stem}.log", given
             ): notebook
-            for notebook, given in reversed(jobs.items())  # the later chapters take longest
+            for notebook, given in sorted(jobs.items(), key=size, reverse=True)
             if notebook not in kept
         }
         bar = tqdm(as_completed(running), "chapters", len(running), leave=False, disable=None)
