@@ -37,7 +37,7 @@ class Commands(click.Group):
             from nmpcrl.study.storage.place import harmless
 
             if isinstance(error, click.ClickException):
-                error.message = harmless(said)
+                vars(error)["message"] = harmless(said)  # which click declares final
                 raise
             raise click.ClickException(harmless(said)) from None
 
