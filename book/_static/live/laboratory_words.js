@@ -116,9 +116,11 @@
     notCopied: "This browser does not copy; the text is selected.",
     python: "Continue in Python",
     pythonHint: ({ learner }) => {
-      const same = "The command and the code train the same run, with the same numbers";
-      if (learner !== "DES" && learner !== "RDES") return `${same}.`;
-      return `${same} up to the network’s first fit. A fit is in single precision, and Python adds its numbers in `
+      const same = "The command and the code train the same run";
+      if (learner !== "DES" && learner !== "RDES") {
+        return `${same}, with the same numbers but for rounding, which grows where learning is chaotic.`;
+      }
+      return `${same}, with the same numbers but for rounding up to the network’s first fit. A fit is in single precision, and Python adds its numbers in `
         + "another order: after it the runs part, as on two computers.";
     },
     commandLabel: "Command of the same run",
