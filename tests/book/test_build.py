@@ -286,9 +286,9 @@ def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(sm
 
 def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
     needs = chapters.ask(ROOT / "book/performance.ipynb", {"length": "smoke"})
-    assert not needs["experiments"]
-    assert not needs["summaries"]
-    (call,) = needs["beforehand"]
+    assert not needs.experiments
+    assert not needs.summaries
+    (call,) = needs.beforehand
     assert call.func.__name__ == "read_or_measure"
     assert call.args == ("smoke",)
 
@@ -297,7 +297,7 @@ def test_the_chapter_that_judges_times_asks_only_for_theirs_beforehand():
     chapter = ROOT / "book/05_results.ipynb"
     given = {name: book.SMOKE[name] for name in chapters.parameters(chapter) if name in book.SMOKE}
     needs = chapters.ask(chapter, given)
-    (call,) = needs["beforehand"]
+    (call,) = needs.beforehand
     assert (call.func.__name__, call.args) == ("read_or_measure", ("smoke",))
     assert call.keywords == {"only": ["learning steps"], "calm": True}
 

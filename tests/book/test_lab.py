@@ -79,9 +79,9 @@ def folder(tmp_path_factory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
         patch.setenv("NMPCRL_RUNS", str(place / "runs"))
-        needs = [chapters.ask(notebook, given) for notebook, given in jobs.items()]
-        train.train(*(sum((need[what] for need in needs), ()) for what in chapters.NEEDS[:2]))
-        for call in [call for need in needs for call in need["beforehand"]]:
+        needs = chapters.together(chapters.ask(*job) for job in jobs.items())
+        train.train(needs.experiments, needs.summaries)
+        for call in needs.beforehand:
             call()
         execute.execute_all(place, jobs)
         yield place

@@ -357,7 +357,7 @@ def test_whatever_a_chapter_is_given_it_takes_little_or_refuses_in_a_sentence(dr
         assert "\n" not in said
         assert len(said) < 400
         return
-    cost = estimate((*needs["experiments"], *needs["summaries"]))
+    cost = estimate((*needs.experiments, *needs.summaries))
     assert cost.seconds <= HOURS * 3600
     assert cost.memory <= MEMORY
 

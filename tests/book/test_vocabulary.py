@@ -7,6 +7,7 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from driver.page import enrich
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMED = ("README.md", "CONTRIBUTING.md", "CITATION.cff", "metadata.yaml")
@@ -81,6 +82,11 @@ def strings(code: str) -> list[str]:
     return [node.value for node in nodes if isinstance(getattr(node, "value", None), str)]
 
 
+def said(cell) -> list[str]:
+    """What a cell says."""
+    return [cell.source] if cell.cell_type == "markdown" else strings(cell.source)
+
+
 @cache
 def prose() -> dict[str, str]:
     """What is written for readers, by file."""
@@ -89,12 +95,8 @@ def prose() -> dict[str, str]:
     for path in (ROOT / "nmpcrl").rglob("*.py"):
         found[path.relative_to(ROOT).as_posix()] = "\n".join(strings(path.read_text()))
     for name, cells in NOTEBOOKS.items():
-        said = [
-            part
-            for cell in cells
-            for part in ([cell.source] if cell.cell_type == "markdown" else strings(cell.source))
-        ]
-        found[name] = "\n".join([*said, *map(alternative, cells)])
+        texts = [text for cell in cells for text in said(cell)]
+        found[name] = "\n".join([*texts, *map(alternative, cells)])
     return found
 
 
@@ -152,3 +154,16 @@ def test_an_old_word_is_found(better, text):
 def test_what_the_field_says_is_allowed(text):
     assert not any(found(better, text) for better in OLD)
     assert not finder(PLACES).search(text)
+
+
+@pytest.mark.parametrize(
+    "term",
+    ["TD error", "Expected Sarsa", "bootstrap", "semi-gradient", "on-policy", "off-policy"],
+)
+def test_a_term_is_defined_in_the_paragraph_that_first_uses_it(term):
+    read = [*NOTEBOOKS["01_mdp_and_nmpc.ipynb"], *NOTEBOOKS["02_expected_sarsa.ipynb"]]
+    shown = [cell for cell in read if "goals" not in cell.metadata.get("tags", [])]
+    texts = [text for cell in shown for text in said(cell)]
+    paragraphs = re.sub(enrich.ANCHOR, "", "\n\n".join(texts)).split("\n\n")
+    first = next(one for one in paragraphs if re.search(rf"(?<![\w-]){term}(?![\w-])", one, re.I))
+    assert f"*{term}*" in first

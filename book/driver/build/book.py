@@ -31,7 +31,7 @@ from pathlib import Path
 
 import click
 
-from driver.build.chapters import NEEDS, Given, ask, known, parameters, values
+from driver.build.chapters import Given, ask, known, parameters, together, values
 from driver.build.dress import dress
 from driver.build.execute import execute_all, finished
 from driver.build.mirror import mirror
@@ -45,14 +45,13 @@ SMOKE = {"episodes": 4, "length": "smoke", "layouts": ["A", "D"], "seeds": [0, 1
 def build(place: Path, jobs: dict[Path, Given], announcement: str, strict: bool) -> Path:
     """The six steps."""
     with reported(place / "logs/build.log"):
-        needs = [ask(notebook, given) for notebook, given in jobs.items()]
+        needs = together(ask(*job) for job in jobs.items())
         require_published()
         shutil.rmtree(place / "html", ignore_errors=True)
         mirror(place, announcement)
-        wanted = {n: tuple(dict.fromkeys(one for need in needs for one in need[n])) for n in NEEDS}
         with compiling_for_pages():
-            train(wanted["experiments"], wanted["summaries"])
-        measure(wanted["beforehand"])
+            train(needs.experiments, needs.summaries)
+        measure(needs.beforehand)
         execute_all(place, jobs)
         dress(place / "src", jobs)
         render(place, strict)

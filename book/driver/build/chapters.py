@@ -1,10 +1,11 @@
 """What a chapter of the book is given and asked: its parameters, and what it needs."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import nbformat
 import papermill
@@ -13,7 +14,20 @@ import yaml
 from driver.project import Failure, listed, notebooks
 
 Given = dict[str, Any]  # parameters of a chapter by name
-NEEDS = ("experiments", "summaries", "beforehand")
+
+
+class Needs(NamedTuple):
+    """What a chapter needs; its second cell gives names of these fields to what it needs."""
+
+    experiments: tuple[Any, ...] = ()  # whole runs
+    summaries: tuple[Any, ...] = ()  # of these runs
+    beforehand: tuple[Callable[[], Any], ...] = ()  # done with the machine to itself
+
+
+def together(needs: Iterable[Needs]) -> Needs:
+    """What several chapters need, each thing once."""
+    each = zip(*needs, strict=True)
+    return Needs(*(tuple(dict.fromkeys(chain.from_iterable(one))) for one in each))
 
 
 def parameters(notebook: Path) -> list[str]:
@@ -44,23 +58,20 @@ def refuse_unknown(notebook: Path, given: Given) -> None:
             )
 
 
-def ask(notebook: Path, given: Given) -> dict[str, tuple[Any, ...]]:
-    """What a chapter needs: run its parameters cell, set `given`, run its check cell.
-
-    Returns what that cell gives each of `NEEDS`.
-    """
+def ask(notebook: Path, given: Given) -> Needs:
+    """What a chapter needs: run its parameters cell, set `given`, run its check cell."""
     refuse_unknown(notebook, given)
     cells = [cell for cell in nbformat.read(notebook, 4).cells if cell.cell_type == "code"]
     if not cells or "parameters" not in cells[0].metadata.get("tags", []):
-        return dict.fromkeys(NEEDS, ())
-    names = {"__name__": "__main__"}
+        return Needs()
+    names: dict[str, Any] = {"__name__": "__main__"}
     try:
         exec(cells[0].source, names)
         names.update(given)
         exec(cells[1].source, names)
     except ValueError as error:  # ParameterError: the chapter's own sentence
         raise Failure(str(error)) from error
-    return {need: tuple(names.get(need, ())) for need in NEEDS}
+    return Needs(*(tuple(names.get(need, ())) for need in Needs._fields))
 
 
 def nearest(name: str, names: Iterable[str]) -> str:

@@ -41,12 +41,9 @@ def needed(files: Iterable[str]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """The runs, and the runs of which the summaries, are to be stored."""
     from nmpcrl.study.limits import seconds_of
 
-    asked = [chapters.ask(path, given(path)) for path in (ROOT / "book" / f for f in files)]
-    whole, summarised = (
-        tuple(dict.fromkeys(one for needs in asked for one in needs[what]))
-        for what in ("experiments", "summaries")
-    )
-    return tuple(one for one in whole if seconds_of(one) > LONG), summarised
+    paths = [ROOT / "book" / file for file in files]
+    needs = chapters.together(chapters.ask(path, given(path)) for path in paths)
+    return tuple(one for one in needs.experiments if seconds_of(one) > LONG), needs.summaries
 
 
 def examples() -> tuple[Any, ...]:
