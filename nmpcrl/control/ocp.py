@@ -85,7 +85,7 @@ class Ocp(ABC):
     @property
     @abstractmethod
     def slack_weights(self) -> Any:
-        """What a unit of each slack of stage 0 costs: a number, or shape (M,)."""
+        """The cost of a unit of each slack of stage 0, a number or shape (M,)."""
 
     @abstractmethod
     def settled(self, p: Vector) -> tuple[Any, Vector]:
