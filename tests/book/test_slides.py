@@ -155,7 +155,9 @@ def test_a_live_figure_fits_its_slide_works_there_and_keeps_the_arrow_keys(shown
         assert tab.evaluate("Reveal.getIndices().h") == where
 
 
-PRINTED = "import sys, pathlib; from driver.course import slides; slides.printed([pathlib.Path(sys.argv[1])])"
+PRINTED = """import sys, pathlib
+from driver.course import slides
+slides.printed([pathlib.Path(sys.argv[1])])"""
 
 
 def test_a_pdf_has_a_wide_page_for_each_slide_but_the_live_ones(decks):
