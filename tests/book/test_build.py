@@ -55,6 +55,8 @@ def test_a_chapter_that_does_not_exist_is_refused_with_those_that_do(driver):
     assert "'03_rde'" in sentence
     for chapter in ("01_mdp_and_nmpc", "02_expected_sarsa", "03_rdes", "04_ges", "05_results"):
         assert chapter in sentence
+    *_, before_last, last = project.notebooks()
+    assert sentence.endswith(f", {before_last} and {last}.")
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from driver import project
 from driver.paper import pdf, whole
 from filelock import FileLock
 from pypdf import PdfReader
+from pypdf.generic import DictionaryObject, NameObject, TextStringObject
 
 
 def test_without_a_built_book_the_reader_is_told_to_make_one(tmp_path):
@@ -31,6 +32,17 @@ def test_without_a_chromium_the_reader_is_told_what_to_install(tmp_path, monkeyp
     (sentence,) = result.output.strip().splitlines()
     assert "apt-get install chromium" in sentence
     assert not (tmp_path / pdf.NAME).exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "role"), [("Formula: x", "/Formula"), ("A plan", "/Figure"), ("", "/Div")]
+)
+def test_what_chromium_calls_a_figure_is_a_formula_a_picture_or_a_part(words, role):
+    figure = DictionaryObject({NameObject("/S"): NameObject("/Figure")})
+    figure[NameObject("/Alt")] = TextStringObject(words)
+    pdf.retag(figure)
+    assert figure["/S"] == role
+    assert figure["/Alt"] == words.removeprefix("Formula: ")
 
 
 @pytest.mark.parametrize(
