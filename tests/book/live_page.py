@@ -16,6 +16,10 @@ CHAPTERS = {  # of each live figure
 ALSO = ("07_beyond",)  # has the figure of runs, too
 FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => done(figure.shown))))"""
+LATER = """count => new Promise(done => {
+  const next = left => left ? requestAnimationFrame(() => next(left - 1)) : done()
+  next(count)
+})"""
 OTHERWISE = {"alpha": 5.01e-8, "decay": "episode", "seed": 3}  # than two learners begin with
 MOST = 200_000  # bytes that a chapter's live figures may add
 
@@ -46,6 +50,11 @@ class Tab:
     def shown(self) -> dict:
         """What was asked and found, once it is drawn."""
         return self.figure.evaluate(FRAMES)
+
+    def later(self, frames=30) -> "Tab":
+        """This page, once it could have drawn so many pictures more."""
+        self.page.evaluate(LATER, frames)
+        return self
 
     def handle(self, name):
         return self.figure.get_by_role("slider", name=name, exact=True)

@@ -116,8 +116,7 @@ def test_a_swipe_from_a_slider_scrolls_the_page_or_moves_the_slider(opened, by, 
     before, box = tab.shown(), slider.bounding_box()
     track = (box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2)  # off the thumb
     tab.swipe(track, by, steps=8)
-    tab.page.wait_for_timeout(300)  # a browser scrolls on for a while
-    after = tab.shown()
+    after = tab.later().shown()  # a browser scrolls on for a while
     assert (after["given"]["theta"][5] != before["given"]["theta"][5]) == moves
     assert (after["given"] == before["given"]) != moves
     assert (abs(slider.bounding_box()["y"] - box["y"]) > 50) != moves
@@ -128,7 +127,7 @@ def test_nothing_lies_on_the_sliders_on_a_telephone(opened):
     for slider in tab.begun().figure.locator("input[type=range]").all():
         for height in (400, 762):  # scroll up, to where the theme has its button
             slider.evaluate("(one, y) => scrollBy(0, one.getBoundingClientRect().y - y)", height)
-            tab.page.wait_for_timeout(100)
+            tab.later(6)
         assert slider.evaluate(COVERED) == []
 
 

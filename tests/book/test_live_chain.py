@@ -86,13 +86,13 @@ def test_a_step_a_key_and_play_move_through_the_updates(tab):
 
 def test_nothing_moves_before_play_or_after_pause(tab):
     tab.quiet().figure.evaluate(MOVES)
-    tab.page.wait_for_timeout(300)
+    tab.later()
     assert tab.page.evaluate("window.changes") == 0
     tab.click("Play")
     tab.page.wait_for_function(AT, arg=[tab.figure.element_handle(), 2])
     tab.click("Pause")
     at = tab.shown()["given"]["at"]
-    tab.page.wait_for_timeout(300)
+    tab.later()
     assert tab.shown()["given"]["at"] == at < 120
 
 

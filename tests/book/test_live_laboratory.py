@@ -49,6 +49,7 @@ ARMS_OF = """lengths => {
   const { runs } = document.querySelector("figure.live").shown
   return String(runs.map(run => run.arm.length)) === String(lengths)
 }"""
+LINKED = """() => document.querySelector("figure.live textarea").value === location.href"""
 REFUSES = "Clipboard.prototype.writeText = async () => { throw new Error('refused') }"
 SLOW = """
   const post = Worker.prototype.postMessage
@@ -256,7 +257,7 @@ def test_training_is_stopped_and_what_it_found_stays(opened):
     tab.click("Stop")
     stopped = tab.shown()["runs"][0]
     assert stopped["state"] == "stopped"
-    tab.page.wait_for_timeout(300)
+    tab.later()
     assert len(tab.shown()["runs"][0]["rows"]) == len(stopped["rows"])
     assert "stopped" in tab.figure.get_by_role("listitem").inner_text()
 
@@ -286,7 +287,7 @@ def test_a_link_restores_everything_and_the_browsers_arrows_lead_back(tab, opene
     fill(tab, Seed=9, Step_size_β="3e-7")
     tab.press("Target, heading", "ArrowLeft")
     settled(tab, first)
-    tab.page.wait_for_timeout(600)
+    tab.page.wait_for_function(LINKED)
     link, given = box(tab, "A link to these settings"), tab.shown()["given"]
     assert link == tab.page.url
     other = opened(FIGURE).begun()

@@ -58,7 +58,7 @@ def test_it_trains_until_it_is_stopped_and_goes_on(tab):
     tab.page.wait_for_function(EPISODES, arg=[tab.figure.element_handle(), 2])
     tab.click("Stop")
     shown = tab.shown()
-    tab.page.wait_for_timeout(300)
+    tab.later()
     assert tab.shown() == shown
     found, records = shown["found"][0], run(Experiment(learner="ES", episodes=10))
     assert 10 <= found["episode"] < 300

@@ -54,7 +54,7 @@ def test_it_trains_until_it_is_stopped_and_the_network_with_theta_errs_less(tab)
     tab.page.wait_for_function(TRAINED, arg=[tab.figure.element_handle(), 20])
     tab.click("Stop")
     shown = tab.shown()
-    tab.page.wait_for_timeout(300)
+    tab.later()
     assert tab.shown() == shown
     des, rdes = shown["found"]
     assert 20 <= des["episode"] < two_learners.EPISODES

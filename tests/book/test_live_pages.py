@@ -90,5 +90,5 @@ def test_nothing_moves_by_itself(opened, figure, motion):
           new MutationObserver(all => window.changes += all.length).observe(figure, options)
         }"""
     )
-    tab.page.wait_for_timeout(400)
+    tab.later()
     assert tab.page.evaluate("window.changes") == 0
