@@ -29,7 +29,7 @@ DAMAGED = {  # and what is said to be allowed
     "learner=random": "one of ES, DES, RDES, GES, TDC, QL, frozen",
     "alpha=": "above 0", "alpha=0": "above 0", "alpha=%": "above 0",
     "seed=1.5": "a whole number from 0", "horizon=41": "a whole number from 1 to 40",
-    "colour=red": "No setting", "{}=1": "No setting", "=1": "No setting",
+    "colour=red": "No setting", "{}=1": "No setting", "{b}=1": "No setting", "=1": "No setting",
     "constructor=1": "No setting", "theta=1,2": "9 numbers",
     "theta=1e9,1,1,1,1,1,1,1,1": "9 numbers from -1000000 to 1000000",
     "layout=1,2;3": "1 to 8 pairs", "layout=1,2,3": "1 to 8 pairs",

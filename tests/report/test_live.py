@@ -51,6 +51,9 @@ def test_the_problem_is_the_one_that_the_controller_solves(nmpc, data):
     for name, value in Riccati().prepare(nmpc.ocp).problem._asdict().items():
         shown = data["problem"][name]
         assert (shown[:8] if name == "discount" else shown) == np.asarray(value).tolist()
+    limits = [data["problem"][name] for name in ("lower", "upper")]
+    assert limits == [nmpc.plant.lower.tolist(), nmpc.plant.upper.tolist()]
+    assert data["problem"]["most_discs"] == browser.DISCS
 
 
 def test_a_start_on_a_boundary_counts_as_with_the_controller(nmpc):
