@@ -79,7 +79,7 @@ class Nmpc:
                     " Nmpc(problem, solver=...)"
                 )
             self.horizon, self.gamma = plant.horizon, plant.gamma
-            self.n, self.m, self.parameters = plant.states, plant.inputs, plant.names.size
+            self.n, self.m, self._theta_size = plant.states, plant.inputs, plant.names.size
             self._far = FARTHEST
         else:
             if task is None:
@@ -91,7 +91,7 @@ class Nmpc:
                 raise ValueError(f"the task has {task.start.size} states and the plant {plant.n}")
             self._plant, self._task, self._slack_weight = plant, task, float(slack_weight)
             self.solver.check(task)
-            self.n, self.m, self.parameters = plant.n, plant.m, 2 * plant.n + plant.m + 1
+            self.n, self.m, self._theta_size = plant.n, plant.m, 2 * plant.n + plant.m + 1
             box = np.abs([task.lower, task.upper])
             self._far = max(FAR, 100 * box[np.isfinite(box)].max(initial=0))
         self.lower, self.upper = plant.lower, plant.upper
@@ -123,7 +123,7 @@ class Nmpc:
         """
         began = time.perf_counter()
         state = _checked("state", state, self.n, self._far)
-        theta = _checked("theta", theta, self.parameters)
+        theta = _checked("theta", theta, self._theta_size)
         known = None
         if self.problem is not None:
             known = self.problem.stage_data(data)

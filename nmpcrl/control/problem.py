@@ -38,9 +38,7 @@ class Soft:
 
     row: Callable[..., Any]  # (x, u, th) -> h, a number or a column; with d where there are data
     weight: Any = 1.0  # W > 0, a number, or one a row
-    stages: Any = (
-        None  # among 0, ..., N: an index, a slice or a list; all that are possible if None
-    )
+    stages: Any = None  # among 0, ..., N: an index, a slice or a list; all possible ones if None
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from numba import njit, types
 
 from .hessian import gradient_along
 from .kernel import (
+    INSIDE,
     PROBLEM,
     RIGID,
     SAME,
@@ -44,7 +45,7 @@ def restore_rows(task, duals, factor, solved):
             else:
                 side = task.sides[j - obstacles]
                 old = side[1] * solved[nu + variables + int(side[0])] / factor
-            duals.lam[i, j] = min(max(old, 1e-12 * weight), (1.0 - 1e-12) * weight)
+            duals.lam[i, j] = min(max(old, INSIDE * weight), (1.0 - INSIDE) * weight)
 
 
 SIGNATURE = types.boolean(*PROBLEM, vector, matrix, matrix, vector)

@@ -22,6 +22,7 @@ from .expressions import (
     stage_mixed,
 )
 from .kernel import (
+    INSIDE,
     RIGID,
     SAME,
     add,
@@ -61,7 +62,7 @@ def restore_rows(task, duals, factor, solved):
         for j in range(NROWS):
             weight = task.weights[i, j]
             old = solved[row + j] / factor if task.kind[i, j] == PLANNED else 0.0
-            duals.lam[i, j] = min(max(old, 1e-12 * weight), (1.0 - 1e-12) * weight)
+            duals.lam[i, j] = min(max(old, INSIDE * weight), (1.0 - INSIDE) * weight)
 
 
 @inlined
