@@ -108,7 +108,7 @@
       problem.lines = [];
       move(part);
     };
-    const open = (given, run = null) => { // a find, a link, the beginning; or a run, to follow
+    const open = (given, run = null) => { // an example, a link, the beginning; or a run, to follow
       for (const input of figure.querySelectorAll("[aria-invalid=true]")) set(input, { "aria-invalid": false });
       chosen = run;
       change(given);

@@ -1,4 +1,4 @@
-// What a reader of the laboratory takes along, the run as a link and as Python; and the finds that open with a click.
+// What a reader of the laboratory takes along, the run as a link and as Python; and the examples that open with a click.
 (() => {
   "use strict";
 
@@ -47,10 +47,10 @@
     if (!data.gallery.length) return;
     add(parent, "p", { class: "plot-title" }, words.gallery);
     const row = add(parent, "div", { class: "buttons gallery" }), sentence = add(parent, "p", { class: "sentence", role: "status" });
-    for (const find of data.gallery) {
-      shared.button(row, find.title, () => {
-        sentence.textContent = find.sentence;
-        open({ ...settings.defaults(data), ...find.settings });
+    for (const example of data.gallery) {
+      shared.button(row, example.title, () => {
+        sentence.textContent = example.sentence;
+        open({ ...settings.defaults(data), ...example.settings });
       });
     }
   }

@@ -22,7 +22,7 @@
     add: "Add an obstacle",
     remove: "Remove the last one",
     reset: "Reset all",
-    gallery: "Six finds, to open with a click:",
+    gallery: "Six examples, to open with a click:",
     names: {
       learner: "Learner", alpha: "Step size α", beta: "Step size β", beta_tdc: "Step size β", zeta: "Learning rate ζ",
       decay: "Decay per", decay_rate: "Decay factor c", horizon: "Horizon N", seed: "Seed", episodes: "Episodes",
