@@ -46,7 +46,7 @@ addEventListener("pointermove", () => { if (!due) requestAnimationFrame(draw); d
 draw()
 window.nmpcrl = {
   module: "", solver: async () => ({ wasm: {}, rollout: () => ({ failed: false }) }),
-  generator: () => 0, network: (_, inputs) => ({
+  generator: () => 0, network: (_, { inputs }) => ({
     remember(row) { if (row.length !== inputs || inputs !== 3) throw new Error("other inputs") },
     fit: () => 0,
   }),
