@@ -1,0 +1,185 @@
+"""How hard a layout looks before anything is trained: the measures that may predict success.
+
+The first five are those by which BARN orders its maps (Perille et al. 2020, "Benchmarking Metric
+Ground Navigation"), written anew from their definitions. There they are counted in the cells of a
+grid, along its shortest path, and averaged over the path. Here
+
+- obstacles are discs and walls are lines, so that distances are exact and not numbers of cells; a
+  disc is as wide as plans at theta_c = 0 keep, which is the configuration space of the robot;
+- the path is the first trajectory of the controller, without noise, from theta_init, up to where
+  the robot has arrived and no further; its points are `SPACING` apart;
+- a point within a disc is at distance 0 from it and sees nothing;
+- every direction ends at a wall, so that none has to be left out.
+"""
+
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control import Task
+from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.study import paper
+from nmpcrl.study.layouts import ARRIVED, Centres, gaps
+from nmpcrl.study.storage.archive import Column
+
+SPACING = 0.15  # [m]; the side of a cell of BARN
+REACH = 3 * SPACING  # [m]; how far BARN's dispersion looks
+SIGHTS = 8  # directions in which visibility looks
+SECTORS = 16  # directions in which dispersion looks
+RAISED = 0.01  # of theta_c, for the slope of the cost
+OPEN = 1.0  # theta_c beyond which it does not matter where a gap closes
+
+
+@dataclass(frozen=True)
+class Difficulty:
+    """Measures of one layout; the higher, the easier, unless said."""
+
+    closest: float  # mean distance [m] to the closest obstacle or wall
+    visibility: float  # mean distance [m] to what is seen in `SIGHTS` directions
+    dispersion: float  # changes between blocked and free around a point; the higher, the harder
+    dimension: float  # mean of the least width [m] across a point, along 4 lines
+    tortuosity: float  # length of the path over that of its chord; the higher, the harder
+    cost: float  # without noise, of theta_init; the higher, the harder
+    slope: float  # of the cost in theta_c; the higher, the harder
+    overshoot: float  # alpha ||phi||^2 in the start; the higher, the harder
+    closes: float  # theta_c at which the first gap of the path closes, at most `OPEN`
+
+
+BARN = ("closest", "visibility", "dispersion", "dimension", "tortuosity")
+PILOT = "closes"  # what predicted every failure of the pilot
+MEASURES = tuple(one.name for one in fields(Difficulty))
+RIVALS = tuple(name for name in MEASURES if name != PILOT)
+
+
+def measure(centres: Centres) -> Difficulty:
+    """All measures of a layout; two rollouts and one solve are made."""
+    task = paper.task_among(centres)
+    controller, theta = Persistent(paper.controller(task)), np.array(paper.THETA_INIT)
+    first = evaluate(controller, theta, paper.STEPS)
+    raised = theta + RAISED * np.eye(len(theta))[-1]
+    phi = controller.solve(task.start, theta).features
+    path = until_arrival(first.states, task)
+    return Difficulty(
+        **barn(path, task),
+        cost=first.cost,
+        slope=(evaluate(controller, raised, paper.STEPS).cost - first.cost) / RAISED,
+        overshoot=float(paper.ALPHA * phi @ phi),
+        closes=min(closing(task, path), OPEN),
+    )
+
+
+def as_row(centres: Centres) -> dict[str, float]:
+    """`measure`, by name."""
+    return asdict(measure(centres))
+
+
+def barn(path: Matrix, task: Task) -> dict[str, float]:
+    """The five measures of BARN along a path, shape (points, 2)."""
+    points = spaced(path)
+    across = sight(points, SIGHTS, task)
+    return {
+        "closest": float(clearance(points, task).mean()),
+        "visibility": float(across.mean()),
+        "dispersion": float(_changes(sight(points, SECTORS, task) <= REACH).mean()),
+        "dimension": float((across[:, : SIGHTS // 2] + across[:, SIGHTS // 2 :]).min(1).mean()),
+        "tortuosity": _length(path) / float(np.linalg.norm(path[-1] - path[0])),
+    }
+
+
+def closing(task: Task, path: Matrix) -> float:
+    """theta_c at which the first of the gaps closes that a path goes through; else infinity."""
+    keep_out = _radius(task)
+    widths = gaps(task, path, 0.0)
+    # closed where sides * keep_out * sqrt(1 + theta_c) is what lies between the centres
+    sides = {gap: 1 if min(gap) < 0 else 2 for gap in widths}
+    apart = {gap: width / (sides[gap] * keep_out) + 1 for gap, width in widths.items()}
+    return min((one**2 - 1 for one in apart.values()), default=np.inf)
+
+
+def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
+    """The least theta_c of a grid at which the robot does not arrive, all else as theta_init.
+
+    Nothing is learned. nan where it arrives on the whole grid.
+    """
+    task = paper.task_among(centres)
+    controller, theta = Persistent(paper.controller(task, horizon=horizon)), [*paper.THETA_INIT]
+    for theta_c in grid:
+        states = evaluate(controller, np.array([*theta[:-1], theta_c]), paper.STEPS).states
+        if len(states) < paper.STEPS or task.distance(states[-1]) > ARRIVED:
+            return float(theta_c)
+    return np.nan
+
+
+def raised_cost(layout: str | Centres, theta: Vector, share: float) -> float:
+    """By which share of its cost a rollout costs more with theta_c raised by another share."""
+    controller = Persistent(paper.nmpc(layout))
+    raised = np.array([*theta[:-1], (1 + share) * theta[-1]])
+    before, after = (evaluate(controller, one, paper.STEPS).cost for one in (theta, raised))
+    return after / before - 1
+
+
+def until_arrival(states: Matrix, task: Task) -> Matrix:
+    """The positions of a trajectory up to the first at the target; all if it does not arrive."""
+    there = np.flatnonzero(np.linalg.norm(states - task.target, axis=1) <= ARRIVED)
+    return states[: there[0] + 1 if there.size else None, :2]
+
+
+def spaced(path: Matrix) -> Matrix:
+    """Points of a path that lie `SPACING` apart along it, from its first on."""
+    along = np.r_[0.0, np.linalg.norm(np.diff(path, axis=0), axis=1).cumsum()]
+    wanted = np.arange(0.0, along[-1] + 1e-9, SPACING)
+    return np.stack([np.interp(wanted, along, column) for column in path.T], axis=1)
+
+
+def clearance(points: Matrix, task: Task) -> Vector:
+    """Distance [m] of each point, shape (k, 2), to the closest disc or wall; 0 within a disc."""
+    away = np.linalg.norm(points[:, None] - _centres(task), axis=-1) - _radius(task)
+    walls = np.concatenate([points - task.lower[:2], task.upper[:2] - points], axis=1)
+    result: Vector = np.concatenate([away, walls], axis=1).min(axis=1).clip(min=0)
+    return result
+
+
+def sight(points: Matrix, directions: int, task: Task) -> Matrix:
+    """Distance [m] from points, shape (k, 2), to what is met first in so many directions.
+
+    The directions go around, from that of x on.
+    """
+    angle = np.arange(directions) * 2 * np.pi / directions
+    ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    to = _centres(task) - points[:, None]  # (k, discs, 2)
+    along = np.einsum("kdi,ri->krd", to, ray)
+    inside = _radius(task) ** 2 - (to**2).sum(-1)[:, None] + along**2
+    hit = along - np.sqrt(inside.clip(min=0))
+    within = (to**2).sum(-1)[:, None] <= _radius(task) ** 2
+    discs = np.where(within, 0.0, np.where((inside >= 0) & (hit >= 0), hit, np.inf))
+    result: Matrix = np.minimum(discs.min(axis=-1, initial=np.inf), _to_walls(points, ray, task))
+    return result
+
+
+def _to_walls(points: Matrix, ray: Matrix, task: Task) -> Matrix:
+    """Distance [m] to the wall that each ray meets first, shape (points, rays)."""
+    limit = np.where(ray > 0, task.upper[:2], task.lower[:2])  # (rays, 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = (limit - points[:, None]) / ray
+    result: Matrix = np.where(np.abs(ray) > 1e-12, far, np.inf).min(axis=-1).clip(min=0)
+    return result
+
+
+def _changes(blocked: Column) -> Vector:
+    """How often neighbours around a point differ, shape (points,)."""
+    result: Vector = (blocked != np.roll(blocked, 1, axis=1)).sum(axis=1)
+    return result
+
+
+def _centres(task: Task) -> Matrix:
+    return np.stack(task.discs[:2], axis=1)
+
+
+def _radius(task: Task) -> float:
+    """Of the discs in the configuration space at theta_c = 0 [m]."""
+    return float(task.discs[2].max() / 2)
+
+
+def _length(path: Matrix) -> float:
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())

@@ -1,0 +1,207 @@
+"""Why the more accurate network dies sooner: what theta does as an input of the network, Eq. (11).
+
+A step theta + alpha delta phi changes V in s by alpha delta phi'phi, and the target gamma Q(s+, a+)
+by alpha delta gamma psi'phi, where psi is the slope in theta of whatever predicts. Their ratio is
+the `feedback`: below 1 the TD error shrinks, above 1 a step makes it larger. A second solve has
+psi = phi+. A network without theta has psi = 0. One with theta has the slope that it learned from
+the thetas seen so far, which lie along one line, and it is asked at the end of it.
+
+An intervention changes what predicts, and nothing else: the same noise, first weights, examples
+and fits.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.learning.bootstrap import Bootstrap, Imitation, Successor, Transition
+from nmpcrl.learning.rollout import Persistent
+from nmpcrl.learning.training import Diverged, Step, train
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.setup import controller_of, environment_of, prepare
+from nmpcrl.study.storage.executor import execute
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PROBE = 1e-5  # alpha delta of the step along which a slope is measured: delta = 100 at the paper's
+
+
+@dataclass
+class Held:
+    """The network is asked with theta of the start of the episode; it learns as before."""
+
+    network: Imitation
+    controller: Persistent
+    theta: Vector | None = field(default=None, init=False)  # None where an episode begins
+
+    def __call__(self, transition: Transition, theta: Vector) -> Successor | None:
+        """Value the next state under the theta that is held."""
+        if self.theta is None:
+            self.theta = theta
+        successor = self._value(transition, theta, self.theta)
+        if transition.last:
+            self.theta = None
+        return successor
+
+    def _value(self, transition: Transition, theta: Vector, held: Vector) -> Successor | None:
+        return self.network(transition, held)
+
+
+@dataclass
+class TrueSlope(Held):
+    """`Held`, and what theta has changed since is the NMPC's own change of V in s+."""
+
+    def _value(self, transition: Transition, theta: Vector, held: Vector) -> Successor | None:
+        successor = self.network(transition, held)
+        if successor is None or transition.end:
+            return successor
+        now, then = (
+            self.controller.solve(transition.next_state, one, transition.solution).value
+            for one in (theta, held)
+        )
+        return replace(successor, value=successor.value + now - then)
+
+
+def untouched(network: Imitation, controller: Persistent) -> Bootstrap:
+    """What an experiment has."""
+    return network
+
+
+INTERVENTIONS: Mapping[str, Callable[[Imitation, Persistent], Bootstrap]] = {
+    "none": untouched,
+    "theta held": Held,
+    "true slope": TrueSlope,
+}
+
+
+def feedback(
+    network: Imitation, transition: Transition, theta: Vector, gamma: float, probe: float = PROBE
+) -> float:
+    """gamma psi'phi / phi'phi, psi being the network's slope in theta at (s+, a+), along phi."""
+    phi, where = transition.solution.features, transition.next_state
+    ahead, behind = (
+        network.network.predict(
+            network.inputs(where, transition.solution.next_action, theta + sign * probe * phi)
+        )
+        for sign in (1, -1)
+    )
+    return float(gamma * (ahead - behind) / (2 * probe * (phi @ phi)))
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What became of one run; a column has a row an episode that was begun."""
+
+    stopped: bool
+    theta: Matrix  # at the end, shape (episodes, d)
+    delta: Vector  # root mean square
+    overshoot: Vector  # largest alpha ||phi||^2
+    feedback: Vector  # median over the steps with a prediction
+
+    @property
+    def episodes(self) -> int:
+        """How many were begun."""
+        return len(self.theta)
+
+
+def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
+    """Train a learner that imitates, with one of `INTERVENTIONS`, and watch what theta feeds back.
+
+    Raises:
+        KeyError: there is no such intervention.
+        TypeError: the experiment's learner has no network.
+    """
+    change, controller = INTERVENTIONS[intervention], controller_of(experiment)
+    learner, weights, explore = prepare(experiment, controller)
+    network = learner.bootstrap
+    if not isinstance(network, Imitation):
+        raise TypeError(f"learner = {experiment.learner!r} has no network that is asked with theta")
+    changed = change(network, controller)
+    fed: list[float] = []
+
+    def watched(transition: Transition, theta: Vector) -> Successor | None:
+        successor = changed(transition, theta)
+        if successor is not None:
+            fed.append(feedback(network, transition, theta, learner.gamma))
+        return successor
+
+    found, stopped = _Columns(), False
+    how: dict[str, Any] = environment_of(experiment) | {
+        "clipped": experiment.clipped,
+        "constrained": experiment.values_actions,
+    }
+    steps = train(replace(learner, bootstrap=watched), controller, weights, explore, **how)
+    try:
+        for step in steps:
+            found.add(step, experiment.alpha, fed)
+    except Diverged:
+        stopped = True
+    return found.outcome(stopped)
+
+
+def compare(
+    experiments: Iterable[Experiment],
+    interventions: Iterable[str] = tuple(INTERVENTIONS),
+    *,
+    workers: int | None = None,
+    progress: bool = True,
+) -> "pd.DataFrame":
+    """`watch` for many, in parallel.
+
+    Returns:
+        Columns learner, layout, decay, seed, intervention, stopped, episodes (that were begun),
+        overshoot (largest alpha ||phi||^2) and feedback (largest median of an episode).
+    """
+    import pandas as pd
+
+    rows: dict[tuple[Experiment, str], dict[str, Any]] = {}
+
+    def keep(one: tuple[Experiment, str], outcome: Outcome) -> str:
+        named = {name: getattr(one[0], name) for name in ("learner", "layout", "decay", "seed")}
+        rows[one] = named | {
+            "intervention": one[1],
+            "stopped": outcome.stopped,
+            "episodes": outcome.episodes,
+            "overshoot": float(np.nanmax(outcome.overshoot, initial=0.0)),
+            "feedback": float(np.nanmax(outcome.feedback, initial=-np.inf)),
+        }
+        return ""
+
+    jobs = {(e, name): partial(watch, e, name) for e in experiments for name in interventions}
+    for error in execute(jobs, keep, workers=workers, progress=progress).values():
+        raise error
+    return pd.DataFrame([rows[one] for one in jobs])
+
+
+class _Columns:
+    """What `Outcome` says of each episode, while it grows."""
+
+    def __init__(self) -> None:
+        self._theta: list[Vector] = []
+        self._steps: list[list[tuple[float, float, float]]] = []
+
+    def add(self, step: Step, alpha: float, fed: list[float]) -> None:
+        """One step; the last of `fed` is its own, if it had a prediction."""
+        if step.episode == len(self._theta):
+            self._theta.append(step.weights.theta)
+            self._steps.append([(np.nan, np.nan, np.nan)])
+        self._theta[-1] = step.weights.theta
+        if step.solution and step.update and step.update.delta is not None:
+            phi = step.solution.features
+            self._steps[-1].append((step.update.delta, alpha * float(phi @ phi), fed[-1]))
+
+    def outcome(self, stopped: bool) -> Outcome:
+        """The columns of what was added; nan in an episode without a prediction."""
+        episodes = [np.array(rows[1:] or rows).T for rows in self._steps]
+        return Outcome(
+            stopped,
+            np.array(self._theta),
+            np.array([np.sqrt(np.mean(delta**2)) for delta, _, _ in episodes]),
+            np.array([overshoot.max() for _, overshoot, _ in episodes]),
+            np.array([np.median(own) for _, _, own in episodes]),
+        )
