@@ -1,0 +1,95 @@
+"""The robot in one layout, whose every episode counts: what an entry of the suite is given."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.control import Task
+from nmpcrl.learning import Exploration, Learner, Rollout, Step, Weights, train
+from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.study import paper
+from nmpcrl.study.geometry import Centres
+from nmpcrl.study.storage.refusal import Refusal
+
+
+class OverBudget(Refusal):
+    """An episode was begun for which there was no budget."""
+
+
+class Robot:
+    """One layout and a budget of episodes, with noise or without.
+
+    An episode counts from its first step on, whether it is trained on, confirms something or is a
+    tuner's: by `train`, by `rollout` and `cost`, or as a reset of `env`.
+    """
+
+    def __init__(self, centres: Centres, budget: int, seed: int) -> None:
+        """Nothing is spent.
+
+        Args:
+            centres: of the obstacles [m].
+            budget: episodes that may be begun.
+            seed: of all that an entry draws; two with the same seed do the same.
+        """
+        self.centres, self.budget, self.seed = centres, budget, seed
+        self.rng = np.random.default_rng(seed)
+        self.task: Task = paper.task_among(centres)
+        self.controller = Persistent(paper.controller(self.task))
+        self.begun = 0  # episodes; more than the budget where an entry has tried to begin more
+
+    @property
+    def left(self) -> int:
+        """Episodes that may still be begun."""
+        return max(self.budget - self.begun, 0)
+
+    def train(
+        self, learner: Learner, weights: Weights, explore: Exploration, *, constrained: bool = False
+    ) -> Iterator[Step]:
+        """`learning.train` with this robot.
+
+        Raises:
+            OverBudget: an episode is not to be had.
+            Diverged: as `learning.train`.
+        """
+        how: dict[str, Any] = {"constrained": constrained, "start": self._begin}
+        return train(learner, self.controller, weights, explore, **how)
+
+    def rollout(self, theta: Vector) -> Rollout:
+        """`learning.evaluate`: an episode without noise under the policy of theta.
+
+        Raises:
+            OverBudget: it is not to be had.
+        """
+        return evaluate(self.controller, theta, paper.STEPS, start=self._begin)
+
+    def cost(self, theta: Vector) -> float:
+        """The summed cost of `rollout`; infinite where a solve failed."""
+        return self.rollout(theta).cost
+
+    def env(self) -> Any:
+        """`nmpcrl/Robot-v0` in this layout, whose every reset counts.
+
+        Raises:
+            OverBudget: when it is reset and an episode is not to be had.
+        """
+        from nmpcrl.study.robot import RobotEnv  # and Gymnasium, which not all entries need
+
+        robot = self
+
+        class Counted(RobotEnv):
+            """The environment, which asks before it begins."""
+
+            def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+                robot._begin()
+                return super().reset(seed=seed, options={"layout": robot.centres})
+
+        return Counted(self.centres)
+
+    def _begin(self, _: Any = None) -> Vector:
+        """The start of an episode, once it is counted."""
+        self.begun += 1
+        if self.begun > self.budget:
+            raise OverBudget(f"episode {self.begun} was begun with a budget of {self.budget}")
+        return self.task.start

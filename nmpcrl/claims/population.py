@@ -1,0 +1,336 @@
+"""What the population answers, by the definitions of `population_questions`.
+
+Whatever is missing is left out: a layout answers what its runs can tell, and is not asked the rest.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl.analysis.difficulty import MEASURES, PILOT, RIVALS
+from nmpcrl.analysis.predictors import Logistic, auc, brier, fit, over_layouts
+from nmpcrl.analysis.statistics import Estimate, rate
+from nmpcrl.claims.by_runs import RunClaim
+from nmpcrl.claims.own_claims import OWN_CLAIMS
+from nmpcrl.claims.paper_claims import BY_RUNS, cost_reduced
+from nmpcrl.claims.population_questions import (
+    CLIFF_COST,
+    CLOSES_BEFORE,
+    DEAD_BY,
+    EXPECTED,
+    RESAMPLES,
+    RIDGE,
+    SAME_CLOSING,
+    STANDING,
+    WORDS,
+)
+from nmpcrl.claims.rule import MAJORITY, Observations, Paths, read
+from nmpcrl.claims.thresholds import was_stopped
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
+from nmpcrl.claims.wider_claims import WIDER_CLAIMS
+from nmpcrl.study import paper
+from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.population_design import HORIZONS, name_of
+
+PICTURE = ("C1", "C2", "C5", "C9")  # the paper's whole picture
+JUDGED = ("judge", "judge again")  # parts
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of a question."""
+
+    question: str
+    outcome: Outcome
+    counts: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # yes of layouts, by part
+    numbers: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def words(self) -> str:
+        """The outcome as a page says it."""
+        return WORDS.get(self.outcome, str(self.outcome))
+
+
+def asked() -> dict[str, RunClaim]:
+    """The claims that are put to each layout, by their names in `EXPECTED`."""
+    known = {**BY_RUNS, **WIDER_CLAIMS, **OWN_CLAIMS}
+    alone = {name: name.partition(" ")[0] for name in EXPECTED if name not in known}
+    improves = {
+        name: replace(BY_RUNS["C9"], name=name, **cost_reduced((learner,)))
+        for name, learner in alone.items()
+    }
+    return {name: (known | improves)[name] for name in EXPECTED}
+
+
+def held(runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTED)) -> pd.DataFrame:
+    """Where each claim holds, a row a claim and layout that it could be put to.
+
+    Args:
+        runs: of `rows.table`, of one setting.
+        paths: as `paper_claims.judge` takes them.
+        claims: names in `EXPECTED`.
+
+    Returns:
+        Columns claim, layout (its name in the population), yes, of (answers) and holds.
+    """
+    rows, known, there = [], asked(), {*runs.learner}
+    for name in claims:
+        if not {*known[name].learners} <= there:
+            continue
+        counts = known[name].settled(Observations(runs, paths)).counts
+        for layout in runs.layout.unique():
+            yes, of = counts.get(layout, (0, 0))
+            if of:
+                rows.append((name, name_of(layout), yes, of, yes / of > MAJORITY))
+    return pd.DataFrame(rows, columns=["claim", "layout", "yes", "of", "holds"])
+
+
+def shares(where: pd.DataFrame) -> pd.DataFrame:
+    """In which share of the layouts each claim holds, beside what was expected.
+
+    Args:
+        where: of `held`.
+
+    Returns:
+        Columns claim, holding, layouts, share, low, high (by `rate`: layouts are independent),
+        outcome (by `rule.read`), expected (an outcome) and within (the share that was expected).
+    """
+    rows = []
+    for name, group in where.groupby("claim", sort=False):
+        holding, layouts = int(group.holds.sum()), len(group)
+        share, expected = rate(holding, layouts), EXPECTED[str(name)]
+        numbers = (share.value, share.low, share.high)
+        said = (read(holding, layouts), expected.outcome, share.value in expected)
+        rows.append((name, holding, layouts, *numbers, *said))
+    names = ["claim", "holding", "layouts", "share", "low", "high", "outcome", "expected", "within"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def succeeds(runs: pd.DataFrame, learner: str = "ES") -> pd.Series:
+    """Whether a learner improves in each layout, by its name in the population."""
+    where = held(runs, {}, [f"{learner} improves"])
+    return where.set_index("layout").holds.astype(bool)
+
+
+def predictor_scores(difficulty: pd.DataFrame, tuned: pd.Series, judged: pd.Series) -> pd.DataFrame:
+    """Each measure as a predictor of success, fitted on some layouts and scored on others.
+
+    Args:
+        difficulty: columns `MEASURES`, a row a layout.
+        tuned: whether learning succeeds, by layout, for the fit.
+        judged: the same of the layouts that it is scored on.
+
+    Returns:
+        A row a measure: slope (of the standardised measure), auc and brier, each an `Estimate`,
+        and ahead, by how much the area of `PILOT` is larger (an `Estimate`; 0 for itself).
+    """
+    y = judged.to_numpy(bool)
+    fits = {name: _fitted(difficulty[name], tuned) for name in MEASURES}
+    probability = {name: one(difficulty.loc[judged.index, name]) for name, one in fits.items()}
+    pilot = probability[PILOT]
+    area = partial(over_layouts, auc, resamples=RESAMPLES)
+    return pd.DataFrame(
+        {
+            name: {
+                "slope": fits[name].slope,
+                "auc": area(probability[name], y),
+                "brier": over_layouts(brier, probability[name], y, resamples=RESAMPLES),
+                "ahead": over_layouts(_ahead, pilot, probability[name], y, resamples=RESAMPLES),
+            }
+            for name in MEASURES
+        }
+    ).T
+
+
+def _fitted(measure: pd.Series, success: pd.Series) -> Logistic:
+    return fit(measure[success.index].to_numpy(float), success.to_numpy(bool), RIDGE)
+
+
+def _ahead(first: np.ndarray, second: np.ndarray, success: np.ndarray) -> float:
+    return auc(first, success) - auc(second, success)
+
+
+def closing_gaps(difficulty: pd.DataFrame, judged: pd.Series) -> Answer:
+    """The question "closing gaps"."""
+    closes = difficulty.loc[judged.index, PILOT] < CLOSES_BEFORE
+    counts = {
+        "fails where it closes": _count(~judged[closes]),
+        "succeeds elsewhere": _count(judged[~closes]),
+    }
+    return Answer("closing gaps", _both(counts.values()), counts)
+
+
+def predictors(scores: pd.DataFrame) -> Answer:
+    """The question "predictors", from `predictor_scores`."""
+    ahead: dict[str, Estimate] = {name: scores.ahead[name] for name in RIVALS}
+    lows, highs = ([getattr(one, end) for one in ahead.values()] for end in ("low", "high"))
+    outcome = PARTLY
+    if min(lows) > 0:
+        outcome = REPRODUCED
+    elif min(highs) < 0:
+        outcome = NOT
+    if not np.isfinite(lows).all():
+        outcome = UNDECIDABLE
+    return Answer("predictors", outcome, numbers={name: e.value for name, e in ahead.items()})
+
+
+def _predictors(difficulty: pd.DataFrame, tuned: pd.Series, judged: pd.Series) -> Answer:
+    """`predictors`, where there is something to fit on and something to score on."""
+    if tuned.empty or judged.empty:
+        return Answer("predictors", UNDECIDABLE)
+    return predictors(predictor_scores(difficulty, tuned, judged))
+
+
+def horizon(runs: pd.DataFrame) -> Answer:
+    """The question "horizon"; `runs` has all parts."""
+    short = runs[(runs.part == "judge") & runs.seed.isin(_first_seeds(runs))]
+    base = succeeds(short)
+    longer = [succeeds(runs[runs.part == f"N = {n}"]) for n in HORIZONS]
+    asked_of = [name for name in base.index[~base] if all(name in one.index for one in longer)]
+    yes = [not any(one[name] for one in longer) for name in asked_of]
+    count = (sum(yes), len(yes))
+    return Answer("horizon", read(*count), {"still fails": count})
+
+
+def _first_seeds(runs: pd.DataFrame) -> set[int]:
+    """The seeds of the parts with other horizons: the first of each layout."""
+    return {*runs[runs.part.isin([f"N = {n}" for n in HORIZONS])].seed}
+
+
+def gaps_and_horizon(stops: pd.DataFrame) -> Answer:
+    """The question "gaps and horizon".
+
+    Args:
+        stops: theta_c at which a rollout stops arriving, a row a layout, a column a horizon; nan
+            where it arrives on the whole grid.
+    """
+    known = stops[stops[paper.HORIZON].notna()]
+    apart = known.max(axis=1, skipna=False) - known.min(axis=1, skipna=False)
+    count = _count(apart <= SAME_CLOSING + 1e-9)
+    return Answer("gaps and horizon", read(*count), {"same": count})
+
+
+def trap(runs: pd.DataFrame) -> tuple[Answer, Answer]:
+    """The questions "trap" and "accurate and worse", of the runs of ES that do not arrive."""
+    away = _of(runs, "ES").query(f"distance > {ARRIVED}")
+    stands = (away.moved < STANDING) & (away.worth < 1)
+    worse = (away.delta_last < away.delta_first) & (away.final_cost > away.initial_cost)
+    found = []
+    for name, yes in {"trap": stands, "accurate and worse": worse}.items():
+        count = _count(yes.groupby(away.layout).all())
+        found.append(Answer(name, read(*count), {"layouts": count, "runs": _count(yes)}))
+    return found[0], found[1]
+
+
+def early_overshoot(runs: pd.DataFrame) -> Answer:
+    """The question "early overshoot", of RDES's stopped runs in the reading per episode."""
+    rdes = _of(runs, "RDES").query("decay == 'episode'")
+    stopped = rdes[was_stopped(rdes)]
+    early = stopped.steps_done < DEAD_BY * stopped.steps
+    answers = {"overshot": stopped.over > 0, "early": early}
+    counts = {
+        name: _count(yes.groupby(stopped.layout).mean() > MAJORITY) for name, yes in answers.items()
+    }
+    known = [rate(*count) for count in counts.values() if count[1]]
+    outcome = PARTLY
+    if len(known) < len(counts):
+        outcome = UNDECIDABLE
+    elif min(one.low for one in known) > MAJORITY:
+        outcome = REPRODUCED
+    elif min(one.high for one in known) < MAJORITY:
+        outcome = NOT
+    runs_stopped = {"stopped": (len(stopped), len(rdes))}
+    return Answer("early overshoot", outcome, counts | runs_stopped)
+
+
+def cliff(raised: pd.Series) -> Answer:
+    """The question "cliff"; by which share the best theta's cost rises, by layout."""
+    count = _count(raised >= CLIFF_COST)
+    return Answer("cliff", read(*count), {"layouts": count}, {"most": float(raised.max())})
+
+
+def extrapolation(compared: pd.DataFrame, intervention: str = "theta held") -> Answer:
+    """The question "extrapolation", or the same of another intervention.
+
+    Args:
+        compared: of `extrapolation.compare`; the runs that are stopped without one are asked.
+        intervention: which.
+    """
+    names = ["layout", "seed"]
+    by = {name: some.set_index(names) for name, some in compared.groupby("intervention")}
+    dead = by["none"].index[by["none"].stopped]
+    count = _count(~by[intervention].stopped.reindex(dead).dropna().astype(bool))
+    return Answer("extrapolation", read(*count), {f"survive, {intervention}": count})
+
+
+def picture(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
+    """How much of the paper's picture holds in each layout and reading, the most first.
+
+    Args:
+        runs: of one setting, with all four of the paper's learners.
+        paths: as `paper_claims.judge` takes them.
+
+    Returns:
+        Columns layout and decay, of each of `PICTURE` the share of yes, whole (how many claims have
+        nothing but yes) and answers (the mean share); cells in which all four were answered.
+    """
+    known, columns = asked(), {}
+    for name in PICTURE:
+        claim = known[name]
+        answers = claim.yes(claim.measure(runs, paths), claim.threshold).dropna().astype(float)
+        columns[name] = answers.groupby(level=["layout", "decay"]).mean()
+    found = pd.DataFrame(columns).dropna()
+    found["whole"] = (found[[*PICTURE]] == 1).sum(axis=1)
+    found["answers"] = found[[*PICTURE]].mean(axis=1)
+    return found.sort_values(["whole", "answers"], ascending=False, kind="stable").reset_index()
+
+
+def whole_picture(tried: Mapping[str, pd.DataFrame]) -> Answer:
+    """The question "whole picture"; `tried` has `picture` of each setting."""
+    everywhere = pd.concat(tried.values())
+    if everywhere.empty:
+        return Answer("whole picture", UNDECIDABLE)
+    found = int((everywhere.whole == len(PICTURE)).sum())
+    numbers = {"tried": float(len(everywhere)), "most": float(everywhere.whole.max())}
+    outcome = REPRODUCED if found else NOT
+    return Answer("whole picture", outcome, {"whole": (found, len(everywhere))}, numbers)
+
+
+def answers(
+    runs: pd.DataFrame, paths: Paths, difficulty: pd.DataFrame, stops: pd.DataFrame
+) -> tuple[Answer, ...]:
+    """All questions that the population decides; arguments as each function takes them."""
+    main = runs[runs.part.isin(JUDGED)]
+    tuned, judged = succeeds(runs[runs.part == "tune"]), succeeds(main)
+    settings = {"main": main}
+    for part in runs.part[runs.part.str.startswith("alpha")].unique():
+        settings[part] = runs[runs.part == part]
+    return (
+        closing_gaps(difficulty, judged),
+        _predictors(difficulty, tuned, judged),
+        horizon(runs),
+        gaps_and_horizon(stops),
+        *trap(main),
+        early_overshoot(main),
+        whole_picture({name: picture(some, paths) for name, some in settings.items()}),
+    )
+
+
+def _of(runs: pd.DataFrame, learner: str) -> pd.DataFrame:
+    return runs[runs.learner == learner]
+
+
+def _count(yes: pd.Series) -> tuple[int, int]:
+    return int(yes.sum()), len(yes)
+
+
+def _both(counts: Iterable[tuple[int, int]]) -> Outcome:
+    """Confirmed if both halves are, contradicted if one is."""
+    outcomes = {read(*count) for count in counts}
+    for one in (NOT, UNDECIDABLE):
+        if one in outcomes:
+            return one
+    return REPRODUCED if outcomes == {REPRODUCED} else PARTLY

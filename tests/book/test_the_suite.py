@@ -1,0 +1,48 @@
+"""The page on the suite: its entry runs, and what it says of a robot is so."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nmpcrl.analysis import leaderboard
+from nmpcrl.analysis.interaction import Robot
+from nmpcrl.study.population import JUDGE, TUNE
+
+PAGE = (Path(__file__).resolve().parents[2] / "book/the_suite.md").read_text()
+LAYOUT = TUNE["T01"]
+
+
+@pytest.fixture
+def factory():
+    """What the page shows."""
+    (code,) = re.findall(r"^```python\n(.*?)^```$", PAGE, flags=re.M | re.S)
+    space = {}
+    exec(code, space)
+    return space["factory"]
+
+
+def test_its_entry_keeps_to_the_budget_and_saves_cost(factory, monkeypatch):
+    monkeypatch.setitem(leaderboard.ENTRIES, "shown", factory)
+    found = leaderboard.judge_once("shown", LAYOUT, 4, 0)
+    assert (found.episodes, found.over) == (4, False)
+    assert found.solved
+    assert found.gain > 0
+
+
+def test_a_robot_has_all_that_the_table_names():
+    named = set(re.findall(r"`robot\.(\w+)", PAGE))
+    robot = Robot(LAYOUT, 2, 0)
+    assert len(named) > 9
+    assert all(hasattr(robot, name) for name in named)
+
+
+def test_what_it_says_of_the_layouts_is_so():
+    assert f"has {len(TUNE)} to tune on, `TUNE`, and {len(JUDGE)} to judge on, `JUDGE`" in PAGE
+
+
+def test_it_has_no_results_yet():
+    rows = [line for line in PAGE.splitlines() if line.startswith("|")]
+    assert not [row for row in rows if re.search(r"\d+ ?%", row)]
+    assert np.all(["robot." in row or set(row) <= set("|- ") or "call" in row for row in rows])

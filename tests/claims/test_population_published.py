@@ -1,0 +1,84 @@
+"""The population published: what is read is what was written, and judged alike."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nmpcrl.analysis.difficulty import MEASURES
+from nmpcrl.claims import population_published as published
+from nmpcrl.claims.published import Damaged
+from nmpcrl.study.population import JUDGE, LAYOUTS
+from nmpcrl.study.population_design import COMPARED, HORIZONS, seeds
+
+NAME = "J001"
+
+
+@pytest.fixture
+def summaries(made_up):
+    """All learners in one layout, in both readings, with both seeds."""
+    return made_up(layouts=(JUDGE[NAME],), seeds=seeds(NAME)).summaries
+
+
+@pytest.fixture
+def layouts():
+    found = pd.DataFrame(0.5, index=[*LAYOUTS], columns=[*MEASURES])
+    for horizon in (10, *HORIZONS):
+        found[f"stops_{horizon}"] = pd.Series(dict.fromkeys(COMPARED, 0.2))
+    return found
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, summaries, layouts):
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path))
+    return published.publish(summaries, layouts)
+
+
+@pytest.mark.usefixtures("folder")
+def test_what_is_read_is_what_was_published(summaries, layouts):
+    found = published.load()
+    assert len(found.runs) == len(summaries)
+    assert {*found.runs.part} == {"judge", "judge again"}
+    costs = [one.evaluations["cost"][-1] for one in summaries.values()]
+    assert found.runs.final_cost.to_numpy() == pytest.approx(costs, rel=1e-5)
+    assert found.runs.cost_ratio.notna().all()
+    for experiment, path in found.paths.items():
+        assert path == pytest.approx(summaries[experiment].states[:, :2], abs=5e-4)
+    assert {e.learner for e in found.paths} == {"RDES", "GES"}
+    pd.testing.assert_frame_equal(found.layouts, layouts, check_names=False)
+    assert found.stops.columns.tolist() == [10, 20, 40]
+    assert found.about["runs"] == {"judge": 20, "judge again": 4}
+
+
+@pytest.mark.usefixtures("folder")
+def test_claims_are_put_to_what_is_published():
+    shares = published.load().shares().set_index("claim")
+    assert shares.loc["C9", ["holding", "layouts"]].tolist() == [1, 1]
+    assert shares.loc["C5", "holding"] == 1
+
+
+def test_the_same_runs_give_the_same_bytes(folder, summaries, layouts):
+    names = (published.TABLE, published.PATHS, published.MEASURED)
+    before = [(folder / name).read_bytes() for name in names]
+    published.publish(summaries, layouts)
+    assert [(folder / name).read_bytes() for name in names] == before
+
+
+@pytest.mark.parametrize("name", [published.TABLE, published.PATHS, published.MEASURED])
+def test_a_file_that_is_not_the_one_that_was_written_is_refused(folder, name):
+    (folder / name).write_bytes(b"1")
+    with pytest.raises(Damaged, match="nmpcrl study --population --publish"):
+        published.load()
+
+
+def test_what_is_not_there_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "nowhere"))
+    with pytest.raises(Damaged, match="not published whole"):
+        published.load()
+
+
+def test_where_a_solve_failed_there_is_no_position():
+    states = np.zeros((3, 3))
+    states[2] = np.nan
+    kept = published._lengthened(published._shortened([states]))
+    assert np.isnan(kept[0, 2]).all()
+    assert not np.isnan(kept[0, :2]).any()

@@ -1,0 +1,222 @@
+"""Remedies: on the two-state chain by hand, and equal to what they mend where they do not bind."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nmpcrl.analysis.two_state import (
+    FIRST,
+    SECOND,
+    Chain,
+    auxiliary_fixed_point,
+    expected_matrix,
+    sampled_step,
+    spectral_radius,
+)
+from nmpcrl.learning import (
+    Exploration,
+    Weights,
+    expected_sarsa,
+    gradient_expected_sarsa,
+    lstd_q,
+    train,
+)
+from nmpcrl.learning.learners import semi_gradient
+from nmpcrl.learning.remedies import (
+    averaged,
+    directed,
+    guard,
+    guarded,
+    judged_theta,
+    normalised_ges,
+    tdrc,
+    undo,
+)
+from nmpcrl.study import paper
+
+CHAIN, ALPHA = Chain(gamma=0.97), 0.1
+THETA = np.array(paper.THETA_INIT)
+
+
+def in_turn(learner, weights, transitions):
+    """The weights after each transition."""
+    path = []
+    for transition in transitions:
+        weights = learner.step(weights, transition).weights
+        path.append(weights)
+    return path
+
+
+def test_the_expected_step_of_tdrc_on_the_chain_is_that_of_ghiassian_et_al(controller):
+    controller.gamma, decay, up = CHAIN.gamma, 0.5, 2 * CHAIN.gamma - 1
+    rule = tdrc(controller, ALPHA, decay).rule
+    by_hand = [
+        [1 + ALPHA * up, -2 * ALPHA * CHAIN.gamma],
+        [ALPHA * up, 1 - ALPHA * (1 + decay)],
+    ]
+    np.testing.assert_allclose(expected_matrix(CHAIN, rule), by_hand)
+
+
+def test_tdrc_converges_where_a_semi_gradient_diverges_if_it_is_not_regularised_too_much(
+    controller,
+):
+    controller.gamma = CHAIN.gamma
+    edge, alpha = 2 * CHAIN.gamma - 1, 0.01  # of the regularisation, for small steps
+    assert spectral_radius(CHAIN, semi_gradient(alpha)) > 1
+    assert spectral_radius(CHAIN, tdrc(controller, alpha, edge - 0.1).rule) < 1
+    assert spectral_radius(CHAIN, tdrc(controller, alpha, edge + 0.01).rule) > 1
+
+
+def test_tdrc_without_its_decay_is_gradient_td_with_one_step_size(controller, transition, weights):
+    one = transition(weights.theta)
+    found = tdrc(controller, ALPHA, 0.0).step(weights, one).weights
+    wanted = gradient_expected_sarsa(controller, ALPHA, ALPHA).step(weights, one).weights
+    np.testing.assert_allclose(found.theta, wanted.theta)
+    np.testing.assert_allclose(found.w, wanted.w)
+
+
+def test_a_normalised_step_of_w_meets_its_error_however_large_beta_is(controller):
+    """With a huge beta the error of w on the chain is 0 after one step, and changes no sign."""
+    weights = Weights(np.ones(1), np.array([-3.0]))
+    for ratio, left in ((1e9, 0.0), (30.0, 1 / (1 + 3.0))):
+        rule = normalised_ges(controller, ALPHA, ratio).rule
+        moved = sampled_step(CHAIN, rule, weights, FIRST)
+        error = auxiliary_fixed_point(CHAIN, 1.0) - np.array([weights.w[0], moved.w[0]])
+        assert error[1] == pytest.approx(left * error[0], abs=1e-6)
+
+
+def test_ges_with_a_small_beta_is_the_normalised_one_to_first_order(
+    controller, transition, weights
+):
+    one, alpha = transition(weights.theta), 1e-9
+    found = normalised_ges(controller, alpha).step(weights, one).weights
+    wanted = gradient_expected_sarsa(controller, alpha, 3 * alpha).step(weights, one).weights
+    np.testing.assert_allclose(found.theta, wanted.theta, rtol=1e-12)
+    np.testing.assert_allclose(found.w - weights.w, wanted.w - weights.w, rtol=1e-6)
+
+
+@pytest.mark.parametrize("make", [expected_sarsa, lambda c, a: gradient_expected_sarsa(c, a, 0.2)])
+def test_a_guard_that_does_not_bind_leaves_every_bit(controller, transition, weights, make):
+    one, alpha = transition(weights.theta), 1 / 14  # ||phi||^2 = 14
+    base = make(controller, alpha)
+    found, wanted = guarded(base, alpha).step(weights, one), base.step(weights, one)
+    np.testing.assert_array_equal(found.weights.theta, wanted.weights.theta)
+    np.testing.assert_array_equal(found.weights.w, wanted.weights.w)
+
+
+@pytest.mark.parametrize("make", [expected_sarsa, lambda c, a: gradient_expected_sarsa(c, a, 0.2)])
+def test_a_guard_that_binds_is_the_learner_with_the_smaller_alpha(
+    controller, transition, weights, make
+):
+    one = transition(weights.theta)
+    found = guarded(make(controller, 5.0), 5.0).step(weights, one).weights
+    wanted = make(controller, 1 / 14).step(weights, one).weights
+    np.testing.assert_allclose(found.theta, wanted.theta)
+    np.testing.assert_allclose(found.w, wanted.w)
+
+
+def test_a_guarded_semi_gradient_never_passes_its_target(controller):
+    weights, alpha = Weights(np.ones(1), np.zeros(1)), 100.0
+    rule = guarded(expected_sarsa(controller, alpha), alpha).rule
+    moved = sampled_step(CHAIN, rule, weights, SECOND)  # whose next state is worth 0
+    assert CHAIN.delta(moved.theta, SECOND) == pytest.approx(0, abs=1e-12)
+
+
+def test_a_guard_allows_any_step_where_there_is_no_feature():
+    assert guard(0.5, np.zeros(3)) == 0.5
+
+
+def test_the_control_goes_as_far_as_the_remedy_in_the_direction_of_es(
+    controller, transition, weights
+):
+    one, alpha = transition(weights.theta), 5.0
+    remedy = guarded(gradient_expected_sarsa(controller, alpha, 0.2), alpha)
+    moved = remedy.step(weights, one).weights
+    found = directed(remedy, alpha).step(weights, one)
+    step = found.weights.theta - weights.theta
+    assert np.linalg.norm(step) == pytest.approx(np.linalg.norm(moved.theta - weights.theta))
+    phi = one.solution.features
+    np.testing.assert_allclose(
+        step / np.linalg.norm(step), np.sign(found.delta) * phi / np.linalg.norm(phi)
+    )
+
+
+@pytest.mark.parametrize("wrap", [guarded, directed])
+def test_what_needs_a_step_size_refuses_a_batch(controller, wrap):
+    with pytest.raises(ValueError, match="needs a rule that moves theta at every step; LSTD-Q has"):
+        wrap(lstd_q(controller), 0.1)
+
+
+@pytest.mark.parametrize("skip", [0, 2])
+def test_an_average_is_the_mean_of_the_thetas_that_are_counted(
+    controller, transition, weights, skip
+):
+    base = expected_sarsa(controller, 0.01)
+    given = [transition(weights.theta, cost=cost) for cost in (1.0, -2.0, 4.0, 0.5)]
+    path, found = in_turn(base, weights, given), in_turn(averaged(base, skip), weights, given)
+    thetas = [one.theta for one in path]
+    np.testing.assert_array_equal([one.theta for one in found], thetas)
+    np.testing.assert_allclose(judged_theta(found[-1]), np.mean(thetas[skip:], axis=0))
+    np.testing.assert_array_equal(judged_theta(path[-1]), thetas[-1])
+
+
+class Judge:
+    """Says costs in turn, and notes what it was asked."""
+
+    def __init__(self, *costs):
+        self.costs, self.asked = list(costs), []
+
+    def __call__(self, theta):
+        self.asked.append(theta)
+        return self.costs.pop(0)
+
+
+def test_undo_goes_back_to_the_best_theta_and_w(controller, transition, weights):
+    judge = Judge(10.0, 8.0, np.inf, 9.0, 7.0)
+    learner = undo(gradient_expected_sarsa(controller, 0.01, 0.02), judge)
+    ends = [replace(transition(weights.theta, cost=c), last=True) for c in (1.0, -2.0, 4.0, 0.5)]
+    first, second, third, fourth = in_turn(learner, weights, ends)
+    assert len(judge.asked) == 5
+    assert not judge.costs
+    np.testing.assert_array_equal(judge.asked[0], weights.theta)
+    for back in (second, third):  # a failed rollout, and one that is worse than the best
+        np.testing.assert_array_equal(back.theta, first.theta)
+        np.testing.assert_array_equal(back.w, first.w)
+    assert not np.array_equal(fourth.theta, first.theta)
+    np.testing.assert_array_equal(judged_theta(fourth), fourth.theta)
+
+
+def test_undo_confirms_only_where_its_episodes_are_over(controller, transition, weights):
+    judge = Judge(3.0, 2.0, 1.0)
+    learner = undo(expected_sarsa(controller, 0.01), judge, every=2)
+    one = transition(weights.theta)
+    in_turn(learner, weights, [replace(one, last=last) for last in (0, 1, 0, 1, 1, 0, 1, 1)])
+    assert len(judge.asked) == 3
+
+
+def test_undo_that_never_has_to_is_the_learner(controller, transition, weights):
+    base = expected_sarsa(controller, 0.01)
+    given = [replace(transition(weights.theta, cost=c), last=True) for c in (1.0, -2.0, 4.0)]
+    found = in_turn(undo(base, lambda theta: 0.0), weights, given)
+    wanted = in_turn(base, weights, given)
+    np.testing.assert_array_equal(found[-1].theta, wanted[-1].theta)
+
+
+def test_a_batch_can_be_undone_and_averaged(controller, transition, weights):
+    given = [replace(transition(weights.theta, cost=c), last=True) for c in (1.0, -2.0)]
+    base = lstd_q(controller)
+    plain = in_turn(base, weights, given)[-1].theta
+    for learner in (undo(base, lambda theta: 0.0), averaged(base)):
+        np.testing.assert_array_equal(in_turn(learner, weights, given)[-1].theta, plain)
+
+
+@pytest.mark.parametrize("make", [tdrc, normalised_ges])
+def test_a_remedy_learns_on_the_robot(make):
+    nmpc = paper.nmpc()
+    learner = guarded(make(nmpc, paper.ALPHA), paper.ALPHA)
+    noise = Exploration.draw(np.random.default_rng(0), (1, 20, 2))
+    steps = list(train(learner, nmpc, Weights(THETA, np.full(9, paper.W_INIT)), noise))
+    assert len(steps) == 20
+    assert not np.array_equal(steps[-1].weights.theta, THETA)
+    assert np.isfinite(steps[-1].weights.w).all()

@@ -1,0 +1,185 @@
+"""The public tasks for Gymnasium, and the NMPC as a policy in one of them."""
+
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import nmpcrl.gym
+from nmpcrl.analysis.policy_search import LOWER, SCALE
+from nmpcrl.analysis.tune_env import CHANGE, WORST, TuneEnv
+from nmpcrl.learning import Persistent, evaluate
+from nmpcrl.study import ParameterError, paper
+from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.robot import NmpcPolicy, RobotEnv
+
+THETA = np.array(paper.THETA_INIT)
+FORWARD = np.array([0.6, 0.0])
+in_its_units = pytest.mark.filterwarnings("ignore:.*For Box action spaces:UserWarning")
+
+
+def follow(env, policy, **options):
+    """Observations, rewards and the last step of an episode."""
+    seen, _ = env.reset(**options)
+    states, rewards = [seen], []
+    while True:
+        seen, reward, terminated, truncated, info = env.step(policy(states[-1]))
+        rewards.append(reward)
+        if terminated or truncated:
+            return np.array(states), np.array(rewards), (terminated, truncated, info)
+        states.append(seen)
+
+
+@in_its_units
+@pytest.mark.parametrize("name", [nmpcrl.gym.ROBOT, nmpcrl.gym.TUNE])
+@pytest.mark.parametrize("layout", [None, "E", "T07", "0.5,2.2 3,0.5"])
+def test_gymnasiums_own_check_passes(name, layout):
+    env = gymnasium.make(name, layout=layout)
+    check_env(env.unwrapped, skip_render_check=True)
+
+
+@in_its_units
+def test_the_frames_pass_gymnasiums_check():
+    check_env(gymnasium.make("nmpcrl/Robot-v0", render_mode="rgb_array", steps=3).unwrapped)
+
+
+def test_a_module_before_the_name_is_enough():
+    code = 'import gymnasium; print(gymnasium.make("nmpcrl.gym:nmpcrl/Robot-v0").spec.id)'
+    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert said.stdout.strip() == "nmpcrl/Robot-v0"
+
+
+@pytest.mark.parametrize("layout", ["A", "E"])
+def test_the_nmpc_as_a_policy_makes_the_rollout_by_which_theta_is_judged(layout):
+    states, rewards, end = follow(gymnasium.make("nmpcrl/Robot-v0", layout=layout), NmpcPolicy())
+    judged = evaluate(Persistent(paper.nmpc(layout)), THETA, paper.STEPS)
+    np.testing.assert_array_equal(states[:, :3], judged.states)
+    np.testing.assert_array_equal(-rewards, judged.costs)
+    assert end[:2] == (False, True)
+    assert len(rewards) == paper.STEPS
+
+
+def test_a_policy_forgets_its_plan_in_another_layout():
+    policy, env = NmpcPolicy(), RobotEnv(steps=5)
+    first = follow(env, policy, options={"layout": "A"})[1]
+    follow(env, policy, options={"layout": "B"})
+    np.testing.assert_array_equal(follow(env, policy, options={"layout": "A"})[1], first)
+
+
+def test_the_obstacles_are_observed_and_the_start_is_the_papers():
+    seen, info = RobotEnv("C").reset()
+    np.testing.assert_array_equal(seen, [*paper.START, *np.ravel(paper.LAYOUTS["C"])])
+    assert info["layout"] == paper.LAYOUTS["C"]
+
+
+def test_a_layout_is_drawn_anew_from_those_to_tune_on_and_a_seed_draws_the_same():
+    drawn = {}
+    for seed in (3, 3, 4):
+        env = RobotEnv()
+        first = env.reset(seed=seed)[1]["layout"]
+        drawn.setdefault(seed, []).append([first, *(env.reset()[1]["layout"] for _ in range(9))])
+    assert drawn[3][0] == drawn[3][1] != drawn[4][0]
+    found = set(drawn[3][0] + drawn[4][0])
+    assert len(found) > 5
+    assert found <= set(TUNE.values())
+    assert not found & set(JUDGE.values())
+
+
+def test_an_action_outside_the_bounds_is_clipped():
+    far, near = RobotEnv("A"), RobotEnv("A")
+    for env in (far, near):
+        env.reset()
+    one, other = far.step(np.array([9.0, 0.0])), near.step(FORWARD)
+    np.testing.assert_array_equal(one[0], other[0])
+    assert one[1] == other[1]
+
+
+def test_an_episode_stays_in_the_space_of_observations_wherever_it_goes():
+    env = RobotEnv("A")
+    for action in (FORWARD, -FORWARD, np.array([0.6, np.pi / 2])):
+        states, _, _ = follow(env, lambda _, action=action: action)
+        assert all(env.observation_space.contains(state) for state in states)
+
+
+def test_a_step_before_a_reset_and_after_the_end_is_refused():
+    env = RobotEnv("A", steps=1)
+    with pytest.raises(gymnasium.error.ResetNeeded, match="call reset first"):
+        env.step(FORWARD)
+    env.reset()
+    assert env.step(FORWARD)[3]
+    with pytest.raises(gymnasium.error.ResetNeeded, match="call reset first"):
+        env.step(FORWARD)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: RobotEnv("Z"), "layout = 'Z' must be one of A to F and T01 to T60, or 1 to 16"),
+        (lambda: RobotEnv("J001"), "layout = 'J001' must be one of A to F and T01 to T60"),
+        (lambda: RobotEnv(steps=0), "steps = 0 must be"),
+        (lambda: RobotEnv(render_mode="human"), "render_mode = 'human' must be None or one of rgb"),
+        (lambda: RobotEnv().reset(options={"layout": "1,1"}), "layout = '1,1' must be one of 4 ob"),
+        (lambda: TuneEnv(rollouts=1), "rollouts = 1 must be"),
+        (lambda: TuneEnv("A", render_mode="rgb_array"), "render_mode = 'rgb_array' must be None"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_a_sentence(call, message):
+    with pytest.raises(ParameterError, match=message):
+        call()
+
+
+@pytest.mark.parametrize("action", [[np.nan, 0.0], [0.1], "left"])
+def test_what_is_no_action_is_refused(action):
+    env = RobotEnv("A")
+    env.reset()
+    with pytest.raises((ParameterError, ValueError)):
+        env.step(action)
+
+
+def test_a_frame_shows_the_robot_where_it_is():
+    env = gymnasium.make("nmpcrl/Robot-v0", layout="A", render_mode="rgb_array")
+    env.reset()
+    first = env.render()
+    for _ in range(10):
+        env.step(FORWARD)
+    later = env.render()
+    assert first.shape == later.shape == (640, 640, 3)
+    assert first.dtype == np.uint8
+    assert not np.array_equal(first, later)
+
+
+def test_tuning_nothing_costs_what_theta_init_does():
+    env = TuneEnv("A", rollouts=3)
+    seen, info = env.reset()
+    cost = evaluate(Persistent(paper.nmpc("A")), THETA, paper.STEPS).cost
+    assert info["cost"] == cost
+    ends = [env.step(np.zeros(9)) for _ in range(2)]
+    assert [one[1] for one in ends] == [-1.0, -1.0]
+    assert [one[3] for one in ends] == [False, True]
+    assert [one[4]["rollouts"] for one in ends] == [2, 3]
+    np.testing.assert_array_equal(ends[0][0], seen)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(np.zeros(9))
+
+
+def test_an_action_of_tuning_moves_theta_within_its_box():
+    env = TuneEnv("A")
+    env.reset()
+    *_, info = env.step(np.r_[np.full(8, 0.5), 9.0])
+    np.testing.assert_allclose(info["theta"] - THETA, CHANGE * SCALE * np.r_[np.full(8, 0.5), 1.0])
+    for _ in range(12):
+        *_, info = env.step(-np.ones(9))
+    np.testing.assert_allclose(info["theta"][:2], LOWER[:2], atol=1e-12)
+
+
+def test_a_failed_rollout_of_tuning_counts_the_worst(monkeypatch):
+    env = TuneEnv("A")
+    env.reset()
+    monkeypatch.setattr(env, "_rollout", lambda: np.inf)
+    seen, reward, *_ = env.step(np.zeros(9))
+    assert reward == -WORST
+    assert seen[-1] == WORST
+    assert env.observation_space.contains(seen)
