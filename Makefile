@@ -45,20 +45,21 @@ bench: .venv/ready  ## Measure how long solves, steps and runs take, and print w
 	@if [ -d _build/html ]; then $(BIN)/python -m nmpcrl bench --live > /dev/null; fi
 	@$(BIN)/python -m nmpcrl bench
 
-# On all cores, up to four.
+# On all cores, up to four. A target that names files does so to read no others: tests/conftest.py
+# lets no test with its marker stand elsewhere.
 PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
 
 test: .venv/ready  ## All tests of the library, its commands and the sources of the book
 	@$(PYTEST) -m "not built and not lab and not course"
 
 test-site: .venv/ready  ## The built book in browsers; needs a built book, a Chromium and a Firefox
-	@$(PYTEST) -m "built and not lab and not course"
+	@$(PYTEST) -m "built and not lab and not course" tests/book
 
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
-	@$(BIN)/python -m pytest -m lab
+	@$(BIN)/python -m pytest -m lab tests/book/test_lab.py
 
 test-course: .venv/ready  ## Run every notebook of the course, as students and as teachers get it, and grade it
-	@$(PYTEST) -m course
+	@$(PYTEST) -m course tests/book/test_course.py tests/course/test_graded_chapters.py
 
 test-clusters: .venv/ready  ## The programs for clusters against a SLURM, which it installs as root, and an operator
 	@$(if $(filter-out 0,$(shell id -u)),sudo) .ci/clusters

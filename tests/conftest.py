@@ -3,13 +3,16 @@ a benchmark that nobody measured, and evidence that nobody trained."""
 
 import copy
 import os
+import re
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from filelock import FileLock
@@ -36,6 +39,12 @@ NEEDS = {  # fixture -> the marker of a test that asks for it, directly or throu
     "jupyter_lab": "lab",
     "nbgrader": "network",
 }
+PLACES = {  # marker -> where `make` looks for the tests that have it
+    marker: places.split()
+    for marker, places in re.findall(
+        r'-m "?(built|lab|course)\b.*?((?: tests/\S+)+)$', (ROOT / "Makefile").read_text(), re.M
+    )
+}
 RUNS = Path(os.environ.get("NMPCRL_RUNS") or ROOT / "runs")  # before a test names others
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
@@ -45,9 +54,13 @@ FLAGS = (
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Mark a test with what it needs, so that none can forget to say so."""
+    """Mark a test with what it needs, so that none can forget to say so, and see that it is run."""
     for fixture in NEEDS.keys() & set(getattr(item, "fixturenames", ())):
         item.add_marker(NEEDS[fixture])
+    for marker, places in PLACES.items():
+        there = any(item.path.is_relative_to(ROOT / place) for place in places)
+        if not there and item.get_closest_marker(marker):
+            raise pytest.UsageError(f"{item.nodeid} is {marker!r}: it belongs in {places}")
 
 
 def missing(reason: str) -> None:
@@ -73,6 +86,22 @@ def stores_in_a_folder_of_its_own(nobodys) -> Iterator[None]:
     assert not nobodys.exists(), "set NMPCRL_RUNS to a folder of this test's own"
 
 
+@pytest.fixture
+def interpreted(tmp_path, monkeypatch) -> Iterator[None]:
+    """Python runs what numba would compile: slower, and at once for any number of problems.
+
+    Only in the test that asks for it: what comes after it in its module may be about machine code.
+    """
+    before = set(sys.modules)
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", True)
+    monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path / "interpreted"))
+    with np.errstate(all="ignore"):
+        yield
+    for name in set(sys.modules) - before:
+        if name.startswith("riccati_"):
+            del sys.modules[name]
+
+
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory) -> Path:
     """A folder that the workers of a session have in common."""
@@ -88,6 +117,34 @@ def long_runs(shared) -> dict[str, Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("NMPCRL_RUNS", str(RUNS if RUNS.is_dir() else shared / "long_runs"))
         return offline.stored(course.chapters())
+
+
+@pytest.fixture
+def edition_of_course(shared, long_runs, tmp_path) -> Iterator[Callable[[str], Path]]:
+    """A copy of an edition of the course, which is made once for all workers.
+
+    It holds what chapters have trained in copies of other tests: each trains it once, not thrice.
+    """
+    from driver.course import course
+
+    trained, lock = shared / "trained", FileLock(shared / "editions.lock")
+    copies = []
+
+    def copy(name: str) -> Path:
+        place, half = (shared / "editions" / f"{part}{name}" for part in ("", "half-"))
+        with lock:
+            if not place.exists():
+                course.edition(name, half, long_runs)
+                half.rename(place)
+            copies.append(shutil.copytree(place, tmp_path / name))
+            trained.mkdir(exist_ok=True)
+            shutil.copytree(trained, copies[-1] / "data/runs", dirs_exist_ok=True)
+        return copies[-1]
+
+    yield copy
+    with lock:
+        for path in (path for place in copies for path in place.glob("data/runs/*.npz")):
+            shutil.copy2(path, trained)
 
 
 @pytest.fixture

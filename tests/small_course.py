@@ -1,7 +1,14 @@
 """A chapter that takes no time to run, as a student gets it: exercises that all ask for a root."""
 
+import csv
+from pathlib import Path
+
+import nbformat
+from click.testing import CliRunner
 from driver.course import editions
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+from nmpcrl.commands import main
 
 SMALL = "01_small"
 ASKED = ("one", "two", "three", "four", "five", "six", "seven")  # of each the square root of four
@@ -63,3 +70,30 @@ def solved_by_student(**answers):
 
 def cell_of(notebook, name):
     return next(cell for cell in notebook.cells if cell.id == name)
+
+
+def edition_in(folder: Path) -> Path:
+    """The edition for graders of the small chapter."""
+    place, data = (folder / "edition" / name for name in (f"source/{SMALL}", "data"))
+    place.mkdir(parents=True)
+    (data / "published").mkdir(parents=True)
+    (data / "of_the_chapter.txt").write_text("4")
+    nbformat.write(editions.grader(small_chapter(), set()), place / f"{SMALL}.ipynb")
+    return folder / "edition"
+
+
+def graded_in(folder: Path, edition: Path, *words: str, name=SMALL, **handed):
+    """By student, the rows of the CSV file by exercise; notebooks are handed in to a folder."""
+    for student, notebook in handed.items():
+        place = folder / "in" / student / f"{name}.ipynb"
+        place.parent.mkdir(parents=True)
+        text = notebook if isinstance(notebook, str) else nbformat.writes(notebook)
+        place.write_text(text)
+    out = folder / "grades.csv"
+    given = ["grade", str(folder / "in"), "--out", str(out), "--edition", str(edition)]
+    called = CliRunner().invoke(main, [*given, *words])
+    assert called.exit_code == 0, called.output
+    assert "no sandbox" in called.output
+    with out.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {s: {r["exercise"]: r for r in rows if r["student"] == s} for s in handed}

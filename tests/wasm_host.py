@@ -223,3 +223,100 @@ class Controller:
         self.module.write(states, state)
         self.module.write(actions, action)
         return self.module("stage_cost", self.discs, self._discs, self._target, states, actions)
+
+
+class ProblemController:
+    """An `Nmpc` of a `Problem` whose solves a module makes; solutions are those of `Controller`."""
+
+    def __init__(self, module: Module) -> None:
+        self.module = module
+        sizes = module.put(np.zeros(8))
+        module("nmpc_sizes", sizes)
+        self.n, self.m, self.d, self.N, _, size, z, lam = map(int, module.read(sizes, 8))
+        self._sizes = [2 * z + lam + fixed * self.m for fixed in (0, 1)]
+        most = self._sizes[1] + self.d
+        rooms = {
+            "data": (self.N + 1) * size,
+            "state": self.n,
+            "theta": self.d,
+            "action": self.m,
+            "warm": most,
+            "out": most,
+            "report": max(5, self.n),
+            "vector": self.d,
+            "states": (self.N + 1) * self.n,
+            "inputs": self.N * self.m,
+            "slope": self.d,
+            "least": self.d,
+            "most": self.d,
+        }
+        self.at = {name: module.put(np.zeros(size)) for name, size in rooms.items()}
+        names = ("data", "theta", "least", "most", "action", "state")
+        module("nmpc_defaults", *(self.at[name] for name in names))
+        self.theta = module.read(self.at["theta"], self.d)
+        self.data = module.read(self.at["data"], rooms["data"])
+
+    def _write(self, **numbers) -> None:
+        for name, array in numbers.items():
+            if array is not None:
+                self.module.write(self.at[name], np.ravel(array))
+
+    def _places(self, *names: str) -> list[int]:
+        return [self.at[name] for name in names]
+
+    def solve(self, state, theta, warm_start=None, action=None, data=None):
+        """As `Nmpc.solve`; data are those of all stages.
+
+        Raises:
+            ArithmeticError: no optimum was found; with the end.
+        """
+        fixed, known = int(action is not None), -1
+        self._write(state=state, theta=theta, action=action)
+        self._write(data=self.data if data is None else data)
+        if warm_start is not None:
+            known = warm_start["fixed"]
+            self._write(warm=warm_start["numbers"])
+        given = self._places("data", "state", "theta", "action")
+        end = self.module(
+            "nmpc_solve",
+            *given,
+            fixed,
+            known,
+            self.at["warm"],
+            1e-8,
+            *self._places("out", "report"),
+        )
+        if end:
+            raise ArithmeticError(end)
+        value, iterations, restarts, *_ = self.module.read(self.at["report"], 5)
+        numbers = self.module.read(self.at["out"], self._sizes[fixed] + self.d)
+        return {
+            "value": value,
+            "iterations": int(iterations),
+            "restarts": int(restarts),
+            "fixed": fixed,
+            "numbers": numbers,
+            "action": numbers[self.n : self.n + self.m],
+            "features": numbers[-self.d :],
+        }
+
+    def slopes(self, state, theta, solution, vector, states, inputs, action=None):
+        """`Nmpc.value_hessian_times` and the gradient of a weighted plan, or None."""
+        self._write(state=state, theta=theta, action=action, warm=solution["numbers"])
+        self._write(vector=vector, states=states, inputs=inputs)
+        given = self._places("data", "state", "theta", "action")
+        there = self._places("warm", "vector", "states", "inputs", "slope")
+        formed = self.module("nmpc_slopes", *given, solution["fixed"], *there)
+        return self.module.read(self.at["slope"], self.d) if formed else None
+
+    def step(self, state, action, theta):
+        """x+ of the model, with the data of stage 0."""
+        self._write(state=state, theta=theta, action=action)
+        given = self._places("data", "state", "action", "theta")
+        self.module("model_step", *given, self.at["report"])
+        return self.module.read(self.at["report"], self.n)
+
+    def cost(self, state, action, theta):
+        """l, with the data of stage 0."""
+        self._write(state=state, theta=theta, action=action)
+        return self.module("stage_cost", *self._places("data", "state", "action", "theta"))

@@ -41,14 +41,14 @@ def time_mpcrl(steps: int = 60) -> list[float]:
         MpcSolverError: a solve failed, and nothing was learned from its step.
     """
     nmpc = paper.nmpc()
-    world = _World(nmpc, steps)
+    world = World(nmpc, steps)
     with warnings.catch_warnings():  # casadi's on numpy functions, which mpcrl calls on its arrays
         warnings.simplefilter("ignore", FutureWarning)
-        _agent(nmpc).train(world, episodes=1, seed=0)
+        agent(nmpc).train(world, episodes=1, seed=0)
     return np.diff(world.calls).tolist()
 
 
-def _agent(nmpc: Nmpc) -> LstdQLearningAgent:
+def agent(nmpc: Nmpc) -> LstdQLearningAgent:
     """The agent: theta moves after every step, the noise is added to u_0 and clipped."""
     theta = LearnableParameter("theta", len(paper.THETA_INIT), paper.THETA_INIT)
     return LstdQLearningAgent(
@@ -99,7 +99,7 @@ def _mpc(nmpc: Nmpc) -> Mpc:
     return mpc
 
 
-class _World(gymnasium.Env):
+class World(gymnasium.Env):
     """The plant and the RL stage cost as a gymnasium environment, which notes when it is called.
 
     mpcrl calls it once a learning step, so that a step lasts from one call to the next.

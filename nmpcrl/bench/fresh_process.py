@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import psutil
 
+from nmpcrl.bench import problem_sizes
 from nmpcrl.bench.learners import time_learners
 from nmpcrl.bench.solves import Columns, columns_of
 from nmpcrl.study import Experiment, paper, run
@@ -56,10 +57,16 @@ def learning_steps(steps: str) -> Columns:
     return columns_of(time_learners(steps=int(steps)))
 
 
+def problem_of_sizes(*sizes: str) -> dict[str, float]:
+    """The times of `problem_sizes.measured`."""
+    return problem_sizes.measured(problem_sizes.Sizes(*map(int, sizes)))
+
+
 MEASURES: dict[str, Callable[..., Any]] = {
     "run": whole_run,
     "first": first_call,
     "steps": learning_steps,
+    "sizes": problem_of_sizes,
 }
 
 if __name__ == "__main__":

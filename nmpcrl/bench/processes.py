@@ -16,6 +16,7 @@ import pandas as pd
 
 from nmpcrl.bench.learners import COMPARED
 from nmpcrl.bench.paired import Ratio, pooled
+from nmpcrl.bench.problem_sizes import Sizes
 from nmpcrl.bench.solves import Columns, transposed
 from nmpcrl.study import paper
 from nmpcrl.study.storage.executor import THREADS
@@ -81,6 +82,13 @@ def first_calls(times: int, *, compile_too: bool) -> Columns:
                 process = time.perf_counter() - began
             rows.append((cached, *measured.values(), process, "Compiling" in said))
     return transposed("cached solve step process notice", rows)
+
+
+def problem_of_sizes(sizes: Sizes) -> dict[str, float]:
+    """`problem_sizes.measured` in a fresh process that has no machine code of it yet."""
+    with tempfile.TemporaryDirectory() as folder, _environment(NMPCRL_CACHE=folder):
+        found, _ = _alone("sizes", *map(str, sizes))
+    return found
 
 
 def time_learners_afresh(processes: int = PROCESSES, steps: int = paper.STEPS) -> pd.DataFrame:

@@ -79,7 +79,7 @@ LENGTHS = {  # from the shortest
         run=30,
         learners=ALL,
         seeds=6,
-        seed_run=100,
+        seed_run=50,
         firsts=3,
         compile=False,
     ),

@@ -25,7 +25,7 @@ from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
 from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.parameters import OneOf, Truth
 from nmpcrl.study.records import Column, Stopped
-from nmpcrl.study.setup import controller_of
+from nmpcrl.study.setup import controller_of, environment_of
 from nmpcrl.study.store import Runs
 
 SOURCES = ("published", "fresh")
@@ -208,7 +208,8 @@ def with_inputs(found: Evidence) -> Evidence:
 
 def _inputs(experiment: Experiment, theta: Vector) -> Column:
     """Of a rollout without noise, shape (K + 1, m); nan after a failed solve."""
-    actions = evaluate(controller_of(experiment), theta, experiment.steps).actions
+    around = environment_of(experiment)
+    actions = evaluate(controller_of(experiment), theta, experiment.steps, **around).actions
     missing = ((0, experiment.steps - len(actions)), (0, 0))
     return np.pad(actions, missing, constant_values=np.nan)
 

@@ -325,7 +325,7 @@ def _load(folder: Path) -> Published:
 
 def _read(folder: Path) -> Published:
     about = json.loads((folder / "about.json").read_text("utf-8"))
-    if about["seal"] != _sealed(about) or about["files"] != _sums(folder):
+    if about["seal"] != sealed(about) or about["files"] != sums(folder, FILES[:-1]):
         raise ValueError("a file is not the one that was written")
     runs = pd.read_csv(folder / "runs.csv", dtype=dict.fromkeys(WORDS, str))
     runs = runs.fillna(dict.fromkeys(WORDS, ""))
@@ -355,21 +355,21 @@ def _read(folder: Path) -> Published:
     )
 
 
-def _sums(folder: Path) -> dict[str, str]:
-    """What tells that the files belong together and are whole."""
-    contents = {name: (folder / name).read_bytes() for name in FILES[:-1]}
+def sums(folder: Path, files: Iterable[str]) -> dict[str, str]:
+    """What tells that files belong together and are whole."""
+    contents = {name: (folder / name).read_bytes() for name in files}
     return {name: sha256(content).hexdigest() for name, content in contents.items()}
 
 
 def _seal(folder: Path, about: Mapping[str, Any]) -> None:
     """Write about.json, by which the other files and itself are known again."""
-    sealed = {**about, "files": _sums(folder)}
-    write_json(folder / "about.json", sealed | {"seal": _sealed(sealed)}, indent=1)
+    whole = {**about, "files": sums(folder, FILES[:-1])}
+    write_json(folder / "about.json", whole | {"seal": sealed(whole)}, indent=1)
     _load.cache_clear()
 
 
-def _sealed(about: Mapping[str, Any]) -> str:
-    """What tells that about.json is whole."""
+def sealed(about: Mapping[str, Any]) -> str:
+    """What tells that a file such as about.json is whole."""
     return hash_of({name: value for name, value in about.items() if name != "seal"})
 
 

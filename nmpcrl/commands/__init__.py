@@ -15,6 +15,7 @@ from nmpcrl.commands.refusals import Commands
 from nmpcrl.commands.runs import runs
 from nmpcrl.commands.show import show
 from nmpcrl.commands.study import study
+from nmpcrl.commands.suite import suite
 from nmpcrl.commands.train import train
 from nmpcrl.commands.verify import verify
 from nmpcrl.commands.wasm import wasm
@@ -46,6 +47,7 @@ for command in (
     study,
     verify,
     bench,
+    suite,
     grade,
     wasm,
     completion,

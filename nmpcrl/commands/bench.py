@@ -22,7 +22,17 @@ PROBLEMS = 100_000  # of a sweep
     type=int,
     help=f"Solve N drawn problems, {PROBLEMS:,} by default, and count the outcomes.",
 )
-def bench(length: str, again: bool, publish: bool, live: bool, sweep: int | None) -> None:
+@click.option("--problems", is_flag=True, help="Run the problems of Chapter 10 anew.")
+@click.option("--sizes", is_flag=True, help="Only time problems of many sizes, and beside mpcrl.")
+def bench(
+    length: str,
+    again: bool,
+    publish: bool,
+    live: bool,
+    sweep: int | None,
+    problems: bool,
+    sizes: bool,
+) -> None:
     """Measure how long solves, steps and runs take.
 
     The times are compared with targets, and stored with the runs. What --live measured
@@ -36,6 +46,10 @@ def bench(length: str, again: bool, publish: bool, live: bool, sweep: int | None
     """
     if sweep is not None:
         _sweep(sweep)
+    elif problems:
+        _problems()
+    elif sizes:
+        _sizes()
     elif publish:
         _publish_timing()
     elif live:
@@ -50,6 +64,25 @@ def _sweep(problems: int) -> None:
 
     click.echo(str(sweep.sweep(problems)))
     click.echo(f"{sweep.path()}: stored")
+
+
+def _problems() -> None:
+    """Run other people's problems, and say which predictions came true and where all is stored."""
+    from nmpcrl.analysis import other_problems
+
+    for said, true in other_problems.make().predictions().values():
+        click.echo(f"{'yes' if true else 'no '}  {said}")
+    click.echo(f"{other_problems.path()}: stored")
+
+
+def _sizes() -> None:
+    """Time problems of many sizes and those of Chapter 10, and say where the times are stored."""
+    from nmpcrl.bench import problem_times
+
+    found = problem_times.make()
+    for table in (found.sizes, found.peers):
+        click.echo(table.round(1).to_string(index=False))
+    click.echo(f"{problem_times.path()}: stored")
 
 
 def _print_times(length: str, *, again: bool) -> None:

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from nmpcrl.commands.names import say_of_trials
 from nmpcrl.commands.tables import columns, counted, size
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def clean(yes: bool, only: tuple[str, ...], runs: bool) -> None:
     wanted = [*(only or KINDS), *(["runs"] * runs)]
     names = {store.folder(): store.path_of, summaries.folder(): summaries.path_of}
     found = [one for one in leftovers(names) if one.kind in wanted]
+    say_of_trials("they are kept, for only your code can tell which of them it still reads")
     if not found:
         click.echo(f"Nothing in {store.folder()} can be deleted.")
         return

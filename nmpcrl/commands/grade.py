@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from nmpcrl.commands.places import NewFile
+from nmpcrl.commands.places import NewFile, Place
 from nmpcrl.commands.tables import columns, counted
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 FIELDS = ("student", "notebook", "exercise", "points", "of", "why")
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet computes begins so
 HEADER = ("student", "notebook", "points", "of", "by hand")
-FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
+FOLDER = Place(exists=True, file_okay=False)
 NO_SANDBOX = (
     "The notebooks ran with your rights: limits and a temporary folder are no sandbox."
     " See nmpcrl grade --help."
@@ -36,7 +36,7 @@ def number(name: str, least: int, default: int, text: str) -> Callable[[Command]
 @click.option("--out", type=NewFile(), required=True, help="A CSV file, one row an exercise.")
 @click.option(
     "--edition",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=Place(file_okay=False),
     default=Path("_build/course/grader"),
     show_default=True,
     help="What `make course` writes for graders.",

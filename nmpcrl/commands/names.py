@@ -34,6 +34,20 @@ def names() -> list[str]:
     return sorted(path.stem for path in folder().glob("*.npz"))
 
 
+def trials() -> list[Path]:
+    """The files of the stored trials, which have a folder of their own."""
+    from nmpcrl.study.store import TRIALS, folder
+
+    return sorted((folder() / TRIALS).glob("*.npz"))
+
+
+def say_of_trials(consequence: str) -> None:
+    """Say on standard error how many trials are stored, if any, and what that means here."""
+    if found := trials():
+        count = counted(len(found), "trial")
+        click.echo(f"{count} of your own in {found[0].parent}: {consequence}", err=True)
+
+
 def file_of(run: str) -> Path:
     """The file of the run that is meant.
 
@@ -52,9 +66,20 @@ def file_of(run: str) -> Path:
         return folder() / f"{begin[0]}.npz"
     if begin:
         raise click.ClickException(f"{run!r} is the beginning of several runs: {_listed(begin)}")
+    for path in trials():
+        if path.stem == wanted:
+            raise _no_experiment(path)
     near = get_close_matches(wanted[:80], stored, n=SHOWN, cutoff=0.5) or stored
     raise click.ClickException(
         f"there is no run {run!r} in {folder()}; stored runs: {_listed(near)}"
+    )
+
+
+def _no_experiment(path: Path) -> click.ClickException:
+    """The refusal of a trial's file."""
+    return click.ClickException(
+        f"{path} is a run of a Trial and not of the paper's robot: `nmpcrl.study.fetch(trial)`"
+        " reads it, and `nmpcrl.report.figures.runs.trials` draws it"
     )
 
 
@@ -79,13 +104,15 @@ def records_of(path: Path) -> "Records":
     """What a file of `file_of` holds, if it is the run that its name in the folder says.
 
     Raises:
-        click.ClickException: it is another run.
+        click.ClickException: it is another run, or of a trial.
         DamagedRecords: it cannot be read whole.
     """
     from nmpcrl.study import Experiment, Records
     from nmpcrl.study.store import folder, name_of
 
     records = Records.load(path)
+    if "layout" not in records.experiment:
+        raise _no_experiment(path)
     key = records.facts.get("key", "")[:10]
     said = f"{name_of(Experiment(**records.experiment))}-{key}"
     if key and path.parent == folder() and path.stem != said:

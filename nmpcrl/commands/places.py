@@ -21,19 +21,34 @@ def refuse_unwritable(folder: Path) -> None:
         raise click.ClickException(f"{there} cannot be written: {error.strerror}") from None
 
 
-class NewFile(click.Path):
-    """A file that can be written: its folder is there, and takes files."""
+class Place(click.Path):
+    """A path, as a Path: of a file or folder that may be asked to be there."""
 
-    def __init__(self) -> None:
-        """A file, not a folder; as a Path."""
-        super().__init__(dir_okay=False, writable=True, path_type=Path)
+    def __init__(self, **asked: Any) -> None:
+        """As `click.Path`."""
+        super().__init__(path_type=Path, **asked)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """The path, once a file beside it could be made."""
+        """The path; what no path can be, such as an empty one, is refused."""
         if not str(value):
             self.fail("'' is not a path: it has no name.", param, ctx)
         try:
-            path = Path(str(super().convert(value, param, ctx)))
+            return Path(str(super().convert(value, param, ctx)))
+        except ValueError as error:  # a null character
+            self.fail(f"{str(value)!r} is not a path: {error}.", param, ctx)
+
+
+class NewFile(Place):
+    """A file that can be written: its folder is there, and takes files."""
+
+    def __init__(self) -> None:
+        """A file, not a folder."""
+        super().__init__(dir_okay=False, writable=True)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """The path, once a file beside it could be made."""
+        path = super().convert(value, param, ctx)
+        try:
             with tempfile.TemporaryFile(dir=path.parent):
                 return path
         except OSError as error:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nmpcrl.commands.fields import Conditions
+from nmpcrl.commands.names import say_of_trials
 from nmpcrl.commands.tables import columns, counted, duration, size
 
 if TYPE_CHECKING:
@@ -82,7 +83,8 @@ def runs(sort: str, reverse: bool, as_json: bool, **conditions: Any) -> None:
     With --json, each run is an object with its name `run`, its `path`, its size
     in `bytes`, the fields of its `experiment`, and its `facts`: how it stopped
     (`stopped`), its noise-free `final_cost`, `seconds`, the `solver`, and where
-    it was trained. A number that is not finite is null.
+    it was trained. A number that is not finite is null. Runs of a `Trial` of your
+    own are only counted.
 
     \b
     Example:
@@ -106,6 +108,7 @@ def runs(sort: str, reverse: bool, as_json: bool, **conditions: Any) -> None:
         click.echo(f"No run in {folder()} matches; `nmpcrl runs` lists all.")
     else:
         click.echo(f"No run is stored in {folder()}; `nmpcrl train` trains one.")
+    say_of_trials("`nmpcrl.study.fetch` reads them, and they are not listed")
 
 
 def _wanted(conditions: dict[str, Any]) -> dict[str, tuple[Any, ...]]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--part", "parts", multiple=True, help="Only this part: main, controls or a variant.")
+@click.option("--population", is_flag=True, help="The runs of the 180 drawn layouts instead.")
 @click.option("--workers", metavar="N", type=int, help="Processes; by default one per core.")
 @click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that trains instead.")
 @click.option("--security", metavar="FILE", help="Certificates for a scheduler at tls://.")
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 @click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
 def study(
     parts: tuple[str, ...],
+    population: bool,
     workers: int | None,
     scheduler: str | None,
     security: str | None,
@@ -40,11 +42,13 @@ def study(
     """Train the runs of the study that are not stored.
 
     Finished runs are stored, so it can be interrupted and started again. With --publish and --part,
-    the runs of these parts are published beside those that are there.
+    the runs of these parts are published beside those that are there. With --population, the
+    parts are judge, tune, "N = 20", "N = 40", "alpha x 3" and "judge again", published together.
 
     \b
     Example:
       nmpcrl study --part main --table episodes.csv.gz
+      nmpcrl study --population --part judge --dry-run
     """
     from nmpcrl.analysis import summaries
     from nmpcrl.study import cluster
@@ -52,10 +56,12 @@ def study(
     from nmpcrl.study.storage.place import refuse_file
 
     if judge:
-        _judge()
+        _judge_population() if population else _judge()
         return
     refuse_file()
-    chosen = _chosen(parts)
+    chosen = _chosen(parts, population)
+    if population and parts and publish:
+        raise click.ClickException("--population is published whole: leave --part out")
     _check(workers, scheduler, security, publish=publish, sure=yes)
     missing = [e for e in chosen if not summaries.is_stored(e)]
     stored = f"{len(chosen) - len(missing)} of {counted(len(chosen), 'run')}"
@@ -70,7 +76,12 @@ def study(
         )
     if table:
         _write(table, found, chosen)
-    if publish:
+    if publish and population:
+        from nmpcrl.claims import population_published
+
+        click.echo(f"{population_published.publish(found)}: published")
+        _judge_population()
+    elif publish:
         from nmpcrl.claims.publish import publish_parts, publish_study
 
         place = publish_parts(found, chosen) if parts else publish_study(found, chosen)
@@ -86,6 +97,20 @@ def _judge() -> None:
 
     for verdict in rejudge():
         click.echo(f"{verdict.claim} {verdict.words}")
+
+
+def _judge_population() -> None:
+    """Say in which share of the layouts each claim holds, and each question's answer."""
+    from nmpcrl.claims import population_published
+
+    found = population_published.load()
+    for row in found.shares().itertuples():
+        interval = f"{row.share:.0%} [{row.low:.0%}, {row.high:.0%}]"
+        where = f"{row.holding} of {row.layouts} layouts, {interval}"
+        click.echo(f"{row.claim}: {where}; {row.outcome}")
+    for answer in found.answers():
+        counts = ", ".join(f"{name} {yes} of {of}" for name, (yes, of) in answer.counts.items())
+        click.echo(f"{answer.question}: {answer.words}" + (f" ({counts})" if counts else ""))
 
 
 def _check(
@@ -110,11 +135,11 @@ def _check(
         refuse_unwritable(published.place())
 
 
-def _chosen(parts: tuple[str, ...]) -> "dict[Experiment, str]":
-    """The runs of some parts of the study, or of all, with the part of each."""
-    from nmpcrl.study import design
+def _chosen(parts: tuple[str, ...], population: bool) -> "dict[Experiment, str]":
+    """The runs of some parts of the study, or of the population's, with the part of each."""
+    from nmpcrl.study import design, population_design
 
-    whole = design.whole_study()
+    whole = population_design.whole_population() if population else design.whole_study()
     unknown = set(parts) - set(whole.values())
     if unknown:
         known = ", ".join(dict.fromkeys(whole.values()))

@@ -1,4 +1,4 @@
-"""`nmpcrl wasm`: the controller of a plant as a WebAssembly module."""
+"""`nmpcrl wasm`: the controller of a plant, or of a problem, as a WebAssembly module."""
 
 import importlib
 import sys
@@ -22,34 +22,47 @@ ROBOT = "nmpcrl.control:differential_drive"
     show_default=True,
 )
 @click.option("--task", "of_task", metavar="MODULE:NAME", help="Of a Task; by default the paper's.")
+@click.option(
+    "--problem", "of_problem", metavar="MODULE:NAME", help="Of a Problem, instead of both."
+)
 @click.option("--out", type=NewFile(), default="nmpc.wasm", show_default=True)
-def wasm(of_plant: str, of_task: str | None, out: Path) -> None:
+def wasm(of_plant: str, of_task: str | None, of_problem: str | None, out: Path) -> None:
     """Compile what solves and learns to WebAssembly.
 
     It holds the solver, the update rules and the network, and runs in any
     browser, in Node and in engines such as wasmtime; target, obstacles, horizon
-    and discount are arguments of its functions. It takes about a minute, once.
-    MODULE:NAME may be a function that returns a Plant or a Task.
+    and discount are arguments of its functions; of a Problem, data and theta. It
+    takes a minute or two, once. MODULE:NAME may be a function that returns it.
 
     \b
     Example:
       nmpcrl wasm --plant my_robot:plant --task my_robot:task --out robot.wasm
+      nmpcrl wasm --problem my_reactor:problem --out reactor.wasm
     """
     from nmpcrl.study.limits import need_numba
 
     need_numba("its LLVM compiles to WebAssembly")
 
-    from nmpcrl.control import Plant, Task
+    from nmpcrl.control import Plant, Problem, Task
     from nmpcrl.control.codegen.source import CannotCompile
     from nmpcrl.learning import browser
     from nmpcrl.study import paper
 
-    plant = named(of_plant, Plant)
-    task = paper.task() if of_task is None else named(of_task, Task)
-    if task.start.size != plant.n:
-        raise click.ClickException(f"the task has {task.start.size} states, the plant {plant.n}")
+    of: tuple[Any, ...]
+    if of_problem is not None:
+        if of_task is not None or of_plant != ROBOT:
+            raise click.ClickException("a Problem has no Plant and no Task beside it")
+        of = (named(of_problem, Problem),)
+    else:
+        plant = named(of_plant, Plant)
+        task = paper.task() if of_task is None else named(of_task, Task)
+        if task.start.size != plant.n:
+            raise click.ClickException(
+                f"the task has {task.start.size} states, the plant {plant.n}"
+            )
+        of = plant, task
     try:
-        module = browser.module(plant, task)
+        module = browser.module(*of)
     except (CannotCompile, RuntimeError) as error:
         raise click.ClickException(str(error)) from None
     out.write_bytes(module)

@@ -1,5 +1,6 @@
 """What the controller is: a plant, a task, and the NMPC that solves it. The only home of CasADi."""
 
+from nmpcrl.control.lookup import lookup
 from nmpcrl.control.nmpc import Nmpc, PlanJacobian
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
 from nmpcrl.control.problem import Parameter, Problem, Series, Soft
@@ -24,6 +25,7 @@ __all__ = [
     "Status",
     "Task",
     "differential_drive",
+    "lookup",
     "rk4",
     "unicycle",
 ]

@@ -1,4 +1,4 @@
-"""A plant's controller as WebAssembly: the solver that trains every run, for any other host."""
+"""A controller as WebAssembly: the solver that trains every run, for any other host."""
 
 from importlib.resources import files
 
@@ -7,10 +7,14 @@ import numpy as np
 
 from nmpcrl.control.codegen import browser
 from nmpcrl.control.codegen.source import source
+from nmpcrl.control.ocp import transcribe_problem
 from nmpcrl.control.plant import Plant
-from nmpcrl.control.solvers import riccati, stages
+from nmpcrl.control.problem import Problem
+from nmpcrl.control.solvers import problem_stages, riccati, stages
 from nmpcrl.control.solvers.charge import DISCS, LONGEST
+from nmpcrl.control.solvers.starts import random_inputs
 from nmpcrl.control.task import Task
+from nmpcrl.control.units import sizes_in
 
 HEADER = '''"""The RL stage cost of a task, and inputs to start from."""
 
@@ -28,11 +32,12 @@ RANDOM_INPUTS = np.array({inputs})
 '''
 
 
-def module(plant: Plant, task: Task) -> bytes:
+def module(of: Plant | Problem, task: Task | None = None) -> bytes:
     """One WebAssembly module that solves Eq. (2), steps the plant and charges Eq. (20).
 
     Target, obstacles, box, horizon and discount are arguments of its functions, which
-    `solvers.entries` describes; the plant and the rest of the task are compiled in. Made once, in
+    `solvers.entries` describes; the plant and the rest of the task are compiled in. Of a `Problem`
+    all but data and theta are, and `solvers.rows_entries` describes the functions. Made once, in
     about a minute, and kept with the machine code.
 
     Raises:
@@ -40,18 +45,76 @@ def module(plant: Plant, task: Task) -> bytes:
         RuntimeError: numba is missing, or cannot compile this.
         CannotLink: they call more than the functions that every host has.
     """
-    return browser.from_texts(texts(plant, task))
+    return browser.from_texts(texts(of, task))
 
 
-def texts(plant: Plant, task: Task) -> dict[str, str]:
-    """What is compiled: the text of each module by its name."""
+def texts(of: Plant | Problem, task: Task | None = None) -> dict[str, str]:
+    """What is compiled: the text of each module by its name; a `Problem` has no task."""
+    if isinstance(of, Problem):
+        return _texts_of_problem(of)
+    assert task is not None
+    return _texts_of_task(of, task)
+
+
+def _texts_of_task(plant: Plant, task: Task) -> dict[str, str]:
     here = files(riccati.__package__)
     return {
         **{name: riccati.TEXTS[name] for name in (*riccati.STAGES, "solve", "hessian_times")},
         "model": stages.write(plant),
         "charge": _charge(plant, task),
-        "entries": here.joinpath("entries.py").read_text("utf-8"),
+        **{name: here.joinpath(f"{name}.py").read_text("utf-8") for name in ("points", "entries")},
     }
+
+
+def _texts_of_problem(problem: Problem) -> dict[str, str]:
+    here, solved = files(riccati.__package__), problem.solved
+    names = ("codes", "kernel", "rows", "rows_solve", "rows_slopes")
+    return {
+        **{name: riccati.TEXTS[name] for name in names},
+        **problem_stages.write(solved),
+        "settled": _settled(problem, solved),
+        "points": here.joinpath("points.py").read_text("utf-8"),
+        "entries": here.joinpath("rows_entries.py").read_text("utf-8"),
+    }
+
+
+def _settled(problem: Problem, solved: Problem) -> str:
+    """The text of the module `settled`."""
+    ocps = [transcribe_problem(problem, fix_action=fixed) for fixed in (False, True)]
+    points = [riccati.ProblemPoint(transcribe_problem(solved, fix_action=fixed), None)
+              for fixed in (False, True)]  # fmt: skip
+    data, lower, upper, free, discount, weights, factor, tie = points[0].problem
+    inputs = [random_inputs(solved, seed, problem.horizon) for seed in range(riccati.PERTURBED)]
+    arrays = {
+        "LOWER": lower,
+        "UPPER": upper,
+        "STATES": problem.sizes[0],
+        "INPUTS": problem.sizes[1],
+        "SIZES": np.concatenate([sizes_in(ocp, *problem.sizes) for ocp in ocps]),
+        "DISCOUNT": discount,
+        "WEIGHTS": weights,
+        "KIND": np.array([free, points[1].problem[3]]),
+        "DATA": data,
+        "THETA": problem.theta,
+        "THETA_LOWER": problem.theta_lower,
+        "THETA_UPPER": problem.theta_upper,
+        "RANDOM_INPUTS": np.array(inputs),
+    }
+    numbers = {
+        "N": problem.horizon,
+        "ROWS": weights.size,
+        "WARM_LIMIT": riccati.WARM_LIMIT,
+        "COLD_LIMIT": riccati.COLD_LIMIT,
+        "FACTOR": factor,
+        "TIE": tie,
+    }
+    lines = ["from math import inf", "", "import numpy as np", ""]
+    lines += [f"{name} = {number!r}" for name, number in numbers.items()]
+    lines += [
+        f"{name} = np.array({one.ravel().tolist()}, np.{one.dtype}).reshape({one.shape})"
+        for name, one in arrays.items()
+    ]
+    return "\n".join(lines) + "\n"
 
 
 def _charge(plant: Plant, task: Task) -> str:
@@ -61,7 +124,7 @@ def _charge(plant: Plant, task: Task) -> str:
     cost = task.cost_of(state, action, target, tuple(ca.horzsplit(discs)))
     names = ["state", "action", "target", "discs"]
     function = ca.Function("charge", [state, action, target, discs], [cost], names, ["cost"])
-    inputs = [riccati.random_inputs(plant, seed, LONGEST) for seed in range(riccati.PERTURBED)]
+    inputs = [random_inputs(plant, seed, LONGEST) for seed in range(riccati.PERTURBED)]
     header = HEADER.format(
         discs=DISCS,
         longest=LONGEST,

@@ -1,13 +1,17 @@
 """What a function of the user writes down in symbols, looked through before anything is solved."""
 
 import inspect
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from nmpcrl import Vector
+
 IF = "a Python `if`, `max` or `and` cannot wait for numbers: write ca.if_else(...), ca.fmax(...)"
+INFINITE = "write a large number, or leave out what has no bound"
 NAN = "math's functions make nan of a symbol: write ca.sin(x) for math.sin(x), and so on"
 
 
@@ -34,11 +38,13 @@ def expression(
     if wrong:
         raise ValueError(f"{name} is called as {call}, and does not take that: {wrong}")
     try:
-        written = column(function(*arguments))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FutureWarning)  # CasADi's, of np.sin and its like
+            written = column(function(*arguments))
     except ValueError:
         raise
     except Exception as error:
-        reason = str(error).strip().splitlines()[-1]
+        reason = (str(error).strip() or "nothing is said").splitlines()[-1]
         why = IF if "truth value" in reason else f"{reason} ({type(error).__name__})"
         raise ValueError(f"{name} cannot be written down in symbols: {why}") from error
     if written is None:
@@ -76,24 +82,36 @@ def column(result: Any) -> ca.SX | None:
     return ca.densify(ca.vec(written)) if 1 in written.shape else None
 
 
+def place(name: str, row: int, size: int) -> str:
+    """What an entry of an expression is called: "model[1]", or "stage" where there is one."""
+    return f"{name}[{row}]" if size > 1 else name
+
+
 def _refuse_unusable(name: str, written: ca.SX, allowed: list[ca.SX]) -> None:
     known = {one.__hash__() for vector in allowed for one in ca.vertsplit(vector)}
-    for symbol in ca.symvar(written):
-        if symbol.__hash__() not in known:
-            raise ValueError(
-                f"{name} uses {symbol}, which is none of its arguments: make it a parameter in"
-                " theta, or data"
-            )
-    flat = ca.Function("flat", ca.symvar(written), [written])
-    constants = (
-        flat.instruction_constant(k)
-        for k in range(flat.n_instructions())
-        if flat.instruction_id(k) == ca.OP_CONST
-    )
-    if any(np.isnan(one) for one in constants):
-        raise ValueError(f"{name} holds nan: {NAN}")
+    for row, entry in enumerate(ca.vertsplit(written)):
+        called = place(name, row, written.numel())
+        for symbol in ca.symvar(entry):
+            if symbol.__hash__() not in known:
+                raise ValueError(
+                    f"{called} uses {symbol}, which is none of its arguments: make it a parameter"
+                    " in theta, or data"
+                )
+        constants = _constants(entry)
+        if np.isnan(constants).any():
+            raise ValueError(f"{called} holds nan: {NAN}")
+        if np.isinf(constants).any():
+            raise ValueError(f"{called} holds {constants[np.isinf(constants)][0]}: {INFINITE}")
     try:
         ca.jacobian(written, ca.vertcat(*allowed))
     except Exception as error:
         reason = str(error).strip().splitlines()[-1]
         raise ValueError(f"{name} cannot be differentiated by CasADi: {reason}") from error
+
+
+def _constants(entry: ca.SX) -> Vector:
+    """The numbers in an expression."""
+    flat = ca.Function("flat", ca.symvar(entry), [entry])
+    places = range(flat.n_instructions())
+    found = [flat.instruction_constant(k) for k in places if flat.instruction_id(k) == ca.OP_CONST]
+    return np.array(found, float)

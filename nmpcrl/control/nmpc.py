@@ -14,14 +14,15 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.control.ocp import Indices, Ocp, transcribe, transcribe_problem
+from nmpcrl.control.description import Described, key
+from nmpcrl.control.diagnosis import FARTHEST
+from nmpcrl.control.ocp import Ocp, transcribe, transcribe_problem
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem, discount
-from nmpcrl.control.sensitivity import Sensitivity
-from nmpcrl.control.solution import Solution, short
+from nmpcrl.control.solution import Solution, SolverError, short
 from nmpcrl.control.solvers import Fatrop, Prepared, Riccati, Solver, solver_of
-from nmpcrl.control.solvers.solver import FARTHEST
 from nmpcrl.control.task import Task
+from nmpcrl.control.variant import Variant
 from nmpcrl.control.vectors import whole
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
@@ -41,8 +42,11 @@ class PlanJacobian(NamedTuple):
     inputs: Matrix  # d u_i / d theta, shape (m, d); (0, d) at stage N
 
 
-class Nmpc:
-    """Eq. (2) for one plant and one task, or a `Problem`, as a function of state and theta."""
+class Nmpc(Described):
+    """Eq. (2) for one plant and one task, or a `Problem`, as a function of state and theta.
+
+    It can be pickled and copied; a copy solves as the original does, to the last bit.
+    """
 
     def __init__(
         self,
@@ -80,7 +84,8 @@ class Nmpc:
                 )
             self.horizon, self.gamma = plant.horizon, plant.gamma
             self.n, self.m, self._theta_size = plant.states, plant.inputs, plant.names.size
-            self._far = FARTHEST
+            self._far = FARTHEST * max(1.0, *plant.sizes[0])
+            self._large = max(ABSURD, 1e3 * np.abs(plant.theta).max())
         else:
             if task is None:
                 raise ValueError("a plant needs a task: write Nmpc(plant, task)")
@@ -92,6 +97,7 @@ class Nmpc:
             self._plant, self._task, self._slack_weight = plant, task, float(slack_weight)
             self.solver.check(task)
             self.n, self.m, self._theta_size = plant.n, plant.m, 2 * plant.n + plant.m + 1
+            self._large = ABSURD
             box = np.abs([task.lower, task.upper])
             self._far = max(FAR, 100 * box[np.isfinite(box)].max(initial=0))
         self.lower, self.upper = plant.lower, plant.upper
@@ -123,23 +129,31 @@ class Nmpc:
         """
         began = time.perf_counter()
         state = _checked("state", state, self.n, self._far)
-        theta = _checked("theta", theta, self._theta_size)
+        theta = _checked("theta", theta, self._theta_size, self._large)
         known = None
         if self.problem is not None:
             known = self.problem.stage_data(data)
         elif data is not None:
             raise ValueError("data belong to a Problem: a task's target and obstacles stand still")
-        if action is None:
-            return self._free.solve(state, theta, warm_start, began=began, data=known)
-        action = _checked("action", action, self.m)
-        if (action < self.lower).any() or (action > self.upper).any():
-            bounds = f"{short(self.lower)} and {short(self.upper)}"
-            raise ValueError(f"action {short(action)} must lie between {bounds}")
-        return self._fixed.solve(state, theta, warm_start, action, began=began, data=known)
+        given: tuple[Vector, ...] = ()
+        if action is not None:
+            action = _checked("action", action, self.m, self._far)
+            if (action < self.lower).any() or (action > self.upper).any():
+                bounds = f"{short(self.lower)} and {short(self.upper)}"
+                raise ValueError(f"action {short(action)} must lie between {bounds}")
+            given = (action,)
+        variant = self._fixed if given else self._free
+        try:
+            return variant.solve(state, theta, warm_start, *given, began=began, data=known)
+        except SolverError as error:
+            why = variant.diagnosis.why(state, theta, known)
+            if not why:
+                raise
+            raise SolverError(f"{error.status}; {why}", state, theta) from error
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
-        return self._variant(solution).sensitivity.hessian(*_point(solution))
+        return self._variant(solution).hessian(solution)
 
     def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
         """The product of `value_hessian` with a vector of shape (d,); in microseconds by riccati.
@@ -177,8 +191,16 @@ class Nmpc:
 
         `relative` to the sizes of the plan and of its multipliers, whatever their units.
         """
-        point = _point(solution)
-        return self._variant(solution).sensitivity.kkt_residual(*point, relative=relative)
+        return self._variant(solution).kkt_residual(solution, relative=relative)
+
+    @property
+    def key(self) -> str:
+        """A hash of all that its solutions depend on, the same in every process."""
+        how = (self.solver.name, self.solver.tolerance, self.ties_active)
+        if self.problem is not None:
+            return key("nmpc", self.problem.key, *how)
+        said = (self.horizon, self.gamma, self._slack_weight)
+        return key("nmpc", self._plant.key, self._task.key, *said, *how)
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""
@@ -231,75 +253,24 @@ class Nmpc:
             self._solves = instead
         return self._solves.prepare(ocp)
 
-    def _variant(self, solution: Solution) -> "_Variant":
+    def _variant(self, solution: Solution) -> Variant:
         return self._fixed if solution.ocp.fixed_action.size else self._free
 
     @cached_property
-    def _free(self) -> "_Variant":
-        return _Variant(self, fix_action=False)
+    def _free(self) -> Variant:
+        return self._with(fix_action=False)
 
     @cached_property
-    def _fixed(self) -> "_Variant":
-        return _Variant(self, fix_action=True)
+    def _fixed(self) -> Variant:
+        return self._with(fix_action=True)
 
-
-class _Variant:
-    """Eq. (2) with u_0 free or fixed: transcribed, with its sensitivities and a solver."""
-
-    def __init__(self, nmpc: Nmpc, *, fix_action: bool) -> None:
-        self.ocp: Ocp
-        ties_active = nmpc.ties_active
-        if nmpc.problem is not None:
-            self.ocp = transcribe_problem(
-                nmpc.problem, fix_action=fix_action, ties_active=ties_active
-            )
-        else:
-            problem = (nmpc.plant, nmpc.task, nmpc.horizon, nmpc.gamma, nmpc.slack_weight)
-            self.ocp = transcribe(*problem, fix_action=fix_action, ties_active=ties_active)
-        self._solver = nmpc._prepared(self.ocp)
-        self.solve = self._solver.solve
-
-    def hessian_times(self, solution: Solution, vector: Vector) -> Vector:
-        """As `Nmpc.value_hessian_times`; by dense algebra where there is no machine code."""
-        product = self._solver.hessian_times(solution, vector)
-        if product is None:
-            return self.sensitivity.hessian(*_point(solution)) @ vector
-        return product
-
-    def inputs_jacobian(self, solution: Solution, stage: int) -> Matrix:
-        """d u_i / d theta; by dense algebra where there is no machine code."""
-        if stage == len(self.ocp.inputs):
-            return np.zeros((0, solution.theta.size))
-        return self._rows(solution, stage, self.ocp.inputs)
-
-    def states_jacobian(self, solution: Solution, stage: int) -> Matrix:
-        """d x_i / d theta, in the same way."""
-        return self._rows(solution, stage, self.ocp.states)
-
-    def _rows(self, solution: Solution, stage: int, part: Indices) -> Matrix:
-        """The gradients of the plan's entries at a stage, a sweep each."""
-        ocp, found = self.ocp, []
-        states: Matrix = np.zeros(ocp.states.shape)
-        inputs: Matrix = np.zeros(ocp.inputs.shape)
-        chosen = states if part is ocp.states else inputs
-        for k in range(chosen.shape[1]):
-            chosen[stage] = np.arange(chosen.shape[1]) == k
-            gradient = self._solver.plan_gradient(solution, states, inputs)
-            if gradient is None:
-                dense: Matrix = self.sensitivity.plan(*_point(solution))[part[stage]]
-                return dense
-            found.append(gradient)
-        return np.array(found)
-
-    @cached_property
-    def sensitivity(self) -> Sensitivity:
-        return Sensitivity(self.ocp)
-
-
-def _point(solution: Solution) -> tuple[Vector, Vector, Vector, Vector]:
-    return (
-        solution.primal, solution.parameters, solution.constraint_duals, solution.bound_duals,
-    )  # fmt: skip
+    def _with(self, *, fix_action: bool) -> Variant:
+        """The problem transcribed, with u_0 free or fixed."""
+        options: Any = {"fix_action": fix_action, "ties_active": self.ties_active}
+        if self.problem is not None:
+            return Variant(transcribe_problem(self.problem, **options), self._prepared)
+        problem = (self._plant, self._task, self.horizon, self.gamma, self._slack_weight)
+        return Variant(transcribe(*problem, **options), self._prepared)
 
 
 def _checked(name: str, vector: Vector, size: int, largest: float = ABSURD) -> Vector:

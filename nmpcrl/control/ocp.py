@@ -6,7 +6,7 @@ the constraints. That order is the block structure which a structure-exploiting 
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -100,6 +100,12 @@ class TaskOcp(Ocp):
     task: Task
     slack_weight: float
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled as what it is transcribed from."""
+        again = partial(transcribe, fix_action=self.fixed_action.size > 0,
+                        ties_active=self.ties_active)  # fmt: skip
+        return again, (self.plant, self.task, len(self.inputs), self.gamma, self.slack_weight)
+
     @property
     def slack_weights(self) -> float:
         """omega."""
@@ -116,6 +122,12 @@ class ProblemOcp(Ocp):
     """A `Problem`."""
 
     problem: Problem
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled as what it is transcribed from."""
+        again = partial(transcribe_problem, fix_action=self.fixed_action.size > 0,
+                        ties_active=self.ties_active)  # fmt: skip
+        return again, (self.problem,)
 
     @property
     def slack_weights(self) -> Vector:

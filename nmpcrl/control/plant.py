@@ -3,12 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
+from nmpcrl.control.description import Described, Recorded, key
 from nmpcrl.control.expression import column, expression
 from nmpcrl.control.vectors import kept, whole
 
@@ -35,7 +37,7 @@ def rk4(dynamics: Dynamics, state: ca.SX, action: ca.SX, period: float, substeps
 
 
 @dataclass(frozen=True, eq=False)
-class Plant:
+class Plant(Described):
     """A plant that is sampled every `period` seconds.
 
     Where a task has obstacles, the first two states are its position.
@@ -69,6 +71,16 @@ class Plant:
         symbols = {"state": state, "action": action}
         expression("dynamics", self.dynamics, (state, action), symbols, self.n, "state")
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields, with the dynamics as an expression: a function need not have a name."""
+        return super().__getstate__() | {"dynamics": Recorded(self._derivative)}
+
+    @property
+    def key(self) -> str:
+        """A hash of all that describes the plant, the same in every process."""
+        fields = (self.state_names, self.action_names, self.lower, self.upper)
+        return key("plant", self._derivative, *fields, self.period, self.substeps)
+
     @property
     def n(self) -> int:
         """Number of states."""
@@ -78,6 +90,11 @@ class Plant:
     def m(self) -> int:
         """Number of inputs."""
         return len(self.action_names)
+
+    @cached_property
+    def _derivative(self) -> ca.Function:
+        state, action = ca.SX.sym("state", self.n), ca.SX.sym("action", self.m)
+        return ca.Function("dynamics", [state, action], [self._written(state, action)])
 
     @cached_property
     def transition(self) -> ca.Function:

@@ -9,6 +9,7 @@ f, l, V_f, V0 and h are written once, in CasADi's SX; all their derivatives foll
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -19,8 +20,12 @@ from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.blocks import Blocks, Symbols, numbers
+from nmpcrl.control.description import Described, key
 from nmpcrl.control.expression import expression
 from nmpcrl.control.vectors import kept, whole
+
+SMALL, LARGE = 1e-2, 1e4  # sizes of states that every solver takes as they are
+LEAST = 1e-200  # curvature
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +67,11 @@ class Expressions(NamedTuple):
     rows: ca.SX  # h, shape (M,)
 
 
-class Problem:
-    """What an NMPC minimises, in symbols of which each may be learned."""
+class Problem(Described):
+    """What an NMPC minimises, in symbols of which each may be learned.
+
+    It can be pickled and copied, whatever its functions are: as expressions they go along.
+    """
 
     def __init__(
         self,
@@ -81,6 +89,7 @@ class Problem:
         upper: Any = np.inf,
         gamma: float = 1.0,
         data: Mapping[str, Any] | None = None,
+        scale: Any = None,
     ) -> None:
         """Write the problem down in symbols and look through it.
 
@@ -103,6 +112,9 @@ class Problem:
             gamma: discount factor, 0 < gamma <= 1.
             data: what is known of every stage and not learned: by name, the array of one stage, or
                 a `Series` of all, that is taken where `Nmpc.solve` is given none.
+            scale: typical sizes of the states, a number or one a state: it is solved in these
+                units. Absent, they are 1, or what the costs say where that is below 0.01 or
+                above 10,000.
 
         Raises:
             ValueError: something is no such thing; the message names it and says what to write.
@@ -138,23 +150,58 @@ class Problem:
         }
         self.data_names = Blocks("data", shapes)
         empty: Matrix = np.zeros((self.horizon + 1, self.data_names.size))
-        self.data = self.data_names.filled(empty, defaults)
-        self.soft = tuple(soft)
-        self.expressions, sizes = self._written(model, stage, terminal, initial)
-        self.weights = kept(_weights(self.soft, sizes))
+        self.data = kept(self.data_names.filled(empty, defaults))
+        soft = tuple(soft)
+        self._function, sizes = self._written(model, stage, terminal, initial, soft)
+        self.weights = kept(_weights(soft, sizes))
         self.on_inputs = _depends(self.expressions.rows, self.expressions.u)
-        self.active = self._active(sizes)
+        self.active = self._active(soft, sizes)
+        self.sizes = _sizes(scale, self)
 
     @cached_property
-    def scale(self) -> float:
+    def expressions(self) -> Expressions:
+        """The problem in symbols."""
+        arguments = self._function.sx_in()
+        return Expressions(*arguments, *self._function.call(arguments))
+
+    @cached_property
+    def key(self) -> str:
+        """A hash of all that describes the problem, the same in every process."""
+        return key(
+            "problem", self._function, self.horizon, self.gamma, self.lower, self.upper,
+            self.names, self.theta, self.theta_lower, self.theta_upper,
+            self.weights, self.active, self.data_names, self.data, self.sizes,
+        )  # fmt: skip
+
+    @cached_property
+    def cost_scale(self) -> float:
         """What riccati divides the objective by, half of the largest curvature or a slope."""
+        curvature, slope = self._bends
+        found = max(np.abs(curvature).max() / 2, np.abs(slope).max())
+        return float(found) if 0 < found < np.inf else 1.0
+
+    @cached_property
+    def solved(self) -> "Problem":
+        """The same problem with states and inputs in parts of `sizes`, which is what is solved."""
+        if all((size == 1).all() for size in self.sizes):
+            return self
+        (states, inputs), other = self.sizes, copy(self)
+        x, u, theta, d = given = self._function.sx_in()
+        next_x, *costs = self._function(ca.DM(states) * x, ca.DM(inputs) * u, theta, d)
+        function = ca.Function("problem", given, [next_x / ca.DM(states), *costs])
+        bounds = {"lower": kept(self.lower / inputs), "upper": kept(self.upper / inputs)}
+        vars(other).update(_function=function, sizes=_ones(self), **bounds)
+        return other
+
+    @cached_property
+    def _bends(self) -> tuple[Matrix, Matrix]:
+        """Hessian and gradient in (x, u) of a stage's cost and the last, around 0."""
         e = self.expressions
         z, costs = ca.vertcat(e.x, e.u), e.stage + self.gamma**self.horizon * e.terminal
-        sizes = ca.Function("sizes", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
+        both = ca.Function("bends", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
         still = np.clip(np.zeros(self.inputs), self.lower, self.upper)
-        curvature, slope = sizes(np.zeros(self.states), still, self.theta, self.data[0])
-        found = max(np.abs(curvature.full()).max() / 2, np.abs(slope.full()).max())
-        return float(found) if 0 < found < np.inf else 1.0
+        curvature, slope = both(np.zeros(self.states), still, self.theta, self.data[0])
+        return curvature.full(), slope.full()
 
     def split(self, theta: Vector) -> dict[str, Any]:
         """A vector in the order of theta, or of its gradient, by name."""
@@ -170,7 +217,12 @@ class Problem:
         Raises:
             ValueError: a name is unknown, or a shape neither that of a stage nor of all.
         """
-        return self.data if values is None else self.data_names.filled(self.data, values)
+        return self._known if values is None else self.data_names.filled(self.data, values)
+
+    @cached_property
+    def _known(self) -> Matrix:
+        """The data as machine code takes them, which could be written to and are not."""
+        return self.data.copy()
 
     def _written(
         self,
@@ -178,8 +230,9 @@ class Problem:
         stage: Callable[..., Any],
         terminal: Callable[..., Any] | None,
         initial: Callable[..., Any] | None,
-    ) -> tuple[Expressions, list[int]]:
-        """The problem in symbols, and how many rows each `Soft` has."""
+        soft: tuple[Soft, ...],
+    ) -> tuple[ca.Function, list[int]]:
+        """The problem as a function that can be pickled, and how many rows each `Soft` has."""
         x, u = ca.SX.sym("x", self.states), ca.SX.sym("u", self.inputs)
         theta, d = ca.SX.sym("theta", self.names.size), ca.SX.sym("d", self.data_names.size)
         last: tuple[Symbols, ...] = (self.names.symbols(theta),)
@@ -191,28 +244,24 @@ class Problem:
         cost = expression("stage", stage, *both, 1, "cost")
         final = expression("terminal", terminal, *alone, 1, "cost")
         first = expression("initial", initial, *alone, 1, "cost")
-        rows = [
-            expression(f"soft[{k}]", one.row, *both, 0, "row") for k, one in enumerate(self.soft)
-        ]
-        found = Expressions(
-            x, u, theta, d, next_x, cost, final, first, ca.vertcat(ca.SX(0, 1), *rows)
-        )
-        idle = ~_depends(found.rows, ca.vertcat(x, u))
+        rows = [expression(f"soft[{k}]", one.row, *both, 0, "row") for k, one in enumerate(soft)]
+        together = ca.vertcat(ca.SX(0, 1), *rows)
+        idle = ~_depends(together, ca.vertcat(x, u))
         for k, place in _each(rows):
             if idle[place]:
                 raise ValueError(
                     f"soft[{k}] has a row that depends on neither x nor u: no plan can change it"
                 )
-        return found, [row.numel() for row in rows]
+        results = [next_x, cost, final, first, together]
+        function = ca.Function("problem", [x, u, theta, d], results)
+        return function, [row.numel() for row in rows]
 
-    def _active(self, sizes: list[int]) -> NDArray[np.bool_]:
+    def _active(self, soft: tuple[Soft, ...], sizes: list[int]) -> NDArray[np.bool_]:
         """Which row holds at which stage, shape (N + 1, M)."""
         stages = np.arange(self.horizon + 1)
         active = np.zeros((stages.size, sum(sizes)), bool)
         ends = np.cumsum([0, *sizes])
-        for k, (one, place) in enumerate(
-            zip(self.soft, map(slice, ends[:-1], ends[1:]), strict=True)
-        ):
+        for k, (one, place) in enumerate(zip(soft, map(slice, ends[:-1], ends[1:]), strict=True)):
             on_inputs = self.on_inputs[place].any()
             try:
                 chosen = stages if one.stages is None else np.atleast_1d(stages[one.stages])
@@ -248,6 +297,34 @@ def discount(gamma: Any) -> float:
     if not 0 < gamma <= 1:
         raise ValueError(f"gamma = {gamma} must lie in (0, 1]")
     return float(gamma)
+
+
+def _ones(problem: Problem) -> tuple[Vector, Vector]:
+    return kept(np.ones(problem.states)), kept(np.ones(problem.inputs))
+
+
+def _sizes(scale: Any, problem: Problem) -> tuple[Vector, Vector]:
+    """In which units states and inputs are solved: powers of 2, so that nothing is rounded."""
+    bends = np.diag(problem._bends[0])
+    usual = np.where((bends > 0) & (bends < np.inf), np.maximum(bends, LEAST) ** -0.5, 1.0)
+    states, inputs = usual[: problem.states], usual[problem.states :]
+    if scale is None and ((states > SMALL) & (states < LARGE)).all():
+        return _ones(problem)
+    if scale is not None:
+        states = np.array(scale, float)
+        if (
+            states.shape not in ((), (1,), (problem.states,))
+            or not ((states > 0) & (states < np.inf)).all()
+        ):
+            raise ValueError(
+                f"scale = {scale!r} must hold {problem.states} positive numbers, one a state"
+            )
+    half = (problem.upper - problem.lower) / 2
+    inputs = np.where(half < np.inf, half, inputs)
+    rounded = (2.0 ** np.round(np.log2(size)) for size in (states, inputs))
+    spread = zip(rounded, (problem.states, problem.inputs), strict=True)
+    states, inputs = (kept(np.broadcast_to(size, count)) for size, count in spread)
+    return states, inputs
 
 
 def _spread(name: str, bound: Any, start: Matrix) -> Vector:

@@ -10,6 +10,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
+from nmpcrl.control.description import Described, key
 from nmpcrl.control.vectors import kept
 
 
@@ -29,7 +30,7 @@ class Obstacle:
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class Task(Described):
     """Go from `start` to `target` within a box and around the obstacles, at the cost of Eq. (20).
 
     Raises:
@@ -68,6 +69,12 @@ class Task:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         if self.obstacles and self.start.size < 2:
             raise ValueError("obstacles stand in a plane: a task with one state has none")
+
+    @property
+    def key(self) -> str:
+        """A hash of all that describes the task, the same in every process."""
+        discs = tuple((one.x, one.y, one.diameter) for one in self.obstacles)
+        return key("task", {**self.__getstate__(), "obstacles": discs})
 
     def _refuse_outside(self, name: str) -> None:
         point = getattr(self, name)

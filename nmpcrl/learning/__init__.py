@@ -6,9 +6,12 @@
 from typing import TYPE_CHECKING, Any
 
 from nmpcrl.learning.baselines import frozen, random_direction, step_matched
+from nmpcrl.learning.batches import Batched, batch_semi_gradient, lstd_q
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, SecondSolve, Successor, Transition
+from nmpcrl.learning.gymnasium import as_gymnasium
 from nmpcrl.learning.learners import (
     Learner,
+    StatefulRule,
     Update,
     Weights,
     deep_expected_sarsa,
@@ -18,6 +21,8 @@ from nmpcrl.learning.learners import (
     q_learning,
     regularized_deep_expected_sarsa,
 )
+from nmpcrl.learning.optimisers import Adam, Descent, GaussNewton, Optimiser
+from nmpcrl.learning.policy_gradient import policy_gradient
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
 from nmpcrl.learning.training import (
     Diverged,
@@ -50,21 +55,29 @@ else:
 
 
 __all__ = [
+    "Adam",
+    "Batched",
     "Bootstrap",
+    "Descent",
     "Diverged",
     "Exploration",
+    "GaussNewton",
     "Imitation",
     "Learner",
+    "Optimiser",
     "Persistent",
     "QNetwork",
     "Rollout",
     "SecondSolve",
+    "StatefulRule",
     "Step",
     "Successor",
     "Transition",
     "Update",
     "Weights",
+    "as_gymnasium",
     "auxiliary_step",
+    "batch_semi_gradient",
     "count_episodes",
     "count_steps",
     "curvature_correction",
@@ -75,6 +88,8 @@ __all__ = [
     "gradient_expected_sarsa",
     "gradient_td_step",
     "gradient_tdc",
+    "lstd_q",
+    "policy_gradient",
     "project",
     "q_learning",
     "random_direction",

@@ -1,8 +1,9 @@
 """Where the value of the next state comes from: a second solve, or a network that imitates one."""
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -24,6 +25,8 @@ class Transition:
     next_state: Vector  # s+, shape (n,)
     solution: Solution  # of the NMPC in s: its value is Q_theta(s, a)  # departure F
     end: bool = False  # whether s+ ends the episode, and is worth 0
+    last: bool = False  # whether the episode is over: by `end`, or since its time is
+    next_data: Mapping[str, Any] | None = None  # what a `Problem` knows of the stages from s+ on
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +53,19 @@ class Controller(Protocol):
         theta: Vector,
         warm_start: Solution | None = None,
         action: Vector | None = None,
+        *,
+        data: Mapping[str, Any] | None = None,
     ) -> Solution:
-        """See `nmpcrl.control.Nmpc.solve`."""
+        """See `nmpcrl.control.Nmpc.solve`; data are given only where there are any."""
 
     def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
         """See `nmpcrl.control.Nmpc.value_hessian_times`; only exact TDC asks for it."""
+
+    def value_hessian(self, solution: Solution) -> Matrix:
+        """See `nmpcrl.control.Nmpc.value_hessian`; only LSTD-Q with curvature asks for it."""
+
+    def policy_jacobian(self, solution: Solution) -> Matrix:
+        """See `nmpcrl.control.Nmpc.policy_jacobian`; only DPG asks for it."""
 
 
 class Bootstrap(Protocol):
@@ -78,7 +89,11 @@ class SecondSolve:
         """
         if transition.end:
             return Successor(0.0, np.zeros(theta.size))
-        solution = self.nmpc.solve(transition.next_state, theta, transition.solution)
+        what = (transition.next_state, theta, transition.solution)
+        if transition.next_data is None:
+            solution = self.nmpc.solve(*what)
+        else:
+            solution = self.nmpc.solve(*what, data=transition.next_data)
         return Successor(solution.value, solution.features, solution)
 
 

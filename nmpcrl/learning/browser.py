@@ -2,7 +2,7 @@
 
 from importlib.resources import files
 
-from nmpcrl.control import Plant, Task, browser
+from nmpcrl.control import Plant, Problem, Task, browser
 from nmpcrl.control.codegen.browser import from_texts
 from nmpcrl.control.solvers.charge import DISCS, LONGEST
 
@@ -11,7 +11,7 @@ __all__ = ["DISCS", "LONGEST", "module"]  # at most: obstacles, and steps planne
 OWN = ("updates", "rules", "network_rules")
 
 
-def module(plant: Plant, task: Task) -> bytes:
+def module(of: Plant | Problem, task: Task | None = None) -> bytes:
     """`control.browser.module` with what `rules` and `network_rules` describe.
 
     Raises:
@@ -19,4 +19,4 @@ def module(plant: Plant, task: Task) -> bytes:
     """
     here = files(__package__)
     own = {name: here.joinpath(f"{name}.py").read_text("utf-8") for name in OWN}
-    return from_texts(browser.texts(plant, task) | own)
+    return from_texts(browser.texts(of, task) | own)

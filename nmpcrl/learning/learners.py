@@ -8,13 +8,17 @@
 | GES     | a second solve    | gradient TD with the weights w             |
 | TDC     | a second solve    | gradient TD with its curvature, projected  |
 | QL      | a second solve    | a semi-gradient of Q(s, a), u_0 = a fixed  |
+| LSTD-Q  | a second solve    | a Gauss-Newton step of a batch             |
+| DPG     | none              | the policy's gradient, from a batch        |
 
-The control arms that they are compared with are in `baselines`.
+LSTD-Q is in `batches`, DPG in `policy_gradient`, and the control arms are in `baselines`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Solution
@@ -45,10 +49,34 @@ class Weights:
 
     theta: Vector  # of the NMPC, shape (d,)
     w: Vector  # auxiliary weights of gradient TD, shape (d,)
+    memory: Any = None  # of a `StatefulRule`; None before its first step
 
 
 # (weights, delta, solution in s, what is known of s+) -> weights
 UpdateRule = Callable[[Weights, float, Solution, Successor], Weights]
+
+
+class StatefulRule(Protocol):
+    """An update rule that remembers, in what it returns and nowhere else.
+
+    So one learner serves many runs, and a run goes on from the weights of any of its steps.
+    """
+
+    def init(self, weights: Weights) -> Any:
+        """The memory with which a run begins."""
+
+    def step(
+        self,
+        memory: Any,
+        weights: Weights,
+        transition: Transition,
+        delta: float,
+        successor: Successor,
+    ) -> tuple[Weights, Any]:
+        """New weights and memory; `transition.last` says whether the episode is over.
+
+        A failed solve ends an episode without a transition: the next one begins a new episode.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +94,10 @@ class Learner:
 
     name: str  # as tables show it
     bootstrap: Bootstrap  # values the next state
-    rule: UpdateRule  # moves the weights
+    rule: UpdateRule | StatefulRule  # moves the weights
     gamma: float  # discount factor of the TD error
+    bounds: tuple[Vector, Vector] | None = None  # into which theta is projected after each step
+    values_actions: bool = False  # whether it is meant for Q(s, a), and not for V(s)
 
     def step(self, weights: Weights, transition: Transition) -> Update:
         """Value the next state, form the TD error, and move the weights.
@@ -80,7 +110,23 @@ class Learner:
             return Update(weights)
         solution = transition.solution
         delta = td_error(transition.cost, self.gamma, solution.value, successor.value)
-        return Update(self.rule(weights, delta, solution, successor), successor, delta)
+        if callable(self.rule):
+            moved = self.rule(weights, delta, solution, successor)
+        else:
+            memory = self.rule.init(weights) if weights.memory is None else weights.memory
+            moved, memory = self.rule.step(memory, weights, transition, delta, successor)
+            moved = replace(moved, memory=memory)
+        if self.bounds is not None:
+            moved = replace(moved, theta=project(moved.theta, *self.bounds))
+        return Update(moved, successor, delta)
+
+
+def theta_bounds(nmpc: Any) -> tuple[Vector, Vector] | None:
+    """The bounds of a `Problem`'s theta; None where there is no problem, or nothing is bounded."""
+    problem = getattr(nmpc, "problem", None)
+    if problem is None or not np.isfinite([problem.theta_lower, problem.theta_upper]).any():
+        return None
+    return problem.theta_lower, problem.theta_upper
 
 
 def semi_gradient(alpha: float) -> UpdateRule:
@@ -150,7 +196,7 @@ def expected_sarsa(nmpc: Controller, alpha: float) -> Learner:
 
     Source: Moradimaryamnegari et al. (2022).
     """
-    return Learner("ES", SecondSolve(nmpc), semi_gradient(alpha), nmpc.gamma)
+    return Learner("ES", SecondSolve(nmpc), semi_gradient(alpha), nmpc.gamma, theta_bounds(nmpc))
 
 
 def deep_expected_sarsa(
@@ -161,7 +207,7 @@ def deep_expected_sarsa(
     `options` are those of `Imitation`.
     """
     bootstrap = Imitation(network, with_theta=False, **options)
-    return Learner("DES", bootstrap, semi_gradient(alpha), nmpc.gamma)
+    return Learner("DES", bootstrap, semi_gradient(alpha), nmpc.gamma, theta_bounds(nmpc))
 
 
 def regularized_deep_expected_sarsa(
@@ -172,12 +218,13 @@ def regularized_deep_expected_sarsa(
     Eqs. (9), (10) and (11); `options` are those of `Imitation`.
     """
     bootstrap = Imitation(network, with_theta=True, **options)
-    return Learner("RDES", bootstrap, semi_gradient(alpha), nmpc.gamma)
+    return Learner("RDES", bootstrap, semi_gradient(alpha), nmpc.gamma, theta_bounds(nmpc))
 
 
 def gradient_expected_sarsa(nmpc: Controller, alpha: float, beta: float) -> Learner:
     """GES, the paper's second method: two solves a step, Eq. (7), and gradient TD, Eq. (16)."""
-    return Learner("GES", SecondSolve(nmpc), gradient_td(alpha, beta, nmpc.gamma), nmpc.gamma)
+    rule = gradient_td(alpha, beta, nmpc.gamma)
+    return Learner("GES", SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
 
 
 def gradient_tdc(
@@ -193,13 +240,15 @@ def gradient_tdc(
     Arguments as in `exact_gradient_td`; without curvature and projection it is GES.
     """
     rule = exact_gradient_td(nmpc, alpha, beta, curvature=curvature, projection=projection)
-    return Learner("TDC", SecondSolve(nmpc), rule, nmpc.gamma)
+    return Learner("TDC", SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
 
 
 def q_learning(nmpc: Controller, alpha: float) -> Learner:
     """QL: two solves a step, semi-gradient of the action value proper (Gros and Zanon 2020).
 
-    A step's transition must hold the solution with u_0 = a fixed, whose value is Q_theta(s, a). In
-    the next state the policy minimises Q, so its value is V_theta(s+): a solve with u_0 free.
+    A step's transition must hold the solution with u_0 = a fixed, whose value is Q_theta(s, a), as
+    `train` has it for this learner. In the next state the policy minimises Q, so its value is
+    V_theta(s+): a solve with u_0 free.
     """
-    return Learner("QL", SecondSolve(nmpc), semi_gradient(alpha), nmpc.gamma)
+    rule, bounds = semi_gradient(alpha), theta_bounds(nmpc)
+    return Learner("QL", SecondSolve(nmpc), rule, nmpc.gamma, bounds, values_actions=True)

@@ -1,13 +1,14 @@
 """The closed loop without noise, by which theta is judged, and what a failed solve means in it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Nmpc, Plant, Solution, SolverError
-from nmpcrl.learning.environment import StepFunction, environment
+from nmpcrl.control import Nmpc, Plant, Problem, Solution, SolverError
+from nmpcrl.learning.environment import Data, GymnasiumEnv, StepFunction, environment, forecasts
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,11 @@ class Persistent:
     nmpc: Nmpc
 
     @property
+    def problem(self) -> Problem | None:
+        """As `Nmpc.problem`."""
+        return self.nmpc.problem
+
+    @property
     def gamma(self) -> float:
         """The discount factor of the NMPC."""
         return self.nmpc.gamma
@@ -30,19 +36,30 @@ class Persistent:
         theta: Vector,
         warm_start: Solution | None = None,
         action: Vector | None = None,
+        data: Mapping[str, Any] | None = None,
     ) -> Solution:
         """As `Nmpc.solve`; the status is "restarted" where only the second attempt succeeded."""
         try:
-            return self.nmpc.solve(state, theta, warm_start, action)
+            if data is None:
+                return self.nmpc.solve(state, theta, warm_start, action)
+            return self.nmpc.solve(state, theta, warm_start, action, data=data)
         except SolverError:
             if warm_start is None:
                 raise
-            solution = self.nmpc.solve(state, theta, None, action)
+            solution = self.solve(state, theta, None, action, data)
             return replace(solution, restarts=solution.restarts + 1)
 
     def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
         """As `Nmpc.value_hessian_times`."""
         return self.nmpc.value_hessian_times(solution, vector)
+
+    def value_hessian(self, solution: Solution) -> Matrix:
+        """As `Nmpc.value_hessian`."""
+        return self.nmpc.value_hessian(solution)
+
+    def policy_jacobian(self, solution: Solution) -> Matrix:
+        """As `Nmpc.policy_jacobian`."""
+        return self.nmpc.policy_jacobian(solution)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +87,9 @@ def evaluate(
     theta: Vector,
     steps: int,
     *,
-    plant: Plant | StepFunction | None = None,
+    plant: Plant | StepFunction | GymnasiumEnv | None = None,
     start: Any = None,
+    data: Data | None = None,
     rng: np.random.Generator | int = 0,
 ) -> Rollout:
     """Follow the policy of theta, Eq. (4), from the start and without noise.
@@ -84,24 +102,26 @@ def evaluate(
         steps: K + 1, the most states that are visited.
         plant: the environment, as in `train`; the plant that plans if absent.
         start: a state or rng -> state; the task's if absent.
+        data: of a `Problem` at each time, as in `train`.
         rng: for a plant or a start that draws.
     """
     controller = persistent(controller)
     nmpc, rng = controller.nmpc, np.random.default_rng(rng)
     around = environment(nmpc, plant, start)
-    state, plan, failure, end = around.start(rng), None, "", False
+    state, plan, failure = around.start(rng), None, ""
     states, actions, costs = [], [], []
-    for _ in range(steps):
+    ahead = forecasts(data, nmpc.horizon)
+    for t in range(steps):
         try:
-            plan = controller.solve(state, theta, plan)
+            plan = controller.solve(state, theta, plan, None, ahead and ahead(t))
         except SolverError as error:
             failure = str(error)
             break
         states.append(state)
         actions.append(plan.action)
-        state, cost, end = around.step(state, plan.action, rng)
+        state, cost, end, cut = around.step(state, plan.action, rng)
         costs.append(cost)
-        if end:
+        if end or cut:
             break
     return Rollout(
         states=np.reshape(states, (-1, nmpc.n)),

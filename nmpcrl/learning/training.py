@@ -1,6 +1,6 @@
 """Algorithm 1 as a generator of steps."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,7 +13,14 @@ from nmpcrl.control import Nmpc, Plant, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.solution import short
 from nmpcrl.learning.bootstrap import Transition
-from nmpcrl.learning.environment import Environment, StepFunction, environment
+from nmpcrl.learning.environment import (
+    Data,
+    Environment,
+    GymnasiumEnv,
+    StepFunction,
+    environment,
+    forecasts,
+)
 from nmpcrl.learning.learners import Learner, Update, Weights
 from nmpcrl.learning.rollout import Persistent, persistent
 
@@ -42,6 +49,7 @@ class Step:
     update: Update | None = None
     failure: str = ""  # what the solver said, if it failed
     end: bool = False  # whether the plant ended the episode
+    last: bool = False  # whether it is the last step of its episode, for whatever reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +58,14 @@ class Exploration:
 
     noise: Matrix  # epsilon, shape (episodes, steps, m)
     scale: NDArray[np.floating]  # c_epsilon^k, shape (episodes, steps)
+
+    def __post_init__(self) -> None:
+        noise, scale = np.shape(self.noise), np.shape(self.scale)
+        if len(noise) != 3 or scale != noise[:2]:
+            raise ValueError(
+                f"noise has shape {noise} and scale {scale}: they must be (episodes, steps, inputs)"
+                " and (episodes, steps)"
+            )
 
     @classmethod
     def draw(
@@ -101,9 +117,10 @@ def train(
     explore: Exploration,
     *,
     clipped: bool = True,
-    constrained: bool = False,
-    plant: Plant | StepFunction | None = None,
+    constrained: bool | None = None,
+    plant: Plant | StepFunction | GymnasiumEnv | None = None,
     start: Any = None,
+    data: Data | None = None,
     rng: np.random.Generator | int = 0,
 ) -> Iterator[Step]:
     """Algorithm 1: as many episodes, and at most as many steps, as `explore` has noise for.
@@ -116,11 +133,15 @@ def train(
         weights: to start with.
         explore: the noise.
         clipped: whether actions are kept in the action space.  # departure E
-        constrained: whether Q(s, a) is solved for, with u_0 = a, instead of V(s).  # departure F
-        plant: the environment: a `Plant`, whose cost is the task's, or a function (state, action,
-            rng) -> (next state, cost, end); the plant that plans if absent. The state in which an
-            episode ends is worth 0.
+        constrained: whether Q(s, a) is solved for, with u_0 = a, instead of V(s); what the learner
+            is meant for if absent.  # departure F
+        plant: the environment, as in `environment`: a `Plant`, whose cost is the task's, a function
+            (state, action, rng) -> (next state, cost, end), or a `gymnasium.Env`; the plant that
+            plans if absent. The state in which an episode ends is worth 0.
         start: a state, or a function rng -> state; the task's if absent.
+        data: of a `Problem` at each time t of an episode: a function of t, that gives what
+            `Nmpc.solve` takes; or by name an array over the episode, of which each plan sees its
+            N + 1 stages.
         rng: for a plant or a start that draws.
 
     Raises:
@@ -129,7 +150,12 @@ def train(
     """
     controller, rng = persistent(controller), np.random.default_rng(rng)
     around = environment(controller.nmpc, plant, start)
-    trainer = _Trainer(learner, controller, explore, clipped, constrained, around, rng)
+    known = forecasts(data, controller.nmpc.horizon)
+    if explore.noise.shape[2] != controller.nmpc.m:
+        raise ValueError(f"the noise has {explore.noise.shape[2]} numbers a step; the NMPC has"
+                         f" {controller.nmpc.m} inputs")  # fmt: skip
+    fixed = learner.values_actions if constrained is None else constrained
+    trainer = _Trainer(learner, controller, explore, clipped, fixed, around, known, rng)
     failed = 0
     for episode in range(len(explore.scale)):
         failure = ""
@@ -153,6 +179,7 @@ class _Trainer:
     clipped: bool
     constrained: bool
     environment: Environment
+    data: Callable[[int], Mapping[str, Any]] | None
     rng: np.random.Generator
 
     def episode(self, episode: int, weights: Weights) -> Iterator[Step]:
@@ -161,29 +188,38 @@ class _Trainer:
         nmpc, rng = controller.nmpc, self.rng
         state, warm_start = self.environment.start(rng), None
         nothing = np.full(nmpc.m, np.nan)
-        for t in range(self.explore.scale.shape[1]):
+        final = self.explore.scale.shape[1] - 1
+        ahead = self.data
+        later = ahead and ahead(0)
+        for t in range(final + 1):
+            known, later = later, ahead and ahead(t + 1)
             try:
-                plan = controller.solve(state, weights.theta, warm_start)
+                plan = controller.solve(state, weights.theta, warm_start, None, known)
             except SolverError as error:
-                yield Step(episode, t, state, weights, nothing, failure=str(error))
+                yield Step(episode, t, state, weights, nothing, failure=str(error), last=True)
                 return
             action = self.explore(plan.action, episode, t)
             action = nmpc.clip(action) if self.clipped else action  # departure E
-            next_state, cost, end = self.environment.step(state, action, rng)
+            next_state, cost, end, cut = self.environment.step(state, action, rng)
+            last = end or cut or t == final
             solution = None
             try:
                 solution = (
-                    controller.solve(state, weights.theta, plan, action) if constrained else plan
+                    controller.solve(state, weights.theta, plan, action, known)
+                    if constrained
+                    else plan
                 )
-                transition = Transition(state, action, cost, next_state, solution, end)
+                transition = Transition(state, action, cost, next_state, solution, end, last, later)
                 update = self.learner.step(weights, transition)
             except SolverError as error:
                 what = (state, weights, action, cost, plan, solution)
-                yield Step(episode, t, *what, failure=str(error))
+                yield Step(episode, t, *what, failure=str(error), last=True)
                 return
             weights = update.weights
-            yield Step(episode, t, state, weights, action, cost, plan, solution, update, end=end)
-            if end:
+            yield Step(
+                episode, t, state, weights, action, cost, plan, solution, update, "", end, last
+            )
+            if last:
                 return
             warm_start = (update.successor and update.successor.solution) or solution
             state = next_state

@@ -53,7 +53,7 @@ def curvature_correction(delta: float, phi: Vector, w: Vector, hessian_w: Vector
     return (delta - phi @ w) * hessian_w
 
 
-def project(theta: Vector, least: float, most: float) -> Vector:
+def project(theta: Vector, least: float | Vector, most: float | Vector) -> Vector:
     """The nearest theta with every component in [least, most]: the compact set of Maei et al."""
     return np.minimum(np.maximum(theta, least), most)
 

@@ -7,6 +7,7 @@ from nmpcrl.study.records import DamagedRecords, Records
 from nmpcrl.study.run import run
 from nmpcrl.study.store import Runs, StoreError, fetch, fetch_all, stored
 from nmpcrl.study.sweeps import paper_runs, sweep
+from nmpcrl.study.trial import Trial
 
 __all__ = [
     "DamagedRecords",
@@ -15,6 +16,7 @@ __all__ = [
     "Records",
     "Runs",
     "StoreError",
+    "Trial",
     "fetch",
     "fetch_all",
     "paper",

@@ -37,6 +37,7 @@ from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.machine import Fingerprint, fingerprint
+from nmpcrl.study.trial import Trial
 
 # Raised by hand where an edit of the room changes a number; then every run is trained anew.
 EPOCHS = {"control": 1, "learning": 1, "study": 1, "analysis": 1}
@@ -71,6 +72,7 @@ ORIGINAL: dict[str, Any] = {
     "steps": 130,
     "start": (-2.5, 1.5, 0.0),
     "target": (8.5, 2.0, math.pi / 2),
+    "plant": "model",
     "horizon": 10,
     "solver": "riccati",
     "tolerance": 1e-8,
@@ -113,7 +115,7 @@ def before() -> dict[str, Any]:
     return {name: value for name, value in ORIGINAL.items() if name != "obstacles"}
 
 
-def key(experiment: Experiment) -> str:
+def key(experiment: Experiment | Trial) -> str:
     """A hash of all that the run's numbers depend on."""
     return hash_of([identity(experiment), versions(experiment), _epochs(RUN_ROOMS)])
 
@@ -123,8 +125,10 @@ def summary_key(experiment: Experiment) -> str:
     return hash_of([identity(experiment), versions(experiment), _epochs(SUMMARY_ROOMS)])
 
 
-def identity(experiment: Experiment) -> dict[str, Any]:
+def identity(experiment: Experiment | Trial) -> dict[str, Any]:
     """The fields that name a run, resolved, without those that have their `ORIGINAL` value."""
+    if isinstance(experiment, Trial):
+        return experiment.identity
     fields = resolved(experiment)
     return {name: value for name, value in fields.items() if value != ORIGINAL[name]}
 
@@ -135,12 +139,12 @@ def resolved(experiment: Experiment) -> dict[str, Any]:
     return {"obstacles": paper.centres_of(fields.pop("layout"))} | fields
 
 
-def versions(experiment: Experiment | None = None) -> dict[str, str]:
+def versions(experiment: Experiment | Trial | None = None) -> dict[str, str]:
     """The versions of the libraries that touch the numbers of a run, or of any run.
 
     What a build adds after "+" is left out: it is the same code.
     """
-    learns = experiment is None or LEARNERS[experiment.learner].network
+    learns = not isinstance(experiment, Experiment) or LEARNERS[experiment.learner].network
     names = (*LIBRARIES, "torch") if learns else LIBRARIES
     return {name: _version(name).partition("+")[0] for name in names}
 
@@ -151,7 +155,7 @@ def environment() -> dict[str, str]:
     return {"python": platform.python_version(), **libraries}
 
 
-def provenance(experiment: Experiment) -> Provenance:
+def provenance(experiment: Experiment | Trial) -> Provenance:
     """That of a run that is made here and now."""
     return {
         "versions": environment(),

@@ -3,17 +3,18 @@
 Analyses read records and nothing else. Loading never unpickles.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple, NotRequired, TypedDict
+from typing import Any, NamedTuple, NotRequired, Protocol, TypedDict, TypeVar
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.parameters import Whole
 from nmpcrl.study.storage.archive import (
     Column,
     DamagedRecords,
@@ -41,6 +42,9 @@ __all__ = [
 LAST = 3  # rollouts that the final cost averages
 STATES = len(paper.START)  # n of the robot
 INPUTS = len(paper.THETA_INIT) - 2 * STATES - 1  # m of the robot
+MOST = 10**9  # of anything
+
+Read = TypeVar("Read")
 
 
 class Stopped(StrEnum):
@@ -151,9 +155,21 @@ def _fields(row: type[NamedTuple], shapes: Mapping[str, Any]) -> list[Field]:
     ]
 
 
-def most_evaluations(experiment: Experiment) -> int:
+class Judged(Protocol):
+    """What is judged every few episodes."""
+
+    @property
+    def episodes(self) -> int:
+        """Of training."""
+
+    @property
+    def evaluate_every(self) -> int:
+        """Episodes between rollouts without noise."""
+
+
+def most_evaluations(run: Judged) -> int:
     """How many rollouts without noise a run has at most: the first, the last and those between."""
-    return experiment.episodes // experiment.evaluate_every + 2
+    return run.episodes // run.evaluate_every + 2
 
 
 class Table:
@@ -189,7 +205,7 @@ class Records:
     theta (d,), cost (infinite where a solve failed), states (K + 1, n), actions (K + 1, m).
     """
 
-    experiment: dict[str, Any]  # the fields of the Experiment
+    experiment: dict[str, Any]  # the fields of the Experiment, or what a Trial states
     steps: dict[str, Column]
     evaluations: dict[str, Column]
     facts: Facts
@@ -232,24 +248,52 @@ def named_in(about: dict[str, Any]) -> Experiment:
     Raises:
         ValueError: it does not name one, or a fact is missing.
     """
+    return _with_facts(about, lambda named: Experiment(**named))
+
+
+class Sizes(NamedTuple):
+    """Of a run's tables."""
+
+    states: int
+    inputs: int
+    theta: int
+    episodes: int
+    steps: int
+    evaluate_every: int
+
+
+def _sizes(named: dict[str, Any]) -> Sizes:
+    """Those of an experiment, or of a trial, which states how many states and inputs it has."""
+    if "states" in named:
+        states, inputs, *others = (
+            Whole(1, MOST).check(name, named[name])
+            for name in ("states", "inputs", "episodes", "steps", "evaluate_every")
+        )
+        return Sizes(states, inputs, len(named["theta"]), *others)
+    one = Experiment(**named)
+    return Sizes(STATES, INPUTS, len(one.theta), one.episodes, one.steps, one.evaluate_every)
+
+
+def _with_facts(about: dict[str, Any], read: Callable[[dict[str, Any]], Read]) -> Read:
+    """What `read` makes of the name of a run that has all `Facts`; a ValueError if it has not."""
     try:
-        experiment = Experiment(**about["experiment"])
+        named = read(about["experiment"])
         for fact in Facts.__required_keys__:
             kind = Facts.__annotations__[fact]
             if not isinstance(about["facts"][fact], int | float if kind is float else kind):
                 raise ValueError(f"its {fact} is {about['facts'][fact]!r}")
     except (LookupError, TypeError) as error:
         raise ValueError("it does not say which run it is, or what became of it") from error
-    return experiment
+    return named
 
 
 def _forms(about: dict[str, Any]) -> Forms:
     """Of the tables of a run."""
-    experiment = named_in(about)
-    d, steps = len(experiment.theta), experiment.steps
-    of_steps = [*step_fields(STATES, INPUTS, d), ("alpha_phi2", float)]
-    of_evaluations = evaluation_fields(STATES, INPUTS, d, steps)
+    sizes = _with_facts(about, _sizes)
+    n, m, d, episodes, steps, _ = sizes
+    of_steps = [*step_fields(n, m, d), ("alpha_phi2", float)]
+    of_evaluations = evaluation_fields(n, m, d, steps)
     return {
-        "steps": Form(of_steps, range(experiment.episodes * steps + 1)),
-        "evaluations": Form(of_evaluations, range(1, most_evaluations(experiment) + 1)),
+        "steps": Form(of_steps, range(episodes * steps + 1)),
+        "evaluations": Form(of_evaluations, range(1, most_evaluations(sizes) + 1)),
     }

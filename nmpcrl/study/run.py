@@ -1,17 +1,15 @@
-"""`run` carries out an experiment: it trains, judges theta without noise, and keeps records."""
+"""`run` trains as an experiment or a trial says, judges theta without noise, and keeps records."""
 
 import gc
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from nmpcrl.control import Plant
-from nmpcrl.learning import Exploration, Learner, Successor, Weights
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning import Successor, Weights
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import Diverged, Step, absurd, train
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import (
@@ -27,7 +25,8 @@ from nmpcrl.study.records import (
     most_evaluations,
     step_fields,
 )
-from nmpcrl.study.setup import controller_of, prepare, step_size
+from nmpcrl.study.setup import Job, job_of
+from nmpcrl.study.trial import Trial
 
 UNKNOWN = Successor(np.nan)  # of a step that was not bootstrapped
 UNSOLVED: Any = SimpleNamespace(  # stands in for a solve that failed or was not asked for
@@ -40,50 +39,41 @@ UNSOLVED: Any = SimpleNamespace(  # stands in for a solve that failed or was not
 )
 
 
-def run(experiment: Experiment, on_episode: Callable[[int, float], None] | None = None) -> Records:
-    """Train and evaluate as `experiment` says; the same experiment gives the same numbers.
+def run(
+    named: Experiment | Trial, on_episode: Callable[[int, float], None] | None = None
+) -> Records:
+    """Train and evaluate as it says; the same experiment or trial gives the same numbers.
 
     Args:
-        experiment: names the run; what its learner does not read is set to its default.
+        named: names the run; what an experiment's learner does not read is set to its default.
         on_episode: called after each episode with how many are done and the episode's summed cost.
     """
-    experiment = experiment.canonical
-    controller = controller_of(experiment)
-    ready = prepare(experiment, controller)
+    job = job_of(named)
     gc.freeze()  # the collector need not look through all that was imported, again and again
     try:
-        return _run(experiment, controller, *ready, on_episode)
+        return _run(job, on_episode)
     finally:
         gc.unfreeze()
 
 
-def _run(
-    experiment: Experiment,
-    controller: Persistent,
-    learner: Learner,
-    weights: Weights,
-    explore: Exploration,
-    on_episode: Callable[[int, float], None] | None,
-) -> Records:
-    steps, evaluations = _tables(experiment, controller.nmpc.plant)
-    evaluations.append(_evaluation(controller, weights, 0, experiment.steps))
+def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
+    controller, weights, explore = job.controller, job.weights, job.explore
+    steps, evaluations = _tables(job)
+    evaluations.append(_evaluation(job, weights, 0))
     stopped, cost, began = str(Stopped.FINISHED), 0.0, time.perf_counter()
     named = solver = controller.nmpc.solver.name
     try:
-        clipped, constrained = experiment.clipped, experiment.values_actions
-        for step in train(
-            learner, controller, weights, explore, clipped=clipped, constrained=constrained
-        ):
+        how = job.options | job.environment
+        for step in train(job.learner, controller, weights, explore, **how):
             seconds = time.perf_counter() - began
             steps.append(_row(step, seconds))
             cost += step.cost
             solver = next((one for one in _solvers(step) if one != named), solver)
-            if step.failure or step.time == experiment.steps - 1:
+            if step.last:
                 done = step.episode + 1
-                due = done % experiment.evaluate_every == 0 or done == experiment.episodes
+                due = done % job.evaluate_every == 0 or done == job.episodes
                 if due and not absurd(step.weights):
-                    row = _evaluation(controller, step.weights, done, experiment.steps)
-                    evaluations.append(row)
+                    evaluations.append(_evaluation(job, step.weights, done))
                 if on_episode:
                     on_episode(done, cost)
                 cost = 0.0
@@ -91,22 +81,23 @@ def _run(
     except Diverged as error:
         stopped = f"{Stopped.DIVERGED}: {error}"
     table, judged = steps.columns(), evaluations.columns()
-    table["alpha_phi2"] = step_size(experiment) * (table["features"] ** 2).sum(axis=1)
+    table["alpha_phi2"] = job.alpha * (table["features"] ** 2).sum(axis=1)
     facts: Facts = {
         "stopped": stopped,
         "solver": solver,  # what solved: fatrop where riccati was not to be had, if only once
         "seconds": float(table["seconds"].sum()),
         "final_cost": final_cost(judged["cost"]),
     }
-    return Records(asdict(experiment), table, judged, facts)
+    return Records(job.stated, table, judged, facts)
 
 
-def _tables(experiment: Experiment, plant: Plant) -> tuple[Table, Table]:
+def _tables(job: Job) -> tuple[Table, Table]:
     """Room for `Records.steps` and `Records.evaluations`."""
-    n, m, d = plant.n, plant.m, len(experiment.theta)
+    nmpc = job.controller.nmpc
+    sizes = nmpc.n, nmpc.m, job.weights.theta.size
     return (
-        Table(step_fields(n, m, d), experiment.episodes * experiment.steps),
-        Table(evaluation_fields(n, m, d, experiment.steps), most_evaluations(experiment)),
+        Table(step_fields(*sizes), job.episodes * job.steps),
+        Table(evaluation_fields(*sizes, job.steps), most_evaluations(job)),
     )
 
 
@@ -147,14 +138,17 @@ def _row(step: Step, seconds: float) -> StepRow:
     )
 
 
-def _evaluation(
-    controller: Persistent, weights: Weights, episode: int, steps: int
-) -> EvaluationRow:
-    """The row of `Records.evaluations` for the policy of `weights`."""
-    rollout = evaluate(controller, weights.theta, steps)
+def _evaluation(job: Job, weights: Weights, episode: int) -> EvaluationRow:
+    """The row of `Records.evaluations` for the policy of `weights`; the first rollout is kept."""
+    steps, rng = job.steps, np.random.default_rng(job.judged)
+    rollout, *others = (
+        evaluate(job.controller, weights.theta, steps, rng=rng, **job.environment)
+        for _ in range(job.rollouts)
+    )
+    cost = float(np.mean([rollout.cost, *(one.cost for one in others)]))
     missing = ((0, steps - len(rollout.states)), (0, 0))
     states, actions = (
         np.pad(reached, missing, constant_values=np.nan)
         for reached in (rollout.states, rollout.actions)
     )
-    return EvaluationRow(episode, weights.theta, rollout.cost, states, actions)
+    return EvaluationRow(episode, weights.theta, cost, states, actions)

@@ -1,19 +1,100 @@
-"""From an experiment to what `train` takes: controller, learner, first weights and noise."""
+"""From what names a run to what `train` takes: controller, learner, first weights and noise."""
 
 from collections.abc import Iterable
-from dataclasses import fields
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, cast
 
 import numpy as np
 
+from nmpcrl.control import SolverError
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning import Learner, Weights
+from nmpcrl.learning.environment import environment, forecasts
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Exploration
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import DECAYS, LEARNERS, Generators, Settings
 from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.plants import plant_of
+from nmpcrl.study.trial import Trial
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """All that a run needs."""
+
+    stated: dict[str, Any]  # what its records say that it is
+    controller: Persistent
+    learner: Learner
+    weights: Weights
+    explore: Exploration
+    alpha: float  # of the column alpha ||phi||^2
+    evaluate_every: int
+    options: dict[str, Any]  # of `train` alone
+    environment: dict[str, Any] = field(default_factory=dict)  # of `train` and `evaluate`
+    rollouts: int = 1  # that judge theta
+    judged: int | np.random.SeedSequence = 0  # the seed of each evaluation
+
+    @property
+    def episodes(self) -> int:
+        """Of training."""
+        return len(self.explore.scale)
+
+    @property
+    def steps(self) -> int:
+        """Of an episode, at most."""
+        return len(self.explore.scale[0])
+
+
+def job_of(named: Experiment | Trial) -> Job:
+    """What is to be done to carry out a run."""
+    if isinstance(named, Trial):
+        return _job_of_trial(named)
+    experiment = named.canonical
+    controller = controller_of(experiment)
+    options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
+    return Job(
+        asdict(experiment), controller, *prepare(experiment, controller), step_size(experiment),
+        experiment.evaluate_every, options, environment_of(experiment),
+    )  # fmt: skip
+
+
+def _job_of_trial(trial: Trial) -> Job:
+    """The noise of a seed is that of an `Experiment` of this seed."""
+    trial.refuse_change()
+    noise, learner, world, judged = np.random.SeedSequence(trial.seed).spawn(4)
+    theta, controller = np.array(trial.theta), Persistent(trial.nmpc)
+    explore = Exploration.draw(
+        np.random.default_rng(noise),
+        (trial.episodes, trial.steps, trial.nmpc.m),
+        deviation=trial.deviation,
+        decay_rate=trial.decay_rate,
+    )
+    return Job(
+        trial.stated,
+        controller,
+        trial.made(controller, np.random.default_rng(learner)),
+        Weights(theta, np.full(theta.size, paper.W_INIT)),
+        explore,
+        np.nan,
+        trial.evaluate_every,
+        {
+            "clipped": trial.clipped,
+            "constrained": trial.constrained,
+            "rng": np.random.default_rng(world),
+        },
+        trial.environment,
+        trial.rollouts,
+        judged,
+    )
+
+
+def environment_of(experiment: Experiment) -> dict[str, Any]:
+    """The plant in the loop, as `train` and `evaluate` take it; nothing where it is the plan's."""
+    plant = plant_of(experiment.plant)
+    return {"plant": plant} if plant else {}
 
 
 def controller_of(experiment: Experiment) -> Persistent:
@@ -27,20 +108,37 @@ def controller_of(experiment: Experiment) -> Persistent:
     return Persistent(nmpc)
 
 
-def compile_ahead(experiments: Iterable[Experiment]) -> None:
+def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
     """Compile what the runs will call, so that their processes find it done."""
+    named = tuple(named)
+    _compile_trials(one for one in named if isinstance(one, Trial))
     kinds = {
-        (e.layout, e.start, e.target, e.box, e.solver, LEARNERS[e.learner].curved): e
-        for e in experiments
+        (e.layout, e.start, e.target, e.box, e.solver, e.plant, LEARNERS[e.learner].curved): e
+        for e in named
+        if isinstance(e, Experiment)
     }
     for experiment in kinds.values():
         controller = controller_of(experiment)
         nmpc, theta = controller.nmpc, np.array(paper.THETA_INIT)
         solution = nmpc.solve(nmpc.task.start, theta)
-        nmpc.plant.step(solution.state, solution.action)
+        plant = plant_of(experiment.plant) or nmpc.plant
+        plant.step(solution.state, solution.action)
         nmpc.task.stage_cost(solution.state, solution.action)
         if LEARNERS[experiment.learner].curved:
             nmpc.value_hessian_times(solution, theta)
+
+
+def _compile_trials(trials: Iterable[Trial]) -> None:
+    """Solve once with each controller and in each way that a trial does."""
+    for trial in {(one.nmpc.key, one.constrained): one for one in trials}.values():
+        around = environment(trial.nmpc, trial.plant, trial.start)
+        state, theta = around.start(np.random.default_rng(trial.seed)), np.array(trial.theta)
+        ahead = forecasts(trial.data, trial.nmpc.horizon)
+        known = ahead and ahead(0)
+        with suppress(SolverError):
+            plan = trial.nmpc.solve(state, theta, data=known)
+            if trial.constrained is not False:
+                trial.nmpc.solve(state, theta, plan, plan.action, data=known)
 
 
 def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, Weights, Exploration]:

@@ -1,8 +1,8 @@
 """Where runs are kept: `fetch` and `fetch_all` train what is missing and read what is there.
 
-A run's file is named by its experiment and by the key of `provenance`. A file that is damaged or of
-another run is set aside, and the run is done again. A trained run is not lost, even if it cannot be
-written. Runs that another process trains in the same folder are awaited.
+A run's file is named by its experiment or its trial and by the key of `provenance`. A file that is
+damaged or of another run is set aside, and the run is done again. A trained run is not lost, even
+if it cannot be written. Runs that another process trains in the same folder are awaited.
 """
 
 import re
@@ -39,6 +39,7 @@ from nmpcrl.study.storage.place import (
     set_aside,
 )
 from nmpcrl.study.storage.reservation import reservations, reserved
+from nmpcrl.study.trial import Trial
 
 __all__ = [
     "Runs",
@@ -54,6 +55,9 @@ __all__ = [
 ]
 
 Run = TypeVar("Run")  # Records, or a summary of them
+Named = Experiment | Trial  # what names a run
+TRIALS = "trials"  # the folder of their runs, in that of the others
+NUMBERS = 20  # at most, of a step beside its vectors
 
 POLL = 0.25  # seconds between two looks at what others are at
 STEP, ROLLOUT_STEP, REST = 300, 40, 20_000  # bytes that a run's file takes at most
@@ -89,8 +93,8 @@ class Runs(Mapping[Experiment, Run]):
         return tuple(dict.fromkeys(getattr(experiment, field) for experiment in self))
 
 
-def fetch(experiment: Experiment, **options: Any) -> Records:
-    """The run of `experiment`: read if it is stored, otherwise trained and stored.
+def fetch(experiment: Named, **options: Any) -> Records:
+    """The run of an experiment or a trial: read if it is stored, otherwise trained and stored.
 
     A run that another solver had to solve is returned, and not stored.
 
@@ -111,7 +115,7 @@ def fetch(experiment: Experiment, **options: Any) -> Records:
 
 
 def fetch_all(
-    experiments: Iterable[Experiment],
+    experiments: Iterable[Named],
     *,
     executor: Executor | None = None,
     workers: int | None = None,
@@ -120,7 +124,7 @@ def fetch_all(
     """`fetch` for many: what is missing is trained in parallel, one thread a process.
 
     Args:
-        experiments: the runs wanted.
+        experiments: the runs wanted, trials among them.
         executor: trains them, on workers that see the same folder; by default processes.
         workers: how many processes; by default as many as there are cores.
         progress: whether to show a bar with episodes done, time left and the latest cost.
@@ -134,20 +138,19 @@ def fetch_all(
     if missing:
         check_folder(sum(map(size_of, missing)))
         compile_ahead(missing)
-    unstored: dict[Experiment, Records] = {}
+    unstored: dict[Named, Records] = {}
     options = {"executor": executor, "workers": workers, "progress": progress}
     while missing:
         missing = _train(missing, unstored, **options)
-    return Runs({e: unstored[e] if e in unstored else fetch(e) for e in experiments})
+    found: dict[Any, Records] = {e: unstored[e] if e in unstored else fetch(e) for e in experiments}
+    return Runs(found)
 
 
-def _train(
-    missing: list[Experiment], unstored: dict[Experiment, Records], **options: Any
-) -> list[Experiment]:
+def _train(missing: list[Named], unstored: dict[Named, Records], **options: Any) -> list[Named]:
     """Train what nobody else is at; what is left, once one of those is no longer."""
     left = _elsewhere(missing)
 
-    def keep(experiment: Experiment, trained: _Trained | None) -> str:
+    def keep(experiment: Named, trained: _Trained | None) -> str:
         if trained is None:
             left.append(experiment)
             return ""
@@ -169,7 +172,7 @@ def _train(
     return left
 
 
-def _elsewhere(experiments: list[Experiment]) -> list[Experiment]:
+def _elsewhere(experiments: list[Named]) -> list[Named]:
     """Those that somebody is at."""
     taken = reservations(folder()).taken(path_of(e).name for e in experiments)
     return [e for e in experiments if path_of(e).name in taken]
@@ -182,7 +185,7 @@ class _Trained(NamedTuple):
     unstored: Records | None
 
 
-def _fetch_quietly(experiment: Experiment) -> _Trained | None:
+def _fetch_quietly(experiment: Named) -> _Trained | None:
     """What a worker does; None if somebody else is at the run."""
     mine, name = reservations(folder()), path_of(experiment).name
     if not mine.take([name]):
@@ -194,7 +197,7 @@ def _fetch_quietly(experiment: Experiment) -> _Trained | None:
     return _Trained(float(records.facts["final_cost"]), None if is_kept else records)
 
 
-def read(experiment: Experiment) -> Records:
+def read(experiment: Named) -> Records:
     """The stored run.
 
     Raises:
@@ -208,7 +211,7 @@ def read(experiment: Experiment) -> Records:
     return records
 
 
-def _read_or_train(experiment: Experiment, **options: Any) -> tuple[Records, bool]:
+def _read_or_train(experiment: Named, **options: Any) -> tuple[Records, bool]:
     """The run, and whether it is where it belongs; for who has reserved it."""
     path = path_of(experiment)
     try:
@@ -225,28 +228,32 @@ def _read_or_train(experiment: Experiment, **options: Any) -> tuple[Records, boo
     return records, keep(path, records.save)
 
 
-def solved_by_another(experiment: Experiment, facts: Facts) -> str:
+def solved_by_another(experiment: Named, facts: Facts) -> str:
     """By which solver a run was solved, if not by the one that its experiment names."""
     solver = facts["solver"]
     same = solver == experiment.solver
     return "" if same else f"solved by {solver} and not by {experiment.solver}"
 
 
-def check_run(path: Path, experiment: Experiment, fields: Mapping[str, Any], facts: Facts) -> None:
+def check_run(path: Path, experiment: Named, fields: Mapping[str, Any], facts: Facts) -> None:
     """See that a file is of the run asked for.
 
     Args:
         path: of the file.
         experiment: names the run.
-        fields: of the experiment that the file names.
+        fields: of the experiment that the file names, or what a trial states.
         facts: that it states.
 
     Raises:
         DamagedRecords: it is of another run, or of code with other numbers.
     """
-    stated = Experiment(**{**before(), **fields})
-    if identity(stated) != identity(experiment):
-        raise DamagedRecords(f"{path} holds another run, {name_of(stated)}")
+    if isinstance(experiment, Trial):
+        if fields != experiment.stated or "key" not in facts:
+            raise DamagedRecords(f"{path} holds another run")
+    else:
+        stated = Experiment(**{**before(), **fields})
+        if identity(stated) != identity(experiment):
+            raise DamagedRecords(f"{path} holds another run, {name_of(stated)}")
     if facts.get("key", key(experiment)) != key(experiment):
         raise DamagedRecords(f"{path} holds a run of other code or other versions than it says")
     if not is_accepted(facts.get("sources", locked_hash())):
@@ -255,14 +262,14 @@ def check_run(path: Path, experiment: Experiment, fields: Mapping[str, Any], fac
         raise DamagedRecords(f"{path} holds a run {other}")
 
 
-def is_stored(experiment: Experiment) -> bool:
+def is_stored(experiment: Named) -> bool:
     """Whether there is a file that says it is the run; all of it is read only by `fetch`."""
     return is_there(path_of(experiment), experiment, Records.about)
 
 
 def is_there(
     path: Path,
-    experiment: Experiment,
+    experiment: Named,
     about: Callable[[Path], About],
 ) -> bool:
     """Whether a file says that it is of a run; `about` reads that."""
@@ -303,13 +310,15 @@ def _check_name(path: Path, about: About) -> None:
         raise DamagedRecords(f"{path} holds another run, {own}")
 
 
-def size_of(experiment: Experiment) -> int:
+def size_of(experiment: Named) -> int:
     """How many bytes the file of a run takes at most."""
-    e = experiment
-    return e.steps * (STEP * e.episodes + ROLLOUT_STEP * most_evaluations(e)) + REST
+    e, step = experiment, STEP
+    if isinstance(e, Trial):
+        step = 8 * (NUMBERS + e.nmpc.n + e.nmpc.m + 3 * len(e.theta))
+    return e.steps * (step * e.episodes + ROLLOUT_STEP * most_evaluations(e)) + REST
 
 
-def wait_for(names: list[str], first: Experiment) -> None:
+def wait_for(names: list[str], first: Named) -> None:
     """Say that another process is training runs, and wait until it has finished one."""
     more = len(names) - 1
     others = f"{more} other{'s' * (more > 1)}"
@@ -319,12 +328,15 @@ def wait_for(names: list[str], first: Experiment) -> None:
         time.sleep(POLL)
 
 
-def path_of(experiment: Experiment) -> Path:
-    """The file of one experiment."""
-    return folder() / f"{name_of(experiment)}-{key(experiment)[:10]}.npz"
+def path_of(experiment: Named) -> Path:
+    """The file of one run."""
+    place = folder() / TRIALS if isinstance(experiment, Trial) else folder()
+    return place / f"{name_of(experiment)}-{key(experiment)[:10]}.npz"
 
 
-def name_of(experiment: Experiment) -> str:
+def name_of(experiment: Named) -> str:
     """The run's name for people; the key says the rest."""
     e = experiment
+    if isinstance(e, Trial):
+        return e.name
     return f"{e.learner}-{short_name(e.layout)}-{e.decay}-seed{e.seed}-{e.episodes}ep"

@@ -1,24 +1,17 @@
-"""Runs outside the study: judged without noise, one row an evaluation, and nothing stored."""
+"""Runs of one's own, compared: one row an evaluation."""
+
+from functools import partial
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.trials import final_costs, summarise, trial
-from nmpcrl.learning import (
-    Exploration,
-    Learner,
-    SecondSolve,
-    Weights,
-    evaluate,
-    expected_sarsa,
-    frozen,
-    train,
-)
-from nmpcrl.study import paper
+from nmpcrl.analysis.trials import evaluations, final_costs, summarise
+from nmpcrl.learning import Learner, SecondSolve, Weights, evaluate, expected_sarsa, frozen
+from nmpcrl.study import Trial, paper, run
 
-THETA = np.array(paper.THETA_INIT)
-SHAPE = (3, 6, 2)
+THETA = paper.THETA_INIT
+EPISODES, STEPS = 3, 6
 
 
 @pytest.fixture(scope="module")
@@ -26,41 +19,47 @@ def nmpc():
     return paper.nmpc()
 
 
-def noise() -> Exploration:
-    return Exploration.draw(np.random.default_rng(0), SHAPE)
+def rows(nmpc, learner, make, **options):
+    options = {"evaluate_every": 1, **options}
+    one = Trial(learner, make, nmpc, THETA, episodes=EPISODES, steps=STEPS, **options)
+    return evaluations([run(one)])
 
 
 def test_the_frozen_arm_costs_the_same_after_every_episode(nmpc):
-    rows = trial(frozen(nmpc), nmpc, THETA, noise(), every=1)
-    assert rows.episode.tolist() == [0, 1, 2, 3]
-    assert rows.cost.tolist() == [evaluate(nmpc, THETA, SHAPE[1]).cost] * 4
-    assert set(rows.learner) == {"frozen"}
+    found = rows(nmpc, "frozen", frozen)
+    assert found.episode.tolist() == [0, 1, 2, 3]
+    assert found.cost.tolist() == [evaluate(nmpc, np.array(THETA), STEPS).cost] * 4
+    assert set(found.learner) == {"frozen"}
 
 
 def test_the_last_episode_is_judged_whatever_the_interval(nmpc):
-    assert trial(frozen(nmpc), nmpc, THETA, noise(), every=2).episode.tolist() == [0, 2, 3]
+    assert rows(nmpc, "frozen", frozen, evaluate_every=2).episode.tolist() == [0, 2, 3]
 
 
-def test_theta_moves_as_train_moves_it(nmpc):
-    es = expected_sarsa(nmpc, 1e-7)
-    rows = trial(es, nmpc, THETA, noise())
-    *_, last = train(es, nmpc, Weights(THETA, np.full(9, paper.W_INIT)), noise())
-    assert np.array_equal(rows.theta.iloc[-1], last.weights.theta)
-    assert not np.array_equal(last.weights.theta, THETA)
-
-
-@pytest.mark.parametrize("at", [1, SHAPE[1]])
-def test_a_run_that_diverges_ends_in_an_infinite_cost(nmpc, at):
+def lost(nmpc, at):
     steps = []
 
-    def lost(weights, *_):
+    def rule(weights, *_):
         steps.append(1)
         return Weights(weights.theta * (np.nan if len(steps) == at else 1), weights.w)
 
-    rows = trial(Learner("lost", SecondSolve(nmpc), lost, 0.97), nmpc, THETA, noise(), every=1)
-    assert rows.cost.iloc[-1] == np.inf
-    assert rows.episode.iloc[-1] == SHAPE[0]
-    assert np.isfinite(rows.cost.iloc[:-1]).all()
+    return Learner("lost", SecondSolve(nmpc), rule, nmpc.gamma)
+
+
+@pytest.mark.parametrize("at", [1, STEPS])
+def test_a_run_that_diverges_ends_in_an_infinite_cost(nmpc, at):
+    found = rows(nmpc, "lost", partial(lost, at=at))
+    assert found.cost.iloc[-1] == np.inf
+    assert found.episode.iloc[-1] == EPISODES
+    assert np.isfinite(found.cost.iloc[:-1]).all()
+
+
+def test_each_run_has_its_learner_and_its_seed(nmpc):
+    make = partial(expected_sarsa, alpha=1e-7)
+    trials = [Trial("mine", make, nmpc, THETA, seed, 1, 3) for seed in (4, 5)]
+    found = evaluations(map(run, trials))
+    assert found.seed.tolist() == [4, 4, 5, 5]
+    assert not np.array_equal(found.theta.iloc[1], found.theta.iloc[3])
 
 
 def rows_of(costs: dict[str, list[float]]) -> pd.DataFrame:

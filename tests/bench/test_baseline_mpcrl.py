@@ -29,10 +29,10 @@ def nmpc():
 
 @pytest.fixture
 def agent(nmpc):
-    return baseline_mpcrl._agent(nmpc)
+    return baseline_mpcrl.agent(nmpc)
 
 
-class Watched(baseline_mpcrl._World):
+class Watched(baseline_mpcrl.World):
     """A world that keeps its last transition."""
 
     def step(self, action):

@@ -16,6 +16,7 @@ from bs4 import BeautifulSoup
 from click.testing import CliRunner
 from driver import project
 from driver.build import book, chapters, execute, train
+from filelock import FileLock
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from raising import raising
 
@@ -124,100 +125,123 @@ See [Chapter 1](one.ipynb).
 
 
 @pytest.fixture
-def small(tmp_path):
+def small(tmp_path, robot_module) -> Path:
     """A copy of the driver with a book of one page and one chapter."""
+    return small_book(tmp_path)
+
+
+def small_book(place: Path) -> Path:
     for name in ("_static", "driver"):
-        shutil.copytree(ROOT / "book" / name, tmp_path / "book" / name)
-    for name in (
-        "_config.yml",
-        "book/references.bib",
-        "book/build.py",
-    ):
-        shutil.copy2(ROOT / name, tmp_path / name)
-    (tmp_path / "nmpcrl").symlink_to(ROOT / "nmpcrl")
-    toc = {
-        "format": "jb-book",
-        "root": "book/intro",
-        "parts": [{"caption": "Part", "numbered": True, "chapters": [{"file": "book/one"}]}],
-    }
-    (tmp_path / "_toc.yml").write_text(yaml.safe_dump(toc))
-    (tmp_path / "book/intro.md").write_text(INTRO)
-    syllabus = {"chapters": {"one": {"short": "One", "needs": {}}}, "path": [], "self-test": []}
-    syllabus |= {"live": {}, "plans": {}}
-    (tmp_path / "book/syllabus.yml").write_text(yaml.safe_dump(syllabus))
-    write(tmp_path, "print(episodes)")
-    return tmp_path
+        shutil.copytree(ROOT / "book" / name, place / "book" / name)
+    for name in ("_config.yml", "book/references.bib", "book/build.py"):
+        shutil.copy2(ROOT / name, place / name)
+    (place / "nmpcrl").symlink_to(ROOT / "nmpcrl")
+    (place / "book/intro.md").write_text(INTRO)
+    syllabus = {"path": [], "self-test": [], "live": {}, "plans": {}}
+    (place / "book/syllabus.yml").write_text(yaml.safe_dump(syllabus))
+    save(place, new_code_cell("print(episodes)"))
+    listed(place, "one")
+    return place
 
 
-def write(place: Path, last: str) -> None:
-    """Write the small book's chapter, which ends in the cell `last`."""
-    save(place, new_code_cell(last))
+def listed(place: Path, *chapters: str) -> None:
+    """Let the small book have these chapters."""
+    files = [{"file": f"book/{name}"} for name in chapters]
+    parts = [{"caption": "Part", "numbered": True, "chapters": files}]
+    toc = {"format": "jb-book", "root": "book/intro", "parts": parts}
+    (place / "_toc.yml").write_text(yaml.safe_dump(toc))
+    syllabus = yaml.safe_load((place / "book/syllabus.yml").read_text())
+    syllabus["chapters"] = {name: {"short": name, "needs": {}} for name in chapters}
+    (place / "book/syllabus.yml").write_text(yaml.safe_dump(syllabus))
 
 
-def save(place: Path, *last) -> None:
-    """Write the small book's chapter, which ends in these cells."""
+def save(place: Path, *last, name: str = "one") -> None:
+    """Write a chapter of the small book, which ends in these cells."""
     cells = [
-        new_markdown_cell("# One"),
+        new_markdown_cell(f"# {name.title()}"),
         new_code_cell("episodes = 300", metadata={"tags": ["parameters"]}),
         new_code_cell("experiments = ()"),
         *last,
     ]
     kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
-    nbformat.write(
-        new_notebook(cells=cells, metadata={"kernelspec": kernel}), place / "book/one.ipynb"
-    )
+    notebook = new_notebook(cells=cells, metadata={"kernelspec": kernel})
+    nbformat.write(notebook, place / f"book/{name}.ipynb")
+
+
+CHOSEN = ("OMP_NUM_THREADS", "NMPCRL_STRICT", "NMPCRL_FIGURES_FOR_PAGE")  # by a build itself
 
 
 def run(place: Path, *arguments: str) -> subprocess.CompletedProcess:
     command = [sys.executable, str(place / "book/build.py"), *arguments]
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    inherited = os.environ.keys() - {"PYTHONPATH", *CHOSEN}
+    environment = {name: os.environ[name] for name in inherited}
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
 
 
-@pytest.mark.slow
-def test_a_whole_build_ends_with_the_path_of_the_book(small):
-    result = run(small)
-    assert result.returncode == 0, result.stderr
-    assert result.stdout.splitlines()[-1] == "_build/html/index.html"
-    assert "book/intro.html" in (small / "_build/html/index.html").read_text()
-    assert "300" in (small / "_build/html/book/one.html").read_text()
-    assert (small / "_build/executed/one.ipynb").exists()
-    assert "_repository" not in (small / "_build/html/book/intro.html").read_text()
+EXECUTION = "print(open('executions', 'a').write('{}'))"  # leaves this letter
+WHERE = "import ipykernel\nprint(ipykernel.get_connection_info())"
+SETTINGS = f"import os\nprint(*[os.environ[name] for name in {CHOSEN}])"
+
+
+@pytest.fixture(scope="session")
+def whole(shared, robot_module) -> Path:
+    """The small book with an exercise and a trace of each execution, built once; only to read.
+
+    What a build compiles is there by then, so that no two workers compile it at once.
+    """
+    place = shared / "small"
+    with FileLock(shared / "small.lock"):
+        if not place.exists():
+            small_book(place)
+            last = map(new_code_cell, (EXECUTION.format("x"), WHERE, SETTINGS, "print(episodes)"))
+            save(place, *exercise("d = 1.375"), *last)
+            result = run(place)
+            assert result.returncode == 0, result.stderr
+            (place / "said").write_text(result.stdout)
+    return place
+
+
+def outputs(place: Path, name: str = "_build/executed/one.ipynb") -> list[str]:
+    """What the cells of an executed chapter printed."""
+    cells = nbformat.read(place / name, 4).cells
+    code = [cell for cell in cells if cell.cell_type == "code"]
+    return [out.text for cell in code for out in cell.outputs if out.output_type == "stream"]
 
 
 @pytest.mark.slow
-def test_a_build_that_failed_goes_on_where_it_was_and_one_that_is_done_begins_anew(small):
-    save(small, new_code_cell("open('executions', 'a').write('x')"))
-    intro, executions = small / "book/intro.md", small / "executions"
-    good = intro.read_text()
-    intro.write_text(f"{good}\n[nowhere](nowhere.md)\n")
-    assert run(small).returncode == 1
-    intro.write_text(good)
-    second = run(small)
-    assert second.returncode == 0, second.stderr
-    assert "executed before: one" in second.stdout
-    assert executions.read_text() == "x"
-    assert run(small).returncode == 0
-    assert executions.read_text() == "xx"
+def test_a_whole_build_ends_with_the_path_of_the_book(whole):
+    assert (whole / "said").read_text().splitlines()[-1] == "_build/html/index.html"
+    assert "book/intro.html" in (whole / "_build/html/index.html").read_text()
+    assert "300" in (whole / "_build/html/book/one.html").read_text()
+    assert (whole / "_build/executed/one.ipynb").exists()
+    assert "_repository" not in (whole / "_build/html/book/intro.html").read_text()
 
 
 @pytest.mark.slow
-def test_what_was_executed_before_a_source_was_changed_is_executed_again(small):
-    save(small, new_code_cell("open('executions', 'a').write('x')"))
-    (small / "book/intro.md").write_text("[nowhere](nowhere.md)\n")
+def test_a_build_that_failed_goes_on_with_what_no_change_of_a_source_has_made_stale(small):
+    executions = small / "executions"
+    (small / "_build/html").mkdir(parents=True)
+    (small / "book/intro.md").write_text("# A small book\n\nSee [the other](#two).\n")
+    save(small, new_code_cell(EXECUTION.format("x")))
+    refused = run(small)
+    assert refused.returncode == 1
+    assert "intro.md:3: WARNING" in refused.stderr
+    assert "'two'" in refused.stderr
+    assert not (small / "_build/html").exists()
+    save(small, new_code_cell(EXECUTION.format("y")))
     assert run(small).returncode == 1
-    save(small, new_code_cell("open('executions', 'a').write('y')"))
-    assert run(small).returncode == 1
-    assert (small / "executions").read_text() == "xy"
+    assert executions.read_text() == "xy"
+    (small / "book/intro.md").write_text(INTRO)
+    last = run(small)
+    assert last.returncode == 0, last.stderr
+    assert "executed before: one" in last.stdout
+    assert executions.read_text() == "xy"
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows has ports only")
-def test_no_port_that_another_program_may_take_leads_to_a_kernel(small):
-    save(small, new_code_cell("import ipykernel\nprint(ipykernel.get_connection_info())"))
-    assert run(small).returncode == 0
-    executed = nbformat.read(small / "_build/executed/one.ipynb", 4)
-    assert '"transport": "ipc"' in executed.cells[-1].outputs[0].text
+def test_no_port_that_another_program_may_take_leads_to_a_kernel(whole):
+    assert '"transport": "ipc"' in "".join(outputs(whole))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has ports only")
@@ -235,22 +259,24 @@ def test_a_smoke_build_has_its_own_place_few_episodes_and_says_so_on_every_page(
     assert not (small / "_build/html").exists()
     pages = [small / f"_build/smoke/html/book/{page}.html" for page in ("intro", "one")]
     assert all("A smoke build" in page.read_text() for page in pages)
-    executed = nbformat.read(small / "_build/smoke/executed/one.ipynb", 4)
-    assert executed.cells[-1].outputs[0].text == f"{book.SMOKE['episodes']}\n"
+    assert outputs(small, "_build/smoke/executed/one.ipynb")[-1] == f"{book.SMOKE['episodes']}\n"
 
 
 @pytest.mark.slow
-def test_a_page_offers_its_executed_notebook_and_links_to_a_repository_that_is_set(small):
-    config = yaml.safe_load((small / "_config.yml").read_text())
+def test_a_build_after_a_whole_one_begins_anew_and_links_to_a_repository_that_is_set(
+    whole, tmp_path
+):
+    again = shutil.copytree(whole, tmp_path / "again", symlinks=True)
+    config = yaml.safe_load((again / "_config.yml").read_text())
     config["repository"]["url"] = "https://github.com/us/book"
-    (small / "_config.yml").write_text(yaml.safe_dump(config))
-    assert run(small).returncode == 0
-    page = (small / "_build/html/book/one.html").read_text()
+    (again / "_config.yml").write_text(yaml.safe_dump(config))
+    assert run(again).returncode == 0
+    assert (again / "executions").read_text() == "xx"
+    page = (again / "_build/html/book/one.html").read_text()
     assert '<a href="one.ipynb" download' in page
     assert 'href="https://github.com/us/book"' in page
-    executed = nbformat.read(small / "_build/html/book/one.ipynb", 4)
-    assert executed.cells[-1].outputs[0].text == "300\n"
-    assert "github.com/us/book" in (small / "_build/html/book/intro.html").read_text()
+    assert outputs(again, "_build/html/book/one.ipynb")[-1] == "300\n"
+    assert "github.com/us/book" in (again / "_build/html/book/intro.html").read_text()
 
 
 @pytest.mark.slow
@@ -264,25 +290,17 @@ def test_one_chapter_is_built_apart_with_the_given_parameters(small):
 
 
 @pytest.mark.slow
-def test_a_cell_that_fails_is_named_and_no_older_book_survives(small):
+def test_cells_and_solutions_that_fail_are_named_and_no_older_book_survives(small):
     (small / "_build/html").mkdir(parents=True)
-    write(small, "1 / 0")
+    listed(small, "one", "two")
+    save(small, new_code_cell("1 / 0"))
+    save(small, *exercise("d = 1.25"), name="two")
     result = run(small)
     assert result.returncode == 1
     assert "one: cell 3 failed with ZeroDivisionError: division by zero" in result.stderr
+    assert "Unsolved: That is where the overlap is 0" in result.stderr
     assert "Traceback" not in result.stderr
     assert "ZeroDivisionError" in (small / "_build/logs/one.log").read_text()
-    assert not (small / "_build/html").exists()
-
-
-@pytest.mark.slow
-def test_a_warning_of_jupyter_book_fails_the_build_and_no_older_book_survives(small):
-    (small / "_build/html").mkdir(parents=True)
-    (small / "book/intro.md").write_text("# A small book\n\nSee [the other](#two).\n")
-    result = run(small)
-    assert result.returncode == 1
-    assert "intro.md:3: WARNING" in result.stderr
-    assert "'two'" in result.stderr
     assert not (small / "_build/html").exists()
 
 
@@ -354,18 +372,16 @@ def exercise(code: str) -> list:
 
 
 @pytest.mark.slow
-def test_a_page_has_an_empty_answer_a_place_for_it_and_the_folded_solution(small):
-    save(small, *exercise("d = 1.375"))
-    result = run(small)
-    assert result.returncode == 0, result.stderr
-    page = BeautifulSoup((small / "_build/html/book/one.html").read_text(), "html.parser").article
+def test_a_page_has_an_empty_answer_a_place_for_it_and_the_folded_solution(whole):
+    html = (whole / "_build/html/book/one.html").read_text()
+    page = BeautifulSoup(html, "html.parser").article
     assert page.select_one(".exercise .exercise-line").text.startswith("By hand · level 1 of 3")
     place = page.select_one("div.answer[hidden]")
     assert json.loads(place.script.string)["expected"] == pytest.approx(1.375)
     assert "d = ..." in page.select_one("details.hide pre").text
     assert "d = 1.375" in page.select_one("details.solution").text
     assert page.text.count("d = 1.375") == 1
-    offered = nbformat.read(small / "_build/html/book/one.ipynb", 4)
+    offered = nbformat.read(whole / "_build/html/book/one.ipynb", 4)
     assert [cell.source for cell in offered.cells if "answer" in cell.metadata.get("tags", [])] == [
         "d = ..."
     ]
@@ -373,25 +389,17 @@ def test_a_page_has_an_empty_answer_a_place_for_it_and_the_folded_solution(small
 
 
 @pytest.mark.slow
-def test_a_solution_that_its_check_refuses_ends_the_build(small):
-    save(small, *exercise("d = 1.25"))
-    result = run(small)
-    assert result.returncode == 1
-    assert "Unsolved: That is where the overlap is 0" in result.stderr
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("answer", ["d = ...", "d = 1.25"])
-def test_papermill_runs_a_chapter_to_its_end_whatever_the_answers_are(answer, small):
-    cells = exercise("d = 1.375")
-    cells[1].source = answer
-    save(small, *cells, new_code_cell("print(episodes)"))
+def test_papermill_runs_a_chapter_to_its_end_whatever_the_answers_are(small):
+    unanswered, wrong = exercise("d = 1.375"), exercise("d = 1.375")
+    wrong[1].source = "d = 1.25"
+    save(small, *unanswered, *wrong, new_code_cell("print(episodes)"))
     papermill.execute_notebook(
         small / "book/one.ipynb", small / "o.ipynb", {"episodes": 2}, progress_bar=False
     )
-    *_, check, _, last = nbformat.read(small / "o.ipynb", 4).cells
-    assert not check.outputs[0].data["text/plain"].startswith("Right")
-    assert last.outputs[0].text == "2\n"
+    checks = [c for c in nbformat.read(small / "o.ipynb", 4).cells if "check" in c.metadata.tags]
+    assert len(checks) == 2
+    assert not any(one.outputs[0].data["text/plain"].startswith("Right") for one in checks)
+    assert outputs(small, "o.ipynb") == ["2\n"]
 
 
 @pytest.mark.parametrize("value", [True, False, None, 3, -3, 3.5, 1e-7, math.nan, "A", "true", ""])
@@ -428,11 +436,5 @@ def test_no_module_of_the_driver_changes_the_environment_of_who_imports_it():
 
 
 @pytest.mark.slow
-def test_a_chapter_runs_on_one_thread_strictly_and_its_figures_are_for_a_page(small, monkeypatch):
-    names = ("OMP_NUM_THREADS", "NMPCRL_STRICT", "NMPCRL_FIGURES_FOR_PAGE")
-    for name in names:
-        monkeypatch.delenv(name, raising=False)
-    save(small, new_code_cell(f"import os\nprint(*[os.environ[name] for name in {names}])"))
-    assert run(small).returncode == 0
-    executed = nbformat.read(small / "_build/executed/one.ipynb", 4)
-    assert executed.cells[-1].outputs[0].text == "1 1 1\n"
+def test_a_chapter_runs_on_one_thread_strictly_and_its_figures_are_for_a_page(whole):
+    assert "1 1 1\n" in outputs(whole)

@@ -254,6 +254,7 @@ def test_two_builds_give_the_same_bytes(tmp_path):
     (tmp_path / "run.npz").write_bytes(bytes(9))
     runs = {"data/runs/run.npz": tmp_path / "run.npz"}
     for build in ("one", "two"):
+        course.wheel.cache_clear()
         for edition in course.EDITIONS:
             course.edition(edition, tmp_path / build / edition, runs)
     files = {
@@ -290,7 +291,7 @@ def test_with_a_secret_students_get_neither_an_answer_that_counts_nor_its_check(
             asked = "\n".join(cell.source for cell in cells_of(one))
             for value in filter(None, map(value_of, solutions[one.name].answers)):
                 assert not re.search(rf"(?<![\d.]){re.escape(value)}(?![\d.])", asked)
-    assert others == 20
+    assert others == 21
     assert secret not in b"".join(p.read_bytes() for p in tmp_path.rglob("*") if p.is_file())
 
 
@@ -300,16 +301,21 @@ def test_a_secret_that_is_empty_is_refused(tmp_path):
     assert "The file is empty" in refused.output
 
 
-def executed(edition: str, name: str, folder: Path, runs, monkeypatch):
-    """An edition of a chapter, run from its own folder, with its own wheel and runs."""
-    for variable in ("NMPCRL_RUNS", "NMPCRL_PUBLISHED", "NMPCRL_STRICT"):
-        monkeypatch.delenv(variable, raising=False)
-    course.edition(edition, folder, runs)
-    zipfile.ZipFile(next(folder.glob("*.whl"))).extractall(folder.parent / "installed")
-    monkeypatch.setenv("PYTHONPATH", str(folder.parent / "installed"))
-    notebook = nbformat.read(folder / name, 4)
-    place = {"metadata": {"path": str(folder)}}
-    return NotebookClient(notebook, timeout=900, resources=place).execute()
+@pytest.fixture
+def executed(edition_of_course, tmp_path, monkeypatch):
+    """Runs a chapter of an edition from its own folder, with its own wheel and runs."""
+
+    def run(edition: str, name: str):
+        for variable in ("NMPCRL_RUNS", "NMPCRL_PUBLISHED", "NMPCRL_STRICT"):
+            monkeypatch.delenv(variable, raising=False)
+        folder = edition_of_course(edition)
+        zipfile.ZipFile(next(folder.glob("*.whl"))).extractall(tmp_path / "installed")
+        monkeypatch.setenv("PYTHONPATH", str(tmp_path / "installed"))
+        notebook = nbformat.read(folder / name, 4)
+        place = {"metadata": {"path": str(folder)}}
+        return NotebookClient(notebook, timeout=900, resources=place).execute()
+
+    return run
 
 
 def failed(notebook) -> list[str]:
@@ -324,18 +330,16 @@ def failed(notebook) -> list[str]:
 
 @pytest.mark.course
 @each_chapter
-def test_an_untouched_notebook_of_a_student_runs_and_fails_exactly_its_checks(
-    name, tmp_path, long_runs, monkeypatch
-):
-    notebook = executed("student", name, tmp_path / "student", long_runs, monkeypatch)
+def test_an_untouched_notebook_of_a_student_runs_and_fails_exactly_its_checks(name, executed):
+    notebook = executed("student", name)
     checks = [c.id for one in exercises(notebook) for c in one.parts["check"]]
     assert failed(notebook) == checks
 
 
 @pytest.mark.course
 @each_chapter
-def test_every_check_passes_in_the_notebook_of_a_teacher(name, tmp_path, long_runs, monkeypatch):
-    notebook = executed("instructor", name, tmp_path / "instructor", long_runs, monkeypatch)
+def test_every_check_passes_in_the_notebook_of_a_teacher(name, executed):
+    notebook = executed("instructor", name)
     assert failed(notebook) == []
     for one in exercises(notebook):
         for cell in one.parts["check"]:

@@ -80,7 +80,7 @@ def notebook_of(*outputs: str) -> nbformat.NotebookNode:
 def test_the_files_of_runs_are_written_if_a_figure_asks_for_them(tmp_path):
     live.add_runs([notebook_of("<p>none</p>"), notebook_of()], tmp_path)
     assert list(tmp_path.iterdir()) == []
-    live.add_runs([notebook_of('<figure data-figure="runs">')], tmp_path)
+    live.add_runs([notebook_of("<p>none</p>", '<figure data-figure="runs">')], tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"runs_{k}.js" for k in "ABCDEF"]
 
 

@@ -14,6 +14,7 @@ from textwrap import dedent
 
 import nbformat
 import pytest
+from click.testing import CliRunner
 from driver import project
 from driver.build import book, chapters
 from driver.page import enrich
@@ -33,11 +34,17 @@ PATHS = sorted((ROOT / "book").glob("*.ipynb"))
 NOTEBOOKS = {path.stem: nbformat.read(path, as_version=4) for path in PATHS}
 CHAPTERS = [name for name in NOTEBOOKS if re.match(r"\d\d_|solver", name)]
 OWN = [name for name in NOTEBOOKS if name.startswith("your_")]  # a reader's own robot, learner ...
-GIVEN = [*CHAPTERS, *OWN, "paper_and_book", "performance"]  # which have parameters
+GIVEN = [
+    *CHAPTERS,
+    *OWN,
+    "paper_and_book",
+    "performance",
+    "other_problems",
+]  # which have parameters
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)
-each_exercised = pytest.mark.parametrize("name", [*CHAPTERS, "performance"])
+each_exercised = pytest.mark.parametrize("name", [*CHAPTERS, "performance", "other_problems"])
 each_own = pytest.mark.parametrize("name", OWN)
 each_given = pytest.mark.parametrize("name", GIVEN)
 
@@ -383,10 +390,10 @@ def test_papermill_itself_ends_in_the_sentence_before_anything_is_trained(
 ):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
     output = tmp_path / "o.ipynb"
-    command = [sys.executable, "-m", "papermill", f"book/{name}.ipynb", str(output), *words]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode != 0
-    last = done.stderr.strip().splitlines()[-1]
+    monkeypatch.chdir(ROOT)
+    done = CliRunner().invoke(papermill, [f"book/{name}.ipynb", str(output), *words])
+    assert done.exit_code != 0
+    last = str(done.exception).strip().splitlines()[-1]
     assert last.startswith("ParameterError: ")
     assert said in last
     (error,) = [
@@ -515,4 +522,16 @@ def test_a_notebook_of_ones_own_runs_with_few_episodes_and_one_seed(name, tmp_pa
         [*command, "-y", str(given)], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert not (tmp_path / "runs").exists()  # nothing of it belongs to the study
+    kept = {path.name for path in (tmp_path / "runs").glob("[!.]*")}
+    assert kept <= {"trials"}  # nothing of it belongs to the study
+
+
+def test_the_forty_lines_of_your_problem_are_a_script_that_learns_the_mass(tmp_path):
+    cells = {cell.id: cell.source for cell in code("your_problem")}
+    script = "\n".join(cells[f"drone-{part}"] for part in ("model", "problem", "learned"))
+    assert sum(bool(line.strip()) for line in script.splitlines()) <= 40
+    (tmp_path / "drone.py").write_text(script)
+    command = [sys.executable, str(tmp_path / "drone.py")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert abs(ast.literal_eval(done.stdout)["mass"] - 1.3) < 0.05

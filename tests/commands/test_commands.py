@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from raising import raising
 
 from nmpcrl.analysis import summaries
+from nmpcrl.analysis.policy_search import LEAST, Search
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.commands import main
@@ -32,9 +33,10 @@ STUDY = {
 
 @pytest.fixture
 def small(monkeypatch, measured):
-    """A study of six short runs, judged by nobody, and times that nobody measured."""
+    """A study of six short runs, short searches, judged by nobody, and times nobody measured."""
     times = pd.DataFrame(measured["learners"])
     monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
+    monkeypatch.setattr(publish, "Search", partial(Search, budget=LEAST))
     monkeypatch.setattr(publish, "rejudge", lambda: ())
     monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: times)
 
@@ -220,13 +222,14 @@ def test_what_is_published_verifies_the_runs_it_was_made_of(command, trained):
     asked = command("study", "--publish")
     assert asked.exit_code == 0, asked.output
     assert list(published.load().rows) == list(STUDY)
+    assert list(published.load().searches) == [Search(a, budget=LEAST) for a in design.LAYOUTS]
     verified = command("verify")
     assert verified.exit_code == 0, verified.output
     assert "6 runs compared with the published ones, 6 bit for bit: " in verified.output
     assert ": 0 contradictions" in verified.output
 
 
-def test_verify_names_what_contradicts_and_fails(command, trained, tmp_path):
+def test_verify_names_what_contradicts_and_fails(command, trained, trains_here):
     command("study", "--publish")
     wrong = next(e for e in STUDY if e.learner == "ES")
     one = trained[wrong]
@@ -273,7 +276,7 @@ def test_verify_says_that_nothing_is_published(command, small):
     assert refused.output.startswith("Error: nothing is published in ")
 
 
-def test_verify_says_that_what_is_published_is_damaged(command, trained, tmp_path):
+def test_verify_says_that_what_is_published_is_damaged(command, trained, trains_here, tmp_path):
     command("study", "--publish")
     (tmp_path / "published/curves.npz").write_bytes(b"")
     published._load.cache_clear()

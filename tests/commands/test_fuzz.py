@@ -6,12 +6,13 @@ import click
 import pytest
 from raising import raising
 
-from nmpcrl.analysis import summaries
-from nmpcrl.bench import live, suite, sweep
+from nmpcrl.analysis import other_problems, summaries
+from nmpcrl.bench import live, problem_times, suite, sweep
 from nmpcrl.claims import publish, published, verification
 from nmpcrl.commands import main
 from nmpcrl.study import Experiment, Records, cluster, run, store
 from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.storage import executor
 
 LINES = 1500
 SHORT = Experiment(episodes=1, steps=5)
@@ -47,7 +48,10 @@ def fast(command, monkeypatch, tmp_path):
     monkeypatch.setattr(verification, "relock", refuse)
     monkeypatch.setattr(published, "load", lambda: published.Published(rows={SHORT: {}}))
     monkeypatch.setattr(verification, "sample", lambda *_: [SHORT])
+    monkeypatch.setattr(executor, "processes", refuse)  # nothing that takes long does without
     for place, name in (
+        (other_problems, "make"),
+        (problem_times, "make"),
         (suite, "measure"),
         (suite, "read_or_measure"),
         (sweep, "sweep"),
@@ -104,6 +108,9 @@ def test_the_stand_ins_stand_where_the_commands_look(fast):
         "bench",
         "bench --sweep 5",
         "bench --live",
+        "bench --problems",
+        "bench --sizes",
         "show ES",
+        "suite --policy ES",
     ):
         assert "not here" in fast(*line.split()).output, line

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from click.testing import CliRunner
 from nmpcrl.commands import main
 from nmpcrl.commands.names import file_of
 from nmpcrl.commands.tables import columns, counted, duration, size
-from nmpcrl.study import Experiment, fetch_all, store, sweep
+from nmpcrl.learning import expected_sarsa
+from nmpcrl.study import Experiment, Trial, fetch, fetch_all, paper, store, sweep
 from nmpcrl.study.records import Records
 
 DRAWN = ((0.5, 2.2), (3.0, 0.5))
@@ -245,3 +247,22 @@ def test_nothing_in_a_file_is_a_command_to_the_terminal(tmp_path, monkeypatch):
         said = CliRunner().invoke(main, words).output
         assert "\x1b" not in said
         assert "\x07" not in said
+
+
+def test_runs_of_ones_own_are_counted_kept_and_not_drawn_in_a_sentence(command):
+    make = partial(expected_sarsa, alpha=paper.ALPHA)
+    trial = Trial("mine", make, paper.nmpc(), paper.THETA_INIT, episodes=1, steps=3)
+    fetch(trial)
+    place = store.path_of(trial)
+    try:
+        for words, consequence in ((["runs"], "not listed"), (["clean"], "they are kept")):
+            said = command(*words).stderr
+            assert f"1 trial of your own in {place.parent}: " in said
+            assert consequence in said
+        for name in (place.stem, str(place)):
+            done = command("show", name)
+            assert done.exit_code == 1
+            assert "is a run of a Trial" in done.stderr
+    finally:
+        shutil.rmtree(place.parent)
+    assert command("runs").stderr == ""

@@ -7,9 +7,18 @@ from nmpcrl.learning import browser
 
 MINE = """
 import numpy as np
-from nmpcrl.control import Plant, Task
+from nmpcrl.control import Plant, Problem, Task
 
 plant = Plant(lambda s, a: a, ("x [m]", "y [m]"), ("u", "v"), -np.ones(2), np.ones(2))
+
+problem = Problem(
+    states=1,
+    inputs=1,
+    horizon=3,
+    theta={"gain": 1.0},
+    model=lambda x, u, th: x + th["gain"] * u,
+    stage=lambda x, u, th: x**2 + u**2,
+)
 
 def task():
     return Task(np.zeros(2), np.ones(2), np.full(2, -9.0), np.full(2, 9.0), (), np.ones(2))
@@ -44,6 +53,17 @@ def test_a_plant_in_a_file_beside_is_found(command, asked, tmp_path, monkeypatch
     assert "states" in command("wasm", *named[:2]).output  # the paper's task has three
 
 
+def test_a_problem_is_compiled_instead_of_a_plant_and_a_task(command, asked, tmp_path, monkeypatch):
+    (tmp_path / "mine_for_wasm.py").write_text(MINE)
+    monkeypatch.chdir(tmp_path)
+    assert command("wasm", "--problem", "mine_for_wasm:problem").exit_code == 0
+    ((problem,),) = asked
+    assert (problem.states, list(problem.names)) == (1, ["gain"])
+    both = command("wasm", "--problem", "mine_for_wasm:problem", "--task", "mine_for_wasm:task")
+    assert both.exit_code
+    assert "a Problem has no Plant and no Task beside it" in both.output
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -52,6 +72,7 @@ def test_a_plant_in_a_file_beside_is_found(command, asked, tmp_path, monkeypatch
         (("--plant", "nmpcrl.control:nothing"), "nothing"),
         (("--plant", "nmpcrl.study:paper"), "is no Plant"),
         (("--task", "nmpcrl.control:differential_drive"), "is no Task"),
+        (("--problem", "nmpcrl.control:differential_drive"), "is no Problem"),
         (("--out", "/nowhere/at/all.wasm"), "cannot be written"),
     ],
 )

@@ -1,10 +1,8 @@
 """Two plants and drawn problems for the tests of control."""
 
-import sys
 from collections.abc import Callable, Iterator
 
 import casadi as ca
-import numba
 import numpy as np
 import pytest
 
@@ -43,20 +41,6 @@ def robot(controllers, solver) -> Nmpc:
 def fatrop(controllers) -> Nmpc:
     """The paper's controller with the default solver."""
     return controllers["fatrop"]
-
-
-@pytest.fixture(scope="module")
-def interpreted(tmp_path_factory) -> Iterator[None]:
-    """Python runs what numba would compile: slower, and at once for any number of problems."""
-    before = set(sys.modules)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(numba.config, "DISABLE_JIT", True)
-        patch.setenv("NMPCRL_CACHE", str(tmp_path_factory.mktemp("interpreted")))
-        with np.errstate(all="ignore"):
-            yield
-    for name in set(sys.modules) - before:
-        if name.startswith("riccati_"):
-            del sys.modules[name]
 
 
 @pytest.fixture

@@ -84,18 +84,24 @@ def pressed(solution):
     return tuple(shares > 1e-3) + tuple(shares > 1 - 1e-3)
 
 
-def differences(nmpc, solution, data, read, fixed):
-    """Central differences of `read(solution)` in theta; None where a constraint changes sides."""
-    here, columns = pressed(solution), []
+def beside(nmpc, solution, data, fixed):
+    """Solutions on both sides in each theta; None where a constraint changes sides."""
+    here, pairs = pressed(solution), []
     for e in STEP * np.eye(solution.theta.size):
-        sides = [
-            nmpc.solve(solution.state, solution.theta + d, solution, fixed, data=data)
-            for d in (e, -e)
-        ]
-        if here is None or any(pressed(side) != here for side in sides):
+        pairs.append(
+            [
+                nmpc.solve(solution.state, solution.theta + d, solution, fixed, data=data)
+                for d in (e, -e)
+            ]
+        )
+        if here is None or any(pressed(side) != here for side in pairs[-1]):
             return None
-        above, below = map(read, sides)
-        columns.append((above - below) / (2 * STEP))
+    return pairs
+
+
+def differences(pairs, read):
+    """Central differences of `read(solution)` in theta."""
+    columns = [(read(above) - read(below)) / (2 * STEP) for above, below in pairs]
     return np.moveaxis(np.array(columns), 0, -1)
 
 
@@ -106,23 +112,24 @@ def test_all_derivatives_are_finite_differences(problem, solvers, fixed):
     for state, theta, action, data in drawn(problem, 12, seed=2):
         given = action if fixed else None
         solution = nmpc.solve(state, theta, action=given, data=data)
-        slope = differences(nmpc, solution, data, lambda s: s.value, given)
-        if slope is None:
+        pairs = beside(nmpc, solution, data, given)
+        if pairs is None:
             continue
+        slope = differences(pairs, lambda s: s.value)
         np.testing.assert_allclose(solution.features, slope, atol=1e-6 * np.abs(slope).max())
-        hessian = differences(nmpc, solution, data, lambda s: s.features, given)
+        hessian = differences(pairs, lambda s: s.features)
         along = rng.normal(size=theta.size)
         product = nmpc.value_hessian_times(solution, along)
         np.testing.assert_allclose(product, hessian @ along, atol=2e-5 * np.abs(hessian).max())
-        policy = differences(nmpc, solution, data, lambda s: s.action, given)
+        policy = differences(pairs, lambda s: s.action)
         found = nmpc.policy_jacobian(solution)
         np.testing.assert_allclose(found, policy, atol=2e-5)
         for stage in (1, 3, 6):
             plan = nmpc.plan_jacobian(solution, stage)
-            states = differences(nmpc, solution, data, lambda s, i=stage: s.states[i], given)
+            states = differences(pairs, lambda s, i=stage: s.states[i])
             np.testing.assert_allclose(plan.states, states, atol=2e-5)
             if stage < 6:
-                inputs = differences(nmpc, solution, data, lambda s, i=stage: s.inputs[i], given)
+                inputs = differences(pairs, lambda s, i=stage: s.inputs[i])
                 np.testing.assert_allclose(plan.inputs, inputs, atol=2e-5)
         compared += 1
     assert compared >= 6

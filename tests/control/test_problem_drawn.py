@@ -3,54 +3,12 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from scipy.linalg import solve_discrete_are
 
 from nmpcrl import Vector
 from nmpcrl.control import Ipopt, Nmpc, Problem, Riccati, Series, Soft, Solution
-
-GAMMA, N = 0.9, 10
-A = np.array([[1.0, 0.25], [0.0, 1.0]])  # of the wrong model
-B = np.array([[0.0312], [0.25]])
-P = ca.DM(solve_discrete_are(A, B, np.eye(2) / 2, np.eye(1) / 4))
-
-
-def gros_and_zanon() -> Problem:
-    """The linear example with a wrong model of Gros and Zanon (2020).
-
-    Its terminal cost and its linear cost are not discounted, and its slacks are one stage late.
-    """
-    late = {"weight": 50.0 / GAMMA, "stages": slice(1, None)}
-    return Problem(
-        states=2,
-        inputs=1,
-        horizon=N,
-        gamma=GAMMA,
-        theta={
-            "V0": 0.0,
-            "x_lower": np.zeros(2),
-            "x_upper": np.zeros(2),
-            "b": np.zeros(2),
-            "f": np.zeros(3),
-            "A": A,
-            "B": B,
-        },
-        model=lambda x, u, th, d: th["A"] @ x + th["B"] @ u + th["b"],
-        stage=lambda x, u, th, d: (
-            0.5 * (ca.sumsqr(x) + 0.5 * ca.sumsqr(u))
-            + d["undiscounted"] * ca.dot(th["f"], ca.vertcat(x, u))
-        ),
-        terminal=lambda x, th, d: d["undiscounted"] * ca.bilin(P, x, x),
-        initial=lambda x, th, d: th["V0"],
-        soft=[
-            Soft(lambda x, u, th, d: ca.DM([0, -1]) + th["x_lower"] - x, **late),
-            Soft(lambda x, u, th, d: x - 1 - th["x_upper"], **late),
-        ],
-        lower=-1.0,
-        upper=1.0,
-        data={"undiscounted": Series(GAMMA ** -np.arange(N + 1.0))},
-    )
+from nmpcrl.study.problems import gros_zanon
 
 
 def strict(solution: Solution) -> bool:
@@ -77,27 +35,10 @@ def draws(problem: Problem, count: int) -> list[tuple[Vector, Vector, Vector]]:
     ]
 
 
-@pytest.mark.usefixtures("interpreted")
-def test_values_and_gradients_of_gros_and_zanon_are_ipopts():
-    problem = gros_and_zanon()
-    riccati, ipopt = (Nmpc(problem, solver=s) for s in (Riccati(1e-10), Ipopt(1e-10)))
-    compared = 0
-    for state, theta, action in draws(problem, 200):
-        for fixed in (None, action):
-            ours = riccati.solve(state, theta, action=fixed)
-            theirs = ipopt.solve(state, theta, action=fixed)
-            assert ours.value == pytest.approx(theirs.value, rel=1e-6, abs=1e-6)
-            if strict(ours):
-                size = max(1.0, np.abs(theirs.features).max())
-                np.testing.assert_allclose(ours.features, theirs.features, atol=1e-6 * size)
-                compared += 1
-    assert compared > 300
-
-
 @pytest.mark.slow
-def test_machine_code_finds_all_derivatives_of_gros_and_zanon():
+def test_machine_code_finds_the_values_and_all_derivatives_of_gros_and_zanon():
     """Among them one with an active row of a small multiplier, which the costates depend on."""
-    problem = gros_and_zanon()
+    problem = gros_zanon.problem()
     compiled = Nmpc(problem, solver=Riccati(1e-10))
     ipopt = Nmpc(problem, solver=Ipopt(1e-10))
     along = np.linspace(-1, 1, problem.theta.size)
@@ -157,7 +98,12 @@ def random_problem(seed: int) -> Problem:
 
 
 @pytest.mark.usefixtures("interpreted")
-@settings(derandomize=True, deadline=None, max_examples=15)
+@settings(
+    derandomize=True,
+    deadline=None,
+    max_examples=15,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(seed=st.integers(0, 10**6))
 def test_a_drawn_problem_has_the_solution_that_ipopt_finds_from_there(seed):
     problem, rng = random_problem(seed), np.random.default_rng(seed)

@@ -6,7 +6,19 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.control import Ipopt, Nmpc, Parameter, Plant, Problem, Riccati, Soft, SolverError, Task
+from nmpcrl.control import (
+    Ipopt,
+    Nmpc,
+    Parameter,
+    Plant,
+    Problem,
+    Riccati,
+    Soft,
+    SolverError,
+    Task,
+    rk4,
+)
+from nmpcrl.control.solvers.riccati import random_inputs
 from nmpcrl.study import paper
 
 STRANGER = ca.SX.sym("stranger")
@@ -27,14 +39,24 @@ def problem(**changes) -> Problem:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"model": lambda x, u, th: ca.vertcat(math.sin(x[0]), u)}, "model holds nan.*ca.sin"),
+        (
+            {"model": lambda x, u, th: ca.vertcat(math.sin(x[0]), u)},
+            r"model\[0\] holds nan.*ca.sin",
+        ),
+        ({"model": lambda x, u, th: [x[0], math.exp(x[1])]}, r"model\[1\] holds nan.*ca.sin"),
+        ({"model": lambda x, u, th: [x[0], float(u)]}, r"model\[1\] holds nan.*ca.sin"),
+        ({"model": lambda x, u, th: x * math.log(x[0])}, r"model\[0\] holds nan: math's .*ca.sin"),
+        ({"model": lambda x, u, th: x * np.inf}, r"model\[0\] holds inf: write a large number"),
+        ({"model": lambda x, u, th: np.eye(3) @ x}, "model cannot be written down.*dimensions"),
+        ({"model": lambda x, u, th: x[2] * x}, "model cannot be written down"),
+        ({"model": lambda x, u, th: x if u else 2 * x}, "model .* Python `if`.*ca.if_else"),
         ({"model": lambda x, u, th: [x[0], x[1], u]}, "model returns 3 numbers.* 2 states"),
         ({"model": lambda x, u, th: x if x[0] > 0 else -x}, "model .* Python `if`.*ca.if_else"),
         ({"model": lambda x, u, th: max(x[0], 0) * x}, "model .* ca.fmax"),
         ({"model": lambda x, u: x}, r"model is called as model\(x, u, th\)"),
         ({"model": lambda x, u, th: ca.MX.sym("y", 2)}, "model must return a column of SX"),
         ({"model": lambda x, u, th: "x"}, "model must return a column of SX"),
-        ({"model": lambda x, u, th: STRANGER * x}, "model uses stranger, which is none of"),
+        ({"model": lambda x, u, th: STRANGER * x}, r"model\[0\] uses stranger, which is none of"),
         ({"model": 3}, "model = 3 must be a function"),
         ({"stage": lambda x, u, th: x}, "stage returns 2 numbers; it must return 1 cost"),
         ({"stage": lambda x, u, th: x @ x}, "stage cannot be written down.*dimensions"),
@@ -75,6 +97,13 @@ def test_a_solve_that_is_none():
     assert nmpc.solve(np.array([3000.0, -2e5]), theta).value > 0  # no unit is forbidden
 
 
+@pytest.mark.parametrize(("lower", "upper"), [(280, 370), (-5, -3), (-1e3, 1e3), (-0.5, 0.2)])
+def test_random_starts_lie_between_the_bounds_wherever_these_are(lower, upper):
+    inputs = random_inputs(problem(lower=lower, upper=upper), 0, 50)
+    assert lower <= inputs.min() < inputs.max() <= upper
+    assert np.ptp(inputs) <= 2
+
+
 def test_a_controller_that_is_none():
     with pytest.raises(ValueError, match="a Problem has its own costs, horizon, gamma"):
         Nmpc(problem(), horizon=4)
@@ -97,6 +126,102 @@ def test_a_plan_that_leaves_all_numbers_is_no_solution(solver):
         Nmpc(wild, solver=solver).solve(np.ones(2), wild.theta)
 
 
+@pytest.mark.parametrize("solver", ["fatrop", "ipopt"])
+@pytest.mark.parametrize(
+    ("changes", "state", "message"),
+    [
+        (
+            {"stage": lambda x, u, th: th["alpha"] * ca.log(x[1]) + u**2},
+            [1.0, 0.0],
+            r"; stage is -inf at x = \[1. 0.\], u = \[0.\]: keep it finite, as ca.log\(ca.fmax",
+        ),
+        (
+            {
+                "stage": lambda x, u, th: ca.sumsqr(u),
+                "model": lambda x, u, th: [x[0], ca.sqrt(-x[1])],
+            },
+            [1.0, 2.0],
+            r"; model\[1\] is nan at x = \[1. 2.\], u = \[0.\]",
+        ),
+        (
+            {"stage": lambda x, u, th: -ca.norm_2(x - 1) + u**2},
+            [1.0, 1.0],
+            r"; the derivative of stage is nan at .*: write ca.sqrt\(ca.sumsqr\(x\) \+ 1e-9\)",
+        ),
+        (
+            {"soft": [Soft(lambda x, u, th: [x[0], -(ca.fabs(x[1]) ** 1.5) - x[0]])]},
+            [-1e300, 0.0],
+            "state .* must hold finite numbers",
+        ),
+    ],
+)
+def test_what_is_not_finite_where_a_plan_begins_is_named(solver, changes, state, message):
+    nmpc = Nmpc(problem(**changes), solver=solver)
+    with pytest.raises((SolverError, ValueError), match=message) as caught:
+        nmpc.solve(np.array(state), nmpc.problem.theta)
+    assert "\n" not in str(caught.value)
+
+
+def test_numpys_functions_write_what_casadis_do():
+    """They need no refusal: np.sin of a symbol is ca.sin of it, as np.where is ca.if_else."""
+    ours = problem(
+        model=lambda x, u, th: np.array([np.sin(x[0]), np.where(x[1] > 0, x[1], 2 * x[1])]) + u,
+        stage=lambda x, u, th: np.linalg.norm(x) ** 2 + np.maximum(u, 0) + np.abs(x[0]),
+    )
+    same = problem(
+        model=lambda x, u, th: ca.vertcat(ca.sin(x[0]), ca.if_else(x[1] > 0, x[1], 2 * x[1])) + u,
+        stage=lambda x, u, th: ca.norm_2(x) ** 2 + ca.fmax(u, 0) + ca.fabs(x[0]),
+    )
+    assert ours.key == same.key
+
+
+def test_a_state_may_be_alone():
+    alone = problem(states=1, theta={"a": 0.9}, model=lambda x, u, th: th["a"] * x + u,
+                    stage=lambda x, u, th: x**2 + u**2)  # fmt: skip
+    assert Nmpc(alone, solver="ipopt").solve(np.ones(1), alone.theta).states.shape == (4, 1)
+    with pytest.raises(ValueError, match=r"model cannot be written down.*out of bounds"):
+        problem(states=1, model=lambda x, u, th: x[1])
+
+
+@pytest.mark.parametrize("solver", ["riccati", "fatrop", "ipopt"])
+@pytest.mark.usefixtures("interpreted")
+def test_a_plant_faster_than_its_period_is_said_to_be(solver):
+    """Time constants of 1 ms sampled at 30 ms: each step multiplies a current by 30,000."""
+    fast = plant(lambda s, a: ca.vertcat((a - s[0]) / 1e-3, s[0] - s[1]), period=0.03)
+    task = Task([0, 0], [0, 1], [-np.inf] * 2, [np.inf] * 2, weights=[1.0, 1.0])
+    message = r"dynamics makes 3e\+04 times as much of a small deviation in one step, .* substeps"
+    with pytest.raises(SolverError, match=message):
+        Nmpc(fast, task, solver=solver).solve(np.array([900.0, 0]), np.full(6, 1e-6))
+
+
+@pytest.mark.usefixtures("interpreted")
+def test_substeps_make_a_fast_model_one_that_can_be_planned_with():
+    """A motor whose current settles in 1 ms, sampled at 10 ms."""
+
+    def motor(substeps):
+        def dynamics(x, u):
+            return ca.vertcat((u - 0.5 * x[0] - 0.01 * x[1]) / 1e-3, (x[0] - 0.1 * x[1]) / 0.1)
+
+        return problem(
+            theta={"target": 5.0},
+            horizon=5,
+            model=lambda x, u, th: rk4(dynamics, x, u, 0.01, substeps=substeps),
+            stage=lambda x, u, th: (x[1] - th["target"]) ** 2 + 1e-3 * u**2,
+            terminal=lambda x, th: 10 * (x[1] - th["target"]) ** 2,
+            lower=-12,
+            upper=12,
+        )
+
+    with pytest.raises(SolverError, match=r"model makes 1e\+01 times .* substeps"):
+        Nmpc(motor(1), solver="ipopt").solve(np.array([900.0, 0.0]), motor(1).theta)
+    nmpc = Nmpc(motor(8))
+    solution = nmpc.solve(np.zeros(2), motor(8).theta)
+    ipopt = Nmpc(motor(8), solver=Ipopt(1e-10)).solve(np.zeros(2), motor(8).theta)
+    np.testing.assert_allclose(solution.states, ipopt.states, atol=1e-4)
+    assert 0 < solution.states[-1, 1] < 6
+    assert np.abs(solution.states[:, 0]).max() < 24.1  # [A], 12 V through half an ohm
+
+
 def plant(dynamics, states=2, **options) -> Plant:
     names = tuple("abc"[:states])
     return Plant(dynamics, names, ("u",), lower=[-1], upper=[1], **options)
@@ -105,7 +230,7 @@ def plant(dynamics, states=2, **options) -> Plant:
 @pytest.mark.parametrize(
     ("dynamics", "message"),
     [
-        (lambda s, a: ca.vertcat(math.sin(s[0]), a), "dynamics holds nan.*ca.sin"),
+        (lambda s, a: ca.vertcat(math.sin(s[0]), a), r"dynamics\[0\] holds nan.*ca.sin"),
         (lambda s, a: [s[0]], "dynamics returns 1 numbers; it must return 2 states"),
         (lambda s, a: s if s[0] > 0 else -s, "dynamics .* Python `if`"),
         (lambda s: s, r"dynamics is called as dynamics\(state, action\)"),

@@ -7,14 +7,15 @@ import pytest
 STEP = 1e-4
 
 
-def differences(nmpc, solution, read):
-    """Central differences of `read(solution)` in theta, each solve started from the same plan."""
-    rows = []
-    for e in STEP * np.eye(solution.theta.size):
-        above = nmpc.solve(solution.state, solution.theta + e, solution)
-        below = nmpc.solve(solution.state, solution.theta - e, solution)
-        rows.append((read(above) - read(below)) / (2 * STEP))
-    return np.array(rows)
+def beside(nmpc, solution):
+    """Solutions on both sides in each theta, each solve started from the same plan."""
+    state, theta, steps = solution.state, solution.theta, STEP * np.eye(solution.theta.size)
+    return [[nmpc.solve(state, theta + d, solution) for d in (e, -e)] for e in steps]
+
+
+def differences(pairs, read):
+    """Central differences of `read(solution)` in theta."""
+    return np.array([(read(above) - read(below)) / (2 * STEP) for above, below in pairs])
 
 
 def active(solution):
@@ -38,7 +39,7 @@ def same_side_throughout(nmpc, solution):
 def test_features_are_the_differences_of_the_value(robot, draw):
     for state, theta in draw(10, seed=10):
         solution = robot.solve(state, theta)
-        slope = differences(robot, solution, lambda s: s.value)
+        slope = differences(beside(robot, solution), lambda s: s.value)
         scale = np.abs(slope).max()
         np.testing.assert_allclose(solution.features, slope, atol=2e-6 * scale)
 
@@ -83,7 +84,7 @@ def test_the_hessian_is_the_differences_of_the_features(fatrop, draw):
         solution = fatrop.solve(state, theta)
         if not same_side_throughout(fatrop, solution):
             continue
-        slope = differences(fatrop, solution, lambda s: s.features)
+        slope = differences(beside(fatrop, solution), lambda s: s.features)
         found = fatrop.value_hessian(solution)
         np.testing.assert_allclose(found, slope, atol=1e-5 * np.abs(slope).max())
         compared += 1
@@ -157,10 +158,11 @@ def test_the_jacobian_of_the_policy_is_its_differences(robot, draw):
         solution = robot.solve(state, theta)
         if not same_side_throughout(robot, solution):
             continue
+        pairs = beside(robot, solution)
         for stage in (0, 4):
             plan = robot.plan_jacobian(solution, stage)
             for found, part in ((plan.states, "states"), (plan.inputs, "inputs")):
-                slope = differences(robot, solution, lambda s, p=part, i=stage: getattr(s, p)[i])
+                slope = differences(pairs, lambda s, p=part, i=stage: getattr(s, p)[i])
                 size = max(1.0, np.abs(slope).max())
                 np.testing.assert_allclose(found, slope.T, atol=1e-3 * size)
         given = robot.solve(state, theta, solution, solution.action * 0.9)

@@ -1,16 +1,13 @@
 """Grades of what students hand in."""
 
-import csv
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import nbformat
 import pytest
-from click.testing import CliRunner
-from driver.course import editions
-from small_course import SMALL, small_chapter
+from small_course import edition_in, graded_in
 
-from nmpcrl.commands import main
 from nmpcrl.course.execution import Limits
 from nmpcrl.course.judge import Judge
 from nmpcrl.course.submissions import chapters, matched, notebook_of
@@ -19,34 +16,13 @@ from nmpcrl.course.submissions import chapters, matched, notebook_of
 @pytest.fixture
 def edition(tmp_path) -> Path:
     """The edition for graders of the small chapter."""
-    place, data = (tmp_path / "edition" / name for name in (f"source/{SMALL}", "data"))
-    place.mkdir(parents=True)
-    (data / "published").mkdir(parents=True)
-    (data / "of_the_chapter.txt").write_text("4")
-    nbformat.write(editions.grader(small_chapter(), set()), place / f"{SMALL}.ipynb")
-    return tmp_path / "edition"
+    return edition_in(tmp_path)
 
 
 @pytest.fixture
 def graded(tmp_path, edition):
     """By student, the rows of the CSV file by exercise."""
-
-    def grade(*words, name=SMALL, **handed):
-        for student, notebook in handed.items():
-            place = tmp_path / "in" / student / f"{name}.ipynb"
-            place.parent.mkdir(parents=True)
-            text = notebook if isinstance(notebook, str) else nbformat.writes(notebook)
-            place.write_text(text)
-        out = tmp_path / "grades.csv"
-        given = ["grade", str(tmp_path / "in"), "--out", str(out), "--edition", str(edition)]
-        called = CliRunner().invoke(main, [*given, *words])
-        assert called.exit_code == 0, called.output
-        assert "no sandbox" in called.output
-        with out.open(newline="") as file:
-            rows = list(csv.DictReader(file))
-        return {s: {r["exercise"]: r for r in rows if r["student"] == s} for s in handed}
-
-    return grade
+    return partial(graded_in, tmp_path, edition)
 
 
 @pytest.fixture

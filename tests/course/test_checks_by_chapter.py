@@ -16,6 +16,7 @@ from nmpcrl.course.checks import (
     expected_sarsa,
     ges,
     mdp_and_nmpc,
+    other_problems,
     performance,
     rdes,
     results,
@@ -27,7 +28,7 @@ from nmpcrl.study import paper
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 CALLED = re.compile(r"check\.(\w+)")
-BY_HAND = ["1.7", "2.7", "3.8", "4.8", "5.8", "6.9", "7.9", "8.8", "9.7"]
+BY_HAND = ["1.7", "2.7", "3.8", "4.8", "5.8", "6.9", "7.9", "8.8", "9.7", "10.6"]
 FEATURES = np.linspace(100.0, 1100.0, 9)
 SQUARED = float(FEATURES @ FEATURES)
 
@@ -419,6 +420,30 @@ CHECKS = {
             lambda gradient, jacobian, g, multipliers: missed(-gradient, jacobian, g, multipliers),
         ],
     ),
+    other_problems.moved: ([0.1, "0.05 * 2"], [0.4, 2, 0.05]),
+    other_problems.factor: ([1.17, "10 ** 0.07"], [0.07, 1e5, 1.07]),
+    other_problems.single: letters("c"),
+    other_problems.gain: (
+        [other_problems.riccati_step, lambda **case: [*other_problems.riccati_step(**case)]],
+        [
+            lambda **case: other_problems.riccati_step(**case | {"gamma": 1.0}),
+            lambda **case: other_problems.riccati_step(**case, sign=1.0),
+            lambda **case: other_problems.riccati_step(**case)[::-1],
+        ],
+    ),
+    other_problems.newton: (
+        [
+            other_problems.batch_step,
+            lambda **case: other_problems.batch_step(**case) + np.zeros(4),
+        ],
+        [
+            lambda **case: other_problems.batch_step(**case | {"alpha": -case["alpha"]}),
+            lambda **case: other_problems.batch_step(
+                **case | {"ridge": case["ridge"] / len(case["deltas"])}
+            ),
+            lambda **case: case["theta"],
+        ],
+    ),
     performance.ratio: (
         ["0.5 / (r - 0.5)", "-1 / (1 - 2 * r)"],
         ["2 * r - 1", "1 / r", "1 / (2 * r)"],
@@ -514,5 +539,5 @@ def test_a_numeric_exercise_says_a_precision_that_its_check_accepts_or_has_an_ex
 
 def test_every_exercise_is_tried_here_or_marked_by_hand():
     assert set(texts()) == {named(check) for check in CHECKS} | set(BY_HAND)
-    assert len(texts()) == 71
+    assert len(texts()) == 77
     assert all(len(right) >= 2 and len(wrong) >= 3 for right, wrong in CHECKS.values())

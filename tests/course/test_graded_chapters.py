@@ -8,7 +8,6 @@ import sqlite3
 import subprocess
 import sys
 import venv
-from collections.abc import Mapping
 from copy import deepcopy
 from pathlib import Path
 
@@ -34,12 +33,12 @@ where auto_score is not null"""
 pytestmark = pytest.mark.course
 
 
-def for_graders(folder: Path, name: str, runs: Mapping[str, Path], secret: bytes = b"") -> None:
-    """The edition for graders with one chapter."""
-    course.edition("grader", folder, runs, secret=secret)
+def with_one_chapter(folder: Path, name: str) -> Path:
+    """An edition for graders without its other chapters."""
     for place in (folder / "source").iterdir():
         if place.name != Path(name).stem:
             shutil.rmtree(place)
+    return folder
 
 
 def answered(notebook, every):
@@ -52,12 +51,12 @@ def answered(notebook, every):
 
 
 @pytest.mark.parametrize("name", SOURCES)
-def test_all_solutions_of_a_chapter_have_all_points(name, long_runs, tmp_path):
-    for_graders(tmp_path / "grader", name, long_runs)
+def test_all_solutions_of_a_chapter_have_all_points(name, edition_of_course, tmp_path):
+    edition = with_one_chapter(edition_of_course("grader"), name)
     student = course.EDITIONS["student"](SOURCES[name], set(SOURCES))
     (tmp_path / "in").mkdir()
     nbformat.write(answered(student, exercises(SOURCES[name])), tmp_path / "in" / name)
-    (marks,) = grade(tmp_path / "in", tmp_path / "grader", Limits(seconds=1800))
+    (marks,) = grade(tmp_path / "in", edition, Limits(seconds=1800))
     checked = [mark for mark in marks if mark.points is not None]
     assert [(mark.exercise, mark.why) for mark in checked if mark.points != mark.of] == []
     assert len(checked) == len(marks) - 1  # the project
@@ -65,7 +64,7 @@ def test_all_solutions_of_a_chapter_have_all_points(name, long_runs, tmp_path):
 
 def test_with_a_secret_its_own_solutions_have_all_points_and_published_ones_none(tmp_path):
     name, secret = f"{CHAPTER}.ipynb", b"a secret"
-    for_graders(tmp_path / "grader", name, {}, secret)
+    course.edition("grader", tmp_path / "grader", {}, secret=secret)
     other = varied(SOURCES[name], secret)
     student = course.EDITIONS["student"](other, set(SOURCES))
     for who, source in {"own": other, "published": SOURCES[name]}.items():
@@ -96,9 +95,9 @@ def nbgrader(request) -> Path:
     return python
 
 
-def test_nbgrader_gives_the_same_points(nbgrader, tmp_path):
-    name, folder = f"{CHAPTER}.ipynb", tmp_path / "grader"
-    for_graders(folder, name, {})  # this chapter needs none
+def test_nbgrader_gives_the_same_points(nbgrader, edition_of_course, tmp_path):
+    name = f"{CHAPTER}.ipynb"
+    folder = with_one_chapter(edition_of_course("grader"), name)
     called(nbgrader, folder, "generate_assignment", CHAPTER)
     released = folder / "release" / CHAPTER / name
     assert "SOLUTION" not in released.read_text()

@@ -9,7 +9,15 @@ import pytest
 from click.testing import CliRunner
 from driver.course import course, editions
 from nbformat.v4 import new_code_cell, new_markdown_cell
-from small_course import ASKED, SMALL, cell_of, small_chapter, solved_by_student
+from small_course import (
+    ASKED,
+    SMALL,
+    cell_of,
+    edition_in,
+    graded_in,
+    small_chapter,
+    solved_by_student,
+)
 
 from nmpcrl.commands import main
 from nmpcrl.commands.grade import cell
@@ -38,10 +46,96 @@ def reasons(rows) -> dict[str, str]:
     return {number: row["why"] for number, row in rows.items() if number in POINTS}
 
 
-def test_points_of_samples_and_a_sentence_for_each_loss(graded):
+def half_solved():
+    return solved_by_student(**dict.fromkeys(ASKED[3:], "pass"), two="root_of_two = 16")
+
+
+def renaming():
+    """Gives names of the chapter other meanings, and leaves its folder."""
+    other = {
+        "one": "four = sorted = None\nroot_of_one = 3",
+        "two": "import os\nos.chdir('/')\nroot_of_two = 2\nfour = 5",
+        "three": "root_of_three = int(len(open('data/of_the_chapter.txt').read()) * four ** 0.5)",
+        "four": "%reset -f\nroot_of_four = 2",
+        "five": "check = print\nroot_of_five = 2",
+        "six": "root_of_six = sorted([four])[0] ** 0.5",
+        "seven": "root_of_seven = root_of_six",
+    }
+    return solved_by_student(**other)
+
+
+def relying():
+    """Relies on names that it gave another meaning."""
+    notebook = solved_by_student(one="root_of_one = five", three="root_of_three = 3")
+    at = notebook.cells.index(cell_of(notebook, "chapter"))
+    notebook.cells.insert(at + 1, new_code_cell("five = 2; max = 2"))
+    cell_of(notebook, "six-answer").source = "root_of_six = max"
+    return notebook
+
+
+def editing_checks():
+    notebook = solved_by_student(two="root_of_two = 3")
+    one, two, three = list(exercises(notebook))[:3]
+    one.parts["check"][0].source = "1 / 0"
+    two.parts["check"][0].source = "'Right: 2.'"
+    notebook.cells.remove(three.parts["check"][0])
+    notebook.cells.append(new_code_cell("class check:\n    four = print"))
+    strict = cell_of(notebook, "setup")
+    strict.source = strict.source.replace('"1"', '""')
+    return notebook
+
+
+def silencing(line):
     untouched = editions.student(small_chapter(), set())
-    half = solved_by_student(**dict.fromkeys(ASKED[3:], "pass"), two="root_of_two = 16")
-    rows = graded(untouched=untouched, half=half, perfect=solved_by_student())
+    cell_of(untouched, "one-answer").source = f"import os\n{line}\nroot_of_one = ..."
+    return untouched
+
+
+def nearly_empty():
+    gone = solved_by_student()
+    gone.cells = [cell for cell in gone.cells if cell.id.startswith("two")]
+    return gone
+
+
+def malformed():
+    """Has cells that no editor writes."""
+    notebook = json.loads(nbformat.writes(solved_by_student()))
+    cells = {cell["id"]: cell for cell in notebook["cells"]}
+    cells["one-answer"]["source"] = "root_of_one = '\0'"
+    cells["two-answer"]["source"] = "raise ValueError(chr(0xD800))"
+    cells["three-answer"]["metadata"] = {"nbgrader": 3, "tags": {"answer": 1}}
+    cells["four-answer"]["source"] = ["root_of_four", " = 2"]
+    cells["chapter"] |= {"id": [1], "metadata": None, "cell_type": None}
+    cells["six-answer"]["source"] = LINES
+    return json.dumps(notebook)
+
+
+TEXTS = {"broken": "{", "list": "[1]", "cells": '{"cells": 3}'}  # of no notebook
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    """By student, the rows of a class whose notebooks are graded in one call."""
+    place = tmp_path_factory.mktemp("class")
+    return graded_in(
+        place,
+        edition_in(place),
+        untouched=editions.student(small_chapter(), set()),
+        half=half_solved(),
+        perfect=solved_by_student(),
+        renaming=renaming(),
+        relying=relying(),
+        editing=editing_checks(),
+        popping=silencing('os.environ.pop("NMPCRL_STRICT", None)'),
+        clearing=silencing("os.environ.clear()"),
+        gone=nearly_empty(),
+        malformed=malformed(),
+        long=solved_by_student(one='raise ValueError("much" * 100_000)'),
+        **TEXTS,
+    )
+
+
+def test_points_of_samples_and_a_sentence_for_each_loss(rows):
     assert points(rows["untouched"]) == expected(*POINTS)
     assert points(rows["half"]) == expected("1.2", "1.4", "1.5", "1.6", "1.7")
     assert points(rows["perfect"]) == expected()
@@ -74,70 +168,39 @@ def test_an_answer_that_hangs_ends_the_process_or_takes_memory_costs_its_own_poi
     assert "SystemExit" in said["1.6"]
 
 
-def test_other_meanings_of_names_and_a_folder_left_cost_no_points_elsewhere(graded):
-    other = {
-        "one": "four = sorted = None\nroot_of_one = 3",
-        "two": "import os\nos.chdir('/')\nroot_of_two = 2\nfour = 5",
-        "three": "root_of_three = int(len(open('data/of_the_chapter.txt').read()) * four ** 0.5)",
-        "four": "%reset -f\nroot_of_four = 2",
-        "five": "check = print\nroot_of_five = 2",
-        "six": "root_of_six = sorted([four])[0] ** 0.5",
-        "seven": "root_of_seven = root_of_six",
-    }
-    assert points(graded(one=solved_by_student(**other))["one"]) == expected("1.1")
+def test_other_meanings_of_names_and_a_folder_left_cost_no_points_elsewhere(rows):
+    assert points(rows["renaming"]) == expected("1.1")
 
 
-def test_what_a_student_gave_another_meaning_keeps_it_where_an_answer_relies_on_it(graded):
-    notebook = solved_by_student(one="root_of_one = five", three="root_of_three = 3")
-    at = notebook.cells.index(cell_of(notebook, "chapter"))
-    notebook.cells.insert(at + 1, new_code_cell("five = 2; max = 2"))
-    cell_of(notebook, "six-answer").source = "root_of_six = max"
-    assert points(graded(one=notebook)["one"]) == expected("1.3")
+def test_what_a_student_gave_another_meaning_keeps_it_where_an_answer_relies_on_it(rows):
+    assert points(rows["relying"]) == expected("1.3")
 
 
-def test_checks_that_are_edited_or_deleted_do_not_count(graded):
-    notebook = solved_by_student(two="root_of_two = 3")
-    one, two, three = list(exercises(notebook))[:3]
-    one.parts["check"][0].source = "1 / 0"
-    two.parts["check"][0].source = "'Right: 2.'"
-    notebook.cells.remove(three.parts["check"][0])
-    notebook.cells.append(new_code_cell("class check:\n    four = print"))
-    strict = cell_of(notebook, "setup")
-    strict.source = strict.source.replace('"1"', '""')
-    assert points(graded(one=notebook)["one"]) == expected("1.2")
+def test_checks_that_are_edited_or_deleted_do_not_count(rows):
+    assert points(rows["editing"]) == expected("1.2")
 
 
-@pytest.mark.parametrize("line", ['os.environ.pop("NMPCRL_STRICT", None)', "os.environ.clear()"])
-def test_an_answer_that_silences_its_checks_gets_no_points_for_that(line, graded):
-    untouched = editions.student(small_chapter(), set())
-    cell_of(untouched, "one-answer").source = f"import os\n{line}\nroot_of_one = ..."
-    assert points(graded(one=untouched)["one"]) == expected(*POINTS)
+@pytest.mark.parametrize("student", ["popping", "clearing"])
+def test_an_answer_that_silences_its_checks_gets_no_points_for_that(student, rows):
+    assert points(rows[student]) == expected(*POINTS)
 
 
-def test_cells_that_are_gone_and_files_that_are_no_notebook_are_rows_with_a_sentence(graded):
-    gone = solved_by_student()
-    gone.cells = [cell for cell in gone.cells if cell.id.startswith("two")]
-    texts = {"broken": "{", "list": "[1]", "cells": '{"cells": 3}'}
-    rows = graded(gone=gone, **texts)
+def test_cells_that_are_gone_and_files_that_are_no_notebook_are_rows_with_a_sentence(rows):
     assert points(rows["gone"]) == expected(*(set(POINTS) - {"1.2"}))
     assert rows["gone"]["1.1"]["why"] == "The answer cell is missing."
-    for name in texts:
+    for name in TEXTS:
         assert points(rows[name]) == expected(*POINTS)
         assert rows[name]["1.1"]["why"] == "The file is no notebook."
 
 
-def test_cells_that_no_editor_writes_cost_no_more_than_their_points(graded):
-    notebook = json.loads(nbformat.writes(solved_by_student()))
-    cells = {cell["id"]: cell for cell in notebook["cells"]}
-    cells["one-answer"]["source"] = "root_of_one = '\0'"
-    cells["two-answer"]["source"] = "raise ValueError(chr(0xD800))"
-    cells["three-answer"]["metadata"] = {"nbgrader": 3, "tags": {"answer": 1}}
-    cells["four-answer"]["source"] = ["root_of_four", " = 2"]
-    cells["chapter"] |= {"id": [1], "metadata": None, "cell_type": None}
-    cells["six-answer"]["source"] = LINES
-    rows = graded(one=json.dumps(notebook))["one"]
-    assert points(rows) == expected("1.1", "1.2", "1.6")  # the last writes where it should not
-    assert rows["1.2"]["why"] == "The answer fails with ValueError: ?"
+def test_cells_that_no_editor_writes_cost_no_more_than_their_points(rows):
+    lost = rows["malformed"]
+    assert points(lost) == expected("1.1", "1.2", "1.6")  # the last writes where it should not
+    assert lost["1.2"]["why"] == "The answer fails with ValueError: ?"
+
+
+def test_a_long_message_does_not_fill_the_table(rows):
+    assert len(rows["long"]["1.1"]["why"]) < 2000
 
 
 def test_a_notebook_whose_name_is_that_of_no_chapter_is_a_row_with_a_sentence(graded):
@@ -215,12 +278,6 @@ def test_copies_and_files_that_windows_wrote_are_graded(tmp_path, edition):
     assert [marks[0].student for marks in found] == ["anna", "ben"]
     for marks in found:
         assert {mark.points == mark.of for mark in marks if mark.points is not None} == {True}
-
-
-def test_a_long_message_does_not_fill_the_table(graded):
-    long = 'raise ValueError("much" * 100_000)'
-    rows = graded(one=solved_by_student(one=long))
-    assert len(rows["one"]["1.1"]["why"]) < 2000
 
 
 BESIDE = """from math import comb

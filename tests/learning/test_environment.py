@@ -1,5 +1,7 @@
 """The environment need not be what plans: other plants, costs, starts and ends."""
 
+from itertools import pairwise
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -118,3 +120,80 @@ def test_a_plant_of_another_size_is_refused(robot):
     plant = Plant(lambda s, a: [a, a, a], ("a", "b", "c"), ("u",), [-1], [1])
     with pytest.raises(ValueError, match=r"the plant has 3 states and 1 inputs, and the plan 3"):
         evaluate(robot, THETA, 1, plant=plant)
+
+
+def test_a_state_in_which_only_time_ends_an_episode_keeps_its_worth(tank):
+    def cut(state, action, rng):
+        later, cost, _ = filling(state, action, rng)
+        return later, cost, False, later[0] > 0.3
+
+    weights = Weights(tank.problem.theta, np.zeros(1))
+    noisy = noise(1, 60, 1)
+    steps = list(train(expected_sarsa(tank, 1e-3), tank, weights, noisy, plant=cut, start=[0.0]))
+    last = steps[-1]
+    assert len(steps) < 60
+    assert (last.end, last.last) == (False, True)
+    assert last.update.successor.value > 0
+    assert last.update.delta == pytest.approx(
+        last.cost + 0.9 * last.update.successor.value - last.solution.value
+    )
+    assert len(evaluate(tank, tank.problem.theta, 60, plant=cut, start=[0.0]).costs) < 60
+
+
+@pytest.fixture(scope="module")
+def shop() -> Nmpc:
+    """Storage of which each unit that is bought costs the price of its time."""
+    problem = Problem(
+        states=1,
+        inputs=1,
+        horizon=3,
+        gamma=0.9,
+        theta={"wear": 0.1},
+        model=lambda x, u, th, d: 0.8 * x + u,
+        stage=lambda x, u, th, d: ca.sumsqr(x - 1) + d["price"] * u + th["wear"] * ca.sumsqr(u),
+        lower=0,
+        upper=1,
+        data={"price": 0.0},
+    )
+    return Nmpc(problem, solver=Ipopt())
+
+
+PRICES = np.array([0.1, 2.0, 0.5, 0.1, 3.0])
+
+
+def selling(state, action, rng):
+    return 0.8 * state + action, float(action[0]), False
+
+
+def test_a_plan_sees_the_data_of_its_stages(shop):
+    theta = shop.problem.theta
+    rollout = evaluate(shop, theta, 4, plant=selling, start=[0.2], data={"price": PRICES})
+    windows = [PRICES[[0, 1, 2, 3]], PRICES[1:], PRICES[[2, 3, 4, 4]], PRICES[[3, 4, 4, 4]]]
+    for state, action, prices in zip(rollout.states, rollout.actions, windows, strict=True):
+        np.testing.assert_allclose(
+            action, shop.solve(state, theta, data={"price": prices}).action, atol=1e-6
+        )
+    same = evaluate(
+        shop, theta, 4, plant=selling, start=[0.2],
+        data=lambda t: {"price": windows[t] if t < 4 else 0.0},
+    )  # fmt: skip
+    np.testing.assert_array_equal(rollout.actions, same.actions)
+
+
+@pytest.mark.parametrize("constrained", [False, True])
+def test_the_next_state_is_valued_with_the_data_of_the_next_time(shop, constrained):
+    weights, es = Weights(shop.problem.theta, np.zeros(1)), expected_sarsa(shop, 1e-3)
+    options = {"plant": selling, "start": [0.2], "data": {"price": PRICES}}
+    steps = list(train(es, shop, weights, noise(2, 3, 1), constrained=constrained, **options))
+    for step, later in pairwise(steps):
+        if not step.last:
+            np.testing.assert_array_equal(
+                step.update.successor.solution.data[:, 0],
+                later.plan.data[:, 0],
+            )
+        assert step.solution.data[0, 0] == PRICES[step.time]
+
+
+def test_data_without_time_are_refused(shop):
+    with pytest.raises(ValueError, match="data 'price' must be an array with an axis of time"):
+        evaluate(shop, shop.problem.theta, 2, plant=selling, start=[0.2], data={"price": 1.0})

@@ -1,6 +1,7 @@
 """Algorithm 1 as a generator, what a failed solve means, and the rollout without noise."""
 
 import dataclasses
+import re
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
-from nmpcrl.learning import Weights, expected_sarsa, frozen
+from nmpcrl.learning import Weights, expected_sarsa, frozen, q_learning
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import (
     PATIENCE,
@@ -121,6 +122,27 @@ def test_where_actions_are_valued_the_solution_has_the_applied_action_first(soun
 
 def test_where_states_are_valued_the_solution_is_the_plan(sound):
     assert all(step.solution is step.plan for step in training(sound, noisy(1, 5), es))
+
+
+def test_a_learner_of_action_values_gets_them_unless_told_otherwise(sound):
+    learner = q_learning(sound, paper.ALPHA)
+    for told, valued in (({}, True), ({"constrained": False}, False)):
+        for step in train(learner, sound, first_weights(), noisy(1, 3), **told):
+            assert (step.solution is not step.plan) == valued
+
+
+@pytest.mark.parametrize(
+    ("noise", "scale"), [((2, 5), (2, 5)), ((2, 5, 2), (2,)), ((2, 5, 2), (2, 4))]
+)
+def test_noise_of_another_shape_is_refused_with_it(noise, scale):
+    with pytest.raises(ValueError, match=rf"{re.escape(str(noise))}.* \(episodes, steps, inputs\)"):
+        Exploration(np.zeros(noise), np.ones(scale))
+
+
+def test_noise_for_another_number_of_inputs_is_refused(sound):
+    explore = Exploration(np.zeros((1, 3, 1)), np.ones((1, 3)))
+    with pytest.raises(ValueError, match="1 numbers a step; the NMPC has 2 inputs"):
+        next(train(frozen(sound), sound, first_weights(), explore))
 
 
 def test_weights_go_from_step_to_step_and_from_episode_to_episode(sound):

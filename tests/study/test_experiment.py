@@ -422,10 +422,10 @@ def test_evaluations_do_not_count_as_training_time(monkeypatch):
     """A clock that only runs while a policy is evaluated."""
     now = 0.0
 
-    def slowly(*arguments):
+    def slowly(*arguments, **options):
         nonlocal now
         now += 1000.0
-        return evaluate(*arguments)
+        return evaluate(*arguments, **options)
 
     evaluate = RUN.evaluate
     monkeypatch.setattr(RUN, "evaluate", slowly)

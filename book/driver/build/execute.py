@@ -34,9 +34,10 @@ KERNEL = {  # the environment of what executes a chapter
 }
 
 
-def size(job: tuple[Path, Given]) -> int:
-    """Bytes of a notebook: the larger ones take longer, and are begun first."""
-    return job[0].stat().st_size
+def weight(job: tuple[Path, Given]) -> tuple[bool, int]:
+    """What compiles a plant or problem of its own is begun first, and then the largest in bytes."""
+    text = job[0].read_bytes()
+    return any(word in text for word in (b"Plant(", b"Problem(", b"study.problems")), len(text)
 
 
 def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
@@ -54,7 +55,7 @@ def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
             pool.submit(
                 execute, notebook, executed / notebook.name, logs / f"{notebook.stem}.log", given
             ): notebook
-            for notebook, given in sorted(jobs.items(), key=size, reverse=True)
+            for notebook, given in sorted(jobs.items(), key=weight, reverse=True)
             if notebook not in kept
         }
         bar = tqdm(as_completed(running), "chapters", len(running), leave=False, disable=None)

@@ -23,7 +23,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -53,11 +53,13 @@ def chapters() -> dict[str, Any]:
     return {name: notebook for name, notebook in read.items() if any(exercises(notebook))}
 
 
-def wheel(place: Path, *, withheld: bool = False) -> Path:
-    """The library as a wheel at `place`, without a network, the same bytes every time.
+@cache
+def wheel(*, withheld: bool = False) -> tuple[str, bytes]:
+    """The name and the bytes of the library as a wheel, built without a network.
+
+    They are the same in every process, and built once in each.
 
     Args:
-        place: a folder.
         withheld: without the checks of exercises whose numbers may be others.
     """
     with tempfile.TemporaryDirectory() as folder:
@@ -68,10 +70,10 @@ def wheel(place: Path, *, withheld: bool = False) -> Path:
             path.write_text(variants.without(path.read_text("utf-8")), "utf-8")
         for name in PACKAGED:
             shutil.copy2(ROOT / name, source)
-        command = [sys.executable, "-m", "pip", "wheel", *WHEEL, "-w", str(place), str(source)]
+        command = [sys.executable, "-m", "pip", "wheel", *WHEEL, "-w", folder, str(source)]
         subprocess.run(command, check=True, env=os.environ | {"SOURCE_DATE_EPOCH": SINCE_1980})
-    (made,) = place.glob("*.whl")
-    return made
+        (made,) = Path(folder).glob("*.whl")
+        return made.name, made.read_bytes()
 
 
 def edition(
@@ -88,7 +90,8 @@ def edition(
     """
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
-    library = wheel(place, withheld=bool(secret) and name == "student").name
+    library, content = wheel(withheld=bool(secret) and name == "student")
+    (place / library).write_bytes(content)
     sources = chapters()
     make = partial(EDITIONS[name], otter=True) if otter else EDITIONS[name]
     assignments = name == "grader" and not otter

@@ -11,8 +11,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from nmpcrl.report.live import published_runs
-
 INLINE = re.compile(
     r'<(?P<kind>script|style) data-file="(?P<name>[\w.]+)">\n(?P<text>.*?)\n</(?P=kind)>',
     flags=re.S,
@@ -51,6 +49,8 @@ def share(notebook: Any, page: Path, folder: Path) -> None:
 def add_runs(notebooks: Iterable[Any], folder: Path) -> None:
     """Write the files with all published runs if one of the notebooks has a figure that asks."""
     if any(ASKS in html for notebook in notebooks for html in shown(notebook)):
+        from nmpcrl.report.live import published_runs  # with pandas and scipy, which take seconds
+
         for name, text in published_runs.scripts().items():
             (folder / name).write_text(text, "utf-8")
 

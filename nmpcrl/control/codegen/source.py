@@ -119,6 +119,11 @@ def _line(function: ca.Function, k: int, returned: bool, matrices: Collection[st
         entry = _entry(function.sparsity_out(into[0]), into[1], matrix=name in matrices)
         return f"{name}_[{entry}] = w{of[0]}"
     template = UNARY.get(operation) or BINARY.get(operation)
+    if operation == ca.OP_CALL:
+        raise CannotCompile(
+            f"{function.name()} calls a function that is not written in SX; for a table, as of"
+            " ca.interpolant, write lookup(points, values, x)"
+        )
     if template is None:
         raise CannotCompile(
             f"{function.name()} holds CasADi's {_name(operation)}, which is not known here"

@@ -13,8 +13,8 @@ from numba import carray, float64, int32, njit, types
 from .charge import COLD_LIMIT, DISCS, LONGEST, RANDOM_INPUTS, WARM_LIMIT, charge
 from .codes import End, Start
 from .hessian_times import hessian_times
-from .kernel import options
 from .model import NTHETA, NU, NX, transition
+from .points import carried, equal, lengths
 from .solve import solve
 
 COLD, SHIFTED, NEAR, SAME = map(int, Start)
@@ -30,38 +30,6 @@ PROBLEM = (
     float64, int32, float64,  # slack_weight, soft_box, tie
     address, address, address, int32,  # state (NX,), theta (NTHETA,), action (NU,), fixed
 )  # fmt: skip
-plain = njit(**options)
-
-
-@plain
-def lengths(N, M, fixed):
-    """Of z and of lam."""
-    return (N + 1) * (NX + M) + N * NU, (N + 1) * (NX + M) + fixed * NU
-
-
-@plain
-def carried(N, M, fixed, old_fixed, old):
-    """The numbers of a solution as those of the same problem with u_0 fixed or free instead."""
-    z, lam = lengths(N, M, fixed)
-    _, old_lam = lengths(N, M, old_fixed)
-    new = np.zeros(2 * z + lam)
-    for k in range(z):
-        new[k] = old[k]
-        new[z + lam + k] = old[z + old_lam + k]
-    for k in range(lam):  # the rows of a given u_0 follow those of x_0
-        beyond = k >= 2 * NX
-        if k < 2 * NX or k >= 2 * NX + fixed * NU:
-            new[z + k] = old[z + k + ((old_fixed - fixed) * NU if beyond else 0)]
-    return new
-
-
-@plain
-def equal(x, y):
-    """Whether two vectors are the same, number by number."""
-    for k in range(len(x)):  # noqa: SIM110  numba compiles no generators
-        if x[k] != y[k]:
-            return False
-    return True
 
 
 @njit(int32(*PROBLEM, int32, address, float64, address, address), error_model="numpy")

@@ -9,11 +9,12 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.ocp import Ocp
+from nmpcrl.control.diagnosis import FARTHEST
+from nmpcrl.control.ocp import Ocp, ProblemOcp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers.codes import Start
-from nmpcrl.control.solvers.solver import FARTHEST, LED_ASTRAY, Solver
+from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
 
 PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
 
@@ -104,6 +105,7 @@ class Program:
         self._solvers = {
             start: _function(ocp, solver, options) for start, options in solver.starts.items()
         }
+        self._at_start = _start_of(ocp) if isinstance(ocp, ProblemOcp) else None
         self._bounds = {
             "lbx": ca.DM(ocp.lower),
             "ubx": ca.DM(ocp.upper),
@@ -128,6 +130,10 @@ class Program:
             same = np.array_equal(warm_start.state, state)
             start = Start.SAME if same else Start.SHIFTED
             z, lam, nu = self._from(warm_start, state, same=same)
+        if self._at_start is not None and not np.isfinite(self._at_start(z, p).full()).all():
+            raise SolverError(
+                f"{self._name} cannot begin where a number is not finite", state, theta
+            )
         solver = self._solvers[start]
         result = solver(p=p, x0=z, lam_g0=lam, lam_x0=nu, **self._bounds)
         stats = solver.stats()
@@ -199,6 +205,14 @@ class Program:
         inside = beyond > self._ocp.tie
         lam[self._ocp.obstacles[0][which]] = np.where(inside, weights, 0.0)
         nu[self._ocp.slacks[0][which]] = np.where(inside, 0.0, -weights)
+
+
+def _start_of(ocp: Ocp) -> ca.Function:
+    """What must be finite, or fatrop never returns: objective, its slope, and constraints."""
+    z, f = ocp.variables, ocp.objective
+    return ca.Function(
+        "start", [z, ocp.parameters], [ca.veccat(f, ca.gradient(f, z), ocp.constraints)]
+    )
 
 
 def _function(ocp: Ocp, solver: Nlpsol, start: dict[str, Any]) -> ca.Function:

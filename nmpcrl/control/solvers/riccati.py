@@ -18,12 +18,17 @@ from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers import problem_stages
 from nmpcrl.control.solvers.codes import End, Start
-from nmpcrl.control.solvers.solver import LED_ASTRAY, TOLERANCE, Solver
+from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
 from nmpcrl.control.solvers.stages import write
+from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
+from nmpcrl.control.vectors import whole
 
 WARM_LIMIT = 40  # iterations from a warm start
 COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
+SEVERAL = 9  # cold starts of a `Problem` with rows
+CLEARLY = 1e-6  # a plan is better if its value is less by this share
+LEAVES = 1e-9  # and it leaves the box by no more than this
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
 PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
 COLD, SHIFTED, NEAR, SAME = map(int, Start)  # plain numbers, as machine code takes them
@@ -60,6 +65,15 @@ class TaskArguments(NamedTuple):
 
 
 Attempt = tuple[int, Vector, int]  # which `Start`, with which (z, lam, nu), iterations allowed
+
+
+class Found(NamedTuple):
+    """What one start led to."""
+
+    value: float
+    iterations: float
+    violation: float
+    point: Vector  # z, lam and nu, and then the gradient
 
 
 class Code(NamedTuple):
@@ -121,12 +135,6 @@ def _loaded(
     return [getattr(module, name) for name in entries]
 
 
-def random_inputs(of: Plant | Problem, seed: int, horizon: int) -> Matrix:
-    """Where a start begins that nothing else is known for, shape (horizon, m)."""
-    lower, upper = np.maximum(of.lower, -1.0), np.minimum(of.upper, 1.0)
-    return np.random.default_rng(seed).uniform(lower, upper, (horizon, lower.size))
-
-
 @dataclass(frozen=True)
 class Riccati(Solver):
     """The interior point of `kernel`, compiled for a plant at its first solve."""
@@ -135,6 +143,20 @@ class Riccati(Solver):
     prices_box: ClassVar[bool] = True
 
     code: Callable[[Plant], Code] = field(default=machine_code, repr=False)
+    starts: int | None = None  # cold ones, of which the best plan counts; see `starts_of`
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.starts is not None and whole("starts", self.starts) > MOST:
+            raise ValueError(f"starts = {self.starts} must be at most {MOST}")
+
+    def starts_of(self, ocp: Ocp) -> int:
+        """How many cold starts are compared: 1 for a task, as published, 9 for a `Problem`.
+
+        Where a problem has no rows, and for a solve with a warm start, it is 1 as well.
+        """
+        several = isinstance(ocp, ProblemOcp) and ocp.problem.weights.size > 0
+        return self.starts or (SEVERAL if several else 1)
 
     def prepare(self, ocp: Ocp) -> "Compiled":
         """Load the machine code, or compile it.
@@ -143,9 +165,12 @@ class Riccati(Solver):
             CannotCompile: numba is missing, or the plant holds an operation that is not known.
         """
         if isinstance(ocp, ProblemOcp):
-            return ProblemPoint(ocp, problem_code(ocp.problem), self.tolerance)
+            return ProblemPoint(ocp, problem_code(ocp.problem), self)
         assert isinstance(ocp, TaskOcp)
-        return InteriorPoint(ocp, self.code(ocp.plant), self.tolerance)
+        return InteriorPoint(ocp, self.code(ocp.plant), self)
+
+
+DEFAULT = Riccati()
 
 
 class Compiled(ABC):
@@ -153,7 +178,7 @@ class Compiled(ABC):
 
     problem: Any  # the first arguments of the code, a tuple; u_0 free or fixed
 
-    def __init__(self, ocp: Ocp, of: Plant | Problem, solve: Any, tolerance: float) -> None:
+    def __init__(self, ocp: Ocp, of: Plant | Problem, solve: Any, solver: Riccati) -> None:
         self._ocp, self._of = ocp, of
         self._code = solve
         self._fixed = int(ocp.fixed_action.size > 0)
@@ -162,7 +187,8 @@ class Compiled(ABC):
         self._size = self._split + ocp.theta.numel()
         self._no_action = np.zeros(of.lower.size)
         self._bounds = np.maximum(of.lower, -UNBOUNDED), np.minimum(of.upper, UNBOUNDED)
-        self._tolerance = tolerance
+        self._tolerance = solver.tolerance
+        self._others = cold_inputs(of, len(ocp.inputs), solver.starts_of(ocp) - 1)
 
     def solve(
         self,
@@ -183,6 +209,11 @@ class Compiled(ABC):
                 *problem, state, theta, given, fixed, start, limit, tolerance, point, out
             )
             if end == SOLVED and value < ABSURD:
+                if warm_start is None and self._others:
+                    first = Found(value, iterations, violation, out)
+                    value, iterations, violation, out = self._best(
+                        first, problem, state, theta, given
+                    )
                 return Solution(
                     state,
                     theta,
@@ -204,6 +235,20 @@ class Compiled(ABC):
             state,
             theta,
         )
+
+    def _best(self, first: Found, problem: tuple[Any, ...], *given: Vector) -> Found:
+        """The best plan of all cold starts; the earlier one where they are as good."""
+        best = first
+        for inputs in self._others:
+            out, point = np.empty(self._size), self._standing.copy()
+            point[self._ocp.inputs] = inputs
+            value, iterations, end, violation, _ = self._code(
+                *problem, *given, self._fixed, COLD, COLD_LIMIT, self._tolerance, point, out
+            )
+            less = value < best.value - CLEARLY * abs(best.value)
+            if end == SOLVED and less and violation <= best.violation + LEAVES:
+                best = Found(value, iterations, violation, out)
+        return best
 
     def _given(self, solution: Solution) -> tuple[Any, ...]:
         """The arguments of a derivative at a solution."""
@@ -249,8 +294,8 @@ class Compiled(ABC):
 class InteriorPoint(Compiled):
     """Eq. (2) of the paper."""
 
-    def __init__(self, ocp: TaskOcp, code: Code, tolerance: float = TOLERANCE) -> None:
-        super().__init__(ocp, ocp.plant, code.solve, tolerance)
+    def __init__(self, ocp: TaskOcp, code: Code, solver: Riccati = DEFAULT) -> None:
+        super().__init__(ocp, ocp.plant, code.solve, solver)
         self._hessian_times = code.hessian_times
         self._plant, task = ocp.plant, ocp.task
         sides = [
@@ -285,10 +330,10 @@ class InteriorPoint(Compiled):
 class ProblemPoint(Compiled):
     """A `Problem`."""
 
-    def __init__(self, ocp: ProblemOcp, solve: Any, tolerance: float = TOLERANCE) -> None:
+    def __init__(self, ocp: ProblemOcp, solve: Any, solver: Riccati = DEFAULT) -> None:
         problem = ocp.problem
-        super().__init__(ocp, problem, solve, tolerance)
-        self._problem, self._tolerance = problem, tolerance
+        super().__init__(ocp, problem, solve, solver)
+        self._problem = problem
         kind = problem.active.astype(np.int64)  # 1 where a plan can change a row, as `rows` says
         kind[0] *= np.where(ocp.settled_rows, 2, 1)
         self.problem = (
@@ -297,7 +342,7 @@ class ProblemPoint(Compiled):
             kind,
             ocp.gamma ** np.arange(len(ocp.states), dtype=float),
             problem.weights.copy(),
-            problem.scale,
+            problem.cost_scale,
             ocp.tie,
         )
 

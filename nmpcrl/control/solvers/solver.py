@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control.diagnosis import SUBSTEPS
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.solution import Solution
 from nmpcrl.control.task import Task
 
 TOLERANCE = 1e-8  # what is taken where none is said
-FARTHEST = 1e9  # no plan goes through such a state
-LED_ASTRAY = "led through numbers that are absurd: is the period too long for the dynamics?"
+LED_ASTRAY = f"led through numbers that are absurd: {SUBSTEPS}"
 LEAST_TOLERANCE, LARGEST_TOLERANCE = 1e-12, 1e-2
 
 

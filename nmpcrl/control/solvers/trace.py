@@ -8,18 +8,29 @@ from collections.abc import Callable
 from types import FunctionType, ModuleType
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pandas as pd
 
-from nmpcrl import Vector
-from nmpcrl.control.ocp import TaskOcp
+from nmpcrl import Matrix, Vector
+from nmpcrl.control.ocp import ProblemOcp, TaskOcp
 from nmpcrl.control.plant import Plant
+from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution
 from nmpcrl.control.solvers.codes import End
-from nmpcrl.control.solvers.riccati import Code, InteriorPoint, machine_code
+from nmpcrl.control.solvers.riccati import (
+    Code,
+    Compiled,
+    InteriorPoint,
+    ProblemPoint,
+    Riccati,
+    machine_code,
+    problem_code,
+)
+from nmpcrl.control.units import units_of
 
 
-def interpreted(plant: Plant) -> ModuleType:
+def interpreted(of: Plant | Problem) -> ModuleType:
     """The solver's functions, and those of its model, as plain Python.
 
     Replace one of them, `plain.factorise = mine`, and the others call yours.
@@ -29,8 +40,9 @@ def interpreted(plant: Plant) -> ModuleType:
     """
     plain = ModuleType("riccati")
     names = vars(plain)
-    solve = machine_code(plant).solve.py_func
-    names.update(solve.__globals__["iterate"].py_func.__globals__)
+    solve = (problem_code(of) if isinstance(of, Problem) else machine_code(of).solve).py_func
+    for one in ("iterate", "evaluate"):  # of the kernel, and of a problem's rows
+        names.update(solve.__globals__[one].py_func.__globals__)
     names.update(solve.__globals__)
     for name, found in list(names.items()):
         if hasattr(found, "py_func"):
@@ -39,57 +51,82 @@ def interpreted(plant: Plant) -> ModuleType:
 
 
 def trace(
-    ocp: TaskOcp,
+    ocp: TaskOcp | ProblemOcp,
     state: Vector,
     theta: Vector,
     warm_start: Solution | None = None,
     *,
     curvature: bool = True,
+    data: Matrix | None = None,
 ) -> pd.DataFrame:
     """Every iterate of V_theta(s)'s first start, from the start to the answer.
 
     Args:
         ocp: with u_0 free, as `Nmpc.ocp` is.
         state: as in `Nmpc.solve`, as the next two.
-        theta: shape (2n + m + 1,).
+        theta: shape (2n + m + 1,), or that of a problem's theta.
         warm_start: an earlier solution to start from.
         curvature: False drops from the Hessian how dynamics and obstacles bend (Gauss-Newton).
+        data: of a problem, as `Problem.stage_data` gives them; its own if absent.
 
     Returns:
         A row an iterate. Columns: error (of the KKT conditions, as the solver judges it), mu
         (barrier parameter), value (of the plan, slacks included), delta (what every Q_uu got on top
         in the step from here; nan in the last row).
     """
-    plain = interpreted(ocp.plant)
+    units = units_of(ocp)
+    if units is not None:
+        ocp, state = units.ocp, state / units.states
+        warm_start = None if warm_start is None else units.inside(warm_start)
+    of = ocp.plant if isinstance(ocp, TaskOcp) else ocp.problem
+    plain = interpreted(of)
     rows: list[dict[str, float]] = []
-    factor = [1.0]
+    factor = [of.cost_scale if isinstance(of, Problem) else 1.0]
 
     def judged(norms: Any, task: Any, point: Any, _duals: Any, _stages: Any, mu: float) -> None:
         stationarity, complementarity, largest = norms
         objective, _ = plain.evaluate(task, point, mu)
-        obstacles = len(task.discs)
-        slacks = task.weights[:, :obstacles] * np.maximum(0, point.h[:, :obstacles])
+        priced = plain.slacks_of(task)
+        slacks = task.weights[:, :priced] * np.maximum(0, point.h[:, :priced])
         error, value = max(stationarity / largest, complementarity, mu), objective + slacks.sum()
         rows.append({"error": error, "mu": mu, "value": value, "delta": np.nan})
 
     def factorised(_done: bool, _stages: Any, delta: float, *_: Any) -> None:
         rows[-1]["delta"] = delta
 
-    _watch(plain, "scaled", lambda result, *_: factor.append(result[1]))
+    if isinstance(ocp, TaskOcp):
+        _watch(plain, "scaled", lambda result, *_: factor.append(result[1]))
     _watch(plain, "residuals", judged)
     _watch(plain, "factorise", factorised)
     if not curvature:
-        _straighten(plain)
-    code = Code(
-        lambda *arguments: (*plain.solve(*arguments)[:2], End.SOLVED, 0.0, 0.0),
-        machine_code(ocp.plant).hessian_times,
-    )
+        _straighten(plain, of)
     with np.errstate(all="ignore"):
-        InteriorPoint(ocp, code).solve(state, theta, warm_start, began=0.0)
-    at_state = np.maximum(0, ocp.task.overlap(state) + theta[-1]).sum()
+        _point(ocp, plain).solve(state, theta, warm_start, began=0.0, data=data)
     iterates = pd.DataFrame(rows).rename_axis("iteration").astype(float)
-    iterates["value"] = factor[-1] * iterates["value"] + ocp.slack_weight * at_state
+    iterates["value"] = factor[-1] * iterates["value"] + _settled(ocp, state, theta, data)
     return iterates
+
+
+def _point(ocp: TaskOcp | ProblemOcp, plain: ModuleType) -> Compiled:
+    """The OCP with plain Python for its machine code, and its first start taken as it ends."""
+
+    def solve(*arguments: Any) -> tuple[Any, ...]:
+        return (*plain.solve(*arguments)[:2], End.SOLVED, 0.0, 0.0)
+
+    if isinstance(ocp, ProblemOcp):
+        return ProblemPoint(ocp, solve, Riccati(starts=1))
+    return InteriorPoint(ocp, Code(solve, machine_code(ocp.plant).hessian_times))
+
+
+def _settled(ocp: TaskOcp | ProblemOcp, state: Vector, theta: Vector, data: Matrix | None) -> float:
+    """What the value has of the state alone."""
+    if isinstance(ocp, TaskOcp):
+        beyond = np.maximum(0, ocp.task.overlap(state) + theta[-1]).sum()
+        return float(ocp.slack_weight * beyond)
+    e, known = ocp.problem.expressions, ocp.problem.data if data is None else data
+    initial = ca.Function("initial", [e.x, e.theta, e.d], [e.initial])(state, theta, known[0])
+    which, rows = ocp.settled(np.concatenate([state, theta, known.ravel()]))
+    return float(initial) + float(ocp.slack_weights[which] @ np.maximum(0, rows))
 
 
 def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
@@ -104,8 +141,14 @@ def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
     setattr(plain, name, watched)
 
 
-def _straighten(plain: ModuleType) -> None:
-    """Differentiate as if dynamics and obstacles were straight lines."""
+def _straighten(plain: ModuleType, of: Plant | Problem) -> None:
+    """Differentiate as if dynamics, obstacles and rows were straight lines."""
+    if isinstance(of, Problem):
+        vars(plain).update(
+            expand_stage=_without(plain.expand_stage, 5, 6),  # costate and lam
+            expand_last=_without(plain.expand_last, 4),
+        )
+        return
     expand, expand_path = plain.expand_stage, plain.expand_constraint
 
     def without_costate(*arguments: Any) -> None:
@@ -117,3 +160,12 @@ def _straighten(plain: ModuleType) -> None:
         hxx[:] = 0.0
 
     vars(plain).update(expand_stage=without_costate, expand_constraint=without_hessian)
+
+
+def _without(function: Callable[..., None], *places: int) -> Callable[..., None]:
+    """The function with zeros for some of its arguments."""
+
+    def called(*arguments: Any) -> None:
+        function(*(np.zeros_like(a) if k in places else a for k, a in enumerate(arguments)))
+
+    return called

@@ -72,6 +72,24 @@ def sheet() -> Sheet:
     return _open.get() or WIDE
 
 
+class TooHeavy(Exception):
+    """A file has too many bytes."""
+
+
+class Limited(BytesIO):
+    """A file that takes no more than so many bytes."""
+
+    def __init__(self, most: float) -> None:
+        super().__init__()
+        self._most = most
+
+    def write(self, data: Any) -> int:
+        written = super().write(data)
+        if self.tell() >= self._most:
+            raise TooHeavy
+        return written
+
+
 class Drawn(Figure):
     """A figure that can be drawn once more on another sheet, and shows itself."""
 
@@ -87,17 +105,23 @@ class Drawn(Figure):
             titles = [axes.get_title(loc="left") for axes in self.axes]
         return in_words("; ".join(filter(None, titles)))
 
-    def written(self, kind: str) -> bytes:
-        """The figure as "svg", "pdf" or "png"; the same figure gives the same bytes."""
-        file = BytesIO()
+    def written(self, kind: str, most: float = np.inf) -> bytes:
+        """The figure as "svg", "pdf" or "png"; the same figure gives the same bytes.
+
+        Raises:
+            TooHeavy: it has `most` bytes or more, and is not written to its end.
+        """
+        file = Limited(most)
         with plt.rc_context(PAGE):
             options: dict[str, Any] = {"metadata": {DATES[kind]: None}} if kind in DATES else {}
             if kind == "png" and self.get_figwidth() <= NARROW.width:
                 options["dpi"] = SHARP
             if isinstance(self.get_layout_engine(), ConstrainedLayoutEngine):
                 self.draw_without_rendering()  # equal scales settle first, and the layout after
-            self.savefig(file, format=kind, **options)
-        self.set_layout_engine("none")  # what is laid out stays so
+            try:
+                self.savefig(file, format=kind, **options)
+            finally:
+                self.set_layout_engine("none")  # what is laid out stays so
         return file.getvalue()
 
     def _ipython_display_(self) -> None:
@@ -116,15 +140,20 @@ class Drawn(Figure):
         assert self.again
         drawn = self.again(other)
         assert isinstance(drawn, Drawn)
-        file = drawn._file()
-        return file | {"png": drawn._png()} if file.pop("heavy", None) else file
+        try:
+            return drawn._size() | {"svg": drawn.written("svg", HEAVY).decode()}
+        except TooHeavy:
+            return drawn._size() | {"png": drawn._png()}
 
     def _file(self) -> dict[str, Any]:
-        """The size of the figure in a browser's pixels, and its SVG, light or "heavy"."""
-        width, height = np.round(96 * self.get_size_inches()).astype(int).tolist()
+        """The size of the figure, and its SVG, light or "heavy"."""
         svg = self.written("svg")
-        kind = "svg" if len(svg) < HEAVY else "heavy"
-        return {"width": width, "height": height, kind: svg.decode()}
+        return self._size() | {"svg" if len(svg) < HEAVY else "heavy": svg.decode()}
+
+    def _size(self) -> dict[str, int]:
+        """Width and height in a browser's pixels."""
+        width, height = np.round(96 * self.get_size_inches()).astype(int).tolist()
+        return {"width": width, "height": height}
 
     def _png(self) -> str:
         return b64encode(self.written("png")).decode()

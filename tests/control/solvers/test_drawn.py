@@ -15,9 +15,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nmpcrl.control import Nmpc, Obstacle, Plant, Solution, SolverError, Task, differential_drive
+from nmpcrl.control import (
+    Nmpc,
+    Obstacle,
+    Plant,
+    Riccati,
+    Solution,
+    SolverError,
+    Task,
+    differential_drive,
+)
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import lagrangian
+from nmpcrl.control.solvers.starts import random_inputs
 
 ROBOT = differential_drive()
 KKT = 2e-8  # what is left of the conditions, each in its own unit: see `residual`
@@ -239,12 +249,12 @@ def total(solution: Solution) -> float:
     return solution.value + box_weight(solution) * beyond(solution).sum()
 
 
-def ipopts(solution: Solution) -> tuple[float, np.ndarray] | None:
-    """Ipopt's `total` and states for the same problem, from standing still; None if it fails."""
+def ipopts(solution: Solution, inputs: np.ndarray | float = 0.0) -> tuple[float, np.ndarray] | None:
+    """Ipopt's `total` and states for the same problem, from these inputs; None if it fails."""
     ocp = solution.ocp
     solver, bounds = penalised(ocp)
     z = np.zeros(ocp.lower.size)
-    z[ocp.states] = solution.state
+    z[ocp.states], z[ocp.inputs] = solution.state, inputs
     weight = box_weight(solution) if solution.violation > 1e-6 else 1e4 * unit(solution.theta)
     start = np.append(z, np.zeros(bounds["lbx"].size - z.size))
     found = solver(x0=start, p=np.append(parameters(solution), weight), **bounds)
@@ -327,6 +337,53 @@ def test_values_are_ipopts_or_those_of_another_minimum():
     assert compared >= 200
     assert elsewhere <= 0.15 * compared  # mostly better ones
     assert worse <= 0.03 * compared
+
+
+def worse_than_ipopts_best(layouts: range, starts: tuple[int, ...]) -> tuple[int, dict[int, int]]:
+    """How many cold solves, and of those with so many starts, how many are 0.1 % above Ipopt.
+
+    The best of ten: from standing still, and nine times from other inputs.
+    """
+    compared, worse = 0, dict.fromkeys(starts, 0)
+    for layout in layouts:
+        rng = np.random.default_rng([5, layout])
+        nmpc = controller(rng)
+        solvers = {
+            k: Nmpc(
+                nmpc.plant,
+                nmpc.task,
+                horizon=nmpc.horizon,
+                gamma=nmpc.gamma,
+                slack_weight=nmpc.slack_weight,
+                solver=Riccati(starts=k),
+            )
+            for k in starts
+        }
+        for _ in range(10):
+            problem = drawn(rng, nmpc)
+            try:
+                found = {k: problem.solve(one) for k, one in solvers.items()}
+            except SolverError:
+                continue
+            standing = found[starts[0]]
+            if standing.violation > 1e-6:
+                continue
+            others = [random_inputs(ROBOT, seed, nmpc.horizon) for seed in range(20, 29)]
+            values = [one[0] for u in (0.0, *others) if (one := ipopts(standing, u))]
+            if not values:
+                continue
+            compared += 1
+            for k, solution in found.items():
+                worse[k] += solution.value - min(values) > 1e-3 * max(abs(min(values)), 1e-6)
+    return compared, worse
+
+
+@pytest.mark.slow
+def test_nine_cold_starts_leave_few_worse_plans_than_ten_of_ipopts():
+    compared, worse = worse_than_ipopts_best(range(4), starts=(1, 9))
+    assert compared >= 20
+    assert worse[9] <= 0.03 * compared
+    assert worse[9] <= worse[1]
 
 
 @pytest.mark.slow

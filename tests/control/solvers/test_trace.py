@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from nmpcrl.control import Nmpc, Problem, Soft
 from nmpcrl.control.solvers import TOLERANCE
 from nmpcrl.control.solvers.codes import End
 from nmpcrl.control.solvers.riccati import InteriorPoint, machine_code
 from nmpcrl.control.solvers.trace import interpreted, trace
 from nmpcrl.study import paper
+from nmpcrl.study.problems import gros_zanon
 
 BUSY = np.array([-0.6, 1.4, -0.4])  # in front of an obstacle
 
@@ -97,3 +99,48 @@ def test_a_function_that_is_replaced_is_called_by_the_others_of_its_copy_only(nm
     assert plain.residuals.__globals__["row_residuals"]() == 9.0
     assert other.residuals.__globals__["row_residuals"] is other.row_residuals
     assert other.row_residuals is not plain.row_residuals
+
+
+def pendulum(unit: float) -> Problem:
+    """In its own units, with a row that the start violates, and a cost of the state alone."""
+    return Problem(
+        states=2,
+        inputs=1,
+        horizon=6,
+        theta={"stiff": 1.0, "V0": 0.5},
+        model=lambda x, u, th, d: [
+            x[0] + 0.2 * x[1],
+            x[1] + 0.2 * unit * (u / unit - th["stiff"] * np.sin(x[0] / unit) + d["wind"]),
+        ],
+        stage=lambda x, u, th, d: (x.T @ x + 0.1 * u**2) / unit**2,
+        initial=lambda x, th, d: th["V0"],
+        soft=[Soft(lambda x, u, th, d: x[1] / unit - 0.3, weight=4.0)],
+        lower=-unit,
+        upper=unit,
+        data={"wind": 0.1},
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("problem", "state", "data", "curved"),
+    [
+        (pendulum(1e-4), [1.2e-4, 0.5e-4], {"wind": -0.2}, True),
+        (gros_zanon.problem(), [-0.1, 0.2], {"undiscounted": np.ones(11)}, False),
+    ],
+    ids=["pendulum", "Gros and Zanon"],
+)
+def test_a_problem_is_traced_as_a_plant_is(problem, state, data, curved):
+    nmpc, state, theta = Nmpc(problem), np.array(state), problem.theta
+    for given in (None, data):
+        solution = nmpc.solve(state, theta, data=given)
+        known = problem.stage_data(given)
+        iterates = trace(nmpc.ocp, state, theta, data=known)
+        assert len(iterates) == solution.iterations + 1
+        assert iterates.value.iloc[-1] == pytest.approx(solution.value, rel=1e-9)
+        assert iterates.error.iloc[-1] < TOLERANCE < iterates.error.iloc[0]
+        straight = trace(nmpc.ocp, state, theta, data=known, curvature=False)
+        assert straight.value.iloc[-1] == pytest.approx(solution.value, rel=1e-6)
+        assert np.allclose(straight.value[2], iterates.value[2], rtol=1e-9) != curved
+        again = trace(nmpc.ocp, state, theta, solution, data=known)
+        assert len(again) < len(iterates)

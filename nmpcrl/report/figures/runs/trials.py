@@ -1,41 +1,21 @@
-"""Figures of runs outside the study: another robot, another learner, another claim."""
+"""Figures of runs outside the study: another problem, another learner, another claim."""
 
 from collections.abc import Mapping
-from itertools import cycle
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from nmpcrl import Vector
 from nmpcrl.analysis.trials import final_costs
 from nmpcrl.claims.rule import MAJORITY
 from nmpcrl.claims.verdict import REPRODUCED, Verdict
-from nmpcrl.control import Task
-from nmpcrl.learning import Rollout
-from nmpcrl.report.figures.axes import below, draw_task, over_episodes
-from nmpcrl.report.figures.style import INK, LIMIT, LOOKS, TEAL, WINE, Look, page, subplots
+from nmpcrl.report.figures.axes import below, over_episodes
+from nmpcrl.report.figures.style import INK, LIMIT, LOOKS, TEAL, WINE, Look, headed, page, subplots
 from nmpcrl.report.tables import WORDS
 
 OWN = (Look(WINE, (0, (3, 1, 1, 1)), "p"), Look(TEAL, (0, (6, 2)), "h"))  # of learners without one
-
-
-@page
-def trajectories(task: Task, rollouts: Mapping[str, Rollout]) -> Figure:
-    """Closed loops without noise among the obstacles, each named with its cost."""
-    figure, axes = subplots(height=3.7, tall=3.2)
-    draw_task(axes, task)
-    for (name, rollout), style, color in zip(
-        rollouts.items(), cycle(("-", "--", "-.", ":")), cycle((INK, WINE, TEAL)), strict=False
-    ):
-        label = f"{name}: {_brief(rollout.cost)}"
-        axes.plot(*rollout.states[:, :2].T, color=color, linestyle=style, lw=1.6, label=label)
-    least = min(rollouts, key=lambda name: rollouts[name].cost)
-    axes.set_title(f"Lowest cost: {least}, {_brief(rollouts[least].cost)}")
-    axes.set(xlabel="x [m]", ylabel="y [m]")
-    axes.margins(0.04)
-    below(figure, axes.get_legend_handles_labels()[0])
-    return figure
 
 
 @page
@@ -54,6 +34,32 @@ def costs(rows: pd.DataFrame) -> Figure:
     over_episodes(axes)
     below(figure, axes.get_legend_handles_labels()[0])
     return figure
+
+
+@page
+def learned(
+    values: Vector, truth: float, courses: Mapping[str, Vector], names: tuple[str, str]
+) -> Figure:
+    """A parameter of the model as it is learned, and what a state does with it.
+
+    Args:
+        values: the parameter at the start and after each learning step.
+        truth: the plant's.
+        courses: the state over steps without noise, by what to call it.
+        names: of the parameter and the state, with units.
+    """
+    figure, (left, right) = subplots(1, 2, height=3.0)
+    left.axhline(truth, **LIMIT)
+    left.plot(values, color=TEAL)
+    left.set(xlabel="learning step", ylabel=names[0], title="dashed: the plant's")
+    right.axhline(0, **LIMIT)
+    for (name, course), color, dashes in zip(courses.items(), (WINE, TEAL), ("--", "-"), strict=True):
+        right.plot(course, color=color, linestyle=dashes, label=name)
+    right.set(xlabel="step", ylabel=names[1], title="dashed: the target")
+    below(figure, right.get_legend_handles_labels()[0])
+    share = 1 - abs(values[-1] - truth) / abs(values[0] - truth)
+    plain = names[0].partition(" [")[0]
+    return headed(figure, f"Learning closes {share:.0%} of the gap to the plant's {plain}")
 
 
 @page

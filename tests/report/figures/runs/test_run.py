@@ -1,6 +1,8 @@
 """One run on one page, wide and narrow."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from nmpcrl.report.figures.runs.run import run_page
 from nmpcrl.report.run import finding
 from nmpcrl.study import Experiment, run
 from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.records import Records
 
 SHORT = {"steps": 5, "evaluate_every": 1}
 RUNS = {
@@ -35,23 +38,30 @@ def titles(figure) -> list[str]:
     return [axes.get_title(loc="left") for axes in figure.axes]
 
 
+@pytest.fixture(scope="module")
+def arms() -> Callable[[str], Records]:
+    """The frozen arm of a run."""
+    return cache(lambda name: run(frozen_arm(RUNS[name])))
+
+
 @pytest.mark.parametrize("name", RUNS)
 @pytest.mark.parametrize("with_arm", [False, True])
-def test_every_run_has_a_page_whose_titles_state_what_is_seen(known, name, with_arm, tmp_path):
-    records = known[name]
-    arm = run(frozen_arm(RUNS[name])) if with_arm else None
-    figure = run_page(records, arm)
-    assert figure.get_suptitle() == finding(records)
+def test_every_run_has_a_page_whose_titles_state_what_is_seen(
+    known, arms, name, with_arm, tmp_path
+):
+    figure = run_page(known[name], arms(name) if with_arm else None)
+    assert figure.get_suptitle() == finding(known[name])
     for kind in ("svg", "png"):
         figure.savefig(tmp_path / f"page.{kind}")
+        figure.set_layout_engine("none")  # what is laid out stays so
     assert len(figure.axes) == 5
     assert all(titles(figure))
     assert not plt.get_fignums()
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_any_run_can_be_read_wide_and_on_a_telephone(known, name):
-    wide = run_page(known[name], run(frozen_arm(RUNS[name])))
+def test_any_run_can_be_read_wide_and_on_a_telephone(known, arms, name):
+    wide = run_page(known[name], arms(name))
     narrow = wide.again(sheet.NARROW)
     assert not flaws(wide)
     assert not flaws(narrow)

@@ -1,14 +1,11 @@
 """The figures of runs outside the study: their titles follow from what they are given."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pandas as pd
 import pytest
 
 from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
 from nmpcrl.report.figures.runs import trials
-from nmpcrl.study import paper
 
 
 def title(figure) -> str:
@@ -42,17 +39,6 @@ def test_the_infinite_cost_of_a_lost_run_is_not_drawn():
     assert np.isfinite(line.get_ydata()).tolist() == [True, False]
 
 
-def test_the_trajectory_that_costs_least_is_named():
-    there = {"states": np.zeros((4, 5)), "cost": 3.0}
-    rollouts = {
-        "before": SimpleNamespace(**there | {"cost": 12.4}),
-        "after": SimpleNamespace(**there),
-    }
-    figure = trials.trajectories(paper.task(), rollouts)
-    assert title(figure) == "Lowest cost: after, 3"
-    assert names(figure) == ["before: 12.4", "after: 3"]
-
-
 @pytest.mark.parametrize(("second", "said"), [(REPRODUCED, "2 of 2"), (NOT, "1 of 2")])
 def test_the_title_counts_the_parts_that_say_yes(second, said):
     def verdict(outcome, share):
@@ -64,13 +50,9 @@ def test_the_title_counts_the_parts_that_say_yes(second, said):
     assert [tick.get_text() for tick in figure.axes[0].get_xticklabels()] == ["0.1", "4"]
 
 
-def test_every_rollout_is_drawn_in_a_look_of_its_own_and_small_costs_keep_their_digits():
-    rollouts = {
-        name: SimpleNamespace(states=np.zeros((4, 5)), cost=cost)
-        for name, cost in zip("abcde", (0.384, 1.5, 99.96, 1234.5, np.inf), strict=True)
-    }
-    figure = trials.trajectories(paper.task("A"), rollouts)
-    assert names(figure) == ["a: 0.384", "b: 1.5", "c: 100", "d: 1234", "e: inf"]
-    drawn = figure.axes[0].get_lines()[-5:]
-    assert len({(line.get_color(), line.get_linestyle()) for line in drawn}) == 5
-    assert title(figure) == "Lowest cost: a, 0.384"
+
+def test_the_title_says_how_much_of_the_gap_to_the_plant_is_closed():
+    heights = {"before": np.array([1.0, -0.4]), "after": np.array([1.0, 0.0])}
+    figure = trials.learned(np.array([1.0, 1.1, 1.2]), 1.4, heights, ("mass [kg]", "height [m]"))
+    assert figure.get_suptitle() == "Learning closes 50% of the gap to the plant's mass"
+    assert names(figure) == ["before", "after"]

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
-from nmpcrl.claims import paper_claims, thresholds
+from nmpcrl.claims import thresholds
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.rule import Assumption, Observations
@@ -57,8 +57,33 @@ def as_the_paper_says(experiment: Experiment) -> dict:
 
 
 def verdict(found: Evidence, claim: str) -> Verdict:
-    (one,) = (v for v in paper_claims.judge_runs(found.runs, paths(found)) if v.claim == claim)
-    return one
+    return CLAIMS[claim].judge(Observations(found.runs, paths(found)))
+
+
+@pytest.fixture(scope="module")
+def as_said(made_up) -> Evidence:
+    """All is as the paper says."""
+    return made_up(as_the_paper_says)
+
+
+@pytest.fixture(scope="module")
+def in_one_layout(made_up) -> Evidence:
+    """In layout A alone DES diverges, ES swings, and RDES goes into obstacles and saves nothing."""
+
+    def unlike(experiment: Experiment) -> dict:
+        there = experiment.layout == "A"
+        changes = {
+            "DES": {"training": 2.0 if there else 1.0},
+            "ES": {"swing": 0.1 * there},
+            "RDES": {
+                "end": 1.2 if there else 0.9,
+                "imitation": (1.0, 1.0) if there else (0.1, 1),
+                "inside": (0, 0, 5 * there),
+            },
+        }
+        return changes.get(experiment.learner, {})
+
+    return made_up(unlike)
 
 
 def title(figure: Figure) -> str:
@@ -88,39 +113,22 @@ def drawn(claim: str, found: Evidence) -> Figure:
 
 
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
-def test_the_title_is_the_verdict_and_what_it_rests_on(claim, made_up):
-    found = made_up(as_the_paper_says)
-    assert title(drawn(claim, found)) == f"{claim} reproduced: {RUN_CLAIMS[claim][1]}"
+def test_the_title_is_the_verdict_and_what_it_rests_on(claim, as_said):
+    assert title(drawn(claim, as_said)) == f"{claim} reproduced: {RUN_CLAIMS[claim][1]}"
     assert not plt.get_fignums()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("claim", ["C1", "C2", "C6", "C9"])
-def test_every_run_has_its_point(claim, made_up):
-    found = made_up(as_the_paper_says)
+def test_every_run_has_its_point(claim, as_said):
     learners = 1 if claim == "C6" else 2
-    assert len(points(drawn(claim, found).axes[0])) == learners * CELLS
+    assert len(points(drawn(claim, as_said).axes[0])) == learners * CELLS
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("claim", RUN_CLAIMS)
-def test_the_shares_are_those_of_the_verdict_with_wilson_s_interval(claim, made_up):
-    """In layout A alone DES diverges, ES swings, and RDES goes into obstacles and saves nothing."""
-
-    def unlike(experiment: Experiment) -> dict:
-        there = experiment.layout == "A"
-        changes = {
-            "DES": {"training": 2.0 if there else 1.0},
-            "ES": {"swing": 0.1 * there},
-            "RDES": {
-                "end": 1.2 if there else 0.9,
-                "imitation": (1.0, 1.0) if there else (0.1, 1),
-                "inside": (0, 0, 5 * there),
-            },
-        }
-        return changes.get(experiment.learner, {})
-
-    found = made_up(unlike)
+def test_the_shares_are_those_of_the_verdict_with_wilson_s_interval(claim, in_one_layout):
+    found = in_one_layout
     one = verdict(found, claim)
     rows = shares(drawn(claim, found).axes[-1])
     names = ("all", "A", "D", "per step", "per episode")

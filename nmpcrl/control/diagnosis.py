@@ -1,0 +1,79 @@
+"""Why a solve can have failed: what is not finite, or grows too fast, where a plan begins."""
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control.expression import place
+from nmpcrl.control.ocp import Ocp, ProblemOcp, TaskOcp
+from nmpcrl.control.solution import short
+
+FASTEST = 10.0  # what one step of a model may multiply a small deviation by
+FARTHEST = 1e9  # no plan goes through such a state
+SUBSTEPS = "is the period too long for the dynamics? Then give rk4, or the plant, more substeps"
+ORDERS = {  # what is not finite -> what to write instead
+    "": "keep it finite, as ca.log(ca.fmax(x, 1e-6)) does",
+    "the derivative of ": "write ca.sqrt(ca.sumsqr(x) + 1e-9) for ca.norm_2(x), and so on",
+    "the second derivative of ": "write a power of 2 or more, or add a small number to its base",
+}
+
+
+class Diagnosis:
+    """The functions of an OCP and their derivatives, looked at without planning anything."""
+
+    def __init__(self, ocp: Ocp) -> None:
+        self._ocp = ocp
+        of: Any
+        if isinstance(ocp, ProblemOcp):
+            of, e = ocp.problem, ocp.problem.expressions
+            z = ca.vertcat(e.x, e.u)
+            given, self._model = [e.x, e.u, e.theta, e.d], "model"
+            parts = {"model": e.next_x, "stage": e.stage, "soft": e.rows, "initial": e.initial}
+        else:
+            assert isinstance(ocp, TaskOcp)
+            of = ocp.plant
+            x, u = of.transition.sx_in()
+            z = ca.vertcat(x, u)
+            given, self._model = [x, u, ocp.theta, ca.SX(0, 1)], "dynamics"
+            parts = {"dynamics": of.transition(x, u)}
+        self._still = np.clip(np.zeros(of.lower.size), of.lower, of.upper)
+        self._orders: dict[str, dict[str, Callable[..., Any]]] = {order: {} for order in ORDERS}
+        for name, written in parts.items():
+            slope = ca.jacobian(written, z)
+            bend = ca.reshape(ca.jacobian(ca.vec(slope), z), written.numel(), z.numel() ** 2)
+            for order, values in zip(self._orders, (written, slope, bend), strict=True):
+                self._orders[order][name] = ca.Function("part", given, [ca.densify(values)])
+
+    def why(self, state: Vector, theta: Vector, data: Matrix | None) -> str:
+        """What is wrong on the way that no input leads to, in one sentence; "" if nothing is."""
+        N = len(self._ocp.inputs)
+        known = np.zeros((N, 0)) if data is None else data
+        for i in range(N):
+            given = state, self._still, theta, known[i]
+            said = self._not_finite(*given) or self._too_fast(*given)
+            if said:
+                return said.format(f"at x = {short(state)}, u = {short(self._still)}")
+            state = self._orders[""][self._model](*given).full().ravel()
+        return ""
+
+    def _not_finite(self, *given: Vector) -> str:
+        for order, functions in self._orders.items():
+            for name, function in functions.items():
+                values = function(*given).full()
+                for row in np.flatnonzero(~np.isfinite(values).all(axis=1)):
+                    what = values[row][~np.isfinite(values[row])][0]
+                    called = order + place(name, int(row), len(values))
+                    return f"{called} is {what} {{}}: {ORDERS[order]}"
+        return ""
+
+    def _too_fast(self, *given: Vector) -> str:
+        value, slope, _ = (functions[self._model] for functions in self._orders.values())
+        speed = slope(*given).full()[:, : self._ocp.states.shape[1]]
+        growth, largest = np.abs(np.linalg.eigvals(speed)).max(), np.abs(value(*given).full()).max()
+        if growth > FASTEST or largest > FARTHEST:
+            does = f"makes {growth:.1g} times as much of a small deviation in one step"
+            return f"{self._model} {does}, {{}}: {SUBSTEPS}"
+        return ""

@@ -1,0 +1,105 @@
+"""One OCP with u_0 free or fixed: a solver that is ready for it, and its derivatives."""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control.diagnosis import Diagnosis
+from nmpcrl.control.ocp import Indices, Ocp
+from nmpcrl.control.sensitivity import Sensitivity
+from nmpcrl.control.solution import Solution, SolverError
+from nmpcrl.control.solvers import Prepared
+from nmpcrl.control.units import Units, units_of
+
+
+class Variant:
+    """Eq. (2) with u_0 free or fixed: transcribed, with its sensitivities and a solver."""
+
+    def __init__(self, ocp: Ocp, prepared: Callable[[Ocp], Prepared]) -> None:
+        self.ocp = ocp
+        self._units: Units | None = units_of(ocp)
+        self._solver = prepared(ocp if self._units is None else self._units.ocp)
+        self.solve = self._solver.solve if self._units is None else self._solve_in_units
+
+    def _solve_in_units(
+        self,
+        state: Vector,
+        theta: Vector,
+        warm_start: Solution | None,
+        *action: Vector,
+        **others: Any,
+    ) -> Solution:
+        """As `Prepared.solve`, of a problem that is solved in other units than its own."""
+        units = self._units
+        assert units is not None
+        begin = None if warm_start is None else units.inside(warm_start)
+        scaled = [one / units.inputs for one in action]
+        try:
+            found = self._solver.solve(state / units.states, theta, begin, *scaled, **others)
+        except SolverError as error:
+            raise SolverError(error.status, state, theta) from None
+        return units.outside(found, state)
+
+    def _inside(self, solution: Solution) -> Solution:
+        """A solution in the units in which it was found."""
+        return solution if self._units is None else self._units.inside(solution)
+
+    def hessian(self, solution: Solution) -> Matrix:
+        """As `Nmpc.value_hessian`."""
+        return self._sensitivity.hessian(*_point(self._inside(solution)))
+
+    def kkt_residual(self, solution: Solution, *, relative: bool) -> float:
+        """As `Nmpc.kkt_residual`."""
+        point = _point(self._inside(solution))
+        return self._sensitivity.kkt_residual(*point, relative=relative)
+
+    def hessian_times(self, solution: Solution, vector: Vector) -> Vector:
+        """As `Nmpc.value_hessian_times`; by dense algebra where there is no machine code."""
+        product = self._solver.hessian_times(self._inside(solution), vector)
+        return self.hessian(solution) @ vector if product is None else product
+
+    def inputs_jacobian(self, solution: Solution, stage: int) -> Matrix:
+        """d u_i / d theta; by dense algebra where there is no machine code."""
+        if stage == len(self.ocp.inputs):
+            return np.zeros((0, solution.theta.size))
+        return self._rows(solution, stage, self.ocp.inputs)
+
+    def states_jacobian(self, solution: Solution, stage: int) -> Matrix:
+        """d x_i / d theta, in the same way."""
+        return self._rows(solution, stage, self.ocp.states)
+
+    def _rows(self, solution: Solution, stage: int, part: Indices) -> Matrix:
+        """The gradients of the plan's entries at a stage, a sweep each."""
+        ocp, found = self.ocp, []
+        states: Matrix = np.zeros(ocp.states.shape)
+        inputs: Matrix = np.zeros(ocp.inputs.shape)
+        chosen = states if part is ocp.states else inputs
+        size = np.ones(chosen.shape[1])
+        if self._units is not None:
+            size = self._units.states if part is ocp.states else self._units.inputs
+        solution = self._inside(solution)
+        for k in range(chosen.shape[1]):
+            chosen[stage] = size * (np.arange(chosen.shape[1]) == k)
+            gradient = self._solver.plan_gradient(solution, states, inputs)
+            if gradient is None:
+                dense = self._sensitivity.plan(*_point(solution))[part[stage]]
+                return np.asarray(size[:, None] * dense, float)
+            found.append(gradient)
+        return np.array(found)
+
+    @cached_property
+    def diagnosis(self) -> Diagnosis:
+        return Diagnosis(self.ocp)
+
+    @cached_property
+    def _sensitivity(self) -> Sensitivity:
+        return Sensitivity(self.ocp if self._units is None else self._units.ocp)
+
+
+def _point(solution: Solution) -> tuple[Vector, Vector, Vector, Vector]:
+    return (
+        solution.primal, solution.parameters, solution.constraint_duals, solution.bound_duals,
+    )  # fmt: skip

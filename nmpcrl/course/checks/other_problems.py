@@ -1,0 +1,129 @@
+"""The exercises of the chapter on other people's problems."""
+
+from typing import Any
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.course import Outcome, choice, exercise, function, number, varied
+
+
+@varied(delta=(3.0, 6.0, 0.5))
+@exercise
+def moved(answer: Any, *, delta: float = 2.0) -> Outcome:
+    """By how much a normalised step moves Q, to first order: 0.05 delta."""
+    return number(
+        answer,
+        0.05 * delta,
+        tolerance=0.01,
+        mistakes={
+            0.05 * delta * 4: "The step is divided by the squared norm of phi.",
+            0.05 * delta / 4: "The change of Q is phi times the step: phi comes twice.",
+            delta: "Only the twentieth part of the error is closed.",
+            0.05 * delta / 2: "The norm is squared in the denominator, as it is in phi'phi.",
+        },
+    )
+
+
+@exercise
+def factor(answer: Any) -> Outcome:
+    """What a difference is multiplied by in each step, from 1e-10 to 1e-3 in 100 steps."""
+    return number(
+        answer,
+        10 ** (7 / 100),
+        tolerance=0.005,
+        mistakes={
+            7 / 100: "That is the exponent of ten, not the factor.",
+            1e5: "The factors of 100 steps are multiplied, not added.",
+            10 ** (3 / 100): "From 1e-10 to 1e-3 it is seven powers of ten.",
+        },
+    )
+
+
+@exercise
+def single(answer: Any) -> Outcome:
+    """What a stored result of a single seed can promise."""
+    return choice(
+        answer,
+        "c",
+        {
+            "a": "The solver is right to its tolerance, and that is what the seed magnifies.",
+            "b": "A tighter tolerance delays the difference by some steps, and no more.",
+            "c": "the distribution is what both agree on, within its interval.",
+            "d": "The seed is the same in both; the last digits of a solve are not.",
+        },
+    )
+
+
+@exercise
+def gain(answer: Any) -> Outcome:
+    """One step of Riccati's recursion with random matrices: K, and then P."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        n, m = int(rng.integers(2, 4)), int(rng.integers(1, 3))
+        half, last = rng.normal(size=(n, n)), rng.normal(size=(n, n))
+        return {
+            "A": rng.normal(size=(n, n)),
+            "B": rng.normal(size=(n, m)),
+            "Q": half @ half.T,
+            "R": np.diag(rng.uniform(0.5, 2, m)),
+            "P": last @ last.T,
+            "gamma": float(rng.uniform(0.5, 0.95)),
+        }
+
+    return function(
+        answer,
+        riccati_step,
+        draw,
+        mistakes={
+            "What comes later is discounted by gamma.": lambda **one: riccati_step(
+                **one | {"gamma": 1.0}
+            ),
+            "u = -K x: the closed loop is A - B K.": lambda **one: riccati_step(**one, sign=1.0),
+        },
+    )
+
+
+def riccati_step(
+    A: Matrix, B: Matrix, Q: Matrix, R: Matrix, P: Matrix, gamma: float, sign: float = -1.0
+) -> tuple[Matrix, Matrix]:
+    """K and P of one stage earlier."""
+    K: Any = np.linalg.solve(R + gamma * B.T @ P @ B, gamma * B.T @ P @ A)
+    closed = A + sign * B @ K
+    return K, Q + K.T @ R @ K + gamma * closed.T @ P @ closed
+
+
+@exercise
+def newton(answer: Any) -> Outcome:
+    """A regularised step of Gauss and Newton of a batch, with its mean statistics."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        count = int(rng.integers(2, 9))
+        return {
+            "theta": rng.normal(size=4),
+            "deltas": rng.normal(size=count),
+            "phis": rng.normal(size=(count, 4)),
+            "alpha": float(rng.uniform(0.01, 0.5)),
+            "ridge": float(rng.uniform(1e-3, 0.1)),
+        }
+
+    return function(
+        answer,
+        batch_step,
+        draw,
+        mistakes={
+            "The ridge is added to the mean, not to the sum.": lambda **one: batch_step(
+                **one | {"ridge": one["ridge"] / len(one["deltas"])}
+            ),
+            "theta moves with delta phi: a lower error, not a larger one.": lambda **one: (
+                batch_step(**one | {"alpha": -one["alpha"]})
+            ),
+        },
+    )
+
+
+def batch_step(theta: Vector, deltas: Vector, phis: Matrix, alpha: float, ridge: float) -> Vector:
+    """theta + alpha (mean(phi phi') + ridge)^-1 mean(delta phi)."""
+    hessian = phis.T @ phis / len(deltas) + ridge * np.eye(theta.size)
+    moved: Vector = theta + alpha * np.linalg.solve(hessian, deltas @ phis / len(deltas))
+    return moved

@@ -1,0 +1,146 @@
+"""The deterministic policy gradient of an NMPC, with a compatible critic.
+
+The policy is pi_theta(s) = u_0, and its Jacobian dpi / dtheta, shape (m, d), is exact. The critic
+is linear: V_v(s) = v' features(s), and A_w(s, a) = w' psi with psi = (dpi / dtheta)' (a - pi(s)),
+which is compatible: with it the gradient of the return is exact (Silver et al. 2014).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.learning.batches import Batched, Statistics
+from nmpcrl.learning.bootstrap import Controller, Successor, Transition
+from nmpcrl.learning.learners import Learner, theta_bounds
+from nmpcrl.learning.optimisers import Bounds, Descent, Optimiser
+
+Features = Callable[[Vector], Vector]
+
+
+def monomials(state: Vector) -> Vector:
+    """1, s_i and s_i s_j, i <= j: the features of a quadratic value."""
+    rows, columns = np.triu_indices(state.size)
+    return np.concatenate([[1.0], state, state[rows] * state[columns]])
+
+
+def compatible_features(policy_jacobian: Matrix, exploration: Vector) -> Vector:
+    """psi = (dpi / dtheta)' (a - pi(s)), shape (d,); Silver et al. (2014)."""
+    result: Vector = policy_jacobian.T @ exploration
+    return result
+
+
+class CriticMeans(NamedTuple):
+    """Means over a batch, of which v and w are made."""
+
+    value_matrix: Matrix  # phi (phi - gamma phi+)'
+    value_vector: Vector  # phi l
+    advantage_matrix: Matrix  # psi psi'
+    advantage_vector: Vector  # psi l
+    coupling: Matrix  # psi (gamma phi+ - phi)'
+    fisher: Matrix  # (dpi / dtheta)' dpi / dtheta
+
+
+def critic_statistics(
+    phi: Vector, phi_next: Vector, psi: Vector, cost: float, gamma: float
+) -> Statistics:
+    """What one step adds to the first five of `CriticMeans`."""
+    change = gamma * phi_next - phi
+    return (
+        np.outer(phi, -change), phi * cost, np.outer(psi, psi), psi * cost, np.outer(psi, change),
+    )  # fmt: skip
+
+
+def ridge(A: Matrix, b: Vector, regularisation: float) -> Vector:
+    """The x that is least in ||A x - b||^2 + regularisation ||x||^2."""
+    found: Any = np.linalg.solve(A.T @ A + regularisation * np.eye(b.size), A.T @ b)
+    return np.asarray(found)
+
+
+def lstd_value(means: CriticMeans, regularisation: float) -> Vector:
+    """v of LSTD: mean(phi (l + gamma v'phi+ - v'phi)) = 0; Bradtke and Barto (1996)."""
+    return ridge(means.value_matrix, means.value_vector, regularisation)
+
+
+def lstd_advantage(means: CriticMeans, v: Vector, regularisation: float) -> Vector:
+    """w: the TD error of v regressed on psi, mean(psi (l + gamma v'phi+ - v'phi - w'psi)) = 0."""
+    target = means.advantage_vector + means.coupling @ v
+    return ridge(means.advantage_matrix, target, regularisation)
+
+
+def policy_gradient_estimate(fisher: Matrix, w: Vector) -> Vector:
+    """dJ / dtheta = mean((dpi / dtheta)' dpi / dtheta) w; Gros and Zanon (2020)."""
+    result: Vector = fisher @ w
+    return result
+
+
+def no_successor(transition: Transition, theta: Vector) -> Successor:
+    """The critic values states, so no value is taken from the NMPC."""
+    return Successor(np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class PolicyGradientSample:
+    """The statistics of one step."""
+
+    nmpc: Controller
+    features: Features
+
+    def __call__(self, transition: Transition, delta: float) -> Statistics:
+        """Those of `CriticMeans`.
+
+        Raises:
+            ValueError: u_0 was fixed, so that the solution has no policy.
+        """
+        solution = transition.solution
+        if solution.ocp.fixed_action.size:
+            raise ValueError(
+                "a policy gradient needs the plan with u_0 free: call train without constrained"
+            )
+        jacobian = self.nmpc.policy_jacobian(solution)
+        phi = self.features(transition.state)
+        phi_next = np.zeros_like(phi) if transition.end else self.features(transition.next_state)
+        psi = compatible_features(jacobian, transition.action - solution.action)
+        own = critic_statistics(phi, phi_next, psi, transition.cost, self.nmpc.gamma)
+        return (*own, jacobian.T @ jacobian)
+
+
+def policy_gradient(
+    nmpc: Controller,
+    alpha: float = 1e-3,
+    *,
+    every: int | None = None,
+    optimiser: Optimiser | None = None,
+    features: Features = monomials,
+    regularisation: float = 1e-6,
+    bounds: Bounds | None = None,
+) -> Learner:
+    """DPG: theta <- theta - alpha dJ / dtheta, estimated anew from each batch; one solve a step.
+
+    It needs exploration: without it a = pi(s), and nothing is learned. Means stand where other
+    texts have sums, so that alpha does not depend on the length of an episode.
+
+    Source: Gros and Zanon (2020), with the critic by LSTD of Gros and Zanon (2021).
+
+    Args:
+        nmpc: the controller.
+        alpha: step size.
+        every: steps of a batch; those of an episode if absent.
+        optimiser: takes the gradient, and the mean of dpi'dpi for a curvature: `Adam`, or
+            `GaussNewton`, whose step is the natural gradient. `Descent(alpha)` if absent.
+        features: of the value; all monomials of the state up to degree 2 by default.
+        regularisation: of the two least-squares fits.
+        bounds: the least and the largest theta; those of a `Problem` if absent.
+    """
+
+    def estimate(*found: Any) -> Statistics:
+        means = CriticMeans(*found)
+        v = lstd_value(means, regularisation)
+        w = lstd_advantage(means, v, regularisation)
+        return policy_gradient_estimate(means.fisher, w), means.fisher
+
+    sample = PolicyGradientSample(nmpc, features)
+    rule = Batched(sample, optimiser or Descent(alpha), every, estimate)
+    return Learner("DPG", no_successor, rule, nmpc.gamma, bounds or theta_bounds(nmpc))

@@ -1,0 +1,175 @@
+"""`gros_zanon` as csnlp and mpcrl have it (F. Airaldi): a peer, and an oracle that shares no code.
+
+The plan, the plant and the agent are set up as in mpcrl's example of Q-learning: a step of Newton
+for each transition with the outer product of Q's gradient for a Hessian, and no exploration.
+"""
+
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import gymnasium
+import numpy as np
+from csnlp import Nlp
+from csnlp.wrappers import Mpc
+from mpcrl import LearnableParameter, LearnableParametersDict, LstdQLearningAgent
+from mpcrl.core.errors import MpcSolverError
+from mpcrl.optim import NewtonMethod
+
+from nmpcrl import Vector
+from nmpcrl.control import Problem
+from nmpcrl.learning.environment import StepFunction
+from nmpcrl.study.problems import gros_zanon as gz
+
+RATE = 0.05  # of mpcrl's example
+IPOPT = {"print_level": 0, "sb": "yes", "max_iter": 500}
+SOLVERS: Mapping[str, tuple[str, dict[str, Any]]] = MappingProxyType(
+    {
+        "ipopt": ("ipopt", {"ipopt": IPOPT}),
+        "ipopt, 1e-10": ("ipopt", {"ipopt": IPOPT | {"tol": 1e-10}}),
+        "ipopt, exact": ("ipopt", {"ipopt": IPOPT | {"tol": 1e-10, "bound_relax_factor": 0.0}}),
+        "fatrop": ("fatrop", {"fatrop": {"max_iter": 500, "print_level": 0}}),
+    }
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """An episode of the agent; it is shorter where a solve failed."""
+
+    costs: Vector  # of each step
+    disturbances: Vector  # e of each step
+    failure: str = ""
+
+
+def run(solver: str, seed: int, steps: int) -> Run:
+    """Train mpcrl's agent for an episode.
+
+    Args:
+        solver: a name in `SOLVERS`.
+        seed: of the disturbance.
+        steps: of the episode.
+    """
+    world, failure = World(steps), ""
+    with silent():
+        try:
+            agent(mpc(solver)).train(world, episodes=1, seed=seed)
+        except MpcSolverError as error:
+            failure = str(error)
+    return Run(np.array(world.costs), np.array(list(map(_disturbance, world.passed))), failure)
+
+
+def agent(
+    controller: Mpc, problem: Problem | None = None, optimiser: Any = None
+) -> LstdQLearningAgent:
+    """Q-learning after each transition.
+
+    Args:
+        controller: as `mpc` writes it.
+        problem: ours, whose theta and gamma it takes; that of Gros and Zanon if absent.
+        optimiser: one of mpcrl's; a step of Newton if absent.
+    """
+    problem = problem or gz.problem()
+    return LstdQLearningAgent(
+        mpc=controller,
+        learnable_parameters=LearnableParametersDict(
+            [
+                LearnableParameter(name, value.shape, value)
+                for name, value in starts(problem).items()
+            ]
+        ),
+        discount_factor=problem.gamma,
+        update_strategy=1,
+        optimizer=optimiser or NewtonMethod(RATE),
+        hessian_type="approx",
+        remove_bounds_on_initial_action=True,
+    )
+
+
+def starts(problem: Problem) -> dict[str, Any]:
+    """theta as it begins, by name, each an array."""
+    return {name: np.asarray(one, float) for name, one in problem.split(problem.theta).items()}
+
+
+def symbols(plan: Mpc, problem: Problem) -> dict[str, Any]:
+    """theta as parameters of csnlp, by name."""
+    return {
+        name: plan.parameter(name, value.shape if value.ndim == 2 else (value.size, 1))
+        for name, value in starts(problem).items()
+    }
+
+
+def mpc(solver: str) -> Mpc:
+    """The plan in csnlp, by multiple shooting.
+
+    Args:
+        solver: a name in `SOLVERS`.
+    """
+    plan = Mpc(Nlp("SX"), gz.HORIZON)
+    th = symbols(plan, gz.problem())
+    x, _ = plan.state("x", 2, bound_initial=False)
+    u, _ = plan.action("u", 1, lb=-1, ub=1)
+    slack, _, _ = plan.variable("s", (2, gz.HORIZON), lb=0)
+    plan.set_affine_dynamics(th["A"], th["B"], c=th["b"])
+    plan.constraint("lower", gz.LOWER[:, None] + th["x_lower"] - slack, "<=", x[:, 1:])
+    plan.constraint("upper", x[:, 1:], "<=", gz.UPPER[:, None] + th["x_upper"] + slack)
+    objective = th["V0"] + x[:, -1].T @ gz.TERMINAL @ x[:, -1]
+    for i in range(gz.HORIZON):
+        z, v, s = x[:, i], u[:, i], slack[:, i]
+        stage = 0.5 * (z.T @ z + 0.5 * v**2 + gz.PENALTY * (s[0] + s[1]))
+        objective += gz.GAMMA**i * stage + th["f"][:2].T @ z + th["f"][2] * v
+    plan.minimize(objective)
+    give_solver(plan, solver)
+    return plan
+
+
+def give_solver(plan: Mpc, solver: str) -> None:
+    """Let a solver in `SOLVERS` solve it."""
+    name, options = SOLVERS[solver]
+    common = {"expand": True, "print_time": False, "bound_consistency": True, "calc_lam_p": False}
+    plan.init_solver(common | options, solver=name, type="nlp")
+
+
+class World(gymnasium.Env):
+    """A plant as a Gymnasium environment that remembers its costs and transitions."""
+
+    def __init__(
+        self, steps: int, plant: StepFunction = gz.plant, start: Vector = gz.START, most: float = 1
+    ) -> None:
+        self.action_space = gymnasium.spaces.Box(-most, most, (1,), dtype=float)
+        self.costs: list[float] = []
+        self.passed: list[tuple[Vector, Vector, Vector]] = []  # state, action, next state
+        self._steps, self._plant, self._start = steps, plant, start
+
+    def reset(
+        self, *, seed: int | None = None, options: Any = None
+    ) -> tuple[Vector, dict[str, Any]]:
+        """Back to the start."""
+        super().reset(seed=seed, options=options)
+        self._state = self._start
+        return self._state, {}
+
+    def step(self, action: Any) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
+        """Next state, cost, whether the episode is over, whether it was cut short, nothing."""
+        state, action = self._state, np.asarray(action, float).ravel()
+        self._state, cost, end = self._plant(state, action, self.np_random)
+        self.costs.append(cost)
+        self.passed.append((state, action, self._state))
+        return self._state, cost, end, len(self.costs) >= self._steps, {}
+
+
+def _disturbance(passed: tuple[Vector, Vector, Vector]) -> float:
+    """e of a transition."""
+    state, action, later = passed
+    return float(later[0] - (gz.TRUE_A @ state + gz.TRUE_B @ action)[0])
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """Without CasADi's warnings on numpy functions, which mpcrl calls on its arrays."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)
+        yield

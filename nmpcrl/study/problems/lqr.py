@@ -1,0 +1,107 @@
+"""A linear plant with a quadratic cost, of which A, B, Q and R are learned: the truth is known.
+
+Riccati's equation has the value and the policy of every theta, and Lyapunov's what a policy costs.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control import Problem
+
+GAMMA, HORIZON = 0.9, 10
+START = np.array([1.0, -0.5])
+A, B = np.array([[0.9, 0.35], [0.0, 1.1]]), np.array([[0.0813], [0.2]])  # of the plant
+Q, R = np.eye(2), np.array([[0.5]])  # of its cost
+WRONG_A, WRONG_B = np.array([[1.0, 0.25], [0.0, 1.0]]), np.array([[0.0312], [0.25]])
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The policy u = -K x, whose cost from x is x' P x."""
+
+    K: Matrix
+    P: Matrix
+
+    @property
+    def cost(self) -> float:
+        """From the start."""
+        return float(START @ self.P @ START)
+
+
+def problem(*, informed: bool = False, horizon: int = HORIZON) -> Problem:
+    """The plan: A, B, Q, R, the terminal P and a constant V0 are learned.
+
+    Args:
+        informed: whether it begins with the truth, P included.
+        horizon: N.
+    """
+    model = (A, B) if informed else (WRONG_A, WRONG_B)
+    best = optimal(*model)
+    return Problem(
+        states=2,
+        inputs=1,
+        horizon=horizon,
+        gamma=GAMMA,
+        theta={
+            "V0": 0.0,
+            "A": model[0],
+            "B": model[1],
+            "Q": Q,
+            "R": R,
+            "P": best.P,
+        },
+        model=lambda x, u, th: th["A"] @ x + th["B"] @ u,
+        stage=lambda x, u, th: x.T @ th["Q"] @ x + u.T @ th["R"] @ u,
+        terminal=lambda x, th: x.T @ th["P"] @ x,
+        initial=lambda x, th: th["V0"],
+    )
+
+
+def plant(state: Vector, action: Vector, rng: np.random.Generator) -> tuple[Vector, float, bool]:
+    """A step of the plant: next state, cost of this one, and no end."""
+    later = A @ state + B @ action
+    return later, float(state @ Q @ state + action @ R @ action), False
+
+
+def optimal(a: Matrix = A, b: Matrix = B, q: Matrix = Q, r: Matrix = R) -> Truth:
+    """The best policy of a model and its value: Riccati's equation of sqrt(gamma) (A, B)."""
+    root = np.sqrt(GAMMA)
+    p = solve_discrete_are(root * a, root * b, q, r)
+    return Truth(gain(a, b, r, p), p)
+
+
+def gain(a: Matrix, b: Matrix, r: Matrix, p: Matrix) -> Matrix:
+    """K of the input that minimises u'R u + gamma (A x + B u)'P (A x + B u)."""
+    found: Any = np.linalg.solve(r + GAMMA * b.T @ p @ b, GAMMA * b.T @ p @ a)
+    return np.asarray(found)
+
+
+def worth(k: Matrix) -> Truth:
+    """What u = -K x costs on the plant, by Lyapunov's equation; infinite where it diverges."""
+    closed = np.sqrt(GAMMA) * (A - B @ k)
+    if np.abs(np.linalg.eigvals(closed)).max() >= 1:
+        return Truth(k, np.diag([np.inf, np.inf]))
+    return Truth(k, solve_discrete_lyapunov(closed.T, Q + k.T @ R @ k))
+
+
+def recursion(
+    a: Matrix, b: Matrix, q: Matrix, r: Matrix, p: Matrix, horizon: int = HORIZON
+) -> Truth:
+    """Riccati's recursion of a plan: its policy u = -K x and its value x' P x."""
+    k = np.zeros((b.shape[1], a.shape[0]))
+    for _ in range(horizon):
+        k = gain(a, b, r, p)
+        closed: Matrix = a - b @ k
+        p = q + k.T @ r @ k + GAMMA * closed.T @ p @ closed
+    return Truth(k, p)
+
+
+def planned(theta: Vector) -> Truth:
+    """What the plan of a theta does and believes, but for V0; Q and P count by halves of Q + Q'."""
+    parts = problem().split(theta)
+    a, b, q, r, p = (parts[name] for name in "ABQRP")
+    return recursion(a, b, (q + q.T) / 2, r, (p + p.T) / 2)

@@ -1,0 +1,131 @@
+"""What a value is made of, as JSON can hold it: whatever changes what it does changes its content.
+
+Of a function that is the code that Python compiled, with all that it closes over and all that it
+reads of its module; a comment or another name changes nothing. What a library brings is named by
+its version.
+"""
+
+import dis
+import sys
+import sysconfig
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
+from importlib.metadata import PackageNotFoundError, version
+from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, ModuleType
+from typing import Any
+
+import numpy as np
+
+PLAIN = (type(None), bool, int, float, complex, str, bytes, range, type(Ellipsis))
+OWN = "nmpcrl"  # whose code the epochs of `provenance` stand for
+
+
+class NoContent(ValueError):
+    """Of this value no name can be made; the message says what it is."""
+
+
+def content(value: Any, inside: tuple[int, ...] = ()) -> Any:
+    """Nested lists and texts, the same for values that do the same.
+
+    Raises:
+        NoContent: the value holds something that may be different each time, as a generator does.
+    """
+    if id(value) in inside:
+        return "itself"
+    if isinstance(value, PLAIN):
+        return repr(value)
+    inside = (*inside, id(value))
+    if isinstance(value, np.ndarray | np.generic):
+        return [str(value.dtype), np.asarray(value).tolist()]
+    if isinstance(value, Mapping):
+        return [[repr(name), content(one, inside)] for name, one in value.items()]
+    if isinstance(value, tuple | list | frozenset | set):
+        parts = [content(one, inside) for one in value]
+        return parts if isinstance(value, tuple | list) else sorted(map(str, parts))
+    if isinstance(value, partial):
+        return [content(one, inside) for one in (value.func, value.args, value.keywords)]
+    if isinstance(value, MethodType):
+        return [value.__name__, content(value.__self__, inside)]
+    if isinstance(value, ModuleType | FunctionType | BuiltinFunctionType | type):
+        return _defined(value, inside)
+    return _instance(value, inside)
+
+
+def _instance(value: Any, inside: tuple[int, ...]) -> Any:
+    """An object by its key, by the specification of Gymnasium, or by its class and its fields."""
+    key: Any = getattr(value, "key", None)
+    spec: Any = getattr(value, "spec", None)
+    if isinstance(key, str):
+        return key
+    if hasattr(spec, "to_json"):
+        return spec.to_json()
+    kind = type(value)
+    names = getattr(value, "__dataclass_fields__", None)
+    if names is None and (_is_library(kind.__module__) or not hasattr(value, "__dict__")):
+        raise NoContent(
+            f"a {kind.__name__}, {str(value)[:60]}, has no content of which a name can be made:"
+            " make it inside of the function that needs it, or pass numbers"
+        )
+    parts = vars(value) if names is None else {name: getattr(value, name) for name in names}
+    return [content(kind, inside), content(parts, inside)]
+
+
+def _defined(value: Any, inside: tuple[int, ...]) -> Any:
+    """A module, a function or a class."""
+    module = str(getattr(value, "__module__", None) or getattr(value, "__name__", ""))
+    name = getattr(value, "__qualname__", "")
+    if isinstance(value, ModuleType | BuiltinFunctionType) or _is_library(module):
+        return [module, name, _version(module.partition(".")[0])]
+    if isinstance(value, type):
+        own = {n: one for n, one in vars(value).items() if _is_written(n, one)}
+        return [content(value.__bases__, inside), content(own, inside)]
+    closed = [cell.cell_contents for cell in value.__closure__ or ()]
+    reads = {n: value.__globals__[n] for n in sorted(_reads(value.__code__)) if n in
+             value.__globals__}  # fmt: skip
+    parts = (value.__defaults__, value.__kwdefaults__, closed, reads)
+    return [_code(value.__code__), *(content(part, inside) for part in parts)]
+
+
+def _is_written(name: str, value: Any) -> bool:
+    """Whether an attribute of a class was written there, and not made by Python or a decorator."""
+    if isinstance(value, FunctionType) and name != "__repr__":
+        return not name.startswith("__") or value.__code__.co_filename != "<string>"
+    return not name.startswith(("__", "_abc_"))
+
+
+def _code(code: CodeType) -> Any:
+    """What Python compiled, without where it stands."""
+    constants = [
+        _code(one) if isinstance(one, CodeType) else content(one) for one in code.co_consts
+    ]
+    return [code.co_code.hex(), constants, [*code.co_names], [*code.co_varnames]]
+
+
+def _reads(code: CodeType) -> Iterator[str]:
+    """The names of a function's module that it reads, inner functions included."""
+    for step in dis.get_instructions(code):
+        if step.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+            yield step.argval
+    for one in code.co_consts:
+        if isinstance(one, CodeType):
+            yield from _reads(one)
+
+
+@cache
+def _is_library(module: str) -> bool:
+    """Whether a module is Python's, an installed one or ours, and not the user's."""
+    root = module.partition(".")[0]
+    if root == "__main__":
+        return False
+    if root == OWN or root in sys.stdlib_module_names:
+        return True
+    file = getattr(sys.modules.get(root), "__file__", None) or ""
+    return file.startswith((sysconfig.get_path("purelib"), sysconfig.get_path("platlib")))
+
+
+@cache
+def _version(library: str) -> str:
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return ""

@@ -1,0 +1,167 @@
+"""A controller is a value: pickled or copied it solves alike, and its key says what it is."""
+
+import copy
+import pickle
+import subprocess
+import sys
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from nmpcrl.control import Fatrop, Ipopt, Nmpc, Plant, Problem, Riccati, Series, Soft, Task
+from nmpcrl.control.solvers import problem_stages, stages
+from nmpcrl.study import paper
+
+ELSEWHERE = """
+import pickle, sys
+import numpy as np
+nmpc, state, theta = pickle.loads(sys.stdin.buffer.read())
+solution = nmpc.solve(state, theta)
+found = nmpc.key, solution.value, solution.features, solution.point
+sys.stdout.buffer.write(pickle.dumps(found))
+"""
+
+
+def cart(gain=1.0, **changes) -> Problem:
+    """A problem of lambdas, with everything that one may have."""
+    fields = {
+        "states": 2,
+        "inputs": 1,
+        "horizon": 4,
+        "gamma": 0.9,
+        "theta": {"A": np.array([[1.0, 0.2], [0.0, 1.0]]), "limit": 0.5},
+        "model": lambda x, u, th, d: th["A"] @ x + gain * ca.vertcat(0, ca.sin(u)) + d["wind"],
+        "stage": lambda x, u, th, d: ca.sumsqr(x) / 3 + 0.1 * ca.sumsqr(u),
+        "terminal": lambda x, th, d: 2 * ca.sumsqr(x),
+        "initial": lambda x, th, d: th["limit"] ** 2 * x[0],
+        "soft": [Soft(lambda x, u, th, d: x[1] - th["limit"], weight=3.0)],
+        "lower": -1.0,
+        "upper": 1.0,
+        "data": {"wind": Series(np.linspace(0, 0.1, 5))},
+    }
+    return Problem(**fields | changes)
+
+
+def pendulum(**changes) -> tuple[Plant, Task]:
+    """A plant of a lambda, with a task."""
+    plant = Plant(
+        **{
+            "dynamics": lambda s, a: [s[1], -ca.sin(s[0]) + a],
+            "state_names": ("angle", "speed"),
+            "action_names": ("torque",),
+            "lower": [-2.0],
+            "upper": [2.0],
+        }
+        | changes
+    )
+    return plant, Task([1.0, 0.0], [0.0, 0.0], [-5, -5], [5, 5], weights=[1.0, 1.0])
+
+
+def controllers() -> list[tuple[Nmpc, np.ndarray, np.ndarray]]:
+    """Of every kind, with a state and theta."""
+    return [
+        (Nmpc(cart(), solver="ipopt"), np.array([0.7, 0.2]), cart().theta),
+        (Nmpc(cart(), solver=Fatrop(1e-9)), np.array([0.7, 0.2]), cart().theta),
+        (Nmpc(*pendulum(), 4, solver="ipopt"), np.array([1.0, 0.3]), np.full(6, 0.5)),
+        (paper.nmpc(), np.array(paper.START), np.array(paper.THETA_INIT)),
+    ]
+
+
+def same(one, other) -> None:
+    """Two solutions, bit for bit."""
+    assert one.value == other.value
+    assert one.iterations == other.iterations
+    np.testing.assert_array_equal(one.features, other.features)
+    np.testing.assert_array_equal(one.point, other.point)
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))])
+@pytest.mark.parametrize("k", range(4))
+def test_a_copy_solves_as_the_original_does(again, k):
+    nmpc, state, theta = controllers()[k]
+    before, solution = again(nmpc), nmpc.solve(state, theta)
+    for one in (before, again(nmpc), again(again(nmpc))):
+        same(one.solve(state, theta), solution)
+        assert one.key == nmpc.key
+
+
+@pytest.mark.parametrize("k", [0, 2, 3])
+def test_another_process_finds_the_same_key_and_the_same_bits(k):
+    nmpc, state, theta = controllers()[k]
+    ran = subprocess.run(
+        [sys.executable, "-c", ELSEWHERE],
+        input=pickle.dumps((nmpc, state, theta)),
+        capture_output=True,
+        check=True,
+    )
+    key, value, features, point = pickle.loads(ran.stdout)
+    solution = nmpc.solve(state, theta)
+    assert (key, value) == (nmpc.key, solution.value)
+    np.testing.assert_array_equal(features, solution.features)
+    np.testing.assert_array_equal(point, solution.point)
+
+
+def test_a_copy_is_written_down_in_the_same_lines_and_so_is_not_compiled_again():
+    problem, (plant, _) = cart(), pendulum()
+    for one in (problem, paper.nmpc().plant, plant):
+        write = problem_stages.write if one is problem else stages.write
+        assert write(pickle.loads(pickle.dumps(one))) == write(one)
+
+
+@pytest.mark.parametrize("k", range(4))
+def test_a_solution_that_was_pickled_is_a_warm_start(k):
+    nmpc, state, theta = controllers()[k]
+    for action in (None, nmpc.clip(np.full(nmpc.m, 0.1))):
+        solution = nmpc.solve(state, theta, action=action)
+        copied = pickle.loads(pickle.dumps(solution))
+        same(copied, solution)
+        assert nmpc.kkt_residual(copied) == nmpc.kkt_residual(solution)
+        again, with_copy = (nmpc.solve(state, theta, one, action) for one in (solution, copied))
+        assert with_copy.value == pytest.approx(again.value, rel=1e-9)
+
+
+def test_what_was_not_to_be_changed_cannot_be_changed_in_a_copy():
+    for one in map(copy.deepcopy, (cart(), *pendulum())):
+        with pytest.raises(ValueError, match="read-only"):
+            one.lower[0] = 7.0
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda one: one.solved])
+def test_data_go_to_the_machine_code_as_it_takes_them_in_copies_too(copied):
+    """It refuses an array that nobody may change."""
+    problem = cart(scale=100.0)
+    for one in (copied(problem), problem):
+        assert one.stage_data(None).flags.writeable
+        assert one.stage_data({"wind": 0.0}).flags.writeable
+        assert not one.data.flags.writeable
+
+
+def test_the_key_is_that_of_the_content():
+    assert cart().key == cart().key
+    assert Nmpc(cart()).key == Nmpc(cart()).key
+    assert len(Nmpc(cart()).key) == 64
+    assert pendulum()[0].key == pendulum()[0].key
+
+
+def test_any_other_number_or_name_is_another_key():
+    others = [
+        cart(),
+        cart(gain=1.0000000001),
+        cart(gamma=0.91),
+        cart(horizon=3, data={"wind": Series(np.zeros(4))}),
+        cart(theta={"A": np.eye(2), "limit": 0.5}),
+        cart(theta={"A": np.array([[1.0, 0.2], [0.0, 1.0]]), "limit": 0.5000000001}),
+        cart(lower=-0.99),
+        cart(data={"wind": 0.0}),
+        cart(soft=[Soft(lambda x, u, th, d: x[1] - th["limit"], weight=3.1)]),
+        cart(soft=[Soft(lambda x, u, th, d: x[1] - th["limit"], weight=3.0, stages=[2])]),
+        cart(stage=lambda x, u, th, d: ca.sumsqr(x) / 3 + 0.1 * ca.sumsqr(2 * u)),
+        cart(terminal=None),
+    ]
+    keys = [Nmpc(one).key for one in others]
+    keys += [Nmpc(cart(), solver=how).key for how in (Fatrop(), Ipopt(), Riccati(1e-9))]
+    keys += [Nmpc(cart(), ties_active=True).key, paper.nmpc().key, paper.nmpc("B").key]
+    keys += [paper.nmpc(horizon=9).key, Nmpc(*pendulum()).key, Nmpc(*pendulum(period=0.1)).key]
+    keys += [Nmpc(*pendulum(), gamma=0.9).key, Nmpc(*pendulum(), slack_weight=9).key]
+    assert len(set(keys)) == len(keys)

@@ -1,0 +1,106 @@
+"""A `Problem` as WebAssembly: solved in wasmtime as by the machine code.
+
+That of Gros and Zanon has data, an initial cost and rows that begin late; the quadrotor has units
+of its own, two inputs and parameters of any size.
+"""
+
+import casadi as ca
+import numpy as np
+import pytest
+from wasm_host import Module, ProblemController
+
+from nmpcrl.control import Nmpc, Problem, Riccati, Soft, rk4
+from nmpcrl.learning import browser
+from nmpcrl.study.problems import gros_zanon
+
+
+def quadrotor() -> Problem:
+    """A planar quadrotor: position, attitude and their rates; its mass and inertia are learned.
+
+    Its lift grows near the ground.
+    """
+
+    def dynamics(x, u, th):
+        cushion = 1 + th["cushion"] * ca.exp(-3 * (x[1] + 2))
+        lift, turn = (u[0] + u[1]) * cushion, u[0] - u[1]
+        return ca.vertcat(
+            x[3:],
+            -1000 * lift * ca.sin(x[2]) / th["grams"],
+            1000 * lift * ca.cos(x[2]) / th["grams"] - 9.81,
+            0.25 * turn / th["inertia"],
+        )
+
+    return Problem(
+        states=6,
+        inputs=2,
+        horizon=10,
+        gamma=0.98,
+        theta={
+            "grams": 500.0,
+            "inertia": 0.01,
+            "q": np.array([5.0, 5.0, 0.5]),
+            "ceiling": 0.8,
+            "cushion": 0.1,
+        },
+        model=lambda x, u, th: rk4(lambda x, u: dynamics(x, u, th), x, u, 0.05),
+        stage=lambda x, u, th: (
+            ca.dot(th["q"], x[:3] ** 2) + 0.1 * ca.sumsqr(x[3:]) + 0.1 * ca.sumsqr(u - 2.45)
+        ),
+        terminal=lambda x, th: 10 * ca.sumsqr(x[:2]) + ca.sumsqr(x[2:]),
+        soft=[Soft(lambda x, u, th: x[1] - th["ceiling"], weight=50.0)],
+        lower=0.0,
+        upper=6.0,
+        scale=[1.0, 1.0, 0.3, 2.0, 2.0, 5.0],
+    )
+
+
+# At most in kB, with what is drawn around: states, actions.
+PROBLEMS = {
+    gros_zanon.problem: (90, ([0.0, -1.0], [1.0, 1.0]), (-1.0, 1.0)),
+    quadrotor: (140, ([-1, -1, -0.3, -1, -1, -0.5], [1, 1, 0.3, 1, 1, 0.5]), (1.0, 5.0)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", PROBLEMS, ids=["Gros and Zanon", "quadrotor"])
+def test_values_gradients_and_slopes_are_those_of_the_machine_code(make):
+    """Cold, warm and shifted; with u_0 free and given; and the model's step and cost."""
+    problem, (most, box, actions) = make(), PROBLEMS[make]
+    data = browser.module(problem)
+    assert len(data) < 1000 * most
+    nmpc, module = Nmpc(problem, solver=Riccati(starts=1)), ProblemController(Module(data))
+    np.testing.assert_array_equal(module.theta, problem.theta)
+    np.testing.assert_array_equal(module.data, problem.data.ravel())
+    rng, n, m, N = np.random.default_rng(3), problem.states, problem.inputs, problem.horizon
+    e = problem.expressions
+    both = ca.Function("both", [e.x, e.u, e.theta, e.d], [e.next_x, e.stage])
+    warm = kept = None
+    for k in range(30):
+        theta = problem.theta * rng.uniform(0.97, 1.03, problem.theta.size)
+        state, action = rng.uniform(*box), rng.uniform(*actions, m) if k % 3 == 2 else None
+        if k % 5 == 4:
+            state = warm.states[1]
+        ours = nmpc.solve(state, theta, warm if k % 2 else None, action)
+        theirs = module.solve(state, theta, kept if k % 2 else None, action)
+        assert (theirs["iterations"], theirs["restarts"]) == (ours.iterations, ours.restarts)
+        assert theirs["value"] == pytest.approx(ours.value, rel=1e-11, abs=1e-11)
+        size = np.abs(ours.features).max()
+        np.testing.assert_allclose(theirs["features"], ours.features, rtol=1e-11, atol=1e-11 * size)
+        np.testing.assert_allclose(theirs["action"], ours.action, rtol=1e-9, atol=1e-9)
+        warm, kept = ours, theirs
+        if k % 6 == 0:
+            weights, along = np.zeros((N + 1, n)), rng.normal(size=theta.size)
+            inputs = np.zeros((N, m))
+            found = module.slopes(state, theta, theirs, along, weights, inputs, action)
+            product = nmpc.value_hessian_times(ours, along)
+            np.testing.assert_allclose(found, product, atol=1e-5 * np.abs(product).max())
+            inputs[0, 0] = 1.0
+            found = module.slopes(state, theta, theirs, 0 * along, weights, inputs, action)
+            policy = nmpc.policy_jacobian(ours)[0]
+            np.testing.assert_allclose(found, policy, rtol=1e-5, atol=1e-7)
+        here = ours.action
+        later, cost = both(state, here, theta, problem.data[0])
+        np.testing.assert_allclose(
+            module.step(state, here, theta), later.full().ravel(), rtol=1e-12
+        )
+        assert module.cost(state, here, theta) == pytest.approx(float(cost), rel=1e-12)

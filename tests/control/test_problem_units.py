@@ -1,0 +1,140 @@
+"""No plan depends on its units: pascals, micrometres and kelvins are solved as numbers near 1."""
+
+import pickle
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from nmpcrl.control import Fatrop, Ipopt, Nmpc, Problem, Riccati, Soft, SolverError
+
+pytestmark = pytest.mark.usefixtures("interpreted")
+
+STATE, UNITS = np.array([0.5, 1.0]), (1e5, 1e-6, 1e12)
+SOLVERS = (Riccati(1e-10), Fatrop(1e-9), Ipopt(1e-10))
+
+
+def tank(unit: float, **changes) -> Problem:
+    """A pressure and a temperature in any unit; the costs and rows have none."""
+
+    def model(x, u, th):
+        pressure = x[0] + 0.1 * (-th["k"] * x[0] + u + 0.1 * unit * ca.sin(x[1] / unit))
+        return ca.vertcat(pressure, x[1] + 0.1 * (0.2 * x[0] - (x[1] - unit)))
+
+    def away(x, th):
+        return ca.sumsqr(x / unit - th["target"])
+
+    fields = {
+        "states": 2,
+        "inputs": 1,
+        "horizon": 8,
+        "gamma": 0.95,
+        "theta": {"k": 0.3, "target": np.array([1.3, 1.2])},
+        "model": model,
+        "stage": lambda x, u, th: away(x, th) + 0.01 * ca.sumsqr(u / unit),
+        "terminal": lambda x, th: 5 * away(x, th),
+        "soft": [Soft(lambda x, u, th: x[0] / unit - 1.2, weight=2.0)],
+        "lower": -unit,
+        "upper": 2 * unit,
+    }
+    return Problem(**fields | changes)
+
+
+def numbers(nmpc: Nmpc, unit: float) -> dict[str, np.ndarray]:
+    """All that a controller says of a problem, in parts of the unit."""
+    theta = nmpc.problem.theta
+    first = nmpc.solve(STATE * unit, theta)
+    given = nmpc.solve(STATE * unit, theta, first, np.array([0.7 * unit]))
+    later = nmpc.solve(given.states[1], theta, given)
+    found = {}
+    for name, one in (("first", first), ("given", given), ("later", later)):
+        m, plan = one.multipliers, nmpc.plan_jacobian(one, 5)
+        found |= {
+            f"{name} value": one.value,
+            f"{name} gradient": one.features,
+            f"{name} states": one.states / unit,
+            f"{name} inputs": one.inputs / unit,
+            f"{name} slacks": one.slacks,
+            f"{name} costates": m.dynamics * unit,
+            f"{name} multipliers": m.obstacles,
+            f"{name} bounds": m.inputs * unit,
+            f"{name} fixed": m.action * unit,
+            f"{name} initial": m.initial * unit,
+            f"{name} policy": nmpc.policy_jacobian(one) / unit,
+            f"{name} plan": plan.states / unit,
+            f"{name} plan of inputs": plan.inputs / unit,
+            f"{name} curvature": nmpc.value_hessian_times(one, np.array([1.0, 0.5, -1.0])),
+        }
+        assert nmpc.kkt_residual(one, relative=True) < 1e-6
+    return found
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=lambda one: one.name)
+@pytest.mark.parametrize("unit", UNITS)
+def test_the_plan_in_other_units_is_the_same_plan(solver, unit):
+    plain = numbers(Nmpc(tank(1.0), solver=solver), 1.0)
+    other = numbers(Nmpc(tank(unit), solver=solver), unit)
+    for name, expected in plain.items():
+        np.testing.assert_allclose(other[name], expected, rtol=2e-5, atol=2e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_derivatives_in_other_units_are_finite_differences(unit):
+    nmpc = Nmpc(tank(unit), solver=Riccati(1e-11))
+    theta, state = nmpc.problem.theta, STATE * unit
+    solution, step = nmpc.solve(state, theta), 1e-5
+    sides = [
+        [nmpc.solve(state, theta + sign * step * e, solution) for sign in (1, -1)]
+        for e in np.eye(theta.size)
+    ]
+    slope = [(a.value - b.value) / (2 * step) for a, b in sides]
+    np.testing.assert_allclose(solution.features, slope, rtol=1e-5, atol=1e-6)
+    states = [(a.states[6] - b.states[6]) / (2 * step) for a, b in sides]
+    jacobian = nmpc.plan_jacobian(solution, 6)
+    np.testing.assert_allclose(jacobian.states, np.transpose(states), atol=1e-4 * unit)
+
+
+def test_sizes_may_be_said_and_are_found_where_they_are_extreme():
+    np.testing.assert_array_equal(tank(1.0).sizes[0], [1, 1])
+    np.testing.assert_array_equal(tank(300.0).sizes[0], [1, 1])  # kelvins are solved as they are
+    np.testing.assert_array_equal(tank(1e-6).sizes[0], [2.0**-21, 2.0**-21])
+    np.testing.assert_array_equal(tank(1.0, scale=[2.0**-10, 1024]).sizes[0], [2.0**-10, 1024])
+    plain, scaled = (Nmpc(tank(1.0, **said)) for said in ({}, {"scale": [3.0, 0.2]}))
+    one, other = (nmpc.solve(STATE, nmpc.problem.theta) for nmpc in (plain, scaled))
+    np.testing.assert_allclose(other.states, one.states, atol=1e-6)
+    assert plain.key != scaled.key
+    for wrong in ([1.0, 2.0, 3.0], 0.0, [1.0, np.inf], -1):
+        with pytest.raises(ValueError, match=r"scale = .* must hold 2 positive numbers, one a st"):
+            tank(1.0, scale=wrong)
+
+
+def test_a_copy_of_a_problem_in_extreme_units_solves_alike():
+    nmpc = Nmpc(tank(1e-6))
+    copied = pickle.loads(pickle.dumps(nmpc))
+    one, other = (each.solve(STATE * 1e-6, nmpc.problem.theta) for each in (nmpc, copied))
+    np.testing.assert_array_equal(one.point, other.point)
+    warm = copied.solve(STATE * 1e-6, nmpc.problem.theta, one)
+    assert warm.value == pytest.approx(one.value, rel=1e-7)
+
+
+def test_an_error_names_the_state_in_its_own_units():
+    nmpc = Nmpc(
+        tank(1e5, stage=lambda x, u, th: th["k"] * ca.log(x[0] - 1e9) + 1e-10 * u**2),
+        solver="ipopt",
+    )
+    with pytest.raises(SolverError, match=r"in state \[ 50000. 100000.\]"):
+        nmpc.solve(STATE * 1e5, nmpc.problem.theta)
+
+
+def test_a_parameter_may_be_as_large_as_it_starts():
+    """The frequency of an Arrhenius law is 7.2e10 a minute."""
+    problem = tank(
+        1.0,
+        theta={"k": 7.2e10, "target": np.array([1.3, 1.2])},
+        stage=lambda x, u, th: ca.sumsqr(x - th["k"] / 7.2e10) + ca.sumsqr(u),
+        model=lambda x, u, th: x + 0.1 * ca.vertcat(u - th["k"] * ca.exp(-25.0) * x[0], -x[1]),
+        terminal=None,
+    )
+    assert Nmpc(problem).solve(STATE, problem.theta).value > 0
+    with pytest.raises(ValueError, match=r"theta .* of size at most 7.2e\+13"):
+        Nmpc(problem).solve(STATE, problem.theta * 1e4)

@@ -1,0 +1,162 @@
+"""Gymnasium in both directions."""
+
+import subprocess
+import sys
+from itertools import pairwise
+
+import casadi as ca
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from nmpcrl.control import Ipopt, Nmpc, Problem
+from nmpcrl.learning import (
+    Exploration,
+    Weights,
+    as_gymnasium,
+    evaluate,
+    expected_sarsa,
+    train,
+)
+from nmpcrl.study import paper
+
+THETA = np.array(paper.THETA_INIT)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Nmpc:
+    return paper.nmpc()
+
+
+@pytest.fixture(scope="module")
+def car() -> Nmpc:
+    """Gymnasium's MountainCarContinuous, planned with another hill."""
+    problem = Problem(
+        states=2,
+        inputs=1,
+        horizon=10,
+        gamma=0.99,
+        theta={"hill": 0.002},
+        model=lambda x, u, th: ca.vertcat(
+            x[0] + x[1], x[1] + 0.0015 * u - th["hill"] * ca.cos(3 * x[0])
+        ),
+        stage=lambda x, u, th: ca.sumsqr(x[0] - 0.45) + 0.1 * ca.sumsqr(u),
+        lower=-1,
+        upper=1,
+    )
+    return Nmpc(problem, solver=Ipopt())
+
+
+class Slow(gymnasium.Env):
+    """x+ = x + u + noise from a random start; terminated beyond 1, truncated after 6 steps."""
+
+    def __init__(self):
+        self.observation_space = gymnasium.spaces.Box(-9, 9, (2,), np.float32)
+        self.action_space = gymnasium.spaces.Box(-1, 1, (1,), np.float32)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.time, self.x = 0, self.np_random.uniform(-0.5, 0.5, 2).astype(np.float32)
+        return self.x, {}
+
+    def step(self, action):
+        assert action.dtype == np.float32
+        assert action.shape == (1,)
+        self.time += 1
+        self.x = self.x + action + self.np_random.normal(scale=0.01, size=2).astype(np.float32)
+        return self.x, float(self.x[0]) - 2, bool(self.x[0] > 1), self.time == 6, {}
+
+
+def noise(episodes, steps, inputs=1, seed=0):
+    return Exploration.draw(np.random.default_rng(seed), (episodes, steps, inputs), deviation=0.1)
+
+
+def run(nmpc, theta, plant, rng=0, shape=(3, 10)):
+    weights = Weights(theta, np.zeros(theta.size))
+    explore = noise(*shape, nmpc.m)
+    return list(train(expected_sarsa(nmpc, 1e-7), nmpc, weights, explore, plant=plant, rng=rng))
+
+
+def test_a_gymnasium_environment_is_a_plant(car):
+    steps = run(car, car.problem.theta, Slow())
+    for step, later in pairwise(steps):
+        if not step.last:
+            moved = later.state - step.state - step.action
+            assert abs(moved).max() < 0.1
+            assert step.cost == pytest.approx(2 - later.state[0])
+
+
+def test_truncated_and_terminated_are_told_apart(car):
+    steps = run(car, car.problem.theta, Slow(), shape=(10, 10))
+    ends = [step for step in steps if step.last]
+    assert all(step.time == 5 for step in ends if not step.end)
+    assert {step.end for step in ends} == {True, False}
+    for step in ends:
+        assert (step.update.successor.value == 0) == step.end
+
+
+def test_the_seeds_of_an_environment_come_from_the_generator(car):
+    first, again, other = (
+        [step.state for step in run(car, car.problem.theta, Slow(), rng=rng)] for rng in (1, 1, 2)
+    )
+    np.testing.assert_array_equal(first, again)
+    starts = {tuple(step.state) for step in run(car, car.problem.theta, Slow()) if step.time == 0}
+    assert len(starts) == 3
+    assert not np.array_equal(first[0], other[0])
+
+
+def test_an_environment_of_gymnasiums_own_is_taken(car):
+    env = gymnasium.make("MountainCarContinuous-v0", max_episode_steps=15)
+    rollout = evaluate(car, car.problem.theta, 100, plant=env, rng=4)
+    assert not rollout.failure
+    assert len(rollout.costs) == 15
+    np.testing.assert_allclose(rollout.costs, 0.1 * rollout.actions[:, 0] ** 2, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: gymnasium.make("Pendulum-v1"), "observation_space = .* must be a Box of 2 numb"),
+        (lambda: gymnasium.make("MountainCar-v0"), r"action_space = Discrete\(3\) must be a Box"),
+    ],
+)
+def test_an_environment_of_another_kind_is_refused(car, make, message):
+    with pytest.raises(ValueError, match=message):
+        evaluate(car, car.problem.theta, 5, plant=make())
+
+
+def test_an_environment_has_a_start_of_its_own(car):
+    with pytest.raises(ValueError, match="draws its own start: leave start= out"):
+        evaluate(car, car.problem.theta, 5, plant=Slow(), start=[0.0, 0.0])
+
+
+@pytest.mark.filterwarnings("ignore:.*Box observation space:UserWarning")
+@pytest.mark.filterwarnings("ignore:.*For Box action spaces:UserWarning")
+def test_ours_pass_gymnasiums_own_check(robot, car):
+    check_env(as_gymnasium(robot, steps=5), skip_render_check=True)
+
+    def hilly(state, action, rng):
+        return state + rng.normal(scale=0.01, size=2), 1.0, state[0] > 3
+
+    env = as_gymnasium(car, plant=hilly, start=lambda rng: rng.uniform(-1, 1, 2))
+    check_env(env, skip_render_check=True)
+
+
+def test_there_and_back_is_the_same_run(robot):
+    ours = run(robot, THETA, None, shape=(2, 8))
+    theirs = run(robot, THETA, as_gymnasium(robot), shape=(2, 8))
+    assert [step.cost for step in ours] == [step.cost for step in theirs]
+    np.testing.assert_array_equal(ours[-1].weights.theta, theirs[-1].weights.theta)
+
+
+def test_an_episode_of_ours_is_truncated_after_its_steps(robot):
+    env = as_gymnasium(robot, steps=3)
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(2))[2:4] for _ in range(3)]
+    assert ends == [(False, False), (False, False), (False, True)]
+
+
+def test_gymnasium_is_imported_only_where_it_is_asked_for():
+    code = "import sys, nmpcrl.learning; sys.exit('gymnasium' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,173 @@
+"""The deterministic policy gradient: its critic in closed form (LQR), and beside mpcrl's."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_lyapunov
+
+from nmpcrl.learning import Transition, Weights, policy_gradient
+from nmpcrl.learning.policy_gradient import (
+    CriticMeans,
+    critic_statistics,
+    lstd_advantage,
+    lstd_value,
+    monomials,
+    policy_gradient_estimate,
+)
+
+A, B = np.array([[0.9, 0.35], [0.0, 1.1]]), np.array([[0.08], [0.2]])
+Q, R, GAMMA = np.diag([1.0, 2.0]), np.array([[0.5]]), 0.9
+K = np.array([[1.0, 2.0]])  # stabilises A - B K
+E = 0.3  # size of the exploration
+
+
+class Gain:
+    """The policy -K s, theta = K."""
+
+    gamma = GAMMA
+
+    def policy_jacobian(self, solution):
+        return -solution.state[None]
+
+
+def cost(state, action):
+    return float(state @ Q @ state + action @ R @ action)
+
+
+def transition(state, exploration, *, last=False, end=False):
+    plan = -K @ state
+    action = plan + exploration
+    solution = SimpleNamespace(
+        state=state, action=plan, value=0.0, ocp=SimpleNamespace(fixed_action=np.zeros(0))
+    )
+    later = A @ state + B @ action
+    return Transition(state, action, cost(state, action), later, solution, end, last)
+
+
+def pairs(count=30):
+    """Exploration of both signs in every state: what is even in it drops out of the critic."""
+    states = np.random.default_rng(1).normal(size=(count, 2))
+    return [transition(s, sign * np.array([E])) for s in states for sign in (1, -1)]
+
+
+def means_of(transitions):
+    sums = [
+        (
+            *critic_statistics(
+                monomials(t.state),
+                monomials(t.next_state),
+                -t.state * (t.action - t.solution.action),
+                t.cost,
+                GAMMA,
+            ),
+            np.outer(t.state, t.state),
+        )
+        for t in transitions
+    ]
+    return CriticMeans(*(np.mean(column, axis=0) for column in zip(*sums, strict=True)))
+
+
+@pytest.fixture(scope="module")
+def P():
+    """The value s'P s of -K s: P = Q + K'R K + gamma (A - B K)'P (A - B K)."""
+    closed = np.sqrt(GAMMA) * (A - B @ K)
+    return solve_discrete_lyapunov(closed.T, Q + K.T @ R @ K)
+
+
+@pytest.fixture(scope="module")
+def slope(P):
+    """dQ / da in a = -K s, as a matrix times s."""
+    return 2 * (GAMMA * B.T @ P @ (A - B @ K) - R @ K)
+
+
+def test_the_value_of_a_linear_policy_is_found(P):
+    v = lstd_value(means_of(pairs()), 0.0)
+    curvature = float((R + GAMMA * B.T @ P @ B).item())
+    expected = [E**2 * curvature / (1 - GAMMA), 0, 0, P[0, 0], 2 * P[0, 1], P[1, 1]]
+    np.testing.assert_allclose(v, expected, atol=1e-7)
+
+
+def test_the_advantage_has_the_slope_of_the_action_value(slope):
+    means = means_of(pairs())
+    w = lstd_advantage(means, lstd_value(means, 0.0), 0.0)
+    np.testing.assert_allclose(w, -slope.ravel(), atol=1e-7)  # psi = -s e
+
+
+def test_a_step_goes_down_the_mean_of_the_policys_slope_times_that_of_the_value(slope):
+    steps = pairs()
+    steps[-1] = transition(steps[-1].state, steps[-1].action - steps[-1].solution.action, last=True)
+    learner = policy_gradient(Gain(), 0.1, regularisation=0.0)
+    weights = Weights(K.ravel(), np.zeros(2))
+    for step in steps:
+        weights = learner.step(weights, step).weights
+    gradient = np.mean([-(slope @ t.state) * t.state for t in steps], axis=0)
+    np.testing.assert_allclose(weights.theta, K.ravel() - 0.1 * gradient, atol=1e-7)
+
+
+def test_the_gradient_is_that_of_the_return(P):
+    """Against central differences of E[s'P s] in K, over starts weighted as they are visited."""
+    starts = np.random.default_rng(2).normal(size=(40, 2))
+
+    def performance(gain):
+        closed = np.sqrt(GAMMA) * (A - B @ gain)
+        value = solve_discrete_lyapunov(closed.T, Q + gain.T @ R @ gain)
+        return np.mean([s @ value @ s for s in starts])
+
+    eps = 1e-6
+    steps = [np.array([[eps, 0.0]]), np.array([[0.0, eps]])]
+    numeric = [(performance(K + e) - performance(K - e)) / (2 * eps) for e in steps]
+    means = means_of(pairs())
+    w = lstd_advantage(means, lstd_value(means, 0.0), 0.0)
+    visited, state, discount = np.zeros((2, 2)), starts.T, 1.0
+    for _ in range(400):
+        visited += discount * state @ state.T / len(starts)
+        state, discount = (A - B @ K) @ state, discount * GAMMA
+    np.testing.assert_allclose(policy_gradient_estimate(visited, w), numeric, rtol=1e-5)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_critic_and_gradient_are_those_of_mpcrl():
+    from mpcrl.agents import lstd_dpg
+
+    rng = np.random.default_rng(3)
+    count, rho = 40, 1e-3
+    states = rng.normal(size=(count + 1, 2))
+    costs, jacobian, noise = (
+        rng.normal(size=count),
+        rng.normal(size=(count, 3, 1)),
+        rng.normal(size=(count, 1, 1)),
+    )
+    Phi = np.array([monomials(s) for s in states])
+    Psi = (jacobian @ noise)[..., 0]
+    v_theirs = lstd_dpg._compute_cafa_weight_v.py_func(Phi, costs, GAMMA, rho)
+    w_theirs = lstd_dpg._compute_cafa_weight_w.py_func(Phi, Psi, costs, v_theirs, GAMMA, rho)
+    sums = [
+        (
+            *critic_statistics(Phi[k], Phi[k + 1], Psi[k], costs[k], GAMMA),
+            jacobian[k] @ jacobian[k].T,
+        )
+        for k in range(count)
+    ]
+    means = CriticMeans(*(np.sum(column, axis=0) for column in zip(*sums, strict=True)))
+    v = lstd_value(means, rho)
+    w = lstd_advantage(means, v, rho)
+    np.testing.assert_allclose(v, v_theirs, rtol=1e-8)
+    np.testing.assert_allclose(w, w_theirs, rtol=1e-8)
+    theirs = (jacobian @ jacobian.transpose(0, 2, 1)).sum(0) @ w_theirs
+    np.testing.assert_allclose(policy_gradient_estimate(means.fisher, w), theirs, rtol=1e-8)
+
+
+def test_a_state_that_ends_an_episode_is_worth_nothing():
+    ends = policy_gradient(Gain()).rule
+    one = transition(np.array([1.0, 2.0]), np.array([E]), end=True)
+    phi = monomials(one.state)
+    np.testing.assert_allclose(ends.sample(one, np.nan)[0], np.outer(phi, phi))
+
+
+def test_a_solution_with_a_fixed_action_is_refused():
+    one = transition(np.array([1.0, 2.0]), np.array([E]))
+    one.solution.ocp.fixed_action = np.zeros(1)
+    learner = policy_gradient(Gain())
+    with pytest.raises(ValueError, match="call train without constrained"):
+        learner.step(Weights(K.ravel(), np.zeros(2)), one)

@@ -1,0 +1,76 @@
+"""Where the truth is known: Riccati's and Lyapunov's equations against plans and simulation."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.control import Nmpc, Riccati
+from nmpcrl.study.problems import gros_zanon_csnlp as peer
+from nmpcrl.study.problems import lqr, lqr_csnlp
+
+STATE = np.array([0.7, -1.1])
+
+pytestmark = pytest.mark.usefixtures("interpreted")
+
+
+@pytest.fixture(scope="module")
+def nmpc() -> Nmpc:
+    return Nmpc(lqr.problem(), solver=Riccati(1e-11))
+
+
+def test_value_gradient_and_policys_sensitivity_are_those_of_riccatis_recursion(nmpc):
+    theta = lqr.problem().theta + 0.02 * np.random.default_rng(1).normal(size=16)
+    theta = lqr.problem().names.filled(theta, {"R": [[0.4]]})
+    solution, step = nmpc.solve(STATE, theta), 1e-6
+
+    def truth(values):
+        found = lqr.planned(values)
+        return values[0] + STATE @ found.P @ STATE, -found.K @ STATE
+
+    value, action = truth(theta)
+    assert solution.value == pytest.approx(value, rel=1e-9)
+    np.testing.assert_allclose(solution.action, action, atol=1e-8)
+    sides = [[truth(theta + s * e) for s in (step, -step)] for e in np.eye(theta.size)]
+    slopes = np.array([(up[0] - down[0]) / (2 * step) for up, down in sides])
+    moves = np.array([(up[1] - down[1]) / (2 * step) for up, down in sides]).T
+    np.testing.assert_allclose(solution.features, slopes, atol=1e-6)
+    np.testing.assert_allclose(nmpc.policy_jacobian(solution), moves, atol=1e-6)
+
+
+def test_an_informed_plan_has_the_best_policy_and_its_value_at_any_horizon(nmpc):
+    best, theta = lqr.optimal(), lqr.problem(informed=True).theta
+    solution = nmpc.solve(STATE, theta)
+    assert solution.value == pytest.approx(STATE @ best.P @ STATE, rel=1e-9)
+    np.testing.assert_allclose(solution.action, -best.K @ STATE, atol=1e-8)
+
+
+def test_the_worth_of_a_gain_is_what_it_costs():
+    best = lqr.optimal()
+    for k in (best.K, lqr.optimal(lqr.WRONG_A, lqr.WRONG_B).K):
+        state, total, rng = lqr.START, 0.0, np.random.default_rng(0)
+        for t in range(400):
+            state, cost, _ = lqr.plant(state, -k @ state, rng)
+            total += lqr.GAMMA**t * cost
+        assert lqr.worth(k).cost == pytest.approx(total, rel=1e-9)
+        assert lqr.worth(k).cost >= best.cost * (1 - 1e-12)
+    np.testing.assert_allclose(lqr.worth(best.K).P, best.P, atol=1e-9)
+    assert lqr.worth(np.array([[9.0, 9.0]])).cost == np.inf
+
+
+def test_value_and_action_are_csnlps(nmpc):
+    agent = peer.agent(lqr_csnlp.mpc("ipopt, 1e-10"), lqr.problem())
+    for state in np.random.default_rng(3).normal(size=(5, 2)):
+        solution = nmpc.solve(state, lqr.problem().theta)
+        with peer.silent():
+            action, theirs = agent.state_value(state, True)
+        assert float(theirs.f) == pytest.approx(solution.value, rel=1e-7)
+        assert float(action) == pytest.approx(solution.action[0], rel=1e-5, abs=1e-7)
+
+
+def test_the_agent_of_the_peer_meets_our_plant():
+    world = peer.World(3, plant=lqr.plant, start=lqr.START, most=np.inf)
+    with peer.silent():
+        peer.agent(lqr_csnlp.mpc("ipopt, 1e-10"), lqr.problem()).train(world, episodes=1, seed=0)
+    first, action, later = world.passed[0]
+    expected, cost, _ = lqr.plant(first, action, None)
+    np.testing.assert_array_equal(later, expected)
+    assert (len(world.costs), world.costs[0]) == (3, cost)

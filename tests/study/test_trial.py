@@ -1,0 +1,214 @@
+"""Runs of one's own: named by all that they are made of, stored, and done in parallel."""
+
+import pickle
+from functools import partial
+
+import casadi as ca
+import numpy as np
+import pytest
+from raising import raising
+
+from nmpcrl.control import Ipopt, Nmpc, Problem
+from nmpcrl.learning import (
+    Exploration,
+    Weights,
+    expected_sarsa,
+    frozen,
+    lstd_q,
+    random_direction,
+    train,
+)
+from nmpcrl.study import (
+    Experiment,
+    ParameterError,
+    Records,
+    Trial,
+    fetch,
+    fetch_all,
+    paper,
+    run,
+    store,
+)
+from nmpcrl.study.provenance import key
+from nmpcrl.study.store import path_of
+
+pytestmark = pytest.mark.usefixtures("runs")
+CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
+GAIN = 0.3
+
+
+def tank(horizon=3) -> Nmpc:
+    """One state, two parameters, no task."""
+    problem = Problem(
+        states=1,
+        inputs=1,
+        horizon=horizon,
+        gamma=0.9,
+        theta={"gain": 0.5, "V0": 0.0},
+        model=lambda x, u, th: 0.9 * x + th["gain"] * u,
+        stage=lambda x, u, th: ca.sumsqr(x - 1) + 0.1 * ca.sumsqr(u),
+        initial=lambda x, th: th["V0"],
+        lower=-1,
+        upper=1,
+    )
+    return Nmpc(problem, solver=Ipopt())
+
+
+TANK = tank()
+
+
+def filling(state, action, rng):
+    later = 0.9 * state + GAIN * action + rng.normal(scale=0.01, size=1)
+    return later, float((state[0] - 1) ** 2), later[0] > 0.95
+
+
+def anywhere(rng):
+    return rng.uniform(0, 0.5, 1)
+
+
+def trial(**options):
+    given = {
+        "learner": "LSTD-Q", "make": partial(lstd_q, alpha=0.5), "nmpc": TANK, "episodes": 2,
+        "steps": 6, "plant": filling, "start": anywhere, "evaluate_every": 1,
+    }  # fmt: skip
+    return Trial(**given | options)
+
+
+def assert_same_numbers(one, other):
+    for name in set(one.steps) - CLOCKS:
+        np.testing.assert_array_equal(one.steps[name], other.steps[name])
+
+
+def test_a_trial_of_the_papers_robot_is_the_run_of_its_experiment():
+    experiment = Experiment(episodes=2, steps=8, seed=3, evaluate_every=5)
+    make = partial(expected_sarsa, alpha=paper.ALPHA)
+    same = Trial("ES", make, paper.nmpc(), paper.THETA_INIT, seed=3, episodes=2, steps=8)
+    one, other = run(experiment), run(same)
+    for name in set(one.steps) - CLOCKS - {"alpha_phi2"}:
+        np.testing.assert_array_equal(one.steps[name], other.steps[name])
+    np.testing.assert_array_equal(one.evaluations["states"], other.evaluations["states"])
+
+
+def test_a_trial_is_what_train_does():
+    records = run(trial())
+    noise, _, world, _ = np.random.SeedSequence(0).spawn(4)
+    explore = Exploration.draw(np.random.default_rng(noise), (2, 6, 1))
+    steps = train(
+        lstd_q(TANK, 0.5), TANK, Weights(TANK.problem.theta, np.zeros(2)), explore,
+        constrained=True, plant=filling, start=anywhere, rng=np.random.default_rng(world),
+    )  # fmt: skip
+    np.testing.assert_array_equal(records.steps["theta"], [s.weights.theta for s in steps])
+
+
+def test_a_trial_is_stored_and_read(runs, monkeypatch):
+    records = fetch(trial())
+    (path,) = (runs / "trials").iterdir()
+    assert path == path_of(trial())
+    assert path.name.startswith("LSTD_Q-seed0-2ep-")
+    assert Records.load(path).facts["key"] == key(trial())
+    assert records.steps["theta"].shape[1:] == (2,)
+    assert records.evaluations["states"].shape == (3, 6, 1)
+    monkeypatch.setattr(store, "run", raising(AssertionError("trained again")))
+    assert_same_numbers(fetch(trial()), records)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"seed": 1},
+        {"make": partial(lstd_q, alpha=0.4)},
+        {"nmpc": tank(horizon=4)},
+        {"plant": lambda state, action, rng: (state, 0.0, False)},
+        {"start": (0.2,)},
+        {"theta": (0.5, 0.1)},
+        {"deviation": 0.5},
+        {"rollouts": 2},
+    ],
+)
+def test_whatever_a_trial_is_made_of_is_part_of_its_key(change):
+    assert key(trial(**change)) != key(trial()) == key(trial())
+    assert trial(**change) != trial() == trial()
+
+
+def test_a_number_that_the_plant_reads_is_part_of_the_key_too(monkeypatch):
+    before, old = key(trial()), trial()
+    monkeypatch.setitem(globals(), "GAIN", 0.4)
+    assert key(trial()) != before
+    with pytest.raises(ParameterError, match="what it is made of has changed since; make it anew"):
+        run(old)
+
+
+def test_a_damaged_trial_is_done_again(capsys):
+    records = fetch(trial())
+    path_of(trial()).write_bytes(b"nothing")
+    assert_same_numbers(fetch(trial()), records)
+    assert "is damaged, or not a run" in capsys.readouterr().err
+
+
+def test_the_run_of_another_trial_is_not_believed(capsys):
+    fetch(trial())
+    path_of(trial()).rename(path_of(trial(seed=1)))
+    other = fetch(trial(seed=1))
+    assert "holds another run" in capsys.readouterr().err
+    assert_same_numbers(other, run(trial(seed=1)))
+
+
+def test_three_seeds_of_a_random_start_are_three_runs():
+    found = fetch_all([trial(seed=seed) for seed in range(3)], workers=1, progress=False)
+    finals = {records.facts["final_cost"] for records in found.values()}
+    assert len(finals) == 3
+    lengths = [np.bincount(records.steps["episode"]).tolist() for records in found.values()]
+    assert any(min(length) < 6 for length in lengths)  # an episode ended early
+    assert [one.seed for one in found.select(seed=1)] == [1]
+
+
+def test_trials_of_a_notebook_are_done_in_other_processes(runs):
+    """A cell's functions have no module that a worker could import."""
+    cell = {"__name__": "__main__", "np": np, "lstd_q": lstd_q}
+    exec(
+        "leak = 0.8\n"
+        "def plant(state, action, rng):\n"
+        "    return leak * state + 0.3 * action, float(np.abs(state[0] - 1)), False\n"
+        "def make(nmpc):\n"
+        "    return lstd_q(nmpc, 0.5)\n",
+        cell,
+    )
+    own = {"plant": cell["plant"], "make": cell["make"], "start": (0.0,)}
+    trials = [trial(seed=seed, **own) for seed in range(2)]
+    found = fetch_all([*trials, Experiment(episodes=1, steps=3)], workers=2, progress=False)
+    assert len([*(runs / "trials").iterdir()]) == 2
+    for one in trials:
+        assert_same_numbers(found[one], run(one))
+
+
+def test_a_trial_survives_pickling():
+    again = pickle.loads(pickle.dumps(trial()))
+    assert again == trial()
+    assert key(again) == key(trial())
+
+
+def test_a_learner_that_draws_is_given_a_generator_of_the_seed():
+    make = partial(random_direction, alpha=1e-3)
+    one, same = (run(trial(make=make)) for _ in range(2))
+    assert_same_numbers(one, same)
+
+
+def test_theta_is_judged_by_the_mean_of_several_rollouts_with_the_same_draws():
+    records = run(trial(make=frozen, rollouts=3))
+    (cost,) = set(records.evaluations["cost"])
+    assert cost != run(trial(make=frozen)).evaluations["cost"][0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"episodes": 0}, "episodes = 0 must be a whole number from 1"),
+        ({"make": frozen(TANK)}, "must be a function of nmpc: a learner is made anew for each run"),
+        ({"nmpc": None}, "nmpc = None must be an Nmpc"),
+        ({"nmpc": paper.nmpc()}, "theta must be given where the Nmpc has a task and no Problem"),
+        ({"plant": np.random.default_rng(0)}, "this trial cannot be stored: a Generator, .*"),
+    ],
+)
+def test_what_makes_no_trial_is_refused(change, message):
+    with pytest.raises(ParameterError, match=message):
+        trial(**change)
