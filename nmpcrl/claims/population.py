@@ -36,7 +36,7 @@ from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.population_design import HORIZONS, name_of
 
 PICTURE = ("C1", "C2", "C5", "C9")  # the paper's whole picture
-JUDGED = ("judge", "judge again")  # parts
+JUDGED = ("judge", "judge imitating", "judge again")  # parts
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from nmpcrl.analysis.rows import OUTCOME, as_text, cost_ratios, row
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.population import Answer, answers, held, shares
 from nmpcrl.claims.population_questions import RAISED_TO, SAME_CLOSING
-from nmpcrl.claims.published import Damaged, made_here, place, sealed, sums
+from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place, sealed, sums
 from nmpcrl.claims.rule import Paths
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
@@ -95,21 +95,60 @@ def publish(
     Returns:
         Where they are.
     """
-    folder, parts = place(), whole_population()
+    folder = place()
     folder.mkdir(parents=True, exist_ok=True)
-    runs = pd.DataFrame([_row(one, parts[e]) for e, one in summaries.items()])
+    runs = _rows(summaries)
     runs.to_csv(folder / TABLE, index=False, float_format="%.6g")
-    followed = [one.states for e, one in summaries.items() if e.learner in FOLLOWED]
-    arrays: dict[str, Any] = {"positions": _shortened(followed)}
+    arrays: dict[str, Any] = {"positions": _positions(summaries)}
     np.savez_compressed(folder / PATHS, **arrays)
     known = measured() if layouts is None else layouts
     known.to_csv(folder / MEASURED, index_label="layout", float_format="%.9g")
-    effort = {"runs": runs.part.value_counts(sort=False).to_dict()}
-    hours = {"hours": float(runs.seconds.sum() / 3600)}
-    about = made_here() | effort | hours | {"files": sums(folder, (TABLE, PATHS, MEASURED))}
-    write_json(folder / ABOUT, about | {"seal": sealed(about)}, indent=1)
-    _load.cache_clear()
+    _seal(folder, made_here() | _effort(runs))
     return folder
+
+
+def extend(summaries: Mapping[Experiment, RunSummary]) -> Path:
+    """Publish further runs beside those that are there, which stay as they are to the last byte.
+
+    Args:
+        summaries: as of `publish`, which writes them where nothing is published yet.
+
+    Returns:
+        Where they are.
+
+    Raises:
+        Damaged: what is published is not what was written.
+        Unpublishable: a run is there already.
+    """
+    folder = place()
+    if not (folder / ABOUT).exists():
+        return publish(summaries)
+    found, runs = load(), _rows(summaries)
+    both = pd.concat([found.runs.assign(layout=found.runs.layout.map(name_of)), runs])
+    if (again := both.duplicated([*NAMED])).any():
+        one = both[again].iloc[0]
+        raise Unpublishable(f"{one.learner} in layout {one.layout} is published already")
+    with np.load(folder / PATHS, allow_pickle=False) as file:
+        arrays: dict[str, Any] = {"positions": _joined(file["positions"], _positions(summaries))}
+    with (folder / TABLE).open("a", encoding="utf-8") as table:
+        runs.to_csv(table, index=False, header=False, float_format="%.6g")
+    np.savez_compressed(folder / PATHS, **arrays)
+    addition, about = made_here() | _effort(runs), dict(found.about)
+    more = {"additions": [*about.get("additions", []), addition]}
+    _seal(folder, about | more | {"runs": about["runs"] | addition["runs"]})
+    return folder
+
+
+def _effort(runs: pd.DataFrame) -> dict[str, Any]:
+    """How many runs each part has, and how long all took."""
+    counts = runs.part.value_counts(sort=False).to_dict()
+    return {"runs": counts, "hours": float(runs.seconds.sum() / 3600)}
+
+
+def _seal(folder: Path, about: Mapping[str, Any]) -> None:
+    whole = {**about, "files": sums(folder, (TABLE, PATHS, MEASURED))}
+    write_json(folder / ABOUT, whole | {"seal": sealed(whole)}, indent=1)
+    _load.cache_clear()
 
 
 def load() -> PopulationRuns:
@@ -139,6 +178,22 @@ def _load(folder: Path) -> PopulationRuns:
             f"the population is not published whole in {folder} ({error});"
             " `nmpcrl study --population --publish` makes it anew"
         ) from error
+
+
+def _rows(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
+    parts = whole_population()
+    return pd.DataFrame([_row(one, parts[e]) for e, one in summaries.items()])
+
+
+def _positions(summaries: Mapping[Experiment, RunSummary]) -> Column:
+    """Of the last rollouts of those whose paths are kept."""
+    return _shortened([one.states for e, one in summaries.items() if e.learner in FOLLOWED])
+
+
+def _joined(first: Column, second: Column) -> Column:
+    """Positions of some runs before those of others; either may be none."""
+    there = [one for one in (first, second) if len(one)]
+    return np.concatenate(there) if there else first
 
 
 def _row(summary: RunSummary, part: str) -> dict[str, Any]:

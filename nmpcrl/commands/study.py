@@ -43,7 +43,7 @@ def study(
 
     Finished runs are stored, so it can be interrupted and started again. With --publish and --part,
     the runs of these parts are published beside those that are there. With --population, the
-    parts are judge, tune, "N = 20", "N = 40", "alpha x 3" and "judge again", published together.
+    parts are judge, tune, "N = 20", "N = 40", "judge imitating", "alpha x 3" and "judge again".
 
     \b
     Example:
@@ -60,8 +60,6 @@ def study(
         return
     refuse_file()
     chosen = _chosen(parts, population)
-    if population and parts and publish:
-        raise click.ClickException("--population is published whole: leave --part out")
     _check(workers, scheduler, security, publish=publish, sure=yes)
     missing = [e for e in chosen if not summaries.is_stored(e)]
     stored = f"{len(chosen) - len(missing)} of {counted(len(chosen), 'run')}"
@@ -79,7 +77,8 @@ def study(
     if publish and population:
         from nmpcrl.claims import population_published
 
-        click.echo(f"{population_published.publish(found)}: published")
+        publish_runs = population_published.extend if parts else population_published.publish
+        click.echo(f"{publish_runs(found)}: published")
         _judge_population()
     elif publish:
         from nmpcrl.claims.publish import publish_parts, publish_study

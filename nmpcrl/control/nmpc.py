@@ -4,6 +4,7 @@
 `Nmpc.solve(state, theta, action=a)` fixes u_0 = a and is the action value proper.
 """
 
+import math
 import time
 import warnings
 from collections.abc import Mapping
@@ -281,7 +282,7 @@ def _checked(name: str, vector: Vector, size: int, largest: float = ABSURD) -> V
         raise ValueError(f"{name} = {vector!r} must hold {size} numbers") from None
     if vector.shape != (size,):
         raise ValueError(f"{name} has shape {vector.shape}; it must be ({size},)")
-    if not vector.dot(vector) <= largest**2 and not (np.abs(vector) <= largest).all():
+    if not math.hypot(*vector) <= largest and not (np.abs(vector) <= largest).all():
         raise ValueError(
             f"{name} {short(vector)} must hold finite numbers of size at most {largest:g}"
         )

@@ -6,9 +6,9 @@ import pytest
 
 from nmpcrl.analysis.difficulty import MEASURES
 from nmpcrl.claims import population_published as published
-from nmpcrl.claims.published import Damaged
+from nmpcrl.claims.published import Damaged, Unpublishable
 from nmpcrl.study.population import JUDGE, LAYOUTS
-from nmpcrl.study.population_design import COMPARED, HORIZONS, seeds
+from nmpcrl.study.population_design import COMPARED, HORIZONS, seeds, whole_population
 
 NAME = "J001"
 
@@ -37,7 +37,7 @@ def folder(tmp_path, monkeypatch, summaries, layouts):
 def test_what_is_read_is_what_was_published(summaries, layouts):
     found = published.load()
     assert len(found.runs) == len(summaries)
-    assert {*found.runs.part} == {"judge", "judge again"}
+    assert {*found.runs.part} == {"judge", "judge imitating", "judge again"}
     costs = [one.evaluations["cost"][-1] for one in summaries.values()]
     assert found.runs.final_cost.to_numpy() == pytest.approx(costs, rel=1e-5)
     assert found.runs.cost_ratio.notna().all()
@@ -46,7 +46,7 @@ def test_what_is_read_is_what_was_published(summaries, layouts):
     assert {e.learner for e in found.paths} == {"RDES", "GES"}
     pd.testing.assert_frame_equal(found.layouts, layouts, check_names=False)
     assert found.stops.columns.tolist() == [10, 20, 40]
-    assert found.about["runs"] == {"judge": 20, "judge again": 4}
+    assert found.about["runs"] == {"judge": 16, "judge imitating": 4, "judge again": 4}
 
 
 @pytest.mark.usefixtures("folder")
@@ -54,6 +54,33 @@ def test_claims_are_put_to_what_is_published():
     shares = published.load().shares().set_index("claim")
     assert shares.loc["C9", ["holding", "layouts"]].tolist() == [1, 1]
     assert shares.loc["C5", "holding"] == 1
+
+
+def test_parts_are_put_beside_what_is_there(folder, summaries, layouts, monkeypatch, tmp_path):
+    whole = published.load()
+    parts = whole_population()
+    first = {e: one for e, one in summaries.items() if parts[e] == "judge"}
+    others = {e: one for e, one in summaries.items() if e not in first}
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "parts"))
+    there = published.publish(first, layouts)
+    begins = (there / published.TABLE).read_bytes()
+    published.extend(others)
+    assert (there / published.TABLE).read_bytes().startswith(begins)
+    found = published.load()
+    assert found.shares().equals(whole.shares())
+    assert {e: path.tolist() for e, path in found.paths.items()} == {
+        e: path.tolist() for e, path in whole.paths.items()
+    }
+    assert found.about["runs"] == whole.about["runs"]
+    assert [one["runs"] for one in found.about["additions"]] == [
+        {"judge imitating": 4, "judge again": 4}
+    ]
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_run_is_not_published_twice(summaries):
+    with pytest.raises(Unpublishable, match="in layout J001 is published already"):
+        published.extend(dict([*summaries.items()][:1]))
 
 
 def test_the_same_runs_give_the_same_bytes(folder, summaries, layouts):

@@ -23,12 +23,6 @@ def test_the_parts_are_those_of_the_population(command):
     assert "the parts are judge, tune, N = 20" in refused.output
 
 
-def test_a_part_of_the_population_is_not_published_alone(command):
-    refused = command("study", "--population", "--part", "tune", "--publish")
-    assert refused.exit_code == 1
-    assert "leave --part out" in refused.output
-
-
 def test_what_is_not_published_is_not_judged(command):
     refused = command("study", "--population", "--judge")
     assert refused.exit_code == 1

@@ -15,7 +15,8 @@ def test_no_two_layouts_share_a_seed():
 
 
 def test_every_learner_of_the_main_table_is_judged_on_120_layouts_in_two_readings_with_two_seeds():
-    judged = [one for part in ("judge", "judge again") for one in design.arms()[part]]
+    parts = ("judge", "judge imitating", "judge again")
+    judged = [one for part in parts for one in design.arms()[part]]
     assert {one.learner for one in judged} == {*MAIN}
     assert len(judged) == len({*judged}) == 6 * 120 * 2 * 2
 

@@ -51,11 +51,11 @@ def learned(
     figure, (left, right) = subplots(1, 2, height=3.0)
     left.axhline(truth, **LIMIT)
     left.plot(values, color=TEAL)
-    left.set(xlabel="learning step", ylabel=names[0], title="dashed: the plant's")
+    left.set(xlabel="learning step", ylabel=names[0], title="Parameter (dashed: the plant's)")
     right.axhline(0, **LIMIT)
     for (name, course), color, dashes in zip(courses.items(), (WINE, TEAL), ("--", "-"), strict=True):
         right.plot(course, color=color, linestyle=dashes, label=name)
-    right.set(xlabel="step", ylabel=names[1], title="dashed: the target")
+    right.set(xlabel="step", ylabel=names[1], title="State (dashed: the target)")
     below(figure, right.get_legend_handles_labels()[0])
     share = 1 - abs(values[-1] - truth) / abs(values[0] - truth)
     plain = names[0].partition(" [")[0]
