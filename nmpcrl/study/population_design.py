@@ -82,18 +82,18 @@ def runs(
 def arms(episodes: int = paper.EPISODES) -> dict[str, tuple[Experiment, ...]]:
     """The parts of the population's study, in the order in which they are wanted.
 
-    "judge" has the learners that solve for Q; those that imitate come later, with one seed in
-    "judge imitating" and the other in "judge again", the longest parts. "tune" has what predictors
-    are fitted to. The others change one thing in the layouts that are `COMPARED`, with one seed,
-    and the step size in the paper's reading only: so that all of them take less than five hours on
-    two cores.
+    "judge" has the learners that solve for Q with a layout's first seed, "judge imitating" those
+    that imitate it, and "judge again" all of them with the second: the longest part, which changes
+    least, since a layout has only further answers. "tune" has what predictors are fitted to. The
+    others change one thing in the layouts that are `COMPARED`, with one seed, and the step size in
+    the paper's reading only: so that all of them take less than five hours on two cores.
     """
     judged, tuned = [*population.JUDGE], [*population.TUNE]
     learning = ("frozen", *SOLVING_TWICE)
     length: dict[str, Any] = {"episodes": episodes}
     one: dict[str, Any] = {"places": (0,), **length}
     parts = {
-        "judge": runs(SOLVING, judged, **length),
+        "judge": runs(SOLVING, judged, **one),
         "tune": runs(learning, tuned, **one),
     }
     for horizon in HORIZONS:
@@ -101,7 +101,7 @@ def arms(episodes: int = paper.EPISODES) -> dict[str, tuple[Experiment, ...]]:
     parts["judge imitating"] = runs(IMITATING, judged, **one)
     larger: dict[str, Any] = {"alpha": STEP_SIZE * paper.ALPHA, "decays": ("step",)}
     parts[f"alpha x {STEP_SIZE}"] = runs(PAPER, COMPARED, **larger, **one)
-    parts["judge again"] = runs(IMITATING, judged, places=(1,), **length)
+    parts["judge again"] = runs((*SOLVING, *IMITATING), judged, places=(1,), **length)
     return parts
 
 

@@ -46,7 +46,7 @@ def test_what_is_read_is_what_was_published(summaries, layouts):
     assert {e.learner for e in found.paths} == {"RDES", "GES"}
     pd.testing.assert_frame_equal(found.layouts, layouts, check_names=False)
     assert found.stops.columns.tolist() == [10, 20, 40]
-    assert found.about["runs"] == {"judge": 16, "judge imitating": 4, "judge again": 4}
+    assert found.about["runs"] == {"judge": 8, "judge imitating": 4, "judge again": 12}
 
 
 @pytest.mark.usefixtures("folder")
@@ -73,7 +73,7 @@ def test_parts_are_put_beside_what_is_there(folder, summaries, layouts, monkeypa
     }
     assert found.about["runs"] == whole.about["runs"]
     assert [one["runs"] for one in found.about["additions"]] == [
-        {"judge imitating": 4, "judge again": 4}
+        {"judge imitating": 4, "judge again": 12}
     ]
 
 
