@@ -175,7 +175,8 @@ def _rows(
         yield {
             "part": part, "entry": entry, "name": name, "layout": layout, "k": k,
             "initial": initial, "best": best, "cost": np.inf if cost is None else cost,
-            "arrived": letters[letter], "episodes": begun[i] if isinstance(begun, list) else begun, "over": i in block["over"],
+            "arrived": letters[letter], "over": i in block["over"],
+            "episodes": begun[i] if isinstance(begun, list) else begun,
             "seconds": block["seconds"] / len(order),
         }  # fmt: skip
 
