@@ -1,6 +1,7 @@
 """The share of the possible gain that each remedy has, with intervals, in the order of advice."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -22,9 +23,10 @@ def gains(advice: Sequence[Advice]) -> Figure:
     Args:
         advice: of `remedies.advice`, the first on top.
     """
-    figure, panels = subplots(
-        1, len(ADVISED), 0.22 * len(advice) + 0.8, sharex=True, sharey="row", squeeze=False
-    )
+    high = 0.2 * len(advice) + 0.8
+    options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
+    tall = len(ADVISED) * (high + 0.3) + 0.6
+    figure, panels = subplots(1, len(ADVISED), high, tall=tall, **options)
     for axes, part in zip(panels.flat, ADVISED, strict=True):
         _panel(axes, advice, part)
     return headed(figure, _finding(advice))
