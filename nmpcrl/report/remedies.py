@@ -48,6 +48,28 @@ def advice_table(advice: Iterable[Advice], caption: str) -> str:
     return html_table(caption, header, map(_cells, advice), headed=True)
 
 
+def part_table(rows: Iterable[RemedyRow], caption: str) -> str:
+    """One row an entry of a part, in HTML, the control among them; the greatest lower end first.
+
+    Args:
+        rows: of `remedies.rows`.
+        caption: of the table.
+    """
+    order = sorted(rows, key=lambda row: (np.isnan(row.gain.low), -row.gain.low, row.seconds))
+    header = ("Entry", "Share of the possible gain", "Layouts solved", "Rollouts", "CPU time")
+    return html_table(caption, header, map(_part_cells, order), headed=True)
+
+
+def _part_cells(row: RemedyRow) -> tuple[str, ...]:
+    evidence = ("disqualified",) * 2 if row.disqualified else (_gain(row), _solved(row))
+    return (
+        f"<code>{escape(row.name)}</code>",
+        *evidence,
+        f"{row.rollouts}",
+        f"{row.seconds:.1f} s",
+    )
+
+
 def _cells(one: Advice) -> tuple[str, ...]:
     judged = [one.rows.get(part) for part in ADVISED]
     known = [row for row in judged if row]

@@ -1,5 +1,7 @@
 """What a page says of remedies follows from the rows: order, evidence, price and words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bs4 import BeautifulSoup
@@ -20,7 +22,14 @@ from nmpcrl.claims.remedy_questions import (
 from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.report import remedies
 from nmpcrl.report.figures.verdicts.remedies import gains
-from nmpcrl.report.remedies import COLOURS, advice_table, answer_items, in_short, rule
+from nmpcrl.report.remedies import (
+    COLOURS,
+    advice_table,
+    answer_items,
+    in_short,
+    part_table,
+    rule,
+)
 
 SHORT, LONG = ADVISED
 
@@ -71,6 +80,20 @@ def test_who_mostly_fails_is_infinitely_bad_and_not_nan(advised):
     said = cells(advice_table(advised, "All."))[-1][2]
     assert said.startswith("−∞ [−∞, ")
     assert "nan" not in said
+
+
+def test_a_table_of_a_part_begins_with_the_greatest_lower_end_and_has_the_control():
+    rows = [
+        row("frozen", gain=(0.0, 0.0, 0.0)),
+        row("ES", gain=(0.9, 0.1, 1.0)),
+        row("SPSA", gain=(0.5, 0.4, 0.6)),
+        row("Bayes", gain=(np.nan, np.nan, np.nan)),
+        replace(row("DES"), disqualified=True),
+    ]
+    _, *found = cells(part_table(rows, "All."))
+    assert [one[0] for one in found] == ["DES", "SPSA", "ES", "frozen", "Bayes"]
+    assert found[0][1:3] == ["disqualified", "disqualified"]
+    assert found[1][1:] == ["0.50 [0.40, 0.60]|118 layouts", "90% of 120", "49", "0.5 s"]
 
 
 def test_every_word_has_a_colour_and_a_rule():
