@@ -138,6 +138,14 @@ def test_who_loses_at_every_budget_is_never_advised_and_who_gains_at_one_is_open
     assert expectations(found)["DPG is never advised"]
 
 
+def test_a_gain_is_sure_if_its_whole_interval_is_above_0():
+    found = table(block("ES", gains=np.tile([-0.5, 1.0], 10)), block("GES", gains=0.01))
+    by = {one.entry: one for one in rows(found, "judge 50")}
+    assert by["ES"].gain.low < 0 < by["ES"].gain.value
+    assert word(found, "ES") == OPEN
+    assert word(found, "GES") == FIRST
+
+
 def test_who_solves_fewer_than_half_is_never_advised_whatever_it_gains():
     found = table(block("CMA-ES", gains=0.9, arrived=False), block("SPSA", gains=0.1))
     assert word(found, "CMA-ES") == NEVER
