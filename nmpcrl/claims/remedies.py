@@ -137,11 +137,12 @@ def _row(part: str, entry: str, runs: pd.DataFrame) -> RemedyRow:
 
 def advice(table: pd.DataFrame) -> tuple[Advice, ...]:
     """What to try first, second and never, in that order, by `remedy_questions.ADVICE`."""
+    judged = [row for part in ADVISED for row in rows(table, part)]
+    refused = {UNTUNED, *(row.entry for row in judged if row.disqualified)}
     found: dict[str, dict[str, RemedyRow]] = {}
-    for part in ADVISED:
-        for row in rows(table, part):
-            if row.entry != UNTUNED and not row.disqualified:
-                found.setdefault(row.entry, {})[part] = row
+    for row in judged:
+        if row.entry not in refused:
+            found.setdefault(row.entry, {})[row.part] = row
     words = {entry: _word(list(by_part.values())) for entry, by_part in found.items()}
     order = sorted(found, key=lambda entry: (RANK.index(words[entry]), _order(found[entry])))
     for entry, word in zip(

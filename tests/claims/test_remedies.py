@@ -103,7 +103,7 @@ def test_the_best_setting_is_the_one_with_the_greatest_gain_and_the_first_of_equ
 
 
 def test_what_is_disqualified_is_advised_neither_way():
-    assert advice(table(block("ES", over=True))) == ()
+    assert advice(table(block("ES", over=True), block("ES", "judge 300"))) == ()
 
 
 def test_the_greatest_lower_end_is_first_and_not_the_greatest_value():
