@@ -15,7 +15,7 @@ from nmpcrl.analysis.policy_search import FAILED, LOWER, SCALE, SPREAD, UPPER
 from nmpcrl.study import paper
 
 Cost = Callable[[Vector], float]  # theta -> cost of a rollout; infinite where a solve failed
-Search = Callable[[Cost, Vector, int, int], Vector]  # (cost, start, budget, seed) -> theta
+Search = Callable[..., Vector]  # (cost, start, budget, seed, further settings by name) -> theta
 
 POINTS = 11  # of the grid
 WIDEST = 0.35  # theta_c at which the grid ends: d_o, where the penalty vanishes  # departure N
@@ -74,34 +74,45 @@ def grid(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
     return tried.theta
 
 
-def spsa(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
+def spsa(
+    cost: Cost,
+    start: Vector,
+    budget: int,
+    seed: int = 0,
+    *,
+    step: float = STEP,
+    perturbed: float = PERTURBED,
+) -> Vector:
     """Simultaneous perturbation: two rollouts an iteration, on either side of theta.
 
     g = (y+ - y-) / (2 c_k) sign, theta <- theta - a_k g, with a_k = a / (k + 1 + A)^0.602 and
-    c_k = c / (k + 1)^0.101; `a` is such that the first step is `STEP` long in each component. A
-    rollout that is left over judges the last theta.  Source: Spall (1998).
+    c_k = perturbed / (k + 1)^0.101; `a` is such that the first step is `step` long in each
+    component. A rollout that is left over judges the last theta.  Source: Spall (1998).
     """
     tried, rng = Tried(cost, start, budget), np.random.default_rng(seed)
     point, delay, a, k = np.asarray(start, float) / SCALE, budget / 20, 0.0, 0
     while tried.left >= 2:
         signs = rng.choice([-1.0, 1.0], point.size)
-        c = PERTURBED / (k + 1) ** FADING
+        c = perturbed / (k + 1) ** FADING
         up, down = (
             tried(np.clip(point + side * c * signs, tried.lower, tried.upper)) for side in (1, -1)
         )
         slope = (up - down) / (2 * c)
-        a = a or (STEP * (1 + delay) ** DECAY / abs(slope) if slope else 0.0)
-        step = np.clip(a / (k + 1 + delay) ** DECAY * slope, -STEP, STEP)
-        point, k = np.clip(point - step * signs, tried.lower, tried.upper), k + 1
+        a = a or (step * (1 + delay) ** DECAY / abs(slope) if slope else 0.0)
+        length = np.clip(a / (k + 1 + delay) ** DECAY * slope, -step, step)
+        point, k = np.clip(point - length * signs, tried.lower, tried.upper), k + 1
     if tried.left:
         tried(point)
     return tried.theta
 
 
-def cma_es(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
+def cma_es(
+    cost: Cost, start: Vector, budget: int, seed: int = 0, *, spread: float = SPREAD
+) -> Vector:
     """CMA-ES, begun anew from the best point where it has converged; Hansen (2016).
 
-    Of a generation that the budget cuts off, the rollouts are made that it has room for.
+    The first rollouts lie `spread` about it, in `SCALE`s. Of a generation that the budget cuts off,
+    the rollouts are made that it has room for.
     """
     import cma  # takes a second
 
@@ -112,7 +123,7 @@ def cma_es(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
             "seed": 1 + (seed + 7919 * again) % (2**31 - 2),  # 0 would mean the clock
             "verbose": -9,
         }
-        strategy = cma.CMAEvolutionStrategy(tried.best, SPREAD, options)
+        strategy = cma.CMAEvolutionStrategy(tried.best, spread, options)
         while tried.left and not strategy.stop():
             asked = strategy.ask()
             costs = [tried(one) for one in asked[: tried.left]]
@@ -122,10 +133,12 @@ def cma_es(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
     return tried.theta
 
 
-def bayesian(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
+def bayesian(
+    cost: Cost, start: Vector, budget: int, seed: int = 0, *, nearby: float = NEARBY
+) -> Vector:
     """Bayesian optimisation by tree-structured Parzen estimators; Bergstra et al. (2011).
 
-    Its first rollouts are drawn, from the box within `NEARBY` of the start: hardly any theta of the
+    Its first rollouts are drawn, from the box within `nearby` of the start: hardly any theta of the
     whole box brings the robot to its target.
 
     Raises:
@@ -135,8 +148,8 @@ def bayesian(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
 
     tried = Tried(cost, start, budget)
     names = [f"{k}: {name}" for k, name in enumerate(paper.THETA_NAMES)]
-    lower = np.maximum(tried.lower, tried.best - NEARBY)
-    upper = np.minimum(tried.upper, tried.best + NEARBY)
+    lower = np.maximum(tried.lower, tried.best - nearby)
+    upper = np.minimum(tried.upper, tried.best + nearby)
     box: dict[str, Any] = {
         name: optuna.distributions.FloatDistribution(*ends)
         for name, *ends in zip(names, lower, upper, strict=True)

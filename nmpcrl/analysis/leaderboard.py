@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.analysis.entries import ENTRIES, Factory, Policy
+from nmpcrl.analysis.entries import ENTRIES, Factory, Policy, entry_with
 from nmpcrl.analysis.interaction import OverBudget, Robot
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
 from nmpcrl.control import SolverError
@@ -78,13 +78,16 @@ class Row:
 
 
 def entry_of(name: str) -> Factory:
-    """An entry by its name in `ENTRIES`, or as MODULE:FACTORY; the working directory is searched.
+    """An entry by its name in `ENTRIES`, with something set or not, or as MODULE:FACTORY.
+
+    The working directory is searched, too.
 
     Raises:
         NoEntry: there is none.
+        NoSetting: it cannot be set so.
     """
-    if name in ENTRIES:
-        return ENTRIES[name]
+    if name.partition("[")[0] in ENTRIES:
+        return entry_with(name)
     module, colon, attribute = name.partition(":")
     if not (module and colon and attribute):
         shipped = "one that ships, such as ES, undone-GES or CMA-ES"

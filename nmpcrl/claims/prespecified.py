@@ -3,7 +3,8 @@
 They were fixed in the first commit since which every committed state of the code has had each of
 `NUMBERS`, by name and value, as it is today; what surrounds them may have moved. The commit is kept
 with the published data, and a test asks git whether it is still the one. What is asked of the
-population of layouts came later and stands in `population_questions`.
+population of layouts came later and stands in `population_questions`; of remedies, in
+`remedy_questions`.
 """
 
 from collections.abc import Mapping

@@ -12,6 +12,7 @@ from nmpcrl.commands.completion import completion
 from nmpcrl.commands.evaluate import evaluate
 from nmpcrl.commands.grade import grade
 from nmpcrl.commands.refusals import Commands
+from nmpcrl.commands.remedies import remedies
 from nmpcrl.commands.runs import runs
 from nmpcrl.commands.show import show
 from nmpcrl.commands.study import study
@@ -48,6 +49,7 @@ for command in (
     verify,
     bench,
     suite,
+    remedies,
     grade,
     wasm,
     completion,

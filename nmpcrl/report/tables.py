@@ -48,7 +48,7 @@ def claim_table(claims: Iterable[Claim], caption: str) -> str:
         )
         for c in claims
     )
-    return _table(caption, ("Claim", "What is asked and measured", "Threshold and test"), rows)
+    return html_table(caption, ("Claim", "What is asked and measured", "Threshold and test"), rows)
 
 
 def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verdict] = ()) -> str:
@@ -69,7 +69,7 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
         for v in verdicts
     )
     header = ("The paper claims", "Published", "Runs of this page")
-    return _table(scope, header if others else ("The paper claims", "Here"), rows)
+    return html_table(scope, header if others else ("The paper claims", "Here"), rows)
 
 
 def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
@@ -87,7 +87,7 @@ def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
         )
         for v in decided
     )
-    return _table(caption, header, rows, headed=True)
+    return html_table(caption, header, rows, headed=True)
 
 
 def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
@@ -100,7 +100,7 @@ def assumption_table(assumptions: Iterable[Assumption], caption: str) -> str:
         )
         for a in assumptions
     )
-    return _table(caption, ("Assumption", *THEOREMS, "Here"), rows)
+    return html_table(caption, ("Assumption", *THEOREMS, "Here"), rows)
 
 
 def target_table(targets: Iterable[Target], caption: str) -> str:
@@ -109,7 +109,7 @@ def target_table(targets: Iterable[Target], caption: str) -> str:
         (_text(t.what), _text(t.to_reach), f"{_badge(*MET[t.reached])}<br>{_text(t.measured)}")
         for t in targets
     )
-    return _table(caption, ("What", "To reach", "Here"), rows)
+    return html_table(caption, ("What", "To reach", "Here"), rows)
 
 
 TIMES = {  # columns of `time_learners` with one number each, and what one of their units is
@@ -142,7 +142,7 @@ def timing_table(timings: pd.DataFrame, machine: str) -> str:
         for row in timings.to_dict("records")
     )
     header = ("step of", *(words for words, _ in TIMES.values()), "ratio")
-    return _table(f"Times of a learning step on {machine}.", header, rows, headed=True)
+    return html_table(f"Times of a learning step on {machine}.", header, rows, headed=True)
 
 
 def evidence(verdicts: Iterable[Verdict]) -> str:
@@ -207,7 +207,7 @@ def _options(names: list[str]) -> str:
 LEFT = 'style="text-align: left"'  # the theme and Jupyter turn cells to the right
 
 
-def _table(
+def html_table(
     caption: str, header: tuple[str, ...], rows: Iterable[tuple[str, ...]], *, headed: bool = False
 ) -> str:
     """A table whose cells are HTML already; `headed` if they are words in rows that have a name."""

@@ -112,5 +112,6 @@ def test_the_stand_ins_stand_where_the_commands_look(fast):
         "bench --sizes",
         "show ES",
         "suite --policy ES",
+        "remedies --part best",
     ):
         assert "not here" in fast(*line.split()).output, line

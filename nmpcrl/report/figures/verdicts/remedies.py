@@ -1,0 +1,64 @@
+"""The share of the possible gain that each remedy has, with intervals, in the order of advice."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from nmpcrl.claims.remedies import Advice
+from nmpcrl.claims.remedy_questions import ADVISED, FIRST, NEVER, PARTS, SECOND
+from nmpcrl.report.figures.style import AT_ONE, INK, LIMIT, TEAL, WINE, headed, page, subplots
+
+COLOURS = {FIRST: TEAL, SECOND: TEAL, NEVER: WINE}  # others are in ink
+MARKS = {FIRST: "D", SECOND: "D", NEVER: "X"}  # others are round
+LEAST, MOST = -1.0, 1.15  # shares that are drawn; what is lower ends in an arrow
+
+
+@page
+def gains(advice: Sequence[Advice]) -> Figure:
+    """One row an entry, one panel a budget: the interquartile mean over layouts, with its interval.
+
+    Args:
+        advice: of `remedies.advice`, the first on top.
+    """
+    high = 0.2 * len(advice) + 0.8
+    options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
+    tall = len(ADVISED) * (high + 0.3) + 0.6
+    figure, panels = subplots(1, len(ADVISED), high, tall=tall, **options)
+    for axes, part in zip(panels.flat, ADVISED, strict=True):
+        _panel(axes, advice, part)
+    return headed(figure, _finding(advice))
+
+
+def _panel(axes: Axes, advice: Sequence[Advice], part: str) -> None:
+    axes.axvline(0, **LIMIT)
+    axes.axvline(1, **AT_ONE)
+    for y, one in enumerate(advice):
+        if part in one.rows:
+            _mark(axes, y, one, part)
+    names = [f"{one.entry}: {one.word}" for one in advice]
+    axes.set_yticks(range(len(advice)), names, fontsize="small")
+    axes.set(xlim=(LEAST, MOST), ylim=(len(advice) - 0.4, -0.6))
+    axes.set(xlabel="share of the possible gain [-]")
+    axes.set_title(f"{PARTS[part].budget} episodes", fontsize="medium", fontweight="normal")
+
+
+def _mark(axes: Axes, y: int, one: Advice, part: str) -> None:
+    """A mark with its interval; an arrow where it lies beyond the panel."""
+    share, colour = one.rows[part].gain, COLOURS.get(one.word, INK)
+    low, high = np.clip([share.low, share.high], LEAST, MOST)
+    axes.plot([low, high], [y, y], color=colour, linewidth=1.6)
+    if share.value < LEAST:
+        axes.plot(LEAST, y, marker="<", color=colour, markersize=6, clip_on=False)
+    else:
+        axes.plot(share.value, y, marker=MARKS.get(one.word, "o"), color=colour, markersize=5)
+
+
+def _finding(advice: Sequence[Advice]) -> str:
+    """What to try first, second and never, in a title."""
+    by = {word: [one.entry for one in advice if one.word == word] for word in MARKS}
+    said = [f"{word} {', '.join(by[word])}" for word in MARKS if by[word]]
+    text = "; ".join(said) or "nothing surely gains"
+    return f"What to try: {text}"

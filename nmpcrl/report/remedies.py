@@ -1,0 +1,135 @@
+"""What to try where learning fails, as a page shows it: the table of advice, and the answers."""
+
+from collections.abc import Iterable
+from html import escape
+
+import numpy as np
+
+from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.claims.population import Answer
+from nmpcrl.claims.remedies import Advice, RemedyRow
+from nmpcrl.claims.remedy_questions import (
+    ADVICE,
+    ADVISED,
+    FIRST,
+    LATER,
+    NEVER,
+    OPEN,
+    PARTS,
+    REMEDY_QUESTIONS,
+    SECOND,
+)
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.report.cited import cited
+from nmpcrl.report.tables import BADGES, html_table
+from nmpcrl.report.text import listed
+
+COLOURS = {  # of a word, as of a verdict
+    FIRST: REPRODUCED, SECOND: REPRODUCED, LATER: PARTLY, OPEN: UNDECIDABLE, NEVER: NOT,
+}  # fmt: skip
+NOTHING = "–"  # where an entry was not judged
+
+
+def advice_table(advice: Iterable[Advice], caption: str) -> str:
+    """One row an entry, in HTML: whether to try it, its evidence, and its price.
+
+    The price of a layout is in rollouts, confirming ones and a tuner's own included, and in
+    processor time; beside it stands what was spent once to find the setting.
+
+    Args:
+        advice: of `remedies.advice`, in its order.
+        caption: of the table.
+    """
+    budgets = [PARTS[part].budget for part in ADVISED]
+    header = (
+        "Entry", "Try it", *(f"Share of the possible gain, {n} rollouts" for n in budgets),
+        "Layouts solved", "Rollouts", "CPU time", "Rollouts of tuning",
+    )  # fmt: skip
+    return html_table(caption, header, map(_cells, advice), headed=True)
+
+
+def part_table(rows: Iterable[RemedyRow], caption: str) -> str:
+    """One row an entry of a part, in HTML, the control among them; the greatest lower end first.
+
+    Args:
+        rows: of `remedies.rows`.
+        caption: of the table.
+    """
+    order = sorted(rows, key=lambda row: (np.isnan(row.gain.low), -row.gain.low, row.seconds))
+    header = ("Entry", "Share of the possible gain", "Layouts solved", "Rollouts", "CPU time")
+    return html_table(caption, header, map(_part_cells, order), headed=True)
+
+
+def _part_cells(row: RemedyRow) -> tuple[str, ...]:
+    evidence = ("disqualified",) * 2 if row.disqualified else (_gain(row), _solved(row))
+    return (
+        f"<code>{escape(row.name)}</code>",
+        *evidence,
+        f"{row.rollouts}",
+        f"{row.seconds:.1f} s",
+    )
+
+
+def _cells(one: Advice) -> tuple[str, ...]:
+    judged = [one.rows.get(part) for part in ADVISED]
+    known = [row for row in judged if row]
+    return (
+        f"<code>{escape(known[0].name)}</code>",
+        f'<span class="{BADGES[COLOURS[one.word]]}">{one.word}</span>',
+        *(_gain(row) if row else NOTHING for row in judged),
+        "<br>".join(_solved(row) for row in known),
+        "<br>".join(f"{row.rollouts}" for row in known),
+        "<br>".join(f"{row.seconds:.1f} s" for row in known),
+        f"{one.tuning:,}" if one.tuning else "none",
+    )
+
+
+def _gain(row: RemedyRow) -> str:
+    """The share of the possible gain, its interval, and in how many layouts."""
+    layouts = row.layouts - row.left_out
+    what = f"share of the possible gain, {row.entry}, {row.part}: published"
+    return f"{cited(_shown(row.gain), row.gain, what)}<br>{layouts} layouts"
+
+
+def _shown(share: Estimate) -> str:
+    """With its interval; a quarter of failures or more is infinitely bad."""
+    text = f"{share:.2f}" if np.isfinite(share.low) else f"{share.value:.2f} [{share.low:.2f}, …]"
+    return text.replace("-", "−").replace("inf", "∞")
+
+
+def _solved(row: RemedyRow) -> str:
+    what = f"layouts solved, {row.entry}, {row.part}: published"
+    return cited(f"{row.solved.value:.0%} of {row.layouts}", row.solved, what)
+
+
+def rule() -> str:
+    """How the words of the table follow from its rows, in Markdown: one item a word."""
+    return "\n".join(f"- **{word}**: {when}." for word, when in ADVICE.items())
+
+
+def in_short(advice: Iterable[Advice]) -> str:
+    """The advice in a sentence or two: what to try first, second, and never."""
+    by: dict[str, list[str]] = {}
+    for one in advice:
+        by.setdefault(one.word, []).append(f"`{one.entry}`")
+    said = [f"Try {by[FIRST][0]} first" if FIRST in by else "Nothing compared surely gains"]
+    if SECOND in by:
+        said[0] += f" and {by[SECOND][0]} second"
+    if NEVER in by:
+        said.append(f"Never try {listed(by[NEVER])}")
+    return f"{'. '.join(said)}."
+
+
+def answer_items(answers: Iterable[Answer]) -> str:
+    """One item a question, in Markdown: the pilot, the question, and what became of it."""
+    return "\n".join(_item(one) for one in answers)
+
+
+def _item(answer: Answer) -> str:
+    asked = REMEDY_QUESTIONS[answer.question]
+    pilot = f" The pilot: “{asked.pilot}”" if asked.pilot else ""
+    said = [f"{yes} of {of} {name}" for name, (yes, of) in answer.counts.items()]
+    if "difference" in answer.numbers:
+        found = Estimate(*(answer.numbers[name] for name in ("difference", "low", "high")))
+        said.append(f"the difference is {_shown(found)}")
+    return f"- **{asked.question}** {answer.words.capitalize()}: {'; '.join(said)}.{pilot}"

@@ -1,0 +1,97 @@
+"""What is asked of the remedies: complete, and not moved since it was fixed."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from nmpcrl.analysis.entries import ENTRIES, called, entry_with
+from nmpcrl.analysis.judgements import LAYOUTS
+from nmpcrl.claims import remedy_questions
+from nmpcrl.claims.remedy_questions import (
+    ADVICE,
+    ADVISED,
+    CONTROLS,
+    DEAR,
+    EXPECTED_FIRST,
+    EXPECTED_NEVER,
+    PARTS,
+    REMEDY_QUESTIONS,
+    RUNS_OF_TUNING,
+    SETTINGS,
+)
+from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.provenance import code
+
+FILE = Path(remedy_questions.__file__)
+ROOT = FILE.parents[2]
+
+
+def git(*arguments: str) -> str:
+    asked = ["git", "-C", str(ROOT), *arguments]
+    shallow = ["git", "-C", str(ROOT), "rev-parse", "--is-shallow-repository"]
+    done, whole = (subprocess.run(one, capture_output=True, text=True) for one in (asked, shallow))
+    if done.returncode or whole.stdout.strip() != "false":
+        pytest.skip(f"the history is not here: {done.stderr}")
+    return done.stdout.strip()
+
+
+def test_the_questions_are_those_of_the_commit_that_added_them():
+    path = FILE.relative_to(ROOT).as_posix()
+    added = git("log", "--format=%H", "--diff-filter=A", "--", path)
+    if not added:
+        pytest.skip("it is not committed yet")
+    assert code(git("show", f"{added.splitlines()[-1]}:{path}")) == code(FILE.read_text("utf-8"))
+
+
+def test_the_questions_are_older_than_the_runs_that_are_published():
+    runs = git("log", "--format=%H", "--diff-filter=A", "--", "book/published/suite.json")
+    if not runs:
+        pytest.skip("no run is published yet")
+    path = FILE.relative_to(ROOT).as_posix()
+    added = git("log", "--format=%H", "--diff-filter=A", "--", path).splitlines()[-1]
+    assert added in git("rev-list", f"{runs.splitlines()[-1]}^").split()
+
+
+def test_every_entry_ships_and_begins_its_tuning_as_it_ships():
+    assert {*SETTINGS} <= {*ENTRIES}
+    for entry, settings in SETTINGS.items():
+        names = [called(entry, setting) for setting in settings]
+        assert names[:1] in ([entry], [])
+        assert len({*names}) == len(names)
+        assert all(entry_with(name) for name in names)
+
+
+def test_every_entry_that_has_a_setting_has_as_many_runs_of_tuning():
+    assert {len(one) for one in SETTINGS.values()} == {0, RUNS_OF_TUNING}
+    free = {entry for entry, settings in SETTINGS.items() if not settings}
+    assert free == {one for one in SETTINGS if not getattr(ENTRIES[one], "defaults", {})}
+
+
+def test_what_is_tuned_on_is_never_judged_on():
+    assert {*PARTS["tune"].layouts} <= {*TUNE}
+    for part in ADVISED:
+        assert {*PARTS[part].layouts} <= {*JUDGE}
+    assert all({*one.layouts} <= {*LAYOUTS} for one in PARTS.values())
+
+
+def test_what_is_judged_in_fewer_layouts_is_compared_at_all():
+    for part in PARTS.values():
+        assert {*part.fewer} <= {*SETTINGS}
+        for entry in {*SETTINGS} - {*CONTROLS, *DEAR}:
+            assert len(part.layouts_of(entry)) >= min(len(part.layouts), 60)
+    assert PARTS["judge 50"].layouts_of("GN-J")[-1] == "J060"
+    assert PARTS["judge 300"].layouts_of("guarded-RDES") == ()
+
+
+def test_what_is_expected_can_come_true():
+    assert {PARTS[part].budget for part in ADVISED} == {*EXPECTED_FIRST}
+    assert {*EXPECTED_FIRST.values(), *EXPECTED_NEVER} <= {*SETTINGS}
+    assert len({*ADVICE}) == 5
+
+
+def test_a_question_says_how_it_is_decided():
+    for one in REMEDY_QUESTIONS.values():
+        assert one.question.endswith("?")
+        assert all((one.asked_of, one.measured, one.border))
+        assert one.pilot == "" or one.pilot.endswith(".")
