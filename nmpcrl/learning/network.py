@@ -44,6 +44,7 @@ class Predictor:
             activation: of the hidden layers.
             scales: what inputs and target are divided by.
         """
+        torch.set_num_threads(1)  # this thread's own number: with another, last bits are others
         self._weights, self._gradient, self._widths = weights, gradient, widths
         self._activation = activation
         self._input_scale, self._target_scale = scales
