@@ -111,8 +111,8 @@ def cma_es(
 ) -> Vector:
     """CMA-ES, begun anew from the best point where it has converged; Hansen (2016).
 
-    The first rollouts lie `spread` about it, in `SCALE`s. Of a generation that the budget cuts off,
-    the rollouts are made that it has room for.
+    The first rollouts lie `spread` about it, in units of `SCALE`. Of a generation that the budget
+    cuts off, the rollouts are made that it has room for.
     """
     import cma  # takes a second
 
