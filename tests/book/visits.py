@@ -23,7 +23,10 @@ UNREADABLE = "[data-mjx-error], mjx-container mtext[mathcolor=red]"  # errors, u
 TYPESET = "window.MathJax?.startup?.promise"
 WIDTH = "document.documentElement.scrollWidth"
 OPEN = "document.querySelectorAll('details').forEach(box => (box.open = true))"
-SETTLED = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+SETTLED = """new Promise(done => {  // a browser may stop drawing
+  requestAnimationFrame(() => requestAnimationFrame(done))
+  setTimeout(done, 5000)
+})"""
 STILL = "*, ::before, ::after { transition: none !important; animation: none !important; }"
 
 # A page repeats formulas and words of code by the thousand: the first of each kind stands for all.
