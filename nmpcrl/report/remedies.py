@@ -31,20 +31,13 @@ NOTHING = "–"  # where an entry was not judged
 
 
 def advice_table(advice: Iterable[Advice], caption: str) -> str:
-    """One row an entry, in HTML: whether to try it, its evidence, and its price.
-
-    The price of a layout is in rollouts, confirming ones and a tuner's own included, and in
-    processor time; beside it stands what was spent once to find the setting.
+    """One row an entry, in HTML: whether to try it, and its evidence and price by budget.
 
     Args:
         advice: of `remedies.advice`, in its order.
         caption: of the table.
     """
-    budgets = [PARTS[part].budget for part in ADVISED]
-    header = (
-        "Entry", "Try it", *(f"Share of the possible gain, {n} rollouts" for n in budgets),
-        "Layouts solved", "Rollouts", "CPU time", "Rollouts of tuning",
-    )  # fmt: skip
+    header = ("Entry", "Try it", *(f"With {PARTS[part].budget} episodes" for part in ADVISED))
     return html_table(caption, header, map(_cells, advice), headed=True)
 
 
@@ -62,33 +55,36 @@ def part_table(rows: Iterable[RemedyRow], caption: str) -> str:
 
 def _part_cells(row: RemedyRow) -> tuple[str, ...]:
     evidence = ("disqualified",) * 2 if row.disqualified else (_gain(row), _solved(row))
-    return (
-        f"<code>{escape(row.name)}</code>",
-        *evidence,
-        f"{row.rollouts}",
-        f"{row.seconds:.1f} s",
-    )
+    return (_name(row.name), *evidence, f"{row.rollouts}", f"{row.seconds:.1f} s")
 
 
 def _cells(one: Advice) -> tuple[str, ...]:
     judged = [one.rows.get(part) for part in ADVISED]
-    known = [row for row in judged if row]
+    (known, *_) = [row for row in judged if row]
     return (
-        f"<code>{escape(known[0].name)}</code>",
+        _name(known.name),
         f'<span class="{BADGES[COLOURS[one.word]]}">{one.word}</span>',
-        *(_gain(row) if row else NOTHING for row in judged),
-        "<br>".join(_solved(row) for row in known),
-        "<br>".join(f"{row.rollouts}" for row in known),
-        "<br>".join(f"{row.seconds:.1f} s" for row in known),
-        f"{one.tuning:,}" if one.tuning else "none",
+        *(_evidence(row) if row else NOTHING for row in judged),
     )
 
 
+def _evidence(row: RemedyRow) -> str:
+    """What it gained, and below that how many layouts it solves, and at which price."""
+    price = f"{row.rollouts} rollouts, {row.seconds:.1f} s"
+    return f"{_gain(row)}<br><small>{_solved(row)} layouts; {price}</small>"
+
+
+def _name(name: str) -> str:
+    """An entry, and below it what is set."""
+    entry, bracket, setting = name.partition("[")
+    below = f"<br><small>{escape(setting.rstrip(']'))}</small>" if bracket else ""
+    return f"<code>{escape(entry)}</code>{below}"
+
+
 def _gain(row: RemedyRow) -> str:
-    """The share of the possible gain, its interval, and in how many layouts."""
-    layouts = row.layouts - row.left_out
+    """The share of the possible gain with its interval."""
     what = f"share of the possible gain, {row.entry}, {row.part}: published"
-    return f"{cited(_shown(row.gain), row.gain, what)}<br>{layouts} layouts"
+    return cited(_shown(row.gain), row.gain, what)
 
 
 def _shown(share: Estimate) -> str:

@@ -86,7 +86,7 @@ def test_tagged_cells_become_the_boxes_of_the_page():
         tagged('<a id="alg-a"></a>\n**Algorithm 1.1.** *Learning*\n\n1. Solve', "algorithm"),
     )
     assert [cell.source for cell in cells] == [
-        "::::::{admonition} Learning goals\n:class: tip\n\nAfter\n::::::",
+        "::::::{admonition} Learning goals\n:class: tip dropdown\n\nAfter\n::::::",
         "::::::{admonition} Try\n:class: seealso\n\nA seed\n::::::",
         "::::::{exercise}\n:label: ex-a\n\nHow?\n::::::",
         "::::::{solution} ex-a\n:class: dropdown\n\nSo.\n::::::",
@@ -198,3 +198,31 @@ def test_what_a_first_solve_says_stands_on_no_page_and_all_else_does(said, left)
     outputs = enrich.without_notices(executed).cells[0].outputs
     assert [one.text for one in outputs if one.output_type == "stream"] == left
     assert outputs[-1] == shown
+
+
+def test_a_page_begins_with_what_was_found_and_has_one_set_up():
+    shown = displayed(text_markdown="1. It moves.")
+    cells = dressed(
+        new_markdown_cell("# Title"),
+        tagged("**Learning goals.** After", "goals"),
+        new_code_cell("layout = 'A'", metadata={"tags": ["parameters"]}),
+        new_code_cell("import numpy"),
+        new_code_cell("1", outputs=[displayed(text_plain="1")]),
+        tagged("## What we saw\n", "opening"),
+        new_code_cell('say("1. It moves.")', outputs=[shown], metadata={"tags": ["opening"]}),
+        new_markdown_cell("## Exercises"),
+    )
+    title, box, goals, set_up, shows, exercises = [cell.source for cell in cells]
+    assert (title, shows, exercises) == ("# Title", "1", "## Exercises")
+    assert box == "::::::{admonition} In short\n:class: note\n\n1. It moves.\n::::::"
+    assert "Learning goals" in goals
+    assert set_up == "layout = 'A'\n\nimport numpy"
+    assert "hide-input" in cells[3].metadata["tags"]
+
+
+def test_the_opening_of_a_page_that_was_not_executed_stays_where_it_is():
+    cells = dressed(
+        new_markdown_cell("# Title"),
+        new_code_cell('say("1. It moves.")', metadata={"tags": ["opening"]}),
+    )
+    assert [cell.source for cell in cells] == ["# Title", 'say("1. It moves.")']

@@ -154,7 +154,7 @@ MACROS = re.findall(  # KaTeX of VS Code has them, and so has MathJax of Jupyter
     """
     alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta kappa lambda mu nu pi varpi
     rho varrho sigma varsigma phi varphi omega Gamma Delta Xi Pi Upsilon ell gimel partial nabla
-    approx ge gg in le leftarrow mapsto mid subseteq to cdot pm star times top
+    approx ge gg in infty le leftarrow mapsto mid subseteq to cdot pm star times top
     arg cos log max min sin operatorname sum binom dot frac hat sqrt tfrac underbrace
     left right lVert rVert bigl bigr Bigl Bigr dots quad qquad
     boldsymbol mathbb mathbf mathcal mathrm text textstyle begin end tag

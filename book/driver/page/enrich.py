@@ -12,6 +12,7 @@ What the page needs stands where an editor shows nothing, or as what an editor s
 | `<details><summary>title</summary>` | a box that opens |
 | a list of `<a id="key"></a>` on the page of references | the bibliography |
 | `<!-- output: page.ipynb tag -->` | what the cell with that tag displayed |
+| cells tagged `opening` | a box below the title |
 | cells tagged `goals`, `try`, `exercise`, `solution`, `algorithm` | boxes |
 | a cell tagged `caption` after a figure | its caption, with number and label |
 | cells that only call `say` or `source` | the paragraphs that they displayed |
@@ -24,6 +25,7 @@ from typing import Any
 
 import nbformat
 
+from driver.page.opening import opened
 from nmpcrl.control.solvers.riccati import NOTICE
 
 Cell = Any  # nbformat's, a dictionary with attributes
@@ -68,9 +70,10 @@ def page(markdown: str, outputs: Callable[[str, str], str]) -> str:
 
 def notebook(source: Any, download: str = "") -> Any:
     """A notebook, executed or not, for the page, with a link to its file below the title."""
-    source.cells = list(_captioned(_dressed(source.cells)))
+    first, rest = opened(list(_captioned(_dressed(source.cells))))
     if download:
-        source.cells.insert(1, nbformat.v4.new_markdown_cell(DOWNLOAD.format(download)))
+        first.append(nbformat.v4.new_markdown_cell(DOWNLOAD.format(download)))
+    source.cells = [*first, *rest]
     for cell in source.cells:
         for output in cell.get("outputs", []):
             if "text/markdown" in output.get("data", {}):
@@ -154,7 +157,8 @@ def _dressed(cells: list[Cell]) -> Iterator[Cell]:
 def _paragraphs(cell: Cell) -> Cell:
     """What a cell displayed, as a Markdown cell."""
     shown = (one.data["text/markdown"] for one in cell.outputs if "data" in one)
-    return nbformat.v4.new_markdown_cell("\n\n".join(map(text, shown)), id=cell.id)
+    whole, about = "\n\n".join(map(text, shown)), {"tags": _tags(cell)}
+    return nbformat.v4.new_markdown_cell(whole, id=cell.id, metadata=about)
 
 
 def _captioned(cells: Iterator[Cell]) -> Iterator[Cell]:
@@ -201,7 +205,8 @@ NUMBERED = {"eq": "eq", "fig": "numref", "alg": "prf:ref"}
 
 def _goals(source: str, _: str) -> str:
     return _box(
-        "{admonition} Learning goals\n:class: tip", source.removeprefix("**Learning goals.** ")
+        "{admonition} Learning goals\n:class: tip dropdown",
+        source.removeprefix("**Learning goals.** "),
     )
 
 

@@ -1,0 +1,53 @@
+"""The beginning of a page: what was found, and then what a chapter needs before it can find it.
+
+A notebook has to load before it can say anything, so what it found stands where it is known. On the
+page the cells tagged `opening` come first, in a box, and the code that sets a chapter up is one
+cell that is folded.
+"""
+
+import re
+from typing import Any
+
+from nbformat.v4 import new_markdown_cell
+
+Cell = Any  # nbformat's, a dictionary with attributes
+
+HEADING = re.compile(r"^#+ .*\n*", flags=re.M)
+PROMPTS = {"show": "Show the parameters and the set-up", "hide": "Hide the parameters"}
+
+
+def opened(cells: list[Cell]) -> tuple[list[Cell], list[Cell]]:
+    """The cells of a dressed page up to its set-up, and those from there on.
+
+    What was not executed has nothing to say, and stays.
+    """
+    found = [cell for cell in cells if "opening" in _tags(cell) and cell.cell_type == "markdown"]
+    title, *rest = [cell for cell in cells if cell not in found]
+    said = "\n\n".join(filter(None, (HEADING.sub("", cell.source).strip() for cell in found)))
+    if not said:
+        return [title], _set_up(rest)
+    box = f"::::::{{admonition}} In short\n:class: note\n\n{said}\n::::::"
+    return [title, new_markdown_cell(box, id="opening")], _set_up(rest)
+
+
+def _set_up(cells: list[Cell]) -> list[Cell]:
+    """The cells, with one in the place of the code that shows nothing from the parameters on."""
+    first = next((i for i, cell in enumerate(cells) if "parameters" in _tags(cell)), None)
+    if first is None:
+        return cells
+    last = next(i for i, cell in enumerate([*cells[first:], None], first) if not _silent(cell))
+    one, *others = cells[first:last]
+    one.source = "\n\n".join(cell.source for cell in (one, *others))
+    one.metadata["tags"] = [*_tags(one), "hide-input"]
+    one.metadata["mystnb"] = {f"code_prompt_{name}": text for name, text in PROMPTS.items()}
+    return [*cells[:first], one, *cells[last:]]
+
+
+def _silent(cell: Cell) -> bool:
+    """Whether it is code that displays nothing."""
+    return cell is not None and cell.cell_type == "code" and not cell.outputs
+
+
+def _tags(cell: Cell) -> list[str]:
+    tags: list[str] = cell.metadata.get("tags", [])
+    return tags
