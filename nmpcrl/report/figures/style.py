@@ -65,6 +65,17 @@ SYMBOLS = {  # of paper.THETA_NAMES, between dollar signs
     "heading_f": r"\theta_{\varphi_f}",
     "c": r"\theta_c",
 }
+MEANINGS = {  # of paper.THETA_NAMES, in a word or two
+    "x": "place along x",
+    "y": "place along y",
+    "heading": "heading",
+    "v": "speed",
+    "nu": "turn rate",
+    "x_f": "last place along x",
+    "y_f": "last place along y",
+    "heading_f": "last heading",
+    "c": "clearance",
+}
 STEP_PARTS = {  # of a learning step: colour and hatching
     "solves": ("0.2", ""),
     "network": ("0.42", "//"),

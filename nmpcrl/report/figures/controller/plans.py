@@ -13,7 +13,17 @@ from nmpcrl.control import Solution, Task
 from nmpcrl.learning.rollout import Rollout
 from nmpcrl.report.figures.axes import below, draw_task, map_grid
 from nmpcrl.report.figures.sheet import sheet
-from nmpcrl.report.figures.style import INK, SYMBOLS, TEAL, WINE, headed, page, shades, subplots
+from nmpcrl.report.figures.style import (
+    INK,
+    MEANINGS,
+    SYMBOLS,
+    TEAL,
+    WINE,
+    headed,
+    page,
+    shades,
+    subplots,
+)
 
 
 @page
@@ -128,7 +138,8 @@ def theta_effects(
             cost = f"{rollout.cost:.0f}" if np.isfinite(rollout.cost) else "fails"
             where = {"x": side["x"], "y": 0.03, "ha": side["ha"], "color": side["color"]}
             axes.text(s=f"{change}: {cost}", transform=axes.transAxes, fontsize="small", **where)
-        axes.set_title(f"${SYMBOLS[name]}$", fontsize=12)
+        title = f"${SYMBOLS[name]}$ {MEANINGS[name]}"
+        axes.set_title(title, fontsize="medium", fontweight="normal")
     bottom, top = grid[0, 0].get_ylim()
     grid[0, 0].set_ylim(bottom - 1, top)
     for axes in grid[-1]:

@@ -40,6 +40,7 @@ from nmpcrl.report.figures.style import (
     page,
     subplots,
 )
+from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.records import Column, Records, Stopped
 
@@ -54,6 +55,7 @@ ABOVE: dict[str, Any] = {
     "fontsize": "small",
 }
 PROFILED = (-0.5, 0.15)  # shares of the cost saved
+LAYOUT_MARKS = ("o", "s", "^", "D", "v", "P")
 SIZE_MARKS = {"small": ("o", "0.55"), "medium": ("^", "0.3"), "large": ("s", "black")}
 
 
@@ -102,7 +104,7 @@ def times(timings: pd.DataFrame, verdict: Verdict, learner: str) -> Figure:
 
 @page
 def same_policy(found: Evidence, verdict: Verdict) -> Figure:
-    """C5: how far RDES and GES come apart in trajectory and in cost; a letter a pair."""
+    """C5: how far RDES and GES come apart in trajectory and in cost; a mark a pair."""
     drawn = part(found, ("RDES", "GES"))
     decays = found.summaries.values_of("decay")
     figure, axes = _panels(len(decays))
@@ -112,6 +114,8 @@ def same_policy(found: Evidence, verdict: Verdict) -> Figure:
         axis.set_title(f"noise per {decay}", **SUBTITLE)
         axis.tick_params(labelleft=axis is axes[0])
     axes[0].set_ylabel("noise-free costs apart\n/ cost at the start")
+    names = dict.fromkeys(pairs.layout)
+    below(figure, [Line2D([], [], label=name, **_layout_mark(name)) for name in names])
     finding = "RDES and GES end in the same policy"
     return _finished(figure, axes[-1], verdict, finding, "pairs", drawn)
 
@@ -252,7 +256,7 @@ def _pairs(drawn: Evidence) -> pd.DataFrame:
 
 
 def _scatter(axis: Axes, pairs: pd.DataFrame, decay: str) -> None:
-    """A letter a pair of one reading, in a panel that has room for both."""
+    """A mark a pair of one reading, in a panel that has room for both; its shape is the layout."""
     box = Rectangle(
         (0, 0), thresholds.SAME_PATH, thresholds.SAME_COST, facecolor="0.88", edgecolor=INK
     )
@@ -260,9 +264,14 @@ def _scatter(axis: Axes, pairs: pd.DataFrame, decay: str) -> None:
     across = logarithmic(axis, "x", pairs.path.to_numpy(float), thresholds.SAME_PATH)
     up = logarithmic(axis, "y", pairs.cost.to_numpy(float), thresholds.SAME_COST)
     for one in pairs[pairs.decay == decay].dropna(subset="cost").itertuples():
-        letter = dots("GES", marker=f"${one.layout}$", markersize=5.5)
-        axis.plot(across(one.path), up(one.cost), **letter)
+        axis.plot(across(one.path), up(one.cost), **_layout_mark(one.layout))
     axis.set_xlabel("robots apart [m]")
+
+
+def _layout_mark(layout: str) -> dict[str, Any]:
+    """A mark by layout, that shows how many lie upon each other; those of one's own share one."""
+    shapes = dict(zip(paper.LAYOUTS, LAYOUT_MARKS, strict=True))
+    return {**dots("GES", marker=shapes.get(layout, "o"), markersize=4.5), "alpha": 0.45}
 
 
 def _counts(axis: Axes, runs: pd.DataFrame, column: str) -> None:

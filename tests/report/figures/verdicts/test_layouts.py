@@ -159,6 +159,9 @@ def test_the_clearest_changes_are_drawn_a_row_a_cell_with_every_run_in_it(changi
         groups = maps.groups(found.runs, variant)
         values = [BY_RUNS[claim].measure(runs, paths(found)) for runs in groups]
         assert drawn == sum(int(one.notna().sum().sum()) for one in values)
+    for axes in figure.axes[1::2]:
+        shares = np.concatenate([line.get_ydata() for line in axes.get_lines()])
+        assert ((shares >= 0) & (shares <= 1)).all()
 
 
 def test_what_is_infinite_is_drawn_at_the_edge(changing):
