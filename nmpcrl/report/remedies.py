@@ -1,6 +1,6 @@
 """What to try where learning fails, as a page shows it: the table of advice, and the answers."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from html import escape
 
 import numpy as np
@@ -114,6 +114,14 @@ def in_short(advice: Iterable[Advice]) -> str:
     if NEVER in by:
         said.append(f"Never try {listed(by[NEVER])}")
     return f"{'. '.join(said)}."
+
+
+def expectation_items(expected: Mapping[str, bool]) -> str:
+    """One item a sentence that was expected, in Markdown, and whether it came true."""
+    return "\n".join(
+        f"- Expected: {said}. {'So it is.' if true else 'It is not so.'}"
+        for said, true in expected.items()
+    )
 
 
 def answer_items(answers: Iterable[Answer]) -> str:

@@ -21,7 +21,6 @@ from nmpcrl.claims.remedy_questions import (
 )
 from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.report import remedies
-from nmpcrl.report.figures.verdicts.remedies import gains
 from nmpcrl.report.remedies import (
     COLOURS,
     advice_table,
@@ -120,12 +119,8 @@ def test_an_answer_stands_beside_its_pilot():
     assert "The pilot" not in second
 
 
-def test_the_figure_says_what_to_try_and_marks_what_is_beyond_it(advised):
-    figure = gains(advised)
-    assert figure.get_suptitle() == "What to try: first CMA-ES; second grid; never DPG"
-    short, long = figure.axes
-    assert next(text.get_text() for text in short.get_yticklabels()) == "CMA-ES: first"
-    marks = [line.get_marker() for line in short.get_lines()]
-    assert marks.count("D") == 2
-    assert marks.count("<") == 1
-    assert [line.get_marker() for line in long.get_lines()].count("D") == 1
+def test_an_expectation_says_whether_it_came_true():
+    items = remedies.expectation_items({"DPG is never advised": True, "ES is first": False})
+    assert items == (
+        "- Expected: DPG is never advised. So it is.\n- Expected: ES is first. It is not so."
+    )

@@ -269,9 +269,10 @@ def _scatter(axis: Axes, pairs: pd.DataFrame, decay: str) -> None:
 
 
 def _layout_mark(layout: str) -> dict[str, Any]:
-    """A mark by layout, that shows how many lie upon each other; those of one's own share one."""
+    """A hollow mark by layout; those of one's own share one."""
     shapes = dict(zip(paper.LAYOUTS, LAYOUT_MARKS, strict=True))
-    return {**dots("GES", marker=shapes.get(layout, "o"), markersize=4.5), "alpha": 0.45}
+    look = dots("GES", marker=shapes.get(layout, "o"), markersize=4.5)
+    return {**look, "markerfacecolor": "none", "markeredgewidth": 0.8}
 
 
 def _counts(axis: Axes, runs: pd.DataFrame, column: str) -> None:

@@ -1,18 +1,38 @@
 """The share of the possible gain that each remedy has, with intervals, in the order of advice."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
 
+from nmpcrl.analysis.leaderboard import Judged
 from nmpcrl.claims.remedies import Advice
 from nmpcrl.claims.remedy_questions import ADVISED, FIRST, NEVER, PARTS, SECOND
-from nmpcrl.report.figures.style import AT_ONE, INK, LIMIT, TEAL, WINE, headed, page, subplots
+from nmpcrl.report.figures.style import (
+    AT_ONE,
+    INK,
+    LIMIT,
+    LOOKS,
+    TEAL,
+    WINE,
+    Look,
+    headed,
+    page,
+    subplots,
+)
 
 COLOURS = {FIRST: TEAL, SECOND: TEAL, NEVER: WINE}  # others are in ink
 MARKS = {FIRST: "D", SECOND: "D", NEVER: "X"}  # others are round
+ABOVE: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "fontsize": "small"}
+LINES = (  # of entries that are no learner of the study
+    Look(TEAL, "-", "D"), Look("#B37A00", (0, (6, 2)), "s"), Look("#332288", "-.", "^"),
+    Look(INK, ":", "v"), Look("#8C5A2B", "--", "P"),
+)  # fmt: skip
+DEAREST = 1.1  # cost in parts of the start's that is drawn; what is dearer stands at the edge
 LEAST, MOST = -1.0, 1.15  # shares that are drawn; what is lower ends in an arrow
 
 
@@ -30,6 +50,44 @@ def gains(advice: Sequence[Advice]) -> Figure:
     for axes, part in zip(panels.flat, ADVISED, strict=True):
         _panel(axes, advice, part)
     return headed(figure, _finding(advice))
+
+
+@page
+def by_budget(budgets: Sequence[int], returned: Mapping[str, Sequence[Judged]]) -> Figure:
+    """One line an entry: the cost of what it returns, in parts of theta_init's, over the budget.
+
+    Args:
+        budgets: in episodes.
+        returned: by the name of the entry, one for each budget.
+    """
+    figure, axes = subplots()
+    axes.axhline(1, **LIMIT)
+    looks = cycle(LINES)
+    for name, each in returned.items():
+        look = LOOKS.get(name) or next(looks)
+        costs = np.array([one.cost / one.initial for one in each])
+        drawn = np.minimum(costs, DEAREST)
+        axes.plot(budgets, drawn, label=name, marker=look.marker, markersize=4, **look.line)
+        away = np.flatnonzero([not one.arrived for one in each])
+        axes.plot(np.array(budgets)[away], drawn[away], "x", color=WINE, markersize=9, zorder=3)
+        for budget, cost in zip(budgets, costs, strict=True):
+            if cost > DEAREST:
+                axes.annotate(f"{cost:.0%}", (budget, DEAREST), (0, 6), **ABOVE)
+    ylabel = r"cost over that of $\theta_\mathrm{init}$"
+    axes.set(xlabel="episodes spent", ylabel=ylabel, xscale="log")
+    axes.set_xticks(budgets, [f"{one}" for one in budgets])
+    axes.minorticks_off()
+    axes.yaxis.set_major_formatter(PercentFormatter(1, 0))
+    axes.legend(fontsize="small")
+    return headed(figure, _cheapest(budgets, returned))
+
+
+def _cheapest(budgets: Sequence[int], returned: Mapping[str, Sequence[Judged]]) -> str:
+    """Who costs least with the whole budget, in a title."""
+    last = {name: each[-1] for name, each in returned.items()}
+    best = min(last, key=lambda name: last[name].cost)
+    share = last[best].cost / last[best].initial
+    return f"With {budgets[-1]} episodes {best} costs least: {share:.0%} of the start's cost"
 
 
 def _panel(axes: Axes, advice: Sequence[Advice], part: str) -> None:

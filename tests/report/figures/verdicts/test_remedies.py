@@ -1,0 +1,47 @@
+"""Figures of remedies: a title says what to try, and what lies beyond the axes is marked."""
+
+import numpy as np
+
+from nmpcrl.analysis.leaderboard import Judged
+from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.claims.remedies import Advice, RemedyRow
+from nmpcrl.claims.remedy_questions import ADVISED, FIRST, NEVER, SECOND
+from nmpcrl.report.figures.verdicts.remedies import DEAREST, by_budget, gains
+
+
+def row(entry, part, *gain):
+    solved = Estimate(0.9, 0.8, 0.95)
+    return RemedyRow(part, entry, entry, Estimate(*gain), solved, 120, 2, 49, 0.5, False)
+
+
+def test_the_title_says_what_to_try_and_an_arrow_marks_what_is_beyond_the_panel():
+    short, long = ADVISED
+    figure = gains(
+        [
+            Advice("CMA-ES", FIRST, {short: row("CMA-ES", short, 0.8, 0.7, 0.9),
+                                     long: row("CMA-ES", long, 0.99, 0.98, 1.0)}),
+            Advice("grid", SECOND, {short: row("grid", short, 0.7, 0.6, 0.8)}),
+            Advice("DPG", NEVER, {short: row("DPG", short, -np.inf, -np.inf, -0.2)}),
+        ]
+    )  # fmt: skip
+    assert figure.get_suptitle() == "What to try: first CMA-ES; second grid; never DPG"
+    left, right = figure.axes
+    assert next(text.get_text() for text in left.get_yticklabels()) == "CMA-ES: first"
+    marks = [line.get_marker() for line in left.get_lines()]
+    assert marks.count("D") == 2
+    assert marks.count("<") == 1
+    assert [line.get_marker() for line in right.get_lines()].count("D") == 1
+
+
+def test_what_did_not_arrive_is_crossed_and_what_costs_too_much_stands_at_the_edge():
+    made = [
+        Judged(100.0, 95.0, arrived=True, episodes=5, seconds=0.1),
+        Judged(100.0, 150.0, arrived=False, episodes=10, seconds=0.2),
+    ]
+    figure = by_budget([5, 10], {"ES": made, "grid": [made[0], made[0]]})
+    assert figure.get_suptitle() == "With 10 episodes grid costs least: 95% of the start's cost"
+    (axes,) = figure.axes
+    assert [text.get_text() for text in axes.texts] == ["150%"]
+    crosses = [line.get_ydata() for line in axes.get_lines() if line.get_marker() == "x"]
+    assert [len(one) for one in crosses] == [1, 0]
+    assert crosses[0] == [DEAREST]
