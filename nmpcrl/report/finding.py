@@ -1,0 +1,57 @@
+"""What the introduction says first: the finding in two sentences, and four numbers with links."""
+
+from nmpcrl.claims.finding import EARLY, LEARNERS, Finding
+from nmpcrl.report.cited import Count
+from nmpcrl.report.prose import filled
+from nmpcrl.report.text import NOTHING, listed
+
+ORIGIN = "the published study"
+
+
+def sentences(found: Finding | None) -> str:
+    """The finding in two sentences, in Markdown."""
+    if found is None:
+        return NOTHING
+    return filled(
+        """
+        **Reinforcement learning tunes this robot's controller well as long as the gaps on its way
+        stay open, and leads the robot to a dead end where learning itself closes one.** One number
+        set by hand saves {saved_by_hand:.0%} of the cost where learning saves {saved_there:.0%},
+        wherever the robot still arrives; and RDES, the paper's first method, can break down within
+        {early} episodes.
+        """,
+        origin=ORIGIN,
+        saved_by_hand=found.saved_by_hand,
+        saved_there=found.saved_there,
+        early=str(EARLY),
+    )
+
+
+def numbers(found: Finding | None) -> str:
+    """Four numbers, each with a line and a link to its evidence: a list in Markdown."""
+    if found is None:
+        return NOTHING
+    return filled(
+        """
+        {.numbers}
+        - **{arrived_with_open_gaps}** runs of {learners} in which every gap stayed open end at the target, at a
+          cost that is {saved_where_it_arrived:.1%} lower (median). [Chapter 5](05_results.ipynb#results-why)
+        - **{arrived_with_a_closed_gap}** runs of {learners} in which the learned $\\theta_c$ closed a gap end at the
+          target. [The picture of it](05_results.ipynb#fig-results-reasons)
+        - **{layouts_solved_by_hand}** layouts are solved with $\\theta_c$ set by hand to the margin that the cost
+          names, in {better_by_hand} of them at a lower cost than in any run of {learners}.
+          [Chapter 7](07_beyond.ipynb#beyond-plain-words)
+        - **{stopped_runs_of_RDES}** runs of RDES had to be stopped when the noise decays per episode,
+          {stopped_early} of them within {early} episodes. [Claim C1](05_results.ipynb#fig-results-c1)
+        """,
+        origin=ORIGIN,
+        arrived_with_open_gaps=Count(*found.arrived_open),
+        arrived_with_a_closed_gap=Count(*found.arrived_closed),
+        saved_where_it_arrived=found.learned,
+        learners=listed(LEARNERS),
+        layouts_solved_by_hand=Count(*found.by_hand),
+        better_by_hand=Count(*found.better),
+        stopped_runs_of_RDES=Count(*found.stopped),
+        stopped_early=found.stopped_early,
+        early=str(EARLY),
+    )
