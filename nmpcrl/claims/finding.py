@@ -5,6 +5,7 @@ at a theta_c that is known before anything is trained (`trajectory.closes_at`). 
 GES is sorted by the theta_c that it ends with, and not by how it ended.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -39,6 +40,9 @@ class Finding:
     saved_there: float  # median of the runs in these layouts
     stopped: Count  # runs of RDES, with noise that decays per episode
     stopped_early: int  # of these, within `EARLY` episodes
+    not_there: Mapping[str, Count]  # runs that did not end at the target, of some learners
+    seconds: float  # of one core, a run of ES with the compiled solver
+    hours: float  # that the robot moves in a run
 
 
 def finding(found: Published) -> Finding | None:
@@ -62,6 +66,12 @@ def finding(found: Published) -> Finding | None:
         saved_there=float(runs.saved[runs.layout.isin(list(there))].median()),
         stopped=(len(stopped), len(rdes)),
         stopped_early=int((stopped.steps_done <= EARLY * paper.STEPS).sum()),
+        not_there={
+            name: _count(found.main.ending[found.main.learner == name] != Ending.ARRIVED)
+            for name in (*LEARNERS, "TDC")
+        },
+        seconds=3600 * float(found.timings.set_index(["solver", "learner"]).hours["riccati", "ES"]),
+        hours=paper.EPISODES * paper.STEPS * paper.nmpc().plant.period / 3600,
     )
 
 

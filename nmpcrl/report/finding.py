@@ -4,6 +4,7 @@ from nmpcrl.claims.finding import EARLY, LEARNERS, Finding
 from nmpcrl.report.cited import Count
 from nmpcrl.report.prose import filled
 from nmpcrl.report.text import NOTHING, listed
+from nmpcrl.study import paper
 
 ORIGIN = "the published study"
 
@@ -54,4 +55,28 @@ def numbers(found: Finding | None) -> str:
         stopped_runs_of_RDES=Count(*found.stopped),
         stopped_early=found.stopped_early,
         early=str(EARLY),
+    )
+
+
+def use(found: Finding | None) -> str:
+    """Which learner to take and what that costs: two paragraphs in Markdown."""
+    if found is None:
+        return NOTHING
+    return filled(
+        """
+        **Which learner.** ES: it needs no second set of weights and no network, and ended as GES
+        did. TDC is the careful one: {astray_TDC} runs did not end at the target, against
+        {astray_ES} of ES and {astray_GES} of GES, and it saves less
+        ([Fig. 7.3](07_beyond.ipynb#fig-beyond-tdc)). A network pays only where a solve is slow
+        ([Chapter 9](performance.ipynb)).
+
+        **What it costs.** {episodes} episodes, in which the robot moves for {hours_of_the_robot:.1f}
+        hours; simulated, {seconds_of_a_run_of_ES:.0f} seconds of one core ([Chapter
+        8](solver.ipynb)).
+        """,
+        origin=ORIGIN,
+        episodes=str(paper.EPISODES),
+        hours_of_the_robot=found.hours,
+        seconds_of_a_run_of_ES=found.seconds,
+        **{f"astray_{name}": Count(*count) for name, count in found.not_there.items()},
     )
