@@ -38,12 +38,12 @@ def numbers(found: Finding | None) -> str:
         - **{arrived_with_open_gaps}** runs of {learners} in which every gap stayed open end at the target, at a
           cost that is {saved_where_it_arrived:.1%} lower (median). [Chapter 5](05_results.ipynb#results-why)
         - **{arrived_with_a_closed_gap}** runs of {learners} in which the learned $\\theta_c$ closed a gap end at the
-          target. [The picture of it](05_results.ipynb#fig-results-reasons)
+          target. [Fig. 5.17](05_results.ipynb#fig-results-reasons)
         - **{layouts_solved_by_hand}** layouts are solved with $\\theta_c$ set by hand to the margin that the cost
           names, in {better_by_hand} of them at a lower cost than in any run of {learners}.
           [Chapter 7](07_beyond.ipynb#beyond-plain-words)
         - **{stopped_runs_of_RDES}** runs of RDES had to be stopped when the noise decays per episode,
-          {stopped_early} of them within {early} episodes. [Claim C1](05_results.ipynb#fig-results-c1)
+          {stopped_early} of them within {early} episodes. [Fig. 5.2](05_results.ipynb#fig-results-c1)
         """,
         origin=ORIGIN,
         arrived_with_open_gaps=Count(*found.arrived_open),

@@ -80,7 +80,7 @@ def plain_verdict_table(verdicts: Iterable[Verdict]) -> str:
     """
     rows = (
         (
-            f"<strong>{_text(v.claim)}</strong> {_aside(v)}{_text(v.statement)}",
+            f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}",
             _labelled(v),
             _text(_rests_on(v)),
         )
@@ -291,7 +291,7 @@ def _rests_on(verdict: Verdict) -> str:
     if "all" in verdict.counts:
         yes, of = verdict.counts["all"]
         unit = BY_RUNS[verdict.claim].unit
-        return f"it holds in {yes} of {of} {'pairs of runs' if unit == 'pairs' else unit}"
+        return f"held in {yes} of {of} {'pairs of runs' if unit == 'pairs' else unit}"
     return "what the cited theorems assume; no run is needed"
 
 

@@ -18,12 +18,15 @@
     ));
   }
 
-  function trajectories(map) {
+  function trajectories(map, { robot }) {
     const before = add(map.ground, "polyline", { class: "before" });
     const loop = add(map.ground, "polyline", { class: "loop" });
+    const end = add(map.ground, "circle", { class: "end", r: robot });
     return (_, { first, now }) => {
       set(before, { points: first === now ? "" : points(first.states) });
       set(loop, { points: points(now.states) });
+      const [cx, cy] = now.states.at(-1) ?? [NaN, NaN];
+      set(end, Number.isFinite(cx) ? { cx, cy, visibility: "visible" } : { visibility: "hidden" });
     };
   }
 
@@ -93,14 +96,15 @@
       });
     }
 
-    shared.heading(figure, words);
+    set(figure, { "aria-label": words.map });
+    add(figure, "p", { class: "title" }, words.title);
     const drawButtons = buttons(figure, settings, { learn, toggle });
     const map = plane(figure, data.view, words.handles);
     mapParts.background(map, data);
     const drawn = [
       circles(map, { discs: layouts.open }),
       ...mapParts.handles(map, data, read, moved),
-      trajectories(map),
+      trajectories(map, data),
     ];
     mapParts.target(map, data);
     const tell = shared.results(figure);

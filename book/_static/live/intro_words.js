@@ -10,17 +10,17 @@
 
   function change(before, now) {
     const share = 1 - now / before;
-    if (!Number.isFinite(now)) return "";
+    if (!Number.isFinite(share)) return "";
     return Math.abs(share) < SAME ? "as much as" : `${percent(share)} ${share > 0 ? "less" : "more"} than`;
   }
 
   words.intro = {
     map: "The robot, its trajectory among obstacles that can be moved, and a learner",
     handles: "What can be moved on the map",
-    title: "Drag an obstacle: the robot plans anew. Press Learn: it learns.",
-    hint: "By keyboard: Tab to an obstacle, to the robot or to its arrow, then arrow keys, with Shift for larger steps.",
+    title: "Drag an obstacle: the robot plans anew. Press Learn. Then close the gap, and learn again.",
     legend: "Line: the robot’s trajectory without noise; dotted: before learning. Dashed circles: the distance from an "
-      + "obstacle that its plans keep, which learning changes; where two overlap, the gap between them is closed.",
+      + "obstacle that its plans keep, which learning changes; where two overlap, the gap between them is closed. "
+      + "By keyboard: Tab to an obstacle, to the robot or to its arrow, then arrow keys, with Shift for larger steps.",
     learn: "Learn",
     stop: "Stop",
     close: "Close the gap",
@@ -29,13 +29,13 @@
     // Lines of words and numbers in turn.
     now: ({ episode, episodes, learning, rollout, first, moved }) => {
       const does = words.intro.does(rollout);
-      if (!episode && !learning) return [["Before learning, the robot", does, "; cost of its trajectory:", fixed(rollout.cost, 0)]];
+      const cost = rollout.failed ? [] : ["; cost:", fixed(rollout.cost, 0)];
+      if (!episode && !learning) return [["Before learning, the robot", does, ...cost]];
       const when = learning ? `Episode ${episode} of ${episodes}` : `After ${episode} episodes`;
-      const where = moved ? `, moved since: the robot` : ": the robot";
-      return [[
-        `${when}${where}`, does, "; cost:", fixed(rollout.cost, 0),
-        `, ${change(first.cost, rollout.cost)} before learning (${fixed(first.cost, 0)})`,
-      ]];
+      const where = moved ? ", and moved since: the robot" : ": the robot";
+      const than = change(first.cost, rollout.cost);
+      const beside = than ? [`; ${than} before learning`, `(${fixed(first.cost, 0)})`] : [];
+      return [[`${when}${where}`, does, ...cost, ...beside]];
     },
     does: ({ failed, arrived, states }) => {
       if (failed) return `has no plan at step ${states.length}`;
