@@ -37,8 +37,9 @@ def numbers(found: Finding | None) -> str:
         {.numbers}
         - **{arrived_with_open_gaps}** runs of {learners} in which every gap stayed open end at the target, at a
           cost that is {saved_where_it_arrived:.1%} lower (median). [Chapter 5](05_results.ipynb#results-why)
-        - **{arrived_with_a_closed_gap}** runs of {learners} in which the learned $\\theta_c$ closed a gap end at the
-          target. [Fig. 5.17](05_results.ipynb#fig-results-reasons)
+        - **{arrived_with_a_closed_gap}** runs of {learners} end at the target in which $\\theta_c$,
+          which keeps plans away from obstacles, grew until a gap closed.
+          [Fig. 5.17](05_results.ipynb#fig-results-reasons)
         - **{layouts_solved_by_hand}** layouts are solved with $\\theta_c$ set by hand to the margin that the cost
           names, in {better_by_hand} of them at a lower cost than in any run of {learners}.
           [Chapter 7](07_beyond.ipynb#beyond-plain-words)
@@ -64,11 +65,10 @@ def use(found: Finding | None) -> str:
         return NOTHING
     return filled(
         """
-        **Which learner.** ES: it needs no second set of weights and no network, and ended as GES
-        did. TDC is the careful one: {astray_TDC} runs did not end at the target, against
-        {astray_ES} of ES and {astray_GES} of GES, and it saves less
-        ([Fig. 7.3](07_beyond.ipynb#fig-beyond-tdc)). A network pays only where a solve is slow
-        ([Chapter 9](performance.ipynb)).
+        **Which learner.** ES: it needs no second set of weights and no network. TDC is the careful
+        one: {astray_TDC} of its runs did not end at the target, against {astray_ES} of ES and
+        {astray_GES} of GES, and it saves less ([Fig. 7.3](07_beyond.ipynb#fig-beyond-tdc)). A
+        network pays only where a solve is slow ([Chapter 9](performance.ipynb)).
 
         **What it costs.** {episodes} episodes, in which the robot moves for {hours_of_the_robot:.1f}
         hours; simulated, {seconds_of_a_run_of_ES:.0f} seconds of one core ([Chapter
