@@ -1,8 +1,8 @@
 """What was found, in a few numbers: whether a gap closed, theta_c by hand, and how RDES ended.
 
 theta_c tightens the obstacle constraint, Eq. (2f). A gap that the first rollout goes through closes
-at a theta_c that is known before anything is trained (`trajectory.closes_at`). So each run of ES and
-GES is sorted by the theta_c that it ends with, and not by how it ended.
+at a theta_c that is known before anything is trained (`trajectory.closes_at`). So each run of ES
+and GES is sorted by the theta_c that it ends with, and not by how it ended.
 """
 
 from collections.abc import Mapping

@@ -35,16 +35,18 @@ def numbers(found: Finding | None) -> str:
     return filled(
         """
         {.numbers}
-        - **{arrived_with_open_gaps}** runs of {learners} in which every gap stayed open end at the target, at a
-          cost that is {saved_where_it_arrived:.1%} lower (median). [Chapter 5](05_results.ipynb#results-why)
-        - **{arrived_with_a_closed_gap}** runs of {learners} end at the target in which $\\theta_c$,
-          which keeps plans away from obstacles, grew until a gap closed.
+        - **{arrived_with_open_gaps}** runs of {learners} end at the target, at a cost that is
+          {saved_where_it_arrived:.1%} lower (median), in which every gap stayed open.
+          [Fig. 5.15](05_results.ipynb#fig-results-c9)
+        - **{arrived_with_a_closed_gap}** runs of {learners} end at the target in which
+          $\\theta_c$, which keeps plans away from obstacles, grew until a gap closed.
           [Fig. 5.17](05_results.ipynb#fig-results-reasons)
-        - **{layouts_solved_by_hand}** layouts are solved with $\\theta_c$ set by hand to the margin that the cost
-          names, in {better_by_hand} of them at a lower cost than in any run of {learners}.
-          [Chapter 7](07_beyond.ipynb#beyond-plain-words)
-        - **{stopped_runs_of_RDES}** runs of RDES had to be stopped when the noise decays per episode,
-          {stopped_early} of them within {early} episodes. [Fig. 5.2](05_results.ipynb#fig-results-c1)
+        - **{layouts_solved_by_hand}** layouts are solved with $\\theta_c$ set by hand to the margin
+          that the cost names, in {better_by_hand} of them at a lower cost than in any run of
+          {learners}. [Chapter 7](07_beyond.ipynb#beyond-plain-words)
+        - **{stopped_runs_of_RDES}** runs of RDES had to be stopped when the noise decays per
+          episode, {stopped_early} of them within {early} episodes.
+          [Fig. 5.2](05_results.ipynb#fig-results-c1)
         """,
         origin=ORIGIN,
         arrived_with_open_gaps=Count(*found.arrived_open),
@@ -70,9 +72,9 @@ def use(found: Finding | None) -> str:
         {astray_GES} of GES, and it saves less ([Fig. 7.3](07_beyond.ipynb#fig-beyond-tdc)). A
         network pays only where a solve is slow ([Chapter 9](performance.ipynb)).
 
-        **What it costs.** {episodes} episodes, in which the robot moves for {hours_of_the_robot:.1f}
-        hours; simulated, {seconds_of_a_run_of_ES:.0f} seconds of one core ([Chapter
-        8](solver.ipynb)).
+        **What it costs.** {episodes} episodes, in which the robot moves for
+        {hours_of_the_robot:.1f} hours; simulated, {seconds_of_a_run_of_ES:.0f} seconds of one core
+        ([Chapter 8](solver.ipynb)).
         """,
         origin=ORIGIN,
         episodes=str(paper.EPISODES),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from IPython.display import HTML
 
-from nmpcrl.control import Nmpc, Task
+from nmpcrl.control import Task
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import WALL, begin
@@ -53,7 +53,7 @@ def discs(task: Task) -> list[list[float]]:
 
 def view(*tasks: Task) -> list[float]:
     """The part of the plane that shows some layouts whole: least x and y, width and height [m]."""
-    x, y, clearance = np.hstack([task.discs for task in tasks])
+    _, y, clearance = np.hstack([task.discs for task in tasks])
     low, high = tasks[0].lower[:2], tasks[0].upper[:2]
     bottom, top = (y - clearance / 2).min(), (y + clearance / 2).max()
     return [low[0] - WALL, bottom, high[0] - low[0] + 2 * WALL, top - bottom]
