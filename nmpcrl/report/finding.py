@@ -43,7 +43,7 @@ def numbers(found: Finding | None) -> str:
           [Fig. 5.17](05_results.ipynb#fig-results-reasons)
         - **{layouts_solved_by_hand}** layouts are solved with $\\theta_c$ set by hand to the margin
           that the cost names, in {better_by_hand} of them at a lower cost than in any run of
-          {learners}. [Chapter 7](07_beyond.ipynb#beyond-plain-words)
+          {learners}. [In plain words](07_beyond.ipynb#beyond-plain-words)
         - **{stopped_runs_of_RDES}** runs of RDES had to be stopped when the noise decays per
           episode, {stopped_early} of them within {early} episodes.
           [Fig. 5.2](05_results.ipynb#fig-results-c1)
