@@ -67,10 +67,10 @@ def use(found: Finding | None) -> str:
         return NOTHING
     return filled(
         """
-        **Which learner.** ES: it needs no second set of weights and no network. TDC is the careful
-        one: {astray_TDC} of its runs did not end at the target, against {astray_ES} of ES and
-        {astray_GES} of GES, and it saves less ([Fig. 7.3](07_beyond.ipynb#fig-beyond-tdc)). A
-        network pays only where a solve is slow ([Chapter 9](performance.ipynb)).
+        **Which learner.** ES or GES, which fit no network. TDC is the careful one: {astray_TDC} of
+        its runs did not end at the target, against {astray_ES} of ES and {astray_GES} of GES, and
+        it saves less ([Fig. 7.3](07_beyond.ipynb#fig-beyond-tdc)). A network pays only where a
+        solve is slow ([Chapter 9](performance.ipynb)).
 
         **What it costs.** {episodes} episodes, in which the robot moves for
         {hours_of_the_robot:.1f} hours; simulated, {seconds_of_a_run_of_ES:.0f} seconds of one core
