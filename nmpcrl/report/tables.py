@@ -10,7 +10,7 @@ import pandas as pd
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.bench.targets import Target
 from nmpcrl.claims.assumptions import THEOREMS
-from nmpcrl.claims.paper_claims import CLAIMS
+from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS
 from nmpcrl.claims.rule import Assumption, Claim
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.claims.wider_claims import WIDER_THAN
@@ -70,6 +70,25 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
     )
     header = ("The paper claims", "Published", "Runs of this page")
     return html_table(scope, header if others else ("The paper claims", "Here"), rows)
+
+
+def plain_verdict_table(verdicts: Iterable[Verdict]) -> str:
+    """One row a claim of the paper, in HTML: what became of it, and in how much of what was run.
+
+    Args:
+        verdicts: of `judge`; those on wider claims are left out.
+    """
+    rows = (
+        (
+            f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}",
+            _labelled(v),
+            _text(_rests_on(v)),
+        )
+        for v in verdicts
+        if v.claim in CLAIMS
+    )
+    caption = "The claims of the paper, and what became of each in the runs of this book."
+    return html_table(caption, ("The paper claims", "Here", "It rests on"), rows)
 
 
 def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
@@ -263,6 +282,17 @@ def _outcome(verdict: Verdict, source: str = PUBLISHED) -> str:
 def _labelled(verdict: Verdict) -> str:
     """What is said of a claim, in the colour of those words or else of its outcome."""
     return _badge(verdict.words, BADGES.get(verdict.words, BADGES[verdict.outcome]))
+
+
+def _rests_on(verdict: Verdict) -> str:
+    """The number behind a verdict, in words."""
+    if verdict.ratio is not None:
+        return f"a step takes {verdict.ratio:.2f} of the time of a step of ES"
+    if "all" in verdict.counts:
+        yes, of = verdict.counts["all"]
+        unit = BY_RUNS[verdict.claim].unit
+        return f"held in {yes} of {of} {'pairs of runs' if unit == 'pairs' else unit}"
+    return "what the cited theorems assume; no run is needed"
 
 
 def _aside(verdict: Verdict) -> str:

@@ -3,6 +3,7 @@
 import numpy as np
 
 CHAPTERS = {  # of each live figure
+    "intro": "intro",
     "controller": "01_mdp_and_nmpc",
     "gradient": "02_expected_sarsa",
     "kink": "02_expected_sarsa",

@@ -4,8 +4,9 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from live_page import ALSO, CHAPTERS, MOST, loaded
 
+PICTURE = "article :is(figure, .cell_output) img"
 FIRST = {chapter: figure for figure, chapter in reversed(CHAPTERS.items())}  # of each chapter
-IN_ORDER = """() => [...document.querySelectorAll("article figure img, figure.live")]
+IN_ORDER = f"""() => [...document.querySelectorAll("{PICTURE}, figure.live")]
     .map(one => one.matches("img") ? "picture" : one.dataset.figure)"""
 BEGUN = """() => [...document.querySelectorAll("figure.live")]
     .every(one => one.querySelector("[role=status][aria-busy=false]"))"""
@@ -31,7 +32,7 @@ def test_without_javascript_there_are_the_pictures_alone(opened, figure):
     order = tab.page.evaluate(IN_ORDER)
     for at, name in enumerate(order):
         assert name == "picture" or order[at - 1] == "picture", f"{name} stands on no picture"
-    for picture in tab.page.locator("article figure img").all():
+    for picture in tab.page.locator(PICTURE).all():
         assert picture.is_visible()
 
 
@@ -42,7 +43,7 @@ def test_without_webassembly_there_are_the_pictures_and_a_sentence(opened, figur
     for live in tab.page.locator("figure.live").all():
         assert "does not run WebAssembly" in live.inner_text()
         assert live.locator("svg").count() == 0
-    assert tab.page.locator("article figure img").first.is_visible()
+    assert tab.page.locator(PICTURE).first.is_visible()
     assert tab.errors == []
 
 
@@ -50,7 +51,7 @@ def test_without_webassembly_there_are_the_pictures_and_a_sentence(opened, figur
 def test_on_paper_there_are_the_pictures_alone(opened, figure):
     tab = opened(figure).begun()
     tab.page.emulate_media(media="print")
-    assert tab.page.locator("article figure img").first.is_visible()
+    assert tab.page.locator(PICTURE).first.is_visible()
     for live in tab.page.locator("figure.live").all():
         assert not live.is_visible()
 

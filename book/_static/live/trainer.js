@@ -2,7 +2,7 @@
 (() => {
   "use strict";
 
-  const { sources, words: { laboratory: words } } = window.nmpcrl;
+  const { sources, words: { parts: words } } = window.nmpcrl;
 
   // Runs in the worker, which is given { module, problem, settings, widths }.
   function work() {

@@ -31,6 +31,7 @@
     sized,
     scientific,
     none: "This browser does not run WebAssembly, or cannot unpack it, so the figure stays as it is printed above.",
+    noWorker: "it did not start a worker",
     target: "target",
     robot: "Robot, start",
     heading: "Robot, heading",

@@ -21,11 +21,19 @@ LINKS = {"script": '<script src="{}"></script>', "style": '<link rel="stylesheet
 
 
 def share(notebook: Any, page: Path, folder: Path) -> None:
-    """Replace what a notebook's outputs hold inline by links from its page to files.
+    """Replace what a notebook's outputs hold inline, as `linked` does; the notebook is executed."""
+    for cell in notebook.cells:
+        for output in cell.get("outputs", []):
+            if "text/html" in output.get("data", {}):
+                output.data["text/html"] = linked(output.data["text/html"], page, folder)
+
+
+def linked(html: str, page: Path, folder: Path) -> str:
+    """HTML in which what was inline is a link from its page to a file.
 
     Args:
-        notebook: executed.
-        page: its path, from the root of the site.
+        html: what a cell displayed.
+        page: the path of its page, from the root of the site.
         folder: of the files; they are copied to `STATIC`.
 
     Raises:
@@ -33,17 +41,14 @@ def share(notebook: Any, page: Path, folder: Path) -> None:
     """
     place = os.path.relpath(STATIC, page.parent)
 
-    def linked(found: re.Match[str]) -> str:
+    def shared(found: re.Match[str]) -> str:
         path = folder / found["name"]
         if path.exists() and path.read_text("utf-8").strip() != found["text"]:
             raise ValueError(f"a live figure has another {path.name} than the one that pages share")
         path.write_text(found["text"], "utf-8")
         return LINKS[found["kind"]].format(f"{place}/{path.name}")
 
-    for cell in notebook.cells:
-        for output in cell.get("outputs", []):
-            if "text/html" in output.get("data", {}):
-                output.data["text/html"] = INLINE.sub(linked, output.data["text/html"])
+    return INLINE.sub(shared, html)
 
 
 def add_runs(notebooks: Iterable[Any], folder: Path) -> None:

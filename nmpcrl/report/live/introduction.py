@@ -1,0 +1,59 @@
+"""The introduction's live figure: the robot, a learner, and a gap that closes."""
+
+from typing import Any
+
+import numpy as np
+from IPython.display import HTML
+
+from nmpcrl.control import Task
+from nmpcrl.report.live import frame
+from nmpcrl.report.live.noise import widths
+from nmpcrl.report.live.problem import WALL, begin
+from nmpcrl.report.live.two_learners import settings
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.setup import controller_of
+
+SCRIPTS = frame.scripts_of(
+    "intro", *frame.MAP, "random.js", "learning.js", "trainer.js"
+)  # fmt: skip
+STYLES = ("intro.css",)
+OPEN, CLOSED = "A", "E"  # layouts: the first, and the first of the study in which ES closes a gap
+
+
+def intro(learner: str = "ES") -> HTML:
+    """Obstacles to be moved, a learner that trains among them, and a layout in which it fails.
+
+    Args:
+        learner: with the defaults of `Experiment`, so that it trains what the study has trained.
+    """
+    experiment = Experiment(learner=learner, layout=OPEN)
+    nmpc = controller_of(experiment).nmpc
+
+    def data() -> dict[str, Any]:
+        own = settings(experiment, learner, nmpc)
+        own |= {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")}
+        begun = begin(nmpc, nmpc.task.start, np.array(experiment.theta))
+        return begun | {
+            "view": view(paper.task(OPEN), paper.task(CLOSED)),
+            "steps": experiment.steps,
+            "layouts": {"open": discs(paper.task(OPEN)), "closed": discs(paper.task(CLOSED))},
+            "arrived": ARRIVED,
+            "settings": own,
+            "widths": widths(),
+        }
+
+    return frame.solving("intro", nmpc, data, SCRIPTS, STYLES)
+
+
+def discs(task: Task) -> list[list[float]]:
+    """Centre and diameter of each obstacle's clearance, as the solver takes them [m]."""
+    return [list(disc) for disc in zip(*task.discs, strict=True)]
+
+
+def view(*tasks: Task) -> list[float]:
+    """The part of the plane that shows some layouts whole: least x and y, width and height [m]."""
+    _, y, clearance = np.hstack([task.discs for task in tasks])
+    low, high = tasks[0].lower[:2], tasks[0].upper[:2]
+    bottom, top = (y - clearance / 2).min(), (y + clearance / 2).max()
+    return [low[0] - WALL, bottom, high[0] - low[0] + 2 * WALL, top - bottom]
