@@ -17,9 +17,9 @@ def sentences(found: Finding | None) -> str:
         """
         **Without a network, reinforcement learning tunes this robot's controller well as long as
         the gaps on its way stay open, and leads the robot to a dead end where learning itself
-        closes one.** One number set by hand saves {saved_by_hand:.0%} of the cost where learning saves
-        {saved_there:.0%}, wherever the robot still arrives; and with a network, as in RDES, the
-        paper's first method, learning can break down within {early} episodes.
+        closes one.** One number set by hand saves {saved_by_hand:.0%} of the cost where learning
+        saves {saved_there:.0%}, wherever the robot still arrives; and with a network, as in RDES,
+        the paper's first method, learning can break down within {early} episodes.
         """,
         origin=ORIGIN,
         saved_by_hand=found.saved_by_hand,
