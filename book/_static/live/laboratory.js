@@ -137,7 +137,7 @@
     let at = null; // which of its policies, by number; null is the last
     let time = end, due = false, drawn = null, found = null;
     let awaited = null; // { all, then }: runs that a find trains, and what follows
-    let replaying = 0, leave = () => {};
+    let replaying = 0;
     const runs = laboratoryRuns.queue(data, () => {
       if (!due) setTimeout(() => { due = false; drawRuns(); }, OFTEN);
       due = true;
@@ -170,9 +170,11 @@
     };
 
     figure.classList.add("instrument");
-    shared.heading(figure, words);
-    if (data.trap.length) leave = laboratoryLesson.lesson(figure, data, showRuns);
-    const bar = add(figure, "div", { class: "bar" }), lead = add(bar, "div", { class: "lead" });
+    set(figure, { "aria-label": words.map });
+    add(figure, "p", { class: "title" }, words.title);
+    const finds = add(figure, "div"), bar = add(figure, "div", { class: "bar" }), lead = add(bar, "div", { class: "asked" });
+    const desk = add(figure, "div", { class: "laboratory" });
+    const leave = laboratoryLesson.lesson(finds, desk, data, showRuns);
     const tell = (lines) => say(lines);
     const drawForm = form(bar, lead, data, { read, move: touch, tell });
     const drawProgress = trainingButtons(lead, {
@@ -180,7 +182,6 @@
       seeds: () => train(Array.from({ length: OTHERS }, (_, k) => read().seed + k + 1)),
       stop: runs.stop,
     });
-    const desk = add(figure, "div", { class: "laboratory" });
     const side = add(desk, "div", { class: "side" });
     const drawMap = laboratoryMap(side, data, read, touch);
     const play = player(side, {
@@ -197,14 +198,15 @@
       still();
       shift(k);
     });
-    const note = shared.results(side);
-    add(side, "p", { class: "legend" }, words.legend);
     const drawButtons = mapButtons(side, data, read, touch, () => {
       kept = null;
       leave();
       open(settings.defaults(data));
     });
-    const plots = laboratoryPlots(desk, data);
+    const curves = add(desk, "div", { class: "curves" });
+    const note = shared.results(curves);
+    const plots = laboratoryPlots(curves, data);
+    add(figure, "p", { class: "legend" }, words.legend);
     add(figure, "p", { class: "plot-title" }, words.runs);
     const drawList = laboratoryRuns.list(figure, data, { choose, keep, remove: removed, name });
     const drawAlong = takeAlong(figure, data, tell);
@@ -224,15 +226,15 @@
 
     // A run of these settings, which may be trained already.
     function trained(given) {
-      const same = JSON.stringify(given);
+      const same = JSON.stringify(given); // all settings, in the order of the defaults
       const old = runs.runs.find((run) => JSON.stringify(run.given) === same && !["stopped", "failed"].includes(run.state));
       return old ?? runs.add(given);
     }
 
     // What a find, or a step of the lesson, is about: trained, chosen, laid over, and played.
-    function showRuns({ settings: asked, against, learned, replay: again = false, panels }, then) {
-      const given = { ...settings.defaults(data), ...asked };
-      const wanted = [given, against].filter(Boolean).map((each) => JSON.stringify(each));
+    function showRuns({ settings: asked, against: other, learned, replay: again = false, panels }, then) {
+      const [given, against] = [asked, other].map((each) => each && { ...settings.defaults(data), ...each });
+      const wanted = [given, against].map((each) => JSON.stringify(each));
       if (runs.doing() && !wanted.includes(JSON.stringify(runs.doing().run.given))) runs.stop();
       const run = trained(given);
       kept = against ? trained(against) : null;

@@ -19,12 +19,12 @@
 
   // `show({ settings, against, learned, replay, panels }, then)` trains what is to be seen and plays it; `then(run,
   // other)` follows. What comes back ends the lesson: whoever changes the settings has left it.
-  function lesson(parent, data, show) {
+  function lesson(parent, desk, data, show) {
     const row = add(parent, "div", { class: "buttons gallery", role: "group", "aria-label": words.gallery });
-    const told = add(parent, "div", { class: "told" });
+    const told = add(desk, "div", { class: "told" });
     const title = add(told, "p", { class: "plot-title" });
     const said = add(told, "div", { role: "status", class: "sentence" });
-    const text = add(said, "p"), answer = add(said, "p", { class: "answer" });
+    const text = add(said, "p"), answer = add(said, "p", { class: "outcome" });
     const steps = add(told, "div", { class: "buttons" });
     const back = shared.button(steps, words.back, () => turn(-1));
     const next = shared.button(steps, words.next, () => turn(1));

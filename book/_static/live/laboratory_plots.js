@@ -8,7 +8,7 @@
   const SIZE = [600, 135], MARGIN = { left: 48, right: 30, top: 6, bottom: 22 }; // [px]
   const LINE = 12; // height of a small letter [px]
   const ROOM = 0.06; // above and below all that is drawn, of its height
-  const TICKS = { x: 5, y: 3 };
+  const TICKS = { x: 3, y: 3 };
 
   // Powers of ten; every second or third where they are many.
   function powers(from, to, count) {
@@ -55,7 +55,7 @@
       const [from, to] = extent(scaled.flatMap(({ points }) => points.map(([, y]) => y)));
       const places = draw({
         x: { from: x[0], to: x[1], count: TICKS.x },
-        y: { from, to, count: TICKS.y, ticks: log ? powers(from, to, TICKS.y) : undefined },
+        y: { from, to, count: TICKS.y, ticks: scaled.length ? log && powers(from, to, TICKS.y) || undefined : [] },
         lines: scaled,
         width: svg.clientWidth || SIZE[0],
       });

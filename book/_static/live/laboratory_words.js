@@ -3,14 +3,14 @@
   "use strict";
 
   const { words } = window.nmpcrl;
-  const { fixed, sized } = words.parts;
+  const { fixed } = words.parts;
   const percent = (share) => `${fixed(100 * Math.abs(share), 1)} %`;
   const LONG = 60; // letters of a link that are repeated
   const short = (text) => (text.length > LONG ? `${text.slice(0, LONG)}…` : text);
   const stands = ({ arrives }) => (arrives ? "arrives" : "does not arrive");
   // What a run came to, and what one that is laid over it did.
   const ended = ({ given, first, last }) => (
-    `${given.learner === "frozen" ? "Without learning" : `After ${last.episode} episodes of ${given.learner}`}, with θ_c = ${sized(last.thetaC)}, the robot `
+    `${given.learner === "frozen" ? "Without learning" : `After ${last.episode} episodes of ${given.learner}`}, with θ_c = ${fixed(last.thetaC, 3)}, the robot `
     + `${stands(last)}, at a cost of ${fixed(last.cost, 0)}${given.learner === "frozen" ? "" : `; at the start it was ${fixed(first.cost, 0)}`}.`
   );
   const apart = ({ error }) => `${fixed(100 * error, 0)} %`;
@@ -20,7 +20,6 @@
     map: "Laboratory: a map of obstacles, start and target, the settings of a run, and its training",
     handles: "What can be moved on the map",
     title: "Place the obstacles, and train; or see what others found.",
-    hint: "The solver, the update rules and the random numbers are the library’s, compiled for this page.",
     legend: "Line: closed loop without noise, of the chosen run, or of θ at the start, which is dotted beside a run. "
       + "Dashed line: the run laid over it. Thick line: first plan. Dashed circles: what plans keep away from at this θ_c; "
       + "where two overlap, the gap is closed. Drag an obstacle, the robot, the target or the tip of an arrow; or click one and "
@@ -52,7 +51,7 @@
         panels: ["theta", "judged"],
         sentence: "Now θ_c begins low, the gap is open, and ES learns. Look at θ_c and at the cost without noise while it trains.",
         found: ({ first, closed, last }) => (
-          closed ? `After ${closed.episode} episodes θ_c is ${sized(closed.thetaC)}, and the robot does not arrive: the cost without noise is `
+          closed ? `After ${closed.episode} episodes θ_c is ${fixed(closed.thetaC, 3)}, and the robot does not arrive: the cost without noise is `
             + `${fixed(closed.cost, 0)}, and was ${fixed(first.cost, 0)}. After ${last.episode} it is ${fixed(last.cost, 0)}.`
             : `The gap stays open for ${last.episode} episodes.`
         ),
@@ -67,7 +66,7 @@
           `V and that cost are ${apart(first)} apart at the start, ${closed ? `${apart(closed)} once the gap is closed, ` : ""}`
           + `and ${apart(last)} at the end, where the cost without noise is ${fixed(last.cost, 0)} instead of ${fixed(first.cost, 0)}. `
           + `${closed && last.error < closed.error && last.cost > closed.cost
-            ? "The value got more accurate while the policy got worse: standing costs what V says, so nothing tells the learner to move." : ""}`
+            ? "The value got more accurate while the policy got worse: all that is asked of V is to fit what the robot pays." : ""}`
         ),
       },
       {
@@ -145,7 +144,7 @@
         label: "Cost of rollouts without noise over episodes, for each run and for the frozen arm",
       },
       value: {
-        title: "Value V, and the discounted cost",
+        title: "V and discounted cost",
         label: "What the value says of the start, and the discounted cost of a rollout without noise, over the episodes of the chosen run",
       },
       theta: {
@@ -153,7 +152,7 @@
         label: "Components of theta after each episode of the chosen run; the four that move most have names",
       },
       delta: {
-        title: "TD error, root mean square",
+        title: "TD error (rms)",
         label: "Root mean square of the TD error in each training episode, for each run",
       },
       cost: {
@@ -161,7 +160,7 @@
         label: "Cost of each training episode, for each run and for the frozen arm under the same noise",
       },
       step: {
-        title: "Largest α‖φ‖²: above 2 a step overshoots",
+        title: "Largest α‖φ‖² (limit: 2)",
         label: "Largest alpha times the squared norm of phi of each episode, for each run, and the line at 2",
       },
     },
