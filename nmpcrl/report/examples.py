@@ -27,21 +27,33 @@ class Example:
     sentence: str  # what to see
     numbers: dict[str, float]  # of the sentence, not rounded
     experiment: Experiment  # the run, which a page trains
+    look: str = ""  # where on the page to look
+    against: Experiment | None = None  # a run to lay over it, which the page trains, too
+    learned: bool = True  # whether it is about what was learned, or about the theta it begins with
 
     @property
     def settings(self) -> dict[str, Any]:
-        """`SETTINGS` and the centres of the layout as a page opens them, in the types of JSON."""
-        values = {name: getattr(self.experiment, name) for name in SETTINGS}
-        plain = {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
-        return plain | {"layout": [list(one) for one in paper.centres_of(self.experiment.layout)]}
+        """Those of the run, as `settings_of` has them."""
+        return settings_of(self.experiment)
+
+
+def settings_of(experiment: Experiment) -> dict[str, Any]:
+    """`SETTINGS` and the centres of the layout as a page opens them, in the types of JSON."""
+    values = {name: getattr(experiment, name) for name in SETTINGS}
+    plain = {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
+    return plain | {"layout": [list(one) for one in paper.centres_of(experiment.layout)]}
 
 
 def example(
-    title: str, sentence: str, numbers: dict[str, float], experiment: Experiment
+    title: str, sentence: str, numbers: dict[str, float], experiment: Experiment, **more: Any
 ) -> Example:
-    """An example whose `sentence` is filled with the `numbers` and the `learner`."""
+    """An example whose `sentence` is filled with the `numbers` and the `learner`.
+
+    Args:
+        title, sentence, numbers, experiment, more: fields of `Example`.
+    """
     said = sentence.format(learner=experiment.learner, **numbers)
-    return Example(title, said, numbers, experiment)
+    return Example(title, said, numbers, experiment, **more)
 
 
 def kink() -> Example:
@@ -55,7 +67,11 @@ def kink() -> Example:
         " a little above, {jump:.0f} more."
     )
     numbers = {"below": below, "above": above, "jump": above - below}
-    return example("A kink", sentence, numbers, experiment)
+    look = (
+        "Look at the slope in the line of results, and move the robot with the arrow keys towards"
+        " the obstacle and away from it."
+    )
+    return example("A kink", sentence, numbers, experiment, look=look, learned=False)
 
 
 def tie() -> Example:
@@ -79,7 +95,18 @@ def tie() -> Example:
         "between": first_rollout(experiment).cost,
         "apart": float(np.abs(one.states[:, 1] - other.states[:, 1]).max()),
     }
-    return example("A tie", sentence, numbers, experiment)
+    return example(
+        "A tie",
+        sentence,
+        numbers,
+        experiment,
+        look=(
+            "Look at the two robots: one stands before the obstacle, and the other, which starts"
+            " a little aside, passes it."
+        ),
+        against=replace(experiment, start=(x, y + ASIDE, heading)),
+        learned=False,
+    )
 
 
 def first_rollout(experiment: Experiment) -> Rollout:

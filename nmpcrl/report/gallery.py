@@ -72,7 +72,11 @@ def closed_gap(rows: list[Row]) -> Example | None:
         "first": row["initial_cost"],
         "last": row["final_cost"],
     }
-    return example("A gap that closes", sentence, numbers, experiment)
+    look = (
+        "Look at theta_c and at the cost without noise: where the one passes the closing of the"
+        " gap, the other jumps. On the map, the dashed circles then overlap."
+    )
+    return example("A gap that closes", sentence, numbers, experiment, look=look)
 
 
 def overshoot(rows: list[Row]) -> Example | None:
@@ -92,7 +96,14 @@ def overshoot(rows: list[Row]) -> Example | None:
         "first": row["initial_cost"],
         "last": row["final_cost"],
     }
-    return example("A run that overshoots", sentence, numbers, experiment_of(row))
+    look = "Look at the largest alpha ||phi||²: above the line at {limit:.0f} a step overshoots."
+    return example(
+        "A run that overshoots",
+        sentence,
+        numbers,
+        experiment_of(row),
+        look=look.format(limit=OVERSHOOT),
+    )
 
 
 def one_fails(study: Published, wrong: str, well: str) -> Example | None:
@@ -119,7 +130,18 @@ def one_fails(study: Published, wrong: str, well: str) -> Example | None:
         "other": other["final_cost"],
         "episode": ceil(one["steps_done"] / experiment.steps),
     }
-    return example(f"{wrong} fails, {well} does not", sentence, numbers, experiment)
+    look = (
+        f"Look at the cost without noise while both train, {wrong} first, and then at the two"
+        f" robots: {well}'s is the one with the dashed trajectory."
+    )
+    return example(
+        f"{wrong} fails, {well} does not",
+        sentence,
+        numbers,
+        experiment,
+        look=look,
+        against=experiment_of(other),
+    )
 
 
 def _pairs(

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.report import continuing
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.setup import controller_of, environment_of
 
 FIGURE = "laboratory"
 FINISHED = """() => {
@@ -107,6 +109,27 @@ def assert_equal_to_python(found: dict, experiment: Experiment, digits: float = 
     largest = np.maximum.reduceat(steps["alpha_phi2"], np.append(0, last[:-1] + 1))
     found_largest = [row["alphaPhi2"] for row in rows[1:]]
     np.testing.assert_allclose(found_largest, largest, rtol=100 * digits)
+    assert_worth_as_in_python(rows, experiment, 100 * digits)
+
+
+def assert_worth_as_in_python(rows: list[dict], experiment: Experiment, digits: float) -> None:
+    """The TD error of each episode, and of each theta that was judged what its value says."""
+    expected = run(experiment)
+    episode, delta = expected.steps["episode"], expected.steps["delta"]
+    for row in rows[1:]:
+        here = delta[(episode == row["episode"] - 1) & np.isfinite(delta)]
+        if here.size:
+            np.testing.assert_allclose(row["delta"], np.sqrt(np.mean(here**2)), rtol=digits)
+    controller, around = controller_of(experiment), environment_of(experiment)
+    for row in (row for row in rows if row["judged"]):
+        theta = np.array(row["theta"])
+        rollout = evaluate(controller, theta, experiment.steps, **around)
+        pairs = zip(rollout.states, rollout.actions, strict=False)
+        costs = [experiment.task.stage_cost(state, action) for state, action in pairs]
+        discounted = np.sum(paper.GAMMA ** np.arange(len(costs)) * costs)
+        np.testing.assert_allclose(row["judged"]["discounted"], discounted, rtol=digits)
+        value = controller.nmpc.solve(experiment.task.start, theta).value
+        np.testing.assert_allclose(row["judged"]["value"], value, rtol=digits)
 
 
 def assert_command(tab, experiment: Experiment) -> None:
@@ -266,7 +289,7 @@ def test_runs_share_the_plots_and_can_be_removed(tab):
     fill(tab, Episodes=2)
     tab.click("Train")
     choose(tab, "Learner", "GES")
-    tab.click("Other seeds: 3 more runs")
+    tab.click("3 other seeds")
     runs = trained(tab)
     tab.quiet()
     assert [one["given"]["seed"] for one in runs] == [0, 1, 2, 3]
@@ -328,27 +351,206 @@ def test_a_number_that_makes_no_sense_is_refused_beside_its_field(tab):
     assert "please" not in tab.quiet().figure.inner_text()
 
 
-def test_a_find_opens_with_a_click(tab):
-    fill(tab, Episodes=1)
-    tab.click("Train")
-    trained(tab)
+def press(tab, button) -> None:
+    """A button by keyboard."""
+    tab.figure.get_by_role("button", name=button, exact=True).focus()
+    tab.page.keyboard.press("Enter")
+
+
+def told(tab) -> str:
+    """What a find or a step says, once what it trains has ended."""
+    outcome = tab.figure.locator(".told .outcome")
+    outcome.filter(has_text=re.compile(".")).wait_for(timeout=120_000)
+    return outcome.inner_text()
+
+
+def assert_played(tab) -> None:
+    """That the robots drive to the end of their time, which they once had left."""
+    tab.page.wait_for_function(
+        """() => {
+          const range = document.querySelector("figure.live .player input")
+          window.driven = window.driven || range.value < 100
+          return window.driven && range.value === range.max
+        }"""
+    )
+
+
+def test_it_is_the_first_thing_on_its_page_and_as_wide_as_the_window(opened):
+    tab = opened(FIGURE, viewport={"width": 1280, "height": 800}).begun()
+    whole, plot = tab.figure.bounding_box(), tab.figure.locator(".plots").bounding_box()
+    assert whole["y"] < 200
+    assert whole["width"] > 1150
+    before = "one => one.compareDocumentPosition(document.querySelector('figure.live')) & 4"
+    above = tab.page.locator("article :is(img, figure, .highlight)")
+    assert not [one for one in above.all() if one.evaluate(before) and one.is_visible()]
+    sides = tab.page.locator(".bd-sidebar-primary"), tab.page.locator(".bd-sidebar-secondary")
+    assert not any(side.is_visible() for side in sides)
+    map_ = tab.figure.locator("svg").first.bounding_box()
+    assert map_["x"] + map_["width"] <= plot["x"]
+    assert map_["y"] < plot["y"] < map_["y"] + map_["height"] / 2
+    tab.page.locator(".primary-toggle").click()
+    sides[0].wait_for()
+    assert not sides[1].is_visible()
+
+
+def test_on_a_telephone_the_curves_follow_the_map(opened):
+    tab = opened(FIGURE, viewport={"width": 390, "height": 844}).begun()
+    map_, plot = (tab.figure.locator(one).first.bounding_box() for one in ("svg", ".plots"))
+    assert map_["y"] + map_["height"] <= plot["y"]
+    assert map_["width"] > 300
+    assert map_["y"] < 844
+    assert tab.page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_a_find_fills_the_form_trains_and_says_what_to_look_at(tab):
     buttons = tab.figure.locator(".gallery button")
-    assert buttons.count() == 6
-    for name in buttons.all_inner_texts():
-        tab.click(name)
-        find = next(one for one in data_of(tab)["gallery"] if one["title"] == name)
+    finds = {find["title"]: find for find in data_of(tab)["gallery"]}
+    assert buttons.all_inner_texts() == ["Lesson: the trap", *finds]
+    for name, find in finds.items():
+        press(tab, name)
+        assert tab.figure.locator(".told p").nth(1).inner_text() == " ".join(
+            (find["sentence"], find["look"])
+        )
+        tab.page.wait_for_function("() => document.querySelector('figure.live').shown.last")
         assert tab.shown()["given"] == find["settings"]
-        assert tab.figure.locator(".sentence").inner_text() == find["sentence"]
-        assert tab.shown()["last"] is None
+        asked = [find["settings"], *([find["against"]] if find["against"] else [])]
+        of_find = [run["given"] for run in tab.shown()["runs"] if run["state"] != "stopped"]
+        assert all(one in of_find for one in asked)
+        assert tab.figure.locator(".runs [aria-pressed=true]").count() == len(asked) - 1
         assert_command(tab, Experiment(**find["settings"]))
-        tab.click("Reset all")
+    tab.click("Stop")
+    tab.click("Reset all")
     assert tab.shown()["given"]["layout"] == [list(one) for one in paper.LAYOUTS["A"]]
+    assert not tab.figure.locator(".told").is_visible()
+
+
+def test_the_find_about_a_gap_shows_that_it_closes(tab):
+    tab.click("A gap that closes")
+    assert "does not arrive" in told(tab)
+    assert_played(tab)
+    shown = tab.shown()
+    assert shown["runs"][0]["state"] == "finished"
+    assert shown["last"]["cost"] > 1.5 * shown["first"]["cost"]
+    tab.press("Obstacle 4", "ArrowDown")  # whoever moves something has left the find
+    tab.shown()
+    assert not tab.figure.locator(".told").is_visible()
+
+
+def test_the_find_about_a_tie_lays_the_one_that_passes_over_the_one_that_stands(tab):
+    tab.click("A tie")
+    tab.page.wait_for_function("() => document.querySelector('figure.live').shown.over")
+    shown = tab.shown()
+    assert shown["last"]["cost"] == shown["first"]["cost"]  # before anything is learned
+    assert shown["last"]["states"][-1][0] < 3.0
+    told(tab)
+    tab.figure.get_by_label("Policy").press("End")
+    assert tab.shown()["last"]["cost"] != shown["last"]["cost"]
+
+
+def test_a_run_is_laid_over_another(tab):
+    fill(tab, Episodes=10)
+    tab.click("Train")
+    choose(tab, "Learner", "QL")
+    tab.click("Train")
+    runs = trained(tab)
+    assert tab.shown()["over"] is None
+    press(tab, "Lay 1: ES, seed 0, episodes 10 over the chosen one")
+    tab.page.wait_for_function("() => document.querySelector('figure.live').shown.over")
+    shown = tab.shown()
+    costs = [run["rows"][-1]["judged"]["cost"] for run in runs]
+    np.testing.assert_allclose([shown["over"]["cost"], shown["last"]["cost"]], costs)
+    text = tab.quiet().figure.locator(".results").inner_text()
+    assert f"laid over, with the last θ of run 1: cost {costs[0]:.1f}" in text
+    dashed = "all => all.filter(one => one.style.strokeDasharray === '6px, 3px').length"
+    assert tab.figure.locator(".plots svg").first.locator("polyline").evaluate_all(dashed) == 1
+    map_ = tab.figure.locator("svg").first
+    assert map_.locator("polyline.over").get_attribute("points").count(",") == paper.STEPS
+    press(tab, "Lay 1: ES, seed 0, episodes 10 over the chosen one")
+    tab.page.wait_for_function("() => !document.querySelector('figure.live').shown.over")
+    assert map_.locator("polyline.over").get_attribute("points") == ""
+
+
+def test_the_robot_drives_at_the_speed_that_is_asked_for(tab):
+    place = tab.figure.locator(".driven.loop")
+    states = tab.shown()["first"]["states"]
+    time = tab.figure.get_by_label("Time of the closed loop")
+    for key, k in (("Home", 0), ("ArrowRight", 1), ("End", paper.STEPS - 1)):
+        time.press(key)
+        x, y = states[k][:2]
+        moved = place.evaluate(
+            "one => [one.transform.baseVal[0].matrix.e, one.transform.baseVal[0].matrix.f]"
+        )
+        np.testing.assert_allclose(moved, [x, y], atol=1e-6)
+    assert time.get_attribute("aria-valuetext") == "25.8 s"
+    tab.page.clock.install()
+    gone = {}
+    for speed in (1, 16):
+        time.press("Home")
+        tab.figure.get_by_label("Speed of play").select_option(str(speed))
+        tab.click("Play")
+        tab.page.clock.run_for(1000)
+        tab.click("Pause")
+        gone[speed] = int(time.input_value())
+    assert gone == {1: 5, 16: 80}  # steps of 0.2 s
+
+
+def test_whoever_wants_no_motion_sees_the_end(opened):
+    tab = opened(FIGURE, reduced_motion="reduce").begun()
+    tab.click("A tie")
+    tab.page.wait_for_function("() => document.querySelector('figure.live').shown.over")
+    time = tab.figure.get_by_label("Time of the closed loop")
+    assert time.input_value() == time.get_attribute("max")
+    assert tab.figure.get_by_role("button", name="Pause").count() == 0
+
+
+def test_every_policy_of_a_run_can_be_seen_again(tab):
+    fill(tab, Episodes=20)
+    tab.click("Train")
+    (found,) = trained(tab)
+    policy = tab.figure.get_by_label("Policy")
+    judged = [row for row in found["rows"] if row["judged"]]
+    for key, row in zip(("Home", "ArrowRight", "End"), judged, strict=True):
+        policy.press(key)
+        np.testing.assert_allclose(tab.shown()["last"]["cost"], row["judged"]["cost"])
+    assert policy.get_attribute("aria-valuetext") == "after episode 20"
+
+
+def test_the_lesson_on_the_trap_is_six_steps_that_run(tab):
+    """By keyboard; the first step closes a gap by hand, the second by learning."""
+    steps = data_of(tab)["trap"]
+    press(tab, "Lesson: the trap")
+    said = []
+    for number, step in enumerate(steps, 1):
+        if number > 1:
+            press(tab, "Next")
+        heading = tab.figure.locator(".told .plot-title").inner_text()
+        assert heading.startswith(f"Step {number} of 6: ")
+        said.append(told(tab))
+        given = tab.shown()["given"]
+        assert given == step["settings"]
+        assert tab.figure.get_by_label("Seed").input_value() == str(given["seed"])
+        assert tab.figure.locator(".panel.look").count() >= 1
+    by_hand, learned, value, slower, exact, low = said
+    assert re.match(r"Without learning, with θ_c = 0\.100, the robot does not arrive", by_hand)
+    assert "with θ_c = 0.001, the robot arrives" in by_hand
+    assert "the robot does not arrive" in learned
+    assert "The value got more accurate while the policy got worse" in value
+    assert "closed after episode" in slower
+    assert "The gap stays open" in exact
+    assert "with θ_c = 0.050, the robot arrives" in low
+    runs = tab.shown()["runs"]
+    assert len(runs) == 6  # ES is trained once, and steps 1 and 6 have two more of theta_c
+    assert tab.figure.get_by_role("button", name="Next").get_attribute("aria-disabled") == "true"
+    press(tab, "Back")
+    assert told(tab) == exact
+    assert len(tab.shown()["runs"]) == 6
 
 
 def test_a_find_about_a_network_fails_here_as_in_python(tab):
     tab.click("RDES fails, DES does not")
-    tab.click("Train")
-    (found,) = trained(tab)
+    told(tab)
+    found, well = tab.shown()["runs"]
+    assert well["state"] == "finished"
     expected = run(Experiment(**tab.shown()["given"]))
     assert found["state"] == "diverged"
     assert found["rows"][-1]["episode"] == expected.steps["episode"][-1] + 1
@@ -408,9 +610,13 @@ def test_axe_finds_nothing(opened, width, theme):
         color_scheme=theme,
         reduced_motion="reduce",
     ).begun()
+    if not tab.figure.get_by_label("Episodes").is_visible():
+        tab.figure.get_by_text("Settings", exact=True).click()
     fill(tab, Episodes=1)
     tab.click("Train")
     trained(tab)
+    tab.click("Lesson: the trap")
+    told(tab)
     found = Axe().run(tab.quiet().page, context="figure.live")
     assert found.response["passes"]
     assert found.response["violations"] == []

@@ -44,7 +44,8 @@ def test_the_settings_are_json_and_name_the_run(shown, title):
     assert Experiment(**settings).canonical == example.experiment.canonical
     assert settings["learner"] in (*REPEATED, title.split()[0])
     assert 1 <= len(settings["layout"]) <= 8
-    assert not re.search(r"[{}]|nan|inf", example.sentence)
+    assert not re.search(r"[{}]|nan|inf", example.sentence + example.look)
+    assert example.look.startswith("Look at ")
 
 
 def test_the_gap_is_open_at_first_and_closed_at_the_end(shown, study):
@@ -87,6 +88,7 @@ def test_one_learner_fails_where_the_other_does_not(shown, study, title):
     assert study.rows[example.experiment]["wrong"]
     assert not study.rows[other]["wrong"]
     assert example.experiment.learner == wrong
+    assert example.against == other
     assert wrong in example.sentence
 
 

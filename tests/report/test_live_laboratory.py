@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 from raising import raising
 
+from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.bench import live as bench
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.report import live
-from nmpcrl.report.examples import Example
+from nmpcrl.report.examples import Example, first_rollout
 from nmpcrl.report.live import frame, noise, training
 from nmpcrl.report.live.looks import look
 from nmpcrl.study import Experiment, ParameterError, paper
 
-FIND = Example("One", "See.", {}, Experiment(seed=3))
+FIND = Example("One", "See.", {}, Experiment(seed=3), "Look.")
 
 
 @pytest.fixture(scope="module")
@@ -90,8 +91,26 @@ def test_the_widths_of_the_strips_make_numpys_normal_numbers(data):
 def test_a_find_is_a_title_a_sentence_and_settings(data):
     (find,) = data["gallery"]
     assert (find["title"], find["sentence"], find["settings"]["seed"]) == ("One", "See.", 3)
+    assert (find["look"], find["against"], find["learned"]) == ("Look.", None, True)
     names = {field["name"] for field in data["fields"]}
     assert set(find["settings"]) == names | {"layout", "start", "target", "theta"}
+
+
+def test_the_lesson_sets_theta_c_to_either_side_of_where_the_gap_closes(data):
+    runs = [Experiment(**step["settings"]) for step in data["trap"]]
+    over = [step["against"] and Experiment(**step["against"]) for step in data["trap"]]
+    closed, learned, again, slower, exact, by_hand = runs
+    closes = closes_at(learned.task, first_rollout(learned).states[:, :2])
+    assert learned.theta[-1] < by_hand.theta[-1] < closes < closed.theta[-1]
+    assert over == [
+        Experiment(**vars(closed) | {"theta": learned.theta}),
+        None,
+        None,
+        *[learned] * 3,
+    ]
+    assert (again, exact.learner, slower.alpha) == (learned, "TDC", learned.alpha / 10)
+    for one in runs:
+        assert (one.layout, one.start, one.seed) == (learned.layout, learned.start, learned.seed)
 
 
 def test_all_its_files_are_there_once(shown):

@@ -1,4 +1,4 @@
-// What a reader of the laboratory takes along, the run as a link and as Python; and the examples that open with a click.
+// What a reader of the laboratory takes along: the run as a link and as Python.
 (() => {
   "use strict";
 
@@ -43,17 +43,5 @@
     };
   }
 
-  function gallery(parent, data, open) {
-    if (!data.gallery.length) return;
-    add(parent, "p", { class: "plot-title" }, words.gallery);
-    const row = add(parent, "div", { class: "buttons gallery" }), sentence = add(parent, "p", { class: "sentence", role: "status" });
-    for (const example of data.gallery) {
-      shared.button(row, example.title, () => {
-        sentence.textContent = example.sentence;
-        open({ ...settings.defaults(data), ...example.settings });
-      });
-    }
-  }
-
-  window.nmpcrl = { ...window.nmpcrl, laboratoryAlong: { takeAlong, gallery } };
+  window.nmpcrl = { ...window.nmpcrl, takeAlong };
 })();

@@ -1,4 +1,4 @@
-// The laboratory's map: obstacles that come and go, the robot's start, its target, and two closed loops.
+// The laboratory's map: obstacles that come and go, the robot's start, its target, closed loops, and robots that drive them.
 (() => {
   "use strict";
 
@@ -15,7 +15,7 @@
       const to = (point) => move({ layout: read().layout.with(k, gridded(map.inside(point))) });
       const by = (dx, dy) => to([read().layout[k][0] + dx, read().layout[k][1] + dy]);
       const handle = map.handle({ label: common.obstacle(k + 1), kind: "obstacle", range: map.range, to, by });
-      add(handle.body, "circle", { class: "safety", r: clearance / 2 });
+      const safety = add(handle.body, "circle", { class: "safety" });
       add(handle.body, "circle", { class: "disc", r: radius });
       const group = handle.body.parentNode;
       group.addEventListener("keydown", (event) => {
@@ -25,10 +25,11 @@
         move({ layout: read().layout.toSpliced(k, 1) });
         handles[Math.max(0, k - 1)].group.focus({ preventScroll: true });
       });
-      return { ...handle, group };
+      return { ...handle, group, safety };
     });
-    return ({ layout }) => handles.forEach(({ group, put }, k) => {
+    return ({ layout }, { thetaC }) => handles.forEach(({ group, put, safety }, k) => {
       group.style.display = k < layout.length ? "" : "none";
+      set(safety, { r: (clearance / 2) * Math.sqrt(Math.max(0, 1 + thetaC)) }); // where Xi + theta_c = 0
       if (k < layout.length) put(layout[k], layout[k][0], common.place(...layout[k]));
     });
   }
@@ -51,15 +52,26 @@
     };
   }
 
-  function trajectories(map) {
-    const before = add(map.ground, "polyline", { class: "before" });
-    const loop = add(map.ground, "polyline", { class: "loop" });
+  // Each a closed loop with its robot, that of theta at the start, that of a run laid over, and the one that is shown.
+  function trajectories(map, { robot }) {
+    const kinds = ["before", "over", "loop"];
+    const lines = Object.fromEntries(kinds.map((kind) => [kind, add(map.ground, "polyline", { class: kind })]));
     const plan = add(map.ground, "polyline", { class: "plan" });
-    return (_, { first, last, color }) => {
-      set(before, { points: last ? points(first.states) : "" });
-      set(loop, { points: points((last ?? first).states) });
-      set(plan, { points: points((last ?? first).plan?.states ?? []) });
-      loop.style.setProperty("--look", color);
+    const robots = Object.fromEntries(kinds.map((kind) => [kind, add(map.ground, "g", { class: `driven ${kind}` })]));
+    for (const each of Object.values(robots)) {
+      add(each, "circle", { r: robot });
+      add(each, "line", { x1: 0, y1: 0, x2: robot, y2: 0 });
+    }
+    return (_, { first, last, over, colors, time }) => {
+      const loops = { before: last && first, over, loop: last ?? first };
+      set(plan, { points: points(loops.loop.plan?.states ?? []) });
+      for (const kind of kinds) {
+        const states = loops[kind]?.states ?? [], [x, y, heading] = states[Math.min(time, states.length - 1)] ?? [];
+        set(lines[kind], { points: points(states) });
+        robots[kind].style.display = states.length ? "" : "none";
+        set(robots[kind], { transform: `translate(${x ?? 0} ${y ?? 0}) rotate(${((heading ?? 0) * 180) / Math.PI})` });
+        for (const each of [lines[kind], robots[kind]]) each.style.setProperty("--look", colors[kind] ?? "");
+      }
     };
   }
 
@@ -89,9 +101,9 @@
     };
   }
 
-  // What draws the map: (given, { first, last, color }), two rollouts of which the last may be null.
-  function laboratoryMap(parent, data, read, move, restore) {
-    const side = add(parent, "div", { class: "side" });
+  // What draws the map: (given, { first, last, over, colors, time, thetaC }), rollouts of which the last two may be
+  // null, with their colours, the step at which their robots are, and what the circles show.
+  function laboratoryMap(side, data, read, move) {
     const map = plane(side, data.view, words.handles);
     mapParts.background(map, data);
     const start = { kind: "robot", label: common.robot, turned: common.heading };
@@ -100,12 +112,10 @@
       obstacles(map, data, read, move),
       pose(map, data, "target", target, read, move),
       pose(map, data, "start", start, read, move),
-      trajectories(map),
+      trajectories(map, data),
     ];
-    add(side, "p", { class: "legend" }, words.legend);
-    parts.push(buttons(side, data, read, move, restore));
     return (given, found) => parts.forEach((draw) => draw(given, found));
   }
 
-  window.nmpcrl = { ...window.nmpcrl, laboratoryMap };
+  window.nmpcrl = { ...window.nmpcrl, laboratoryMap, mapButtons: buttons };
 })();

@@ -1,14 +1,14 @@
-// The laboratory's four plots: what all runs cost and how theta moves, over the episodes.
+// The laboratory's six plots over the episodes: what all runs cost, how theta moves, and how wrong the value is.
 (() => {
   "use strict";
 
   const { add, graph, laboratoryRuns: { judged }, words: { laboratory: words, parts: { fixed, symbols } } } = window.nmpcrl;
   const NAMED = 4; // components of theta that have names
   const ARM = "frozen";
-  const SIZE = [600, 190], MARGIN = { left: 50, right: 30, top: 10, bottom: 24 }; // [px]
+  const SIZE = [600, 135], MARGIN = { left: 48, right: 30, top: 6, bottom: 22 }; // [px]
   const LINE = 12; // height of a small letter [px]
   const ROOM = 0.06; // above and below all that is drawn, of its height
-  const TICKS = { x: 5, y: 4 };
+  const TICKS = { x: 3, y: 3 };
 
   // Powers of ten; every second or third where they are many.
   function powers(from, to, count) {
@@ -55,7 +55,7 @@
       const [from, to] = extent(scaled.flatMap(({ points }) => points.map(([, y]) => y)));
       const places = draw({
         x: { from: x[0], to: x[1], count: TICKS.x },
-        y: { from, to, count: TICKS.y, ticks: log ? powers(from, to, TICKS.y) : undefined },
+        y: { from, to, count: TICKS.y, ticks: scaled.length ? log && powers(from, to, TICKS.y) || undefined : [] },
         lines: scaled,
         width: svg.clientWidth || SIZE[0],
       });
@@ -95,18 +95,32 @@
     }));
   }
 
+  // Of the chosen run: what its value says of the start, and what a rollout without noise pays from there.
+  function worth({ rows }, color) {
+    const line = (name, read, look) => ({
+      name, look, color, points: judged(rows).map(({ episode, judged: one }) => [episode, read(one)]),
+    });
+    return [
+      line("cost", ({ discounted }) => discounted, "line truth"), line("V", ({ value }) => value, "line chosen"),
+    ];
+  }
+
+  // What is returned draws (runs, chosen, kept), and names the panels to look at.
   function plots(parent, data) {
     const grid = add(parent, "div", { class: "plots" });
-    const draw = Object.fromEntries(["judged", "cost", "theta", "step"].map((name) => (
-      [name, plot(add(grid, "div"), words.plots[name])]
-    )));
+    const panels = Object.fromEntries(Object.keys(words.plots).map((name) => [name, add(grid, "div", { class: "panel" })]));
+    const draw = Object.fromEntries(Object.entries(panels).map(([name, panel]) => [name, plot(panel, words.plots[name])]));
+    const lookAt = (names) => {
+      for (const [name, panel] of Object.entries(panels)) panel.classList.toggle("look", names.includes(name));
+    };
     const heights = (lines) => lines.flatMap(({ points }) => points.map(([, y]) => y)).filter(Number.isFinite);
     const wide = (values) => Math.max(...values) > 20 * Math.min(...values.filter((value) => value > 0));
-    return (runs, chosen) => {
+    const drawn = (runs, chosen, kept) => {
       const x = [0, Math.max(...runs.map(({ given }) => given.episodes), 1)];
       const lines = (points) => runs.map((run) => {
         const look = run === chosen ? "line chosen" : "line";
-        return { ...data.looks[run.given.learner], look, name: `${run.number}`, points: points(run.rows) };
+        const dashes = run === kept ? "6 3" : "";
+        return { ...data.looks[run.given.learner], dashes, look: run === kept ? "line chosen" : look, name: `${run.number}`, points: points(run.rows) };
       });
       const arms = (points) => runs.map((run) => ({ ...data.looks[ARM], look: "line", points: points(run) }));
       const both = (points, ofArm) => {
@@ -114,15 +128,20 @@
         return { lines: all, x, log: wide(heights(all)) };
       };
       const trained = (rows) => after(rows).map(({ episode, cost }) => [episode, cost]);
-      const level = ({ rows, given }) => judged(rows.slice(0, 1)).flatMap(([, cost]) => [[0, cost], [given.episodes, cost]]);
-      draw.judged(both(judged, level)); // without noise the frozen arm always does the same
+      const free = (rows) => judged(rows).map(({ episode, judged: { cost } }) => [episode, cost]);
+      const level = ({ rows, given }) => free(rows.slice(0, 1)).flatMap(([, cost]) => [[0, cost], [given.episodes, cost]]);
+      draw.judged(both(free, level)); // without noise the frozen arm always does the same
       draw.cost(both(trained, ({ arm }) => trained(arm)));
       draw.theta({ x, lines: chosen ? components(chosen, data, data.looks[chosen.given.learner].color) : [] });
+      draw.value({ x, lines: chosen ? worth(chosen, data.looks[chosen.given.learner].color) : [] });
+      const deltas = lines((rows) => after(rows).map(({ episode, delta }) => [episode, delta]));
+      draw.delta({ x, lines: deltas, log: wide(heights(deltas)) });
       const steps = lines((rows) => after(rows).map(({ episode, alphaPhi2 }) => [episode, alphaPhi2]));
       const limit = { look: "level", name: `${data.overshoot}`, points: x.map((episode) => [episode, data.overshoot]) };
       const all = [limit, ...steps];
       draw.step({ x, lines: all, log: wide(heights(all)) });
     };
+    return { draw: drawn, lookAt };
   }
 
   window.nmpcrl = { ...window.nmpcrl, laboratoryPlots: plots };

@@ -79,9 +79,11 @@
       runs,
       doing: () => doing,
       add(given) {
-        runs.push({ number: ++count, given, rows: [], arm: [], state: "waiting", why: "" });
+        const run = { number: ++count, given, rows: [], arm: [], state: "waiting", why: "" };
+        runs.push(run);
         if (!doing) next();
         else changed();
+        return run;
       },
       stop,
       remove(run) {
@@ -93,17 +95,18 @@
     };
   }
 
-  const judged = (rows) => rows.filter((row) => row.judged).map(({ episode, judged: { cost } }) => [episode, cost]);
+  const judged = (rows) => rows.filter((row) => row.judged);
+  const hasEnded = ({ state }) => state !== "waiting" && state !== "running";
 
   // How a run has done: its costs without noise at the start and at the end.
   function verdict({ rows, state, why }, data) {
-    const costs = judged(rows).map(([, cost]) => cost), ended = why || words.ends[state];
+    const costs = judged(rows).map(({ judged: { cost } }) => cost), ended = why || words.ends[state];
     const end = state === "finished" ? finalCost(costs, data.last) : null;
     return [...(costs.length ? [words.cost(costs[0], end)] : []), ...(ended ? [ended] : [])].join("; ");
   }
 
-  // A line a run: chosen by its radio button, removed by its button.
-  function list(parent, data, { choose, remove, name }) {
+  // A line a run: chosen by its radio button, laid over the chosen one and removed by its buttons.
+  function list(parent, data, { choose, keep, remove, name }) {
     const all = add(parent, "ul", { class: "runs", "aria-label": words.runs });
     const nothing = add(parent, "p", { class: "hint" }, words.none);
     const items = new Map();
@@ -117,12 +120,14 @@
       add(label, "span", {}, name(run));
       const found = add(line, "span", { class: "found" });
       input.addEventListener("change", () => choose(run));
+      const over = shared.button(line, words.keep, () => keep(run));
+      set(over, { "aria-label": words.keepRun(name(run)) });
       const button = shared.button(line, words.removeShort, () => remove(run));
       set(button, { "aria-label": words.removeRun(name(run)) });
-      return { line, input, found };
+      return { line, input, found, over };
     }
 
-    return (runs, chosen) => {
+    return (runs, chosen, kept) => {
       nothing.hidden = runs.length > 0;
       for (const [run, { line }] of items) {
         if (runs.includes(run)) continue;
@@ -131,12 +136,13 @@
       }
       for (const run of runs) {
         if (!items.has(run)) items.set(run, item(run));
-        const { input, found } = items.get(run), text = verdict(run, data);
+        const { input, found, over } = items.get(run), text = verdict(run, data);
         input.checked = run === chosen;
+        set(over, { "aria-pressed": run === kept });
         if (found.textContent !== text) found.textContent = text;
       }
     };
   }
 
-  window.nmpcrl = { ...window.nmpcrl, laboratoryRuns: { queue, list, judged } };
+  window.nmpcrl = { ...window.nmpcrl, laboratoryRuns: { queue, list, judged, hasEnded } };
 })();

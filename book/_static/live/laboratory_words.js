@@ -7,25 +7,97 @@
   const percent = (share) => `${fixed(100 * Math.abs(share), 1)} %`;
   const LONG = 60; // letters of a link that are repeated
   const short = (text) => (text.length > LONG ? `${text.slice(0, LONG)}…` : text);
+  const stands = ({ arrives }) => (arrives ? "arrives" : "does not arrive");
+  // What a run came to, and what one that is laid over it did.
+  const ended = ({ given, first, last }) => (
+    `${given.learner === "frozen" ? "Without learning" : `After ${last.episode} episodes of ${given.learner}`}, with θ_c = ${fixed(last.thetaC, 3)}, the robot `
+    + `${stands(last)}, at a cost of ${fixed(last.cost, 0)}${given.learner === "frozen" ? "" : `; at the start it was ${fixed(first.cost, 0)}`}.`
+  );
+  const apart = ({ error }) => `${fixed(100 * error, 0)} %`;
   const plural = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
 
   words.laboratory = {
     map: "Laboratory: a map of obstacles, start and target, the settings of a run, and its training",
     handles: "What can be moved on the map",
-    title: "Place the obstacles, and train.",
-    hint: "Drag an obstacle, the robot, the target or the tip of an arrow; or click one and then its new place; "
-      + "or reach it with Tab and press the arrow keys, with Shift for larger steps. Delete removes an obstacle.",
-    legend: "Thin line: closed loop without noise, with θ at the start, or with the last θ of the chosen run; then "
-      + "the dotted line is that with θ at the start. Thick line: first plan.",
+    title: "Place the obstacles, and train; or see what others found.",
+    legend: "Line: closed loop without noise, of the chosen run, or of θ at the start, which is dotted beside a run. "
+      + "Dashed line: the run laid over it. Thick line: first plan. Dashed circles: what plans keep away from at this θ_c; "
+      + "where two overlap, the gap is closed. Drag an obstacle, the robot, the target or the tip of an arrow; or click one and "
+      + "then its new place; or reach it with Tab and press the arrow keys, with Shift for larger steps. Delete removes "
+      + "an obstacle. In the plots of costs, grey is the frozen arm: the same noise, and θ never moves.",
+    settings: "Settings",
+    time: "Time of the closed loop",
+    seconds: (time) => `${fixed(time, 1)} s`,
+    policy: "Policy",
+    afterEpisode: (episode) => (episode ? `after episode ${episode}` : "at the start"),
+    keep: "Lay over",
+    keepRun: (name) => `Lay ${name} over the chosen one`,
+    lesson: "Lesson: the trap",
+    back: "Back",
+    next: "Next",
+    step: (number, all, heading) => `Step ${number} of ${all}: ${heading}`,
+    outcome: (run) => (run ? ended(run) : ""),
+    // The steps of training.trap(): panels are those to look at; `found` says what became of both runs.
+    trap: [
+      {
+        heading: "close the gap",
+        panels: ["judged"],
+        sentence: "θ_c says how much farther than it must a plan stays from obstacles. Nothing learns here: in one run θ_c is raised by "
+          + "hand, and the dashed circles overlap; the dashed trajectory is that of θ_c at the start. Look at where the two robots end.",
+        found: (run, other) => `${ended(run)} ${ended(other)}`,
+      },
+      {
+        heading: "let learning close it",
+        panels: ["theta", "judged"],
+        sentence: "Now θ_c begins low, the gap is open, and ES learns. Look at θ_c and at the cost without noise while it trains.",
+        found: ({ first, closed, last }) => (
+          closed ? `After ${closed.episode} episodes θ_c is ${fixed(closed.thetaC, 3)}, and the robot does not arrive: the cost without noise is `
+            + `${fixed(closed.cost, 0)}, and was ${fixed(first.cost, 0)}. After ${last.episode} it is ${fixed(last.cost, 0)}.`
+            : `The gap stays open for ${last.episode} episodes.`
+        ),
+      },
+      {
+        heading: "is the value wrong?",
+        panels: ["value", "judged"],
+        replay: true,
+        sentence: "The same run, its policies one after the other. Compare two lines: V, what the NMPC’s value says of the start, "
+          + "and the discounted cost that the robot then pays.",
+        found: ({ first, closed, last }) => (
+          `V and that cost are ${apart(first)} apart at the start, ${closed ? `${apart(closed)} once the gap is closed, ` : ""}`
+          + `and ${apart(last)} at the end, where the cost without noise is ${fixed(last.cost, 0)} instead of ${fixed(first.cost, 0)}. `
+          + `${closed && last.error < closed.error && last.cost > closed.cost
+            ? "The value got more accurate while the policy got worse: all that is asked of V is to fit what the robot pays." : ""}`
+        ),
+      },
+      {
+        heading: "a smaller step",
+        panels: ["theta", "judged"],
+        sentence: "A remedy? α is a tenth. The dashed lines are the run before. Look at whether θ_c stops, or only comes later.",
+        found: (run) => `${ended(run)} ${run.closed ? `The gap is closed after episode ${run.closed.episode}.` : "The gap stays open."}`,
+      },
+      {
+        heading: "another learner",
+        panels: ["theta", "judged"],
+        sentence: "A remedy? TDC follows the exact gradient of the projected error, with the second derivatives that GES leaves out. Look at θ_c.",
+        found: (run) => `${ended(run)} ${run.closed ? `The gap is closed after episode ${run.closed.episode}.` : "The gap stays open."}`,
+      },
+      {
+        heading: "one number by hand",
+        panels: ["judged"],
+        sentence: "A remedy? Nothing learns; θ_c is set once, below where the gap closes. The dashed trajectory is where ES ended.",
+        found: (run, other) => `${ended(run)} ${ended(other)}`,
+      },
+    ],
     target: "Target",
     targetHeading: "Target, heading",
     add: "Add an obstacle",
     remove: "Remove the last one",
     reset: "Reset all",
-    gallery: "Six examples, to open with a click:",
+    gallery: "A lesson, and finds: each trains and plays",
     names: {
       learner: "Learner", alpha: "Step size α", beta: "Step size β", beta_tdc: "Step size β", zeta: "Learning rate ζ",
       decay: "Decay per", decay_rate: "Decay factor c", horizon: "Horizon N", seed: "Seed", episodes: "Episodes",
+      theta_c: "θ_c at the start",
     },
     learners: {
       ES: "ES: Expected Sarsa", DES: "DES: network of (s, a)", RDES: "RDES: network of (s, a, θ)",
@@ -37,7 +109,7 @@
     ),
     train: "Train",
     stop: "Stop",
-    seeds: (count) => `Other seeds: ${count} more runs`,
+    seeds: (count) => `${count} other seeds`,
     progress: "Episodes trained",
     training: (name, done, all) => `${name}: episode ${done} of ${all}`,
     arm: (name) => `frozen arm of ${name}`,
@@ -47,6 +119,7 @@
       alpha: "α", beta: "β", beta_tdc: "β", zeta: "ζ", decay: "decay per", decay_rate: "c", horizon: "N",
       episodes: "episodes",
     },
+    startingAt: (thetaC) => `θ_c ${thetaC} at the start`,
     layout: (letter) => `layout ${letter}`,
     elsewhere: "own places",
     runs: "Runs",
@@ -67,29 +140,42 @@
     frozen: "frozen",
     plots: {
       judged: {
-        title: "Cost without noise, and the frozen arm's (grey)",
+        title: "Cost without noise",
         label: "Cost of rollouts without noise over episodes, for each run and for the frozen arm",
       },
-      cost: {
-        title: "Cost of training, and the frozen arm's under the same noise (grey)",
-        label: "Cost of each training episode, for each run and for the frozen arm",
+      value: {
+        title: "V and discounted cost",
+        label: "What the value says of the start, and the discounted cost of a rollout without noise, over the episodes of the chosen run",
       },
       theta: {
-        title: "Components of θ in the chosen run; the four that move most have names",
-        label: "Components of theta after each episode of the chosen run",
+        title: "θ of the chosen run",
+        label: "Components of theta after each episode of the chosen run; the four that move most have names",
+      },
+      delta: {
+        title: "TD error (rms)",
+        label: "Root mean square of the TD error in each training episode, for each run",
+      },
+      cost: {
+        title: "Cost of training",
+        label: "Cost of each training episode, for each run and for the frozen arm under the same noise",
       },
       step: {
-        title: "Largest α‖φ‖² of each episode: a step overshoots above 2",
+        title: "Largest α‖φ‖² (limit: 2)",
         label: "Largest alpha times the squared norm of phi of each episode, for each run, and the line at 2",
       },
     },
-    now: ({ cost, failed, states }, who) => [
+    now: ({ cost, discounted, plan, failed, states }, who) => [
       failed
-        ? [`The solver found no plan at step ${states.length}; the closed loop ends there.`]
+        ? [`The solver found no plan at step ${states.length}; the closed loop ${who} ends there.`]
         : [`Closed loop ${who}: cost`, fixed(cost, 1)],
+      ...(plan && !failed ? [[
+        "Its start: value", fixed(plan.value, 1), "; discounted cost", fixed(discounted, 1), "; slope of the value in {c}",
+        fixed(plan.features.at(-1), 1),
+      ]] : []),
     ],
     atStart: "with θ at the start",
-    ofRun: (number) => `with the last θ of run ${number}`,
+    ofRun: (number, episode) => `with θ of run ${number} after episode ${episode}`,
+    over: (number) => `laid over, with the last θ of run ${number}`,
     // What a link may say of a setting.
     allowed: (name, { fields, most, theta, limits }) => {
       const field = fields.find((each) => each.name === name);

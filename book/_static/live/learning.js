@@ -140,25 +140,30 @@
     }
   }
 
-  // What a policy does without noise: (theta) => { cost, states }.
+  // What a policy does without noise: (theta) => { cost, states, value, discounted }, the value and the discounted cost of the start.
   const judgeOf = (nmpc, { start, target, discs, horizon, steps: count }) => (theta) => {
-    const { states, cost, failed } = nmpc.rollout({ start, target, discs, horizon, theta }, count);
-    return { states, cost: failed ? Infinity : cost };
+    const { states, cost, discounted, plan, failed } = nmpc.rollout({ start, target, discs, horizon, theta }, count);
+    const end = failed ? { cost: Infinity, discounted: Infinity } : { cost, discounted };
+    return { ...end, states, value: plan?.value ?? NaN };
   };
 
   // The account of a run, as nmpcrl/study/run.py has it, fed step by step: what the episode did so far.
-  // { episode, cost, alphaPhi2 (the largest), theta, diverged, ended, judged: { cost, states } or null }
+  // { episode, cost, delta (root mean square), alphaPhi2 (the largest), theta, diverged, ended, judged or null }
   function account(settings, judge) {
     const { alpha, episodes, evaluateEvery, limits } = settings;
-    let cost = 0, phi2 = 0;
+    let cost = 0, phi2 = 0, squares = 0, count = 0;
     return (step) => {
       const { theta, diverged } = step, episode = step.episode + 1;
       cost += step.cost;
       phi2 = Math.max(phi2, step.phi2 || 0);
-      const row = { episode, cost, alphaPhi2: alpha * phi2, theta, diverged };
+      if (Number.isFinite(step.delta)) {
+        squares += step.delta ** 2;
+        count += 1;
+      }
+      const row = { episode, cost, delta: Math.sqrt(squares / count), alphaPhi2: alpha * phi2, theta, diverged };
       const ended = step.failed || diverged || step.time === settings.steps - 1;
       const due = ended && (episode % evaluateEvery === 0 || episode === episodes);
-      if (ended) cost = phi2 = 0;
+      if (ended) cost = phi2 = squares = count = 0;
       return { ...row, ended, judged: due && !absurd(step, limits) ? judge(theta) : null };
     };
   }
@@ -166,7 +171,7 @@
   // A run: the account of each episode, and before them what theta does at first.
   function* run(nmpc, settings, noise) {
     const judge = judgeOf(nmpc, settings), accounted = account(settings, judge), { theta } = settings;
-    yield { episode: 0, cost: NaN, alphaPhi2: NaN, theta, diverged: false, judged: judge(theta) };
+    yield { episode: 0, cost: NaN, delta: NaN, alphaPhi2: NaN, theta, diverged: false, judged: judge(theta) };
     for (const step of train(nmpc, settings, noise)) {
       const row = accounted(step);
       if (row.ended) yield row;

@@ -127,17 +127,19 @@
       return formed === FORMED ? Array.from(product) : null;
     }
 
-    // The closed loop of a policy from `given.start` without noise, and the first of its plans.
+    // The closed loop of a policy from `given.start` without noise, its cost, discounted too, and the first of its plans.
     // A failed solve ends it, as in `evaluate`.
     function rollout(given, steps) {
       ask({ ...given, state: given.start });
-      const found = { states: [], cost: 0, plan: null, failed: false };
+      const found = { states: [], cost: 0, discounted: 0, plan: null, failed: false };
       for (let k = 0; k < steps; k++) {
         if (!solveThere(k > 0 ? FREE : NOTHING)) return { ...found, failed: true };
         found.plan ??= read();
         action.set(plan.subarray(n, n + m));
         found.states.push(Array.from(state));
-        found.cost += charge();
+        const charged = charge();
+        found.cost += charged;
+        found.discounted += problem.discount[1] ** k * charged;
         wasm.plant_step(state.byteOffset, action.byteOffset, next.byteOffset);
         state.set(next);
       }

@@ -57,7 +57,7 @@
     },
   };
 
-  const player = { play: "Play", pause: "Pause", step: "Step" };
+  const player = { play: "Play", pause: "Pause", step: "Step", speed: "Speed of play", times: (factor) => `${factor} ×` };
 
   window.nmpcrl = { ...window.nmpcrl, words: { parts, player } };
 })();

@@ -1,7 +1,7 @@
 """The laboratory: a live page that places obstacles and trains, as `study.run` does."""
 
 from collections.abc import Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 from IPython.display import HTML
@@ -10,20 +10,21 @@ from nmpcrl.control import Nmpc, Obstacle
 from nmpcrl.learning.browser import LONGEST
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.report.continuing import TEMPLATES
-from nmpcrl.report.examples import Example
+from nmpcrl.report.examples import Example, settings_of
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.algorithm import fixed
 from nmpcrl.report.live.looks import look
 from nmpcrl.report.live.noise import widths
 from nmpcrl.report.live.problem import WALL, problem_of
 from nmpcrl.study import Experiment, paper
+from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.learners import readers
 from nmpcrl.study.records import LAST
 
 SCRIPTS = frame.scripts_of(
     "laboratory", *frame.MAP, "random.js", "network.js", "learning.js", "trainer.js", "graph.js",
-    "settings.js", "laboratory_map.js", "laboratory_runs.js", "laboratory_plots.js",
-    "laboratory_along.js",
+    "player.js", "settings.js", "laboratory_map.js", "laboratory_runs.js", "laboratory_plots.js",
+    "laboratory_lesson.js", "laboratory_along.js",
 )  # fmt: skip
 STYLES = ("laboratory.css",)
 LEARNERS = ("ES", "DES", "RDES", "GES", "TDC", "QL", "frozen")
@@ -33,6 +34,8 @@ SETTINGS = (
 )  # fmt: skip
 MOST = {"horizon": LONGEST, "episodes": 3000}  # of a page
 MOST_OBSTACLES = 8
+CLOSED, BY_HAND = 0.1, 0.05  # theta_c at which no plan, and one, fits through the gap of the lesson
+SLOWER = 1e-8  # alpha, a tenth of the default
 
 
 def laboratory(gallery: Iterable[Example] = ()) -> HTML:
@@ -72,11 +75,49 @@ def _data(nmpc: Nmpc, gallery: Iterable[Example]) -> dict[str, Any]:
         "looks": {learner: look(learner) for learner in LEARNERS},
         "widths": widths(),
         "templates": TEMPLATES,
+        "period": nmpc.plant.period,
+        "arrived": ARRIVED,
         "gallery": [
-            {"title": one.title, "sentence": one.sentence, "settings": one.settings}
+            {
+                "title": one.title,
+                "sentence": one.sentence,
+                "look": one.look,
+                "settings": one.settings,
+                "against": one.against and settings_of(one.against),
+                "learned": one.learned,
+            }
             for one in gallery
         ],
+        "trap": trap(),
     }
+
+
+def trap() -> list[dict[str, Any]]:
+    """The lesson on the trap: what each of its six steps trains, and what is laid over that.
+
+    It is the run of the find "A gap that closes", and its remedies were picked after a look at what
+    they do there: the lesson illustrates, and is evidence for no claim.
+    """
+    learned = Experiment(layout="F", seed=1)
+    asleep = replace(learned, learner="frozen", episodes=default("evaluate_every"))
+    slower, exact = replace(learned, alpha=SLOWER), replace(learned, learner="TDC")
+    steps: list[tuple[Experiment, Experiment | None]] = [
+        (with_theta_c(asleep, CLOSED), asleep),
+        (learned, None),
+        (learned, None),
+        (slower, learned),
+        (exact, learned),
+        (with_theta_c(asleep, BY_HAND), learned),
+    ]
+    return [
+        {"settings": settings_of(one), "against": other and settings_of(other)}
+        for one, other in steps
+    ]
+
+
+def with_theta_c(experiment: Experiment, value: float) -> Experiment:
+    """The same run from another theta_c."""
+    return replace(experiment, theta=(*experiment.theta[:-1], value))
 
 
 def default(name: str) -> Any:
