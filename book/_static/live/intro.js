@@ -88,12 +88,14 @@
         module: window.nmpcrl.module, problem: data.problem, widths: data.widths,
         settings: { ...settings, start, discs, horizon },
       };
-      stopped = trainer(given, {
-        row: ({ episode, theta, diverged }) => (
-          move(diverged ? { episode, said: words.diverged } : { episode, theta })
-        ),
-        end: (why) => end(why ? { said: words.failed(why) } : {}),
+      const stop = trainer(given, {
+        row: ({ episode, theta, diverged }) => {
+          if (stopped !== stop) return; // what was on its way when it was stopped
+          move(diverged ? { episode, said: words.diverged } : { episode, theta });
+        },
+        end: (why) => { if (stopped === stop) end(why ? { said: words.failed(why) } : {}); },
       });
+      stopped = stop;
     }
 
     set(figure, { "aria-label": words.map });
