@@ -549,9 +549,11 @@ def test_the_lesson_on_the_trap_is_six_steps_that_run(tab):
 
 def test_a_find_about_a_network_fails_here_as_in_python(tab):
     tab.click("RDES fails, DES does not")
-    told(tab)
+    tab.page.wait_for_function(
+        "() => document.querySelector('figure.live').shown.runs[0]?.state === 'diverged'"
+    )
     found, well = tab.shown()["runs"]
-    assert well["state"] == "finished"
+    assert well["given"] == {**found["given"], "learner": "DES"}
     expected = run(Experiment(**tab.shown()["given"]))
     assert found["state"] == "diverged"
     assert found["rows"][-1]["episode"] == expected.steps["episode"][-1] + 1
