@@ -6,6 +6,7 @@
   const NAMED = 4; // components of theta that have names
   const ARM = "frozen";
   const SIZE = [600, 135], MARGIN = { left: 48, right: 30, top: 6, bottom: 22 }; // [px]
+  const OVER = "7 4"; // dashes of a run that is laid over the chosen one, as on the map
   const LINE = 12; // height of a small letter [px]
   const ROOM = 0.06; // above and below all that is drawn, of its height
   const TICKS = { x: 3, y: 3 };
@@ -117,11 +118,11 @@
     const wide = (values) => Math.max(...values) > 20 * Math.min(...values.filter((value) => value > 0));
     const drawn = (runs, chosen, kept) => {
       const x = [0, Math.max(...runs.map(({ given }) => given.episodes), 1)];
-      const lines = (points) => runs.map((run) => {
-        const look = run === chosen ? "line chosen" : "line";
-        const dashes = run === kept ? "6 3" : "";
-        return { ...data.looks[run.given.learner], dashes, look: run === kept ? "line chosen" : look, name: `${run.number}`, points: points(run.rows) };
-      });
+      const line = (run) => (run === chosen ? "line chosen" : "line");
+      const look = (run) => (run === kept ? { look: "line kept", dashes: OVER } : { look: line(run) });
+      const lines = (points) => runs.map((run) => ({
+        ...data.looks[run.given.learner], ...look(run), name: `${run.number}`, points: points(run.rows),
+      }));
       const arms = (points) => runs.map((run) => ({ ...data.looks[ARM], look: "line", points: points(run) }));
       const both = (points, ofArm) => {
         const all = [...arms(ofArm), ...lines(points)];
