@@ -195,7 +195,6 @@
     ),
     failed: (why) => `this browser could not train: ${why}`,
     armFailed: (why) => `this browser could not train its frozen arm: ${why}`,
-    noWorker: "it did not start a worker",
     link: "A link to these settings",
     copyLink: "Copy link",
     copied: "Copied.",
