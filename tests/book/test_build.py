@@ -378,7 +378,9 @@ def test_a_page_has_an_empty_answer_a_place_for_it_and_the_folded_solution(whole
     assert page.select_one(".exercise .exercise-line").text.startswith("By hand · level 1 of 3")
     place = page.select_one("div.answer[hidden]")
     assert json.loads(place.script.string)["expected"] == pytest.approx(1.375)
-    assert "d = ..." in page.select_one("details.hide pre").text
+    set_up, answer, *_ = (one.text for one in page.select("details.hide pre"))
+    assert "episodes = 300\n\nexperiments = ()" in set_up
+    assert "d = ..." in answer
     assert "d = 1.375" in page.select_one("details.solution").text
     assert page.text.count("d = 1.375") == 1
     offered = nbformat.read(whole / "_build/html/book/one.ipynb", 4)
