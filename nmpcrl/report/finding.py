@@ -34,7 +34,6 @@ def numbers(found: Finding | None) -> str:
         return NOTHING
     return filled(
         """
-        {.numbers}
         - **{arrived_with_open_gaps}** runs of {learners} end at the target, at a cost that is
           {saved_where_it_arrived:.1%} lower (median), in which every gap stayed open.
           [Fig. 5.15](05_results.ipynb#fig-results-c9)
