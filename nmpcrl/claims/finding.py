@@ -31,9 +31,9 @@ Count: TypeAlias = tuple[int, int]  # yes, of
 class Finding:
     """What the published study found, in counts of runs or layouts, and in shares of the cost."""
 
-    arrived_open: Count  # runs of `LEARNERS` at the target at a lower cost, all gaps being open
-    arrived_closed: Count  # and where theta_c had closed one
-    learned: float  # median reduction of the noise-free cost by those that arrived
+    arrived_open: Count  # runs of `LEARNERS` at the target at a lower cost, every gap being open
+    arrived_closed: Count  # such runs, theta_c having closed a gap
+    learned: float  # median reduction of the noise-free cost by the former
     by_hand: Count  # layouts in which the robot arrives with theta_c = d_o and all else as it was
     better: Count  # of these, where that costs less than each run of `LEARNERS` ends at
     saved_by_hand: float  # median of these layouts
@@ -59,7 +59,7 @@ def finding(found: Published) -> Finding | None:
     return Finding(
         arrived_open=_count(arrived[~runs.closed]),
         arrived_closed=_count(arrived[runs.closed]),
-        learned=float(runs.saved[arrived].median()),
+        learned=float(runs.saved[arrived & ~runs.closed].median()),
         by_hand=(len(there), len(hand)),
         better=(sum(bool(saved > most[name]) for name, saved in there.items()), len(there)),
         saved_by_hand=float(np.median(list(there.values()))),

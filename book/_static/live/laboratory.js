@@ -299,7 +299,7 @@
       plots.draw(runs.runs, chosen, kept);
       drawProgress(runs, name);
       drawEpisodes(...policies(chosen));
-      const [over] = [kept && judged(kept.rows).at(-1)];
+      const over = kept && judged(kept.rows).at(-1);
       if (!drawn || drawn.theta !== learnt() || drawn.over !== over) drawPolicy(read());
       if (awaited?.all.every(hasEnded)) {
         const { then } = awaited;

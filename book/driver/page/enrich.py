@@ -25,10 +25,8 @@ from typing import Any
 
 import nbformat
 
-from driver.page.opening import opened
+from driver.page.opening import Cell, opened, tags_of
 from nmpcrl.control.solvers.riccati import NOTICE
-
-Cell = Any  # nbformat's, a dictionary with attributes
 
 ANCHOR = r'<a id="(?P<label>[^"]+)"></a>\n'
 EQUATION = re.compile(
@@ -110,7 +108,7 @@ def download(executed: Any) -> Any:
 
 def output(source: Any, tag: str) -> str:
     """What the cell with a tag displayed, HTML or Markdown; nothing if it was not executed."""
-    (cell,) = (cell for cell in source.cells if tag in _tags(cell))
+    (cell,) = (cell for cell in source.cells if tag in tags_of(cell))
     shown = [one.data for one in cell.outputs if "data" in one]
     return "\n\n".join(one.get("text/html") or one.get("text/markdown", "") for one in shown)
 
@@ -147,9 +145,9 @@ def _dressed(cells: list[Cell]) -> Iterator[Cell]:
             yield _paragraphs(cell) if cell.outputs and calls_prose(cell.source) else cell
             continue
         label = re.match(ANCHOR, cell.source)
-        if "exercise" in _tags(cell) and label:
+        if "exercise" in tags_of(cell) and label:
             exercise = label["label"]
-        box = next((BOXES[tag] for tag in _tags(cell) if tag in BOXES), None)
+        box = next((BOXES[tag] for tag in tags_of(cell) if tag in BOXES), None)
         cell.source = text(box(cell.source, exercise) if box else cell.source)
         yield cell
 
@@ -157,7 +155,7 @@ def _dressed(cells: list[Cell]) -> Iterator[Cell]:
 def _paragraphs(cell: Cell) -> Cell:
     """What a cell displayed, as a Markdown cell."""
     shown = (one.data["text/markdown"] for one in cell.outputs if "data" in one)
-    whole, about = "\n\n".join(map(text, shown)), {"tags": _tags(cell)}
+    whole, about = "\n\n".join(map(text, shown)), {"tags": tags_of(cell)}
     return nbformat.v4.new_markdown_cell(whole, id=cell.id, metadata=about)
 
 
@@ -165,7 +163,7 @@ def _captioned(cells: Iterator[Cell]) -> Iterator[Cell]:
     """The cells without captions, which become the name and the caption of the figure before."""
     figure: Cell = None
     for cell in cells:
-        if "caption" in _tags(cell):
+        if "caption" in tags_of(cell):
             label = re.match(ANCHOR, cell.source)
             assert figure is not None
             assert label
@@ -242,8 +240,3 @@ BOXES = {
 
 def _box(head: str, body: str) -> str:
     return f"::::::{head}\n\n{body}\n::::::"
-
-
-def _tags(cell: Cell) -> list[str]:
-    tags: list[str] = cell.metadata.get("tags", [])
-    return tags

@@ -13,7 +13,7 @@ from nbformat.v4 import new_markdown_cell
 Cell = Any  # nbformat's, a dictionary with attributes
 
 HEADING = re.compile(r"^#+ .*\n*", flags=re.M)
-PROMPTS = {"show": "Show the parameters and the set-up", "hide": "Hide the parameters"}
+PROMPTS = {verb: f"{verb.title()} the parameters and the set-up" for verb in ("show", "hide")}
 
 
 def opened(cells: list[Cell]) -> tuple[list[Cell], list[Cell]]:
@@ -21,7 +21,7 @@ def opened(cells: list[Cell]) -> tuple[list[Cell], list[Cell]]:
 
     What was not executed has nothing to say, and stays.
     """
-    found = [cell for cell in cells if "opening" in _tags(cell) and cell.cell_type == "markdown"]
+    found = [cell for cell in cells if "opening" in tags_of(cell) and cell.cell_type == "markdown"]
     title, *rest = [cell for cell in cells if cell not in found]
     said = "\n\n".join(filter(None, (HEADING.sub("", cell.source).strip() for cell in found)))
     if not said:
@@ -32,13 +32,13 @@ def opened(cells: list[Cell]) -> tuple[list[Cell], list[Cell]]:
 
 def _set_up(cells: list[Cell]) -> list[Cell]:
     """The cells, with one in the place of the code that shows nothing from the parameters on."""
-    first = next((i for i, cell in enumerate(cells) if "parameters" in _tags(cell)), None)
+    first = next((i for i, cell in enumerate(cells) if "parameters" in tags_of(cell)), None)
     if first is None:
         return cells
     last = next(i for i, cell in enumerate([*cells[first:], None], first) if not _silent(cell))
     one, *others = cells[first:last]
     one.source = "\n\n".join(cell.source for cell in (one, *others))
-    one.metadata["tags"] = [*_tags(one), "hide-input"]
+    one.metadata["tags"] = [*tags_of(one), "hide-input"]
     one.metadata["mystnb"] = {f"code_prompt_{name}": text for name, text in PROMPTS.items()}
     return [*cells[:first], one, *cells[last:]]
 
@@ -48,6 +48,7 @@ def _silent(cell: Cell) -> bool:
     return cell is not None and cell.cell_type == "code" and not cell.outputs
 
 
-def _tags(cell: Cell) -> list[str]:
+def tags_of(cell: Cell) -> list[str]:
+    """The tags of a cell, which may have none."""
     tags: list[str] = cell.metadata.get("tags", [])
     return tags

@@ -100,7 +100,7 @@ def clearest_changes(cells: pd.DataFrame, found: Evidence) -> Figure:
         values = claim.measure(here, where), claim.measure(base, where)
         _strips(left, claim, *values)
         learners = [name for name in LOOKS if any(name in arm.split() for arm in values[0])]
-        _costs(right, found.summaries, here, base, learners)
+        _not_risen(right, found.summaries, here, base, learners)
         left.set_title(
             f"{cell['claim']}: {cell['outcome']}; was: {cell['base']}", fontsize="medium"
         )
@@ -191,7 +191,7 @@ def _strips(axes: Axes, claim: RunClaim, here: Values, base: Values) -> None:
     axes.set_ylabel(claim.label, fontsize="small")
 
 
-def _costs(
+def _not_risen(
     axes: Axes,
     summaries: Mapping[Experiment, Outline],
     here: pd.DataFrame,
@@ -211,13 +211,13 @@ def _costs(
 def _curves(summaries: Mapping[Experiment, Outline], runs: pd.DataFrame) -> tuple[Vector, Matrix]:
     """After which episodes, and the noise-free costs over theta_init's, shape (runs, rollouts).
 
-    What a run did not reach, and a failed rollout, costs infinitely much.
+    What a run did not reach costs infinitely much.
     """
     judged = [summaries[experiment_of(row)].evaluations for row in runs.to_dict("records")]
     episode = max((one["episode"] for one in judged), key=len)
     costs = np.full((len(judged), len(episode)), np.inf)
     for row, one in zip(costs, judged, strict=True):
-        row[: len(one["cost"])] = np.nan_to_num(one["cost"] / one["cost"][0], nan=np.inf)
+        row[: len(one["cost"])] = one["cost"] / one["cost"][0]
     return episode, costs
 
 
