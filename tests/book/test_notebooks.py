@@ -37,6 +37,7 @@ OWN = [name for name in NOTEBOOKS if name.startswith("your_")]  # a reader's own
 GIVEN = [
     *CHAPTERS,
     *OWN,
+    "for_reviewers",
     "paper_and_book",
     "performance",
     "other_problems",
