@@ -1,7 +1,8 @@
 """How long the book takes, and what needs what: chapters in, minutes and links out.
 
 Minutes of reading are computed from a source: its words, formulas, figures and code. Those of the
-exercises are the sum of what their metadata says. What a built page shows is counted in words. What needs what is in `book/syllabus.yml`.
+exercises are the sum of what their metadata says. What a built page shows is counted in words. What
+needs what is in `book/syllabus.yml`.
 """
 
 import math
