@@ -15,7 +15,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book pdf course smoke chapter lab study bench test test-site test-lab test-course test-clusters test-fast check locks clean anew
+.PHONY: help book pdf article course smoke chapter lab study bench test test-site test-lab test-course test-clusters test-fast check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -25,6 +25,9 @@ book: .venv/ready  ## Train what is missing, execute every chapter, build _build
 
 pdf: .venv/ready  ## The built book as one PDF, _build/html/nmpcrl.pdf; needs a Chromium
 	@$(BIN)/python book/pdf.py
+
+article: .venv/ready  ## The article, _build/html/nmpcrl-article.pdf; needs a built book
+	@$(BIN)/python book/article.py
 
 course: .venv/ready  ## Notebooks for students, teachers and graders, and slides; SECRET=FILE draws other numbers
 	@$(BIN)/python book/course.py $(if $(SECRET),--secret "$(SECRET)")
