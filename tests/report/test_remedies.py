@@ -83,7 +83,7 @@ def test_who_mostly_fails_is_infinitely_bad_and_not_nan(advised):
 
 @pytest.fixture
 def runs():
-    """Of three entries in A to F: the first solves all, the second fails in A, the third is over."""
+    """Of three entries in A to F: one fails in A, one solves all, one goes beyond its budget."""
     part = PARTS["named 50"]
     found = [
         {
