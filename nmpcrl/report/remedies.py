@@ -34,11 +34,11 @@ COSTS, STEPS, MODEL = "costs of rollouts", "steps", "the plant's derivatives"
 WHAT: dict[str, tuple[str, str]] = {  # what an entry is, after "Try first", and what it is told
     "frozen": (r"$\boldsymbol{\theta}_\text{init}$ as it is", "nothing"),
     "grid": (r"a grid over $\theta_c$ alone", COSTS),
-    "ES": ("ES", STEPS),
-    "GES": ("GES", STEPS),
-    "TDC": ("exact TDC", STEPS),
-    "RDES": ("RDES", STEPS),
-    "DES": ("DES", STEPS),
+    "ES": ("Expected Sarsa", STEPS),
+    "GES": ("Expected Sarsa by gradient TD", STEPS),
+    "TDC": ("exact nonlinear TDC", STEPS),
+    "RDES": (r"Expected Sarsa with a network that is given $\boldsymbol{\theta}$", STEPS),
+    "DES": ("Expected Sarsa with a network", STEPS),
     "TDRC": (r"gradient TD with one step size and a $\mathbf{w}$ that decays", STEPS),
     "GES-3": (r"GES with a faster $\mathbf{w}$, whose steps are normalised", STEPS),
     "guarded-ES": ("ES whose steps cannot overshoot", STEPS),
@@ -203,4 +203,16 @@ def _item(answer: Answer) -> str:
     if "difference" in answer.numbers:
         found = Estimate(*(answer.numbers[name] for name in ("difference", "low", "high")))
         said.append(f"the difference is {_shown(found)}")
+    said += [f"{entry} has {', '.join(each)}" for entry, each in _by_layout(answer.numbers).items()]
     return f"- **{asked.question}** {answer.words.capitalize()}: {'; '.join(said)}.{pilot}"
+
+
+def _by_layout(numbers: Mapping[str, float]) -> dict[str, list[str]]:
+    """What an answer knows of single layouts: "CMA-ES in A", by entry."""
+    by: dict[str, list[str]] = {}
+    for name, share in numbers.items():
+        entry, there, layout = name.partition(" in ")
+        if there:
+            shown = f"{share:.2f}".replace("-", "−") if np.isfinite(share) else "a failed solve"
+            by.setdefault(entry, []).append(f"{shown} in {layout}")
+    return by

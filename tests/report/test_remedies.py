@@ -151,6 +151,15 @@ def test_an_answer_stands_beside_its_pilot():
     assert "The pilot" not in second
 
 
+def test_an_answer_says_what_it_knows_of_single_layouts():
+    numbers = {"CMA-ES in A": 0.984, "CMA-ES in F": 0.38, "ES in A": -0.53, "ES in F": -np.inf}
+    said = answer_items([Answer("search and learning", REPRODUCED, {"layouts": (9, 9)}, numbers)])
+    assert (
+        "9 of 9 layouts; CMA-ES has 0.98 in A, 0.38 in F; ES has −0.53 in A, a failed solve in F."
+        in said
+    )
+
+
 def test_an_expectation_says_whether_it_came_true():
     items = remedies.expectation_items({"DPG is never advised": True, "ES is first": False})
     assert items == (
