@@ -40,11 +40,14 @@ GIVEN = [
     "paper_and_book",
     "performance",
     "other_problems",
+    "why_learning_stops",
 ]  # which have parameters
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)
-each_exercised = pytest.mark.parametrize("name", [*CHAPTERS, "performance", "other_problems"])
+each_exercised = pytest.mark.parametrize(
+    "name", [*CHAPTERS, "performance", "other_problems", "why_learning_stops"]
+)
 each_own = pytest.mark.parametrize("name", OWN)
 each_given = pytest.mark.parametrize("name", GIVEN)
 

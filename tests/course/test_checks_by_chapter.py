@@ -22,6 +22,7 @@ from nmpcrl.course.checks import (
     results,
     solver,
     what_the_paper_leaves_open,
+    why_learning_stops,
 )
 from nmpcrl.course.exercises import exercises
 from nmpcrl.study import paper
@@ -442,6 +443,32 @@ CHECKS = {
                 **case | {"ridge": case["ridge"] / len(case["deltas"])}
             ),
             lambda **case: case["theta"],
+        ],
+    ),
+    why_learning_stops.standing: ([9, "54 - 0.03 * 1500"], [54, 1800, -9]),
+    why_learning_stops.growth: ([0.0108, "100 * 1e-7 * 9 * 120"], [0.000108, 0.0012, 9e-5]),
+    why_learning_stops.evidence: letters("c"),
+    why_learning_stops.left: (
+        ["1 - step * (1 - f)", "1 - step + step * f"],
+        ["1 - step", "1 - step * (1 + f)", "1 - step * f"],
+    ),
+    why_learning_stops.trapped: (
+        [why_learning_stops.in_trap, lambda **case: np.bool_(why_learning_stops.in_trap(**case))],
+        [
+            why_learning_stops.ends_only,
+            lambda **case: why_learning_stops.in_trap(**case, steps=11),
+            lambda **case: not why_learning_stops.in_trap(**case),
+        ],
+    ),
+    why_learning_stops.feedback: (
+        [
+            why_learning_stops.fed_back,
+            lambda **case: why_learning_stops.fed_back(**case, probe=1e-6),
+        ],
+        [
+            lambda **case: why_learning_stops.fed_back(**case) * np.linalg.norm(case["phi"]),
+            lambda **case: why_learning_stops.fed_back(**case | {"gamma": 1.0}),
+            lambda **case: -why_learning_stops.fed_back(**case),
         ],
     ),
     performance.ratio: (

@@ -32,7 +32,7 @@ WATCHED: dict[str, dict[str, Any]] = {  # by the interventions of `analysis.extr
     "true slope": {"color": TEAL, "linestyle": "-"},
 }
 NAMES = {"none": "RDES", "theta held": "θ held", "true slope": "true slope"}
-LARGEST = 100.0  # alpha ||phi||^2 that is drawn; what is larger stands at the edge
+SHOWN = (0.05, 100.0)  # of alpha ||phi||^2; what is larger stands at the edge
 
 
 @page
@@ -113,12 +113,13 @@ def interventions(watched: Mapping[str, Mapping[str, Outcome]]) -> Figure:
     for column, (name, outcomes) in zip(axes.T, watched.items(), strict=True):
         for how, one in outcomes.items():
             episodes = np.arange(1, one.episodes + 1)
-            step = np.where(one.overshoot > 0, one.overshoot, np.nan).clip(max=LARGEST)
+            step = np.where(one.overshoot > 0, one.overshoot, np.nan).clip(max=SHOWN[1])
             column[0].semilogy(episodes, step, label=NAMES[how], **WATCHED[how])
             column[1].plot(episodes, one.feedback, **WATCHED[how])
             if one.stopped:
                 column[0].plot(episodes[-1], step[-1], "X", color=WATCHED[how]["color"], ms=8)
         column[0].axhline(OVERSHOOT, **LIMIT)
+        column[0].set_ylim(SHOWN[0], 1.5 * SHOWN[1])
         column[1].axhline(1, **AT_ONE)
         column[0].set_title(name, **SUBTITLE)
         over_episodes(column[1])
