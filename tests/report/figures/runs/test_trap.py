@@ -1,4 +1,4 @@
-"""The trap and the cliffs: titles follow from the stands, and the grey is where the robot stands."""
+"""The trap and the cliffs: titles follow from the stands; the grey is where the robot stands."""
 
 from dataclasses import replace
 
@@ -45,19 +45,18 @@ def test_a_plan_that_is_worth_more_than_standing_is_not_called_below():
 
 
 def test_a_run_in_which_no_gap_closes_says_so():
-    figure = figures.trap(paper.task("E"), [OPEN, OPEN, OPEN], (0, 1, 2))
+    figure = figures.trap(paper.task("E"), [OPEN, *[replace(OPEN, episode=4)] * 2], (0, 1, 2))
     assert figure.get_suptitle() == "The robot never stands before a closed gap"
 
 
 def test_every_layout_has_its_two_lines_and_its_best_theta_c(texts):
     grid = np.array([0.0, 0.2, 0.4])
-    figure = figures.cliffs(
-        grid, {"A": (COSTS, 2 * COSTS), "E": (COSTS, COSTS)}, {"A": 0.3, "E": 0.1}, 0.004
-    )
+    costs, best = {"A": (COSTS, 2 * COSTS), "E": (COSTS, COSTS)}, {"A": 0.3, "E": 0.1}
+    figure = figures.cliffs(grid, costs, best, 0.004)
     assert texts(figure).startswith(r"Beside the best $\theta$ there is no cliff: ")
     assert "0.4%" in texts(figure)
-    for axes, best in zip(figure.axes, (0.3, 0.1), strict=True):
-        first, along, border = (line.get_xydata() for line in axes.get_lines())
+    for axes, where in zip(figure.axes, best.values(), strict=True):
+        _, along, border = (line.get_xydata() for line in axes.get_lines())
         assert along[:, 1].tolist() == [4.0, 4.0, 7.0]
-        assert border[0, 0] == best
+        assert border[0, 0] == where
     assert figure.axes[0].get_lines()[0].get_ydata()[2] == 14.0
