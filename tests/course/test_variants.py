@@ -27,6 +27,7 @@ VARIED = {  # by chapter
     "solver.ipynb": ["8.1", "8.4"],
     "performance.ipynb": ["9.2", "9.3"],
     "other_problems.ipynb": ["10.1"],
+    "what_to_try_first.ipynb": ["11.1"],
 }
 
 each_chapter = pytest.mark.parametrize("name", SOURCES)
