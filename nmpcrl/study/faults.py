@@ -45,7 +45,7 @@ class Fault:
 
     @property
     def model(self) -> dict[str, Matrix]:
-        """What an oracle knows before an episode: the parameters of `world.problem`'s model.
+        """What an oracle knows before an episode, as parameters of `world.problem`'s model.
 
         Lag and noise are not among them.
         """

@@ -151,5 +151,5 @@ def _row(point: Point) -> Vector:
 
 
 def _rounded(values: Any) -> Any:
-    """Plain numbers with three digits behind the point, so that what is kept is what is driven."""
+    """Plain numbers with three digits behind the point, so that what is kept is what moves."""
     return tuple(round(float(one), 3) for one in values)
