@@ -15,7 +15,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book pdf course smoke chapter lab study bench test test-site test-lab test-course test-clusters test-fast check locks clean anew
+.PHONY: help book pdf article course release smoke chapter lab study bench test test-site test-lab test-course test-clusters test-fast check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -26,8 +26,14 @@ book: .venv/ready  ## Train what is missing, execute every chapter, build _build
 pdf: .venv/ready  ## The built book as one PDF, _build/html/nmpcrl.pdf; needs a Chromium
 	@$(BIN)/python book/pdf.py
 
+article: .venv/ready  ## The article, _build/html/nmpcrl-article.pdf; needs a built book
+	@$(BIN)/python book/article.py
+
 course: .venv/ready  ## Notebooks for students, teachers and graders, and slides; SECRET=FILE draws other numbers
 	@$(BIN)/python book/course.py $(if $(SECRET),--secret "$(SECRET)")
+
+release: .venv-release/ready  ## What a release hands out, checked and with hashes, in _build/release
+	@.venv-release/bin/python release/make.py
 
 smoke: .venv/ready  ## The same book with four episodes a run, in _build/smoke/html
 	@$(BIN)/python book/build.py --smoke
@@ -92,6 +98,12 @@ clean:  ## Remove the built book; stored runs stay
 	  $(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])').txt,-r environment.txt)
 	@$(BIN)/pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $(if $(LOCKS),.venv/locked) $@
+
+# The tools that check and describe a release are no part of the book's environment.
+.venv-release/ready: release/tools.txt .venv/ready
+	@$(BIN)/python -m venv --clear .venv-release
+	@.venv-release/bin/pip install -qq --disable-pip-version-check --require-hashes -r $<
+	@touch $@
 
 # The kernel of JupyterLab is the Python of .venv.
 .venv-lab/ready: book/lab.txt .venv/ready

@@ -50,7 +50,9 @@ def test_artifacts_are_kept_from_where_they_are_written(path, monkeypatch):
     for place in " ".join(one["path"] for one in kept).split():
         first, _, name = place.partition("/")
         assert first == "_build" or place in (str(summaries.folder()), str(sweep.path()))
-        if first == "_build":
+        if place == "_build/release":
+            assert f'Path("{place}")' in (ROOT / "release/make.py").read_text()
+        elif first == "_build":
             assert f'place / "{name}' in DRIVER
     names = [one["name"] for one in kept if "name" in one]
     assert len(names) == len(set(names))

@@ -17,10 +17,11 @@ from dataclasses import asdict, dataclass, fields
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.control import Task
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
-from nmpcrl.study.layouts import ARRIVED, Centres, gaps
+from nmpcrl.study.layouts import ARRIVED, Centres
 from nmpcrl.study.storage.archive import Column
 
 SPACING = 0.15  # [m]; the side of a cell of BARN
@@ -65,7 +66,7 @@ def measure(centres: Centres) -> Difficulty:
         cost=first.cost,
         slope=(evaluate(controller, raised, paper.STEPS).cost - first.cost) / RAISED,
         overshoot=float(paper.ALPHA * phi @ phi),
-        closes=min(closing(task, path), OPEN),
+        closes=min(closes_at(task, path), OPEN),
     )
 
 
@@ -87,16 +88,6 @@ def barn(path: Matrix, task: Task) -> dict[str, float]:
     }
 
 
-def closing(task: Task, path: Matrix) -> float:
-    """theta_c at which the first of the gaps closes that a path goes through; else infinity."""
-    keep_out = _radius(task)
-    widths = gaps(task, path, 0.0)
-    # closed where sides * keep_out * sqrt(1 + theta_c) is what lies between the centres
-    sides = {gap: 1 if min(gap) < 0 else 2 for gap in widths}
-    apart = {gap: width / (sides[gap] * keep_out) + 1 for gap, width in widths.items()}
-    return min((one**2 - 1 for one in apart.values()), default=np.inf)
-
-
 def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
     """The least theta_c of a grid at which the robot does not arrive, all else as theta_init.
 
@@ -109,14 +100,6 @@ def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
         if len(states) < paper.STEPS or task.distance(states[-1]) > ARRIVED:
             return float(theta_c)
     return np.nan
-
-
-def raised_cost(layout: str | Centres, theta: Vector, share: float) -> float:
-    """By which share of its cost a rollout costs more with theta_c raised by another share."""
-    controller = Persistent(paper.nmpc(layout))
-    raised = np.array([*theta[:-1], (1 + share) * theta[-1]])
-    before, after = (evaluate(controller, one, paper.STEPS).cost for one in (theta, raised))
-    return after / before - 1
 
 
 def until_arrival(states: Matrix, task: Task) -> Matrix:

@@ -6,7 +6,6 @@ one letter a run for whether the robot arrived; episodes, one number where all r
 and the processor time of all together.
 """
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -16,12 +15,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place, sealed
+from nmpcrl.claims.extendable import Extendable, rounded
+from nmpcrl.claims.published import Unpublishable
 from nmpcrl.claims.remedies import COLUMNS
 from nmpcrl.claims.remedy_questions import PARTS
-from nmpcrl.study.storage.atomic import write_json
 
 FILE = "suite.json"
+HELD = Extendable(FILE, "the comparison of remedies", "nmpcrl remedies --publish")
 ARRIVED = {True: "a", False: "-"}
 DIGITS = 7
 
@@ -48,8 +48,7 @@ def extend(table: pd.DataFrame) -> Path:
         Damaged: what is published is not what was written.
         Unpublishable: a part is not whole, or is published otherwise, or nothing is new.
     """
-    path = place() / FILE
-    content = _content(path) if path.exists() else {"layouts": {}, "entries": {}, "about": []}
+    content = HELD.begun(layouts={}, entries={})
     new = False
     for entry, part, name, runs in _blocks(table):
         block = _block(entry, part, runs)
@@ -64,10 +63,7 @@ def extend(table: pd.DataFrame) -> Path:
         _note(content["layouts"], runs)
     if not new:
         raise Unpublishable("nothing of the comparison is whole and new")
-    content["about"] = [*content["about"], made_here()]
-    content.pop("seal", None)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_json(path, content | {"seal": sealed(content)})
+    path = HELD.write(content)
     _load.cache_clear()
     return path
 
@@ -78,12 +74,12 @@ def load() -> Comparison:
     Raises:
         Damaged: it is not there, or not what was written.
     """
-    return _load(place() / FILE)
+    return _load(HELD.path)
 
 
 @cache
 def _load(path: Path) -> Comparison:
-    content = _content(path)
+    content = HELD.content(path)
     try:
         found = [
             row
@@ -94,24 +90,7 @@ def _load(path: Path) -> Comparison:
         ]
         return Comparison(pd.DataFrame(found, columns=[*COLUMNS]), {"made": content["about"]})
     except (ValueError, LookupError, TypeError) as error:
-        raise _damaged(path, error) from error
-
-
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        content: dict[str, Any] = json.loads(path.read_text("utf-8"))
-        if content["seal"] != sealed(content):
-            raise ValueError("it is not what was written")
-        return content
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        raise _damaged(path, error) from error
-
-
-def _damaged(path: Path, error: Exception) -> Damaged:
-    return Damaged(
-        f"the comparison of remedies is not published whole in {path} ({error});"
-        " `nmpcrl remedies --publish` makes it anew"
-    )
+        raise HELD.damaged(path, error) from error
 
 
 def _blocks(table: pd.DataFrame) -> Iterator[tuple[str, str, str, pd.DataFrame]]:
@@ -139,11 +118,11 @@ def _block(entry: str, part: str, runs: pd.DataFrame) -> dict[str, Any]:
     there = by.loc[order]
     episodes = [int(one) for one in there.episodes]
     return {
-        "cost": [_rounded(cost) for cost in there.cost],
+        "cost": [rounded(cost, DIGITS) for cost in there.cost],
         "arrived": "".join(ARRIVED[bool(one)] for one in there.arrived),
         "episodes": episodes[0] if len({*episodes}) == 1 else episodes,
         "over": [i for i, over in enumerate(there.over) if over],
-        "seconds": _rounded(float(there.seconds.sum()), 4),
+        "seconds": rounded(float(there.seconds.sum()), 4),
     }
 
 
@@ -154,7 +133,7 @@ def _note(layouts: dict[str, list[float | None]], runs: pd.DataFrame) -> None:
         Unpublishable: others are published.
     """
     for row in runs.drop_duplicates("layout").itertuples():
-        known = [_rounded(row.initial), _rounded(row.best)]
+        known = [rounded(row.initial, DIGITS), rounded(row.best, DIGITS)]
         if layouts.setdefault(str(row.layout), known) != known:
             raise Unpublishable(f"layout {row.layout} is published with other costs to compare to")
 
@@ -179,7 +158,3 @@ def _rows(
             "episodes": begun[i] if isinstance(begun, list) else begun,
             "seconds": block["seconds"] / len(order),
         }  # fmt: skip
-
-
-def _rounded(value: float, digits: int = DIGITS) -> float | None:
-    return float(f"{value:.{digits}g}") if np.isfinite(value) else None

@@ -9,8 +9,10 @@ from typing import Any
 
 import pandas as pd
 
+from nmpcrl.analysis import kept
 from nmpcrl.analysis.entries import called
-from nmpcrl.analysis.judgements import Wanted, judge_all, seed_of, stored
+from nmpcrl.analysis.judgements import judge_all, seed_of, stored
+from nmpcrl.analysis.kept import Wanted
 from nmpcrl.analysis.leaderboard import Judged
 from nmpcrl.claims.remedies import COLUMNS, best_setting
 from nmpcrl.claims.remedy_questions import PARTS, SETTINGS, YARDSTICK, YARDSTICK_SEED
@@ -164,14 +166,12 @@ def _row(part: str, entry: str, one: Wanted, judged: Judged, best: float) -> dic
 
 def price(runs: Iterable[Wanted], measured: Mapping[Wanted, Judged]) -> float:
     """Seconds of processor time that some runs take, by those that are known of the same entry."""
-    known: dict[tuple[str, int], list[float]] = {}
-    for one, judged in measured.items():
-        known.setdefault((_ships(one), one.budget), []).append(judged.seconds)
-    total = 0.0
-    for one in runs:
-        times = known.get((_ships(one), one.budget))
-        total += sum(times) / len(times) if times else SECONDS * one.budget
-    return total
+    return kept.price(
+        runs,
+        measured,
+        alike=lambda one: (_ships(one), one.budget),
+        otherwise=lambda one: SECONDS * one.budget,
+    )
 
 
 def _ships(one: Wanted) -> str:

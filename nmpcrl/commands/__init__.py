@@ -20,6 +20,7 @@ from nmpcrl.commands.suite import suite
 from nmpcrl.commands.train import train
 from nmpcrl.commands.verify import verify
 from nmpcrl.commands.wasm import wasm
+from nmpcrl.commands.world import world
 
 __all__ = ["main"]
 
@@ -50,6 +51,7 @@ for command in (
     bench,
     suite,
     remedies,
+    world,
     grade,
     wasm,
     completion,

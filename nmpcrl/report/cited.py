@@ -42,11 +42,6 @@ class Cited:
         return format(self)
 
 
-def went_wrong(learner: str, wrong: str, decay: str, layouts: str) -> str:
-    """The quantity of a count of published runs: "DES diverged, noise per step, layout A"."""
-    return f"runs of {learner} that {wrong}, noise per {decay}, {layouts}: published"
-
-
 def cited(text: str, value: Any, quantity: str) -> str:
     """A number as a page shows it, in Markdown or HTML, with its value and what it is of.
 

@@ -48,8 +48,8 @@ def stopped_early(runs: pd.DataFrame, learners: tuple[str, ...]) -> str:
     counts = (asked.kept & asked.stopped).groupby(level="learner", sort=False).sum()
     parts = listed(f"{count} of {name}" for name, count in counts.items() if count)
     return (
-        f"Of those that kept them, {parts} had to be stopped in training: of these, the rollouts"
-        " up to then are asked."
+        f"Of those that kept them, {parts} had to be stopped in training; they are judged by their"
+        " rollouts before that."
     )
 
 

@@ -1,8 +1,9 @@
 """What one should ask the authors, and which of our verdicts the answers would decide."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
+from nmpcrl.claims.verdict import Verdict
 from nmpcrl.report.text import departure_link, listed
 
 
@@ -56,6 +57,39 @@ def question_list(decides: Mapping[str, Collection[str]], varied: Collection[str
     )
 
 
+def asked(decides: Mapping[str, Collection[str]]) -> str:
+    """The questions on which a verdict depends as a numbered list in Markdown, and which."""
+    return "\n".join(
+        f"{number}. {question.ask} (It bears on {listed(claims)}.)"
+        for number, (question, claims) in enumerate(_bearing(decides), start=1)
+    )
+
+
+def by_claim(verdicts: Iterable[Verdict], decides: Mapping[str, Collection[str]]) -> str:
+    """One item a claim, in Markdown: what became of it, and which answers would change what."""
+    lines = []
+    for one in verdicts:
+        numbers = [n for n, (_, claims) in enumerate(_bearing(decides), 1) if one.claim in claims]
+        several = "s" * (len(numbers) > 1)
+        answers = f"The answer{several} to {listed(numbers)} may change it: we would judge it anew."
+        lines.append(
+            f"- **{one.claim}.** {one.statement} *Here: {one.words}.*"
+            f" {answers if numbers else 'No verdict on it changed with any reading that we tried.'}"
+            f" What else we would expect to matter: {one.would_change}"
+        )
+    return "\n".join(lines)
+
+
+def _bearing(decides: Mapping[str, Collection[str]]) -> list[tuple[Question, list[str]]]:
+    """The questions on which a verdict depends, each with its claims."""
+    found = [(question, _decides(question, decides)) for question in QUESTIONS]
+    return [(question, claims) for question, claims in found if claims]
+
+
+def _decides(question: Question, decides: Mapping[str, Collection[str]]) -> list[str]:
+    return sorted({claim for one in question.departures for claim in decides.get(one, ())})
+
+
 def _links(question: Question) -> str:
     refs = " and ".join(departure_link(letter, letter) for letter in question.departures)
     return f"(departure{'s' if len(question.departures) > 1 else ''} {refs})."
@@ -64,8 +98,7 @@ def _links(question: Question) -> str:
 def _decided(
     question: Question, decides: Mapping[str, Collection[str]], varied: Collection[str]
 ) -> str:
-    claims = sorted({claim for letter in question.departures for claim in decides.get(letter, ())})
-    if claims:
+    if claims := _decides(question, decides):
         return f"The answer decides {listed(claims)} here."
     if set(question.departures) & set(varied):
         return "No verdict depends on it in what was run."

@@ -4,10 +4,11 @@ from collections.abc import Iterable, Mapping
 from html import escape
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims.population import Answer
-from nmpcrl.claims.remedies import Advice, RemedyRow
+from nmpcrl.claims.remedies import Advice, RemedyRow, rows, shares, solved
 from nmpcrl.claims.remedy_questions import (
     ADVICE,
     ADVISED,
@@ -28,6 +29,33 @@ COLOURS = {  # of a word, as of a verdict
     FIRST: REPRODUCED, SECOND: REPRODUCED, LATER: PARTLY, OPEN: UNDECIDABLE, NEVER: NOT,
 }  # fmt: skip
 NOTHING = "–"  # where an entry was not judged
+BACK = "undone where a rollout got worse"
+COSTS, STEPS, MODEL = "costs of rollouts", "steps", "the plant's derivatives"
+WHAT: dict[str, tuple[str, str]] = {  # what an entry is, after "Try first", and what it is told
+    "frozen": (r"$\boldsymbol{\theta}_\text{init}$ as it is", "nothing"),
+    "grid": (r"a grid over $\theta_c$ alone", COSTS),
+    "ES": ("Expected Sarsa", STEPS),
+    "GES": ("Expected Sarsa by gradient TD", STEPS),
+    "TDC": ("exact nonlinear TDC", STEPS),
+    "RDES": (r"Expected Sarsa with a network that is given $\boldsymbol{\theta}$", STEPS),
+    "DES": ("Expected Sarsa with a network", STEPS),
+    "TDRC": (r"gradient TD with one step size and a $\mathbf{w}$ that decays", STEPS),
+    "GES-3": (r"GES with a faster $\mathbf{w}$, whose steps are normalised", STEPS),
+    "guarded-ES": ("ES whose steps cannot overshoot", STEPS),
+    "guarded-RDES": ("RDES whose steps cannot overshoot", STEPS),
+    "control-RDES": ("steps as long as those of guarded RDES in the direction of ES", STEPS),
+    "averaged-ES": (r"the mean $\boldsymbol{\theta}$ of the second half of ES", STEPS),
+    "undone-ES": (f"ES, {BACK}", f"{STEPS}, {COSTS}"),
+    "undone-LSTD-Q": (f"Gauss-Newton on the TD error, {BACK}", f"{STEPS}, {COSTS}"),
+    "GN-J": ("Gauss-Newton on the cost of the closed loop", f"{STEPS}, {MODEL}"),
+    "undone-GN-J": (
+        f"Gauss-Newton on the cost of the closed loop, {BACK}", f"{STEPS}, {COSTS}, {MODEL}"
+    ),
+    "DPG": ("the deterministic policy gradient", STEPS),
+    "SPSA": ("SPSA, a gradient from two rollouts", COSTS),
+    "CMA-ES": ("a search of all nine numbers by CMA-ES", COSTS),
+    "Bayes": ("Bayesian optimisation of all nine numbers", COSTS),
+}  # fmt: skip
 
 
 def advice_table(advice: Iterable[Advice], caption: str) -> str:
@@ -41,28 +69,52 @@ def advice_table(advice: Iterable[Advice], caption: str) -> str:
     return html_table(caption, header, map(_cells, advice), headed=True)
 
 
-def part_table(rows: Iterable[RemedyRow], caption: str) -> str:
-    """One row an entry of a part, in HTML, the control among them; the greatest lower end first.
+def entry_table() -> str:
+    """One row an entry, in Markdown: what it is, and what it learns of its episodes."""
+    rows = (f"| `{name}` | {what} | {told} |" for name, (what, told) in WHAT.items())
+    return "\n".join(("| entry | what it is | what it is told |", "|---|---|---|", *rows))
+
+
+def named_table(table: pd.DataFrame, part: str) -> str:
+    """One row an entry of a part, in HTML, the control among them; or that nothing is published.
 
     Args:
-        rows: of `remedies.rows`.
-        caption: of the table.
+        table: with `remedies.COLUMNS`.
+        part: with the few layouts that are shown one by one.
     """
-    order = sorted(rows, key=lambda row: (np.isnan(row.gain.low), -row.gain.low, row.seconds))
-    header = ("Entry", "Share of the possible gain", "Layouts solved", "Rollouts", "CPU time")
-    return html_table(caption, header, map(_part_cells, order), headed=True)
+    order = sorted(rows(table, part), key=lambda row: (-np.nan_to_num(row.gain.value), row.seconds))
+    if not order:
+        return f"<p>Nothing is published yet of the part <em>{escape(part)}</em>.</p>"
+    one = PARTS[part]
+    caption = (
+        f"Share of the possible gain by layout with {one.budget} episodes, mean of {one.seeds}"
+        " seeds; in italics where not every seed solves the layout."
+    )
+    header = ("Entry", *one.layouts, "Solved", "CPU time")
+    by = ((row, table[(table.part == part) & (table.entry == row.entry)]) for row in order)
+    return html_table(caption, header, (_named(row, runs) for row, runs in by), headed=True)
 
 
-def _part_cells(row: RemedyRow) -> tuple[str, ...]:
-    evidence = ("disqualified",) * 2 if row.disqualified else (_gain(row), _solved(row))
-    return (_name(row.name), *evidence, f"{row.rollouts}", f"{row.seconds:.1f} s")
+def _named(row: RemedyRow, runs: pd.DataFrame) -> tuple[str, ...]:
+    share, ended = shares(runs), solved(runs)
+    found = (
+        (f"{share[one]:.2f}" if np.isfinite(share[one]) else "fails") if one in share else NOTHING
+        for one in ended.index
+    )
+    each = [
+        text.replace("-", "−") if well else f"<em>{text.replace('-', '−')}</em>"
+        for text, well in zip(found, ended, strict=True)
+    ]
+    if row.disqualified:
+        each = ["disqualified"] * len(ended)
+    count = f"{ended.sum()} of {len(ended)}"
+    return (_name(row.name), *each, count, f"{row.seconds:.1f} s")
 
 
 def _cells(one: Advice) -> tuple[str, ...]:
     judged = [one.rows.get(part) for part in ADVISED]
-    (known, *_) = [row for row in judged if row]
     return (
-        _name(known.name),
+        _name(_known(one).name),
         f'<span class="{BADGES[COLOURS[one.word]]}">{one.word}</span>',
         *(_evidence(row) if row else NOTHING for row in judged),
     )
@@ -90,7 +142,7 @@ def _gain(row: RemedyRow) -> str:
 def _shown(share: Estimate) -> str:
     """With its interval; a quarter of failures or more is infinitely bad."""
     text = f"{share:.2f}" if np.isfinite(share.low) else f"{share.value:.2f} [{share.low:.2f}, …]"
-    return text.replace("-", "−").replace("inf", "∞")
+    return text.replace("-0.00", "0.00").replace("-", "−").replace("inf", "∞")
 
 
 def _solved(row: RemedyRow) -> str:
@@ -104,16 +156,31 @@ def rule() -> str:
 
 
 def in_short(advice: Iterable[Advice]) -> str:
-    """The advice in a sentence or two: what to try first, second, and never."""
-    by: dict[str, list[str]] = {}
+    """The advice in a sentence or three: what to try first, second, and never, with evidence."""
+    by: dict[str, list[Advice]] = {}
     for one in advice:
-        by.setdefault(one.word, []).append(f"`{one.entry}`")
-    said = [f"Try {by[FIRST][0]} first" if FIRST in by else "Nothing compared surely gains"]
+        by.setdefault(one.word, []).append(one)
+    if FIRST not in by:
+        said = ["Nothing that was compared surely gains."]
+    else:
+        row = _known(by[FIRST][0])
+        said = [f"Try first {_tried(row)} and solves {_solved(row)} layouts."]
     if SECOND in by:
-        said[0] += f" and {by[SECOND][0]} second"
+        said.append(f"Second, {_tried(_known(by[SECOND][0]))}.")
     if NEVER in by:
-        said.append(f"Never try {listed(by[NEVER])}")
-    return f"{'. '.join(said)}."
+        said.append(f"Never try {listed(f'`{one.entry}`' for one in by[NEVER])}.")
+    return " ".join(said)
+
+
+def _known(one: Advice) -> RemedyRow:
+    """Its row with the fewest episodes."""
+    return next(one.rows[part] for part in ADVISED if part in one.rows)
+
+
+def _tried(row: RemedyRow) -> str:
+    what, _ = WHAT[row.entry]
+    has = f"has {_gain(row)} of the possible gain after {row.rollouts} rollouts"
+    return f"{what} (`{row.entry}`), which {has}"
 
 
 def expectation_items(expected: Mapping[str, bool]) -> str:
@@ -136,4 +203,16 @@ def _item(answer: Answer) -> str:
     if "difference" in answer.numbers:
         found = Estimate(*(answer.numbers[name] for name in ("difference", "low", "high")))
         said.append(f"the difference is {_shown(found)}")
+    said += [f"{entry} has {', '.join(each)}" for entry, each in _by_layout(answer.numbers).items()]
     return f"- **{asked.question}** {answer.words.capitalize()}: {'; '.join(said)}.{pilot}"
+
+
+def _by_layout(numbers: Mapping[str, float]) -> dict[str, list[str]]:
+    """What an answer knows of single layouts: "CMA-ES in A", by entry."""
+    by: dict[str, list[str]] = {}
+    for name, share in numbers.items():
+        entry, there, layout = name.partition(" in ")
+        if there:
+            shown = f"{share:.2f}".replace("-", "−") if np.isfinite(share) else "a failed solve"
+            by.setdefault(entry, []).append(f"{shown} in {layout}")
+    return by

@@ -15,7 +15,7 @@ from nmpcrl.claims.rule import Assumption, Claim
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.report.cited import Cited, cited
-from nmpcrl.report.halves import apart, differ
+from nmpcrl.report.halves import differ
 from nmpcrl.report.text import SURE, departure_link, listed
 from nmpcrl.report.timing import to_es
 from nmpcrl.study.departures import DEPARTURES
@@ -168,7 +168,7 @@ def evidence(verdicts: Iterable[Verdict]) -> str:
     """One item a claim, in Markdown: verdict, evidence, and where it would change."""
     return "\n\n".join(
         f"- **{v.claim}: {v.statement}**\n\n"
-        f"  {_labelled(v)} {f'{v.evidence} {apart(v)}'.strip()}\n\n"
+        f"  {_labelled(v)} {v.evidence}\n\n"
         f"  *Where it would change.* {_linked(v.would_change)}"
         for v in verdicts
     )

@@ -12,6 +12,7 @@ from nmpcrl.claims.prespecified import SINCE, Fixed
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.robustness import PARTS
 from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
+from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.study import design
 from nmpcrl.study.departures import DEPARTURES
 
@@ -235,33 +236,38 @@ def open_gaps(depends_on: Mapping[str, tuple[str, ...]]) -> str:
     )
 
 
+def judged(verdict: Verdict) -> str:
+    """A claim, and what became of it, in a sentence of Markdown that links to what it rests on."""
+    return f"{audit_link(verdict.claim)} (*{verdict.statement.rstrip('.')}*): **{verdict.words}**."
+
+
 def outcomes(verdicts: Iterable[Verdict]) -> str:
     """One item a claim, in Markdown: what it says, and what became of it."""
-    return "\n".join(f"- {v.claim}. {v.statement} *{v.words.capitalize()}.*" for v in verdicts)
+    return "\n".join(
+        f"- {audit_link(v.claim)}. {v.statement} *{v.words.capitalize()}.*" for v in verdicts
+    )
 
 
-FIGURES = {  # of chapter 5, in which a claim is decided
-    "C1": ("5.2", "c1"),
-    "C2": ("5.6", "c2"),
-    "C3": ("5.20", "c3"),
-    "C4": ("5.21", "c4"),
-    "C5": ("5.12", "c5"),
-    "C6": ("5.4", "c6"),
-    "C7": ("5.14", "c7"),
-    "C8": ("5.8", "c8"),
-    "C9": ("5.15", "c9"),
-}
+def audits(verdicts: Iterable[Verdict]) -> str:
+    """What each verdict rests on: a sentence of links, in Markdown."""
+    return f"What each rests on: {listed(audit_link(v.claim) for v in verdicts)}."
 
 
 def quotations(verdicts: Mapping[str, Verdict]) -> str:
-    """One item a claim, in Markdown: its verdict, where it is decided, and the paper's words."""
+    """One item a claim, in Markdown: its verdict, and the paper's words."""
     lines = []
     for name, one in verdicts.items():
-        number, label = FIGURES[name]
-        link = f"[Fig. {number}](05_results.ipynb#fig-results-{label})"
         implied = " Taken for granted:" if CLAIMS[name].implied else ""
-        lines.append(f"- **{name}**, *{one.words}* ({link}).{implied} {CLAIMS[name].quotation}.")
+        words = f"**{audit_link(name)}**, *{one.words}*."
+        lines.append(f"- {words}{implied} {CLAIMS[name].quotation}.")
     return "\n".join(lines)
+
+
+def audit_link(claim: str) -> str:
+    """A link from a claim's name to its thresholds, counts and evidence, in Markdown."""
+    name = WIDER_THAN.get(claim, claim)
+    label = name.lower() if name in CLAIMS else "own"
+    return f"[{claim}](for_reviewers.ipynb#reviewers-{label})"
 
 
 def departure_link(words: str, letter: str) -> str:

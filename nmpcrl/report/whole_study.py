@@ -1,12 +1,10 @@
-"""What the whole study says, for chapters that train a few runs: from what is published."""
+"""How many runs of the whole study went wrong, from what is published."""
 
 from collections.abc import Callable, Sequence
 
 import pandas as pd
 
 from nmpcrl.claims import evidence
-from nmpcrl.report import cited
-from nmpcrl.report.cited import Cited
 
 EVERY = "all layouts"  # the last column of `went_wrong`
 
@@ -42,16 +40,3 @@ def went_wrong(wrong: Callable[[pd.DataFrame], pd.Series], learners: Sequence[st
     found = counts.astype(int).loc[order]
     found.columns.name = None
     return found.assign(**{EVERY: found.sum(axis=1), "runs": cells.size()})
-
-
-def everywhere(counts: pd.DataFrame, wrong: str) -> dict[tuple[str, str], Cited]:
-    """The last column of `went_wrong`, by reading and learner, each with what it is of.
-
-    Args:
-        counts: of `went_wrong`.
-        wrong: what the runs did: "diverged".
-    """
-    return {
-        (decay, name): Cited(count, cited.went_wrong(name, wrong, decay, EVERY))
-        for (decay, name), count in counts[EVERY].items()
-    }

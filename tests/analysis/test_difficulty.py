@@ -7,15 +7,12 @@ from nmpcrl.analysis import difficulty
 from nmpcrl.analysis.difficulty import (
     barn,
     clearance,
-    closing,
     measure,
-    raised_cost,
     sight,
     spaced,
     stops_arriving,
 )
 from nmpcrl.study import paper
-from nmpcrl.study.layouts import gaps
 
 ONE = ((3.0, 3.0),)  # in the middle of the box, [-3, 9]^2; its disc has a radius of 1.25
 
@@ -77,18 +74,6 @@ def test_tortuosity_of_a_half_circle_is_half_of_pi(task):
     assert barn(path, task)["tortuosity"] == pytest.approx(np.pi / 2, rel=1e-5)
 
 
-def test_a_gap_closes_where_its_width_is_0():
-    task = paper.task_among(((3.0, 1.0), (3.0, 4.0), (7.0, -1.0)))
-    path = np.array([[0.0, 2.5], [6.0, 2.5], [7.0, -2.8], [8.0, -2.8]])
-    found = closing(task, path)
-    assert found == pytest.approx((3 / 2.5) ** 2 - 1)
-    assert min(gaps(task, path, found).values()) == pytest.approx(0, abs=1e-12)
-
-
-def test_a_path_through_no_gap_never_closes(task):
-    assert closing(task, np.array([[0.0, 0.0], [0.1, 0.0]])) == np.inf
-
-
 def test_the_first_gap_of_e_closes_before_that_of_d_as_their_rollouts_show():
     found = {name: measure(paper.LAYOUTS[name]) for name in "DE"}
     assert 0.15 < found["E"].closes < 0.2 < found["D"].closes < 0.25
@@ -105,9 +90,3 @@ def test_the_robot_stops_arriving_in_e_where_its_gap_has_closed(horizon):
 
 def test_with_one_obstacle_the_robot_always_arrives():
     assert np.isnan(stops_arriving(ONE, 10, np.array([0.0, 0.2])))
-
-
-def test_raising_theta_c_across_the_closing_of_a_gap_costs_much_and_by_nothing_nothing():
-    theta = np.array([*paper.THETA_INIT[:-1], 0.15])
-    assert raised_cost("E", theta, 0.0) == 0
-    assert raised_cost("E", theta, 1 / 3) > 0.5

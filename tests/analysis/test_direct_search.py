@@ -33,7 +33,7 @@ class Bowl:
         return 7 + away**2 if away < 3 else np.inf
 
 
-@pytest.mark.parametrize("budget", [1, 2, 3, 10, 17, 40])
+@pytest.mark.parametrize("budget", [1, 2, 17])
 @pytest.mark.parametrize("search", EVERY)
 def test_a_search_stops_exactly_at_its_budget_and_begins_at_the_start(search, budget):
     bowl = Bowl()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis import judgements
-from nmpcrl.analysis.judgements import LAYOUTS, Wanted, judge_all, path_of, seed_of, stored
+from nmpcrl.analysis.judgements import LAYOUTS, judge_all, path_of, seed_of, stored
+from nmpcrl.analysis.kept import Wanted
 from nmpcrl.analysis.leaderboard import HELD_OUT, MOST_SEEDS, Judged, judge_once
 from nmpcrl.study.population import JUDGE
 

@@ -80,7 +80,7 @@ def test_the_interval_of_the_interquartile_mean_covers_it_about_as_often_as_it_s
         return rng.lognormal(0, 0.5, (runs, 120)) * scale
 
     true = float(np.median(stats.trim_mean(drawn(20_000), 0.25, axis=1)))
-    estimates = [interquartile_mean(scores, LAYOUTS) for scores in drawn(150)]
+    estimates = [interquartile_mean(scores, LAYOUTS) for scores in drawn(60)]
     assert 0.88 <= covered(estimates, true) <= 0.99
 
 
@@ -131,7 +131,7 @@ def test_the_interval_of_the_probability_of_improvement_covers_it_about_as_often
     shift = 0.5
     estimates = [
         probability_of_improvement(common + ours, common + theirs + shift, LAYOUTS)
-        for common, ours, theirs in rng.normal(scale=noise, size=(100, 3, 120))
+        for common, ours, theirs in rng.normal(scale=noise, size=(40, 3, 120))
     ]
     true = stats.norm.cdf(shift / (2 * noise))  # of two runs, each of variance 2
     assert 0.88 <= covered(estimates, true) <= 1

@@ -68,6 +68,8 @@ def test_a_gap_closes_where_its_width_is_nothing():
     shut = closes_at(task, path)
     assert min(gaps(task, path, shut).values()) == pytest.approx(0, abs=1e-12)
     assert shut == pytest.approx((np.hypot(1.5, 2.5) / 2.5) ** 2 - 1)
+    beside_a_wall = paper.task_among(((7.0, -1.0),)), np.array([[7.0, -2.8], [8.0, -2.8]])
+    assert closes_at(*beside_a_wall) == pytest.approx((2 / 1.25) ** 2 - 1)
 
 
 def test_a_path_through_no_gap_never_meets_a_closed_one():

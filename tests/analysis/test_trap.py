@@ -1,10 +1,12 @@
 """The trap: what a run that stands before a closed gap shows, and one that arrives does not."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.analysis.trap import ending
+from nmpcrl.analysis.trap import cliff, ending, stands, stretch
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.run import run
@@ -37,3 +39,34 @@ def test_so_the_td_error_there_is_above_0(standing):
 def test_of_a_run_that_arrives_nothing_is_said_but_of_its_td_error():
     found = ending(frozen(paper.THETA_INIT[-1]))
     assert np.isnan([found.moved, found.worth, found.phi_c]).all()
+
+
+def test_a_stand_is_the_end_of_a_rollout_and_agrees_with_the_summary(standing):
+    first, last = stands(standing, (0, 2))
+    found = ending(standing)
+    assert (first.episode, last.episode) == (0, 2)
+    assert np.isnan(first.delta)
+    assert last.delta == standing.episodes["delta"][1]
+    assert not last.arrived
+    np.testing.assert_array_equal(last.states, standing.states)
+    assert last.value / last.forever == pytest.approx(found.worth)
+    assert (last.moved, last.phi_c) == pytest.approx((found.moved, found.phi_c))
+
+
+def test_a_stretch_is_the_first_unbroken_part_in_which_the_robot_stands():
+    kinds = {"arrives": (True, 0.0), "stands": (False, 0.01), "moves": (False, 1.2)}
+    course = ["arrives", "moves", "stands", "stands", "arrives", "stands"]
+    found = [SimpleNamespace(arrived=kinds[one][0], moved=kinds[one][1]) for one in course]
+    assert stretch(found, 0.05) == found[2:4]
+    assert stretch(found[:2], 0.05) == []
+
+
+def test_the_cliff_is_found_between_two_points_of_the_grid():
+    def cost(theta_c):
+        return 100.0 + (60.0 if theta_c > 0.137 else theta_c)
+
+    grid = np.linspace(0, 0.4, 5)
+    found = cliff(cost, grid, np.array([cost(one) for one in grid]))
+    assert found == pytest.approx(0.137, abs=1e-3)
+    assert cost(found) < 101
+    assert np.isnan(cliff(cost, grid[:2], np.array([100.0, 119.0])))

@@ -52,7 +52,7 @@ def test_what_was_measured_is_read_again(counted):
 def test_a_longer_benchmark_serves_for_a_shorter_one(counted, kept, asked, again):
     measured_here(kept)
     found = measured_here(asked)
-    assert counted == [kept, asked] if again else [kept]
+    assert counted == ([kept, asked] if again else [kept])
     assert found["about"]["length"] == (asked if again else kept)
 
 

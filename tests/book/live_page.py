@@ -14,7 +14,7 @@ CHAPTERS = {  # of each live figure
     "runs": "05_results",
     "laboratory": "laboratory",
 }
-ALSO = ("07_beyond",)  # has the figure of runs, too
+ALSO = ("07_beyond", "why_learning_stops")  # have the figure of runs, too
 FRAMES = """figure => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(
     () => done(figure.shown))))"""
 LATER = """count => new Promise(done => {

@@ -313,8 +313,8 @@ def test_the_benchmark_is_measured_before_the_chapters_run_and_in_the_way():
     assert call.args == ("smoke",)
 
 
-def test_the_chapter_that_judges_times_asks_only_for_theirs_beforehand():
-    chapter = ROOT / "book/05_results.ipynb"
+def test_the_page_that_judges_times_asks_only_for_theirs_beforehand():
+    chapter = ROOT / "book/for_reviewers.ipynb"
     given = {name: book.SMOKE[name] for name in chapters.parameters(chapter) if name in book.SMOKE}
     needs = chapters.ask(chapter, given)
     (call,) = needs.beforehand

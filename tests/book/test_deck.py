@@ -15,7 +15,7 @@ UNITS = {name: (text, unit) for name, text, unit in slides.units()}
 UNIT = plan(slides.PLAN)[0]
 PAGE = UNIT.sections[0].page
 SAY = 'say("It costs {cost:.1f} of $x_{max}$, or {share:.0%}.", cost=cost, share=share)'
-REFERENCE = re.compile(r"!\[.*?\]\(#([\w-]+)\)")
+REFERENCE = re.compile(r"!\[.*?\]\((?:(\w+)\.ipynb)?#([\w-]+)\)")
 DIGITS = re.compile(
     r"!\[.*?\]\(.*?\)|(?s:\$\$.*?\$\$)|\$.*?\$|^\d\. |paper's \(\d+\)|C\d|Figure \d|Table II",
     flags=re.M,
@@ -36,7 +36,7 @@ def code(name: str, source: str = "1", **data: str):
 
 def made(text: str, *cells) -> deck.Deck:
     text = f"# {UNIT.title}\n\nWhy?\n\nSo.\n\n> Begin.\n\n{text}\n\n## What was seen\n\n- All."
-    return deck.deck(text, UNIT, executed(*cells))
+    return deck.deck(text, UNIT, {PAGE: executed(*cells)})
 
 
 def taught(text: str, *cells) -> deck.Slide:
@@ -88,6 +88,15 @@ def test_of_a_table_the_rows_are_shown_whose_first_cell_has_one_of_the_words():
     assert "GES" not in slide.shown[0]
 
 
+def test_another_page_is_shown_by_its_name():
+    own, other = code("own", text_plain="1"), code("it", text_plain="2")
+    pages = {PAGE: executed(own), "other": executed(other)}
+    shown = "## It moves\n\n![](#own)\n\n![](other.ipynb#it)"
+    text = f"# A\n\nWhy?\n\n{shown}\n\n## What was seen\n\n- All."
+    assert deck.pages(text, UNIT) == [*pages]
+    assert deck.deck(text, UNIT, pages).slides[2].shown == ["<pre>1</pre>", "<pre>2</pre>"]
+
+
 def test_a_number_is_what_the_cell_says_in_the_place_of_its_name():
     cell = code("end-said", SAY, text_markdown="It costs 2.5 of $x_{max}$, or 31%.")
     slide = taught("## It moves\n\n{end-said.cost}, {end-said.share}\n\n> {end-said.cost}", cell)
@@ -136,7 +145,7 @@ def test_every_unit_that_teaches_sections_has_a_deck_and_every_deck_a_unit():
     assert [unit.title for unit in plan(slides.PLAN) if unit.sections] == [
         unit.title for _, unit in UNITS.values()
     ]
-    assert len(UNITS) == len(list(slides.TEXTS.glob("*.md"))) == 14
+    assert len(UNITS) == len(list(slides.TEXTS.glob("*.md"))) == 16
 
 
 @each_unit
@@ -169,20 +178,25 @@ def test_no_number_is_typed_on_a_slide(text, unit):
     assert not re.findall(r".*\d.*", shown)
 
 
+def cells_of(page: str) -> dict:
+    notebook = nbformat.read(project.ROOT / "book" / f"{page}.ipynb", 4)
+    return {cell.id: cell for cell in notebook.cells}
+
+
 @each_unit
 def test_a_deck_names_what_its_chapter_has_and_every_live_figure_of_the_unit(text, unit):
     page = unit.sections[0].page
     assert {one.page for one in unit.sections} == {page}
-    notebook = nbformat.read(project.ROOT / "book" / f"{page}.ipynb", 4)
-    sources = "".join(cell.source for cell in notebook.cells)
-    cells = {cell.id: cell for cell in notebook.cells}
-    shown = REFERENCE.findall(text)
-    assert not {one for one in shown if f'<a id="{one}"></a>' not in sources} - set(cells)
+    cells = cells_of(page)
+    sources = "".join(cell.source for cell in cells.values())
+    for other, one in REFERENCE.findall(text):
+        assert one in cells_of(other or page) or f'<a id="{one}"></a>' in sources, one
     for found in deck.NUMBER.finditer(text):
         assert (
             f"{found['name']}=" in cells[found["cell"]].source
             or "**" in cells[found["cell"]].source
         )
+    shown = [one for other, one in REFERENCE.findall(text) if not other]
     live = [one for one in shown if one in cells and "live." in cells[one].source]
     assert len(live) == sum(section.live for section in unit.sections)
 

@@ -377,7 +377,7 @@ def assert_played(tab) -> None:
 
 def test_it_is_the_first_thing_on_its_page_and_as_wide_as_the_window(opened):
     tab = opened(FIGURE, viewport={"width": 1280, "height": 800}).begun()
-    whole, plot = tab.figure.bounding_box(), tab.figure.locator(".plots").bounding_box()
+    whole, plot = tab.figure.bounding_box(), tab.figure.locator(".curves").bounding_box()
     assert whole["y"] < 200
     assert whole["width"] > 1150
     before = "one => one.compareDocumentPosition(document.querySelector('figure.live')) & 4"
@@ -395,11 +395,22 @@ def test_it_is_the_first_thing_on_its_page_and_as_wide_as_the_window(opened):
 
 def test_on_a_telephone_the_curves_follow_the_map(opened):
     tab = opened(FIGURE, viewport={"width": 390, "height": 844}).begun()
-    map_, plot = (tab.figure.locator(one).first.bounding_box() for one in ("svg", ".plots"))
+    map_, plot = (tab.figure.locator(one).first.bounding_box() for one in ("svg", ".curves"))
     assert map_["y"] + map_["height"] <= plot["y"]
     assert map_["width"] > 300
     assert map_["y"] < 844
     assert tab.page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_before_a_run_a_sentence_stands_where_the_curves_will(tab):
+    hint, plots = tab.figure.locator(".curves .hint"), tab.figure.locator(".plots")
+    assert hint.is_visible()
+    assert not plots.is_visible()
+    fill(tab, Episodes=2)
+    tab.click("Train")
+    trained(tab)
+    assert plots.is_visible()
+    assert not hint.is_visible()
 
 
 def test_a_find_fills_the_form_trains_and_says_what_to_look_at(tab):

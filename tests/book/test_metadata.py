@@ -107,6 +107,18 @@ def test_the_title_is_the_papers_after_the_prefix_that_the_published_verdicts_as
     assert prefix == ("[¬Re]" if failed else "[Re]" if whole else "[~Re]")
 
 
+def test_the_entry_to_copy_is_what_the_citation_file_says():
+    text = (ROOT / "book/references.md").read_text()
+    said = dict(re.findall(r"^  (\w+) += \{+(.+?)\}+,?$", text, flags=re.M))
+    assert [said["author"]] == [author["name"] for author in CITATION["authors"]]
+    assert said["note"] == f"Reproduces {PAPER['identifiers'][0]['value']}"
+    assert {said[key] for key in ("title", "version", "license")} == {
+        CITATION[key] for key in ("title", "version", "license")
+    }
+    config = yaml.safe_load((ROOT / "_config.yml").read_text())
+    assert said["year"] == config["copyright"]
+
+
 def test_no_placeholder_is_left():
     texts = [str(leaf) for leaf in leaves(METADATA)]
     assert not [text for text in texts if re.search(r"TODO|FIXME|XXX|example\.(com|org)", text)]

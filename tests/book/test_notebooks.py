@@ -37,14 +37,18 @@ OWN = [name for name in NOTEBOOKS if name.startswith("your_")]  # a reader's own
 GIVEN = [
     *CHAPTERS,
     *OWN,
+    "for_reviewers",
     "paper_and_book",
     "performance",
     "other_problems",
+    "what_to_try_first",
+    "why_learning_stops",
 ]  # which have parameters
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)
-each_exercised = pytest.mark.parametrize("name", [*CHAPTERS, "performance", "other_problems"])
+MORE = ["performance", "other_problems", "what_to_try_first", "why_learning_stops"]
+each_exercised = pytest.mark.parametrize("name", [*CHAPTERS, *MORE])
 each_own = pytest.mark.parametrize("name", OWN)
 each_given = pytest.mark.parametrize("name", GIVEN)
 
@@ -311,6 +315,9 @@ MAY_BE = {  # what is drawn for a parameter, so that it is sometimes right
     "study": st.sampled_from(["fresh", "published", "stale"]),
     "repeat": st.sampled_from([True, False, "no", 1]),
     "budget": st.integers(0, 10**7),
+    "entry": st.sampled_from(["ES", "CMA-ES", "SARSA"]),
+    "overshot": st.lists(st.sampled_from([*paper.LAYOUTS, "Z"]), max_size=3, unique=True),
+    "overshot_episodes": st.integers(0, 400),
     "length": st.sampled_from(["smoke", "short", "full", "long"]),
 }
 LARGE = [10**400, -(10**20), 2**31, 100_000, 10**12, 1e308, 5e-324]
@@ -489,7 +496,7 @@ def chapter_and_parameters(words: list[str]) -> tuple[str, dict]:
     return named["CHAPTER"], chapters.values(given["pairs"], given["raw"], given["texts"])
 
 
-@pytest.mark.parametrize("name", [*CHAPTERS, *OWN])
+@pytest.mark.parametrize("name", [*CHAPTERS, *OWN, "what_to_try_first", "why_learning_stops"])
 def test_the_commands_of_the_try_box_are_accepted(name, monkeypatch):
     monkeypatch.chdir(ROOT)
     lines = commands(name)

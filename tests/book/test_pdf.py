@@ -91,7 +91,9 @@ PAGE = """<html><head>
 <details><summary>Solution</summary>It is so.</details>
 <section id="first"><h2>First</h2></section></section></article></body></html>"""
 TOC = """root: book/one
-parts: [{caption: Part, chapters: [{file: book/other}]}]"""
+parts:
+  - {caption: Part, chapters: [{file: book/other}]}
+  - {caption: The library, chapters: [{file: book/api}, {file: book/api_room}]}"""
 CONFIG = "{title: A book, author: us}"
 
 
@@ -145,6 +147,11 @@ def test_headings_go_down_within_a_part_and_keep_their_words(joined):
     ]
 
 
+def test_the_pages_of_the_api_are_not_printed(joined):
+    assert [one["id"] for one in joined.select("body > section[id]")] == ["book-one", "book-other"]
+    assert "The library" not in joined.text
+
+
 def test_a_page_is_named_in_its_margin(joined):
     assert r'@page book-other { @top-right { content: "1. Q is \3c  1"; } }' in joined.style.text
 
@@ -167,6 +174,9 @@ def test_every_page_offers_the_file_once(small):
         assert link.text == "The book as a PDF (4 MB)"
 
 
+PAGES = [name for name in project.pages() if not whole.API.fullmatch(name)]
+
+
 @pytest.fixture(scope="module")
 def book(printed) -> PdfReader:
     return PdfReader(printed)
@@ -186,7 +196,7 @@ def texts(book, shared) -> list[str]:
 def headings(site) -> list[str]:
     """Of all chapters and their sections, as the site has them."""
     found = []
-    for name in project.pages():
+    for name in PAGES:
         article = BeautifulSoup((site / f"{name}.html").read_text(), "html.parser").article
         for mark in article.select(".headerlink"):
             mark.decompose()
@@ -246,7 +256,7 @@ def test_no_page_is_blank_and_their_number_is_sane(site, texts):
     assert all(len(text.split()) > 15 for text in texts)
     words = sum(
         len(BeautifulSoup((site / f"{name}.html").read_text(), "html.parser").article.text.split())
-        for name in project.pages()
+        for name in PAGES
     )
     assert words / 500 < len(texts) < words / 100
 

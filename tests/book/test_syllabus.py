@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from driver import project
 from driver.teaching import graph, plans, self_test, syllabus, teaching
 from driver.teaching.declared import declared
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
@@ -113,9 +114,9 @@ def test_every_unit_fits_into_its_minutes_and_the_table_adds_them_up(name):
 
 
 def test_the_plans_are_as_long_as_they_say():
-    assert {name: len(units) for name, units in PLANS.items()} == {"two-weeks": 15, "weekend": 6}
+    assert {name: len(units) for name, units in PLANS.items()} == {"two-weeks": 17, "weekend": 6}
     text = (BOOK / "teach.md").read_text()
-    assert f"Fifteen units of {plans.UNIT} minutes" in text
+    assert f"Seventeen units of {plans.UNIT} minutes" in text
     assert f"Six units of {plans.UNIT} minutes" in text
 
 
@@ -209,3 +210,21 @@ def test_the_graph_names_every_chapter_and_says_in_words_what_needs_what():
     for page, chapter in CHAPTERS.items():
         assert f'href="{page}.html" aria-label="Chapter {chapter.number}: ' in drawn
     assert "2 needs 1; 3 needs 2; 4 needs 2; 5 needs 3 and 4" in drawn
+
+
+PAGE = """<article><section><h1>One two<a class="headerlink">#</a></h1><p>three \\(x\\)
+<span class="math">four</span></p><details><summary>Hint</summary>five</details>
+<div class="admonition dropdown"><p class="admonition-title">Goals</p><div>six</div></div>
+<pre>code()</pre><figure class="live">seven</figure>
+<section><h2>Exercises</h2><p>eight</p></section></section></article>"""
+
+
+def test_the_words_of_a_page_are_those_that_are_not_folded_and_no_exercises():
+    assert syllabus.shown(PAGE) == len(["One", "two", "three", "Goals", "code"])
+
+
+def test_the_main_path_has_at_most_24000_words(site):
+    toc = project.from_yaml("_toc.yml")
+    path = [toc["root"], *(page["file"] for page in toc["parts"][0]["chapters"])]
+    words = {page: syllabus.shown((site / f"{page}.html").read_text("utf-8")) for page in path}
+    assert sum(words.values()) <= 24_000, words

@@ -383,7 +383,7 @@ def damages(draw):
 @settings(
     derandomize=True,
     deadline=None,
-    max_examples=600,
+    max_examples=150,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(

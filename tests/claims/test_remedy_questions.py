@@ -1,9 +1,8 @@
 """What is asked of the remedies: complete, and not moved since it was fixed."""
 
-import subprocess
 from pathlib import Path
 
-import pytest
+from fixed_questions import assert_older, assert_unmoved
 
 from nmpcrl.analysis.entries import ENTRIES, called, entry_with
 from nmpcrl.analysis.judgements import LAYOUTS
@@ -21,36 +20,16 @@ from nmpcrl.claims.remedy_questions import (
     SETTINGS,
 )
 from nmpcrl.study.population import JUDGE, TUNE
-from nmpcrl.study.provenance import code
 
 FILE = Path(remedy_questions.__file__)
-ROOT = FILE.parents[2]
-
-
-def git(*arguments: str) -> str:
-    asked = ["git", "-C", str(ROOT), *arguments]
-    shallow = ["git", "-C", str(ROOT), "rev-parse", "--is-shallow-repository"]
-    done, whole = (subprocess.run(one, capture_output=True, text=True) for one in (asked, shallow))
-    if done.returncode or whole.stdout.strip() != "false":
-        pytest.skip(f"the history is not here: {done.stderr}")
-    return done.stdout.strip()
 
 
 def test_the_questions_are_those_of_the_commit_that_added_them():
-    path = FILE.relative_to(ROOT).as_posix()
-    added = git("log", "--format=%H", "--diff-filter=A", "--", path)
-    if not added:
-        pytest.skip("it is not committed yet")
-    assert code(git("show", f"{added.splitlines()[-1]}:{path}")) == code(FILE.read_text("utf-8"))
+    assert_unmoved(FILE)
 
 
 def test_the_questions_are_older_than_the_runs_that_are_published():
-    runs = git("log", "--format=%H", "--diff-filter=A", "--", "book/published/suite.json")
-    if not runs:
-        pytest.skip("no run is published yet")
-    path = FILE.relative_to(ROOT).as_posix()
-    added = git("log", "--format=%H", "--diff-filter=A", "--", path).splitlines()[-1]
-    assert added in git("rev-list", f"{runs.splitlines()[-1]}^").split()
+    assert_older(FILE, "book/published/suite.json")
 
 
 def test_every_entry_ships_and_begins_its_tuning_as_it_ships():

@@ -80,16 +80,17 @@ def test_where_nothing_is_picked_it_says_so(command):
 
 @pytest.mark.parametrize("column", ["cost", "size", "seed", "layout", "run", "theta", "target"])
 def test_any_column_and_any_field_sorts(command, column):
-    rows = json.loads(command("runs", "--sort", column, "--json").stdout)
     measured = {
         "cost": lambda row: row["facts"]["final_cost"],
         "size": lambda row: row["bytes"],
         "run": lambda row: row["run"],
     }
-    values = [measured.get(column, lambda row: row["experiment"].get(column))(row) for row in rows]
-    assert values == sorted(values)
-    reverse = json.loads(command("runs", "--sort", column, "--reverse", "--json").stdout)
-    assert len(reverse) == len(rows) == len(STORED)
+    value = measured.get(column, lambda row: row["experiment"].get(column))
+    for reverse in ((), ("--reverse",)):
+        rows = json.loads(command("runs", "--sort", column, *reverse, "--json").stdout)
+        values = [value(row) for row in rows]
+        assert values == sorted(values, reverse=bool(reverse))
+        assert len(rows) == len(STORED)
 
 
 @pytest.mark.parametrize(

@@ -22,13 +22,15 @@ from nmpcrl.course.checks import (
     results,
     solver,
     what_the_paper_leaves_open,
+    what_to_try_first,
+    why_learning_stops,
 )
 from nmpcrl.course.exercises import exercises
 from nmpcrl.study import paper
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 CALLED = re.compile(r"check\.(\w+)")
-BY_HAND = ["1.7", "2.7", "3.8", "4.8", "5.8", "6.9", "7.9", "8.8", "9.7", "10.6"]
+BY_HAND = ["1.7", "2.7", "3.8", "4.8", "5.8", "6.9", "7.9", "8.8", "9.7", "10.6", "11.6", "12.7"]
 FEATURES = np.linspace(100.0, 1100.0, 9)
 SQUARED = float(FEATURES @ FEATURES)
 
@@ -44,6 +46,15 @@ def by_stages(theta, states, inputs, target, gamma, later=1.0, last=1.0, factor=
 def by_row(pairs, values, thetas, first):
     before = [first, *thetas][: len(pairs)]
     return [np.r_[p, t] for p, t in zip(pairs, before, strict=True)], list(values)
+
+
+def undone(theta, moves, cost, forgets=False):
+    least = cost(theta)
+    for move in moves:
+        found = cost(theta + move)
+        theta = theta + move if found <= least else theta
+        least = found if forgets else min(least, found)
+    return theta
 
 
 def curved(delta, w, theta, features, step, h=1e-4, sign=1):
@@ -444,6 +455,54 @@ CHECKS = {
             lambda **case: case["theta"],
         ],
     ),
+    what_to_try_first.guarded: ([0.125, "1 / 8"], [8, 0.25, 1]),
+    what_to_try_first.middle: ([0.575, "2.3 / 4"], [-3.5, 0.65, 0.517]),
+    what_to_try_first.advised: letters("c"),
+    what_to_try_first.tdrc: (
+        [
+            what_to_try_first.tdrc_step,
+            lambda **case: [*what_to_try_first.tdrc_step(**case)],
+        ],
+        [
+            lambda **case: what_to_try_first.tdrc_step(**case | {"kappa": -case["kappa"]}),
+            lambda **case: what_to_try_first.tdrc_step(**case | {"gamma": 1.0}),
+            lambda **case: what_to_try_first.tdrc_step(**case)[::-1],
+        ],
+    ),
+    what_to_try_first.undone: (
+        [what_to_try_first.kept, undone],
+        [
+            lambda theta, moves, cost: undone(theta, moves, cost, forgets=True),
+            lambda theta, moves, cost: theta + sum(moves),
+            lambda theta, moves, cost: min([theta, *(theta + moves)], key=cost),
+        ],
+    ),
+    why_learning_stops.standing: ([9, "54 - 0.03 * 1500"], [54, 1800, -9]),
+    why_learning_stops.growth: ([0.0108, "100 * 1e-7 * 9 * 120"], [0.000108, 0.0012, 9e-5]),
+    why_learning_stops.evidence: letters("c"),
+    why_learning_stops.left: (
+        ["1 - step * (1 - f)", "1 - step + step * f"],
+        ["1 - step", "1 - step * (1 + f)", "1 - step * f"],
+    ),
+    why_learning_stops.trapped: (
+        [why_learning_stops.in_trap, lambda **case: np.bool_(why_learning_stops.in_trap(**case))],
+        [
+            why_learning_stops.ends_only,
+            lambda **case: why_learning_stops.in_trap(**case, steps=11),
+            lambda **case: not why_learning_stops.in_trap(**case),
+        ],
+    ),
+    why_learning_stops.feedback: (
+        [
+            why_learning_stops.fed_back,
+            lambda **case: why_learning_stops.fed_back(**case, probe=1e-6),
+        ],
+        [
+            lambda **case: why_learning_stops.fed_back(**case) * np.linalg.norm(case["phi"]),
+            lambda **case: why_learning_stops.fed_back(**case | {"gamma": 1.0}),
+            lambda **case: -why_learning_stops.fed_back(**case),
+        ],
+    ),
     performance.ratio: (
         ["0.5 / (r - 0.5)", "-1 / (1 - 2 * r)"],
         ["2 * r - 1", "1 / r", "1 / (2 * r)"],
@@ -539,5 +598,5 @@ def test_a_numeric_exercise_says_a_precision_that_its_check_accepts_or_has_an_ex
 
 def test_every_exercise_is_tried_here_or_marked_by_hand():
     assert set(texts()) == {named(check) for check in CHECKS} | set(BY_HAND)
-    assert len(texts()) == 77
+    assert len(texts()) == 90
     assert all(len(right) >= 2 and len(wrong) >= 3 for right, wrong in CHECKS.values())

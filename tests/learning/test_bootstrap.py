@@ -1,5 +1,7 @@
 """Where the next value comes from: what is solved, remembered and asked of the network."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -95,6 +97,14 @@ def test_as_many_mini_batches_are_fitted_a_step_as_are_asked_for(network, transi
     ]
     assert network.fits == 3 * 4
     assert losses[-3:] == [0.25 * 4, 0.25 * 8, 0.25 * 12]  # of the last fit in the step
+
+
+@pytest.mark.parametrize("gated", [True, False])
+def test_the_state_in_which_an_episode_ended_is_worth_nothing(network, transition, gated):
+    network.batch = 1
+    ended = replace(transition(THETA), end=True)
+    assert Imitation(network, with_theta=True, gated=gated)(ended, THETA).value == 0
+    assert len(network.remembered) == network.fits == 1
 
 
 def test_the_network_fits_before_it_is_asked(network, transition):

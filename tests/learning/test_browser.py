@@ -16,19 +16,11 @@ pytestmark = pytest.mark.slow
 RUNS = [
     Experiment(learner=learner, layout=layout, decay=decay, episodes=20, **options)
     for learner, layout, decay, options in (
-        ("ES", "A", "step", {}),
-        ("ES", "B", "step", {}),
         ("ES", "C", "episode", {}),
-        ("ES", "D", "step", {}),
         ("ES", "A", "episode", {"seed": 3, "alpha": 3e-8}),
-        ("GES", "A", "step", {}),
-        ("GES", "B", "episode", {}),
         ("GES", "D", "step", {"seed": 1}),
         ("GES", "E", "step", {}),
-        ("TDC", "A", "step", {}),
-        ("TDC", "C", "step", {}),
         ("TDC", "D", "episode", {"seed": 2}),
-        ("QL", "A", "step", {"constrained": True}),
         ("QL", "D", "step", {"constrained": True}),
     )
 ]

@@ -1,15 +1,13 @@
 """The same run as a command and as code: both are executed, and give its numbers."""
 
-import os
 import re
 import shlex
 import subprocess
-import sys
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -21,7 +19,6 @@ from nmpcrl.study.learners import NETWORKS
 from nmpcrl.study.provenance import key
 from nmpcrl.study.store import path_of
 
-ROOT = Path(__file__).resolve().parents[2]
 SHORT = {"episodes": 2, "steps": 20, "evaluate_every": 1}
 RUNS = {
     "drawn": Experiment(
@@ -38,32 +35,27 @@ RUNS = {
 
 
 def typed(text: str) -> list[str]:
-    """A command's words as a shell makes them, with this Python's own `nmpcrl`."""
-    program = f'"{sys.executable}" -m nmpcrl'
-    return ["sh", "-c", re.sub("^nmpcrl", lambda _: program, text)]
+    """A command's words as a shell makes them, after `nmpcrl`."""
+    said = subprocess.run(["sh", "-c", f"printf '%s\\0' {text}"], capture_output=True, text=True)
+    program, *words, _ = said.stdout.split("\0")
+    assert program == "nmpcrl"
+    return words
 
 
 @pytest.mark.parametrize("name", RUNS)
 def test_the_command_trains_the_run_in_a_shell(name, tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
-    done = subprocess.run(typed(command(RUNS[name])), cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    done = CliRunner().invoke(main, typed(command(RUNS[name])))
+    assert done.exit_code == 0, done.output
     stored = Records.load(path_of(RUNS[name]))
     assert key(Experiment(**stored.experiment)) == key(RUNS[name])
     np.testing.assert_array_equal(stored.steps["theta"], run(RUNS[name]).steps["theta"])
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_the_code_trains_the_run_and_prints_its_last_cost_and_theta(name):
-    done = subprocess.run(
-        [sys.executable, "-c", code(RUNS[name])],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        env=os.environ | {"NMPCRL_WARNED": "1"},
-    )
-    assert done.returncode == 0, done.stderr
-    stopped, cost, *theta = done.stdout.splitlines()
+def test_the_code_trains_the_run_and_prints_its_last_cost_and_theta(name, capsys):
+    exec(code(RUNS[name]), {"__name__": "__main__"})
+    stopped, cost, *theta = capsys.readouterr().out.splitlines()
     records = run(RUNS[name])
     assert stopped == records.facts["stopped"]
     assert float(cost) == records.facts["final_cost"]

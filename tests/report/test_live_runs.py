@@ -105,6 +105,14 @@ def test_it_begins_with_the_first_two_learners(data):
     assert list(data["layouts"]) == list(design.LAYOUTS)
 
 
+def test_a_page_may_begin_with_another_layout(monkeypatch, known):
+    monkeypatch.setattr(browser, "module", lambda plant, task: b"abc")
+    shown = live.runs("ES", "GES", layout="E").data
+    data = json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
+    assert data["chosen"]["layout"] == "E"
+    assert_published(unpacked(data["given"]), "E", known)
+
+
 def test_a_learner_has_the_look_of_the_printed_figures(data):
     assert data["looks"]["RDES"]["color"] == LOOKS["RDES"].color
     assert data["looks"]["DES"] == {"color": "var(--ink)", "dashes": "5.92 2.56"}

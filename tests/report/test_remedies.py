@@ -1,14 +1,13 @@
 """What a page says of remedies follows from the rows: order, evidence, price and words."""
 
-from dataclasses import replace
-
 import numpy as np
+import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims.population import Answer
-from nmpcrl.claims.remedies import Advice, RemedyRow
+from nmpcrl.claims.remedies import COLUMNS, Advice, RemedyRow
 from nmpcrl.claims.remedy_questions import (
     ADVICE,
     ADVISED,
@@ -16,8 +15,10 @@ from nmpcrl.claims.remedy_questions import (
     LATER,
     NEVER,
     OPEN,
+    PARTS,
     REMEDY_QUESTIONS,
     SECOND,
+    SETTINGS,
 )
 from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.report import remedies
@@ -26,7 +27,6 @@ from nmpcrl.report.remedies import (
     advice_table,
     answer_items,
     in_short,
-    part_table,
     rule,
 )
 
@@ -81,18 +81,44 @@ def test_who_mostly_fails_is_infinitely_bad_and_not_nan(advised):
     assert "nan" not in said
 
 
-def test_a_table_of_a_part_begins_with_the_greatest_lower_end_and_has_the_control():
-    rows = [
-        row("frozen", gain=(0.0, 0.0, 0.0)),
-        row("ES", gain=(0.9, 0.1, 1.0)),
-        row("SPSA", gain=(0.5, 0.4, 0.6)),
-        row("Bayes", gain=(np.nan, np.nan, np.nan)),
-        replace(row("DES"), disqualified=True),
-    ]
-    _, *found = cells(part_table(rows, "All."))
-    assert [one[0] for one in found] == ["DES", "SPSA", "ES", "frozen", "Bayes"]
-    assert found[0][1:3] == ["disqualified", "disqualified"]
-    assert found[1][1:] == ["0.50 [0.40, 0.60]", "90% of 120", "49", "0.5 s"]
+@pytest.fixture
+def runs():
+    """Of three entries in A to F: one fails in A, one solves all, one goes beyond its budget."""
+    part = PARTS["named 50"]
+    found = [
+        {
+            "part": "named 50", "entry": entry, "name": entry, "layout": layout, "k": k,
+            "initial": 100.0, "best": 80.0, "cost": cost, "arrived": cost < 90, "episodes": 50,
+            "over": entry == "DES", "seconds": 0.5,
+        }
+        for entry, cost in (("ES", 110.0), ("SPSA", 84.0), ("DES", 200.0))
+        for layout in part.layouts
+        for k in range(part.seeds)
+    ]  # fmt: skip
+    table = pd.DataFrame(found, columns=[*COLUMNS])
+    table.loc[(table.entry == "ES") & (table.layout == "A") & (table.k == 0), "cost"] = np.inf
+    return table
+
+
+def test_a_table_of_a_part_has_each_layout_and_the_greatest_share_first(runs):
+    table = remedies.named_table(runs, "named 50")
+    head, *found = cells(table)
+    assert head == ["Entry", *"ABCDEF", "Solved", "CPU time"]
+    assert found[0] == ["SPSA", *["0.80"] * 6, "6 of 6", "0.5 s"]
+    assert found[1] == ["ES", "fails", *["−0.50"] * 5, "0 of 6", "0.5 s"]
+    assert found[2][:2] == ["DES", "disqualified"]
+    italic = {one.get_text() for one in BeautifulSoup(table, "html.parser").find_all("em")}
+    assert italic == {"fails", "−0.50"}
+
+
+def test_a_part_that_is_not_published_is_said_to_be_so(runs):
+    said = remedies.named_table(runs, "named 300")
+    assert said == "<p>Nothing is published yet of the part <em>named 300</em>.</p>"
+
+
+def test_every_entry_that_is_compared_is_described():
+    assert [*remedies.WHAT] == [*SETTINGS]
+    assert remedies.entry_table().count("\n| `") == len(SETTINGS)
 
 
 def test_every_word_has_a_colour_and_a_rule():
@@ -100,9 +126,15 @@ def test_every_word_has_a_colour_and_a_rule():
     assert rule().count("\n") == len(ADVICE) - 1
 
 
-def test_the_advice_in_short_names_first_second_and_never(advised):
-    assert in_short(advised) == "Try `CMA-ES` first and `grid` second. Never try `DPG`."
-    assert in_short(advised[2:4]) == "Nothing compared surely gains."
+def test_the_advice_in_short_names_first_second_and_never_with_evidence(advised):
+    said = BeautifulSoup(in_short(advised), "html.parser").get_text()
+    assert said == (
+        "Try first a search of all nine numbers by CMA-ES (`CMA-ES`), which has 0.80 [0.70, 0.90]"
+        " of the possible gain after 49 rollouts and solves 90% of 120 layouts."
+        r" Second, a grid over $\theta_c$ alone (`grid`), which has 0.70 [0.60, 0.80] of the"
+        " possible gain after 49 rollouts. Never try `DPG`."
+    )
+    assert in_short(advised[2:4]) == "Nothing that was compared surely gains."
 
 
 def test_an_answer_stands_beside_its_pilot():
@@ -117,6 +149,15 @@ def test_an_answer_stands_beside_its_pilot():
     assert "Contradicted: ; " not in second
     assert "the difference is −0.10 [−0.20, −0.05]" in second
     assert "The pilot" not in second
+
+
+def test_an_answer_says_what_it_knows_of_single_layouts():
+    numbers = {"CMA-ES in A": 0.984, "CMA-ES in F": 0.38, "ES in A": -0.53, "ES in F": -np.inf}
+    said = answer_items([Answer("search and learning", REPRODUCED, {"layouts": (9, 9)}, numbers)])
+    assert (
+        "9 of 9 layouts; CMA-ES has 0.98 in A, 0.38 in F; ES has −0.53 in A, a failed solve in F."
+        in said
+    )
 
 
 def test_an_expectation_says_whether_it_came_true():

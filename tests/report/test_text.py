@@ -27,6 +27,7 @@ from nmpcrl.study import Experiment
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.design import VARIANTS
 
+OWN = "for_reviewers.ipynb#reviewers-own"
 ABOUT = {
     "runs": {"main": 1200, "controls": 60, "soft box": 40, "tanh": 20},
     "hours": 12.34,
@@ -218,11 +219,20 @@ def test_claims_of_our_own_are_confirmed_or_not_and_never_called_reproduced():
         for name, outcome in (("B1", NOT), ("B2", PARTLY), ("B3", REPRODUCED), ("B4", UNDECIDABLE))
     ]
     assert text.outcomes(judged).splitlines() == [
-        "- B1. It is so. *Not confirmed.*",
-        "- B2. It is so. *Confirmed in part.*",
-        "- B3. It is so. *Confirmed.*",
-        "- B4. It is so. *Not decidable here.*",
+        f"- [B1]({OWN}). It is so. *Not confirmed.*",
+        f"- [B2]({OWN}). It is so. *Confirmed in part.*",
+        f"- [B3]({OWN}). It is so. *Confirmed.*",
+        f"- [B4]({OWN}). It is so. *Not decidable here.*",
     ]
+
+
+def test_a_verdict_leads_to_what_it_rests_on_a_wider_one_to_that_of_the_papers_claim():
+    first, wider = verdict("C1", NOT), verdict("W7", PARTLY)
+    link = "[C1](for_reviewers.ipynb#reviewers-c1)"
+    assert text.judged(first) == f"{link} (*It is so*): **not reproduced**."
+    assert text.audits([first, wider]) == (
+        f"What each rests on: {link} and [W7](for_reviewers.ipynb#reviewers-c7)."
+    )
 
 
 def test_a_claim_with_words_of_its_own_is_counted_apart():

@@ -80,16 +80,6 @@ def run(experiment):
 
 summaries.run = run
 """
-TOO_DEEP = """
-from nmpcrl.analysis import summaries
-
-
-def run(experiment):
-    return run(experiment)
-
-
-summaries.run = run
-"""
 OTHER_VERSIONS = """
 from nmpcrl.study import provenance
 
@@ -313,30 +303,10 @@ def test_a_run_that_kills_every_worker_fails_and_the_others_end(address, worker,
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [(MISTAKEN, "ArithmeticError: a mistake"), (TOO_DEEP, "RecursionError: maximum recursion")],
-    ids=["a mistake", "too many calls for Dask to send"],
-)
-def test_a_run_that_fails_on_a_worker_is_told_with_its_reason(address, worker, text, reason):
-    worker(text)
-    with pytest.raises(Failed, match=reason):
+def test_a_run_that_fails_on_a_worker_is_told_with_its_reason(address, worker):
+    worker(MISTAKEN)
+    with pytest.raises(Failed, match="ArithmeticError: a mistake"):
         on_cluster(address, TEN[:1])
-
-
-@pytest.mark.slow
-def test_a_worker_that_joins_while_others_train_trains_too(address, worker, log, gate):
-    worker(noting(log))
-
-    def join_late():
-        wait_until(lambda: seeds(log, "began"))
-        worker(noting(log))
-        wait_until(lambda: len({pid for _, _, pid in noted(log)}) == 2)
-
-    with meanwhile(join_late, gate):
-        on_cluster(address, TEN)
-    assert len({pid for what, _, pid in noted(log) if what == "ended"}) == 2
-    assert seeds(log, "ended") == list(range(10))
 
 
 @pytest.mark.slow
@@ -544,19 +514,8 @@ def test_the_programs_of_the_page_import_what_there_is(text):
                     importlib.import_module(f"{node.module}.{alias.name}")
 
 
-@pytest.mark.slow
 def test_the_commands_of_the_page_have_the_options_they_are_given():
-    commands = page_commands()
-    ours = [words[1:] for words in commands if words[0] == "nmpcrl"]
+    ours = [words[1:] for words in page_commands() if words[0] == "nmpcrl"]
     assert len(ours) == 2
     for name, *options in ours:
         main.commands[name].make_context(name, options)  # refuses what it does not know
-    for words in commands:
-        if words[0] == "dask":
-            shown = subprocess.run(
-                [sys.executable, "-m", "dask", words[1], "--help"],
-                capture_output=True,
-                text=True,
-                check=True,
-            )
-            assert all(word in shown.stdout for word in words if word.startswith("--"))

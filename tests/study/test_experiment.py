@@ -346,13 +346,6 @@ def test_every_step_has_a_row_and_every_column_every_row(runs, learner):
     assert (steps["status"] == StepStatus.SOLVED).all()
 
 
-@pytest.mark.parametrize(
-    ("learner", "solves"), [("ES", 2), ("GES", 2), ("DES", 1), ("RDES", 1), ("frozen", 1)]
-)
-def test_solves_per_step_are_what_the_table_of_learners_says(runs, learner, solves):
-    assert (runs[learner].steps["solves"] == solves).all()
-
-
 @pytest.mark.parametrize("learner", LEARNERS)
 def test_the_columns_satisfy_the_definition_of_the_td_error(runs, learner):
     s = runs[learner].steps

@@ -118,16 +118,11 @@ def test_an_entry_names_fields_that_not_all_learners_read(name):
 
 
 @pytest.mark.parametrize("name", LEARNERS)
-def test_an_entry_says_how_many_solves_a_step_makes(name):
+def test_an_entry_says_how_many_solves_a_step_makes_and_whether_theta_moves(name):
     wanted = Experiment(name, episodes=2, steps=70)  # a network is fitted in the second
-    solves = run(wanted).steps["solves"]
-    assert solves[-1] == LEARNERS[name].solves + wanted.values_actions
-
-
-@pytest.mark.parametrize("name", LEARNERS)
-def test_an_entry_says_whether_theta_moves(name):
-    theta = run(Experiment(name, episodes=2, steps=70)).steps["theta"]
-    assert (theta[-1] != theta[0]).any() == LEARNERS[name].moves
+    steps = run(wanted).steps
+    assert steps["solves"][-1] == LEARNERS[name].solves + wanted.values_actions
+    assert (steps["theta"][-1] != steps["theta"][0]).any() == LEARNERS[name].moves
 
 
 @pytest.mark.parametrize("name", LEARNERS)

@@ -267,14 +267,6 @@ def test_a_run_says_if_any_of_its_problems_needed_another_solver(monkeypatch):
     assert run(QUICK).facts["solver"] == "riccati"
 
 
-def test_many_runs_do_again_what_is_damaged(runs):
-    fetch(QUICK)
-    path_of(QUICK).write_bytes(b"")
-    with ThreadPoolExecutor(1) as executor:
-        study = fetch_all([QUICK], executor=executor, progress=False)
-    assert study[QUICK].facts["stopped"] == "finished"
-
-
 def test_what_is_stored_is_listed(runs):
     experiments = sweep(learner="frozen", seed=[0, 1], episodes=1, steps=2)
     for e in experiments:

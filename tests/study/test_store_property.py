@@ -327,7 +327,7 @@ class OfSummaries(OfRuns):
 
 
 each_machine = settings(
-    max_examples=20,
+    max_examples=10,
     stateful_step_count=12,
     derandomize=True,
     deadline=None,

@@ -108,6 +108,7 @@
 
   // What is returned draws (runs, chosen, kept), and names the panels to look at.
   function plots(parent, data) {
+    const none = add(parent, "p", { class: "hint" }, words.noRuns);
     const grid = add(parent, "div", { class: "plots" });
     const panels = Object.fromEntries(Object.keys(words.plots).map((name) => [name, add(grid, "div", { class: "panel" })]));
     const draw = Object.fromEntries(Object.entries(panels).map(([name, panel]) => [name, plot(panel, words.plots[name])]));
@@ -117,6 +118,7 @@
     const heights = (lines) => lines.flatMap(({ points }) => points.map(([, y]) => y)).filter(Number.isFinite);
     const wide = (values) => Math.max(...values) > 20 * Math.min(...values.filter((value) => value > 0));
     const drawn = (runs, chosen, kept) => {
+      [none.hidden, grid.hidden] = [Boolean(runs.length), !runs.length];
       const x = [0, Math.max(...runs.map(({ given }) => given.episodes), 1)];
       const line = (run) => (run === chosen ? "line chosen" : "line");
       const look = (run) => (run === kept ? { look: "line kept", dashes: OVER } : { look: line(run) });

@@ -138,6 +138,8 @@
       return `noise-free cost ${fixed(after, 1)} (mean of the last rollouts), ${than} the frozen arm's ${fixed(before, 1)}`;
     },
     frozen: "frozen",
+    noRuns: "Press Train, or choose a find or the lesson. Then six curves grow here with every episode: of the cost, of θ, and of "
+      + "what the value says.",
     plots: {
       judged: {
         title: "Cost without noise",

@@ -44,7 +44,7 @@ EDITIONS: dict[str, Callable[..., Any]] = {
 }
 SINCE_1980 = "315532800"  # the earliest time that a ZIP file, so a wheel, can hold [s]
 WHEEL = ("--no-deps", "--no-build-isolation", "--no-index", "--quiet")
-PACKAGED = ("pyproject.toml", "LICENSE")
+PACKAGED = ("pyproject.toml", "README.md", "LICENSE")
 
 
 def chapters() -> dict[str, Any]:

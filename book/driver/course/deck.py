@@ -6,6 +6,7 @@ r"""The slides of a unit: a text of `book/decks`, with what the unit's chapter h
 | `## Sentence` | begins a slide |
 | `![](#eq-bellman)` | a formula of the chapter, by its label |
 | `![](#sum-code)` | what a cell displays; of a text its table, or all of it |
+| `![](for_reviewers.ipynb#time)` | what a cell of another page displays |
 | `![ES GES](#time)` | of a table, the rows whose first cell has one of these words |
 | `{loop-said.cost}` | what the cell `loop-said` says in the place of `cost` |
 | `> ...` | is said and not shown |
@@ -15,7 +16,7 @@ The goals, the minutes and the exercises are those of the course's plan.
 
 import re
 from base64 import b64decode
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from itertools import chain
@@ -33,6 +34,7 @@ NUMBER = re.compile(r"\{(?P<cell>[a-z\d][a-z\d-]*)\.(?P<name>[a-z_]\w*)\}")
 LINE = re.compile(r"<tr.*?</tr>\s*", flags=re.S)  # of a table
 FIRST = re.compile(r"<t[hd].*?</t[hd]>", flags=re.S)
 STYLE = re.compile(r"<style scoped>.*?</style>\s*", flags=re.S)
+ELSEWHERE = re.compile(r"!\[[^]]*\]\((?P<page>\w+)\.ipynb#")
 FILES = "files"  # beside the decks: all that they share
 FIGURE = '<p class="figure"><img src="{}" alt="{}"></p>'
 BOX = '<div class="live-figure" data-prevent-swipe>{}</div>'
@@ -85,28 +87,34 @@ class Deck:
         return "\n".join([first.html("h1"), *(slide.html("h2") for slide in others)])
 
 
-def deck(text: str, unit: Unit, executed: Any) -> Deck:
+def pages(text: str, unit: Unit) -> list[str]:
+    """The pages that a text shows something of, the unit's chapter first."""
+    return list(dict.fromkeys([unit.sections[0].page, *ELSEWHERE.findall(text)]))
+
+
+def deck(text: str, unit: Unit, executed: Mapping[str, Any]) -> Deck:
     """Make the slides of a unit.
 
     Args:
         text: of `book/decks`.
         unit: of the plan.
-        executed: its chapter, with the outputs that are shown.
+        executed: the notebooks of `pages`, by name, with the outputs that are shown.
 
     Raises:
-        NotThere: the chapter has not what the text shows.
+        NotThere: a page has not what the text shows.
     """
-    chapter = Chapter(unit.sections[0].page, executed)
-    first, *taught, seen = (_slide(part, chapter) for part in PART.split(text) if part)
+    shown = {name: Chapter(name, executed[name]) for name in pages(text, unit)}
+    first, *taught, seen = (_slide(part, shown) for part in PART.split(text) if part)
     first.said.insert(0, f"<p>{_spent(unit)}</p>")
     for slide, minutes in zip(taught, _timed(unit, taught), strict=True):
         slide.said.insert(0, f"<p><b>{minutes}</b></p>")
     slides = [first, _goals(unit), *taught, _exercises(unit), seen]
-    return Deck(first.title, slides, chapter.files)
+    files = {path: data for page in shown.values() for path, data in page.files.items()}
+    return Deck(first.title, slides, files)
 
 
 class Chapter:
-    """What an executed chapter has to show, and the files that this takes."""
+    """What an executed page has to show, and the files that this takes."""
 
     def __init__(self, name: str, executed: Any) -> None:
         self.name = name
@@ -190,16 +198,19 @@ class Chapter:
         return BOX.format(live.INLINE.sub(linked, html))
 
 
-def _slide(part: str, chapter: Chapter) -> Slide:
-    """The slide of a part of a text, which begins with its heading."""
+def _slide(part: str, pages: Mapping[str, Chapter]) -> Slide:
+    """The slide of a part of a text, which begins with its heading; the first page is its own."""
+    chapter = next(iter(pages.values()))
     head, _, body = NUMBER.sub(chapter.number, part).partition("\n")
     slide = Slide(inline(head.lstrip("# ")))
     for kind, html in blocks(body):
         if kind == "quote":
             slide.said.append(html)
         elif kind == "image":
-            label, *words = html.removeprefix("#").split()
-            slide.shown += [_rows(shown, words) for shown in chapter.shown(label)]
+            address, *words = html.split()
+            page, _, label = address.partition("#")
+            source = pages[page.removesuffix(".ipynb")] if page else chapter
+            slide.shown += [_rows(shown, words) for shown in source.shown(label)]
         else:
             slide.shown.append(html)
     return slide

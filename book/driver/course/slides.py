@@ -84,11 +84,13 @@ def make(executed: Path, place: Path) -> list[Path]:
 
 def write(name: str, text: str, unit: Unit, executed: Path, place: Path) -> Path:
     """Write one deck and the files that it alone needs, or the live figures share."""
-    chapter = executed / f"{unit.sections[0].page}.ipynb"
-    if not chapter.exists():
-        raise Failure(f"Slides show what {chapter.name} computes: `make book` executes it.")
+    notebooks = {page: executed / f"{page}.ipynb" for page in deck.pages(text, unit)}
+    for notebook in notebooks.values():
+        if not notebook.exists():
+            raise Failure(f"Slides show what {notebook.name} computes: `make book` executes it.")
+    shown = {page: nbformat.read(notebook, 4) for page, notebook in notebooks.items()}
     try:
-        made = deck.deck(text, unit, nbformat.read(chapter, 4))
+        made = deck.deck(text, unit, shown)
     except deck.NotThere as error:
         raise Failure(f"book/decks/{name}.md: {error}; is the last build older?") from error
     for path, data in made.files.items():

@@ -1,9 +1,9 @@
 """The pages of the built book as one HTML document, from which `pdf` prints the book.
 
-Pages in, a document out: the articles in the order of _toc.yml behind a title page and a table of
-contents. Every identifier gets the name of its page, so links between pages become links within the
-document; what is only for a screen goes; what is folded opens; headings go down by a level within a
-part; a formula gets words for whoever hears it.
+Pages in, a document out: the articles in the order of _toc.yml, but for the library's API, behind a
+title page and a table of contents. Every identifier gets the name of its page, so links between
+pages become links within the document; what is only for a screen goes; what is folded opens;
+headings go down by a level within a part; a formula gets words for whoever hears it.
 """
 
 import os
@@ -51,12 +51,13 @@ COVER = """<section class="cover">
 </section>"""
 MADE = """Every number, table and figure in this book comes from code that <code>make book</code>
 ran; <code>make pdf</code> then printed the pages of the HTML book, with all solutions and all code
-shown."""
+shown. The reference of the library is in the HTML book alone."""
 LICENCE = """The text and the figures are under the Creative Commons Attribution 4.0 International
 licence (CC BY 4.0), the code is under the MIT licence."""
 CITED = """A literate reproduction of {authors}, <cite>{title}</cite>, {number}."""
 ALT = "The robot's trajectory around four obstacles, and some of the short plans behind it."
 
+API = re.compile(r"book/api(_\w+)?")  # pages to search on a screen, and not to read
 SCREEN = (  # nothing for paper
     "script, style, link, button, iframe, form, figure.live, div.answer, .headerlink, .download"
 )
@@ -94,13 +95,14 @@ class Page:
 
 
 def read(site: Path) -> Iterator[Page]:
-    """The pages in the order of _toc.yml."""
+    """The pages in the order of _toc.yml, without those of the library's API."""
     toc = from_yaml("_toc.yml")
     yield page(site, toc["root"], "", 1)
     for part in toc["parts"]:
-        captions = [part["caption"]] + [""] * len(part["chapters"])
-        for chapter, caption in zip(part["chapters"], captions, strict=False):
-            yield page(site, chapter["file"], caption, 2)
+        files = [one["file"] for one in part["chapters"] if not API.fullmatch(one["file"])]
+        captions = [part["caption"]] + [""] * len(files)
+        for file, caption in zip(files, captions, strict=False):
+            yield page(site, file, caption, 2)
 
 
 def parsed(site: Path, name: str) -> Element:

@@ -1,7 +1,8 @@
 """How long the book takes, and what needs what: chapters in, minutes and links out.
 
 Minutes of reading are computed from a source: its words, formulas, figures and code. Those of the
-exercises are the sum of what their metadata says. What needs what is in `book/syllabus.yml`.
+exercises are the sum of what their metadata says. What a built page shows is counted in words. What
+needs what is in `book/syllabus.yml`.
 """
 
 import math
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
+from bs4 import BeautifulSoup
 
 from driver.page import enrich
 from driver.project import ROOT, from_yaml
@@ -24,6 +26,11 @@ FORMULA, FIGURE, CODE = 30, 60, 30  # on top of the words [s]
 HEADING = re.compile(r"^(?=## )", flags=re.M)
 LIVE = re.compile(r"\blive\.\w+\(")
 NOT_READ = ("Exercises", "What we saw")  # counted by themselves, or repeated
+WORD = re.compile(r"[^\W\d_]{2,}")
+UNSEEN = (  # of a built page: folded, for a browser alone, or no words
+    "details, .dropdown > :not(.admonition-title), figure.live, .math, .headerlink, .download,"
+    " script, style"
+)
 
 
 @dataclass(frozen=True)
@@ -142,8 +149,23 @@ def seconds(cell: Any, source: str) -> float:
     if {"exercise", "hint", "solution", "rubric", "remove-cell"} & set(tags):
         return 0.0
     if cell.cell_type == "markdown" or enrich.says(source):
-        words = len(re.findall(r"[^\W\d_]{2,}", source))
+        words = len(WORD.findall(source))
         return 60 * words / WORDS + source.count("$$") / 2 * FORMULA
     if "mystnb" in cell.metadata:
         return FIGURE
     return 0.0 if "hide-input" in tags else CODE
+
+
+def shown(page: str) -> int:
+    """The words that a built page, HTML, shows before anything is unfolded, code and output too.
+
+    Formulas have no words; exercises are counted by themselves.
+    """
+    article = BeautifulSoup(page, "html.parser").article
+    assert article
+    for section in article.find_all("section"):
+        if section.h2 and section.h2.get_text().startswith("Exercises") and not section.h1:
+            section.decompose()
+    for element in article.select(UNSEEN):
+        element.decompose()
+    return len(WORD.findall(article.get_text(" ")))

@@ -76,6 +76,15 @@ MEANINGS = {  # of paper.THETA_NAMES, in a word or two
     "heading_f": "last heading",
     "c": "clearance",
 }
+TOLD_APART = ("v", "nu")  # whose symbols look alike where letters are small
+
+
+def symbol(name: str) -> str:
+    """A component of theta as a figure names it, with a word where its symbol needs one."""
+    word = f" ({MEANINGS[name]})" if name in TOLD_APART else ""
+    return f"${SYMBOLS[name]}${word}"
+
+
 STEP_PARTS = {  # of a learning step: colour and hatching
     "solves": ("0.2", ""),
     "network": ("0.42", "//"),

@@ -1,4 +1,4 @@
-"""The live figure of chapters 5 and 7: published runs, episode by episode.
+"""The live figure of chapters 5, 7 and 12: published runs, episode by episode.
 
 A page is given one seed in one layout; `scripts` are the files that it loads for all others. The
 trajectories are in neither: the page solves them again.
@@ -36,24 +36,24 @@ FILE = "runs_{}.js"
 LATER = "window.nmpcrl.packed = {{ ...window.nmpcrl.packed, {}: {} }};\n"
 
 
-def runs(*learners: str) -> HTML:
-    """Published runs of these learners beside the frozen arm; the first two to begin with."""
-    nmpc = paper.nmpc(LAYOUT)
-    return frame.solving("runs", nmpc, lambda: _data(nmpc, learners), SCRIPTS)
+def runs(*learners: str, layout: str = LAYOUT) -> HTML:
+    """Published runs of these learners beside the frozen arm; two of them in a layout at first."""
+    nmpc = paper.nmpc(layout)
+    return frame.solving("runs", nmpc, lambda: _data(nmpc, learners, layout), SCRIPTS)
 
 
-def _data(nmpc: Nmpc, learners: tuple[str, ...]) -> dict[str, Any]:
+def _data(nmpc: Nmpc, learners: tuple[str, ...], layout: str) -> dict[str, Any]:
     known = published.load()
-    tasks = {layout: paper.task(layout) for layout in LAYOUTS}
+    tasks = {name: paper.task(name) for name in LAYOUTS}
     return {
         "looks": {name: look(name) for name in (*learners, "frozen")},
-        "chosen": dict(zip(CHOICES, (*learners[:2], LAYOUT, "step", SEED), strict=True)),
+        "chosen": dict(zip(CHOICES, (*learners[:2], layout, "step", SEED), strict=True)),
         "layouts": {name: problem_of(paper.nmpc(name))["discs"] for name in tasks},
         "decays": list(DECAY_TITLES),
         "seeds": SEEDS,
         "episodes": _episodes(known),
         "names": paper.THETA_NAMES,
-        "given": packed(known, LAYOUT, SEED, (*learners, "frozen")),
+        "given": packed(known, layout, SEED, (*learners, "frozen")),
         "start": nmpc.task.start.tolist(),
         "horizon": nmpc.horizon,
         "steps": paper.STEPS,

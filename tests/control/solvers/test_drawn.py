@@ -1,4 +1,4 @@
-"""riccati on thousands of drawn problems, most of them far from what learning visits.
+"""riccati on a thousand drawn problems, most of them far from what learning visits.
 
 The problem it solves is Eq. (2) with the box as a penalty, so there is always a solution. Here that
 problem is written with CasADi: its KKT conditions, and an Ipopt that solves it to 1e-10.
@@ -280,7 +280,7 @@ def judged(nmpc: Nmpc, solution: Solution) -> None:
     np.testing.assert_allclose(solution.features, features.full().ravel(), atol=1e-9 * scale)
 
 
-# Two thousand problems
+# A thousand problems
 
 
 @pytest.fixture(scope="module")
@@ -290,11 +290,11 @@ def mass(point_mass) -> Plant:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "layouts", "failures"), [("robot", 44, 8), ("mass", 12, 3)])
-def test_of_thousands_of_problems_nearly_all_are_solved_and_none_wrongly(
+@pytest.mark.parametrize(("name", "layouts", "failures"), [("robot", 16, 4), ("mass", 6, 3)])
+def test_of_a_thousand_problems_nearly_all_are_solved_and_none_wrongly(
     name, layouts, failures, mass
 ):
-    """2,200 of the robot and 600 of the mass; about one in a thousand is given up, and says so."""
+    """About one in a thousand is given up, and says so; `nmpcrl bench --sweep` tries 100,000."""
     ended = {"failed": 0, "restarted": 0}
     for layout in range(layouts):
         rng = np.random.default_rng([1, layout])

@@ -111,8 +111,7 @@ def beside(count, solver, theta_c=0.1, inward=0.0, angle=1.0, **options):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [1, 3])
-@pytest.mark.parametrize("angle", [1.0, 0.3])
+@pytest.mark.parametrize(("count", "angle"), [(1, 0.3), (3, 1.0)])
 def test_on_a_boundary_the_slack_of_stage_zero_is_not_active(solver, theta, count, angle):
     """V has a kink in theta_c there, of omega an obstacle; the side outside is chosen."""
     theta[-1] = 0.1
@@ -147,8 +146,7 @@ def test_the_kink_is_where_differences_say_it_is(solver, theta):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [1, 3])
-@pytest.mark.parametrize("angle", [1.0, 0.3])
+@pytest.mark.parametrize(("count", "angle"), [(1, 0.3), (3, 1.0)])
 def test_with_ties_active_the_other_side_of_the_kink_is_chosen(solver, theta, count, angle):
     """The value and the plan stay as they are; the features are those inside, not outside."""
     theta[-1] = 0.1

@@ -23,6 +23,7 @@ from nmpcrl.report.figures.style import (
     page,
     shades,
     subplots,
+    symbol,
 )
 
 
@@ -147,7 +148,7 @@ def theta_effects(
     for axes in grid[:, 0]:
         axes.set_ylabel("y [m]")
     first, second, *_ = most
-    return headed(figure, f"${SYMBOLS[first]}$ and ${SYMBOLS[second]}$ bend the trajectory most")
+    return headed(figure, f"{symbol(first)} and {symbol(second)} bend the trajectory most")
 
 
 @page

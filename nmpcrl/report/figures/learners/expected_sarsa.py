@@ -12,7 +12,6 @@ from nmpcrl.report.figures.style import (
     LOOKS,
     QUIET,
     SUBTITLE,
-    SYMBOLS,
     TEAL,
     WINE,
     headed,
@@ -20,6 +19,7 @@ from nmpcrl.report.figures.style import (
     page,
     shades,
     subplots,
+    symbol,
 )
 from nmpcrl.report.run import thetas
 from nmpcrl.study import Runs
@@ -47,7 +47,7 @@ def theta_paths(runs: Runs[Records]) -> Figure:
                     values[:, component],
                     color=shade,
                     ls=lines[i % len(lines)],
-                    label=f"${SYMBOLS[THETA_NAMES[component]]}$" if run == 0 else None,
+                    label=symbol(THETA_NAMES[component]) if run == 0 else None,
                 )
         axes.set_title(DECAY_TITLES[decay], **SUBTITLE)
         over_episodes(axes)

@@ -1,16 +1,38 @@
 """Figures of RDES: a network in the place of the second solve."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
+from nmpcrl.analysis.extrapolation import Outcome
 from nmpcrl.analysis.imitation import Imitation
-from nmpcrl.report.figures.axes import label_panel, one_entry_each
-from nmpcrl.report.figures.style import AT_ONE, LOOKS, headed, page, subplots, thin
+from nmpcrl.learning.updates import OVERSHOOT
+from nmpcrl.report.figures.axes import label_panel, one_entry_each, over_episodes
+from nmpcrl.report.figures.style import (
+    AT_ONE,
+    LIMIT,
+    LOOKS,
+    SUBTITLE,
+    TEAL,
+    WINE,
+    headed,
+    page,
+    subplots,
+    thin,
+)
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
+
+WATCHED: dict[str, dict[str, Any]] = {  # by the interventions of `analysis.extrapolation`
+    "none": LOOKS["RDES"].line,
+    "theta held": {"color": WINE, "linestyle": "--"},
+    "true slope": {"color": TEAL, "linestyle": "-"},
+}
+NAMES = {"none": "RDES", "theta held": "θ held", "true slope": "true slope"}
+SHOWN = (0.05, 100.0)  # of alpha ||phi||^2; what is larger stands at the edge
 
 
 @page
@@ -77,6 +99,45 @@ def held_out_errors(imitations: Iterable[Imitation]) -> Figure:
     title = f"With θ as an input, the error is smaller in {helped} of {all_runs} runs"
     axes.set_title(f"{title} (median ratio {np.median(ratios):.2f})")
     return figure
+
+
+@page
+def interventions(watched: Mapping[str, Mapping[str, Outcome]]) -> Figure:
+    """Largest alpha ||phi||^2 and median feedback of each episode, a column a run.
+
+    Args:
+        watched: by the name of a run, and then by intervention.
+    """
+    options: dict[str, Any] = {"sharex": "col", "sharey": "row", "squeeze": False, "across": 1}
+    figure, axes = subplots(2, len(watched), 4.4, **options)
+    for column, (name, outcomes) in zip(axes.T, watched.items(), strict=True):
+        for how, one in outcomes.items():
+            episodes = np.arange(1, one.episodes + 1)
+            step = np.where(one.overshoot > 0, one.overshoot, np.nan).clip(max=SHOWN[1])
+            column[0].semilogy(episodes, step, label=NAMES[how], **WATCHED[how])
+            column[1].plot(episodes, one.feedback, **WATCHED[how])
+            if one.stopped:
+                column[0].plot(episodes[-1], step[-1], "X", color=WATCHED[how]["color"], ms=8)
+        column[0].axhline(OVERSHOOT, **LIMIT)
+        column[0].set_ylim(SHOWN[0], 1.5 * SHOWN[1])
+        column[1].axhline(1, **AT_ONE)
+        column[0].set_title(name, **SUBTITLE)
+        over_episodes(column[1])
+    axes[0, 0].set_ylabel(r"largest $\alpha\,\Vert\phi\Vert^2$ [-]")
+    axes[1, 0].set_ylabel("feedback [-]")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return headed(figure, _stopped(watched))
+
+
+def _stopped(watched: Mapping[str, Mapping[str, Outcome]]) -> str:
+    """How many runs had to be stopped, by intervention, in a title."""
+    counts = {how: sum(of[how].stopped for of in watched.values()) for how in WATCHED}
+    every = len(watched)
+    return (
+        f"Of {every} runs of RDES {counts['none']} were stopped; with the slope of the NMPC"
+        f" {counts['true slope']}, with θ held {counts['theta held']}"
+    )
 
 
 def _fall(lowest: float) -> str:

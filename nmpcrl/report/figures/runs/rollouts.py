@@ -17,7 +17,7 @@ from nmpcrl.claims.failure_modes import ending
 from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import draw_task, legend, map_grid
 from nmpcrl.report.figures.panels import bundle, part, sourced
-from nmpcrl.report.figures.style import DECAY_TITLES, LIMIT, LOOKS, SUBTITLE, page, subplots
+from nmpcrl.report.figures.style import LIMIT, LOOKS, SUBTITLE, page, subplots
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Stopped
@@ -36,16 +36,19 @@ def controls(found: Evidence, layout: str) -> Figure:
     drawn = _finished(part(found, SHOWN, layout))
     drawn = drawn.where([summary.actions is not None for summary in drawn.summaries.values()])
     plant = paper.nmpc(layout).plant
-    figure, axes = _against_time(drawn, "actions", plant.action_names, 4.2)
-    for i, row in enumerate(axes):
-        for axis in row:
-            axis.axhline(plant.lower[i], **LIMIT)
-            axis.axhline(plant.upper[i], **LIMIT)
+    figure, axes = _against_time(drawn, "actions", plant.action_names, 3.6)
+    for i, axis in enumerate(axes):
+        axis.axhline(plant.lower[i], **LIMIT)
+        axis.axhline(plant.upper[i], **LIMIT)
     learned = [one.actions for one in _learned(drawn) if one.actions is not None]
+    if not learned:
+        return sourced(figure, "The inputs of no rollout are kept", drawn)
     outside = sum(metrics.input_violations(one, plant.lower, plant.upper) for one in learned)
-    verb = f"{outside} inputs leave" if outside else "all inputs keep within"
-    title = f"In {len(learned)} rollouts of RDES and GES, {verb} their bounds"
-    return sourced(figure, title if learned else "The inputs of no rollout are kept", drawn)
+    used = np.median([np.nanmax(np.abs(one) / plant.upper, axis=0) for one in learned], axis=0)
+    names = (name.partition(" [")[0] for name in plant.action_names)
+    parts = " and ".join(f"{share:.0%} of the {name}" for share, name in zip(used, names))
+    left = f"; {outside} inputs leave their bounds" * bool(outside)
+    return sourced(figure, f"RDES and GES use up to {parts} allowed{left}", drawn)
 
 
 @page
@@ -53,32 +56,13 @@ def states(found: Evidence, layout: str) -> Figure:
     """Fig. 4 of the paper against time: the states under the learned policies."""
     drawn = _finished(part(found, SHOWN, layout))
     task, plant = paper.task(layout), paper.nmpc(layout).plant
-    figure, axes = _against_time(drawn, "states", plant.state_names, 5.4)
-    for i, row in enumerate(axes):
-        for axis in row:
-            axis.axhline(task.target[i], **LIMIT)
+    figure, axes = _against_time(drawn, "states", plant.state_names, 4.8)
+    for i, axis in enumerate(axes):
+        axis.axhline(task.target[i], **LIMIT)
     ends = np.array([task.distance(summary.states[-1]) for summary in _learned(drawn)])
     arrived = int((ends <= ARRIVED).sum())
     title = f"{arrived} of {ends.size} rollouts of RDES and GES end at the target"
     return sourced(figure, f"In layout {layout}, {title}", drawn)
-
-
-@page
-def paths(found: Evidence, layout: str) -> Figure:
-    """Fig. 4 of the paper in the plane: where the learned policies lead the robot, without noise.
-
-    One line a run and none for the median, for a median of places is no place that a robot was.
-    """
-    drawn = part(found, SHOWN, layout)
-    finished, decays = _finished(drawn), drawn.summaries.values_of("decay")
-    figure, axes = subplots(1, len(decays), 3.8, sharey=True, squeeze=False)
-    for axis, decay in zip(axes[0], decays, strict=True):
-        _map(axis, paper.task(layout), finished.summaries.select(decay=decay))
-        axis.set_title(DECAY_TITLES[decay], **SUBTITLE)
-        axis.set_xlabel("x [m]")
-    axes[0, 0].set_ylabel("y [m]")
-    legend(figure, SHOWN)
-    return sourced(figure, f"In layout {layout}: {_endings(_learned(drawn))}", drawn)
 
 
 @page
@@ -89,7 +73,7 @@ def maps(found: Evidence) -> Figure:
     figure, by_layout, grid = map_grid(layouts, 1.95, 0.8)
     for layout, axis in by_layout.items():
         runs = _finished(drawn).summaries.select(layout=layout)
-        _map(axis, paper.task(layout), runs, names=False)
+        _map(axis, paper.task(layout), runs)
         axis.set_title(layout, **SUBTITLE)
     for axis in grid[-1]:
         axis.set_xlabel("x [m]")
@@ -102,28 +86,24 @@ def maps(found: Evidence) -> Figure:
 def _against_time(
     drawn: Evidence, name: str, components: tuple[str, ...], height: float
 ) -> tuple[Figure, Column]:
-    """`states` or `actions` of the last rollouts: a row a component, a column a reading."""
-    decays, period = drawn.summaries.values_of("decay"), paper.nmpc().plant.period
-    options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
-    figure, axes = subplots(len(components), max(1, len(decays)), height, **options)
-    for column, decay in zip(axes.T, decays, strict=False):
-        for learner in SHOWN:
-            runs = drawn.summaries.select(learner=learner, decay=decay).values()
-            values = np.array([getattr(summary, name) for summary in runs])
-            for i, axis in enumerate(column if values.size else ()):
-                bundle(axis, period * np.arange(values.shape[1]), values[:, :, i], learner)
-        column[0].set_title(DECAY_TITLES[decay], **SUBTITLE)
-    for axis in axes[-1]:
-        axis.set_xlabel("time [s]")
-    for axis, component in zip(axes[:, 0], components, strict=True):
+    """`states` or `actions` of the last rollouts, of both readings together: a row a component."""
+    period = paper.nmpc().plant.period
+    figure, axes = subplots(len(components), 1, height, sharex=True)
+    for learner in SHOWN:
+        runs = drawn.summaries.select(learner=learner).values()
+        values = np.array([getattr(summary, name) for summary in runs])
+        for i, axis in enumerate(axes if values.size else ()):
+            bundle(axis, period * np.arange(values.shape[1]), values[:, :, i], learner)
+    axes[-1].set_xlabel("time [s]")
+    for axis, component in zip(axes, components, strict=True):
         axis.set_ylabel(component)
     legend(figure, SHOWN)
     return figure, axes
 
 
-def _map(axis: Axes, task: Task, runs: Runs[Outline], *, names: bool = True) -> None:
-    """Obstacles, start, target and trajectories; a mark where each ended."""
-    draw_task(axis, task, labels=names)
+def _map(axis: Axes, task: Task, runs: Runs[Outline]) -> None:
+    """Obstacles, start, target and trajectories, a line a run; a mark where each ended."""
+    draw_task(axis, task, labels=False)
     for learner in SHOWN:
         look = LOOKS[learner]
         for summary in runs.select(learner=learner).values():

@@ -20,13 +20,13 @@ from nmpcrl.report.figures.style import (
     LOOKS,
     QUIET,
     SUBTITLE,
-    SYMBOLS,
     headed,
     marked,
     mosaic,
     most_moved,
     page,
     shades,
+    symbol,
 )
 from nmpcrl.report.run import finding, thetas
 from nmpcrl.study import paper
@@ -110,7 +110,7 @@ def _theta(axes: Axes, records: Records) -> None:
     named = [i for i in order[:NAMED] if change[i] > MOVES * change.max()]
     axes.plot(values[:, [i for i in order if i not in named]], color=QUIET, lw=0.7)
     for i, shade, line in zip(named, shades(len(named)), ("-", "--", "-.", ":"), strict=False):
-        name = f"${SYMBOLS[paper.THETA_NAMES[i]]}$"
+        name = symbol(paper.THETA_NAMES[i])
         axes.plot(values[:, i], color=shade, linestyle=line, label=name)
     axes.set_title(most_moved(change) if named else "θ does not move", **SUBTITLE)
     axes.set_ylabel("component of θ [-]")

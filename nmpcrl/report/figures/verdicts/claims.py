@@ -220,10 +220,9 @@ def lowest(means: Mapping[str, Estimate], medians: Mapping[str, float]) -> str:
     """
     best = min(means, key=lambda name: means[name].value)
     middle = min(medians, key=lambda name: medians[name])
-    mean = f"the interquartile mean ({means[best]:.3f} of the start's cost)"
     if best == middle:
-        return f"{best} ends lowest, by {mean} and by the median ({medians[best]:.3f})"
-    return f"{best} ends lowest by {mean}, {middle} by the median ({medians[middle]:.3f})"
+        return f"{best} ends lowest, by the interquartile mean and by the median"
+    return f"{best} ends lowest by the interquartile mean, {middle} by the median"
 
 
 def _panels(measured: int = 1) -> tuple[Figure, Column]:
@@ -291,13 +290,10 @@ def _counts(axis: Axes, runs: pd.DataFrame, column: str) -> None:
 
 
 def _profile(axis: Axes, saved: Vector, learner: str) -> None:
-    """Share of runs that save at least as much, with its pointwise band."""
+    """Share of runs that save at least as much."""
     thresholds = np.linspace(*PROFILED, 121)
     reached = performance_profile(saved, thresholds)
-    look = LOOKS[learner]
-    band: dict[str, Any] = {"color": look.color, "alpha": 0.12, "linewidth": 0}
-    axis.fill_between(thresholds, reached.low, reached.high, **band)
-    axis.plot(thresholds, reached.share, label=learner, **look.line)
+    axis.plot(thresholds, reached.share, label=learner, **LOOKS[learner].line)
 
 
 def _bar(axis: Axes, row: float, mine: pd.Series, reference: pd.Series) -> float:

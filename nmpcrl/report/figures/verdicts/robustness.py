@@ -157,13 +157,16 @@ def _cell(axes: Axes, column: int, y: float, cell: Mapping[str, Any]) -> None:
 
 
 def _changed(judged: pd.DataFrame) -> str:
-    """How many verdicts change, and of which claims none does."""
+    """How many verdicts change, of which claim most do, and of which none does."""
     decided = judged[(judged.variant != WHOLE) & (judged.outcome != UNDECIDABLE)]
     decided = decided[decided.base != UNDECIDABLE]
     changes = decided.groupby("claim", sort=False).changes.sum()
     never = [str(claim) for claim, count in changes.items() if not count]
     steady = f"; those on {' and '.join(never)} never" if never and changes.any() else ""
-    return f"{int(changes.sum())} of {len(decided)} decided verdicts change{steady}"
+    count = f"{int(changes.sum())} of {len(decided)} decided verdicts change"
+    if not changes.any():
+        return count
+    return f"{count}, {changes.max()} of them on {changes.idxmax()}{steady}"
 
 
 def _strips(axes: Axes, claim: RunClaim, here: Values, base: Values) -> None:

@@ -107,11 +107,11 @@ def test_nine_panels_name_the_two_parameters_that_bend_the_trajectory_most(
     figure = draw.theta_effects(nmpc.task, straight(1.5), changes)
     assert_readable(figure)
     assert len(figure.axes) == 9
-    assert texts(figure).startswith(r"$\theta_c$ and $\theta_\nu$ bend")
+    assert texts(figure).startswith(r"$\theta_c$ and $\theta_\nu$ (turn rate) bend")
     assert "0.35: fails" in [text.get_text() for text in figure.axes[8].texts]
     low = figure.again(sheet.SLIDE)
     assert len(low.axes) == 4
-    assert texts(low).startswith(r"$\theta_c$ and $\theta_\nu$ bend")
+    assert texts(low).startswith(r"$\theta_c$ and $\theta_\nu$ (turn rate) bend")
 
 
 def test_the_printed_box_says_how_near_the_robot_comes(nmpc, assert_readable, texts):

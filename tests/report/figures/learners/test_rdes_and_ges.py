@@ -5,6 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
+from nmpcrl.analysis.extrapolation import Outcome
 from nmpcrl.analysis.gradient_td import directions, dropped_curvature
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.two_state import Chain
@@ -170,3 +171,29 @@ def test_the_figures_are_closed(study):
 
     few_runs.figure_1(study)
     assert not plt.get_fignums()
+
+
+def test_interventions_are_counted_in_the_title_and_a_stopped_run_ends_in_a_cross():
+    def outcome(stopped: bool, count: int) -> Outcome:
+        numbers = np.linspace(0.1, 1.0, count)
+        overshoot = np.r_[0.0, numbers[1:-1], 1e6 if stopped else 1.5]
+        return Outcome(stopped, np.zeros((count, 9)), numbers, overshoot, numbers)
+
+    run = {
+        "none": outcome(True, 8),
+        "theta held": outcome(False, 12),
+        "true slope": outcome(False, 12),
+    }
+    other = run | {"theta held": outcome(True, 10)}
+    figure = rdes.interventions({"layout B": run, "layout D": other})
+    assert figure.get_suptitle() == (
+        "Of 2 runs of RDES 2 were stopped; with the slope of the NMPC 0, with θ held 1"
+    )
+    crosses = [
+        [line.get_xdata().tolist() for line in axes.get_lines() if line.get_marker() == "X"]
+        for axes in figure.axes[:2]
+    ]
+    assert crosses == [[[8]], [[8], [10]]]
+    drawn = figure.axes[0].get_lines()[0].get_ydata()
+    assert np.isnan(drawn[0])  # before the first fit
+    assert drawn[-1] == rdes.SHOWN[1]

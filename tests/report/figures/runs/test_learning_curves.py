@@ -1,5 +1,7 @@
 """Figures 1 to 4 over seeds: titles follow from the runs, every run has its line, none is lost."""
 
+import re
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -131,25 +133,25 @@ def test_every_rollout_has_its_line_against_time(draw, made_up):
     figure = draw(made_up(), "A")
     assert {axis.get_xlabel() for axis in figure.axes} == {"", "time [s]"}
     for axis in figure.axes:
-        assert len(thin(axis)) == 3 * SEEDS
+        assert len(thin(axis)) == 2 * 3 * SEEDS
     labels = {axis.get_ylabel() for axis in figure.axes}
     assert all("[" in label for label in labels if label)
 
 
 def test_inputs_that_leave_their_bounds_are_counted(made_up):
-    assert title(rollouts.controls(made_up(), "A")) == (
-        "In 16 rollouts of RDES and GES, all inputs keep within their bounds"
+    kept = title(rollouts.controls(made_up(), "A"))
+    assert re.fullmatch(
+        r"RDES and GES use up to \d+% of the speed and \d+% of the turn rate allowed", kept
     )
     found = made_up(lambda e: {"actions": FAST} if (e.learner, e.seed) == ("GES", 0) else {})
-    assert "10 inputs leave their bounds" in title(rollouts.controls(found, "A"))
+    assert "; 10 inputs leave their bounds" in title(rollouts.controls(found, "A"))
 
 
 def test_rollouts_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
     published = {"actions": None}
     found = made_up(lambda e: published if e.seed else {})
     figure = rollouts.controls(found, "A")
-    assert title(figure).startswith("In 4 rollouts")
-    assert all(len(thin(axis)) == 3 for axis in figure.axes)
+    assert all(len(thin(axis)) == 2 * 3 for axis in figure.axes)
     nowhere = rollouts.controls(made_up(lambda e: published), "A")
     assert title(nowhere) == "The inputs of no rollout are kept"
 
@@ -166,22 +168,19 @@ def test_those_that_arrive_are_counted_and_those_that_were_stopped_are_not_drawn
     assert title(rollouts.states(found, "A")) == (
         "In layout A, 12 of 14 rollouts of RDES and GES end at the target"
     )
-    figure = rollouts.paths(found, "A")
-    assert title(figure) == "In layout A: 12 arrived, 2 stuck, 2 stopped in training"
+    figure = rollouts.maps(found)
+    assert title(figure) == "In all layouts: 24 arrived, 4 stuck, 4 stopped in training"
     ends = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 5]
-    assert len(ends) == 3 * SEEDS - 1
-    assert (
-        title(rollouts.maps(found)) == "In all layouts: 24 arrived, 4 stuck, 4 stopped in training"
-    )
+    assert len(ends) == 2 * (3 * SEEDS - 1)
 
 
 def test_a_rollout_that_failed_is_drawn_as_far_as_it_got(made_up):
     broken = made_up().summaries[Experiment("GES")].states.copy()
     broken[3:] = np.nan
     found = made_up(lambda e: {"states": broken} if e.learner == "GES" else {})
-    assert "8 failed" in title(rollouts.paths(found, "A"))
-    figure = rollouts.paths(found, "A")
-    assert sum(len(line.get_xdata()) == 3 for line in figure.axes[0].get_lines()) == SEEDS
+    figure = rollouts.maps(found)
+    assert "16 failed" in title(figure)
+    assert sum(len(line.get_xdata()) == 3 for line in figure.axes[0].get_lines()) == 2 * SEEDS
     assert "8 of 16 rollouts" in title(rollouts.states(found, "A"))
 
 
@@ -201,7 +200,6 @@ def test_every_layout_has_its_map(made_up):
         learning_curves.figure_2,
         rollouts.controls,
         rollouts.states,
-        rollouts.paths,
         lambda found, _: rollouts.maps(found),
     ],
 )

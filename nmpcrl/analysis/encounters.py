@@ -1,0 +1,77 @@
+"""How a robot fares among obstacles that move, and how crowded their space and time are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.study import paper
+from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.motions import Motion, centres
+from nmpcrl.study.world import CLEARANCE, TASK, World, inside
+
+GRID = 0.1  # [m], of the points at which crowding is counted
+
+
+class Counted(NamedTuple):
+    """How often a robot and obstacles met."""
+
+    inside: int  # states in an obstacle
+    collisions: int  # times that an obstacle was entered
+
+
+@dataclass(frozen=True, eq=False)
+class Encounters:
+    """A rollout without noise on the action; the true states are judged, not the measured ones."""
+
+    states: Matrix  # true ones, shape (<= K + 2, 3)
+    cost: float  # infinite where a solve failed
+    counted: Counted
+    arrived: bool
+
+
+def count(states: Matrix, motions: Sequence[Motion]) -> Counted:
+    """The states in an obstacle, and how often one was entered."""
+    there = inside(states, motions)
+    entered = there[1:] & ~there[:-1]
+    return Counted(int(there.any(axis=1).sum()), int(entered.sum() + there[:1].sum()))
+
+
+def judged(nmpc: Persistent, theta: Vector, world: World, seed: int = 0) -> Encounters:
+    """Follow the policy of theta through an episode.
+
+    Args:
+        nmpc: acts.
+        theta: its parameters.
+        world: where.
+        seed: of what the world draws.
+    """
+    rollout = evaluate(nmpc, theta, paper.STEPS, rng=seed, **world.environment)
+    states = np.array(world.states[: len(rollout.costs) + 1])
+    arrived = not rollout.failure and TASK.distance(states[paper.STEPS - 1]) <= ARRIVED
+    return Encounters(
+        states, rollout.cost, count(states[: paper.STEPS], world.motions), bool(arrived)
+    )
+
+
+def crowding(motions: Sequence[Motion]) -> float:
+    """The share of space and time that obstacles take: points of a grid between start and target.
+
+    The rectangle from start to target, as high as a disc to either side; each point at the time
+    at which a robot at constant speed along x would be there, within five seconds.
+    """
+    start, target = np.array(paper.START[:2]), np.array(paper.TARGET[:2])
+    low, high = np.minimum(start, target), np.maximum(start, target)
+    xs = np.arange(low[0], high[0], GRID)
+    ys = np.arange(low[1] - CLEARANCE, high[1] + CLEARANCE, GRID)
+    times = (xs - low[0]) / (high[0] - low[0]) * (paper.STEPS - 1)
+    late = np.arange(-25, 26, 5)
+    at = centres(motions, (times[:, None] + late).ravel()).reshape(len(xs), late.size, -1, 2)
+    away = (
+        np.stack(np.broadcast_arrays(xs[:, None], ys), axis=-1)[:, None, :, None] - at[:, :, None]
+    )
+    covered = ((away**2).sum(axis=-1) < (CLEARANCE / 2) ** 2).any(axis=-1)
+    return float(covered.mean())

@@ -1,0 +1,149 @@
+"""The exercises of the chapter on why learning stops."""
+
+from typing import Any
+
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.claims.population_questions import STANDING, STOOD
+from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
+
+
+@varied(value=(1200, 1740, 20))
+@exercise
+def standing(answer: Any, *, value: float = 1500) -> Outcome:
+    """The TD error of a robot that stands and pays 54 a step."""
+    cost, gamma = 54.0, 0.97
+    return number(
+        answer,
+        cost - (1 - gamma) * value,
+        tolerance=0.01,
+        mistakes={
+            cost: "The next value is discounted: gamma V, not V, stands beside V.",
+            cost / (1 - gamma): "That is what standing for ever costs, not the TD error.",
+            (1 - gamma) * value - cost: "The TD error is what is paid and promised, minus V.",
+        },
+    )
+
+
+@exercise
+def growth(answer: Any) -> Outcome:
+    """By how much theta_c grows in 100 steps of Eq. (12.2)."""
+    step = 1e-7 * 9 * 120
+    return number(
+        answer,
+        100 * step,
+        tolerance=0.01,
+        mistakes={
+            step: "That is one step; the robot stands for 100 of them.",
+            100 * step / 9: "The TD error of the exercise before is a factor, too.",
+            100 * step / 120: "The slope of V in theta_c is a factor, too.",
+        },
+    )
+
+
+@exercise
+def evidence(answer: Any) -> Outcome:
+    """Which record shows the trap."""
+    return choice(
+        answer,
+        "c",
+        {
+            "a": "In the trap V comes closer to what is paid, so the TD error may fall.",
+            "b": "The training cost falls with the noise, whatever becomes of the policy.",
+            "c": "the trap is a robot that stands and a TD error above 0 there.",
+            "d": "No step in the trap needs to be long.",
+        },
+    )
+
+
+@exercise
+def left(answer: Any) -> Outcome:
+    """The share of a TD error that one step leaves, Eq. (12.3)."""
+    return formula(
+        answer,
+        lambda step, f: 1 - step * (1 - f),
+        {"step": (0.1, 3), "f": (0, 2)},
+        mistakes={
+            "That is without feedback: the target moves, too.": lambda step, f: 1 - step,
+            "The target moves in the direction of V: its part comes back.": lambda step, f: (
+                1 - step * (1 + f)
+            ),
+        },
+    )
+
+
+@exercise
+def trapped(answer: Any) -> Outcome:
+    """Whether a robot stands where the plan is worth less than standing."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        radius = rng.choice([0.0, 0.001, 0.02])
+        turned = np.arange(12) * 2 * np.pi / 10  # after ten steps it is where it was
+        circle = radius * np.stack([np.cos(turned), np.sin(turned)], axis=1)
+        way = rng.choice([0.0, 1.0]) * np.r_[1.0, np.zeros(11)]  # the step before the last ten
+        gamma, cost = float(rng.uniform(0.9, 0.98)), float(rng.uniform(1, 60))
+        path = rng.normal(size=2) + circle + way[:, None]
+        value = float(rng.uniform(0.5, 1.5) * cost / (1 - gamma))
+        return {"path": path, "cost": cost, "value": value, "gamma": gamma}
+
+    return function(
+        answer,
+        in_trap,
+        draw,
+        mistakes={
+            "A robot that turns in a circle moves: add up the steps.": ends_only,
+            "Ten steps have eleven positions, and no more count.": lambda **one: in_trap(
+                **one, steps=11
+            ),
+            "Standing for ever costs l / (1 - gamma).": lambda **one: in_trap(
+                **one | {"gamma": 0.0}
+            ),
+        },
+    )
+
+
+def in_trap(path: Matrix, cost: float, value: float, gamma: float, steps: int = STOOD) -> bool:
+    """The last steps are short, and V < l / (1 - gamma)."""
+    way = np.linalg.norm(np.diff(path[-steps - 1 :], axis=0), axis=1).sum()
+    return bool(way < STANDING and value < cost / (1 - gamma))
+
+
+def ends_only(path: Matrix, cost: float, value: float, gamma: float) -> bool:
+    """What takes the distance of the ends for the way."""
+    return in_trap(path[[-11, -1]], cost, value, gamma)
+
+
+@exercise
+def feedback(answer: Any) -> Outcome:
+    """gamma psi'phi / phi'phi by finite differences, of a prediction that is not linear."""
+
+    def draw(rng: np.random.Generator) -> dict[str, Any]:
+        slope = rng.normal(size=4)
+        return {
+            "predict": lambda theta: float(np.sin(slope @ theta)),
+            "theta": rng.normal(size=4),
+            "phi": rng.normal(size=4) * rng.uniform(0.2, 5),
+            "gamma": float(rng.uniform(0.9, 0.98)),
+        }
+
+    return function(
+        answer,
+        fed_back,
+        draw,
+        tolerance=1e-5,
+        mistakes={
+            "The norm of phi is squared: V moves by phi'phi.": lambda **one: (
+                fed_back(**one) * np.linalg.norm(one["phi"])
+            ),
+            "The next value is discounted by gamma.": lambda **one: fed_back(
+                **one | {"gamma": 1.0}
+            ),
+        },
+    )
+
+
+def fed_back(predict: Any, theta: Vector, phi: Vector, gamma: float, probe: float = 1e-5) -> float:
+    """Eq. (12.3), by central differences along phi."""
+    ahead, behind = predict(theta + probe * phi), predict(theta - probe * phi)
+    return float(gamma * (ahead - behind) / (2 * probe * (phi @ phi)))

@@ -1,0 +1,124 @@
+"""A layout that changes: when, what a chart notices, and what a learner then does."""
+
+import numpy as np
+import pytest
+
+from nmpcrl.analysis import shifts
+from nmpcrl.analysis.shifts import (
+    FOR,
+    RAISED,
+    WINDOW,
+    Chart,
+    Recent,
+    changing,
+    false_alarms,
+    schedule,
+)
+from nmpcrl.learning import Diverged, Exploration
+from nmpcrl.learning.training import Step
+from nmpcrl.study import paper
+
+TWO = (paper.LAYOUTS["A"], paper.LAYOUTS["D"])
+RNG = np.random.default_rng
+
+
+def test_a_layout_changes_once_every_fifty_episodes_or_by_chance():
+    assert schedule("once", 300, RNG(0)) == [0] * 150 + [1] * 150
+    assert schedule("every 50", 120, RNG(0)) == [0] * 50 + [1] * 50 + [2] * 20
+    drawn = [schedule("random", 300, RNG(seed)) for seed in range(400)]
+    assert np.mean([one[-1] for one in drawn]) == pytest.approx(299 / 50, abs=0.4)
+    assert {one[0] for one in drawn} == {0}
+
+
+def test_the_false_alarms_of_stationary_costs_are_as_many_as_the_law_of_t_says():
+    rng, episodes = RNG(0), 60_000
+    chart = Chart()
+    fired = sum(chart(one) for one in rng.normal(4000.0, 30.0, episodes))
+    assert fired / episodes == pytest.approx(false_alarms(episodes), rel=0.35)
+    assert 20 < fired < 100
+
+
+def test_a_chart_fires_on_a_jump_at_once_either_way_and_then_begins_anew():
+    for jump in (500.0, -500.0):
+        rng, chart = RNG(0), Chart()
+        before = [chart(one) for one in rng.normal(4000.0, 30.0, 40)]
+        assert not any(before)
+        assert chart(4000.0 + jump)
+        assert not any(chart(4000.0 + jump * k) for k in range(WINDOW))
+
+
+def test_what_is_not_finite_is_an_alarm():
+    chart = Chart()
+    for one in RNG(2).normal(size=WINDOW):
+        chart(one)
+    assert chart(np.nan)
+
+
+def test_a_replay_that_prefers_what_is_late_draws_no_example_twice():
+    rng = Recent(np.random.PCG64(0))
+    drawn = np.array([rng.choice(20_000, 128, replace=False) for _ in range(200)])
+    assert all(len({*row}) == 128 for row in drawn.tolist())
+    ages = 19_999 - drawn
+    assert ages.mean() == pytest.approx(Recent.AGE, rel=0.15)
+    assert {*rng.choice(128, 128, replace=False).tolist()} == {*range(128)}
+
+
+@pytest.fixture
+def trained(monkeypatch):
+    """Nothing is trained: each episode adds the factor of alpha to theta."""
+    monkeypatch.setattr(shifts, "train", _train)
+
+    def follow(order, costs=None, **reacts):
+        _train.costs = iter(costs if costs is not None else [1.0] * len(order))
+        noise = Exploration(np.zeros((len(order), 1, 2)), np.zeros((len(order), 1)))
+        return [*changing(None, TWO, order, lambda factor: factor, noise, **reacts)]
+
+    return follow
+
+
+def _train(factor, _, weights, explore, **world):
+    assert explore.scale.shape == (1, 1)
+    moved = weights.__class__(weights.theta + factor, weights.w)
+    cost = next(_train.costs)
+    if cost is None:
+        raise Diverged("so be it")
+    yield Step(0, 0, None, moved, None, cost=cost)
+
+
+def moved(episodes):
+    return [float(one.theta[0] - paper.THETA_INIT[0]) for one in episodes]
+
+
+def test_a_change_that_is_told_resets_theta_or_raises_the_rate_for_a_while(trained):
+    order = [0] * 3 + [1] * (FOR + 2)
+    assert moved(trained(order))[-1] == pytest.approx(FOR + 5)
+    assert moved(trained(order, reaction="reset"))[2:5] == pytest.approx([3, 1, 2])
+    raised = moved(trained(order, reaction="raised"))
+    assert raised[2:4] == pytest.approx([3, 3 + RAISED])
+    assert raised[-1] == pytest.approx(3 + FOR * RAISED + 2)
+
+
+def test_who_is_never_told_plans_with_the_first_layout(trained):
+    found = trained([0, 1, 1], knows="never", reaction="reset")
+    assert [(one.layout, one.seen) for one in found] == [(0, 0), (1, 0), (1, 0)]
+    assert moved(found) == pytest.approx([1, 2, 3])
+
+
+def test_who_detects_a_change_plans_with_the_new_layout_from_the_next_episode(trained):
+    costs = [*RNG(0).normal(4000.0, 30.0, 30), 5000.0, 5000.0]
+    found = trained([0] * 30 + [1] * 2, costs, knows="cost", reaction="reset")
+    assert [one.alarm for one in found] == [False] * 30 + [True, False]
+    assert [one.seen for one in found[-2:]] == [0, 1]
+    assert moved(found)[-2:] == pytest.approx([31, 1])
+
+
+def test_a_false_alarm_is_reacted_to_and_changes_no_map(trained):
+    costs = [*RNG(0).normal(4000.0, 30.0, 30), 5000.0, 4000.0]
+    found = trained([0] * 32, costs, knows="cost", reaction="reset")
+    assert found[30].alarm
+    assert {one.seen for one in found} == {0}
+    assert moved(found)[-1] == pytest.approx(1)
+
+
+def test_an_episode_that_diverges_leaves_the_last_theta(trained):
+    assert moved(trained([0, 0, 0], [1.0, None, 1.0])) == pytest.approx([1, 1, 2])

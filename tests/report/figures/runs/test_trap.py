@@ -1,0 +1,62 @@
+"""The trap and the cliffs: titles follow from the stands; the grey is where the robot stands."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from nmpcrl.analysis.trap import Stand
+from nmpcrl.report.figures.runs import trap as figures
+from nmpcrl.study import paper
+
+WAY = np.array([[-2.5, 1.5, 0.0], [2.0, 2.0, 0.0]])
+OPEN = Stand(0, 0.001, np.nan, WAY, 4000.0, True, 0.0, 0.1, 0.1, 0.0)
+COSTS = np.array([4000.0, 4000.0, 7000.0])
+
+
+def course(value=900.0):
+    """Open, then closed from episode 4 to episode 12, then open again."""
+    closed = [
+        replace(OPEN, episode=k, theta_c=k / 10, delta=20.0 - k, cost=6000.0 + k, arrived=False,
+                stage_cost=30.0, value=value)
+        for k in (4, 8, 12)
+    ]  # fmt: skip
+    return [OPEN, *closed, replace(OPEN, episode=16, delta=3.0)]
+
+
+def test_the_title_says_what_theta_c_and_the_cost_did_while_the_robot_stood(texts):
+    figure = figures.trap(paper.task("E"), course(), (0, 1, 3))
+    title = figure.get_suptitle().replace("{}", " ")
+    assert "gamma)$:" in title
+    assert title.endswith("from 0.40 to 1.20, and the cost from 6004 to 6012")
+    _, *curves = figure.axes
+    for axes in curves:
+        (grey,) = axes.patches
+        assert (grey.get_x(), grey.get_x() + grey.get_width()) == (4, 12)
+    forever, value = (line.get_ydata() for line in curves[0].get_lines())
+    assert np.isnan(forever[[0, -1]]).all()
+    assert forever[1] == pytest.approx(30 / (1 - paper.GAMMA))
+    assert value[1:4].tolist() == [900.0] * 3
+
+
+def test_a_plan_that_is_worth_more_than_standing_is_not_called_below():
+    figure = figures.trap(paper.task("E"), course(value=1100.0), (0, 1, 3))
+    assert "at 0 of 3 times" in figure.get_suptitle().replace("{}", " ")
+
+
+def test_a_run_in_which_no_gap_closes_says_so():
+    figure = figures.trap(paper.task("E"), [OPEN, *[replace(OPEN, episode=4)] * 2], (0, 1, 2))
+    assert figure.get_suptitle() == "The robot never stands before a closed gap"
+
+
+def test_every_layout_has_its_two_lines_and_its_best_theta_c(texts):
+    grid = np.array([0.0, 0.2, 0.4])
+    costs, best = {"A": (COSTS, 2 * COSTS), "E": (COSTS, COSTS)}, {"A": 0.3, "E": 0.1}
+    figure = figures.cliffs(grid, costs, best, 0.004)
+    assert texts(figure).startswith(r"Beside the best $\theta$ there is no cliff: ")
+    assert "0.4%" in texts(figure)
+    for axes, where in zip(figure.axes, best.values(), strict=True):
+        _, along, border = (line.get_xydata() for line in axes.get_lines())
+        assert along[:, 1].tolist() == [4.0, 4.0, 7.0]
+        assert border[0, 0] == where
+    assert figure.axes[0].get_lines()[0].get_ydata()[2] == 14.0
