@@ -102,6 +102,14 @@ def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
     return np.nan
 
 
+def raised_cost(layout: str | Centres, theta: Vector, share: float) -> float:
+    """By which share of its cost a rollout costs more with theta_c raised by another share."""
+    controller = Persistent(paper.nmpc(layout))
+    raised = np.array([*theta[:-1], (1 + share) * theta[-1]])
+    before, after = (evaluate(controller, one, paper.STEPS).cost for one in (theta, raised))
+    return after / before - 1
+
+
 def until_arrival(states: Matrix, task: Task) -> Matrix:
     """The positions of a trajectory up to the first at the target; all if it does not arrive."""
     there = np.flatnonzero(np.linalg.norm(states - task.target, axis=1) <= ARRIVED)

@@ -8,6 +8,7 @@ from nmpcrl.analysis.difficulty import (
     barn,
     clearance,
     measure,
+    raised_cost,
     sight,
     spaced,
     stops_arriving,
@@ -90,3 +91,9 @@ def test_the_robot_stops_arriving_in_e_where_its_gap_has_closed(horizon):
 
 def test_with_one_obstacle_the_robot_always_arrives():
     assert np.isnan(stops_arriving(ONE, 10, np.array([0.0, 0.2])))
+
+
+def test_raising_theta_c_across_the_closing_of_a_gap_costs_much_and_by_nothing_nothing():
+    theta = np.array([*paper.THETA_INIT[:-1], 0.15])
+    assert raised_cost("E", theta, 0.0) == 0
+    assert raised_cost("E", theta, 1 / 3) > 0.5
