@@ -1,5 +1,6 @@
 """The trap: what a run that stands before a closed gap shows, and one that arrives does not."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -42,11 +43,12 @@ def test_of_a_run_that_arrives_nothing_is_said_but_of_its_td_error():
 
 
 def test_a_stand_is_the_end_of_a_rollout_and_agrees_with_the_summary(standing):
-    first, last = stands(standing, (0, 2))
+    learned = replace(standing, episodes=standing.episodes | {"delta": np.array([7.0, 3.0])})
+    first, last = stands(learned, (0, 2))
     found = ending(standing)
     assert (first.episode, last.episode) == (0, 2)
     assert np.isnan(first.delta)
-    assert last.delta == standing.episodes["delta"][1]
+    assert last.delta == 3
     assert not last.arrived
     np.testing.assert_array_equal(last.states, standing.states)
     assert last.value / last.forever == pytest.approx(found.worth)

@@ -9,7 +9,7 @@ from nmpcrl.claims.population_questions import STANDING, STOOD
 from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
 
 
-@varied(value=(1200, 1740, 20))
+@varied(value=(1520, 1760, 20))
 @exercise
 def standing(answer: Any, *, value: float = 1500) -> Outcome:
     """The TD error of a robot that stands and pays 54 a step."""
