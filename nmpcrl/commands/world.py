@@ -18,11 +18,12 @@ def world(
     judge: bool,
     yes: bool,
 ) -> None:
-    """Learn where obstacles move, layouts change, or the model is wrong.
+    """Learn where obstacles move or the model is wrong.
 
-    What is asked, and how, was fixed before. The parts are moving, model,
-    once, "every 50", random, carry and gradient, in this order. Each run is
-    stored, so it can be interrupted and started again.
+    Or where layouts change between episodes. What is asked, and how, was
+    fixed before. The parts are moving, model, once, "every 50", random,
+    carry and gradient, in this order. Each run is stored, so it can be
+    interrupted and started again.
 
     \b
     Example:
