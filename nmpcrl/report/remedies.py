@@ -167,8 +167,10 @@ def in_short(advice: Iterable[Advice]) -> str:
         said = [f"Try first {_tried(row)} and solves {_solved(row)} layouts."]
     if SECOND in by:
         said.append(f"Second, {_tried(_known(by[SECOND][0]))}.")
-    if NEVER in by:
-        said.append(f"Never try {listed(f'`{one.entry}`' for one in by[NEVER])}.")
+    never = listed(f"`{one.entry}`" for one in by.get(NEVER, ()))
+    said.append(
+        f"Never try {never}." if NEVER in by else "Of none is it sure that it is never to be tried."
+    )
     return " ".join(said)
 
 

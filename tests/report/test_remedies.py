@@ -134,7 +134,9 @@ def test_the_advice_in_short_names_first_second_and_never_with_evidence(advised)
         r" Second, a grid over $\theta_c$ alone (`grid`), which has 0.70 [0.60, 0.80] of the"
         " possible gain after 49 rollouts. Never try `DPG`."
     )
-    assert in_short(advised[2:4]) == "Nothing that was compared surely gains."
+    assert in_short(advised[2:4]) == (
+        "Nothing that was compared surely gains. Of none is it sure that it is never to be tried."
+    )
 
 
 def test_an_answer_stands_beside_its_pilot():
