@@ -58,7 +58,7 @@ class Stand:
 
     @property
     def forever(self) -> float:
-        """What standing there costs: l / (1 - gamma)."""
+        """What standing there for ever costs, l / (1 - gamma)."""
         return self.stage_cost / (1 - paper.GAMMA)
 
 
