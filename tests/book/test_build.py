@@ -133,7 +133,7 @@ def small(tmp_path, robot_module) -> Path:
 def small_book(place: Path) -> Path:
     for name in ("_static", "driver"):
         shutil.copytree(ROOT / "book" / name, place / "book" / name)
-    for name in ("_config.yml", "book/references.bib", "book/build.py"):
+    for name in ("_config.yml", "CITATION.cff", "book/references.bib", "book/build.py"):
         shutil.copy2(ROOT / name, place / name)
     (place / "nmpcrl").symlink_to(ROOT / "nmpcrl")
     (place / "book/intro.md").write_text(INTRO)

@@ -272,7 +272,9 @@ def test_what_is_folded_on_the_page_can_be_read(site, texts):
         for other in one.select(".math, summary, pre"):
             other.replace_with("\0")
         longest = max(one.get_text().split("\0"), key=len)
-        assert "".join(longest.split()).removeprefix("Solution") in text
+        said = "".join(longest.split()).removeprefix("Solution")
+        cuts = range(len(said))  # a page may end within it
+        assert any(said[:cut] in text and said[cut:] in text for cut in cuts), said
 
 
 def test_no_formula_is_left_as_it_is_typed(texts):
@@ -298,7 +300,7 @@ def test_links_between_pages_lead_within_the_file_and_none_to_the_disk(book):
 
 
 def test_the_table_of_contents_says_on_which_page_a_chapter_begins(book, texts):
-    contents = " ".join(" ".join(texts[1:10]).split())
+    contents = normalize("NFKC", " ".join(" ".join(texts[1:10]).split()))  # without ligatures
     for entry in book.outline:
         for one in entry if isinstance(entry, list) else ():
             if not isinstance(one, list):
