@@ -70,7 +70,8 @@ def test_every_line_of_the_algorithm_names_what_does_it():
 
 def test_every_claim_is_quoted_and_has_its_published_verdict(said):
     items = said["claims-said"].removeprefix("- ").split("\n- ")
-    found = [re.match(r"\*\*\[(C\d)\]\([^)]*\)\*\*, \*(.+?)\* .*?“(.+?)”", item, flags=re.S) for item in items]
+    quoted = re.compile(r"\*\*\[(C\d)\]\([^)]*\)\*\*, \*(.+?)\*[. ].*?“(.+?)”", re.S)
+    found = [quoted.match(item) for item in items]
     words = {one.claim: one.words for one in published.load().verdicts}
     assert [(one[1], one[2]) for one in found] == [(claim, words[claim]) for claim in CLAIMS]
     assert all(len(one[3].split()) <= 30 for one in found)
