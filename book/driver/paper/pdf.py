@@ -19,7 +19,7 @@ import os
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import datetime
 from io import BytesIO
 from pathlib import Path
@@ -38,7 +38,6 @@ logging.getLogger("pypdf").setLevel(logging.ERROR)  # a profile of colours that 
 NAME = "nmpcrl.pdf"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync")
-PRINTS = 3  # at most, until each page is where the table of contents says
 PAPER: dict[str, Any] = {"format": "A4", "print_background": True, "tagged": True, "outline": True}
 COLUMN: Any = {"width": 643, "height": 957}  # [px] of A4 that the margins of print.css leave
 
@@ -59,7 +58,7 @@ READY = """async () => {
 }"""
 NUMBER = """numbers => {
   for (const link of document.querySelectorAll(".all-pages a"))
-    link.lastElementChild.textContent = numbers[link.getAttribute("href").slice(1)];
+    link.lastElementChild.textContent = numbers[link.getAttribute("href").slice(1)] ?? "";
 }"""
 
 OFFER = """<ul class="nav bd-sidenav the-pdf">
@@ -100,26 +99,27 @@ def printed(document: Path, browser: str) -> bytes:
     """A document as PDF, its table of contents with page numbers."""
     from playwright.sync_api import sync_playwright  # only here: a refusal should not wait for it
 
-    missing: list[str] = []
     with (
         sync_playwright() as playwright,
         playwright.chromium.launch(executable_path=browser, args=FLAGS) as chromium,
     ):
-        tab = chromium.new_page(viewport=COLUMN)
-        tab.on("requestfailed", lambda request: missing.append(request.url))
-        tab.emulate_media(media="print")
-        tab.goto(document.resolve().as_uri())
-        if missing:
-            raise Failure(f"{shown(document)} needs what is not there: {', '.join(missing)}")
-        tab.evaluate(READY)
-        pdf = tab.pdf(**PAPER)
-        for _ in range(PRINTS):
-            before = numbers(pdf)
-            tab.evaluate(NUMBER, before)
-            pdf = tab.pdf(**PAPER)
-            if numbers(pdf) == before:
-                return pdf
-        raise Failure(f"{shown(document)} has other pages each time that it is printed")
+        return _printed(chromium, document, numbers(_printed(chromium, document, {})))
+
+
+def _printed(chromium: Any, document: Path, on: Mapping[str, int]) -> bytes:
+    """A document, printed by a tab of its own: a second print of one tab may break elsewhere."""
+    missing: list[str] = []
+    tab = chromium.new_page(viewport=COLUMN)
+    tab.on("requestfailed", lambda request: missing.append(request.url))
+    tab.emulate_media(media="print")
+    tab.goto(document.resolve().as_uri())
+    if missing:
+        raise Failure(f"{shown(document)} needs what is not there: {', '.join(missing)}")
+    tab.evaluate(READY)
+    tab.evaluate(NUMBER, on)
+    pdf: bytes = tab.pdf(**PAPER)
+    tab.close()
+    return pdf
 
 
 def numbers(pdf: bytes) -> dict[str, int]:
