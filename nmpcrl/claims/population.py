@@ -3,9 +3,10 @@
 Whatever is missing is left out: a layout answers what its runs can tell, and is not asked the rest.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -65,16 +66,22 @@ def asked() -> dict[str, RunClaim]:
     return {name: (known | improves)[name] for name in EXPECTED}
 
 
-def held(runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTED)) -> pd.DataFrame:
+def held(
+    runs: pd.DataFrame,
+    paths: Paths,
+    claims: Iterable[str] = tuple(EXPECTED),
+    called: Callable[[Any], str] = name_of,
+) -> pd.DataFrame:
     """Where each claim holds, a row a claim and layout that it could be put to.
 
     Args:
         runs: of `rows.table`, of one setting.
         paths: as `paper_claims.judge` takes them.
         claims: names in `EXPECTED`.
+        called: what a layout is called, in the population unless said; `str` for A to F.
 
     Returns:
-        Columns claim, layout (its name in the population), yes, of (answers) and holds.
+        Columns claim, layout (its name), yes, of (answers) and holds.
     """
     rows, known, there = [], asked(), {*runs.learner}
     for name in claims:
@@ -84,7 +91,7 @@ def held(runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTE
         for layout in runs.layout.unique():
             yes, of = counts.get(layout, (0, 0))
             if of:
-                rows.append((name, name_of(layout), yes, of, yes / of > MAJORITY))
+                rows.append((name, called(layout), yes, of, yes / of > MAJORITY))
     return pd.DataFrame(rows, columns=["claim", "layout", "yes", "of", "holds"])
 
 

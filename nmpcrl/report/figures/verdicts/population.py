@@ -1,0 +1,127 @@
+"""The drawn layouts: in which share a claim holds, and what tells beforehand where ES works."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import PercentFormatter
+
+from nmpcrl.analysis.difficulty import MEASURES, PILOT
+from nmpcrl.claims.population import asked
+from nmpcrl.claims.population_questions import CLOSES_BEFORE, EXPECTED
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
+from nmpcrl.report.figures.axes import below, jitter
+from nmpcrl.report.figures.style import (
+    BAND,
+    INK,
+    LIMIT,
+    SUBTITLE,
+    TEAL,
+    WINE,
+    headed,
+    page,
+    subplots,
+)
+
+LOOK: Mapping[Outcome, tuple[str, str]] = {  # colour and mark of an outcome
+    REPRODUCED: (TEAL, "D"), PARTLY: (INK, "o"), NOT: (WINE, "X"),
+}  # fmt: skip
+OTHER = ("0.5", "s")  # of one that is not decidable
+NAMED: dict[str, Any] = {  # the share of A to F
+    "marker": "|", "color": "#B37A00", "markersize": 11, "markeredgewidth": 2, "linestyle": "",
+}  # fmt: skip
+LABELS = {
+    "closest": "clearance [BARN]",
+    "visibility": "visibility [BARN]",
+    "dispersion": "dispersion [BARN]",
+    "dimension": "width [BARN]",
+    "tortuosity": "tortuosity [BARN]",
+    "cost": "initial cost",
+    "slope": r"its slope in $\theta_c$",
+    "overshoot": r"initial $\alpha\Vert\phi\Vert^2$",
+    "closes": r"$\theta_c$ that closes a gap",
+}
+ROW = 0.23  # height of a row [inches]
+
+
+@page
+def shares(found: pd.DataFrame, six: pd.DataFrame, verdicts: Mapping[str, Outcome]) -> Figure:
+    """One row a claim: in which share of the layouts it holds, beside A to F and what was expected.
+
+    Args:
+        found: of `population.shares`, of the drawn layouts.
+        six: the same of A to F.
+        verdicts: the outcomes of A to F by claim, for the title.
+    """
+    figure, axes = subplots(height=ROW * len(found) + 1.3)
+    for y, row in enumerate(found.itertuples()):
+        colour, mark = LOOK.get(row.outcome, OTHER)
+        expected = EXPECTED[str(row.claim)]
+        width = expected.high - expected.low
+        axes.add_patch(Rectangle((expected.low, y - 0.32), width, 0.64, **BAND))
+        axes.plot([row.low, row.high], [y, y], color=colour, linewidth=1.6)
+        axes.plot(row.share, y, mark, color=colour, markersize=5.5)
+        named = six.share[six.claim == row.claim]
+        axes.plot(named, [y] * len(named), **NAMED)
+    axes.set_yticks(range(len(found)), [_label(str(name)) for name in found.claim])
+    axes.set(xlim=(-0.02, 1.02), ylim=(len(found) - 0.4, -0.6), xlabel="share of layouts")
+    axes.xaxis.set_major_formatter(PercentFormatter(1, 0))
+    handles: list[Any] = [
+        Line2D([], [], color=colour, marker=mark, markersize=5.5, label=str(outcome))
+        for outcome, (colour, mark) in LOOK.items()
+        if (found.outcome == outcome).any()
+    ]
+    handles += [Line2D([], [], label="A to F", **NAMED), Rectangle((0, 0), 1, 1, **BAND)]
+    below(figure, handles, [*(one.get_label() for one in handles[:-1]), "expected"])
+    here = found.set_index("claim").outcome
+    judged = [name for name in here.index if name in verdicts]
+    stand = sum(here[name] == verdicts[name] for name in judged)
+    drawn = f"over {found.layouts.max()} drawn layouts"
+    return headed(figure, f"{stand} of {len(judged)} verdicts on A to F stand {drawn}")
+
+
+def _label(claim: str) -> str:
+    """A claim, and in few words what it says."""
+    short = asked()[claim].short.replace("\n", " ")
+    return claim if claim.endswith("improves") else f"{claim}: {short}"
+
+
+@page
+def predictors(scores: pd.DataFrame, closes: pd.Series, judged: pd.Series) -> Figure:
+    """Where ES works against where a gap closes, and how well each measure tells that beforehand.
+
+    Args:
+        scores: of `population.predictor_scores`.
+        closes: theta_c at which the first gap of the first trajectory closes, by layout.
+        judged: whether ES improves, by layout.
+    """
+    figure, (where, areas) = subplots(1, 2, ROW * len(scores) + 1.2, tall=4.6)
+    _where(where, closes[judged.index], judged)
+    order = [*scores.auc.map(lambda one: one.value).sort_values(ascending=False).index]
+    areas.axvline(0.5, **LIMIT)
+    for y, name in enumerate(order):
+        area, colour = scores.auc[name], TEAL if name == PILOT else INK
+        areas.plot([area.low, area.high], [y, y], color=colour, linewidth=1.6)
+        areas.plot(area.value, y, "D" if name == PILOT else "o", color=colour, markersize=5)
+    areas.set_yticks(range(len(order)), [LABELS[name] for name in order], fontsize="small")
+    areas.set(ylim=(len(order) - 0.4, -0.6), xlabel="area under the ROC curve")
+    areas.set_title("how well it tells beforehand", **SUBTITLE)
+    rank = order.index(PILOT) + 1
+    place = "best" if rank == 1 else f"{rank}th of {len(MEASURES)}"
+    finding = f"Where a gap closes tells {place} where ES works: {scores.auc[PILOT].value:.2f}"
+    return headed(figure, finding)
+
+
+def _where(axes: Axes, closes: pd.Series, judged: pd.Series) -> None:
+    """Success and failure over theta_c at which the gap closes."""
+    for y, (well, colour, mark) in enumerate(((True, TEAL, "o"), (False, WINE, "X"))):
+        there = closes[judged == well]
+        axes.plot(there, y + jitter(len(there), 0.28), mark, color=colour, markersize=3)
+    axes.axvline(CLOSES_BEFORE, **LIMIT)
+    axes.set_yticks((0, 1), ("ES\nimproves", "ES does\nnot"))
+    axes.set(ylim=(1.5, -0.5), xlabel=r"$\theta_c$ at which the first gap closes")
+    axes.set_title("a mark a layout", **SUBTITLE)

@@ -1,0 +1,54 @@
+"""Figures of the drawn layouts: the title counts, and every claim and measure has its row."""
+
+import pandas as pd
+import pytest
+
+from nmpcrl.analysis.difficulty import MEASURES, PILOT
+from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.claims.population import shares
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED
+from nmpcrl.report.figures.verdicts import population as figures
+
+
+def where(**holding):
+    """Of each claim, in how many of forty layouts it holds."""
+    rows = [
+        (name.replace("_", " "), f"J{i:03}", int(i < count), 1, i < count)
+        for name, count in holding.items()
+        for i in range(40)
+    ]
+    return pd.DataFrame(rows, columns=["claim", "layout", "yes", "of", "holds"])
+
+
+def test_the_title_counts_the_verdicts_that_stand_and_others_have_none():
+    found = shares(where(C1=10, C2=0, ES_improves=38))
+    six = shares(where(C1=20, C2=2))
+    verdicts = {"C1": PARTLY, "C2": PARTLY, "C4": REPRODUCED}
+    figure = figures.shares(found, six, verdicts)
+    assert figure.get_suptitle() == "1 of 2 verdicts on A to F stand over 40 drawn layouts"
+    (axes,) = figure.axes
+    names = [text.get_text() for text in axes.get_yticklabels()]
+    assert names == [
+        "C1: DES diverges, RDES does not",
+        "C2: ES is unstable, GES is not",
+        "ES improves",
+    ]
+    marks = {outcome: look[1] for outcome, look in figures.LOOK.items()}
+    drawn = [line.get_marker() for line in axes.get_lines() if len(line.get_xdata()) == 1]
+    assert drawn == [marks[PARTLY], "|", marks[NOT], "|", marks[REPRODUCED]]
+
+
+@pytest.mark.parametrize(("pilot", "place"), [(0.9, "best"), (0.55, "9th of 9")])
+def test_the_title_says_how_well_the_gap_tells(pilot, place):
+    areas = {name: Estimate(0.6, 0.5, 0.7) for name in MEASURES}
+    areas[PILOT] = Estimate(pilot, 0.5, 1.0)
+    scores = pd.DataFrame({"auc": areas})
+    closes = pd.Series({"J001": 0.1, "J002": 0.7, "J003": 1.0})
+    judged = pd.Series({"J001": False, "J002": True, "J003": True})
+    figure = figures.predictors(scores, closes, judged)
+    said = f"Where a gap closes tells {place} where ES works: {pilot:.2f}"
+    assert figure.get_suptitle() == said
+    left, right = figure.axes
+    assert [len(line.get_xdata()) for line in left.get_lines()[:2]] == [2, 1]
+    names = [text.get_text() for text in right.get_yticklabels()]
+    assert names.index(figures.LABELS[PILOT]) == (0 if place == "best" else 8)
