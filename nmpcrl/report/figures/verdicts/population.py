@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,11 +11,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import PercentFormatter
 
-from nmpcrl.analysis.difficulty import MEASURES, PILOT
+from nmpcrl.analysis.difficulty import MEASURES, OPEN, PILOT
 from nmpcrl.claims.population import asked
-from nmpcrl.claims.population_questions import CLOSES_BEFORE, EXPECTED
+from nmpcrl.claims.population_questions import EXPECTED
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
-from nmpcrl.report.figures.axes import below, jitter
+from nmpcrl.report.figures.axes import below, plain
 from nmpcrl.report.figures.style import (
     BAND,
     INK,
@@ -46,6 +47,8 @@ LABELS = {
     "closes": r"$\theta_c$ that closes a gap",
 }
 ROW = 0.23  # height of a row [inches]
+SHOWN = 0.03  # theta_c below which a mark stands at the edge
+ENDS = ((True, TEAL, "o", 3, "ES improves"), (False, WINE, "X", 4, "it does not"))
 
 
 @page
@@ -91,16 +94,17 @@ def _label(claim: str) -> str:
 
 
 @page
-def predictors(scores: pd.DataFrame, closes: pd.Series, judged: pd.Series) -> Figure:
-    """Where ES works against where a gap closes, and how well each measure tells that beforehand.
+def predictors(scores: pd.DataFrame, runs: pd.DataFrame, closes: pd.Series) -> Figure:
+    """Where ES ends against where a gap closes, and how well each measure tells that beforehand.
 
     Args:
         scores: of `population.predictor_scores`.
-        closes: theta_c at which the first gap of the first trajectory closes, by layout.
-        judged: whether ES improves, by layout.
+        runs: of ES, of `rows.table`.
+        closes: theta_c at which the first gap of the first trajectory closes, a run's layout each.
     """
-    figure, (where, areas) = subplots(1, 2, ROW * len(scores) + 1.2, tall=4.6)
-    _where(where, closes[judged.index], judged)
+    figure, (ends, areas) = subplots(1, 2, ROW * len(scores) + 1.3, tall=5.0)
+    _ends(ends, runs, closes)
+    below(figure, *ends.get_legend_handles_labels())
     order = [*scores.auc.map(lambda one: one.value).sort_values(ascending=False).index]
     areas.axvline(0.5, **LIMIT)
     for y, name in enumerate(order):
@@ -116,12 +120,15 @@ def predictors(scores: pd.DataFrame, closes: pd.Series, judged: pd.Series) -> Fi
     return headed(figure, finding)
 
 
-def _where(axes: Axes, closes: pd.Series, judged: pd.Series) -> None:
-    """Success and failure over theta_c at which the gap closes."""
-    for y, (well, colour, mark) in enumerate(((True, TEAL, "o"), (False, WINE, "X"))):
-        there = closes[judged == well]
-        axes.plot(there, y + jitter(len(there), 0.28), mark, color=colour, markersize=3)
-    axes.axvline(CLOSES_BEFORE, **LIMIT)
-    axes.set_yticks((0, 1), ("ES\nimproves", "ES does\nnot"))
-    axes.set(ylim=(1.5, -0.5), xlabel=r"$\theta_c$ at which the first gap closes")
-    axes.set_title("a mark a layout", **SUBTITLE)
+def _ends(axes: Axes, runs: pd.DataFrame, closes: pd.Series) -> None:
+    """The last theta_c of each run over that at which a gap closes."""
+    better = runs.final_cost < runs.initial_cost
+    for well, colour, mark, size, name in ENDS:
+        there = better == well
+        values = runs.theta_8[there].clip(lower=SHOWN)
+        axes.plot(closes[there], values, mark, color=colour, markersize=size, label=name)
+    shut = np.geomspace(SHOWN, OPEN, 50)
+    axes.plot(shut, shut, **(LIMIT | {"label": "the gap is closed above"}))
+    axes.set(yscale="log", ylabel=r"$\theta_c$ after learning", xlim=(0, None))
+    axes.set_xlabel(r"$\theta_c$ at which the first gap closes")
+    plain(axes.yaxis)

@@ -43,12 +43,15 @@ def test_the_title_says_how_well_the_gap_tells(pilot, place):
     areas = {name: Estimate(0.6, 0.5, 0.7) for name in MEASURES}
     areas[PILOT] = Estimate(pilot, 0.5, 1.0)
     scores = pd.DataFrame({"auc": areas})
-    closes = pd.Series({"J001": 0.1, "J002": 0.7, "J003": 1.0})
-    judged = pd.Series({"J001": False, "J002": True, "J003": True})
-    figure = figures.predictors(scores, closes, judged)
+    runs = pd.DataFrame(
+        {"final_cost": [9.0, 9.0, 11.0], "initial_cost": 10.0, "theta_8": [0.2, -1.0, 3.0]}
+    )
+    figure = figures.predictors(scores, runs, pd.Series([0.7, 1.0, 0.1]))
     said = f"Where a gap closes tells {place} where ES works: {pilot:.2f}"
     assert figure.get_suptitle() == said
     left, right = figure.axes
-    assert [len(line.get_xdata()) for line in left.get_lines()[:2]] == [2, 1]
+    well, ill = (line.get_xydata().tolist() for line in left.get_lines()[:2])
+    assert well == [[0.7, 0.2], [1.0, figures.SHOWN]]
+    assert ill == [[0.1, 3.0]]
     names = [text.get_text() for text in right.get_yticklabels()]
     assert names.index(figures.LABELS[PILOT]) == (0 if place == "best" else 8)
