@@ -99,6 +99,7 @@ OWN_CLAIMS: dict[str, RunClaim] = {
         AtMost(
             name="B1",
             statement="Exact TDC is at least as good as GES.",
+            short="TDC as good\nas GES",
             question="Does TDC end at no higher cost than GES with the same layout, decay and"
             " seed?",
             border=f"higher by at most {SAME_COST:.0%}",
