@@ -8,6 +8,7 @@ import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims.population import Answer
+from nmpcrl.claims.population_questions import Question
 from nmpcrl.claims.remedies import Advice, RemedyRow, rows, shares, solved
 from nmpcrl.claims.remedy_questions import (
     ADVICE,
@@ -193,13 +194,19 @@ def expectation_items(expected: Mapping[str, bool]) -> str:
     )
 
 
-def answer_items(answers: Iterable[Answer]) -> str:
-    """One item a question, in Markdown: the pilot, the question, and what became of it."""
-    return "\n".join(_item(one) for one in answers)
+def answer_items(
+    answers: Iterable[Answer], questions: Mapping[str, Question] = REMEDY_QUESTIONS
+) -> str:
+    """One item a question, in Markdown: the pilot, the question, and what became of it.
+
+    Args:
+        answers: in the order in which they are shown.
+        questions: that they answer, by name; those on remedies unless said.
+    """
+    return "\n".join(_item(one, questions[one.question]) for one in answers)
 
 
-def _item(answer: Answer) -> str:
-    asked = REMEDY_QUESTIONS[answer.question]
+def _item(answer: Answer, asked: Question) -> str:
     pilot = f" The pilot: “{asked.pilot}”" if asked.pilot else ""
     said = [f"{yes} of {of} {name}" for name, (yes, of) in answer.counts.items()]
     if "difference" in answer.numbers:

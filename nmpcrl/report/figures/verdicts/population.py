@@ -12,9 +12,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import PercentFormatter
 
 from nmpcrl.analysis.difficulty import MEASURES, OPEN, PILOT
-from nmpcrl.claims.population import asked
 from nmpcrl.claims.population_questions import EXPECTED
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
+from nmpcrl.report.drawn import label
 from nmpcrl.report.figures.axes import below, plain
 from nmpcrl.report.figures.style import (
     BAND,
@@ -70,7 +70,7 @@ def shares(found: pd.DataFrame, six: pd.DataFrame, verdicts: Mapping[str, Outcom
         axes.plot(row.share, y, mark, color=colour, markersize=5.5)
         named = six.share[six.claim == row.claim]
         axes.plot(named, [y] * len(named), **NAMED)
-    axes.set_yticks(range(len(found)), [_label(str(name)) for name in found.claim])
+    axes.set_yticks(range(len(found)), [label(str(name)) for name in found.claim])
     axes.set(xlim=(-0.02, 1.02), ylim=(len(found) - 0.4, -0.6), xlabel="share of layouts")
     axes.xaxis.set_major_formatter(PercentFormatter(1, 0))
     handles: list[Any] = [
@@ -85,12 +85,6 @@ def shares(found: pd.DataFrame, six: pd.DataFrame, verdicts: Mapping[str, Outcom
     stand = sum(here[name] == verdicts[name] for name in judged)
     drawn = f"over {found.layouts.max()} drawn layouts"
     return headed(figure, f"{stand} of {len(judged)} verdicts on A to F stand {drawn}")
-
-
-def _label(claim: str) -> str:
-    """A claim, and in few words what it says."""
-    short = asked()[claim].short.replace("\n", " ")
-    return claim if claim.endswith("improves") else f"{claim}: {short}"
 
 
 @page

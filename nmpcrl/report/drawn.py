@@ -1,0 +1,33 @@
+"""The drawn layouts as a page shows them: each claim's share beside the one that was expected."""
+
+from html import escape
+
+import pandas as pd
+
+from nmpcrl.claims.population import asked
+from nmpcrl.claims.population_questions import EXPECTED
+from nmpcrl.report.tables import BADGES, html_table
+
+
+def label(claim: str) -> str:
+    """A claim of `EXPECTED`, and in few words what it says."""
+    short = asked()[claim].short.replace("\n", " ")
+    return claim if claim.endswith("improves") else f"{claim}: {short}"
+
+
+def share_table(shares: pd.DataFrame) -> str:
+    """One row a claim, in HTML.
+
+    Args:
+        shares: of `population.shares`.
+    """
+    header = ("Claim", "Holds in", "By the rule", "Expected")
+    caption = "In how many of the drawn layouts each claim holds, with its interval of 95 %."
+    return html_table(caption, header, (_cells(row) for _, row in shares.iterrows()), headed=True)
+
+
+def _cells(row: pd.Series) -> tuple[str, ...]:
+    expected = EXPECTED[row.claim]
+    counted = f"{row.holding} of {row.layouts}<br>{row.share:.0%} [{row.low:.0%}, {row.high:.0%}]"
+    badge = f'<span class="{BADGES[row.outcome]}">{row.outcome}</span>'
+    return (escape(label(row.claim)), counted, badge, f"{expected.low:.0%} to {expected.high:.0%}")
