@@ -232,6 +232,24 @@ def trap(runs: pd.DataFrame) -> tuple[Answer, Answer]:
     return found[0], found[1]
 
 
+def at_the_gap(runs: pd.DataFrame, difficulty: pd.DataFrame) -> pd.DataFrame:
+    """What became of each run of ES, and of the first gap of its layout; it was not asked before.
+
+    Args:
+        runs: of `rows.table`.
+        difficulty: columns `MEASURES`, a row a layout.
+
+    Returns:
+        Columns improves, away (from the target, at the end), closes (theta_c at which the gap
+        does, `difficulty.OPEN` where there is none) and closed (whether theta_c is above that).
+    """
+    es = _of(runs, "ES").reset_index(drop=True)
+    closes = difficulty[PILOT][es.layout.map(name_of)].to_numpy()
+    improves, away = es.final_cost < es.initial_cost, es.distance > ARRIVED
+    found = {"improves": improves, "away": away, "closes": closes, "closed": es.theta_8 > closes}
+    return pd.DataFrame(found)
+
+
 def early_overshoot(runs: pd.DataFrame) -> Answer:
     """The question "early overshoot", of RDES's stopped runs in the reading per episode."""
     rdes = _of(runs, "RDES").query("decay == 'episode'")

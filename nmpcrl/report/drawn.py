@@ -1,12 +1,35 @@
-"""The drawn layouts as a page shows them: each claim's share beside the one that was expected."""
+"""The drawn layouts as a page shows them: in short, and claim by claim beside what was expected."""
 
 from html import escape
 
 import pandas as pd
 
-from nmpcrl.claims.population import asked
+from nmpcrl.claims.population import asked, at_the_gap, succeeds
+from nmpcrl.claims.population_published import PopulationRuns
 from nmpcrl.claims.population_questions import EXPECTED
+from nmpcrl.report.cited import Count
+from nmpcrl.report.prose import filled
 from nmpcrl.report.tables import BADGES, html_table
+
+
+def in_short(found: PopulationRuns) -> str:
+    """Whether A to F are exceptions, in two sentences of Markdown."""
+    ends = at_the_gap(found.main, found.layouts)
+    es = succeeds(found.main)
+    counts = {
+        name: Count(int(ends.improves[there].sum()), int(there.sum()))
+        for name, there in {"open": ~ends.closed, "closed": ends.closed}.items()
+    }
+    return filled(
+        r"""
+        Of {layouts} drawn layouts ES improves {es}. Where $\theta_c$ stayed below the value that
+        closes the first gap, {open} of its runs improved; where it passed it, {closed}.
+        """,
+        origin="the published runs in drawn layouts",
+        layouts=str(len(es)),
+        es=int(es.sum()),
+        **counts,
+    )
 
 
 def label(claim: str) -> str:

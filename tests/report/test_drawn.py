@@ -1,9 +1,14 @@
 """What a page says of the drawn layouts."""
 
+import re
+
 import pandas as pd
 
 from nmpcrl.claims.population import shares
-from nmpcrl.report.drawn import share_table
+from nmpcrl.claims.population_published import PopulationRuns
+from nmpcrl.report.drawn import in_short, share_table
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.population import JUDGE
 
 
 def test_a_row_has_count_interval_outcome_and_what_was_expected():
@@ -16,3 +21,20 @@ def test_a_row_has_count_interval_outcome_and_what_was_expected():
     assert "38 of 40<br>95% [83%, 99%]" in table
     assert '<span class="verdict-reproduced">reproduced</span>' in table
     assert "85% to 97%" in table
+
+
+def test_in_short_counts_layouts_and_the_runs_on_either_side_of_the_gap(made_up):
+    names = ["J001", "J002"]
+    layouts = tuple(JUDGE[name] for name in names)
+    found = made_up(layouts=layouts, seeds=(0,))
+    runs = found.runs.assign(part="judge", theta_8=0.2)
+    costs = {
+        Experiment(layout=JUDGE[name]).layout: cost
+        for name, cost in zip(names, (0.9, 1.1), strict=True)
+    }
+    runs["final_cost"] = runs.initial_cost * [costs[layout] for layout in runs.layout]
+    closes = pd.DataFrame({"closes": {"J001": 0.3, "J002": 0.1}})
+    said = re.sub(r"<[^>]+>", "", in_short(PopulationRuns(runs, {}, closes)))
+    each = len(runs[runs.learner == "ES"]) // 2
+    assert "Of 2 drawn layouts ES improves 1." in said
+    assert f"{each} of {each} of its runs improved; where it passed it, 0 of {each}." in said

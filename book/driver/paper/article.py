@@ -30,15 +30,15 @@ from pypdf import PdfReader
 from driver.paper import markup
 from driver.paper.pdf import version
 from driver.project import ROOT, Failure, from_yaml, reported, shown
-from nmpcrl.claims import evidence, prespecified, published, robustness
+from nmpcrl.claims import evidence, population_published, prespecified, published, robustness
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.finding import Finding, finding
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.verdict import Verdict
+from nmpcrl.report import drawn, halves, tables, text, timing
 from nmpcrl.report import finding as said
-from nmpcrl.report import halves, tables, text, timing
 from nmpcrl.report.figures.verdicts import claims as verdicts
 from nmpcrl.report.figures.verdicts import failure_modes
 from nmpcrl.report.open_questions import QUESTIONS
@@ -131,6 +131,7 @@ def _sentences(given: Source) -> dict[str, str]:
         "layouts": text.by_layout_and_decay(given.claims),
         "variants": text.verdicts_changed(given.changed),
         "slow": timing.at_paper_speed(found.timings),
+        "drawn": drawn.in_short(population_published.load()),
     }
     return {name: markup.text(one) for name, one in parts.items()}
 
