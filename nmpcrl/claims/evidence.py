@@ -6,7 +6,7 @@ reader's machine makes of a part of the published study is a check, and stands b
 `agreement.repeated`.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,22 +14,20 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.analysis.rows import THETA, cost_ratios, row, table
+from nmpcrl.analysis.rows import THETA, cost_ratios, table
 from nmpcrl.analysis.summaries import fetch_summaries
-from nmpcrl.analysis.summary import Outline, RunSummary
-from nmpcrl.claims.failure_modes import WELL, mechanism, went_wrong
+from nmpcrl.analysis.summary import Outline
+from nmpcrl.claims.failure_modes import WELL
 from nmpcrl.claims.published import failure_modes_of, load
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
-from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.parameters import OneOf, Truth
 from nmpcrl.study.records import Column, Stopped
 from nmpcrl.study.setup import controller_of, environment_of
 from nmpcrl.study.store import Runs
 
 SOURCES = ("published", "fresh")
-TRIED = 5  # runs of a mechanism that are trained again before it is left without an example
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,44 +150,6 @@ def gather(
     ratios = cost_ratios(rows)
     runs["cost_ratio"] = [ratios[e] for e in wanted]
     return Evidence(Runs(summaries), runs)
-
-
-def examples(found: Evidence) -> dict[str, RunSummary]:
-    """A run of each mechanism that occurs, whole: the first that shows it when trained here, too.
-
-    A mechanism that none of `TRIED` runs shows again has no example.
-    """
-    return {name: run for name, run in tried(found) if _mechanism(run, found) == name}
-
-
-def tried(found: Evidence) -> Iterator[tuple[str, RunSummary]]:
-    """The runs that `examples` trains again with the mechanism that each is to show.
-
-    Those without a network come first, because every processor gives them the same numbers, and
-    then those of the learner in which the mechanism is most common.
-    """
-    runs = found.wrong
-    runs = runs.assign(fits=[LEARNERS[name].network for name in runs.learner])
-    runs["common"] = runs.groupby(["mechanism", "learner"]).learner.transform("size")
-    ordered = runs.sort_values(["fits", "common"], ascending=[True, False], kind="stable")
-    for name, some in ordered.groupby("mechanism", sort=False):
-        for experiment in some.run.head(TRIED):
-            (again,) = fetch_summaries([experiment], progress=False).values()
-            yield str(name), again
-            if _mechanism(again, found) == name:
-                break
-
-
-def _mechanism(run: RunSummary, found: Evidence) -> str:
-    """Of a run that is trained again; `WELL` if it did not go wrong this time."""
-    arm = frozen_arm(run.name)
-    costs = dict(zip(found.summaries, found.runs.training_cost, strict=True))
-    own = row(run)
-    if went_wrong(pd.DataFrame([own | {"cost_ratio": own["training_cost"] / costs[arm]}])) == [
-        None
-    ]:
-        return WELL
-    return mechanism(run, run.name.task, found.summaries[arm].states)
 
 
 def with_inputs(found: Evidence) -> Evidence:

@@ -36,7 +36,7 @@ def numbers(found: Finding | None) -> str:
         """
         - **{arrived_with_open_gaps}** runs of {learners} end at the target, at a cost that is
           {saved_where_it_arrived:.1%} lower (median), in which every gap stayed open.
-          [Fig. 5.7](05_results.ipynb#fig-results-c9)
+          [Fig. 5.6](05_results.ipynb#fig-results-c9)
         - **{arrived_with_a_closed_gap}** runs of {learners} end at the target at a lower cost in
           which $\\theta_c$, which keeps plans away from obstacles, grew until a gap closed.
           [Fig. 5.1](05_results.ipynb#fig-results-reasons)
@@ -45,7 +45,7 @@ def numbers(found: Finding | None) -> str:
           {learners}. [In plain words](07_beyond.ipynb#beyond-plain-words)
         - **{stopped_runs_of_RDES}** runs of RDES had to be stopped when the noise decays per
           episode, {stopped_early} of them within {early} episodes.
-          [Fig. 5.4](05_results.ipynb#fig-results-c1)
+          [Fig. 5.3](05_results.ipynb#fig-results-c1)
         """,
         origin=ORIGIN,
         arrived_with_open_gaps=Count(*found.arrived_open),

@@ -16,7 +16,7 @@ from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome,
 from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.report.cited import Cited, cited
 from nmpcrl.report.halves import differ
-from nmpcrl.report.text import SURE, departure_link, listed
+from nmpcrl.report.text import SURE, audit_place, departure_link, listed
 from nmpcrl.report.timing import to_es
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
@@ -73,7 +73,7 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
 
 
 def plain_verdict_table(verdicts: Iterable[Verdict]) -> str:
-    """One row a claim of the paper, in HTML: what became of it, and in how much of what was run.
+    """One row a claim of the paper, in HTML: what became of it, and a link to what that rests on.
 
     Args:
         verdicts: of `judge`; those on wider claims are left out.
@@ -82,7 +82,7 @@ def plain_verdict_table(verdicts: Iterable[Verdict]) -> str:
         (
             f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}",
             _labelled(v),
-            _text(_rests_on(v)),
+            f'<a href="{audit_place(v.claim)}">{_text(_rests_on(v))}</a>',
         )
         for v in verdicts
         if v.claim in CLAIMS

@@ -265,9 +265,14 @@ def quotations(verdicts: Mapping[str, Verdict]) -> str:
 
 def audit_link(claim: str) -> str:
     """A link from a claim's name to its thresholds, counts and evidence, in Markdown."""
+    return f"[{claim}]({audit_place(claim)})"
+
+
+def audit_place(claim: str) -> str:
+    """Where that link leads."""
     name = WIDER_THAN.get(claim, claim)
     label = name.lower() if name in CLAIMS else "own"
-    return f"[{claim}](for_reviewers.ipynb#reviewers-{label})"
+    return f"for_reviewers.ipynb#reviewers-{label}"
 
 
 def departure_link(words: str, letter: str) -> str:

@@ -144,7 +144,8 @@ def test_markdown_that_another_cell_displays_has_its_references_too():
 
 def test_a_page_takes_what_a_cell_of_a_notebook_displayed():
     cell = new_code_cell("table()", metadata={"tags": ["verdicts"]})
-    cell.outputs = [displayed(text_html="<table></table>")]
+    link = '<a href="for_reviewers.{}#reviewers-c1">'
+    cell.outputs = [displayed(text_html=f"<table>{link.format('ipynb')}</table>")]
     book = new_notebook(cells=[new_code_cell("x"), cell])
 
     def output(page: str, tag: str) -> str:
@@ -152,7 +153,7 @@ def test_a_page_takes_what_a_cell_of_a_notebook_displayed():
         return enrich.output(book, tag)
 
     page = enrich.page("<!-- output: 05_results.ipynb verdicts -->\n", output)
-    assert "<table></table>" in page
+    assert f"<table>{link.format('html')}</table>" in page
     cell.outputs = []
     assert enrich.page("<!-- output: 05_results.ipynb verdicts -->\n", output) == "\n"
 

@@ -14,6 +14,9 @@ from pybtex.database import parse_file
 from pybtex.plugin import find_plugin
 from pybtex.richtext import Text
 
+from nmpcrl.claims import published
+from nmpcrl.claims.paper_claims import CLAIMS
+from nmpcrl.report import tables
 from nmpcrl.study.departures import DEPARTURES
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -82,6 +85,16 @@ def test_every_link_leads_to_a_page_and_a_label_that_are_there(page):
     for words, target, label in links(page):
         assert not target or (ROOT / "book" / target).exists(), words
         assert not label or label in LABELS[Path(target).stem if target else page], words
+
+
+def test_every_verdict_of_the_first_page_leads_to_its_evidence():
+    verdicts = published.load().verdicts
+    rows = BeautifulSoup(tables.plain_verdict_table(verdicts), "html.parser").select("tbody tr")
+    led = {row.find("strong").get_text(): row.find("a")["href"].split("#") for row in rows}
+    assert led.keys() == CLAIMS.keys()
+    for claim, (page, label) in led.items():
+        assert label == f"reviewers-{claim.lower()}"
+        assert label in LABELS[Path(page).stem]
 
 
 @each_page

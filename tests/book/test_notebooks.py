@@ -252,6 +252,13 @@ def test_definitions_are_short_and_there_is_no_class(name):
 
 
 @each_notebook
+def test_no_figure_is_described_by_an_ink_that_the_dark_theme_inverts(name):
+    described = [cell.metadata["mystnb"]["image"]["alt"] for cell, _ in figures(name)]
+    described += [cell.source for cell in tagged(name, "caption")]
+    assert [said for said in described if re.search(r"\b(black|white)\b", said, re.I)] == []
+
+
+@each_notebook
 def test_figures_hide_their_code_and_have_a_name_a_caption_and_alt_text(name):
     assert len(figures(name)) == sum("mystnb" in cell.metadata for cell in code(name))
     for figure, caption in figures(name):

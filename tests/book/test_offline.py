@@ -1,6 +1,5 @@
 """What an edition holds so that its notebooks need not train for long."""
 
-from types import SimpleNamespace
 
 import nbformat
 import pytest
@@ -8,7 +7,6 @@ from driver.course import course, offline
 from nbformat.v4 import new_code_cell, new_notebook
 
 from nmpcrl.analysis import summaries
-from nmpcrl.claims import evidence
 from nmpcrl.study import Experiment, store
 
 ASKS = """from nmpcrl.study import Experiment
@@ -46,7 +44,6 @@ def test_long_runs_and_all_summaries_are_taken_with_the_parameters_of_the_editio
 @pytest.mark.usefixtures("trains_here")
 def test_what_is_missing_is_trained_and_an_edition_reads_it(chapter, tmp_path, monkeypatch):
     monkeypatch.setattr(offline, "LONG", 0)
-    monkeypatch.setattr(offline, "examples", lambda: (Experiment("frozen", episodes=1),))
     found = offline.stored([chapter])
     place = tmp_path / "student"
     offline.copy(found, place)
@@ -60,10 +57,3 @@ def test_runs_with_networks_are_taken_and_those_without_are_not():
     whole, summarised = offline.needed(course.chapters())
     assert {one.learner for one in whole} == {"DES", "RDES"}
     assert {one.learner for one in summarised} > {"ES", "GES", "TDC"}
-
-
-def test_all_runs_that_chapter_5_tries_as_examples_are_taken(monkeypatch):
-    runs = [Experiment("ES", seed=seed) for seed in (3, 4)]
-    tried = [("gap", SimpleNamespace(name=one)) for one in runs]
-    monkeypatch.setattr(evidence, "tried", lambda found: iter(tried))
-    assert offline.examples() == tuple(runs)

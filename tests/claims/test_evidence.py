@@ -1,14 +1,13 @@
 """A chapter's evidence: what is trained here and what is published, side by side."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summaries import fetch_summaries
-from nmpcrl.claims import evidence, failure_modes, published
+from nmpcrl.claims import evidence, published
 from nmpcrl.claims.evidence import gather, needed
-from nmpcrl.study import Experiment, ParameterError, Runs
+from nmpcrl.study import ParameterError
 from nmpcrl.study.design import fresh, main_table
 from nmpcrl.study.experiment import frozen_arm
 
@@ -129,55 +128,6 @@ def test_runs_trained_here_stand_beside_published_ones(known):
     only = found.where(found.runs.seed == 1)
     assert {e.seed for e in only.summaries} == {1}
     assert len(only.runs) == 4
-
-
-def went_wrong(*mechanisms: str) -> evidence.Evidence:
-    """Runs of ES and RDES in turn, and their frozen arms, with these mechanisms."""
-    runs = [Experiment(("RDES", "ES")[k % 2], seed=k) for k in range(len(mechanisms))]
-    named = dict(zip(runs, mechanisms, strict=True)) | {frozen_arm(e): "" for e in runs}
-    table = pd.DataFrame(
-        {
-            "learner": [e.learner for e in named],
-            "mechanism": list(named.values()),
-            "training_cost": 1.0,
-            "source": "published",
-        }
-    )
-    return evidence.Evidence(Runs(dict.fromkeys(named)), table)
-
-
-def test_an_example_of_a_mechanism_is_the_first_without_a_network_that_shows_it_again(monkeypatch):
-    found = went_wrong("gap", "gap", "network", "", "gap", "gap", "network", failure_modes.WELL)
-    first, second, third = (list(found.summaries)[k] for k in (1, 5, 2))
-    shown = {first: "overshoot", second: "gap", third: failure_modes.WELL}
-    tried = []
-
-    def train(runs, **_):
-        tried.extend(runs)
-        return dict.fromkeys(runs, runs[0])
-
-    monkeypatch.setattr(evidence, "fetch_summaries", train)
-    monkeypatch.setattr(evidence, "_mechanism", lambda run, _: shown.get(run, failure_modes.WELL))
-    assert evidence.examples(found) == {"gap": second}
-    assert tried[:2] == [first, second]
-    assert {e.learner for e in tried[2:]} == {"RDES"}
-
-
-def test_the_example_is_of_the_learner_in_which_the_mechanism_is_most_common(monkeypatch):
-    runs = [Experiment(name, seed=seed) for seed, name in enumerate(("DES", "RDES", "RDES"))]
-    arms = [frozen_arm(e) for e in runs]
-    learners = [e.learner for e in (*runs, *arms)]
-    table = pd.DataFrame({"learner": learners, "mechanism": ["overshoot"] * 3 + [""] * 3})
-    found = evidence.Evidence(Runs(dict.fromkeys((*runs, *arms))), table)
-    monkeypatch.setattr(evidence, "fetch_summaries", lambda runs, **_: dict.fromkeys(runs, runs[0]))
-    monkeypatch.setattr(evidence, "_mechanism", lambda run, _: "overshoot")
-    assert evidence.examples(found) == {"overshoot": runs[1]}
-
-
-def test_a_run_that_is_trained_again_may_have_gone_well(known):
-    found = gather("published", **ASKED)
-    (learned,) = (e for e in known if e.learner == "ES" and e.decay == "step")
-    assert evidence._mechanism(known[learned], found) == failure_modes.WELL
 
 
 def test_numbers_of_the_published_main_table_are_called_so(known):

@@ -3,8 +3,6 @@
 Every chapter says what it needs, with the parameters of the editions; what of that is not stored
 is trained first. Summaries are small, and all of them are taken. A whole run takes up to 11 MB:
 those are taken that are long to train, and a notebook trains the others.
-
-Chapter 5 names its `examples` after it has read the study, and so they are found here.
 """
 
 import shutil
@@ -20,17 +18,12 @@ LONG = 10  # of a run [s], as `limits.seconds_of` has it: those whose learner fi
 
 
 def stored(files: Iterable[str]) -> dict[str, Path]:
-    """What the chapters in these files need stored: path in the folder of an edition -> file.
-
-    Examples are not compared with the published study as `train.train` does: they are those of
-    its runs that went wrong, and no sample of it.
-    """
+    """What the chapters in these files need stored: path in the folder of an edition -> file."""
     from nmpcrl.analysis import summaries  # only here: a mistake elsewhere should not wait for it
     from nmpcrl.study import store
 
     whole, summarised = needed(files)
     train.train(whole, summarised)
-    summarised = tuple(summaries.fetch_summaries((*summarised, *examples())))
     paths = [*map(store.path_of, whole), *map(summaries.path_of, summarised)]
     # what another solver had to solve is not stored; a notebook does that again
     there = filter(Path.exists, paths)
@@ -44,13 +37,6 @@ def needed(files: Iterable[str]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     paths = [ROOT / "book" / file for file in files]
     needs = chapters.together(chapters.ask(path, given(path)) for path in paths)
     return tuple(one for one in needs.experiments if seconds_of(one) > LONG), needs.summaries
-
-
-def examples() -> tuple[Any, ...]:
-    """The runs of which Chapter 5 shows one for each mechanism, out of the published study."""
-    from nmpcrl.claims import evidence
-
-    return tuple(run.name for _, run in evidence.tried(evidence.gather("published")))
 
 
 def given(notebook: Path) -> dict[str, Any]:

@@ -43,6 +43,7 @@ ENTRIES = re.compile(r'(?:^- <a id="[^"]+"></a>.*\n(?:  .*\n)*)+', flags=re.M)
 OUTPUT = re.compile(r"<!-- output: (?P<page>[\w.]+) (?P<tag>[\w-]+) -->")
 PROSE = ("say", "source")
 COMPILED = re.compile(re.escape(NOTICE) + r" done in \d+ s\.\n")
+PAGE = re.compile(r'href="([a-z_0-9]+)\.(?:ipynb|md)\b')  # of a link in HTML
 DOWNLOAD = '<p class="download"><a href="{}" download>Download this page as a notebook</a></p>'
 
 
@@ -61,7 +62,8 @@ def page(markdown: str, outputs: Callable[[str, str], str]) -> str:
         output = outputs(found["page"], found["tag"])
         if not output.startswith("<"):  # a paragraph
             return output
-        return f'<div class="cell_output docutils container">\n{output}\n</div>'
+        linked = PAGE.sub(r'href="\1.html', output)
+        return f'<div class="cell_output docutils container">\n{linked}\n</div>'
 
     return text(OUTPUT.sub(shown, ENTRIES.sub("```{bibliography}\n```\n", markdown)))
 
