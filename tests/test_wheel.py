@@ -1,8 +1,10 @@
 """What an installed package needs besides its modules is in the wheel, and it works from there."""
 
 import os
+import re
 import subprocess
 import sys
+import venv
 import zipfile
 from pathlib import Path
 
@@ -49,3 +51,27 @@ def test_the_package_works_where_the_wheel_is_unpacked(wheel, tmp_path):
         text=True,
     )
     assert done.stdout.split() == ["riccati", str(tmp_path / "nmpcrl/__init__.py")], done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.network
+def test_readmes_example_runs_where_the_wheel_alone_is_installed(wheel, tmp_path):
+    """With what it declares, at our versions: no book, no extra, nothing of this environment."""
+    venv.create(tmp_path / "bare", with_pip=True)
+    python = tmp_path / "bare/bin/python"
+    pins = ROOT / "environment.txt"
+    install = [python, "-m", "pip", "install", "-q", "--no-compile", "-c", pins, wheel]
+    done = subprocess.run(install, capture_output=True, text=True)
+    if "No matching distribution" in done.stderr and "NMPCRL_REQUIRE_REGISTRY" not in os.environ:
+        pytest.skip(f"the registry cannot be reached: {done.stderr.splitlines()[-1]}")
+    assert done.returncode == 0, done.stderr
+    (example, *_) = re.findall(
+        r"^```python\n(.*?)^```$", (ROOT / "README.md").read_text(), flags=re.M | re.S
+    )
+    assert {"train(", "evaluate("} < {*re.findall(r"\b\w+\(", example)}
+    done = subprocess.run(  # -I: without this folder, the user's packages and PYTHONPATH
+        [python, "-I", "-c", example], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    before, after = map(int, re.findall(r"^cost without noise: (\d+)$", done.stdout, flags=re.M))
+    assert after < before

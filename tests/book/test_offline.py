@@ -1,6 +1,5 @@
 """What an edition holds so that its notebooks need not train for long."""
 
-
 import nbformat
 import pytest
 from driver.course import course, offline

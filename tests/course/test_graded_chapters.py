@@ -90,7 +90,7 @@ def nbgrader(request) -> Path:
         if done.returncode:
             lines = done.stderr.strip().splitlines()
             reason = f"{NBGRADER} cannot be installed: {lines[-1] if lines else 'no message'}"
-            (pytest.fail if os.environ.get("NMPCRL_REQUIRE_NBGRADER") else pytest.skip)(reason)
+            (pytest.fail if os.environ.get("NMPCRL_REQUIRE_REGISTRY") else pytest.skip)(reason)
         ready.touch()
     return python
 

@@ -28,11 +28,24 @@ def bundle(axis: Axes, along: Column, runs: Column, learner: str) -> None:
 
     Values that are not known, after a failed solve, are left out.
     """
-    color = LOOKS[learner].color
-    axis.plot(along, runs.T, color=color, linewidth=0.5, alpha=0.35)
+    axis.plot(along, runs.T, color=LOOKS[learner].color, linewidth=0.5, alpha=0.35)
     known = np.isfinite(runs).any(axis=0)
-    low, middle, high = np.full((3, along.size), np.nan)
-    low[known], middle[known], high[known] = np.nanquantile(runs[:, known], QUARTILES, axis=0)
+    quartiles = np.full((3, along.size), np.nan)
+    quartiles[:, known] = np.nanquantile(runs[:, known], QUARTILES, axis=0)
+    _middle_half(axis, along, quartiles, learner)
+
+
+def ranges(axis: Axes, along: Column, runs: Column, learner: str) -> None:
+    """The same for runs of which no line can be followed: all of them are a paler band."""
+    color = LOOKS[learner].color
+    axis.fill_between(along, runs.min(axis=0), runs.max(axis=0), color=color, alpha=0.12, lw=0)
+    # between a run that is off the scale and one that is not there is nothing
+    _middle_half(axis, along, np.quantile(runs, QUARTILES, axis=0, method="higher"), learner)
+
+
+def _middle_half(axis: Axes, along: Column, quartiles: Column, learner: str) -> None:
+    low, middle, high = quartiles
+    color = LOOKS[learner].color
     axis.fill_between(along, low, high, color=color, alpha=0.15, linewidth=0)
     axis.plot(along, middle, **line(learner))
 

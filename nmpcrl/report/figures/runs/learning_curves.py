@@ -2,7 +2,7 @@
 
 Costs are drawn in units of theta_init's cost without noise, so that layouts compare. What was cut
 short, or never reached because the run was stopped, cost infinitely much: it counts in median and
-quartiles, and leaves its panel through the upper edge.
+quartiles, and is drawn with all that is above `CEILING` in a strip at the upper end.
 """
 
 from collections.abc import Callable, Iterable
@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
 from nmpcrl import Vector
 from nmpcrl.analysis.summary import Outline
@@ -20,14 +20,15 @@ from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.thresholds import divergence, instability
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.report.figures.axes import label_panel, legend
-from nmpcrl.report.figures.panels import bundle, part, sourced
+from nmpcrl.report.figures.panels import part, ranges, sourced
 from nmpcrl.report.figures.sheet import sheet
-from nmpcrl.report.figures.style import SUBTITLE, page, subplots
+from nmpcrl.report.figures.style import BAND, SUBTITLE, page, subplots
 from nmpcrl.report.tables import WORDS
 from nmpcrl.study.records import Column
 from nmpcrl.study.store import Runs
 
-CEILING = 4.0  # times theta_init's cost without noise, where the panels end
+CEILING = 4.0  # times theta_init's cost without noise, where the scale ends
+STRIP = CEILING * np.array([1.06, 1.18, 1.3])  # of what costs more: its ends and its middle
 Curve = Callable[[Outline], tuple[Vector, Vector]]  # episodes and costs
 
 
@@ -64,7 +65,6 @@ def by_layout(found: Evidence, learners: tuple[str, ...], verdict: Verdict) -> F
     axes[0, 0].xaxis.set_major_locator(MaxNLocator(2, integer=True))
     for axis, decay in zip(axes[:, 0], decays, strict=True):
         axis.set_ylabel(f"cost / at the start\n(noise per {decay})", fontsize="small")
-    _cut(axes)
     legend(figure, learners)
     return sourced(figure, f"Does {verdict.claim} hold? {_spelled(verdict)}", drawn)
 
@@ -101,28 +101,29 @@ def _learning_curves(drawn: Evidence, title: str) -> Figure:
             _costs(axis, drawn.summaries.select(decay=decay), learners, curve)
             label_panel(axis, decay if k == 1 else "", "episode" if k == len(rows) else "")
         axes[k - 1, 0].set_ylabel(label)
-    _cut(axes)
     legend(figure, learners)
     return sourced(figure, title, drawn)
 
 
 def _costs(axis: Axes, runs: Runs[Outline], learners: Iterable[str], curve: Curve) -> None:
-    """Every learner's runs on a logarithmic axis of cost that ends at `CEILING`."""
+    """Every learner's runs on a logarithmic axis of cost, what is beyond `CEILING` in its strip."""
     for learner in learners:
         curves = [curve(summary) for summary in runs.select(learner=learner).values()]
         if curves:
             costs = np.array([cost for _, cost in curves])
-            bundle(axis, curves[0][0], np.minimum(costs, 2 * CEILING), learner)
+            beyond = costs > CEILING
+            if beyond.any():
+                axis.axhspan(STRIP[0], STRIP[2], **BAND)
+            ranges(axis, curves[0][0], np.where(beyond, STRIP[1], costs), learner)
     axis.set_yscale("log")
     axis.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axis.yaxis.set_minor_locator(NullLocator())
+    if axis.patches:
+        axis.set_ylim(None, STRIP[2])
+        axis.yaxis.set_major_locator(FixedLocator(np.arange(1, CEILING + 1)))
+        above = {"transform": axis.get_yaxis_transform(), "va": "center", "fontsize": "small"}
+        axis.text(0.01, STRIP[1], f"> {CEILING:g}", **above)
     axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-
-
-def _cut(axes: Column) -> None:
-    """End the panels at `CEILING`, once all is drawn that may stretch them."""
-    for axis in axes.flat:
-        axis.set_ylim(None, min(CEILING, axis.get_ylim()[1]))
 
 
 def _spelled(verdict: Verdict) -> str:
