@@ -120,8 +120,8 @@ def _costs(axis: Axes, runs: Runs[Outline], learners: Iterable[str], curve: Curv
     axis.yaxis.set_minor_locator(NullLocator())
     if axis.patches:
         axis.set_ylim(None, STRIP[2])
-        axis.yaxis.set_major_locator(FixedLocator(np.arange(1, CEILING + 1)))
-        above = {"transform": axis.get_yaxis_transform(), "va": "center", "fontsize": "small"}
+        axis.yaxis.set_major_locator(FixedLocator([*range(1, int(CEILING) + 1)]))
+        above: dict[str, Any] = {"transform": axis.get_yaxis_transform(), "va": "center", "fontsize": "small"}
         axis.text(0.01, STRIP[1], f"> {CEILING:g}", **above)
     axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
