@@ -5,6 +5,7 @@ each step what it cost. They have no model: neither of the robot nor of the cost
 obstacle is. In the suite they are entries, `SAC` or with something set `SAC[reward=0.1]`.
 """
 
+import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,8 +21,9 @@ from nmpcrl.study.geometry import Centres
 from nmpcrl.study.storage.refusal import Refusal
 
 AGENTS = ("SAC", "TD3")
+REWARD = {"SAC": 0.1, "TD3": 0.01}  # the better of the two for each in one layout to tune on
 SETTING: Mapping[str, float] = {  # what can be set of an agent, and is if nothing is said
-    "reward": 0.01,  # factor of minus the cost
+    "reward": 0.01,  # factor of minus the cost; `REWARD` has that of each
     "turn": 1.0,  # share of the turn rates that it may choose from
     "gradient": 1.0,  # gradient steps a step of the robot
     "width": 64,  # neurons in each of the two hidden layers
@@ -56,7 +58,12 @@ class Agent:
     @property
     def defaults(self) -> Mapping[str, float]:
         """What can be set."""
-        return SETTING
+        return {**SETTING, "reward": REWARD[self.name]}
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """What is set."""
+        return {**self.defaults, **dict(self.setting)}
 
     def __call__(self, robot: Robot) -> Policy:
         """Its policy without noise.
@@ -82,7 +89,7 @@ class Agent:
             NoAgents: stable-baselines3 is not installed.
             OverBudget: as `env.reset`.
         """
-        values = {**SETTING, **dict(self.setting)}
+        values = self.values
         scaled, drawing = _scaled(env, layouts, values), _Drawing()
         with drawing.own():
             model = _model(self.name, scaled, values, checkpoints[-1], seed)
@@ -154,21 +161,29 @@ def _scaled(env: Any, layouts: Sequence[Centres], values: Mapping[str, float]) -
     return Scaled()
 
 
+def require(name: str = "an agent") -> Any:
+    """stable-baselines3.
+
+    Raises:
+        NoAgents: it is not installed.
+    """
+    try:
+        return importlib.import_module("stable_baselines3")
+    except ImportError as error:
+        needed = f"{name} needs stable-baselines3: `pip install nmpcrl[agents]` brings it"
+        raise NoAgents(needed) from error
+
+
 def _model(name: str, env: Any, values: Mapping[str, float], episodes: int, seed: int) -> Any:
     """The agent of stable-baselines3, which learns after each episode and keeps every transition.
 
     Raises:
         NoAgents: it is not installed.
     """
-    try:
-        import stable_baselines3
-        from stable_baselines3.common.logger import Logger
-        from stable_baselines3.common.noise import NormalActionNoise
-    except ImportError as error:
-        needed = f"{name} needs stable-baselines3: `pip install nmpcrl[agents]` brings it"
-        raise NoAgents(needed) from error
-    size = env.action_space.shape
-    model = getattr(stable_baselines3, name)(
+    library = require(name)
+    common, size = library.common, env.action_space.shape
+    noise = common.noise.NormalActionNoise(np.zeros(size), np.full(size, NOISE))
+    model = getattr(library, name)(
         "MlpPolicy",
         env,
         learning_rate=RATE,
@@ -178,14 +193,12 @@ def _model(name: str, env: Any, values: Mapping[str, float], episodes: int, seed
         gamma=paper.GAMMA,
         train_freq=(1, "episode"),
         gradient_steps=max(round(values["gradient"] * paper.STEPS), 1),
-        action_noise=NormalActionNoise(np.zeros(size), np.full(size, NOISE))
-        if name == "TD3"
-        else None,
+        action_noise=noise if name == "TD3" else None,
         policy_kwargs={"net_arch": [int(values["width"])] * 2},
         device="cpu",
         seed=seed % 2**32,
     )
-    model.set_logger(Logger(None, []))  # its own makes a folder for each
+    model.set_logger(common.logger.Logger(None, []))  # its own makes a folder for each
     return model
 
 
