@@ -115,13 +115,14 @@ def seen(observation: Vector) -> Vector:
     points = np.vstack([paper.TARGET[:2], observation[3:].reshape(-1, 2)]) - place
     cos, sin, away = np.cos(heading), np.sin(heading), heading - paper.TARGET[2]
     turned = points @ np.array([[cos, -sin], [sin, cos]]) / FAR
-    found = np.r_[turned.ravel(), away, np.cos(away), np.sin(away)]
-    return found.astype(np.float32)  # type: ignore[return-value]
+    found: Vector = np.r_[turned.ravel(), away, np.cos(away), np.sin(away)].astype(np.float32)
+    return found
 
 
 def _applied(scaled: ArrayLike, turn: float, env: Any) -> Vector:
     """The speed and turn rate of an action between -1 and 1."""
-    return np.asarray(scaled, float) * env.action_space.high * np.array([1.0, turn])
+    applied: Vector = np.asarray(scaled, float) * env.action_space.high * np.array([1.0, turn])
+    return applied
 
 
 def _scaled(env: Any, layouts: Sequence[Centres], values: Mapping[str, float]) -> Any:

@@ -63,7 +63,7 @@ def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()
         agent: with whatever setting.
         among: of an agent for all the layouts to look at.
     """
-    runs = table[(table.part == part) & (table.arm.str.partition("[")[0] == agent)]
+    runs = table[(table.part == part) & (agents_of(table) == agent)]
     if runs.empty:
         return None
     shares = np.array(
@@ -142,7 +142,7 @@ def rows(table: pd.DataFrame, suite: pd.DataFrame) -> tuple[remedies.RemedyRow, 
     runs = table[(table.part == "judge") & table.place.isin(best.index)]
     last = pd.DataFrame(
         {
-            "entry": runs.arm.str.partition("[")[0],
+            "entry": agents_of(runs),
             "name": runs.arm,
             "layout": runs.place,
             "initial": [each[0] for each in runs.initial],
@@ -157,6 +157,11 @@ def rows(table: pd.DataFrame, suite: pd.DataFrame) -> tuple[remedies.RemedyRow, 
     there = (last[last.entry == agent] for agent in AGENTS)
     agents = (one for one in there if len(one))
     return tuple(remedies.row("judge 300", str(one.entry.iloc[0]), one) for one in agents)
+
+
+def agents_of(table: pd.DataFrame) -> pd.Series:
+    """The agent of each run, with whatever setting."""
+    return table.arm.map(lambda arm: arm.partition("[")[0])
 
 
 def _read(name: str, yes: pd.Series, of: str, numbers: dict[str, float] | None = None) -> Answer:

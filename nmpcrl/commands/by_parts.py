@@ -11,14 +11,14 @@ from nmpcrl.commands.places import refuse_unwritable
 from nmpcrl.commands.tables import counted, duration
 from nmpcrl.commands.workers import check
 
-OPTIONS = (
+Option = Callable[[Callable[..., None]], Callable[..., None]]
+OPTIONS: tuple[Option, ...] = (
     click.option("--workers", metavar="N", type=int, help="Processes; by default one per core."),
     click.option("--dry-run", is_flag=True, help="Only report what is missing, and its price."),
     click.option("--publish", is_flag=True, help="Put what is whole beside what is published."),
     click.option("--judge", is_flag=True, help="Only say what the published runs say."),
     click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for."),
 )
-Option = Callable[[Callable[..., None]], Callable[..., None]]
 
 
 @dataclass(frozen=True)
