@@ -27,6 +27,8 @@ from nmpcrl.claims.population import Answer
 from nmpcrl.claims.rule import read
 from nmpcrl.study.population import JUDGE, TUNE
 
+RESAMPLES = 2000  # of the bootstrap over layouts or seeds
+
 
 @dataclass(frozen=True, eq=False)
 class Course:
@@ -43,6 +45,14 @@ class Course:
         """Over the units, at each checkpoint."""
         found: Vector = np.median(self.shares, axis=1)
         return found
+
+    @property
+    def interval(self) -> Matrix:
+        """Of the median, of 95 %, by a bootstrap over the units; shape (2, checkpoints)."""
+        rng, units = np.random.default_rng(0), len(self.units)
+        drawn = self.shares[:, rng.integers(units, size=(RESAMPLES, units))]
+        ends: Matrix = np.quantile(np.median(drawn, axis=2), [0.025, 0.975], axis=1)
+        return ends
 
     @property
     def matched(self) -> tuple[float, float]:

@@ -41,12 +41,15 @@ def options(example: str, *more: Option) -> Callable[[Callable[..., None]], Call
         example: parts that there are, in words.
         more: options of the command's own.
     """
-    part = click.option(
-        "--part", "parts", multiple=True, help=f"Only this part, such as {example}."
+    only = f"Only this part, such as {example}."
+    every: tuple[Option, ...] = (
+        click.option("--part", "parts", multiple=True, help=only),
+        *more,
+        *OPTIONS,
     )
 
     def decorated(command: Callable[..., None]) -> Callable[..., None]:
-        for option in reversed((part, *more, *OPTIONS)):
+        for option in reversed(every):
             command = option(command)
         return command
 
