@@ -13,7 +13,7 @@ from nmpcrl.report.figures.style import LIMIT, SUBTITLE, TEAL, WINE, Look, heade
 
 AGENT_LOOKS = {"SAC": Look(WINE, "-", "o"), "TD3": Look(TEAL, (0, (5, 1)), "s")}
 SEARCHED: dict[str, Any] = {"color": "0.25", "linewidth": 1.2, "linestyle": "-."}
-TICKS = (25, 50, 100, 300, 600, 1600)  # episodes
+TICKS = (25, 50, 100, 300, 1600)  # episodes
 DEAREST = 3.0  # in parts of theta_init's cost; what is dearer is not drawn
 
 
@@ -40,7 +40,8 @@ def courses(panels: Mapping[str, Sequence[Course]], search: Mapping[str, float])
     first.set_yticks([0.8, 1, 1.5, 2, 3])
     first.yaxis.set_major_formatter(PercentFormatter(1, 0))
     first.yaxis.set_minor_formatter(NullFormatter())
-    first.legend(fontsize="small", loc="upper right")
+    handles, labels = first.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return headed(figure, _finding(next(iter(panels.values()))))
 
 
