@@ -1,4 +1,4 @@
-"""What ships as an entry of the suite, by name: learners, remedies, and tuners.
+"""What ships as an entry of the suite, by name: learners, remedies, tuners, and agents.
 
 An entry is a function of a `Robot` that returns theta, or a policy from observations to actions.
 `guarded-ES` is ES with a guard, `control-ES` the control of that, `averaged-ES` and `undone-ES`
@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.analysis.agents import AGENTS, Agent
 from nmpcrl.analysis.direct_search import SEARCHES, Search
-from nmpcrl.analysis.interaction import Robot
+from nmpcrl.analysis.interaction import Policy, Robot
 from nmpcrl.analysis.policy_search import LOWER, SCALE, UPPER
 from nmpcrl.learning import Diverged, Learner, policy_gradient
 from nmpcrl.learning.gauss_newton import TrustRegion, closed_loop, lstd_q_within
@@ -36,13 +37,13 @@ from nmpcrl.study.learners import DECAYS, LEARNERS
 from nmpcrl.study.setup import prepare
 from nmpcrl.study.storage.refusal import Refusal
 
-Policy = Callable[[Vector], Vector]  # observation of `nmpcrl/Robot-v0` -> action
 Factory = Callable[[Robot], Vector | Policy]
 
 Setting = Mapping[str, float]  # of an entry, by the name of what is set
 
 RADIUS = 0.3  # of the trust regions, in `SCALE`s
 BOUNDS = (LOWER, UPPER)  # of theta where a step may be long
+WHOLE = ("every", "width")  # what is set to whole numbers
 WRITTEN = re.compile(r"([^\[\]]+)\[([^\[\]]+)\]")  # "CMA-ES[spread=0.1]"
 
 
@@ -212,7 +213,8 @@ def _entries() -> dict[str, Factory]:
         if decay != one.decay
     }
     searched = {name: Searched(one) for name, one in SEARCHES.items()}
-    return {"frozen": untouched, **learned, **other, **searched}
+    agents = {name: Agent(name) for name in AGENTS}
+    return {"frozen": untouched, **learned, **other, **searched, **agents}
 
 
 ENTRIES: dict[str, Factory] = _entries()
@@ -252,8 +254,8 @@ def entry_with(name: str) -> Factory:
     found = ENTRIES[entry]
     called(entry, setting)
     for key, value in setting.items():
-        if not 0 < value < np.inf or (key == "every" and value != int(value)):
-            what = "a whole number above 0" if key == "every" else "a finite number above 0"
+        if not 0 < value < np.inf or (key in WHOLE and value != int(value)):
+            what = "a whole number above 0" if key in WHOLE else "a finite number above 0"
             raise NoSetting(f"policy = {name!r}: {key} must be {what}")
-    assert isinstance(found, Learned | Searched)  # others have no setting
+    assert isinstance(found, Learned | Searched | Agent)  # others have no setting
     return replace(found, setting=tuple(setting.items()))

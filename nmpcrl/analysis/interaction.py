@@ -1,6 +1,6 @@
 """The robot in one layout, whose every episode counts: what an entry of the suite is given."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.storage.refusal import Refusal
+
+Policy = Callable[[Vector], Vector]  # observation of `nmpcrl/Robot-v0` -> action
 
 
 class OverBudget(Refusal):

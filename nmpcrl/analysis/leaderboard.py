@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.analysis.entries import ENTRIES, Factory, Policy, entry_with
-from nmpcrl.analysis.interaction import OverBudget, Robot
+from nmpcrl.analysis.entries import ENTRIES, Factory, entry_with
+from nmpcrl.analysis.interaction import OverBudget, Policy, Robot
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
 from nmpcrl.control import SolverError
 from nmpcrl.learning.rollout import Rollout
@@ -194,7 +194,7 @@ def _rollout(robot: Robot, answer: Any) -> Rollout:
         NoEntry: it is neither theta nor a policy.
     """
     if callable(answer):
-        return _followed(robot, answer)
+        return followed(robot, answer)
     size = len(paper.THETA_INIT)
     try:
         theta = np.array(answer, float)
@@ -208,7 +208,7 @@ def _rollout(robot: Robot, answer: Any) -> Rollout:
         return _failed(error)
 
 
-def _followed(robot: Robot, policy: Policy) -> Rollout:
+def followed(robot: Robot, policy: Policy) -> Rollout:
     """An episode in `nmpcrl/Robot-v0`."""
     env = robot.env()
     observation, _ = env.reset()

@@ -1,14 +1,16 @@
 """A file of its own beside the published study, to which parts are added and none is changed."""
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from nmpcrl.claims.published import Damaged, made_here, place, sealed
+from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place, sealed
 from nmpcrl.study.storage.atomic import write_json
 
 
@@ -61,6 +63,126 @@ class Extendable:
             f"{self.what} is not published whole in {path} ({error});"
             f" `{self.command}` makes it anew"
         )
+
+
+RUN = ("part", "arm", "place", "k")  # what names a run, k being the number of the seed
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """What is published."""
+
+    table: pd.DataFrame
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Arms:
+    """A file that has by part and arm what was run there, run by run.
+
+    Numbers are rounded, and null where one is not finite; the processor time is that of all runs
+    together.
+    """
+
+    held: Extendable
+    columns: tuple[str, ...]  # of the table: those of `RUN`, what is measured, and "seconds"
+    runs: Callable[[str, str], Sequence[tuple[str, int]]]  # place and k of each, by part and arm
+    digits: int
+
+    def extend(self, table: pd.DataFrame) -> Path:
+        """Publish whole arms beside those that are there, which stay as they are.
+
+        Args:
+            table: with `columns`; an arm that is published already is left out of it if it says
+                the same.
+
+        Returns:
+            The file.
+
+        Raises:
+            Damaged: what is published is not what was written.
+            Unpublishable: an arm is not whole, or is published otherwise, or nothing is new.
+        """
+        content, new = self.held.begun(parts={}), False
+        for (part, arm), runs in table.groupby(["part", "arm"], sort=False):
+            block, arms = self._block(part, arm, runs), content["parts"].setdefault(part, {})
+            if arm in arms:
+                if arms[arm] | {"seconds": 0} != block | {"seconds": 0}:
+                    where = f"in the part {part!r}"
+                    raise Unpublishable(f"{arm} is published already {where}, otherwise")
+                continue
+            arms[arm], new = block, True
+        if not new:
+            raise Unpublishable(f"nothing of {self.held.what} is whole and new")
+        path = self.held.write(content)
+        _load.cache_clear()
+        return path
+
+    def load(self) -> Table:
+        """What is published.
+
+        Raises:
+            Damaged: it is not there, or not what was written.
+        """
+        return _load(self, self.held.path)
+
+    @property
+    def _measured(self) -> tuple[str, ...]:
+        return tuple(one for one in self.columns if one not in (*RUN, "seconds"))
+
+    def _block(self, part: str, arm: str, runs: pd.DataFrame) -> dict[str, Any]:
+        """The runs of one arm.
+
+        Raises:
+            Unpublishable: they are not those of the part.
+        """
+        by, order = runs.set_index(["place", "k"]), list(self.runs(part, arm))
+        if {*by.index} != {*order} or len(by) != len(order):
+            raise Unpublishable(f"{arm} has {len(by)} of {len(order)} runs of the part {part!r}")
+        there = by.loc[order]
+        return {
+            **{name: _plain(there[name].tolist(), self.digits) for name in self._measured},
+            "seconds": rounded(float(there.seconds.sum()), 4),
+        }
+
+    def rows(self, part: str, arm: str, block: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+        """The runs of one arm, as they are read."""
+        order = self.runs(part, arm)
+        for i, (where, k) in enumerate(order):
+            yield {
+                "part": part, "arm": arm, "place": where, "k": k,
+                **{name: _read(block[name][i]) for name in self._measured},
+                "seconds": block["seconds"] / len(order),
+            }  # fmt: skip
+
+
+@cache
+def _load(arms: Arms, path: Path) -> Table:
+    content = arms.held.content(path)
+    try:
+        rows = [
+            row
+            for part, by_arm in content["parts"].items()
+            for arm, block in by_arm.items()
+            for row in arms.rows(part, arm, block)
+        ]
+        return Table(pd.DataFrame(rows, columns=[*arms.columns]), {"made": content["about"]})
+    except (ValueError, LookupError, TypeError) as error:
+        raise arms.held.damaged(path, error) from error
+
+
+def _plain(value: Any, digits: int) -> Any:
+    """As JSON has it."""
+    if isinstance(value, list):
+        return [_plain(one, digits) for one in value]
+    return rounded(value, digits) if isinstance(value, float) else value
+
+
+def _read(value: Any) -> Any:
+    """As it was before, with infinity for null."""
+    if isinstance(value, list):
+        return [_read(one) for one in value]
+    return np.inf if value is None else value
 
 
 def rounded(value: float, digits: int) -> float | None:

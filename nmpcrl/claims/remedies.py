@@ -113,13 +113,14 @@ def rows(table: pd.DataFrame, part: str) -> tuple[RemedyRow, ...]:
     """One row an entry, in the order of `SETTINGS`."""
     there = table[table.part == part]
     return tuple(
-        _row(part, name, there[there.entry == name])
+        row(part, name, there[there.entry == name])
         for name in SETTINGS
         if (there.entry == name).any()
     )
 
 
-def _row(part: str, entry: str, runs: pd.DataFrame) -> RemedyRow:
+def row(part: str, entry: str, runs: pd.DataFrame) -> RemedyRow:
+    """The row of one entry, of its runs in a part."""
     share, arrived = shares(runs), solved(runs)
     return RemedyRow(
         part=part,

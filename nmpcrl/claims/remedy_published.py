@@ -77,6 +77,15 @@ def load() -> Comparison:
     return _load(HELD.path)
 
 
+def load_if_there() -> pd.DataFrame | None:
+    """The table of what is published; None where nothing is.
+
+    Raises:
+        Damaged: it is not what was written.
+    """
+    return load().table if HELD.path.exists() else None
+
+
 @cache
 def _load(path: Path) -> Comparison:
     content = HELD.content(path)

@@ -5,6 +5,7 @@ import os
 import click
 
 from nmpcrl import __version__
+from nmpcrl.commands.agents import agents
 from nmpcrl.commands.bench import bench
 from nmpcrl.commands.clean import clean
 from nmpcrl.commands.compare import compare
@@ -52,6 +53,7 @@ for command in (
     suite,
     remedies,
     world,
+    agents,
     grade,
     wasm,
     completion,

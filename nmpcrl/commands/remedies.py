@@ -1,13 +1,11 @@
 """`nmpcrl remedies`: tune, judge and publish what may help where learning fails."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from nmpcrl.commands import by_parts
-from nmpcrl.commands.places import refuse_unwritable
 from nmpcrl.commands.tables import columns
-from nmpcrl.commands.workers import check
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,21 +13,12 @@ if TYPE_CHECKING:
     from nmpcrl.claims.remedies import Advice
 
 HEAD = ("entry", "try it", "gain at 50", "gain at 300", "solved at 50", "CPU time", "tuning")
+ENTRY = click.option("--entry", "entries", multiple=True, help="Only this entry, such as CMA-ES.")
 
 
 @click.command()
-@click.option("--part", "parts", multiple=True, help="Only this part, such as best or tune.")
-@click.option("--entry", "entries", multiple=True, help="Only this entry, such as CMA-ES.")
-@by_parts.options
-def remedies(
-    parts: tuple[str, ...],
-    entries: tuple[str, ...],
-    workers: int | None,
-    dry_run: bool,
-    publish: bool,
-    judge: bool,
-    yes: bool,
-) -> None:
+@by_parts.options("best or tune", ENTRY)
+def remedies(parts: tuple[str, ...], entries: tuple[str, ...], **asked: Any) -> None:
     """Compare remedies, tuners and learners at equal interaction.
 
     What is compared, and how, was fixed before. The parts are best, tune,
@@ -42,27 +31,22 @@ def remedies(
       nmpcrl remedies --dry-run
     """
     from nmpcrl.analysis import judgements
-    from nmpcrl.claims import published, remedy_published, remedy_runs
+    from nmpcrl.claims import remedy_published, remedy_runs
     from nmpcrl.claims.remedy_questions import SETTINGS
-    from nmpcrl.study.storage.place import refuse_file
 
-    if judge:
-        _say()
-        return
-    refuse_file()
-    chosen = by_parts.some(parts, remedy_runs.ORDER, "part")
-    some = by_parts.some(entries, tuple(SETTINGS), "entry")
-    check(workers, sure=yes)
-    if publish:
-        refuse_unwritable(published.place())
-    if dry_run:
-        wanted = {part: remedy_runs.planned(part, some) for part in chosen}
-        by_parts.report(wanted, judgements.stored, remedy_runs.price)
-        return
-    remedy_runs.judge_parts(chosen, some, workers=workers)
-    if publish:
-        click.echo(f"{remedy_published.extend(remedy_runs.whole(some))}: published")
-        _say()
+    def some() -> tuple[str, ...]:
+        return by_parts.some(entries, tuple(SETTINGS), "entry")
+
+    runs = by_parts.Runs(
+        order=remedy_runs.ORDER,
+        planned=lambda part: remedy_runs.planned(part, some()),
+        stored=judgements.stored,
+        price=remedy_runs.price,
+        run=lambda chosen, **options: remedy_runs.judge_parts(chosen, some(), **options),
+        extend=lambda _: remedy_published.extend(remedy_runs.whole(some())),
+        say=_say,
+    )
+    by_parts.carry_out(runs, parts, **asked)
 
 
 def _say() -> None:
@@ -72,8 +56,7 @@ def _say() -> None:
     found = remedy_published.load().table
     for line in columns([HEAD, *map(cells, remedies.advice(found))], right=frozenset((5, 6))):
         click.echo(line)
-    for answer in remedies.answers(found):
-        by_parts.say_counts(answer.question, answer.words, answer.counts)
+    by_parts.say_answers(remedies.answers(found))
     for said, true in remedies.expectations(found).items():
         click.echo(f"expected that {said}: {'so it is' if true else 'it is not so'}")
 

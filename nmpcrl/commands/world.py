@@ -1,23 +1,15 @@
 """`nmpcrl world`: run, publish and judge worlds that move, change, or are not the model."""
 
+from typing import Any
+
 import click
 
 from nmpcrl.commands import by_parts
-from nmpcrl.commands.places import refuse_unwritable
-from nmpcrl.commands.workers import check
 
 
 @click.command()
-@click.option("--part", "parts", multiple=True, help="Only this part, such as moving.")
-@by_parts.options
-def world(
-    parts: tuple[str, ...],
-    workers: int | None,
-    dry_run: bool,
-    publish: bool,
-    judge: bool,
-    yes: bool,
-) -> None:
+@by_parts.options("moving")
+def world(parts: tuple[str, ...], **asked: Any) -> None:
     """Learn where obstacles move or the model is wrong.
 
     Or where layouts change between episodes. What is asked, and how, was
@@ -31,35 +23,23 @@ def world(
       nmpcrl world --dry-run
     """
     from nmpcrl.analysis.worlds import KEPT
-    from nmpcrl.claims import published, world_published, world_runs
-    from nmpcrl.study.storage.place import refuse_file
+    from nmpcrl.claims import world_published, world_runs
 
-    if judge:
-        _say()
-        return
-    refuse_file()
-    chosen = by_parts.some(parts, world_runs.ORDER, "part")
-    check(workers, sure=yes)
-    if publish:
-        refuse_unwritable(published.place())
-    if dry_run:
-        wanted = {part: world_runs.planned(part) for part in chosen}
-        by_parts.report(wanted, KEPT.stored, world_runs.price)
-        return
-    world_runs.run_parts(chosen, workers=workers)
-    if publish:
-        click.echo(f"{world_published.extend(world_runs.whole(chosen))}: published")
-        _say()
+    runs = by_parts.Runs(
+        order=world_runs.ORDER,
+        planned=world_runs.planned,
+        stored=KEPT.stored,
+        price=world_runs.price,
+        run=world_runs.run_parts,
+        extend=lambda chosen: world_published.extend(world_runs.whole(chosen)),
+        say=_say,
+    )
+    by_parts.carry_out(runs, parts, **asked)
 
 
 def _say() -> None:
     """Each question's answer, and whether it was expected."""
     from nmpcrl.claims import world, world_published
-    from nmpcrl.claims.population_questions import WORDS
     from nmpcrl.claims.world_questions import WORLD_QUESTIONS
 
-    for answer in world.answers(world_published.load().table):
-        by_parts.say_counts(answer.question, answer.words, answer.counts)
-        expected = WORLD_QUESTIONS[answer.question].expected
-        if expected != answer.outcome:
-            click.echo(f"  expected: {WORDS.get(expected, str(expected))}")
+    by_parts.say_answers(world.answers(world_published.load().table), WORLD_QUESTIONS)

@@ -5,6 +5,7 @@ import importlib.util
 import numpy as np
 import pytest
 
+from nmpcrl.analysis.agents import AGENTS
 from nmpcrl.analysis.entries import (
     ENTRIES,
     REMEDIES,
@@ -31,7 +32,9 @@ def short(monkeypatch):
 
 
 @pytest.mark.usefixtures("short")
-@pytest.mark.parametrize("name", [name for name in ENTRIES if not name.endswith("-episode")])
+@pytest.mark.parametrize(
+    "name", [one for one in ENTRIES if not one.endswith("-episode") and one not in AGENTS]
+)
 def test_an_entry_spends_its_budget_and_no_more_and_returns_the_same_theta_twice(name):
     if name == "Bayes" and not importlib.util.find_spec("optuna"):
         pytest.skip("needs the extra nmpcrl[search]")
@@ -76,7 +79,7 @@ def test_a_budget_of_one_episode_is_enough_for_an_entry(name):
 
 
 def test_every_learner_remedy_and_tuner_has_an_entry_and_what_has_a_step_size_a_guard():
-    assert {*LEARNERS, *REMEDIES, "grid", "SPSA", "CMA-ES", "Bayes"} <= set(ENTRIES)
+    assert {*LEARNERS, *REMEDIES, *AGENTS, "grid", "SPSA", "CMA-ES", "Bayes"} <= set(ENTRIES)
     assert {f"guarded-{name}" for name in STEPWISE} <= set(ENTRIES)
     assert {name.partition("-")[0] for name in ENTRIES} >= set(WRAPS)
 

@@ -41,7 +41,9 @@ def test_what_is_published_is_not_published_otherwise_or_in_part():
     published.extend(runs("gradient", "0.05"))
     with pytest.raises(Unpublishable, match=r"0\.05 is published already in the part 'gradient'"):
         published.extend(runs("gradient", "0.05", cost=0.5))
-    with pytest.raises(Unpublishable, match="nothing of these worlds is whole and new"):
+    with pytest.raises(
+        Unpublishable, match="nothing of what was run in worlds that change is whole and new"
+    ):
         published.extend(runs("gradient", "0.05"))
     with pytest.raises(Unpublishable, match=r"0\.1 has 19 of 20 runs of the part 'gradient'"):
         published.extend(runs("gradient", "0.1")[1:])

@@ -42,4 +42,4 @@ def test_a_part_is_run_published_and_judged(command, monkeypatch):
     assert "collisions: not decidable here (0 of 0 scenarios)" in said.stdout
     assert len(world_published.load().table) == 20 * len(PARTS["gradient"].arms)
     again = command("world", "--part", "gradient", "--publish", "--workers", "1")
-    assert "nothing of these worlds is whole and new" in again.stderr
+    assert "nothing of what was run in worlds that change is whole and new" in again.stderr

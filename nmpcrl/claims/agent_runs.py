@@ -1,0 +1,175 @@
+"""The runs of SAC and TD3: which are wanted, and what is there of them.
+
+The tuning comes before the other parts. All are kept by `analysis.agent_curves`, so that an
+interrupted call goes on.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, fields
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl.analysis import judgements, kept
+from nmpcrl.analysis.agent_curves import KEPT, Curve, curve
+from nmpcrl.analysis.agents import Agent, require
+from nmpcrl.analysis.entries import called, entry_with
+from nmpcrl.analysis.kept import Wanted
+from nmpcrl.analysis.leaderboard import HELD_OUT
+from nmpcrl.claims.agent_questions import AGENTS, EVERY, LONG, PARTS, SETTINGS, SPARING
+from nmpcrl.claims.extendable import RUN
+from nmpcrl.study import paper
+from nmpcrl.study.geometry import Centres
+from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.storage.refusal import Refusal
+
+TUNING = "tune"  # the part that comes before the others
+ORDER = tuple(PARTS)
+COLUMNS = (*RUN, *(one.name for one in fields(Curve)))
+SECONDS: Mapping[str, float] = {"SAC": 0.0065, "TD3": 0.0027}  # of a gradient step
+ELSE, ROLLOUT = 0.05, 0.03  # seconds of the rest of an episode, and of a rollout that judges
+
+
+class NotTuned(Refusal):
+    """An agent cannot be judged before its tuning."""
+
+
+def trained_in(place: str) -> dict[str, Centres]:
+    """The layouts of a place."""
+    return dict(TUNE) if place == EVERY else {place: judgements.LAYOUTS[place]}
+
+
+def judged_in(place: str) -> dict[str, Centres]:
+    """Where its policy is judged: an agent for all also in layouts that it never saw."""
+    return {**TUNE, **JUDGE} if place == EVERY else trained_in(place)
+
+
+def seed_of(place: str, k: int) -> int:
+    """The seed number k of a place; of a layout it is that of the suite."""
+    return 6 * HELD_OUT + k if place == EVERY else judgements.seed_of(place, k)
+
+
+def settings(agent: str) -> tuple[str, ...]:
+    """The names that an agent has in its tuning, that of the one it ships with first."""
+    return tuple(called(agent, setting) for setting in SETTINGS[agent])
+
+
+def chosen(agent: str) -> str:
+    """The agent with its best setting, that of the least mean of J / J_init.
+
+    Raises:
+        NotTuned: its tuning is not kept whole.
+    """
+    names = settings(agent)
+    there = KEPT.stored(_runs(TUNING, names))
+    shares = {
+        name: [one.costs[-1][0] / one.initial[0] for run, one in there.items() if run.entry == name]
+        for name in (f"{TUNING}: {each}" for each in names)
+    }
+    if any(len(each) < len(PARTS[TUNING].places) for each in shares.values()):
+        raise NotTuned(f"{agent} is not tuned yet: `nmpcrl agents --part tune` does that")
+    best = min(shares, key=lambda name: float(np.mean(shares[name])))
+    return best.partition(": ")[2]
+
+
+def sparing(name: str) -> str:
+    """An agent with its setting, but at most `SPARING` gradient steps a step."""
+    made = entry_with(name)
+    assert isinstance(made, Agent)
+    gradient = min(made.values["gradient"], SPARING)
+    return called(made.name, {**made.values, "gradient": gradient})
+
+
+def wanted(part: str) -> tuple[Wanted, ...]:
+    """All runs of a part.
+
+    Raises:
+        NotTuned: as `chosen`, of a part in which agents are judged.
+    """
+    if part == TUNING:
+        return _runs(part, [name for agent in AGENTS for name in settings(agent)])
+    names = [chosen(agent) for agent in AGENTS]
+    return _runs(part, [sparing(name) if part in LONG else name for name in names])
+
+
+def planned(part: str) -> tuple[Wanted, ...]:
+    """As `wanted`; of agents that are not tuned yet as they ship."""
+    try:
+        return wanted(part)
+    except NotTuned:
+        return _runs(part, [sparing(name) if part in LONG else name for name in AGENTS])
+
+
+def _runs(part: str, names: Iterable[str]) -> tuple[Wanted, ...]:
+    one = PARTS[part]
+    return tuple(
+        Wanted(f"{part}: {name}", one.budget, place, seed_of(place, k))
+        for name in names
+        for place, k in order(part)
+    )
+
+
+def order(part: str) -> tuple[tuple[str, int], ...]:
+    """Place and number of the seed of each run of an arm."""
+    return tuple((place, k) for place in PARTS[part].places for k in range(PARTS[part].seeds))
+
+
+def run(one: Wanted) -> Curve:
+    """Carry out one."""
+    part, _, name = one.entry.partition(": ")
+    where = trained_in(one.layout), judged_in(one.layout)
+    return curve(name, *where, PARTS[part].checkpoints, one.seed)
+
+
+def run_parts(parts: Iterable[str], **options: Any) -> None:
+    """Run what is missing, part by part; options as `Kept.complete` takes them.
+
+    Raises:
+        NoAgents: stable-baselines3 is not installed.
+        NotTuned: as `wanted`.
+    """
+    for part in sorted(parts, key=ORDER.index):
+        KEPT.complete(
+            wanted(part),
+            run,
+            before=lambda _: require(),
+            said=lambda one, made: f"{one.entry} in {one.layout}: {_share(made):.0%}",
+            **options,
+        )
+
+
+def _share(made: Curve) -> float:
+    """The median over layouts of the cost at the end, in parts of theta_init's."""
+    return float(np.median(np.array(made.costs[-1]) / np.array(made.initial)))
+
+
+def whole(parts: Iterable[str] = ORDER) -> pd.DataFrame:
+    """The table of all that is kept of some parts, but arms that are not there whole."""
+    rows = []
+    for part in parts:
+        runs = planned(part)
+        there = KEPT.stored(runs)
+        missing = {one.entry for one in runs if one not in there}
+        rows += [_row(one, made) for one, made in there.items() if one.entry not in missing]
+    return pd.DataFrame(rows, columns=[*COLUMNS])
+
+
+def _row(one: Wanted, made: Curve) -> dict[str, Any]:
+    part, _, arm = one.entry.partition(": ")
+    k = one.seed - seed_of(one.layout, 0)
+    return {"part": part, "arm": arm, "place": one.layout, "k": k, **asdict(made)}
+
+
+def price(runs: Iterable[Wanted], measured: Mapping[Wanted, Curve]) -> float:
+    """Seconds of processor time that some runs take, by those that are known of the same arm."""
+    return kept.price(runs, measured, alike=lambda one: one.entry, otherwise=_seconds)
+
+
+def _seconds(one: Wanted) -> float:
+    part, _, name = one.entry.partition(": ")
+    made = entry_with(name)
+    assert isinstance(made, Agent)
+    gradient = made.values["gradient"] * paper.STEPS
+    judged = len(judged_in(one.layout)) * len(PARTS[part].checkpoints) * ROLLOUT
+    return one.budget * (gradient * SECONDS[made.name] + ELSE) + judged

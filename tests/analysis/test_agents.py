@@ -1,0 +1,111 @@
+"""SAC and TD3 in the robot's task: the same bits twice, every episode counted, no model known."""
+
+import importlib.util
+import sys
+
+import numpy as np
+import pytest
+
+from nmpcrl.analysis.agents import AGENTS, Agent, NoAgents, seen
+from nmpcrl.analysis.entries import ENTRIES, NoSetting, entry_with
+from nmpcrl.analysis.interaction import Robot
+from nmpcrl.analysis.leaderboard import followed, judge_once
+from nmpcrl.study import paper
+from nmpcrl.study.population import TUNE
+from nmpcrl.study.robot import RobotEnv
+
+needs_agents = pytest.mark.skipif(
+    not importlib.util.find_spec("stable_baselines3"), reason="needs the extra nmpcrl[agents]"
+)
+LAYOUT = paper.LAYOUTS["A"]
+START = np.r_[paper.START, np.ravel(LAYOUT)]
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    """One episode of random actions, and few gradient steps after each."""
+    monkeypatch.setattr("nmpcrl.analysis.agents.RANDOM", 1)
+
+
+def quick(name):
+    return Agent(name, (("gradient", 0.1), ("width", 8)))
+
+
+@needs_agents
+@pytest.mark.parametrize("name", AGENTS)
+def test_two_trainings_give_the_same_bits_however_often_they_are_looked_at(name):
+    first, second = (Robot(LAYOUT, 3, seed=5) for _ in range(2))
+    at_once = quick(name)(first)
+    looked = quick(name).trained(second.env(), [LAYOUT], [1, 2, 3], second.seed)
+    before = np.random.get_state()[1].copy()  # noqa: NPY002 which nobody else may notice
+    actions = []
+    for one in looked:
+        np.random.default_rng(0).normal()
+        actions.append(one.policy(START))
+    np.testing.assert_array_equal(at_once(START), actions[-1])
+    assert (actions[-1] != actions[0]).any()
+    np.testing.assert_array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+
+
+@needs_agents
+def test_episodes_and_steps_are_counted_and_none_is_begun_in_vain():
+    robot = Robot(LAYOUT, 3, seed=0)
+    checkpoints = [*quick("TD3").trained(robot.env(), [LAYOUT], [1, 3], 0)]
+    assert [(one.episodes, one.steps) for one in checkpoints] == [(1, 130), (3, 390)]
+    assert robot.begun == 3
+    assert robot.left == 0
+
+
+@needs_agents
+def test_an_agent_is_an_entry_whose_policy_is_judged_by_the_cost_of_all_others(monkeypatch):
+    monkeypatch.setitem(ENTRIES, "TD3", quick("TD3"))
+    judged = judge_once("TD3", LAYOUT, 2, 7)
+    assert judged.episodes == 2
+    assert not judged.over
+    rollout = followed(Robot(LAYOUT, 1, 7), quick("TD3")(Robot(LAYOUT, 2, 7)))
+    task = Robot(LAYOUT, 1, 0).task
+    charged = sum(map(task.stage_cost, rollout.states, rollout.actions))
+    assert judged.cost == pytest.approx(charged, rel=1e-12)
+
+
+@needs_agents
+def test_an_agent_meets_all_the_layouts_it_is_given():
+    met = set()
+
+    class Noting(RobotEnv):
+        def reset(self, **options):
+            met.add(options["options"]["layout"])
+            return super().reset(**options)
+
+    layouts = [TUNE["T01"], TUNE["T02"]]
+    [*_] = quick("TD3").trained(Noting(), layouts, [8], 0)
+    assert met == {*layouts}
+
+
+def test_what_is_seen_is_turned_with_the_robot_and_says_where_target_and_centres_are():
+    x, y, _ = paper.TARGET
+    target, centre, turned = np.split(seen(np.array([x, y - 2.0, np.pi / 2, x - 3.0, y])), [2, 4])
+    np.testing.assert_allclose(target, [0.2, 0], atol=1e-7)  # 2 m ahead
+    np.testing.assert_allclose(centre, [0.2, 0.3], atol=1e-7)  # and 3 m to the left
+    np.testing.assert_allclose(turned, [0, 1, 0], atol=1e-7)
+
+
+@needs_agents
+def test_a_share_of_the_turn_rates_bounds_what_is_applied():
+    policy = Agent("TD3", (("turn", 0.25), ("gradient", 0.1)))(Robot(LAYOUT, 2, seed=0))
+    actions = np.array([policy(START + 100 * np.eye(11)[i]) for i in range(11)])
+    assert (abs(actions) <= [0.6, np.pi / 8]).all()
+
+
+def test_a_setting_is_refused_that_there_is_not():
+    assert dict(entry_with("SAC[width=32]").setting) == {"width": 32}
+    with pytest.raises(NoSetting, match="width must be a whole number above 0"):
+        entry_with("SAC[width=32.5]")
+    with pytest.raises(NoSetting, match="can be set only reward, turn, gradient, width"):
+        entry_with("SAC[alpha=1]")
+
+
+def test_without_the_extra_one_sentence_says_what_is_missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    with pytest.raises(NoAgents, match=r"SAC needs stable-baselines3: .* nmpcrl\[agents\]"):
+        Agent("SAC")(Robot(LAYOUT, 1, seed=0))

@@ -1,0 +1,69 @@
+"""What is asked of SAC and TD3: complete, and not moved since."""
+
+from pathlib import Path
+
+from fixed_questions import assert_older, assert_unmoved
+
+from nmpcrl.analysis import agents
+from nmpcrl.analysis.entries import called
+from nmpcrl.claims import agent_questions, remedy_questions
+from nmpcrl.claims.agent_questions import (
+    AGENT_QUESTIONS,
+    AGENTS,
+    EVERY,
+    LONG,
+    PARTS,
+    SEARCH,
+    SEARCHED,
+    SETTINGS,
+)
+from nmpcrl.study import paper
+from nmpcrl.study.population import JUDGE, TUNE
+
+FILE = Path(agent_questions.__file__)
+
+
+def test_the_questions_are_those_of_the_commit_that_added_them():
+    assert_unmoved(FILE)
+
+
+def test_the_questions_are_older_than_the_runs_that_are_published():
+    assert_older(FILE, "book/published/agents.json")
+
+
+def test_each_agent_has_as_many_settings_as_a_remedy_the_one_it_ships_with_first():
+    assert AGENTS == agents.AGENTS
+    for agent in AGENTS:
+        names = [called(agent, setting) for setting in SETTINGS[agent]]
+        assert names[0] == agent
+        assert len({*names}) == remedy_questions.RUNS_OF_TUNING
+
+
+def test_what_is_tuned_on_is_not_judged_on_and_is_there():
+    assert {*PARTS["tune"].places} <= {*TUNE}
+    assert {*PARTS["judge"].places} <= {*JUDGE}
+    assert {*PARTS["one"].places} <= {*paper.LAYOUTS}
+    assert PARTS["all"].places == (EVERY,)
+    assert {*LONG} < {*PARTS}
+
+
+def test_checkpoints_rise_and_the_last_is_the_budget():
+    for part in PARTS.values():
+        assert [*part.checkpoints] == sorted({*part.checkpoints})
+        assert part.budget == part.checkpoints[-1]
+
+
+def test_what_agents_are_compared_with_is_in_the_comparison_of_remedies():
+    assert SEARCH in remedy_questions.SETTINGS
+    judged, named = (remedy_questions.PARTS[part] for part in SEARCHED)
+    assert judged.budget == named.budget == 50
+    assert {*PARTS["judge"].places} <= {*judged.layouts}
+    assert {*PARTS["one"].places} <= {*named.layouts}
+
+
+def test_a_question_says_how_it_is_decided():
+    assert len(AGENT_QUESTIONS) == 17
+    for one in AGENT_QUESTIONS.values():
+        assert one.question.endswith("?")
+        assert all((one.asked_of, one.measured, one.border))
+        assert one.pilot == ""
