@@ -157,7 +157,8 @@ def rule() -> str:
 
 
 def in_short(advice: Iterable[Advice]) -> str:
-    """The advice in a sentence or three: what to try first, second, and never, with evidence."""
+    """The advice in a few sentences: first, second, for whom no run may fail, and never."""
+    advice = [*advice]
     by: dict[str, list[Advice]] = {}
     for one in advice:
         by.setdefault(one.word, []).append(one)
@@ -168,11 +169,16 @@ def in_short(advice: Iterable[Advice]) -> str:
         said = [f"Try first {_tried(row)} and solves {_solved(row)} layouts."]
     if SECOND in by:
         said.append(f"Second, {_tried(_known(by[SECOND][0]))}.")
-    never = listed(f"`{one.entry}`" for one in by.get(NEVER, ()))
-    said.append(
-        f"Never try {never}." if NEVER in by else "Of none is it sure that it is never to be tried."
-    )
+    if safe := [one for one in advice if one.rows and _solves_all(one)]:
+        row = _known(safe[0])
+        said.append(f"If no run may fail, {_tried(row)} and solves all {row.layouts} layouts.")
+    if NEVER in by:
+        said.append(f"Never try {listed(f'`{one.entry}`' for one in by[NEVER])}.")
     return " ".join(said)
+
+
+def _solves_all(one: Advice) -> bool:
+    return all(row.solved.value == 1 for row in one.rows.values())
 
 
 def _known(one: Advice) -> RemedyRow:
