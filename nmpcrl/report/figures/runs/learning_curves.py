@@ -24,7 +24,6 @@ from nmpcrl.report.figures.panels import part, ranges, sourced
 from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import BAND, SUBTITLE, page, subplots
 from nmpcrl.report.tables import WORDS
-from nmpcrl.study.records import Column
 from nmpcrl.study.store import Runs
 
 CEILING = 4.0  # times theta_init's cost without noise, where the scale ends
@@ -121,7 +120,11 @@ def _costs(axis: Axes, runs: Runs[Outline], learners: Iterable[str], curve: Curv
     if axis.patches:
         axis.set_ylim(None, STRIP[2])
         axis.yaxis.set_major_locator(FixedLocator([*range(1, int(CEILING) + 1)]))
-        above: dict[str, Any] = {"transform": axis.get_yaxis_transform(), "va": "center", "fontsize": "small"}
+        above: dict[str, Any] = {
+            "transform": axis.get_yaxis_transform(),
+            "va": "center",
+            "fontsize": "small",
+        }
         axis.text(0.01, STRIP[1], f"> {CEILING:g}", **above)
     axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
 

@@ -4,7 +4,6 @@ A run that had to be stopped left no policy: it is counted, and not drawn.
 """
 
 from collections import Counter
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -46,7 +45,9 @@ def controls(found: Evidence, layout: str) -> Figure:
     outside = sum(metrics.input_violations(one, plant.lower, plant.upper) for one in learned)
     used = np.median([np.nanmax(np.abs(one) / plant.upper, axis=0) for one in learned], axis=0)
     names = (name.partition(" [")[0] for name in plant.action_names)
-    parts = " and ".join(f"{share:.0%} of the {name}" for share, name in zip(used, names))
+    parts = " and ".join(
+        f"{share:.0%} of the {name}" for share, name in zip(used, names, strict=True)
+    )
     left = f"; {outside} inputs leave their bounds" * bool(outside)
     return sourced(figure, f"RDES and GES use up to {parts} allowed{left}", drawn)
 

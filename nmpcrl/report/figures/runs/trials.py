@@ -53,7 +53,9 @@ def learned(
     left.plot(values, color=TEAL)
     left.set(xlabel="learning step", ylabel=names[0], title="Parameter (dashed: the plant's)")
     right.axhline(0, **LIMIT)
-    for (name, course), color, dashes in zip(courses.items(), (WINE, TEAL), ("--", "-"), strict=True):
+    for (name, course), color, dashes in zip(
+        courses.items(), (WINE, TEAL), ("--", "-"), strict=True
+    ):
         right.plot(course, color=color, linestyle=dashes, label=name)
     right.set(xlabel="step", ylabel=names[1], title="State (dashed: the target)")
     below(figure, right.get_legend_handles_labels()[0])

@@ -50,7 +50,6 @@ def test_the_title_counts_the_parts_that_say_yes(second, said):
     assert [tick.get_text() for tick in figure.axes[0].get_xticklabels()] == ["0.1", "4"]
 
 
-
 def test_the_title_says_how_much_of_the_gap_to_the_plant_is_closed():
     heights = {"before": np.array([1.0, -0.4]), "after": np.array([1.0, 0.0])}
     figure = trials.learned(np.array([1.0, 1.1, 1.2]), 1.4, heights, ("mass [kg]", "height [m]"))
