@@ -1,0 +1,1 @@
+"""Runs: their curves, their rollouts, and one run looked at closely."""
