@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from nmpcrl.course.cases import telling
 from nmpcrl.course.formulas import FormulaError, evaluated
 from nmpcrl.course.outcome import Outcome, Unsolved, refuse_unanswered
 from nmpcrl.study.parameters import shortened
@@ -127,25 +128,34 @@ def formula(
     refuse_unanswered(answer)
     if type(answer) is not str:
         raise Unsolved(f"Write the formula as a text between quotes, of {', '.join(variables)}.")
-    cases = _cases(np.random.default_rng(), variables)
+    known = mistakes or {}
+    cases = _cases(np.random.default_rng(), variables, expected, known)
     try:
         values = [evaluated(answer, case) for case in cases]
     except FormulaError as error:
         raise Unsolved(f"{answer!r} is no formula of {', '.join(variables)}: {error}.") from None
-    for why, wrong in (mistakes or {}).items():
-        if _same(values, wrong, cases) and not _same(values, expected, cases):
+    for why, wrong in known.items():
+        if _same(values, wrong, cases):
             raise Unsolved(why)
     if not _same(values, expected, cases):
         case = ", ".join(f"{name} = {value:g}" for name, value in cases[0].items())
         raise Unsolved(f"It is not right: for {case} it gives {values[0]:.4g}.")
-    return Outcome("Right.", _formula_of_page(expected, variables, mistakes or {}))
+    return Outcome("Right.", _formula_of_page(expected, variables, known))
 
 
 def _cases(
-    rng: np.random.Generator, variables: Mapping[str, tuple[float, float]]
+    rng: np.random.Generator,
+    variables: Mapping[str, tuple[float, float]],
+    expected: Callable[..., float],
+    mistakes: Mapping[str, Callable[..., float]],
 ) -> list[dict[str, float]]:
-    drawn = {name: rng.uniform(*bounds, CASES) for name, bounds in variables.items()}
-    return [{name: float(drawn[name][k]) for name in drawn} for k in range(CASES)]
+    def draw() -> dict[str, float]:
+        return {name: float(rng.uniform(*bounds)) for name, bounds in variables.items()}
+
+    def shows(wrong: Callable[..., float]) -> Callable[[dict[str, float]], bool]:
+        return lambda case: not _same([wrong(**case)], expected, [case])
+
+    return telling(draw, CASES, map(shows, mistakes.values()))
 
 
 def _same(values: list[float], of: Callable[..., float], cases: list[dict[str, float]]) -> bool:
@@ -158,7 +168,7 @@ def _formula_of_page(
     mistakes: Mapping[str, Callable[..., float]],
 ) -> dict[str, Any]:
     """Values at cases that are the same in every build; the formula itself is not there."""
-    cases = _cases(np.random.default_rng(0), variables)
+    cases = _cases(np.random.default_rng(0), variables, expected, mistakes)
     values = [float(expected(**case)) for case in cases]
     known = [[[float(wrong(**case)) for case in cases], why] for why, wrong in mistakes.items()]
     about = {"cases": cases, "values": values, "mistakes": known}

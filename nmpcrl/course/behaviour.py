@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from nmpcrl.course.cases import telling
 from nmpcrl.course.outcome import Outcome, Unsolved, refuse_unanswered
 
 Arguments = dict[str, Any]  # of one call, by name
@@ -36,8 +37,14 @@ def function(
     refuse_unanswered(answer)
     if not callable(answer):
         raise Unsolved(f"A function is asked for, not {answer!r}.")
-    rng = np.random.default_rng()
-    cases = [draw(rng) for _ in range(TIMES)]
+    rng, known = np.random.default_rng(), dict(mistakes or {})
+
+    def shows(wrong: Callable[..., Any]) -> Callable[[Arguments], bool]:
+        return lambda case: (
+            not agree(wrong(**deepcopy(case)), expected(**deepcopy(case)), tolerance)
+        )
+
+    cases = telling(lambda: draw(rng), TIMES, map(shows, known.values()))
     values = [_called(answer, case) for case in cases]
     refuse_unanswered(values[0])
     different = [
@@ -46,15 +53,15 @@ def function(
         if not agree(value, expected(**deepcopy(case)), tolerance)
     ]
     if not different:
-        return Outcome(f"Right: it does what it should in {TIMES} random cases.")
-    for why, wrong in (mistakes or {}).items():
+        return Outcome(f"Right: it does what it should in {len(cases)} random cases.")
+    for why, wrong in known.items():
         theirs = [wrong(**deepcopy(case)) for case in cases]
         if all(agree(*pair, tolerance) for pair in zip(values, theirs, strict=True)):
             raise Unsolved(why)
     case, value = different[0]
     right = expected(**deepcopy(case))
     raise Unsolved(
-        f"It is wrong in {len(different)} of {TIMES} random cases: "
+        f"It is wrong in {len(different)} of {len(cases)} random cases: "
         f"{described(case)}it gives {brief(value)}, and {brief(right)} is right."
     )
 
