@@ -43,11 +43,13 @@ GIVEN = [
     "other_problems",
     "what_to_try_first",
     "why_learning_stops",
+    "changing_world",
 ]  # which have parameters
 
 each_notebook = pytest.mark.parametrize("name", NOTEBOOKS)
 each_chapter = pytest.mark.parametrize("name", CHAPTERS)
 MORE = ["performance", "other_problems", "what_to_try_first", "why_learning_stops"]
+MORE += ["changing_world"]
 each_exercised = pytest.mark.parametrize("name", [*CHAPTERS, *MORE])
 each_own = pytest.mark.parametrize("name", OWN)
 each_given = pytest.mark.parametrize("name", GIVEN)
@@ -325,6 +327,8 @@ MAY_BE = {  # what is drawn for a parameter, so that it is sometimes right
     "entry": st.sampled_from(["ES", "CMA-ES", "SARSA"]),
     "overshot": st.lists(st.sampled_from([*paper.LAYOUTS, "Z"]), max_size=3, unique=True),
     "overshot_episodes": st.integers(0, 400),
+    "scenario": st.sampled_from(["M01", "M40", "M41", "A"]),
+    "theta_c": st.floats(-0.1, 0.5),
     "length": st.sampled_from(["smoke", "short", "full", "long"]),
 }
 LARGE = [10**400, -(10**20), 2**31, 100_000, 10**12, 1e308, 5e-324]
@@ -503,7 +507,7 @@ def chapter_and_parameters(words: list[str]) -> tuple[str, dict]:
     return named["CHAPTER"], chapters.values(given["pairs"], given["raw"], given["texts"])
 
 
-@pytest.mark.parametrize("name", [*CHAPTERS, *OWN, "what_to_try_first", "why_learning_stops"])
+@pytest.mark.parametrize("name", [*CHAPTERS, *OWN, *MORE[2:]])
 def test_the_commands_of_the_try_box_are_accepted(name, monkeypatch):
     monkeypatch.chdir(ROOT)
     lines = commands(name)

@@ -44,6 +44,15 @@ def test_a_figure_becomes_a_picture_with_its_files():
     assert MIME not in one.cells[1].outputs[0].data
 
 
+def test_the_link_of_a_figure_that_plays_plays_it_if_it_is_an_svg():
+    for files, link in (({"svg": SVG}, ".svg#play"), ({}, ".png")):
+        one = notebook(files, {"svg": SVG})
+        one.cells[1].outputs[0].data[MIME]["plays"] = True
+        pictures.placed(one)
+        assert f'<a href="../_static/figures/es-theta{link}">' in html(one)
+        assert "#play" not in html(one).split("</a>")[0].split(">", 1)[1]
+
+
 def test_what_has_no_light_svg_is_shown_as_a_png():
     one = notebook({}, {"png": b64encode(PNG).decode()})
     assert pictures.placed(one) == {"es-theta.png": PNG, "es-theta-narrow.png": PNG}

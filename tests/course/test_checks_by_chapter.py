@@ -13,6 +13,7 @@ from scipy.stats import fisher_exact
 from nmpcrl.course import Unsolved
 from nmpcrl.course.checks import (
     beyond,
+    changing_world,
     expected_sarsa,
     ges,
     mdp_and_nmpc,
@@ -30,7 +31,21 @@ from nmpcrl.study import paper
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 CALLED = re.compile(r"check\.(\w+)")
-BY_HAND = ["1.7", "2.7", "3.8", "4.8", "5.8", "6.9", "7.9", "8.8", "9.7", "10.6", "11.6", "12.7"]
+BY_HAND = [
+    "1.7",
+    "2.7",
+    "3.8",
+    "4.8",
+    "5.8",
+    "6.9",
+    "7.9",
+    "8.8",
+    "9.7",
+    "10.6",
+    "11.6",
+    "12.7",
+    "13.7",
+]
 FEATURES = np.linspace(100.0, 1100.0, 9)
 SQUARED = float(FEATURES @ FEATURES)
 
@@ -46,6 +61,16 @@ def by_stages(theta, states, inputs, target, gamma, later=1.0, last=1.0, factor=
 def by_row(pairs, values, thetas, first):
     before = [first, *thetas][: len(pairs)]
     return [np.r_[p, t] for p, t in zip(pairs, before, strict=True)], list(values)
+
+
+def foretold_by_stages(before, now, horizon):
+    return np.array([[n + i * (n - b) for n, b in zip(now, before, strict=True)]
+                     for i in range(horizon + 1)])  # fmt: skip
+
+
+def met_by_loops(states, centres):
+    pairs = zip(states, centres, strict=True)
+    return sum(any(np.hypot(*(s[:2] - c)) < 1.25 for c in at) for s, at in pairs)
 
 
 def undone(theta, moves, cost, forgets=False):
@@ -501,6 +526,26 @@ CHECKS = {
             lambda **case: why_learning_stops.fed_back(**case) * np.linalg.norm(case["phi"]),
             lambda **case: why_learning_stops.fed_back(**case | {"gamma": 1.0}),
             lambda **case: -why_learning_stops.fed_back(**case),
+        ],
+    ),
+    changing_world.ahead: (["1.0 + 10 * 0.2", "3 m"], [1.2, -1.0, 2.8]),
+    changing_world.lag: (["N * T * v", "v * (N * T)"], ["T * v", "N * v", "(N + 1) * T * v"]),
+    changing_world.clocked: ([-26.4, "20 + 0.97 * 880 - 900"], [2.7, 0, 26.4]),
+    changing_world.blind: letters("b"),
+    changing_world.predictor: (
+        [changing_world.foretold, foretold_by_stages],
+        [
+            lambda before, now, horizon: changing_world.foretold(before, now, horizon)[1:],
+            lambda before, now, horizon: changing_world.foretold(now, now, horizon),
+            lambda before, now, horizon: changing_world.foretold(now, before, horizon),
+        ],
+    ),
+    changing_world.inside: (
+        [changing_world.met, met_by_loops],
+        [
+            changing_world.met_twice,
+            lambda states, centres: changing_world.met(states, centres, 2.5),
+            lambda states, centres: len(states) - changing_world.met(states, centres),
         ],
     ),
     performance.ratio: (

@@ -12,13 +12,14 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from nmpcrl.report.figures.moving import PLAY
 from nmpcrl.report.figures.sheet import MIME
 
 FOLDER = "_static/figures"
 NARROW = "screen and (max-width: 720px)"  # where the letters of a wide figure are too small
 IMAGE = re.compile(r"!\[(?P<alt>[^]]+)\]\(_static/(?P<name>\w+)\.svg\)")
 PICTURE = """\
-<a href="{wide}"><picture>
+<a href="{wide}{plays}"><picture>
 <source media="{media}" srcset="{narrow}" width="{narrow_width}" height="{narrow_height}">
 <source srcset="{wide}">
 <img src="{png}" alt="{alt}" width="{width}" height="{height}">
@@ -40,6 +41,7 @@ def placed(notebook: Any) -> dict[str, bytes]:
             data["text/html"] = PICTURE.format(
                 png=png,
                 wide=_kept(files, name, wide) or png,
+                plays=f"#{PLAY}" if shown.get("plays") and "svg" in wide else "",
                 narrow=_kept(files, f"{name}-narrow", narrow),
                 media=NARROW,
                 alt=escape(alternative(shown["finding"], settings["image"]["alt"])),
@@ -67,6 +69,7 @@ def beside(markdown: str, folder: Path) -> str:
         picture = PICTURE.format(
             png=f"../{wide}",
             wide=f"../{wide}",
+            plays="",
             narrow=f"../{narrow}",
             media=NARROW,
             alt=escape(found["alt"]),

@@ -19,9 +19,13 @@ from typing import Any, ParamSpec
 import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import display
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from nmpcrl import Matrix
+from nmpcrl.report.figures.moving import Way, playing
 
 PAGE: dict[Any, Any] = {
     "axes.spines.right": False,
@@ -97,6 +101,22 @@ class Drawn(Figure):
     panels: Panels  # rows and columns as they were asked for, wherever they stand
     across = 0  # columns side by side
 
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.ways: list[Way] = []
+
+    def moves(self, axes: Axes, artist: Artist, points: Matrix, stands: int) -> None:
+        """Let an artist play through a way.
+
+        Args:
+            axes: whose data the way is in.
+            artist: drawn at `points[stands]`.
+            points: shape (K, 2), at equal distances in time.
+            stands: see above.
+        """
+        artist.set_gid(f"way{len(self.ways)}")
+        self.ways.append(Way(artist, axes, points, stands))
+
     @property
     def finding(self) -> str:
         """The title, or those of the panels, in words."""
@@ -122,12 +142,16 @@ class Drawn(Figure):
                 self.savefig(file, format=kind, **options)
             finally:
                 self.set_layout_engine("none")  # what is laid out stays so
-        return file.getvalue()
+        data = file.getvalue()
+        if kind == "svg" and self.ways:
+            return playing(data.decode(), self.ways).encode()
+        return data
 
     def _ipython_display_(self) -> None:
         shown: dict[str, Any] = {"text/plain": self.finding, "image/png": self._png()}
         if FOR_PAGE in os.environ:
             shown[MIME] = {"finding": self.finding, "wide": self._file()}
+            shown[MIME]["plays"] = bool(self.ways)
             shown[MIME]["pdf"] = b64encode(self.written("pdf")).decode()
             if self.again is not None:
                 shown[MIME]["narrow"] = self._on(NARROW)

@@ -1,0 +1,99 @@
+"""Robots among obstacles that move, as each of three NMPCs sees them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.analysis.encounters import Encounters
+from nmpcrl.claims.world_questions import VIEWS
+from nmpcrl.report.figures.axes import below
+from nmpcrl.report.figures.sheet import Drawn, sheet
+from nmpcrl.report.figures.style import BAND, INK, QUIET, SUBTITLE, TEAL, WINE, headed, mosaic, page
+from nmpcrl.study import paper
+from nmpcrl.study.motions import PERIOD, Motion, centres
+from nmpcrl.study.world import CLEARANCE, TASK
+
+TITLES = {"known": "knows the motion", "extrapolated": "extrapolates", "frozen": "as if they stood"}
+LINES: Mapping[str, dict[str, Any]] = {
+    "known": {"color": TEAL, "linestyle": "-"},
+    "extrapolated": {"color": "#B37A00", "linestyle": (0, (5, 1))},
+    "frozen": {"color": WINE, "linestyle": "-."},
+}
+PANELS = (("known", "extrapolated", "frozen"), ("near",) * 3)
+AROUND = 0.6  # of the map, beyond start and target [m]
+ROOM = 2.0  # of the map, above and below every way [m]
+
+
+@page
+def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
+    """A map for each view, and how near the robot comes to an obstacle; all of it plays.
+
+    What stands still is the moment at which a robot is deepest in an obstacle, or nearest to one.
+
+    Args:
+        motions: of the obstacles.
+        seen: by view, the episode in which the obstacles were seen so.
+    """
+    figure, panels = mosaic(PANELS, (1.6, 1), 4.6, (2.1, 2.1, 2.1, 1.7))
+    assert isinstance(figure, Drawn)
+    at = centres(motions, np.arange(paper.STEPS))
+    near = {view: _near(one.states[: paper.STEPS], at) for view, one in seen.items()}
+    moment = int(np.argmin(near[min(near, key=lambda view: near[view].min())]))
+    ways = {view: one.states[: paper.STEPS, :2] for view, one in seen.items()}
+    every = np.vstack([*ways.values()])
+    low, high = every.min(axis=0) - [AROUND, ROOM], every.max(axis=0) + [AROUND, ROOM]
+    for view in VIEWS:
+        panels[view].set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        _map(figure, panels[view], at, ways[view], moment, view)
+    _curves(figure, panels["near"], near, moment)
+    counts = {view: seen[view].counted.inside for view in VIEWS}
+    known, extrapolated, frozen = counts.values()
+    return headed(
+        figure,
+        f"States inside an obstacle: {known} if the motion is known, {extrapolated} if it is"
+        f" extrapolated, {frozen} if obstacles are taken as standing",
+    )
+
+
+def _near(states: Matrix, at: Matrix) -> Vector:
+    """The distance from the robot to the nearest obstacle, below 0 inside it [m]."""
+    away = np.linalg.norm(states[:, None, :2] - at[: len(states)], axis=2)
+    nearest: Vector = away.min(axis=1) - CLEARANCE / 2
+    return nearest
+
+
+def _map(figure: Drawn, axes: Axes, at: Matrix, way: Matrix, moment: int, view: str) -> None:
+    """Where everything is at one moment, and its way."""
+    radius, moment = TASK.robot_diameter / 2, min(moment, len(way) - 1)
+    for j in range(at.shape[1]):
+        axes.plot(*at[:, j].T, color=QUIET, linewidth=0.8, zorder=1)
+        disc = Circle(at[moment, j], CLEARANCE / 2 - radius, fc="#CFCFCF", ec="#8A8A8A", zorder=2)
+        figure.moves(axes, axes.add_patch(disc), at[:, j], moment)
+    axes.plot(*way.T, **LINES[view], linewidth=1.8, zorder=3)
+    robot = Circle(way[moment], radius, fc=LINES[view]["color"], ec="white", lw=0.8, zorder=4)
+    figure.moves(axes, axes.add_patch(robot), way, moment)
+    axes.plot(*TASK.target[:2], "*", color=INK, ms=9, zorder=3)
+    first = view == VIEWS[0] or sheet().narrow
+    axes.set(xlabel="x [m]", ylabel="y [m]" if first else "")
+    axes.tick_params(labelleft=first)
+    axes.set_title(TITLES[view], **SUBTITLE)
+
+
+def _curves(figure: Drawn, axes: Axes, near: Mapping[str, Vector], moment: int) -> None:
+    """The distance to the nearest obstacle over time."""
+    seconds = PERIOD * np.arange(paper.STEPS)
+    axes.axhspan(min(one.min() for one in near.values()) - 0.1, 0, **BAND)
+    for view, distances in near.items():
+        points, now = np.c_[seconds[: len(distances)], distances], min(moment, len(distances) - 1)
+        axes.plot(*points.T, label=TITLES[view], **LINES[view])
+        (dot,) = axes.plot(*points[now], "o", color=LINES[view]["color"], ms=5, clip_on=False)
+        figure.moves(axes, dot, points, now)
+    axes.set(xlabel="time [s]", ylabel="to the nearest\nobstacle [m]", xlim=(0, seconds[-1]))
+    axes.set_title("grey: inside an obstacle", **SUBTITLE)
+    axes.margins(y=0)
+    below(figure, axes.get_lines()[::2])

@@ -1,0 +1,83 @@
+"""Worlds that move, change, or are not the model, as a chapter shows them."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl.analysis.encounters import Encounters
+from nmpcrl.claims.population import Answer
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.world_questions import ORACLES, PARTS, WITHOUT, WORLD_QUESTIONS
+from nmpcrl.report.remedies import answer_items
+from nmpcrl.report.text import listed
+from nmpcrl.study import paper
+from nmpcrl.study.motions import Motion, centres
+from nmpcrl.study.world import CLEARANCE
+
+OWN = ("oracle", "ES", "ES+model", "grid")  # policies of a wrong model that are compared
+MOVING = (
+    "a velocity is enough", "a frozen view costs more", "collisions", "crowding",
+    "learning among moving obstacles", "learning or looking",
+    "one number by hand among moving obstacles", "safer by learning",
+)  # fmt: skip
+MODEL = (
+    "a perfect model", "misfit of theta_c", "only drift adds", "recovered by weights",
+    "noise and the gradient",
+)  # fmt: skip
+CHANGING = tuple(name for name in WORLD_QUESTIONS if name not in (*MOVING, *MODEL))
+Saved = Mapping[str, Mapping[str, pd.Series]]
+
+
+def saved(costs: pd.DataFrame) -> Saved:
+    """By fault and policy, the share of theta_init's cost that is saved in each layout.
+
+    Args:
+        costs: of `claims.world.means`, of the part "model".
+    """
+    found = {
+        fault: {
+            how: (1 - costs[f"{fault} {how}"] / costs[f"{fault} init"]).dropna()
+            for how in OWN
+            if f"{fault} {how}" in costs
+        }
+        for fault in (*ORACLES, *WITHOUT)
+    }
+    return {fault: by for fault, by in found.items() if len(by["ES"])}
+
+
+def by_policy(found: Saved) -> dict[str, dict[str, pd.Series]]:
+    """`saved` the other way round."""
+    return {how: {fault: by[how] for fault, by in found.items() if how in by} for how in OWN}
+
+
+def decided(answers: Iterable[Answer]) -> dict[str, str]:
+    """How many questions are answered how, and in words how many wait for their runs."""
+    outcomes = [one.outcome for one in answers]
+    waiting = outcomes.count(UNDECIDABLE)
+    return {
+        "asked": str(len(outcomes)),
+        "confirmed": str(outcomes.count(REPRODUCED)),
+        "partly": str(outcomes.count(PARTLY)),
+        "contradicted": str(outcomes.count(NOT)),
+        "open": f"{waiting} wait for runs that are not published yet." if waiting else "",
+    }
+
+
+def deepest(one: Encounters, motions: Sequence[Motion]) -> float:
+    """How far inside an obstacle the robot gets at most [m]; 0 if it never does."""
+    states = one.states[: paper.STEPS, :2]
+    away = np.linalg.norm(states[:, None] - centres(motions, np.arange(len(states))), axis=2)
+    return float(max(0.0, CLEARANCE / 2 - away.min()))
+
+
+def answered(answers: Iterable[Answer], names: Sequence[str]) -> str:
+    """Those of these questions that published runs answer, one item each, in Markdown."""
+    there = [one for one in answers if one.question in names and one.outcome != UNDECIDABLE]
+    return answer_items(there, WORLD_QUESTIONS)
+
+
+def waiting(table: pd.DataFrame) -> str:
+    """Which parts are not published yet, in a sentence; nothing if all are."""
+    missing = [f'"{part}"' for part in PARTS if not (table.part == part).any()]
+    return f"The runs of {listed(missing)} are not published yet." if missing else ""

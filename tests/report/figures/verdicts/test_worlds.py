@@ -1,0 +1,48 @@
+"""Figures of worlds that move, change, or are not the model: titles follow from the numbers."""
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl.claims.world_questions import VIEWS
+from nmpcrl.report.figures.verdicts import worlds as figures
+
+SCENARIOS = [f"M{i:02}" for i in range(1, 21)]
+COSTS = {"init": 100.0, "ES": 98.0, "grid": 92.0, "CMA-ES": 90.0}
+INSIDE = {"init": 15, "ES": 4, "grid": 1, "CMA-ES": 3}
+
+
+def test_the_title_says_what_policies_save_and_keep_out_of_obstacles():
+    arms = {f"{view} {how}": cost for view in VIEWS for how, cost in COSTS.items()}
+    costs = pd.DataFrame({arm: np.full(20, cost) for arm, cost in arms.items()}, index=SCENARIOS)
+    met = pd.DataFrame(
+        {arm: np.arange(20) < INSIDE[arm.split()[1]] for arm in arms}, index=SCENARIOS, dtype=float
+    )
+    figure = figures.policies(costs, met)
+    assert "by hand saves 8% and ES 2%" in figure.finding
+    assert "inside in 1 and 4 scenarios instead of 15" in figure.finding
+    left, right = figure.axes
+    assert [len(axes.get_lines()) for axes in (left, right)] == [len(VIEWS) + 1, len(VIEWS)]
+    by_view = right.get_lines()[1].get_xdata()
+    assert [*by_view] == [INSIDE[how] / 20 for how in figures.POLICIES]
+
+
+def test_of_a_wrong_model_each_fault_has_its_policies_and_the_title_their_medians():
+    layouts = pd.Series([0.02, 0.03, 0.04])
+    by = {"ES": layouts, "ES+model": layouts - 0.01, "grid": layouts + 0.03}
+    figure = figures.models({"speed": by | {"oracle": layouts - 0.035}, "lag": by})
+    assert figure.finding == "The true model changes the cost by +0.5%, theta_c by hand by −6.0%"
+    (axes,) = figure.axes
+    counts = {line.get_label(): len(line.get_xdata()) for line in axes.get_lines()[:4]}
+    assert counts["true model"] == 1
+    assert counts["ES"] == 2
+
+
+def test_after_a_change_each_arm_has_a_line_and_the_title_where_two_end():
+    shares = {arm: [np.linspace(1, end, 60) for _ in range(4)]
+              for arm, end in zip(figures.ARMS, (0.9, 0.92, 1.2, 1.3), strict=True)}  # fmt: skip
+    figure = figures.shifts(shares, 150)
+    assert "costs 90% of replanning" in figure.finding
+    assert "120% if it never is" in figure.finding
+    lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
+    assert {label for label, _ in figures.ARMS.values()} <= {*lines}
+    assert lines["ES, told"].get_xdata()[[0, -1]].tolist() == [5, 300]

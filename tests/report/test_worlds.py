@@ -1,0 +1,56 @@
+"""What the chapter on a world that changes says of published runs."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nmpcrl.analysis.encounters import Counted, Encounters
+from nmpcrl.claims.population import Answer
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.world_questions import ORACLES, PARTS, WORLD_QUESTIONS
+from nmpcrl.report import worlds
+from nmpcrl.study import paper
+from nmpcrl.study.motions import still
+
+
+def test_each_question_is_in_one_section_of_the_chapter():
+    assert sorted((*worlds.MOVING, *worlds.MODEL, *worlds.CHANGING)) == sorted(WORLD_QUESTIONS)
+
+
+def test_what_is_saved_is_a_share_of_the_same_layout_and_there_is_no_oracle_of_a_lag():
+    costs = pd.DataFrame(index=["J001", "J002"])
+    for fault in (*ORACLES, "lag"):
+        costs[f"{fault} init"] = [100.0, 200.0]
+        for how in worlds.OWN if fault in ORACLES else worlds.OWN[1:]:
+            costs[f"{fault} {how}"] = [90.0, np.nan] if how == "grid" else [95.0, 190.0]
+    costs["noise init"] = costs["noise ES"] = costs["noise ES+model"] = costs["noise grid"] = np.nan
+    found = worlds.saved(costs)
+    assert [*found] == [*ORACLES, "lag"]  # noise has no runs
+    assert "oracle" not in found["lag"]
+    assert found["speed"]["grid"].to_dict() == pytest.approx({"J001": 0.1})
+    assert worlds.by_policy(found)["ES"]["lag"].tolist() == pytest.approx([0.05, 0.05])
+
+
+def test_what_waits_for_its_runs_is_counted_and_not_listed():
+    outcomes = (REPRODUCED, REPRODUCED, PARTLY, NOT, UNDECIDABLE)
+    given = [Answer(name, outcome, {"layouts": (1, 2)})
+             for name, outcome in zip(WORLD_QUESTIONS, outcomes, strict=False)]  # fmt: skip
+    said = worlds.decided(given)
+    assert [said[name] for name in ("asked", "confirmed", "partly", "contradicted")] == [*"5211"]
+    assert said["open"].startswith("1 wait for runs")
+    assert worlds.decided(given[:4])["open"] == ""
+    listed = worlds.answered(given, [*WORLD_QUESTIONS][1:5])
+    assert [line[:4] for line in listed.splitlines()] == ["- **"] * 3
+
+
+def test_the_parts_that_are_not_published_are_named():
+    there = pd.DataFrame({"part": [part for part in PARTS if part != "carry"]})
+    assert worlds.waiting(there) == 'The runs of "carry" are not published yet.'
+    assert worlds.waiting(pd.DataFrame({"part": [*PARTS]})) == ""
+
+
+def test_how_deep_a_robot_is_inside_is_measured_from_the_edge_of_what_it_must_not_touch():
+    states = np.zeros((paper.STEPS + 1, 3))
+    one = Encounters(states, 0.0, Counted(0, 0), arrived=False)
+    assert worlds.deepest(one, still([(3.0, 0.0), (1.0, 0.0)])) == pytest.approx(0.25)
+    assert worlds.deepest(one, still([(3.0, 0.0)])) == 0
