@@ -19,6 +19,7 @@ def ahead(answer: Any, *, steps: float = 10) -> Outcome:
         answer,
         now + steps * (now - before),
         tolerance=0.001,
+        unit="m",
         mistakes={
             now + (now - before): "That is one step ahead.",
             now - steps * (now - before): "It moves up: now minus before, not before minus now.",
