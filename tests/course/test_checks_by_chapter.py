@@ -31,21 +31,8 @@ from nmpcrl.study import paper
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 CALLED = re.compile(r"check\.(\w+)")
-BY_HAND = [
-    "1.7",
-    "2.7",
-    "3.8",
-    "4.8",
-    "5.8",
-    "6.9",
-    "7.9",
-    "8.8",
-    "9.7",
-    "10.6",
-    "11.6",
-    "12.7",
-    "13.7",
-]
+BY_HAND = ["1.7", "2.7", "3.8", "4.8", "5.8", "6.9", "7.9", "8.8", "9.7", "10.6", "11.6"]
+BY_HAND += ["12.7", "13.7"]
 FEATURES = np.linspace(100.0, 1100.0, 9)
 SQUARED = float(FEATURES @ FEATURES)
 
