@@ -1,14 +1,15 @@
 """Worlds that move, change, or are not the model: what a view, a policy and learning are worth."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator, PercentFormatter
+from matplotlib.ticker import MaxNLocator, MultipleLocator, PercentFormatter
 
+from nmpcrl import Matrix
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
 from nmpcrl.analysis.worlds import EVERY
 from nmpcrl.claims.world_questions import VIEWS
@@ -30,12 +31,19 @@ FAULTS = {  # as a figure names them
     "speed": "speed lost", "turn": "turns too much", "drift": "drift", "slip": "wheels slip",
     "lag": "lag", "noise": "measurement noise",
 }  # fmt: skip
-ARMS: Mapping[str, tuple[str, dict[str, Any]]] = {  # that are shown after a change
-    "ES told plain": ("ES, told", {"color": "#0072B2", "linestyle": "-"}),
-    "ES told reset": (r"ES, told, $\theta$ reset", {"color": TEAL, "linestyle": (0, (5, 1))}),
-    "ES never plain": ("ES, never told", {"color": WINE, "linestyle": "-."}),
-    "frozen never plain": (r"$\theta_\mathrm{init}$, never told", {"color": INK, "linestyle": ":"}),
-}
+ARMS: Mapping[str, Mapping[str, tuple[str, dict[str, Any]]]] = {  # by panel: label and look
+    "told of the change": {
+        "ES told plain": ("ES", {"color": "#0072B2", "linestyle": "-"}),
+        "ES told reset": (r"ES, $\theta$ reset", {"color": TEAL, "linestyle": (0, (5, 1))}),
+        "RDES told plain": ("RDES", {"color": "#B37A00", "linestyle": (0, (2, 1))}),
+    },
+    "never told": {
+        "ES never plain": ("ES, never told", {"color": WINE, "linestyle": "-."}),
+        "frozen never plain": (
+            r"$\theta_\mathrm{init}$, never told", {"color": INK, "linestyle": ":"},
+        ),
+    },
+}  # fmt: skip
 SIZE, ROW = 5.0, 0.55  # of a mark [points], and of a row [inches]
 
 
@@ -107,7 +115,7 @@ def models(saved: Mapping[str, Mapping[str, pd.Series]]) -> Figure:
 
 
 @page
-def shifts(shares: Mapping[str, Iterable[Sequence[float]]], change: int) -> Figure:
+def shifts(shares: Mapping[str, Sequence[Sequence[float]]], change: int) -> Figure:
     """What each arm costs before and after the one change, beside replanning with theta_init.
 
     Args:
@@ -115,30 +123,35 @@ def shifts(shares: Mapping[str, Iterable[Sequence[float]]], change: int) -> Figu
             `EVERY` episodes; a sequence a run.
         change: the episode that brings it.
     """
-    figure, axes = subplots(height=3.4)
-    axes.axhline(1, **LIMIT)
-    axes.axvline(change, **LIMIT)
-    for arm, runs in shares.items():
-        label, look = ARMS[arm]
-        each = np.array([*runs], float)
-        estimates = [_middle(pd.Series(column)) for column in each.T]
-        episodes = EVERY * np.arange(1, len(estimates) + 1)
-        axes.plot(episodes, [one.value for one in estimates], label=label, **look)
-        low, high = ([getattr(one, end) for one in estimates] for end in ("low", "high"))
-        axes.fill_between(episodes, low, high, color=look["color"], alpha=0.15, linewidth=0)
-    over_episodes(axes)
-    axes.set(ylabel=r"cost over $\theta_\mathrm{init}$, told", xlim=(0, episodes[-1]))
-    axes.yaxis.set_major_formatter(PercentFormatter(1, 0))
-    below(figure, axes.get_legend_handles_labels()[0])
-    ends = {
-        arm: _middle(pd.Series([run[-1] for run in runs])).value for arm, runs in shares.items()
-    }
-    told, never = ends["ES told plain"], ends["ES never plain"]
+    figure, panels = subplots(1, len(ARMS), 3.3)
+    for axes, (title, arms) in zip(panels, ARMS.items(), strict=True):
+        axes.axhline(1, **LIMIT)
+        axes.axvline(change, **LIMIT)
+        for arm, (label, look) in arms.items():
+            _course(axes, np.array([*shares[arm]], float), label, look)
+        axes.yaxis.set_major_formatter(PercentFormatter(1, 0))
+        axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+        axes.set_title(title, **SUBTITLE)
+        over_episodes(axes)
+    panels[0].set_ylabel(r"cost over $\theta_\mathrm{init}$, told")
+    below(figure, [line for axes in panels for line in axes.get_legend_handles_labels()[0]])
+    told, never = (float(np.median([run[-1] for run in shares[arm]]))
+                   for arm in ("ES told plain", "ES never plain"))  # fmt: skip
     return headed(
         figure,
         f"At the end ES costs {told:.0%} of replanning without learning if it is told of the"
         f" change, and {never:.0%} if it never is",
     )
+
+
+def _course(axes: Axes, runs: Matrix, label: str, look: dict[str, Any]) -> None:
+    """The middle of some runs over the episodes, with its interval."""
+    estimates = [_middle(pd.Series(column)) for column in runs.T]
+    values, low, high = np.array([(one.value, one.low, one.high) for one in estimates]).T
+    episodes = EVERY * np.arange(1, len(values) + 1)
+    axes.fill_between(episodes, low, high, color=look["color"], alpha=0.15, linewidth=0)
+    axes.plot(episodes, values, label=label, **look)
+    axes.set_xlim(0, episodes[-1])
 
 
 def _marks(axes: Axes, rows: Any, estimates: Sequence[Estimate], look: dict[str, Any]) -> None:
