@@ -86,6 +86,22 @@ def test_keys_move_places_and_velocities_and_the_margin(tab):
     assert_equal_to_python(shown)
 
 
+def test_a_shorter_arrow_on_the_left_makes_the_second_robot_the_cheaper_one(tab):
+    tab.press("Obstacle 1, velocity", "ArrowDown")
+    robots = tab.shown()["found"]
+    assert robots["frozen"]["costs"][-1] < robots["extrapolated"]["costs"][-1]
+
+
+def test_a_finger_drags_an_arrow(opened):
+    tab = opened(FIGURE, viewport={"width": 390, "height": 844}, has_touch=True).begun()
+    tab.see()
+    tab.swipe(tab.middle("Obstacle 1, velocity"), (30, 0))
+    vx, vy = tab.shown()["given"]["movers"][0][2:]
+    assert vx > 0.15
+    assert vy > 0.15
+    assert_equal_to_python(tab.shown())
+
+
 def test_no_obstacle_is_faster_than_a_metre_a_second(tab):
     tab.press("Obstacle 1, velocity", *["Shift+ArrowUp"] * 5)
     assert tab.shown()["given"]["movers"][0][2:] == [0, 1]

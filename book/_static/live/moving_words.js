@@ -18,8 +18,8 @@
     time: "Time",
     seconds: (seconds) => `${fixed(seconds, 1)} s`,
     // With symbols.
-    questions: "Which {c} keeps the second robot out of every obstacle, and what does that cost it? Which arrow makes "
-      + "the first robot dearer than the second?",
+    questions: "Which {c} keeps the second robot out of every obstacle, and what does it then cost? Shorten the arrow on "
+      + "the left a little: which robot is cheaper now?",
     reset: "Reset all",
     legend: "Thin lines: each robot's whole way. Thick lines: the part that is driven. Dots: its plan at the time shown. A "
       + "robot that is inside an obstacle's dashed circle has a red ring.",
