@@ -217,11 +217,13 @@ class Controller:
         self.module("plant_step", states, actions, later)
         return self.module.read(later, self.nmpc.plant.n)
 
-    def cost(self, state, action):
-        """As `Task.stage_cost`."""
+    def cost(self, state, action, discs=None):
+        """As `Task.stage_cost`; obstacles may be elsewhere from now on."""
         states, _, actions, *_ = self._at
         self.module.write(states, state)
         self.module.write(actions, action)
+        if discs is not None:
+            self.module.write(self._discs, np.ravel(discs))
         return self.module("stage_cost", self.discs, self._discs, self._target, states, actions)
 
 
@@ -264,8 +266,15 @@ class ProblemController:
     def _places(self, *names: str) -> list[int]:
         return [self.at[name] for name in names]
 
+    def begin(self, state, theta, data=None):
+        """As `Nmpc.solve` where there is neither a warm start nor an action."""
+        self._write(state=state, theta=theta, data=self.data if data is None else data)
+        given = self._places("data", "state", "theta")
+        end = self.module("nmpc_begin", *given, 1e-8, *self._places("out", "report"))
+        return self._found(end, 0)
+
     def solve(self, state, theta, warm_start=None, action=None, data=None):
-        """As `Nmpc.solve`; data are those of all stages.
+        """As `Nmpc.solve` with one cold start; data are those of all stages.
 
         Raises:
             ArithmeticError: no optimum was found; with the end.
@@ -286,6 +295,9 @@ class ProblemController:
             1e-8,
             *self._places("out", "report"),
         )
+        return self._found(end, fixed)
+
+    def _found(self, end, fixed):
         if end:
             raise ArithmeticError(end)
         value, iterations, restarts, *_ = self.module.read(self.at["report"], 5)

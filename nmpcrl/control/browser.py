@@ -12,7 +12,7 @@ from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.solvers import problem_stages, riccati, stages
 from nmpcrl.control.solvers.charge import DISCS, LONGEST
-from nmpcrl.control.solvers.starts import random_inputs
+from nmpcrl.control.solvers.starts import cold_inputs, random_inputs
 from nmpcrl.control.task import Task
 from nmpcrl.control.units import sizes_in
 
@@ -30,6 +30,42 @@ RANDOM_INPUTS = np.array({inputs})
 
 @njit(error_model="numpy", forceinline=True)
 '''
+BEGIN = f'''"""What `Riccati` does where nothing is known: the best plan of several cold starts."""
+
+import numpy as np
+from numba import carray, float64, int32, njit
+
+from .entries import *
+from .settled import COLD_INPUTS
+
+
+@njit(int32(address, address, address, float64, address, address), error_model="numpy")
+def nmpc_begin(data, state, theta, tolerance, out, report):
+    """As `nmpc_solve` with u_0 free and no warm start; the arguments are as there."""
+    end = nmpc_solve(data, state, theta, out, 0, UNKNOWN, out, tolerance, out, report)
+    sizes, (z, lam) = sizes_of(0), lengths(N, ROWS, 0)
+    size, report_ = len(sizes) + NTHETA, carray(report, 5)
+    result, other = carray(out, size), np.empty(size)
+    for k in range(len(COLD_INPUTS) if end == SOLVED else 0):
+        point = np.zeros(2 * z + lam)
+        for i in range(N):
+            for a in range(NU):
+                point[i * (NX + NU + ROWS) + NX + a] = COLD_INPUTS[k, i, a]
+        value, iterations, ended, _, error = solve(
+            carray(data, DATA.shape), LOWER.copy(), UPPER.copy(), KIND[0].copy(),
+            DISCOUNT.copy(), WEIGHTS.copy(), FACTOR, TIE,
+            divided(carray(state, NX), STATES), carray(theta, NTHETA), np.zeros(NU), 0,
+            COLD, COLD_LIMIT, tolerance, point, other,
+        )
+        if int(ended) == SOLVED and value < report_[0] - {riccati.CLEARLY} * abs(report_[0]):
+            report_[0], report_[1], report_[4] = value, iterations, error
+            for j in range(size):
+                result[j] = other[j] * (sizes[j] if j < len(sizes) else 1.0)
+    return end
+
+
+EXPORTS = (nmpc_begin,)
+'''
 
 
 def module(of: Plant | Problem, task: Task | None = None) -> bytes:
@@ -37,8 +73,8 @@ def module(of: Plant | Problem, task: Task | None = None) -> bytes:
 
     Target, obstacles, box, horizon and discount are arguments of its functions, which
     `solvers.entries` describes; the plant and the rest of the task are compiled in. Of a `Problem`
-    all but data and theta are, and `solvers.rows_entries` describes the functions. Made once, in
-    about a minute, and kept with the machine code.
+    all but data and theta are, and `solvers.rows_entries` and `BEGIN` describe the functions. Made
+    once, in about a minute, and kept with the machine code.
 
     Raises:
         CannotCompile: the plant or the task holds an operation that is not known.
@@ -75,6 +111,7 @@ def _texts_of_problem(problem: Problem) -> dict[str, str]:
         "settled": _settled(problem, solved),
         "points": here.joinpath("points.py").read_text("utf-8"),
         "entries": here.joinpath("rows_entries.py").read_text("utf-8"),
+        "begin": BEGIN,
     }
 
 
@@ -85,6 +122,7 @@ def _settled(problem: Problem, solved: Problem) -> str:
               for fixed in (False, True)]  # fmt: skip
     data, lower, upper, free, discount, weights, factor, tie = points[0].problem
     inputs = [random_inputs(solved, seed, problem.horizon) for seed in range(riccati.PERTURBED)]
+    cold = cold_inputs(solved, problem.horizon, riccati.DEFAULT.starts_of(ocps[0]) - 1)
     arrays = {
         "LOWER": lower,
         "UPPER": upper,
@@ -99,6 +137,7 @@ def _settled(problem: Problem, solved: Problem) -> str:
         "THETA_LOWER": problem.theta_lower,
         "THETA_UPPER": problem.theta_upper,
         "RANDOM_INPUTS": np.array(inputs),
+        "COLD_INPUTS": np.reshape(cold, (-1, *inputs[0].shape)),
     }
     numbers = {
         "N": problem.horizon,

@@ -12,6 +12,7 @@ CHAPTERS = {  # of each live figure
     "chain": "04_ges",
     "learners": "04_ges",
     "runs": "05_results",
+    "moving": "changing_world",
     "laboratory": "laboratory",
 }
 ALSO = ("07_beyond", "why_learning_stops")  # have the figure of runs, too

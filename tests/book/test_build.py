@@ -20,6 +20,7 @@ from filelock import FileLock
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from raising import raising
 
+from nmpcrl.control import browser as alone
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
 from nmpcrl.study import paper
@@ -326,14 +327,17 @@ def test_the_page_that_judges_times_asks_only_for_theirs_beforehand():
 def test_what_live_figures_solve_with_is_compiled_ahead_if_it_can_be(known, monkeypatch):
     asked = []
 
-    def module(plant, task):
-        asked.append((plant.n, tuple(task.start)))
+    def module(*of):
+        asked.append(of)
         if not known:
             raise CannotCompile("tan")
 
     monkeypatch.setattr(browser, "module", module)
+    monkeypatch.setattr(alone, "module", module)
     train.compile_for_pages()
-    assert asked == [(3, paper.START)]
+    (plant, task), *problems = asked
+    assert (plant.n, tuple(task.start)) == (3, paper.START)
+    assert [one.data.shape for (one,) in problems] == [(paper.HORIZON + 1, 8)] * known
 
 
 def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):

@@ -56,7 +56,7 @@ def quadrotor() -> Problem:
 
 # At most in kB, with what is drawn around: states, actions.
 PROBLEMS = {
-    gros_zanon.problem: (90, ([0.0, -1.0], [1.0, 1.0]), (-1.0, 1.0)),
+    gros_zanon.problem: (95, ([0.0, -1.0], [1.0, 1.0]), (-1.0, 1.0)),
     quadrotor: (140, ([-1, -1, -0.3, -1, -1, -0.5], [1, 1, 0.3, 1, 1, 0.5]), (1.0, 5.0)),
 }
 
@@ -69,6 +69,7 @@ def test_values_gradients_and_slopes_are_those_of_the_machine_code(make):
     data = browser.module(problem)
     assert len(data) < 1000 * most
     nmpc, module = Nmpc(problem, solver=Riccati(starts=1)), ProblemController(Module(data))
+    several = Nmpc(problem)
     np.testing.assert_array_equal(module.theta, problem.theta)
     np.testing.assert_array_equal(module.data, problem.data.ravel())
     rng, n, m, N = np.random.default_rng(3), problem.states, problem.inputs, problem.horizon
@@ -89,6 +90,9 @@ def test_values_gradients_and_slopes_are_those_of_the_machine_code(make):
         np.testing.assert_allclose(theirs["action"], ours.action, rtol=1e-9, atol=1e-9)
         warm, kept = ours, theirs
         if k % 6 == 0:
+            assert module.begin(state, theta)["value"] == pytest.approx(
+                several.solve(state, theta).value, rel=1e-11, abs=1e-11
+            )
             weights, along = np.zeros((N + 1, n)), rng.normal(size=theta.size)
             inputs = np.zeros((N, m))
             found = module.slopes(state, theta, theirs, along, weights, inputs, action)

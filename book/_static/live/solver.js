@@ -173,5 +173,5 @@
     };
   }
 
-  self.nmpcrl = { ...self.nmpcrl, solver, unpack, sources: [...(self.nmpcrl?.sources ?? []), solving] };
+  self.nmpcrl = { ...self.nmpcrl, solver, instance, unpack, sources: [...(self.nmpcrl?.sources ?? []), solving] };
 })();

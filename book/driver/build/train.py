@@ -29,15 +29,17 @@ def compiling_for_pages() -> Iterator[None]:
 
 
 def compile_for_pages() -> None:
-    """Compile that module, unless it is kept; where it cannot be had, the figures say so."""
+    """Compile these modules, unless they are kept; where they cannot be had, the figures say so."""
+    from nmpcrl.control import browser as alone
     from nmpcrl.control.codegen.source import CannotCompile
     from nmpcrl.learning import browser
-    from nmpcrl.study import Experiment
+    from nmpcrl.study import Experiment, world
     from nmpcrl.study.setup import controller_of
 
     nmpc = controller_of(Experiment()).nmpc
     with suppress(CannotCompile):
         browser.module(nmpc.plant, nmpc.task)
+        alone.module(world.problem())
 
 
 def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:

@@ -9,6 +9,7 @@ Without scripts a page shows nothing of it, and a notebook that is not trusted, 
 from nmpcrl.report.live.closed_loop import controller
 from nmpcrl.report.live.expected_sarsa import gradient, kink, update
 from nmpcrl.report.live.introduction import intro
+from nmpcrl.report.live.moving_obstacles import moving
 from nmpcrl.report.live.published_runs import runs
 from nmpcrl.report.live.training import laboratory
 from nmpcrl.report.live.two_learners import learners, networks
@@ -22,6 +23,7 @@ __all__ = [
     "kink",
     "laboratory",
     "learners",
+    "moving",
     "networks",
     "runs",
     "update",

@@ -1,0 +1,96 @@
+"""The figure of moving obstacles: what it is given, and that its modules drive as Python does."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+from wasm_host import Controller, Module, ProblemController
+
+from nmpcrl.analysis.encounters import count, judged
+from nmpcrl.control import browser as alone
+from nmpcrl.learning import browser
+from nmpcrl.report import live
+from nmpcrl.report.live import frame, moving_obstacles
+from nmpcrl.report.live.moving_obstacles import SCENE
+from nmpcrl.study import paper, world
+from nmpcrl.study.motions import PREDICTORS, Straight, centres
+
+THETA = np.array(paper.THETA_INIT)
+ON_THE_START = (Straight((-1.5, 1.4), (0.1, 0.1)), *SCENE[1:])
+
+
+@pytest.fixture(scope="module")
+def shown() -> str:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(browser, "module", lambda plant, task: b"abc")
+        patch.setattr(alone, "module", lambda problem: b"def")
+        return live.moving().data
+
+
+@pytest.fixture(scope="module")
+def data(shown) -> dict:
+    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
+
+
+def test_its_files_are_those_of_a_figure_that_solves_and_a_second_module(shown):
+    modules = [frame.MODULE, frame.PROBLEM]
+    names = re.findall(r'data-file="([^"]+)"', shown)
+    styles = [frame.STYLE, *moving_obstacles.STYLES]
+    assert names == [*styles, *modules, *moving_obstacles.SCRIPTS]
+    assert "{ ...window.nmpcrl, problem_module: " in shown
+
+
+def test_it_is_given_the_studys_episode_and_clearance(data):
+    assert (data["start"], data["theta"]) == (list(paper.START), list(paper.THETA_INIT))
+    assert (data["steps"], len(data["movers"])) == (paper.STEPS, world.problem().data.shape[1] // 2)
+    assert {clearance for *_, clearance in data["problem"]["discs"]} == {world.CLEARANCE}
+    assert set(data["looks"]) < set(PREDICTORS)
+    movers = np.array(data["movers"])
+    seventh = movers[:, :2] + 7 * data["period"] * movers[:, 2:]
+    np.testing.assert_array_equal(seventh, centres(SCENE, [7])[0])
+
+
+def test_the_scene_shows_what_the_chapter_says():
+    """Who plans as if they stood gets inside; with a margin it does not, and pays for both."""
+    seen = {}
+    for c in (THETA[8], 0.301):
+        theta = np.array([*THETA[:8], c])
+        for view in moving_obstacles.LOOKS:
+            found = judged(world.controller(4), theta, world.World(SCENE, PREDICTORS[view]))
+            assert found.arrived
+            seen[view, c > 0.3] = found
+    assert seen["frozen", False].counted.inside > 20
+    for margin in (False, True):
+        assert seen["extrapolated", margin].counted.inside == 0
+        assert seen["frozen", margin].cost > 1.3 * seen["extrapolated", margin].cost
+    assert seen["frozen", True].counted.inside == 0
+
+
+@pytest.fixture(scope="module")
+def modules() -> tuple[Controller, ProblemController]:
+    nmpc = paper.controller(paper.task_among(one.centre for one in SCENE))
+    there = Controller(Module(browser.module(nmpc.plant, nmpc.task)), nmpc)
+    return there, ProblemController(Module(alone.module(world.problem())))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("view", moving_obstacles.LOOKS)
+@pytest.mark.parametrize("motions", [SCENE, ON_THE_START], ids=["scene", "on the start"])
+def test_the_modules_drive_as_python_does(modules, view, motions):
+    """With an obstacle at the start, the best of several cold starts is another than the first."""
+    (there, planner), state, plan = modules, np.array(paper.START), None
+    states, cost = [], 0.0
+    for t in range(paper.STEPS):
+        data = PREDICTORS[view](motions, t)
+        if plan is None:
+            plan = planner.begin(state, THETA, data)
+        else:
+            plan = planner.solve(state, THETA, plan, data=data)
+        discs = np.column_stack([centres(motions, [t])[0], [world.CLEARANCE] * len(motions)])
+        states.append(state)
+        cost += there.cost(state, plan["action"], discs)
+        state = there.step(state, plan["action"])
+    found = judged(world.controller(4), THETA, world.World(motions, PREDICTORS[view]))
+    assert cost == pytest.approx(found.cost, rel=1e-6)
+    assert count(np.array(states), motions) == found.counted
