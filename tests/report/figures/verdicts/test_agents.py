@@ -34,3 +34,13 @@ def test_the_title_says_from_when_on_the_median_matches_and_each_panel_has_both_
         assert len(axes.collections) == len(AGENT_LOOKS)
     assert ["best search" in str([line.get_label() for line in axes.get_lines()])
             for axes in figure.axes] == [True, True, False]  # fmt: skip
+
+
+def test_one_panel_alone_has_all_that_the_legend_needs_and_says_its_own_finding():
+    figure = courses({"layout A, 4 seeds": [made("TD3", 0.9, units=4)]}, {})
+    (axes,) = figure.axes
+    assert "TD3 from 300 episodes on" in figure.get_suptitle()
+    assert "SAC" not in figure.get_suptitle()
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        line.get_label() for line in axes.get_lines()
+    ]
