@@ -11,7 +11,6 @@ from nmpcrl.claims.agent_questions import AGENTS, PARTS, SEARCH, SEARCHED, SETTI
 from nmpcrl.claims.agents import Course, answers, course, rows, searched
 from nmpcrl.claims.population import Answer
 from nmpcrl.claims.remedies import RemedyRow
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.report.cited import Count, cited
 from nmpcrl.report.remedies import entry_named, share_shown
 from nmpcrl.report.tables import html_table
@@ -26,11 +25,6 @@ NOTHING: Mapping[str, str] = {  # what a part answers, as long as it is not publ
     "judge": f"what {listed(AGENTS)} cost after {BUDGET} episodes",
     "one": f"how long they take to match {INIT} in layout A",
     "all": "what one agent for all layouts comes to",
-}
-COSTS: Mapping[Outcome, str] = {  # by what became of the question whether one matches
-    REPRODUCED: f"no more than {INIT}",
-    PARTLY: f"no more than {INIT} in some layouts, and more in others",
-    NOT: f"more than {INIT}",
 }
 
 
@@ -68,7 +62,7 @@ def finding(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     judged, by = _courses(table, "judge"), _by(table, suite)
     if not judged:
         return ""
-    costs = [f"{_median(one)} times as much with {one.agent}" for one in judged]
+    costs = [f"{_median(one)} times as much ({one.agent})" for one in judged]
     less = [f"{_counted(by[f'{one.agent} or the best search'])} ({one.agent})" for one in judged]
     short = float(searched(suite, SEARCHED[0]).reindex(judged[0].units).median())
     shown = cited(f"{short:.2f}", short, f"cost over theta_init's, {SEARCH}: published")
@@ -149,15 +143,17 @@ def _courses(table: pd.DataFrame, part: str, among: Sequence[str] = ()) -> list[
 
 
 def _head(judged: Sequence[Course], by: Mapping[str, Answer]) -> str:
-    """Whether the agents match, without a full stop."""
-    alike: dict[Outcome, list[str]] = {}
-    for one in judged:
-        alike.setdefault(by[f"{one.agent} {MATCHES}"].outcome, []).append(one.agent)
-    said = [
-        f"{listed(names)} cost{'s' * (len(names) == 1)} {COSTS[outcome]}"
-        for outcome, names in alike.items()
-    ]
-    return f"After {BUDGET} episodes from nothing, {listed(said)}"
+    """In how many layouts the agents do not match, without a full stop."""
+    first, *others = (f"{one.agent}{{}} in {_more(by[f'{one.agent} {MATCHES}'])}" for one in judged)
+    said = [first.format(f" costs more than {INIT}"), *(one.format("") for one in others)]
+    return f"After {BUDGET} episodes from nothing, {listed(said)} layouts"
+
+
+def _more(answer: Answer) -> str:
+    """How many say no."""
+    ((yes, of),) = answer.counts.values()
+    more = Count(of - yes, of)
+    return cited(str(more), more, f"{answer.question}, not: published")
 
 
 def _median(one: Course) -> str:

@@ -58,23 +58,18 @@ def test_the_finding_says_of_each_agent_what_the_rule_does(suite):
     said = plain(finding(made("judge"), suite))
     assert said.startswith(
         r"**After 300 episodes from nothing, SAC costs more than $\boldsymbol{\theta}_\text{init}$"
-        r" and TD3 costs no more than $\boldsymbol{\theta}_\text{init}$**"
+        r" in 6 of 6 and TD3 in 0 of 6 layouts**: in the median 1.20 [1.20, 1.20] times as much"
     )
-    assert "1.20 [1.20, 1.20] times as much with SAC" in said
     assert "is at 0.95. Agents end below the search in 0 of 6 (SAC) and 0 of 6 (TD3)" in said
     assert "SAC costs less than TD3 in 0 of 6." in said
     assert "need not arrive" not in said
     assert "need not arrive" in finding(made("judge", there="-"), suite)
 
 
-def test_where_agents_are_alike_they_have_one_sentence(suite, monkeypatch):
-    monkeypatch.setitem(SHARES, "TD3", 1.1)
-    assert " SAC and TD3 cost more than" in in_short(made("judge"), suite)
-
-
 def test_an_agent_that_is_published_alone_is_shown_and_the_other_one_waited_for(suite):
     alone = made("judge", "one", "all", agents=["TD3"])
-    assert plain(finding(alone, suite)).count("SAC") == 0
+    assert "nothing, TD3 costs more than" in in_short(alone, suite)
+    assert "SAC" not in finding(alone, suite)
     assert waiting(alone) == waiting(NOTHING)
     assert [len(each) for each in panels(alone, suite)[0].values()] == [1, 1, 1, 1]
 
