@@ -128,8 +128,9 @@ def tuned() -> str:
     """How the agents were tuned."""
     tune, most = PARTS["tune"], max(map(len, SETTINGS.values()))
     return (
-        f"Each was tuned as each remedy was, with {number(most)} settings, in"
-        f" {number(len(tune.places))} layouts with {tune.budget} episodes, and the best was judged."
+        f"Each was tuned with {number(most)} settings, as a remedy is, but in"
+        f" {number(len(tune.places))} layouts with {tune.budget} episodes; the best was judged,"
+        f" with {number(PARTS['judge'].seeds)} seed a layout."
     )
 
 
