@@ -8,7 +8,7 @@ import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims.population import Answer
-from nmpcrl.claims.population_questions import Question
+from nmpcrl.claims.population_questions import WORDS, Question
 from nmpcrl.claims.remedies import Advice, RemedyRow, rows, shares, solved
 from nmpcrl.claims.remedy_questions import (
     ADVICE,
@@ -109,13 +109,13 @@ def _named(row: RemedyRow, runs: pd.DataFrame) -> tuple[str, ...]:
     if row.disqualified:
         each = ["disqualified"] * len(ended)
     count = f"{ended.sum()} of {len(ended)}"
-    return (_name(row.name), *each, count, f"{row.seconds:.1f} s")
+    return (entry_named(row.name), *each, count, f"{row.seconds:.1f} s")
 
 
 def _cells(one: Advice) -> tuple[str, ...]:
     judged = [one.rows.get(part) for part in ADVISED]
     return (
-        _name(_known(one).name),
+        entry_named(_known(one).name),
         f'<span class="{BADGES[COLOURS[one.word]]}">{one.word}</span>',
         *(_evidence(row) if row else NOTHING for row in judged),
     )
@@ -127,7 +127,7 @@ def _evidence(row: RemedyRow) -> str:
     return f"{_gain(row)}<br><small>{_solved(row)} layouts; {price}</small>"
 
 
-def _name(name: str) -> str:
+def entry_named(name: str) -> str:
     """An entry, and below it what is set."""
     entry, bracket, setting = name.partition("[")
     below = f"<br><small>{escape(setting.rstrip(']'))}</small>" if bracket else ""
@@ -137,10 +137,10 @@ def _name(name: str) -> str:
 def _gain(row: RemedyRow) -> str:
     """The share of the possible gain with its interval."""
     what = f"share of the possible gain, {row.entry}, {row.part}: published"
-    return cited(_shown(row.gain), row.gain, what)
+    return cited(share_shown(row.gain), row.gain, what)
 
 
-def _shown(share: Estimate) -> str:
+def share_shown(share: Estimate) -> str:
     """With its interval; a quarter of failures or more is infinitely bad."""
     text = f"{share:.2f}" if np.isfinite(share.low) else f"{share.value:.2f} [{share.low:.2f}, …]"
     return text.replace("-0.00", "0.00").replace("-", "−").replace("inf", "∞")
@@ -201,15 +201,28 @@ def expectation_items(expected: Mapping[str, bool]) -> str:
 
 
 def answer_items(
-    answers: Iterable[Answer], questions: Mapping[str, Question] = REMEDY_QUESTIONS
+    answers: Iterable[Answer],
+    questions: Mapping[str, Question] = REMEDY_QUESTIONS,
+    *,
+    expected: bool = False,
 ) -> str:
     """One item a question, in Markdown: the pilot, the question, and what became of it.
 
     Args:
         answers: in the order in which they are shown.
         questions: that they answer, by name; those on remedies unless said.
+        expected: whether to say which outcome was expected, where it is another.
     """
-    return "\n".join(_item(one, questions[one.question]) for one in answers)
+    return "\n".join(
+        _item(one, asked) + _otherwise(one, asked) * expected
+        for one, asked in ((one, questions[one.question]) for one in answers)
+    )
+
+
+def _otherwise(answer: Answer, asked: Question) -> str:
+    """Which outcome was expected, if another one."""
+    other = asked.expected != answer.outcome
+    return f" Expected: {WORDS.get(asked.expected, asked.expected)}." if other else ""
 
 
 def _item(answer: Answer, asked: Question) -> str:
@@ -217,7 +230,7 @@ def _item(answer: Answer, asked: Question) -> str:
     said = [f"{yes} of {of} {name}" for name, (yes, of) in answer.counts.items()]
     if "difference" in answer.numbers:
         found = Estimate(*(answer.numbers[name] for name in ("difference", "low", "high")))
-        said.append(f"the difference is {_shown(found)}")
+        said.append(f"the difference is {share_shown(found)}")
     said += [f"{entry} has {', '.join(each)}" for entry, each in _by_layout(answer.numbers).items()]
     return f"- **{asked.question}** {answer.words.capitalize()}: {'; '.join(said)}.{pilot}"
 

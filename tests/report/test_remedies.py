@@ -161,6 +161,14 @@ def test_an_answer_stands_beside_its_pilot():
     assert "The pilot" not in second
 
 
+def test_an_answer_that_was_not_expected_says_which_one_was():
+    both = [Answer("guard", one, {"layouts": (14, 15)}) for one in (REPRODUCED, NOT)]
+    same, other = answer_items(both, expected=True).splitlines()
+    assert REMEDY_QUESTIONS["guard"].expected == REPRODUCED
+    assert other.endswith(" Expected: confirmed.")
+    assert "Expected" not in same + answer_items(both)
+
+
 def test_an_answer_says_what_it_knows_of_single_layouts():
     numbers = {"CMA-ES in A": 0.984, "CMA-ES in F": 0.38, "ES in A": -0.53, "ES in F": -np.inf}
     said = answer_items([Answer("search and learning", REPRODUCED, {"layouts": (9, 9)}, numbers)])

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, NullLocator, PercentFormatter
 
@@ -47,7 +48,8 @@ def courses(panels: Mapping[str, Sequence[Course]], search: Mapping[str, float])
 
 def _draw(axes: Axes, one: Course) -> None:
     look, (low, high) = AGENT_LOOKS[one.agent], one.interval
-    axes.fill_between(one.episodes, low, high, color=look.color, alpha=0.2, linewidth=0)
+    axes.fill_between(one.episodes, low, high, facecolor=to_rgba(look.color, 0.15),
+                      edgecolor=look.color, linewidth=0.7, linestyle=look.linestyle)  # fmt: skip
     axes.plot(one.episodes, one.median, label=one.agent, marker=look.marker, markersize=4,
               **look.line)  # fmt: skip
     ticks = [tick for tick in TICKS if one.episodes[0] <= tick <= one.episodes[-1]]
@@ -57,11 +59,12 @@ def _draw(axes: Axes, one: Course) -> None:
 
 def _finding(each: Sequence[Course]) -> str:
     """When each agent matches, in a title."""
-    said = []
+    alike: dict[str, list[str]] = {}
     for one in each:
         _, always = one.matched
         until = f"from {always:.0f} episodes on" if np.isfinite(always) else (
             f"not by episode {one.episodes[-1]}"
         )  # fmt: skip
-        said.append(f"{one.agent} {until}")
+        alike.setdefault(until, []).append(one.agent)
+    said = [f"{' and '.join(names)} {until}" for until, names in alike.items()]
     return rf"From nothing, the median matches $\theta_\mathrm{{init}}$: {', '.join(said)}"

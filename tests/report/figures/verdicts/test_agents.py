@@ -34,3 +34,18 @@ def test_the_title_says_from_when_on_the_median_matches_and_each_panel_has_both_
         assert len(axes.collections) == len(AGENT_LOOKS)
     assert ["best search" in str([line.get_label() for line in axes.get_lines()])
             for axes in figure.axes] == [True, True, False]  # fmt: skip
+
+
+def test_agents_that_are_alike_stand_together_in_the_title():
+    title = courses({"layout A": [made("SAC", 1.05), made("TD3", 1.1)]}, {}).get_suptitle()
+    assert title.endswith("SAC and TD3 not by episode 300")
+
+
+def test_one_panel_alone_has_all_that_the_legend_needs_and_says_its_own_finding():
+    figure = courses({"layout A, 4 seeds": [made("TD3", 0.9, units=4)]}, {})
+    (axes,) = figure.axes
+    assert "TD3 from 300 episodes on" in figure.get_suptitle()
+    assert "SAC" not in figure.get_suptitle()
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        line.get_label() for line in axes.get_lines()
+    ]
