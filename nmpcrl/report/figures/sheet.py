@@ -102,6 +102,7 @@ class Drawn(Figure):
     across = 0  # columns side by side
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
+        """As a `Figure` begins; nothing of it moves."""
         super().__init__(*args, **kwargs)
         self.ways: list[Way] = []
 
