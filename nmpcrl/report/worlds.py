@@ -16,16 +16,6 @@ from nmpcrl.study.motions import Motion, centres
 from nmpcrl.study.world import CLEARANCE
 
 OWN = ("oracle", "ES", "ES+model", "grid")  # policies of a wrong model that are compared
-MOVING = (
-    "a velocity is enough", "a frozen view costs more", "collisions", "crowding",
-    "learning among moving obstacles", "learning or looking",
-    "one number by hand among moving obstacles", "safer by learning",
-)  # fmt: skip
-MODEL = (
-    "a perfect model", "misfit of theta_c", "only drift adds", "recovered by weights",
-    "noise and the gradient",
-)  # fmt: skip
-CHANGING = tuple(name for name in WORLD_QUESTIONS if name not in (*MOVING, *MODEL))
 Saved = Mapping[str, Mapping[str, pd.Series]]
 
 
@@ -71,10 +61,10 @@ def deepest(one: Encounters, motions: Sequence[Motion]) -> float:
     return float(max(0.0, CLEARANCE / 2 - away.min()))
 
 
-def answered(answers: Iterable[Answer], names: Sequence[str]) -> str:
-    """Those of these questions that published runs answer, one item each, in Markdown."""
-    there = [one for one in answers if one.question in names and one.outcome != UNDECIDABLE]
-    return answer_items(there, WORLD_QUESTIONS)
+def answered(answers: Iterable[Answer]) -> str:
+    """The questions that published runs answer, one item each, in Markdown."""
+    there = [one for one in answers if one.outcome != UNDECIDABLE]
+    return answer_items(there, WORLD_QUESTIONS, expected=True)
 
 
 def waiting(table: pd.DataFrame) -> str:

@@ -19,7 +19,7 @@
     seconds: (seconds) => `${fixed(seconds, 1)} s`,
     // With symbols.
     questions: "Which {c} keeps the second robot out of every obstacle, and what does it then cost? Shorten the arrow on "
-      + "the left a little: which robot is cheaper now?",
+      + "the left a little: which robot costs less now?",
     reset: "Reset all",
     legend: "Thin lines: each robot's whole way. Thick lines: the part that is driven. Dots: its plan at the time shown. A "
       + "robot that is inside an obstacle's dashed circle has a red ring.",
