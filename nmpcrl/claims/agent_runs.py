@@ -5,7 +5,7 @@ interrupted call goes on.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from nmpcrl.analysis.entries import called, entry_with
 from nmpcrl.analysis.kept import Wanted
 from nmpcrl.analysis.leaderboard import HELD_OUT
 from nmpcrl.claims.agent_questions import AGENTS, EVERY, LONG, PARTS, SETTINGS, SPARING
-from nmpcrl.claims.extendable import RUN
+from nmpcrl.claims.extendable import RUN, whole_arms
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.population import JUDGE, TUNE
@@ -146,19 +146,8 @@ def _share(made: Curve) -> float:
 
 def whole(parts: Iterable[str] = ORDER) -> pd.DataFrame:
     """The table of all that is kept of some parts, but arms that are not there whole."""
-    rows = []
-    for part in parts:
-        runs = planned(part)
-        there = KEPT.stored(runs)
-        missing = {one.entry for one in runs if one not in there}
-        rows += [_row(one, made) for one, made in there.items() if one.entry not in missing]
-    return pd.DataFrame(rows, columns=[*COLUMNS])
-
-
-def _row(one: Wanted, made: Curve) -> dict[str, Any]:
-    part, _, arm = one.entry.partition(": ")
-    k = one.seed - seed_of(one.layout, 0)
-    return {"part": part, "arm": arm, "place": one.layout, "k": k, **asdict(made)}
+    runs = (one for part in parts for one in planned(part))
+    return whole_arms(KEPT, runs, seed_of)
 
 
 def price(runs: Iterable[Wanted], measured: Mapping[Wanted, Curve]) -> float:

@@ -1,8 +1,8 @@
 """A file of its own beside the published study, to which parts are added and none is changed."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from nmpcrl.analysis.kept import Kept, Wanted
 from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place, sealed
 from nmpcrl.study.storage.atomic import write_json
 
@@ -66,6 +67,28 @@ class Extendable:
 
 
 RUN = ("part", "arm", "place", "k")  # what names a run, k being the number of the seed
+
+
+def whole_arms(
+    kept: Kept[Any], runs: Iterable[Wanted], seed_of: Callable[[str, int], int]
+) -> pd.DataFrame:
+    """The table of what is kept of some runs, but arms that are not there whole.
+
+    Args:
+        kept: where; the fields of its results are columns behind those of `RUN`.
+        runs: whose entries are "PART: ARM".
+        seed_of: (place, k) -> seed.
+    """
+    every, columns = tuple(runs), (*RUN, *(one.name for one in fields(kept.result)))
+    there = kept.stored(every)
+    missing = {one.entry for one in every if one not in there}
+    rows = []
+    for one, made in there.items():
+        if one.entry not in missing:
+            part, _, arm = one.entry.partition(": ")
+            named = (part, arm, one.layout, one.seed - seed_of(one.layout, 0))
+            rows.append({**dict(zip(RUN, named, strict=True)), **asdict(made)})
+    return pd.DataFrame(rows, columns=[*columns])
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ All are kept by `analysis.worlds`, so that an interrupted call goes on.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, fields
+from dataclasses import fields
 from typing import Any
 
 import pandas as pd
@@ -13,13 +13,14 @@ from nmpcrl.analysis import kept
 from nmpcrl.analysis.kept import Wanted
 from nmpcrl.analysis.worlds import KEPT, Ran, compile_ahead, run, seed_of
 from nmpcrl.claims import remedies, remedy_published
+from nmpcrl.claims.extendable import RUN, whole_arms
 from nmpcrl.claims.published import Damaged
 from nmpcrl.claims.remedy_questions import EXPECTED_FIRST, FIRST
 from nmpcrl.claims.world_questions import PARTS, REMEDY
 from nmpcrl.study.storage.refusal import Refusal
 
 ORDER = tuple(PARTS)
-COLUMNS = ("part", "arm", "place", "k", *(one.name for one in fields(Ran)))
+COLUMNS = (*RUN, *(one.name for one in fields(Ran)))
 SECONDS: Mapping[str, float] = {  # of processor time an episode, by a word of an arm or its part
     "init": 0.002, "oracle": 0.002, "grid": 0.007, "remedy": 0.03, "RDES": 0.076, "DES": 0.07,
     "moving": 0.035, "model": 0.03, "carry": 0.035, "gradient": 0.06,
@@ -92,19 +93,8 @@ def run_parts(parts: Iterable[str], **options: Any) -> None:
 
 def whole(parts: Iterable[str] = ORDER) -> pd.DataFrame:
     """The table of all that is kept of some parts, but arms that are not there whole."""
-    rows = []
-    for part in parts:
-        runs = planned(part)
-        there = KEPT.stored(runs)
-        missing = {one.entry for one in runs if one not in there}
-        rows += [_row(one, ran) for one, ran in there.items() if one.entry not in missing]
-    return pd.DataFrame(rows, columns=[*COLUMNS])
-
-
-def _row(one: Wanted, ran: Ran) -> dict[str, Any]:
-    part, _, arm = one.entry.partition(": ")
-    k = one.seed - seed_of(one.layout, 0)
-    return {"part": part, "arm": arm, "place": one.layout, "k": k, **asdict(ran)}
+    runs = (one for part in parts for one in planned(part))
+    return whole_arms(KEPT, runs, seed_of)
 
 
 def price(runs: Iterable[Wanted], measured: Mapping[Wanted, Ran]) -> float:
