@@ -54,6 +54,11 @@ def decided(answers: Iterable[Answer]) -> dict[str, str]:
     }
 
 
+def signed(share: float) -> str:
+    """A change, such as +0.4%."""
+    return f"{share:+.1%}".replace("-", "−")
+
+
 def deepest(one: Encounters, motions: Sequence[Motion]) -> float:
     """How far inside an obstacle the robot gets at most [m]; 0 if it never does."""
     states = one.states[: paper.STEPS, :2]

@@ -16,6 +16,7 @@ from nmpcrl.claims.world_questions import VIEWS
 from nmpcrl.report.figures.axes import below, over_episodes
 from nmpcrl.report.figures.runs.moving import LINES, TITLES
 from nmpcrl.report.figures.style import INK, LIMIT, SUBTITLE, TEAL, WINE, headed, page, subplots
+from nmpcrl.report.worlds import signed
 
 POLICIES = {  # by arm
     "init": r"$\theta_\mathrm{init}$", "ES": "ES", "grid": r"$\theta_c$ by hand",
@@ -107,11 +108,8 @@ def models(saved: Mapping[str, Mapping[str, pd.Series]]) -> Figure:
         pd.concat([by[how] for by in saved.values() if how in by]).median()
         for how in ("oracle", "grid")
     )
-    finding = (
-        rf"The true model changes the cost by {-perfect:+.1%}, $\theta_c$ by hand by"
-        f" {-by_hand:+.1%}"
-    )
-    return headed(figure, finding.replace("-", "−"))
+    changed = rf"The true model changes the cost by {signed(-perfect)}, $\theta_c$ by hand by"
+    return headed(figure, f"{changed} {signed(-by_hand)}")
 
 
 @page
