@@ -126,6 +126,7 @@ def test_a_margin_keeps_the_second_robot_outside_and_it_still_pays(tab):
 
 
 def test_time_moves_everything_but_solves_nothing_anew(tab):
+    tab.see()
     before, place = tab.shown(), tab.middle("Obstacle 1")
     assert tab.figure.locator(".within").count() == 1
     tab.press(TIME, "Home")
