@@ -87,6 +87,40 @@ def policies(costs: pd.DataFrame, met: pd.DataFrame) -> Figure:
 
 
 @page
+def survival(crowding: pd.Series, met: pd.DataFrame, correlation: float) -> Figure:
+    """In which share of the scenarios the robot stays out of obstacles, by how crowded they are.
+
+    Args:
+        crowding: of `encounters.crowding`, by scenario.
+        met: as `policies` has it.
+        correlation: of the ranks of crowding and of states inside, with extrapolation.
+    """
+    figure, panels = subplots(1, 2, 3.1, sharey=True, tall=4.8)
+    thirds = pd.qcut(crowding.rank(method="first"), 3, labels=False)
+    middles = crowding.groupby(thirds).median()
+    for axes, how in zip(panels, ("init", "ES"), strict=True):
+        for k, view in enumerate(VIEWS):
+            out = met[f"{view} {how}"].loc[crowding.index] <= 0.5
+            shares = [rate(int(one.sum()), len(one)) for _, one in out.groupby(thirds)]
+            values, low, high = np.array([(one.value, one.low, one.high) for one in shares]).T
+            x = middles + 0.004 * (k - 1)
+            axes.vlines(x, low, high, color=LINES[view]["color"], linewidth=1.4)
+            axes.plot(x, values, marker="osD"[k], markersize=SIZE, label=TITLES[view],
+                      **LINES[view])  # fmt: skip
+        axes.set(xlabel="space and time that obstacles take", ylim=(-0.03, 1.03))
+        axes.set_title(POLICIES[how], **SUBTITLE)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(PercentFormatter(1, 0))
+    panels[0].set_ylabel("scenarios without\nan encounter")
+    below(figure, panels[0].get_legend_handles_labels()[0])
+    return headed(
+        figure,
+        "More crowded scenarios have more states inside an obstacle: rank correlation"
+        f" {correlation:.2f}, with extrapolation",
+    )
+
+
+@page
 def models(saved: Mapping[str, Mapping[str, pd.Series]]) -> Figure:
     """Which share of theta_init's cost is saved where the model is wrong.
 

@@ -27,6 +27,19 @@ def test_the_title_says_what_policies_save_and_keep_out_of_obstacles():
     assert [*by_view] == [INSIDE[how] / 20 for how in figures.POLICIES]
 
 
+def test_survival_is_counted_in_thirds_of_the_scenarios_by_how_crowded_they_are():
+    crowding = pd.Series(np.linspace(0.1, 0.4, 20), index=SCENARIOS)
+    met = pd.DataFrame(
+        {f"{view} {how}": np.arange(20) >= 13 for view in VIEWS for how in ("init", "ES")},
+        index=SCENARIOS, dtype=float,
+    )  # fmt: skip
+    figure = figures.survival(crowding, met.iloc[::-1], 0.4)
+    assert figure.finding.endswith("rank correlation 0.40, with extrapolation")
+    for axes in figure.axes:
+        for line in axes.get_lines():
+            assert line.get_ydata().tolist() == [1, 6 / 6, 0]
+
+
 def test_of_a_wrong_model_each_fault_has_its_policies_and_the_title_their_medians():
     layouts = pd.Series([0.02, 0.03, 0.04])
     by = {"ES": layouts, "ES+model": layouts - 0.01, "grid": layouts + 0.03}
