@@ -53,6 +53,14 @@ QUIET = "0.55"  # the grey of what only stands behind
 PALE = 0.8  # of a grey that is too pale to be seen on white
 LIMIT: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": (0, (2, 2))}
 SUBTITLE: dict[str, Any] = {"loc": "left", "fontsize": "medium", "fontweight": "normal"}
+VIEW_TITLES = {  # of an NMPC among obstacles that move
+    "known": "knows the motion", "extrapolated": "extrapolates", "frozen": "as if they stood",
+}  # fmt: skip
+VIEW_LINES: dict[str, dict[str, Any]] = {
+    "known": {"color": TEAL, "linestyle": "-"},
+    "extrapolated": {"color": "#B37A00", "linestyle": (0, (5, 1))},
+    "frozen": {"color": WINE, "linestyle": "-."},
+}
 DECAY_TITLES = {"step": "noise decays per step", "episode": "noise decays per episode"}
 SYMBOLS = {  # of paper.THETA_NAMES, between dollar signs
     "x": r"\theta_x",

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 FIGURES = Path(__file__).resolve().parents[3] / "nmpcrl/report/figures"
-SHARED = ("sheet", "style", "axes", "panels")  # each may use those before it
+SHARED = ("moving", "sheet", "style", "axes", "panels")  # each may use those before it
 PACKAGE = "nmpcrl.report.figures."
 
 

@@ -1,7 +1,6 @@
 """Robots among obstacles that move, as each of three NMPCs sees them."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,17 +12,21 @@ from nmpcrl.analysis.encounters import Encounters
 from nmpcrl.claims.world_questions import VIEWS
 from nmpcrl.report.figures.axes import below
 from nmpcrl.report.figures.sheet import Drawn, sheet
-from nmpcrl.report.figures.style import BAND, INK, QUIET, SUBTITLE, TEAL, WINE, headed, mosaic, page
+from nmpcrl.report.figures.style import (
+    BAND,
+    INK,
+    QUIET,
+    SUBTITLE,
+    VIEW_LINES,
+    VIEW_TITLES,
+    headed,
+    mosaic,
+    page,
+)
 from nmpcrl.study import paper
 from nmpcrl.study.motions import PERIOD, Motion, centres
 from nmpcrl.study.world import CLEARANCE, TASK
 
-TITLES = {"known": "knows the motion", "extrapolated": "extrapolates", "frozen": "as if they stood"}
-LINES: Mapping[str, dict[str, Any]] = {
-    "known": {"color": TEAL, "linestyle": "-"},
-    "extrapolated": {"color": "#B37A00", "linestyle": (0, (5, 1))},
-    "frozen": {"color": WINE, "linestyle": "-."},
-}
 PANELS = (("known", "extrapolated", "frozen"), ("near",) * 3)
 AROUND = 0.6  # of the map, beyond start and target [m]
 ROOM = 2.0  # of the map, above and below every way [m]
@@ -74,14 +77,14 @@ def _map(figure: Drawn, axes: Axes, at: Matrix, way: Matrix, moment: int, view: 
         axes.plot(*at[:, j].T, color=QUIET, linewidth=0.8, zorder=1)
         disc = Circle(at[moment, j], CLEARANCE / 2 - radius, fc="#CFCFCF", ec="#8A8A8A", zorder=2)
         figure.moves(axes, axes.add_patch(disc), at[:, j], moment)
-    axes.plot(*way.T, **LINES[view], linewidth=1.8, zorder=3)
-    robot = Circle(way[moment], radius, fc=LINES[view]["color"], ec="white", lw=0.8, zorder=4)
+    axes.plot(*way.T, **VIEW_LINES[view], linewidth=1.8, zorder=3)
+    robot = Circle(way[moment], radius, fc=VIEW_LINES[view]["color"], ec="white", lw=0.8, zorder=4)
     figure.moves(axes, axes.add_patch(robot), way, moment)
     axes.plot(*TASK.target[:2], "*", color=INK, ms=9, zorder=3)
     first = view == VIEWS[0] or sheet().narrow
     axes.set(xlabel="x [m]", ylabel="y [m]" if first else "")
     axes.tick_params(labelleft=first)
-    axes.set_title(TITLES[view], **SUBTITLE)
+    axes.set_title(VIEW_TITLES[view], **SUBTITLE)
 
 
 def _curves(figure: Drawn, axes: Axes, near: Mapping[str, Vector], moment: int) -> None:
@@ -90,8 +93,8 @@ def _curves(figure: Drawn, axes: Axes, near: Mapping[str, Vector], moment: int) 
     axes.axhspan(min(one.min() for one in near.values()) - 0.1, 0, **BAND)
     for view, distances in near.items():
         points, now = np.c_[seconds[: len(distances)], distances], min(moment, len(distances) - 1)
-        axes.plot(*points.T, label=TITLES[view], **LINES[view])
-        (dot,) = axes.plot(*points[now], "o", color=LINES[view]["color"], ms=5, clip_on=False)
+        axes.plot(*points.T, label=VIEW_TITLES[view], **VIEW_LINES[view])
+        (dot,) = axes.plot(*points[now], "o", color=VIEW_LINES[view]["color"], ms=5, clip_on=False)
         figure.moves(axes, dot, points, now)
     axes.set(xlabel="time [s]", ylabel="to the nearest\nobstacle [m]", xlim=(0, seconds[-1]))
     axes.set_title("grey: inside an obstacle", **SUBTITLE)

@@ -14,8 +14,18 @@ from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
 from nmpcrl.analysis.worlds import EVERY
 from nmpcrl.claims.world_questions import VIEWS
 from nmpcrl.report.figures.axes import below, over_episodes
-from nmpcrl.report.figures.runs.moving import LINES, TITLES
-from nmpcrl.report.figures.style import INK, LIMIT, SUBTITLE, TEAL, WINE, headed, page, subplots
+from nmpcrl.report.figures.style import (
+    INK,
+    LIMIT,
+    SUBTITLE,
+    TEAL,
+    VIEW_LINES,
+    VIEW_TITLES,
+    WINE,
+    headed,
+    page,
+    subplots,
+)
 from nmpcrl.report.worlds import signed
 
 POLICIES = {  # by arm
@@ -61,7 +71,7 @@ def policies(costs: pd.DataFrame, met: pd.DataFrame) -> Figure:
     for k, view in enumerate(VIEWS):
         place = np.arange(len(POLICIES)) + 0.22 * (k - 1)
         arms = [f"{view} {how}" for how in POLICIES]
-        look = {"color": LINES[view]["color"], "marker": "osD"[k], "label": TITLES[view]}
+        look = {"color": VIEW_LINES[view]["color"], "marker": "osD"[k], "label": VIEW_TITLES[view]}
         _marks(left, place, [_middle(ratios[arm]) for arm in arms], look)
         _marks(right, place, [rate(_inside(met[arm]), len(met)) for arm in arms], look)
     left.axvline(1, **LIMIT)
@@ -104,9 +114,9 @@ def survival(crowding: pd.Series, met: pd.DataFrame, correlation: float) -> Figu
             shares = [rate(int(one.sum()), len(one)) for _, one in out.groupby(thirds)]
             values, low, high = np.array([(one.value, one.low, one.high) for one in shares]).T
             x = middles + 0.004 * (k - 1)
-            axes.vlines(x, low, high, color=LINES[view]["color"], linewidth=1.4)
-            axes.plot(x, values, marker="osD"[k], markersize=SIZE, label=TITLES[view],
-                      **LINES[view])  # fmt: skip
+            axes.vlines(x, low, high, color=VIEW_LINES[view]["color"], linewidth=1.4)
+            axes.plot(x, values, marker="osD"[k], markersize=SIZE, label=VIEW_TITLES[view],
+                      **VIEW_LINES[view])  # fmt: skip
         axes.set(xlabel="space and time that obstacles take", ylim=(-0.03, 1.03))
         axes.set_title(POLICIES[how], **SUBTITLE)
         for axis in (axes.xaxis, axes.yaxis):
