@@ -267,7 +267,7 @@ def mosaic(
         figure, panels = plt.subplot_mosaic(
             [list(row) for row in rows],
             FigureClass=Drawn,
-            figsize=(sheet().width, min(height, sheet().height)),
+            figsize=(sheet().width, height),
             layout="constrained",
             height_ratios=heights,
         )

@@ -42,7 +42,7 @@ def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
         motions: of the obstacles.
         seen: by view, the episode in which the obstacles were seen so.
     """
-    figure, panels = mosaic(PANELS, (1.6, 1), 4.6, (2.1, 2.1, 2.1, 1.7))
+    figure, panels = mosaic(PANELS, (1.6, 1), min(4.6, sheet().height), (2.1, 2.1, 2.1, 1.7))
     assert isinstance(figure, Drawn)
     at = centres(motions, np.arange(paper.STEPS))
     near = {view: _near(one.states[: paper.STEPS], at) for view, one in seen.items()}
