@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from nmpcrl import Vector
 from nmpcrl.analysis.encounters import Encounters
 from nmpcrl.claims.population import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
@@ -61,9 +62,15 @@ def signed(share: float) -> str:
 
 def deepest(one: Encounters, motions: Sequence[Motion]) -> float:
     """How far inside an obstacle the robot gets at most [m]; 0 if it never does."""
+    return float(max(0.0, -nearest(one, motions).min()))
+
+
+def nearest(one: Encounters, motions: Sequence[Motion]) -> Vector:
+    """The distance from the robot to the nearest obstacle at each step, below 0 inside it [m]."""
     states = one.states[: paper.STEPS, :2]
     away = np.linalg.norm(states[:, None] - centres(motions, np.arange(len(states))), axis=2)
-    return float(max(0.0, CLEARANCE / 2 - away.min()))
+    distances: Vector = away.min(axis=1) - CLEARANCE / 2
+    return distances
 
 
 def answered(answers: Iterable[Answer]) -> str:

@@ -16,8 +16,6 @@ from nmpcrl import Matrix
 
 PLAY = "play"  # what the address ends in
 SECONDS = 13.0  # that all ways take
-STILL = "still"  # begins the id of what is only seen while nothing moves
-HIDDEN = f'svg:target [id^="{STILL}"] {{ visibility: hidden }}'
 
 # A disc that moves through a window is cut off where the window ends, which does not move with it.
 CLIPPED = re.compile(r'<g id="(way\d+)">(\s*<path [^>]*?)(clip-path="[^"]*")([^>]*/>\s*)</g>')
@@ -49,7 +47,7 @@ class Way:
 
 def playing(svg: str, ways: Sequence[Way]) -> str:
     """The SVG of a figure whose layout is settled, with the ways of its artists."""
-    style = "\n".join([HIDDEN, *(way.rules() for way in ways)])
+    style = "\n".join(way.rules() for way in ways)
     svg = CLIPPED.sub(r'<g \3><g id="\1">\2\4</g></g>', svg)
     head, rest = svg.split("<svg ", 1)
     opened, rest = rest.split(">", 1)

@@ -23,6 +23,7 @@ from nmpcrl.report.figures.style import (
     mosaic,
     page,
 )
+from nmpcrl.report.worlds import nearest
 from nmpcrl.study import paper
 from nmpcrl.study.motions import PERIOD, Motion, centres
 from nmpcrl.study.world import CLEARANCE, TASK
@@ -45,7 +46,7 @@ def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
     figure, panels = mosaic(PANELS, (1.6, 1), min(4.6, sheet().height), (2.1, 2.1, 2.1, 1.7))
     assert isinstance(figure, Drawn)
     at = centres(motions, np.arange(paper.STEPS))
-    near = {view: _near(one.states[: paper.STEPS], at) for view, one in seen.items()}
+    near = {view: nearest(one, motions) for view, one in seen.items()}
     moment = int(np.argmin(near[min(near, key=lambda view: near[view].min())]))
     ways = {view: one.states[: paper.STEPS, :2] for view, one in seen.items()}
     every = np.vstack([*ways.values()])
@@ -61,13 +62,6 @@ def views(motions: Sequence[Motion], seen: Mapping[str, Encounters]) -> Figure:
         f"States inside an obstacle: {known} if the motion is known, {extrapolated} if it is"
         f" extrapolated, {frozen} if obstacles are taken as standing",
     )
-
-
-def _near(states: Matrix, at: Matrix) -> Vector:
-    """The distance from the robot to the nearest obstacle, below 0 inside it [m]."""
-    away = np.linalg.norm(states[:, None, :2] - at[: len(states)], axis=2)
-    nearest: Vector = away.min(axis=1) - CLEARANCE / 2
-    return nearest
 
 
 def _map(figure: Drawn, axes: Axes, at: Matrix, way: Matrix, moment: int, view: str) -> None:
