@@ -5,7 +5,6 @@ interrupted call goes on.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,10 @@ from nmpcrl.analysis.agents import Agent, require
 from nmpcrl.analysis.entries import called, entry_with
 from nmpcrl.analysis.kept import Wanted
 from nmpcrl.analysis.leaderboard import HELD_OUT
+from nmpcrl.claims import agent_published
+from nmpcrl.claims.agent_published import order
 from nmpcrl.claims.agent_questions import AGENTS, EVERY, LONG, PARTS, SETTINGS, SPARING
-from nmpcrl.claims.extendable import RUN, whole_arms
+from nmpcrl.claims.extendable import whole_arms
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.population import JUDGE, TUNE
@@ -26,7 +27,6 @@ from nmpcrl.study.storage.refusal import Refusal
 
 TUNING = "tune"  # the part that comes before the others
 ORDER = tuple(PARTS)
-COLUMNS = (*RUN, *(one.name for one in fields(Curve)))
 SECONDS: Mapping[str, float] = {"SAC": 0.0065, "TD3": 0.0027}  # of a gradient step
 ELSE, ROLLOUT = 0.05, 0.03  # seconds of the rest of an episode, and of a rollout that judges
 
@@ -59,18 +59,28 @@ def chosen(agent: str) -> str:
     """The agent with its best setting, that of the least mean of J / J_init.
 
     Raises:
-        NotTuned: its tuning is not kept whole.
+        NotTuned: its tuning is neither kept whole nor published.
+        Damaged: what is published is not what was written.
     """
     names = settings(agent)
-    there = KEPT.stored(_runs(TUNING, names))
-    shares = {
-        name: [one.costs[-1][0] / one.initial[0] for run, one in there.items() if run.entry == name]
-        for name in (f"{TUNING}: {each}" for each in names)
-    }
-    if any(len(each) < len(PARTS[TUNING].places) for each in shares.values()):
+    runs = {name: KEPT.stored(_runs(TUNING, [name])).values() for name in names}
+    costs = {name: [each.costs[-1][0] / each.initial[0] for each in runs[name]] for name in names}
+    if any(len(each) < len(order(TUNING)) for each in costs.values()):
+        costs = _published(names)
+    if not all(costs.values()):
         raise NotTuned(f"{agent} is not tuned yet: `nmpcrl agents --part tune` does that")
-    best = min(shares, key=lambda name: float(np.mean(shares[name])))
-    return best.partition(": ")[2]
+    return min(costs, key=lambda name: float(np.mean(costs[name])))
+
+
+def _published(names: Iterable[str]) -> dict[str, list[float]]:
+    """J / J_init of the published tuning; nothing where it is not published."""
+    there = agent_published.load().table if agent_published.HELD.path.exists() else None
+    tuned = {} if there is None else dict(iter(there[there.part == TUNING].groupby("arm")))
+    return {
+        name: [costs[-1][0] / initial[0] for costs, initial in
+               zip(tuned[name].costs, tuned[name].initial, strict=True)] if name in tuned else []
+        for name in names
+    }  # fmt: skip
 
 
 def sparing(name: str) -> str:
@@ -108,11 +118,6 @@ def _runs(part: str, names: Iterable[str]) -> tuple[Wanted, ...]:
         for name in names
         for place, k in order(part)
     )
-
-
-def order(part: str) -> tuple[tuple[str, int], ...]:
-    """Place and number of the seed of each run of an arm."""
-    return tuple((place, k) for place in PARTS[part].places for k in range(PARTS[part].seeds))
 
 
 def run(one: Wanted) -> Curve:

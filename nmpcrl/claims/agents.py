@@ -1,7 +1,7 @@
 """What SAC and TD3 come to, by the definitions of `agent_questions`.
 
-All of it is made of one table, a row a training, with `agent_runs.COLUMNS`. What is missing is left
-out.
+All of it is made of one table, a row a training, with `agent_published.COLUMNS`. What is missing is
+left out.
 """
 
 from collections.abc import Iterator, Sequence
@@ -68,7 +68,7 @@ def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()
     """How an agent did in a part; None where that is not known.
 
     Args:
-        table: with `agent_runs.COLUMNS`.
+        table: with `agent_published.COLUMNS`.
         part: one of those in which agents are judged.
         agent: with whatever setting.
         among: of an agent for all the layouts to look at.
@@ -97,7 +97,7 @@ def answers(table: pd.DataFrame, suite: pd.DataFrame | None = None) -> tuple[Ans
     """All questions of `AGENT_QUESTIONS`.
 
     Args:
-        table: with `agent_runs.COLUMNS`.
+        table: with `agent_published.COLUMNS`.
         suite: the published comparison of remedies; what asks for it is not decidable without.
     """
     found = [one for agent in AGENTS for one in _answers(table, suite, agent)]
@@ -145,7 +145,7 @@ def rows(table: pd.DataFrame, suite: pd.DataFrame) -> tuple[remedies.RemedyRow, 
     """The agents' rows of the suite with 300 episodes, in the layouts in which they are judged.
 
     Args:
-        table: with `agent_runs.COLUMNS`.
+        table: with `agent_published.COLUMNS`.
         suite: the published comparison, which has J_best of each layout.
     """
     best = suite.groupby("layout").best.first()

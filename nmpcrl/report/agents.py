@@ -34,7 +34,7 @@ def panels(
     """What a figure shows: by title the courses that are published, and what the search costs.
 
     Args:
-        table: with `agent_runs.COLUMNS`.
+        table: with `agent_published.COLUMNS`.
         suite: the published comparison of remedies.
     """
     judged, one = PARTS["judge"], PARTS["one"]
@@ -85,7 +85,7 @@ def row_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     """One row an agent and one of the search, in HTML, in the layouts in which agents are judged.
 
     Args:
-        table: with `agent_runs.COLUMNS`.
+        table: with `agent_published.COLUMNS`.
         suite: the published comparison of remedies.
     """
     places = PARTS["judge"].places

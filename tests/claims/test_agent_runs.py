@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.agents import NoAgents
-from nmpcrl.claims import agent_runs
+from nmpcrl.claims import agent_published, agent_runs
+from nmpcrl.claims.agent_published import COLUMNS
 from nmpcrl.claims.agent_questions import AGENTS, EVERY, PARTS, SETTINGS
 from nmpcrl.claims.agent_runs import (
-    COLUMNS,
     KEPT,
     Curve,
     NotTuned,
@@ -40,8 +40,9 @@ def ran(one):
 
 @pytest.fixture(autouse=True)
 def quick(tmp_path, monkeypatch, trains_here):
-    """Nothing is trained."""
+    """Nothing is trained, and nothing is published."""
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    monkeypatch.setattr("nmpcrl.claims.extendable.place", lambda: tmp_path / "published")
     monkeypatch.setattr(agent_runs, "run", ran)
     monkeypatch.setattr(agent_runs, "require", lambda: None)
 
@@ -62,6 +63,15 @@ def test_an_agent_is_judged_with_the_setting_that_costs_least_and_not_before_it_
     assert {agent: chosen(agent) for agent in AGENTS} == names
     assert {one.entry for one in wanted("judge")} == {f"judge: {name}" for name in names.values()}
     assert len(SETTINGS["SAC"]) * 3 * len(AGENTS) == len(wanted("tune"))
+
+
+def test_a_published_tuning_is_as_good_as_one_that_is_kept():
+    agent_runs.run_parts(["tune"], progress=False, workers=1)
+    names = {agent: chosen(agent) for agent in AGENTS}
+    agent_published.extend(whole(["tune"]))
+    for path in {KEPT.path_of(one) for one in wanted("tune")}:
+        path.unlink()
+    assert {agent: chosen(agent) for agent in AGENTS} == names
 
 
 def test_the_long_parts_have_fewer_gradient_steps():

@@ -5,8 +5,9 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims import agent_published as published
+from nmpcrl.claims.agent_published import COLUMNS, order
 from nmpcrl.claims.agent_questions import AGENT_QUESTIONS, AGENTS, EVERY, PARTS
-from nmpcrl.claims.agent_runs import COLUMNS, judged_in, order
+from nmpcrl.claims.agent_runs import judged_in
 from nmpcrl.claims.agents import answers, course, rows
 from nmpcrl.claims.published import Damaged, Unpublishable
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE

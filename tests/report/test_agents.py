@@ -5,8 +5,9 @@ import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
 
+from nmpcrl.claims.agent_published import COLUMNS, order
 from nmpcrl.claims.agent_questions import AGENTS, PARTS
-from nmpcrl.claims.agent_runs import COLUMNS, judged_in, order
+from nmpcrl.claims.agent_runs import judged_in
 from nmpcrl.claims.remedies import COLUMNS as COMPARED
 from nmpcrl.report.agents import finding, in_short, longer, panels, row_table, waiting
 from nmpcrl.study.population import JUDGE
