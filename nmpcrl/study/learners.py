@@ -93,13 +93,13 @@ def _network_learner(
     """A learner whose network predicts the next value."""
     from nmpcrl.learning.network import QNetwork, Target  # and torch: not for the other learners
 
-    plant, read = controller.nmpc.plant, NETWORKS[settings.network]
+    nmpc, read = controller.nmpc, NETWORKS[settings.network]
     options = read.options
     if read.normalised:
         scales = _scales(controller, np.array(settings.theta), with_theta=with_theta)
         options = {**options, "scales": scales}
     network = QNetwork(
-        plant.n + plant.m + with_theta * len(settings.theta),
+        nmpc.n + nmpc.m + with_theta * len(settings.theta),
         generators.network,
         learning_rate=settings.zeta,
         batch=paper.BATCH,
@@ -114,7 +114,7 @@ def _network_learner(
         fits=read.fits,
         target=Target(network, **read.target(settings)) if read.target else None,
         late=read.late,
-        actions=(plant.lower, plant.upper) if read.greedy else None,
+        actions=(nmpc.lower, nmpc.upper) if read.greedy else None,
     )
 
 

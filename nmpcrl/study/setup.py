@@ -151,7 +151,7 @@ def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, We
     generators = Generators(*map(np.random.default_rng, children))
     explore = Exploration.draw(
         generators.noise,
-        (experiment.episodes, experiment.steps, controller.nmpc.plant.m),
+        (experiment.episodes, experiment.steps, controller.nmpc.m),
         deviation=paper.NOISE,
         decay_rate=experiment.decay_rate,
         count=DECAYS[experiment.decay],
