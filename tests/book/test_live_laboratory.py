@@ -53,6 +53,15 @@ ARMS_OF = """lengths => {
 }"""
 LINKED = """() => document.querySelector("figure.live textarea").value === location.href"""
 REFUSES = "Clipboard.prototype.writeText = async () => { throw new Error('refused') }"
+HURRIES = """
+  const later = window.setTimeout
+  window.setTimeout = (done, due) => later(() => {
+    const { hash } = location
+    done()
+    if (hash === location.hash || window.hurried) return
+    window.hurried = true
+    document.querySelector("figure.live .gallery button").click()
+  }, due)"""  # begins the lesson in the very task in which the address changes
 SLOW = """
   const post = Worker.prototype.postMessage
   Worker.prototype.postMessage = function (given) {
@@ -362,6 +371,14 @@ def told(tab) -> str:
     outcome = tab.figure.locator(".told .outcome")
     outcome.filter(has_text=re.compile(".")).wait_for(timeout=120_000)
     return outcome.inner_text()
+
+
+def test_what_is_clicked_while_the_address_changes_stays(opened):
+    tab = opened(FIGURE, script=HURRIES).begun()
+    fill(tab, Episodes=1)
+    tab.page.wait_for_function("() => window.hurried")
+    assert "learns here" in tab.figure.locator(".told").inner_text()
+    assert told(tab)
 
 
 def assert_played(tab) -> None:

@@ -99,7 +99,8 @@
       clearTimeout(due);
       const text = settings.written(given, data), first = settings.written(settings.defaults(data), data);
       const now = location.hash.slice(1) || first;
-      if (text !== now) due = setTimeout(() => { location.hash = text; }, QUIET);
+      // Not by location.hash, which is followed a task later, when something else may have been set.
+      if (text !== now) due = setTimeout(() => { history.pushState(null, "", `#${text}`); }, QUIET);
     };
   }
 
