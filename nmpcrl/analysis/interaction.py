@@ -1,6 +1,6 @@
-"""The robot in one layout, whose every episode counts: what an entry of the suite is given."""
+"""The robot in one place, whose every episode counts: what an entry of the suite is given."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ from nmpcrl.learning import Exploration, Learner, Rollout, Step, Weights, train
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
+from nmpcrl.study.motions import Motion, centres, extrapolated
 from nmpcrl.study.storage.refusal import Refusal
+from nmpcrl.study.world import TASK, World, controller
 
 Policy = Callable[[Vector], Vector]  # observation of `nmpcrl/Robot-v0` -> action
 
@@ -26,6 +28,8 @@ class Robot:
     An episode counts from its first step on, whether it is trained on, confirms something or is a
     tuner's: by `train`, by `rollout` and `cost`, or as a reset of `env`.
     """
+
+    motions: tuple[Motion, ...] = ()  # of the obstacles, if they move
 
     def __init__(self, centres: Centres, budget: int, seed: int) -> None:
         """Nothing is spent.
@@ -55,8 +59,9 @@ class Robot:
             OverBudget: an episode is not to be had.
             Diverged: as `learning.train`.
         """
-        how: dict[str, Any] = {"constrained": constrained, "start": self._begin}
-        return train(learner, self.controller, weights, explore, **how)
+        return train(
+            learner, self.controller, weights, explore, constrained=constrained, **self._place()
+        )
 
     def rollout(self, theta: Vector) -> Rollout:
         """`learning.evaluate`: an episode without noise under the policy of theta.
@@ -64,14 +69,14 @@ class Robot:
         Raises:
             OverBudget: it is not to be had.
         """
-        return evaluate(self.controller, theta, paper.STEPS, start=self._begin)
+        return evaluate(self.controller, theta, paper.STEPS, **self._place())
 
     def cost(self, theta: Vector) -> float:
         """The summed cost of `rollout`; infinite where a solve failed."""
         return self.rollout(theta).cost
 
     def env(self) -> Any:
-        """`nmpcrl/Robot-v0` in this layout, whose every reset counts.
+        """`nmpcrl/Robot-v0` in this place, whose every reset counts.
 
         Raises:
             OverBudget: when it is reset and an episode is not to be had.
@@ -87,7 +92,11 @@ class Robot:
                 robot._begin()
                 return super().reset(seed=seed, options={"layout": robot.centres})
 
-        return Counted(self.centres)
+        return Counted(self.centres, motions=self.motions)
+
+    def _place(self) -> dict[str, Any]:
+        """What `train` and `evaluate` take of where the robot is; episodes are counted."""
+        return {"start": self._begin}
 
     def _begin(self, _: Any = None) -> Vector:
         """The start of an episode, once it is counted."""
@@ -95,3 +104,27 @@ class Robot:
         if self.begun > self.budget:
             raise OverBudget(f"episode {self.begun} was begun with a budget of {self.budget}")
         return self.task.start
+
+
+class AmongMoving(Robot):
+    """A scenario of obstacles that move, planned with the velocity seen since the step before.
+
+    `centres` are those at the start, and `task` has no obstacle.
+    """
+
+    def __init__(self, motions: Sequence[Motion], budget: int, seed: int) -> None:
+        """Nothing is spent; as `Robot`, but with the motions of the obstacles."""
+        first = centres(motions, 0)[0].tolist()
+        self.centres, self.motions = tuple((x, y) for x, y in first), tuple(motions)
+        self.budget, self.seed, self.begun = budget, seed, 0
+        self.rng, self.task = np.random.default_rng(seed), TASK
+        self.controller = controller(len(self.motions))
+
+    def _place(self) -> dict[str, Any]:
+        world = World(self.motions, extrapolated)
+
+        def begin(rng: np.random.Generator) -> Vector:
+            self._begin()
+            return world.begin(rng)
+
+        return {**world.environment, "start": begin}

@@ -1,15 +1,15 @@
 """The suite: any learner, tuner or policy, judged on the layouts of `JUDGE` within a budget.
 
-For each layout and seed an entry gets a `Robot`, spends its budget, and returns a theta or a
-policy, which a rollout without noise judges. A layout is *solved* if under every seed the robot is
-at the target at the end and costs no more than under theta_init. A layout is the unit: what is
-inferred is for layouts that the same sampler draws.
+A second table has the scenarios in which the obstacles move. For each layout and seed an entry gets
+a `Robot`, spends its budget, and returns a theta or a policy, which a rollout without noise judges.
+A layout is *solved* if under every seed the robot is at the target at the end and it costs no more
+than under theta_init. A layout is the unit: what is inferred is for others that are drawn alike.
 """
 
 import importlib
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
@@ -19,16 +19,17 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.analysis.encounters import count
 from nmpcrl.analysis.entries import ENTRIES, Factory, entry_with
-from nmpcrl.analysis.interaction import OverBudget, Policy, Robot
+from nmpcrl.analysis.interaction import AmongMoving, OverBudget, Policy, Robot
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
 from nmpcrl.control import SolverError
 from nmpcrl.learning.rollout import Rollout
 from nmpcrl.study import paper
-from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.parameters import Whole, refused
 from nmpcrl.study.population import JUDGE
+from nmpcrl.study.scenarios import load
 from nmpcrl.study.storage.executor import execute
 from nmpcrl.study.storage.refusal import Refusal
 
@@ -52,6 +53,7 @@ class Judged:
     episodes: int  # begun
     seconds: float  # of processor time
     over: bool = False  # whether it went beyond its budget
+    inside: int = 0  # states in an obstacle that moves
 
     @property
     def solved(self) -> bool:
@@ -75,6 +77,25 @@ class Row:
     episodes: int  # at most, in any layout
     seconds: float  # of processor time, in all
     disqualified: str = ""  # why, in a sentence
+    clear: Estimate | None = None  # share of the scenarios in which no state is in an obstacle
+
+
+@dataclass(frozen=True)
+class Table:
+    """Where entries are judged, by name, and with what."""
+
+    places: Mapping[str, Any]  # centres, or motions, of obstacles
+    robot: Callable[[Any, int, int], Robot]  # (place, budget, seed)
+    seed_of: Callable[[str, int], int]  # (name, number)
+
+
+def scenario_seed(name: str, k: int) -> int:
+    """The seed number k of a scenario, which no layout has."""
+    return 5 * HELD_OUT + 1000 * (100 * ord(name[0]) + int(name[1:])) + k
+
+
+STILL = Table(JUDGE, Robot, lambda name, k: HELD_OUT + MOST_SEEDS * [*JUDGE].index(name) + k)
+MOVING = Table(load(), AmongMoving, scenario_seed)
 
 
 def entry_of(name: str) -> Factory:
@@ -107,6 +128,7 @@ def entry_of(name: str) -> Factory:
 
 def judge(
     name: str,
+    table: Table = STILL,
     *,
     budget: int = BUDGET,
     layouts: int | None = None,
@@ -118,8 +140,9 @@ def judge(
 
     Args:
         name: as in `entry_of`.
+        table: `STILL`, or `MOVING`, whose scenarios are meant by "layouts" then.
         budget: episodes that it may begin, in each layout and with each seed.
-        layouts: the first so many of `JUDGE`; all if absent.
+        layouts: the first so many; all if absent.
         seeds: a layout.
         workers: processes; as many as there are cores if absent.
         progress: whether to show a bar.
@@ -131,12 +154,12 @@ def judge(
     budget = Whole(1, MOST_BUDGET).check("budget", budget)
     seeds = Whole(1, MOST_SEEDS).check("seeds", seeds)
     if layouts is not None:
-        layouts = Whole(1, len(JUDGE)).check("layouts", layouts)
+        layouts = Whole(1, len(table.places)).check("layouts", layouts)
     entry_of(name)
-    chosen = dict(islice(JUDGE.items(), layouts))
+    chosen = dict(islice(table.places.items(), layouts))
     jobs = {
-        (layout, k): partial(judge_once, name, centres, budget, HELD_OUT + MOST_SEEDS * i + k)
-        for i, (layout, centres) in enumerate(chosen.items())
+        (layout, k): partial(judge_once, name, place, budget, table.seed_of(layout, k), table.robot)
+        for layout, place in chosen.items()
         for k in range(seeds)
     }
     found: dict[tuple[str, int], Judged] = {}
@@ -152,10 +175,11 @@ def judge(
     return row(name, budget, {one: [found[one, k] for k in range(seeds)] for one in chosen})
 
 
-def judge_once(name: str, centres: Centres, budget: int, seed: int) -> Judged:
+def judge_once(
+    name: str, place: Any, budget: int, seed: int, among: Callable[..., Robot] = Robot
+) -> Judged:
     """Give an entry its robot, and judge what it returns."""
-    robot = Robot(centres, budget, seed)
-    judged = Robot(centres, 2, seed)
+    robot, judged = among(place, budget, seed), among(place, 2, seed)
     initial, seconds, began = judged.cost(np.array(paper.THETA_INIT)), 0.0, time.process_time()
     try:
         answer = entry_of(name)(robot)
@@ -166,7 +190,7 @@ def judge_once(name: str, centres: Centres, budget: int, seed: int) -> Judged:
     arrived = not rollout.failure and judged.task.distance(rollout.states[-1]) <= ARRIVED
     return Judged(
         initial, rollout.cost, bool(arrived), min(robot.begun, budget), seconds,
-        robot.begun > budget,
+        robot.begun > budget, count(rollout.states, robot.motions).inside if robot.motions else 0,
     )  # fmt: skip
 
 
@@ -175,6 +199,7 @@ def row(name: str, budget: int, found: Mapping[str, Sequence[Judged]]) -> Row:
     gains = np.array([np.mean([one.gain for one in each]) for each in found.values()])
     solved = sum(all(one.solved for one in each) for each in found.values())
     every = [one for each in found.values() for one in each]
+    clear = sum(not any(one.inside for one in each) for each in found.values())
     over = next((layout for layout, each in found.items() if any(one.over for one in each)), "")
     return Row(
         entry=name,
@@ -184,6 +209,7 @@ def row(name: str, budget: int, found: Mapping[str, Sequence[Judged]]) -> Row:
         episodes=max(one.episodes for one in every),
         seconds=sum(one.seconds for one in every),
         disqualified=f"it began more than {budget} episodes in {over}" if over else "",
+        clear=rate(clear, len(found)),
     )
 
 

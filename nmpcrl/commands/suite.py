@@ -11,18 +11,21 @@ if TYPE_CHECKING:
     from nmpcrl.analysis.leaderboard import Row
 
 HEAD = ("entry", "layouts", "solved", "gain", "episodes", "CPU time")
+MOVING_HEAD = (HEAD[0], "scenarios", *HEAD[2:], "never inside")
 
 
 @click.command()
 @click.option("--policy", metavar="ENTRY", help="MODULE:FACTORY, or what ships, such as ES.")
+@click.option("--moving", is_flag=True, help="The 40 scenarios in which obstacles move.")
 @click.option("--budget", type=int, default=300, show_default=True, help="Episodes a layout.")
-@click.option("--layouts", metavar="N", type=int, help="Only the first N of the 120.")
+@click.option("--layouts", metavar="N", type=int, help="Only the first N of the 120, or 40.")
 @click.option("--seeds", metavar="N", type=int, default=2, show_default=True, help="A layout.")
 @click.option("--workers", metavar="N", type=int, help="Processes; by default one per core.")
 @click.option("--list", "listed", is_flag=True, help="Only list what ships.")
 @click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
 def suite(
     policy: str | None,
+    moving: bool,
     budget: int,
     layouts: int | None,
     seeds: int,
@@ -30,7 +33,7 @@ def suite(
     listed: bool,
     yes: bool,
 ) -> None:
-    """Judge a learner, a tuner or a policy on 120 layouts.
+    """Judge a learner, a tuner or a policy on 120 layouts, or among obstacles that move.
 
     None was tuned on them. FACTORY is a function of a Robot. It may begin as
     many of its episodes as the budget has, and returns theta or a policy from
@@ -39,6 +42,7 @@ def suite(
     \b
     Example:
       nmpcrl suite --policy CMA-ES --budget 50
+      nmpcrl suite --policy CMA-ES --budget 50 --moving
       nmpcrl suite --policy my_tuner:factory --layouts 10
     """
     from nmpcrl.analysis import leaderboard
@@ -51,8 +55,12 @@ def suite(
     if policy is None:
         raise click.ClickException("--policy says what is judged: MODULE:FACTORY, or what ships")
     check(workers, sure=yes)
-    row = leaderboard.judge(policy, budget=budget, layouts=layouts, seeds=seeds, workers=workers)
-    for line in columns([HEAD, cells(row)], right=frozenset((1, 4, 5))):
+    table = leaderboard.MOVING if moving else leaderboard.STILL
+    row = leaderboard.judge(
+        policy, table, budget=budget, layouts=layouts, seeds=seeds, workers=workers
+    )
+    lines = [MOVING_HEAD, (*cells(row), f"{row.clear:.0%}")] if moving else [HEAD, cells(row)]
+    for line in columns(lines, right=frozenset((1, 4, 5))):
         click.echo(line)
     if row.disqualified:
         raise click.ClickException(f"{row.entry} is disqualified: {row.disqualified}")

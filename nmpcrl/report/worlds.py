@@ -6,17 +6,25 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
+from nmpcrl.analysis import leaderboard
 from nmpcrl.analysis.encounters import Encounters
+from nmpcrl.analysis.leaderboard import Judged, Row
 from nmpcrl.claims.population import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.claims.world_questions import ORACLES, PARTS, WITHOUT, WORLD_QUESTIONS
-from nmpcrl.report.remedies import answer_items
+from nmpcrl.claims.world_questions import ORACLES, PARTS, VIEWS, WITHOUT, WORLD_QUESTIONS
+from nmpcrl.report.cited import cited
+from nmpcrl.report.remedies import answer_items, entry_named
+from nmpcrl.report.tables import html_table
 from nmpcrl.report.text import listed
 from nmpcrl.study import paper
 from nmpcrl.study.motions import Motion, centres
 from nmpcrl.study.world import CLEARANCE
 
 OWN = ("oracle", "ES", "ES+model", "grid")  # policies of a wrong model that are compared
+ENTRY = {"init": "frozen", "ES": "ES", "grid": "grid", "CMA-ES": "CMA-ES"}  # by policy
+SEES = {  # what plans take of the obstacles, by view; the suite's robot extrapolates
+    "extrapolated": "the velocity just seen", "known": "the motion", "frozen": "the place",
+}  # fmt: skip
 Saved = Mapping[str, Mapping[str, pd.Series]]
 
 
@@ -83,3 +91,50 @@ def waiting(table: pd.DataFrame) -> str:
     """Which parts are not published yet, in a sentence; nothing if all are."""
     missing = [f'"{part}"' for part in PARTS if not (table.part == part).any()]
     return f"The runs of {listed(missing)} are not published yet." if missing else ""
+
+
+def suite_rows(table: pd.DataFrame) -> dict[tuple[str, str], Row]:
+    """By view and policy the row that the suite makes of published runs among moving obstacles.
+
+    Args:
+        table: with `world_runs.COLUMNS`.
+    """
+    there = table[table.part == "moving"]
+    found = {}
+    for view in VIEWS:
+        initial = there[there.arm == f"{view} init"].set_index("place").cost
+        for policy, entry in ENTRY.items():
+            judged: dict[str, list[Judged]] = {}
+            for one in there[there.arm == f"{view} {policy}"].itertuples():
+                begun = PARTS["moving"].budget if policy != "init" else 0
+                judged.setdefault(one.place, []).append(
+                    Judged(initial[one.place], one.cost, one.arrived, begun, one.seconds,
+                           inside=one.inside)
+                )  # fmt: skip
+            if judged:
+                found[view, policy] = leaderboard.row(entry, PARTS["moving"].budget, judged)
+    return found
+
+
+def suite_table(table: pd.DataFrame) -> str:
+    """`suite_rows` in HTML, those of the suite's own robot first."""
+    found = suite_rows(table)
+    header = ("Entry", "Plans with", "Solved", "Gain", "Never inside")
+    caption = f"Among obstacles that move, with {PARTS['moving'].budget} episodes a scenario."
+    rows = (
+        (entry_named(found[view, policy].entry), sees, *_shares(view, found[view, policy]))
+        for view, sees in SEES.items()
+        for policy in ENTRY
+        if (view, policy) in found
+    )
+    return html_table(caption, header, rows, headed=True)
+
+
+def _shares(view: str, row: Row) -> list[str]:
+    assert row.clear is not None
+    shares = {"solved": row.solved, "gain": row.gain, "never inside": row.clear}
+    return [
+        cited(f"{one:.1%}" if name == "gain" else f"{one:.0%}", one,
+              f"{name}, {row.entry}, {view} view: published").replace("-", "−")
+        for name, one in shares.items()
+    ]  # fmt: skip

@@ -5,7 +5,7 @@ terminates; it is truncated after K + 1 = 130 steps. Nothing is drawn but layout
 actions in the same layout give the same rewards.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -18,8 +18,10 @@ from nmpcrl.control import Plant, Solution, Task, differential_drive
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import FARTHEST, MOST_OBSTACLES, Centres, Layout
+from nmpcrl.study.motions import Motion, centres
 from nmpcrl.study.parameters import ParameterError, Whole, refused
 from nmpcrl.study.population import TUNE
+from nmpcrl.study.world import charge
 
 NAMED = paper.LAYOUTS | TUNE  # what a layout may be called; those to judge on have no name here
 MOST_STEPS = 10_000  # of an episode
@@ -64,6 +66,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         self,
         layout: Any = None,
         *,
+        motions: Sequence[Motion] = (),
         steps: int = paper.STEPS,
         render_mode: str | None = None,
         draw: Draw | None = None,
@@ -73,6 +76,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         Args:
             layout: A to F, T01 to T60, or the centres of obstacles; one of the 60 of `TUNE` is
                 drawn at each reset if absent.
+            motions: of the obstacles, where they move; the layout has then their first centres.
             steps: after so many an episode is truncated.
             render_mode: None or "rgb_array".
             draw: makes the pixels; `gymnasium.make` brings it.
@@ -92,6 +96,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         self.action_space = Box(self.plant.lower, self.plant.upper, dtype=np.float64)
         self.task = task_of(self._fixed or next(iter(TUNE.values())))
         self.states: list[Vector] = []  # of the episode so far
+        self._at = centres(motions, np.arange(self._steps + 1)) if motions else None
 
     def _reach(self) -> tuple[Vector, Vector]:
         """How far the robot gets in an episode, and where obstacles may stand."""
@@ -111,16 +116,16 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         super().reset(seed=seed)
         asked = (options or {}).get("layout")
         if asked is not None:
-            centres = centres_of(asked)
+            layout = centres_of(asked)
         elif self._fixed is not None:
-            centres = self._fixed
+            layout = self._fixed
         else:
-            centres = TUNE[str(self.np_random.choice([*TUNE]))]
-        if len(centres) != self._count:
+            layout = TUNE[str(self.np_random.choice([*TUNE]))]
+        if len(layout) != self._count:
             raise refused("layout", asked, f"one of {self._count} obstacles, which are observed")
-        self.task = task_of(centres)
+        self.task = task_of(layout)
         self.states = [self.task.start]
-        return self._observation(), {"layout": centres}
+        return self._observation(), {"layout": layout}
 
     def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
         """One period; an action outside the bounds is clipped.
@@ -135,7 +140,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         if given.shape != (self.plant.m,) or not np.isfinite(given).all():
             raise refused("action", action, "two finite numbers, speed and turn rate")
         state, applied = self.states[-1], self.plant.clip(given)
-        cost = float(self.task.stage_cost(state, applied))
+        cost = self._cost(state, applied)
         self.states.append(self.plant.step(state, applied))
         distance = self.task.distance(self.states[-1])
         over = len(self.states) > self._steps
@@ -153,9 +158,15 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
             raise ParameterError('make it with gymnasium.make("nmpcrl/Robot-v0"), which can draw')
         return self._draw(self.task, np.array(self.states or [self.task.start]))
 
+    def _cost(self, state: Vector, action: Vector) -> float:
+        if self._at is not None:
+            return charge(state, action, self._at[len(self.states) - 1])
+        return float(self.task.stage_cost(state, action))
+
     def _observation(self) -> Vector:
         x, y, _ = self.task.discs
-        return np.concatenate([self.states[-1], np.column_stack([x, y]).ravel()])
+        at = np.column_stack([x, y]) if self._at is None else self._at[len(self.states) - 1]
+        return np.concatenate([self.states[-1], at.ravel()])
 
 
 class NmpcPolicy:

@@ -7,7 +7,18 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis import leaderboard
-from nmpcrl.analysis.leaderboard import Judged, NoEntry, entry_of, judge, judge_once, row
+from nmpcrl.analysis.interaction import AmongMoving, OverBudget
+from nmpcrl.analysis.leaderboard import (
+    MOVING,
+    Judged,
+    NoEntry,
+    entry_of,
+    judge,
+    judge_once,
+    row,
+    scenario_seed,
+)
+from nmpcrl.claims import world_published
 from nmpcrl.learning import evaluate
 from nmpcrl.study import ParameterError, paper
 from nmpcrl.study.population import JUDGE
@@ -186,3 +197,58 @@ def test_who_began_too_many_is_disqualified_with_the_layout():
     over = replace(GOOD, over=True)
     found = row("x", 5, {"J001": [GOOD], "J002": [over]})
     assert found.disqualified == "it began more than 5 episodes in J002"
+
+
+def among_moving(name, place="M03", budget=50, k=0):
+    """An entry in a scenario."""
+    seed = scenario_seed(place, k)
+    return judge_once(name, MOVING.places[place], budget, seed, AmongMoving)
+
+
+@pytest.mark.parametrize(("entry", "policy"), [("frozen", "init"), ("grid", "grid"),
+                                               ("CMA-ES", "CMA-ES")])  # fmt: skip
+@pytest.mark.parametrize("place", ["M03", "M04"])
+def test_a_search_among_moving_obstacles_ends_where_the_published_one_did(entry, policy, place):
+    table = world_published.load().table
+    chosen = (table.part == "moving") & (table.arm == f"extrapolated {policy}")
+    known = table[chosen & (table.place == place) & (table.k == 0)].iloc[0]
+    found = among_moving(entry, place)
+    assert found.cost == pytest.approx(known.cost, rel=1e-4)
+    assert (found.inside, found.arrived) == (known.inside, known.arrived)
+
+
+@pytest.mark.parametrize(
+    "name", ["ES", "DES", "RDES", "QL", "TDRC", "undone-LSTD-Q", "DPG", "SPSA"]
+)
+def test_learners_and_tuners_are_judged_among_moving_obstacles_too(name):
+    found = among_moving(name, budget=3)
+    assert found.initial == among_moving("frozen").cost
+    assert 0 < found.cost < np.inf
+    assert 0 < found.episodes <= 3
+    assert not found.over
+
+
+def test_what_needs_the_papers_own_task_says_so_among_moving_obstacles():
+    with pytest.raises(ValueError, match="GN-J differentiates a task's cost and its plant"):
+        among_moving("GN-J", budget=3)
+
+
+def test_the_environment_has_the_obstacles_of_each_step_and_the_cost_of_a_rollout():
+    robot = AmongMoving(MOVING.places["M04"], 2, 0)
+    rollout, env = robot.rollout(THETA), robot.env()
+    observation, _ = env.reset()
+    steps = zip(rollout.states, rollout.actions, rollout.costs, strict=True)
+    for t, (state, action, cost) in enumerate(steps):
+        expected = [one(np.array([0.2 * t]))[0] for one in robot.motions]
+        np.testing.assert_allclose(observation, np.r_[state, np.ravel(expected)], atol=1e-12)
+        observation, reward, _, over, _ = env.step(action)
+        assert -reward == cost
+    assert over
+    with pytest.raises(OverBudget):
+        robot.cost(THETA)
+
+
+def test_a_row_among_moving_obstacles_counts_the_scenarios_in_which_none_is_entered():
+    inside = replace(GOOD, inside=3)
+    found = row("made", 5, {"M01": [GOOD, inside], "M02": [GOOD, GOOD]})
+    assert found.clear.value == 0.5

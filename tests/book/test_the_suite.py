@@ -43,6 +43,7 @@ def test_what_it_says_of_the_layouts_is_so():
 
 def test_its_results_are_those_of_the_chapter_and_none_is_typed():
     assert "<!-- output: what_to_try_first.ipynb advice-table -->" in PAGE
+    assert "<!-- output: changing_world.ipynb suite-table -->" in PAGE
     rows = [line for line in PAGE.splitlines() if line.startswith("|")]
     assert not [row for row in rows if re.search(r"\d+ ?%", row)]
     assert all("robot." in row or set(row) <= set("|- ") or "call" in row for row in rows)

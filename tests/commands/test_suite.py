@@ -24,6 +24,18 @@ def test_a_row_is_printed(command):
     assert "0.0% [0.0%, 0.0%]" in row
 
 
+def test_among_obstacles_that_move_a_row_says_how_often_the_robot_is_never_inside(command):
+    ended = command("suite", "--policy", "frozen", "--budget", "1", "--layouts", "1", "--moving")
+    assert ended.exit_code == 0, ended.output
+    head, row = ended.stdout.splitlines()
+    assert head.split()[:2] == ["entry", "scenarios"]
+    assert head.endswith("never inside")
+    assert row.split()[:3] == ["frozen", "1", "100%"]
+    assert row.endswith("0 s  100% [21%, 100%]")
+    ended = command("suite", "--policy", "frozen", "--layouts", "41", "--moving")
+    assert "layouts = 41 must be a whole number from 1 to 40" in said(ended)
+
+
 def test_what_ships_is_listed(command):
     assert command("suite", "--list").stdout.split() == [*ENTRIES]
 

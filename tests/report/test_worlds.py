@@ -49,3 +49,21 @@ def test_how_deep_a_robot_is_inside_is_measured_from_the_edge_of_what_it_must_no
     one = Encounters(states, 0.0, Counted(0, 0), arrived=False)
     assert worlds.deepest(one, still([(3.0, 0.0), (1.0, 0.0)])) == pytest.approx(0.25)
     assert worlds.deepest(one, still([(3.0, 0.0)])) == 0
+
+
+def test_the_suites_table_has_a_row_of_each_view_and_policy_that_is_published():
+    runs = [
+        {"part": "moving", "arm": f"extrapolated {policy}", "place": place, "k": k, "cost": cost,
+         "arrived": True, "inside": k * (policy == "ES"), "seconds": 1.0}
+        for policy, cost in (("init", 100.0), ("ES", 90.0))
+        for place in ("M01", "M02")
+        for k in range(1 if policy == "init" else 2)
+    ]  # fmt: skip
+    table = pd.DataFrame(runs)
+    found = worlds.suite_rows(table)
+    assert [*found] == [("extrapolated", "init"), ("extrapolated", "ES")]
+    row = found["extrapolated", "ES"]
+    assert (row.entry, row.layouts, row.solved.value, row.clear.value) == ("ES", 2, 1.0, 0.0)
+    assert row.gain.value == pytest.approx(0.1)
+    assert found["extrapolated", "init"].clear.value == 1.0
+    assert worlds.suite_table(table).count("<tr>") == 3
