@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 import pandas as pd
 
-from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.claims.population import Answer
 from nmpcrl.claims.population_questions import WORDS, Question
 from nmpcrl.claims.remedies import Advice, RemedyRow, rows, shares, solved
@@ -227,12 +227,18 @@ def _otherwise(answer: Answer, asked: Question) -> str:
 
 def _item(answer: Answer, asked: Question) -> str:
     pilot = f" The pilot: “{asked.pilot}”" if asked.pilot else ""
-    said = [f"{yes} of {of} {name}" for name, (yes, of) in answer.counts.items()]
+    said = [f"{yes} of {of} {name}{_bounds(yes, of)}" for name, (yes, of) in answer.counts.items()]
     if "difference" in answer.numbers:
         found = Estimate(*(answer.numbers[name] for name in ("difference", "low", "high")))
         said.append(f"the difference is {share_shown(found)}")
     said += [f"{entry} has {', '.join(each)}" for entry, each in _by_layout(answer.numbers).items()]
-    return f"- **{asked.question}** {answer.words.capitalize()}: {'; '.join(said)}.{pilot}"
+    found = ": ".join([answer.words.capitalize(), *(["; ".join(said)] if said else [])])
+    return f"- **{asked.question}** {found}.{pilot}"
+
+
+def _bounds(yes: int, of: int) -> str:
+    """Wilson's interval of a share, as if what was counted were independent."""
+    return f" [{(share := rate(yes, of)).low:.0%}, {share.high:.0%}]" if of else ""
 
 
 def _by_layout(numbers: Mapping[str, float]) -> dict[str, list[str]]:

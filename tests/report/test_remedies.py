@@ -155,7 +155,7 @@ def test_an_answer_stands_beside_its_pilot():
     )
     first, second = said.splitlines()
     assert REMEDY_QUESTIONS["guard"].pilot in first
-    assert "Confirmed: 14 of 15 layouts." in first
+    assert "Confirmed: 14 of 15 layouts [70%, 99%]." in first
     assert "Contradicted: ; " not in second
     assert "the difference is −0.10 [−0.20, −0.05]" in second
     assert "The pilot" not in second
@@ -173,9 +173,16 @@ def test_an_answer_says_what_it_knows_of_single_layouts():
     numbers = {"CMA-ES in A": 0.984, "CMA-ES in F": 0.38, "ES in A": -0.53, "ES in F": -np.inf}
     said = answer_items([Answer("search and learning", REPRODUCED, {"layouts": (9, 9)}, numbers)])
     assert (
-        "9 of 9 layouts; CMA-ES has 0.98 in A, 0.38 in F; ES has −0.53 in A, a failed solve in F."
-        in said
+        "9 of 9 layouts [70%, 100%]; CMA-ES has 0.98 in A, 0.38 in F; ES has −0.53 in A,"
+        " a failed solve in F." in said
     )
+
+
+def test_an_answer_without_counts_is_a_word():
+    said = answer_items([Answer("guard", NOT), Answer("guard", NOT, {"layouts": (0, 0)})])
+    assert [line.split("** ")[1].split(" The pilot")[0] for line in said.splitlines()] == [
+        "Contradicted.", "Contradicted: 0 of 0 layouts."
+    ]  # fmt: skip
 
 
 def test_an_expectation_says_whether_it_came_true():
