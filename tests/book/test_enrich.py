@@ -221,6 +221,25 @@ def test_a_page_begins_with_what_was_found_and_has_one_set_up():
     assert "hide-input" in cells[3].metadata["tags"]
 
 
+def test_the_first_figure_follows_what_was_found_without_its_code():
+    def first(*outputs):
+        tags = {"tags": ["hide-input", "first-figure"]}
+        return dressed(
+            new_markdown_cell("# Title"),
+            new_code_cell("layout = 'A'", metadata={"tags": ["parameters"]}),
+            new_code_cell("figure()", outputs=[*outputs], metadata=dict(tags)),
+            tagged('<a id="fig-one"></a>\n**Fig. 1.1.** One.', "caption"),
+            tagged("Drag it.", "first-figure"),
+        )
+
+    there = first(displayed(image_png=""))
+    assert [cell.source for cell in there] == ["# Title", "figure()", "Drag it.", "layout = 'A'"]
+    assert there[1].metadata["tags"] == ["first-figure", "remove-input"]
+    assert there[1].metadata["mystnb"]["figure"]["name"] == "fig-one"
+    left = [cell.source for cell in first()]  # not executed: nothing stands apart from the set-up
+    assert left == ["# Title", "layout = 'A'\n\nfigure()", "Drag it."]
+
+
 def test_the_opening_of_a_page_that_was_not_executed_stays_where_it_is():
     cells = dressed(
         new_markdown_cell("# Title"),

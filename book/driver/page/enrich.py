@@ -13,6 +13,7 @@ What the page needs stands where an editor shows nothing, or as what an editor s
 | a list of `<a id="key"></a>` on the page of references | the bibliography |
 | `<!-- output: page.ipynb tag -->` | what the cell with that tag displayed |
 | cells tagged `opening` | a box below the title |
+| cells tagged `first-figure` | below that box, without their code |
 | cells tagged `goals`, `try`, `exercise`, `solution`, `algorithm` | boxes |
 | a cell tagged `caption` after a figure | its caption, with number and label |
 | cells that only call `say` or `source` | the paragraphs that they displayed |

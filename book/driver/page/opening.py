@@ -1,8 +1,8 @@
 """The beginning of a page: what was found, and then what a chapter needs before it can find it.
 
 A notebook has to load before it can say anything, so what it found stands where it is known. On the
-page the cells tagged `opening` come first, in a box, and the code that sets a chapter up is one
-cell that is folded.
+page the cells tagged `opening` come first, in a box, then those tagged `first-figure`, without
+their code; and the code that sets a chapter up is one cell that is folded.
 """
 
 import re
@@ -19,15 +19,33 @@ PROMPTS = {verb: f"{verb.title()} the parameters and the set-up" for verb in ("s
 def opened(cells: list[Cell]) -> tuple[list[Cell], list[Cell]]:
     """The cells of a dressed page up to its set-up, and those from there on.
 
-    What was not executed has nothing to say, and stays.
+    What was not executed has nothing to say or to show, and stays.
     """
     found = [cell for cell in cells if "opening" in tags_of(cell) and cell.cell_type == "markdown"]
     title, *rest = [cell for cell in cells if cell not in found]
+    figure = [cell for cell in rest if "first-figure" in tags_of(cell)]
+    if all(map(_shows, figure)):
+        rest = [cell for cell in rest if cell not in figure]
+        figure = [_without_code(cell) for cell in figure]
+    else:
+        figure = []
     said = "\n\n".join(filter(None, (HEADING.sub("", cell.source).strip() for cell in found)))
-    if not said:
-        return [title], _set_up(rest)
     box = f"::::::{{admonition}} In short\n:class: note\n\n{said}\n::::::"
-    return [title, new_markdown_cell(box, id="opening")], _set_up(rest)
+    boxed = [new_markdown_cell(box, id="opening")] if said else []
+    return [title, *boxed, *figure], _set_up(rest)
+
+
+def _shows(cell: Cell) -> bool:
+    """Whether it is prose, or code that displays something."""
+    return cell.cell_type == "markdown" or bool(cell.outputs)
+
+
+def _without_code(cell: Cell) -> Cell:
+    """The cell as a page shows it where its code would mean nothing yet."""
+    if cell.cell_type == "code":
+        kept = [tag for tag in tags_of(cell) if tag != "hide-input"]
+        cell.metadata["tags"] = [*kept, "remove-input"]
+    return cell
 
 
 def _set_up(cells: list[Cell]) -> list[Cell]:
