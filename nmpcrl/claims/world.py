@@ -174,8 +174,8 @@ def back(shares: list[float], change: int) -> float:
     return float(np.inf if rollouts == len(later) else EVERY * (rollouts + 1))
 
 
-def _shares(table: pd.DataFrame, part: str) -> pd.DataFrame:
-    """`after` by place and arm."""
+def shares(table: pd.DataFrame, part: str) -> pd.DataFrame:
+    """`after` by place and arm: the cost since the first change, over theta_init there."""
     there = table[(table.part == part) & ~table.arm.str.startswith(REMEDY)]
     found = [after(part, row.place, row.series) for row in there.itertuples()]
     return means(there.assign(share=found), part, "share")
@@ -188,16 +188,17 @@ def _changing(table: pd.DataFrame) -> Iterable[Answer]:
         [back(row.series, changes("once", row.place)[0]) for row in told.itertuples()], dtype=float
     )
     yield _read("back soon", until <= SOON, of, {"median episodes": float(until.median())})
-    fifty = _shares(table, "every 50")
+    fifty = shares(table, "every 50")
     for name, (first, second) in AFTER.items():
         medians = {one: float(fifty[one].median()) for one in (first, second)}
         yield _read(name, _lower(fifty, first, second), of, medians)
     for name, arm in (("a chart on the cost", "ES cost plain"),
                       ("a chart on the TD error", "ES delta plain")):  # fmt: skip
         yield _chart(name, table[(table.part == "every 50") & (table.arm == arm)])
-    every = pd.concat([_shares(table, part)["ES told plain"] for part in CHANGES], axis=1).dropna()
-    yield _read("learning pays in a changing world", every.mean(axis=1) < 1, of,
-                {"median share": float(every.mean(axis=1).median())})  # fmt: skip
+    every = pd.concat([shares(table, part)["ES told plain"] for part in CHANGES], axis=1).dropna()
+    mean = every.mean(axis=1)
+    numbers = {"median share": float(mean.median()), "largest share": float(mean.max())}
+    yield _read("learning pays in a changing world", mean < 1, of, numbers)
     last = {
         "remedy": once[once.arm.str.startswith(REMEDY)].set_index("place").cost,
         "ES": told.set_index("place").cost,
@@ -226,17 +227,27 @@ def noticing(begin: list[int], alarms: list[int]) -> tuple[float, float]:
     return float(np.median(delays)), false / true
 
 
+def carried(table: pd.DataFrame, arm: str) -> pd.DataFrame:
+    """What theta costs, over theta_init: by where it was learned, and where it is judged.
+
+    Args:
+        table: with `world_runs.COLUMNS`.
+        arm: an entry, such as "ES".
+    """
+    there = table[(table.part == "carry") & table.arm.isin(["frozen", arm])]
+    runs = {name: each.set_index("place").series for name, each in there.groupby("arm")}
+    if len(runs) < 2:
+        return pd.DataFrame()
+    shares = np.vstack(runs[arm].to_list()) / np.array(runs["frozen"].iloc[0])
+    return pd.DataFrame(shares, runs[arm].index, [*PARTS["carry"].places])
+
+
 def _carried(table: pd.DataFrame) -> Answer:
-    there = table[table.part == "carry"]
-    frozen = there[there.arm == "frozen"].series
-    if frozen.empty:
-        return _read("carried over", pd.Series(dtype=bool), "layouts")
-    first, places = np.array(frozen.iloc[0]), list(PARTS["carry"].places)
-    shares: dict[str, pd.Series] = {}
-    for arm in ("ES", "CMA-ES"):
-        runs = there[there.arm == arm]
-        better = [np.delete(np.array(row.series) < first, places.index(row.place)).mean()
-                  for row in runs.itertuples()]  # fmt: skip
-        shares[arm] = pd.Series(better, dtype=float)
-    numbers = {f"median share, {arm}": float(one.median()) for arm, one in shares.items()}
-    return _read("carried over", shares["ES"] > 0.5, "layouts", numbers)
+    better = {
+        arm: pd.Series(
+            [(row.drop(place) < 1).mean() for place, row in carried(table, arm).iterrows()]
+        )
+        for arm in ("ES", "CMA-ES")
+    }
+    numbers = {f"median share, {arm}": float(one.median()) for arm, one in better.items()}
+    return _read("carried over", better["ES"] > 0.5, "layouts", numbers)

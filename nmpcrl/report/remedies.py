@@ -232,13 +232,16 @@ def _item(answer: Answer, asked: Question) -> str:
         found = Estimate(*(answer.numbers[name] for name in ("difference", "low", "high")))
         said.append(f"the difference is {share_shown(found)}")
     said += [f"{entry} has {', '.join(each)}" for entry, each in _by_layout(answer.numbers).items()]
-    found = ": ".join([answer.words.capitalize(), *(["; ".join(said)] if said else [])])
-    return f"- **{asked.question}** {found}.{pilot}"
+    because = f": {'; '.join(said)}" if said else ""
+    return f"- **{asked.question}** {answer.words.capitalize()}{because}.{pilot}"
 
 
 def _bounds(yes: int, of: int) -> str:
     """Wilson's interval of a share, as if what was counted were independent."""
-    return f" [{(share := rate(yes, of)).low:.0%}, {share.high:.0%}]" if of else ""
+    if not of:
+        return ""
+    share = rate(yes, of)
+    return f" [{share.low:.0%}, {share.high:.0%}]"
 
 
 def _by_layout(numbers: Mapping[str, float]) -> dict[str, list[str]]:

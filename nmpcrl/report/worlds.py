@@ -15,7 +15,6 @@ from nmpcrl.claims.world_questions import ORACLES, PARTS, VIEWS, WITHOUT, WORLD_
 from nmpcrl.report.cited import cited
 from nmpcrl.report.remedies import answer_items, entry_named
 from nmpcrl.report.tables import html_table
-from nmpcrl.report.text import listed
 from nmpcrl.study import paper
 from nmpcrl.study.motions import Motion, centres
 from nmpcrl.study.world import CLEARANCE
@@ -51,15 +50,13 @@ def by_policy(found: Saved) -> dict[str, dict[str, pd.Series]]:
 
 
 def decided(answers: Iterable[Answer]) -> dict[str, str]:
-    """How many questions are answered how, and in words how many wait for their runs."""
+    """How many questions are answered how."""
     outcomes = [one.outcome for one in answers]
-    waiting = outcomes.count(UNDECIDABLE)
     return {
         "asked": str(len(outcomes)),
         "confirmed": str(outcomes.count(REPRODUCED)),
         "partly": str(outcomes.count(PARTLY)),
         "contradicted": str(outcomes.count(NOT)),
-        "open": f"{waiting} wait for runs that are not published yet." if waiting else "",
     }
 
 
@@ -85,12 +82,6 @@ def answered(answers: Iterable[Answer]) -> str:
     """The questions that published runs answer, one item each, in Markdown."""
     there = [one for one in answers if one.outcome != UNDECIDABLE]
     return answer_items(there, WORLD_QUESTIONS, expected=True)
-
-
-def waiting(table: pd.DataFrame) -> str:
-    """Which parts are not published yet, in a sentence; nothing if all are."""
-    missing = [f'"{part}"' for part in PARTS if not (table.part == part).any()]
-    return f"The runs of {listed(missing)} are not published yet." if missing else ""
 
 
 def suite_rows(table: pd.DataFrame) -> dict[tuple[str, str], Row]:

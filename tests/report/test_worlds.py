@@ -7,7 +7,7 @@ import pytest
 from nmpcrl.analysis.encounters import Counted, Encounters
 from nmpcrl.claims.population import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.claims.world_questions import ORACLES, PARTS, WORLD_QUESTIONS
+from nmpcrl.claims.world_questions import ORACLES, WORLD_QUESTIONS
 from nmpcrl.report import worlds
 from nmpcrl.study import paper
 from nmpcrl.study.motions import still
@@ -27,21 +27,13 @@ def test_what_is_saved_is_a_share_of_the_same_layout_and_there_is_no_oracle_of_a
     assert worlds.by_policy(found)["ES"]["lag"].tolist() == pytest.approx([0.05, 0.05])
 
 
-def test_what_waits_for_its_runs_is_counted_and_not_listed():
+def test_what_is_not_decided_is_not_listed():
     outcomes = (REPRODUCED, REPRODUCED, PARTLY, NOT, UNDECIDABLE)
     given = [Answer(name, outcome, {"layouts": (1, 2)})
              for name, outcome in zip(WORLD_QUESTIONS, outcomes, strict=False)]  # fmt: skip
     said = worlds.decided(given)
-    assert [said[name] for name in ("asked", "confirmed", "partly", "contradicted")] == [*"5211"]
-    assert said["open"].startswith("1 wait for runs")
-    assert worlds.decided(given[:4])["open"] == ""
+    assert said == dict(zip(("asked", "confirmed", "partly", "contradicted"), "5211", strict=True))
     assert [line[:4] for line in worlds.answered(given).splitlines()] == ["- **"] * 4
-
-
-def test_the_parts_that_are_not_published_are_named():
-    there = pd.DataFrame({"part": [part for part in PARTS if part != "carry"]})
-    assert worlds.waiting(there) == 'The runs of "carry" are not published yet.'
-    assert worlds.waiting(pd.DataFrame({"part": [*PARTS]})) == ""
 
 
 def test_how_deep_a_robot_is_inside_is_measured_from_the_edge_of_what_it_must_not_touch():
