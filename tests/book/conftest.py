@@ -36,6 +36,7 @@ def visit(site, browser, shared) -> Callable[[str], Visit]:
 MATHJAX = "**/tex-svg-full.js*"
 AS_TYPED = """document.head.insertAdjacentHTML(
     "beforeend", "<style>.math { overflow: hidden }</style>")"""
+PATIENCE = 300_000  # ms until a figure counts as stuck: a busy machine trains several times slower
 
 
 @pytest.fixture
@@ -48,6 +49,7 @@ def opened(site, browser) -> Iterator[Callable[..., Tab]]:
 
     def with_settings(figure, script="", *, chapter=None, formulas=False, **settings):
         contexts.append(browser.new_context(**settings))
+        contexts[-1].set_default_timeout(PATIENCE)
         if not formulas:
             contexts[-1].route(
                 MATHJAX, lambda asked: asked.fulfill(content_type="text/javascript", body=AS_TYPED)

@@ -43,7 +43,7 @@ def assert_equal_to_python(shown: dict) -> None:
 
 def learn(tab) -> dict:
     tab.click("Learn")
-    tab.page.wait_for_function(LEARNED, timeout=120_000)
+    tab.page.wait_for_function(LEARNED)
     return tab.shown()
 
 

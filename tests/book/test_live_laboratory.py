@@ -369,7 +369,7 @@ def press(tab, button) -> None:
 def told(tab) -> str:
     """What a find or a step says, once what it trains has ended."""
     outcome = tab.figure.locator(".told .outcome")
-    outcome.filter(has_text=re.compile(".")).wait_for(timeout=120_000)
+    outcome.filter(has_text=re.compile(".")).wait_for()
     return outcome.inner_text()
 
 

@@ -71,7 +71,7 @@ def test_it_trains_until_it_is_stopped_and_the_network_with_theta_errs_less(tab)
 def test_it_ends_by_itself_after_sixty_episodes(tab):
     tab.click("Train")
     arg = [tab.figure.element_handle(), two_learners.EPISODES]
-    tab.page.wait_for_function(TRAINED, arg=arg, timeout=120_000)
+    tab.page.wait_for_function(TRAINED, arg=arg)
     assert tab.figure.get_by_role("button", name="Train", exact=True).is_disabled()
     for found in tab.shown()["found"]:
         judged = [one["episode"] for one in found["costs"]]
