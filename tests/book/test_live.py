@@ -216,6 +216,6 @@ def test_a_loop_that_ends_early_says_so(opened):
 
 def test_the_book_as_one_document_leaves_live_figures_out(site):
     document = whole.document(site, site.parent / "pdf/book.html", "")
-    assert "live.controller(nmpc" in BeautifulSoup(document, "html.parser").get_text()
+    assert "live.kink(nmpc" in BeautifulSoup(document, "html.parser").get_text()
     assert "_static/live/" not in document
     assert 'class="live"' not in document

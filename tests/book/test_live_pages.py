@@ -1,5 +1,7 @@
 """What holds of every live figure: its picture, its weight, and who can use it."""
 
+from itertools import pairwise
+
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from live_page import ALSO, CHAPTERS, MOST, loaded
@@ -29,9 +31,9 @@ def test_without_javascript_there_are_the_pictures_alone(opened, figure):
     tab = opened(figure, java_script_enabled=False)
     for live in tab.page.locator("figure.live").all():
         assert not live.is_visible()
-    order = tab.page.evaluate(IN_ORDER)
-    for at, name in enumerate(order):
-        assert name == "picture" or order[at - 1] == "picture", f"{name} stands on no picture"
+    opening, *order = tab.page.evaluate(IN_ORDER)  # which is above all pictures
+    for before, name in pairwise([opening, *order]):
+        assert "picture" in (before, name), f"{name} stands on no picture"
     for picture in tab.page.locator(PICTURE).all():
         assert picture.is_visible()
 
