@@ -33,11 +33,12 @@ def suite(
     listed: bool,
     yes: bool,
 ) -> None:
-    """Judge a learner, a tuner or a policy on 120 layouts, or among obstacles that move.
+    """Judge an entry on 120 layouts or among moving obstacles.
 
-    None was tuned on them. FACTORY is a function of a Robot. It may begin as
-    many of its episodes as the budget has, and returns theta or a policy from
-    observations to actions. An entry that begins one more is disqualified.
+    An entry is a learner, a tuner or a policy, and was tuned on neither. FACTORY
+    is a function of a Robot. It may begin as many of its episodes as the budget
+    has, and returns theta or a policy from observations to actions. An entry
+    that begins one more is disqualified.
 
     \b
     Example:
