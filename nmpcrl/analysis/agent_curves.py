@@ -6,7 +6,6 @@ Each run is kept by itself, so that an interrupted call goes on.
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
@@ -82,10 +81,7 @@ def _judged(robot: Robot, policy: Policy) -> tuple[float, bool]:
 
 def depends_on() -> dict[str, Any]:
     """All that the numbers depend on, beside what is wanted."""
-    try:
-        library = version(LIBRARY)
-    except PackageNotFoundError:
-        library = "absent"
+    library = judgements.installed(LIBRARY)
     return {**judgements.depends_on(), "agents": EPOCH, LIBRARY: library}
 
 

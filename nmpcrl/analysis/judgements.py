@@ -1,6 +1,7 @@
 """Entries of the suite judged and kept: one that ships, as `entries.called` names it, by layout."""
 
 from collections.abc import Iterable, Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -65,14 +66,17 @@ def depends_on() -> dict[str, Any]:
     return {"epochs": epochs(), "suite": EPOCH, **versions(), **_libraries()}
 
 
+@cache
+def installed(library: str) -> str:
+    """Its version, which a process asks the disk for once; "absent" where an extra is missing."""
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return "absent"
+
+
 def _libraries() -> dict[str, str]:
-    found = {}
-    for name in LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:  # the extra is not installed
-            found[name] = "absent"
-    return found
+    return {name: installed(name) for name in LIBRARIES}
 
 
 def _compile_ahead(missing: Iterable[Wanted]) -> None:
