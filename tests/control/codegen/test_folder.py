@@ -16,7 +16,6 @@ import pytest
 import nmpcrl
 from nmpcrl.control.codegen import folder, jit
 from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.study import paper
 
 IN_A_TEMPORARY_FOLDER = "; machine code is kept in a temporary folder until this process ends"
 IN_MEMORY = "; machine code is kept in memory until this process ends"
@@ -186,32 +185,40 @@ def test_what_numba_refuses_cannot_be_compiled_wherever_it_is_kept(cache, capsys
 
 # In processes of their own
 
-SOLVE = """
+SUMMED = """
 import resource, sys
-import numpy as np
-from nmpcrl.study import paper
-resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-solution = paper.nmpc().solve(np.array(paper.START), np.array(paper.THETA_INIT))
-print(solution.solver, solution.value.hex())
+from nmpcrl.control.codegen import jit
+resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, 2_000))
+text = '''
+from numba import float64, int64, njit
+
+@njit(float64(int64), cache=True)
+def summed(n):
+    total = 0.0
+    for i in range(1, n):
+        total += 1.0 / i
+    return total
+'''
+found = jit.load("summed", {"__init__": text}, notice="Compiling a sum")
+print(found.summed(100).hex())
 """
 
 
 @pytest.mark.slow
-def test_where_no_file_can_grow_riccati_solves_with_the_same_bits(tmp_path):
+def test_where_no_file_can_grow_code_is_compiled_in_memory_with_the_same_bits(tmp_path):
+    """The text of a package still fits, and what numba makes of it does not."""
     cache = tmp_path / "cache"
     ended = subprocess.run(
-        [sys.executable, "-W", "error", "-c", SOLVE],
+        [sys.executable, "-W", "error", "-c", SUMMED],
         capture_output=True,
         text=True,
         env=os.environ | {"NMPCRL_CACHE": str(cache), "TMPDIR": str(tmp_path)},
     )
-    nmpc = paper.nmpc()
-    kept = nmpc.solve(nmpc.task.start, paper.THETA_INIT)
-    assert ended.stdout.split() == ["riccati", kept.value.hex()], ended.stderr
+    assert ended.stdout.split() == [sum(1.0 / i for i in range(1, 100)).hex()], ended.stderr
     first, second, compiled = ended.stderr.splitlines()
     assert first == f"{cache}: File too large{IN_A_TEMPORARY_FOLDER}"
     assert second.endswith(f": File too large{IN_MEMORY}")
-    assert compiled.startswith("Compiling the NMPC solver")
+    assert compiled.startswith("Compiling a sum")
     assert [*tmp_path.iterdir()] == [cache]
     assert not [*cache.iterdir()]
 
