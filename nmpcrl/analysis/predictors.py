@@ -7,6 +7,7 @@ score, which asks for the probabilities themselves. The bootstrap draws layouts,
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import optimize, stats
@@ -59,34 +60,33 @@ def fit(measure: Vector, success: Vector, ridge: float) -> Logistic:
     return Logistic(centre, scale, float(found[0]), float(found[1]))
 
 
-def auc(score: Vector, success: Vector) -> float:
+def auc(score: Vector, success: Vector) -> Any:
     """Probability that a success scores above a failure, a tie counting one half.
 
-    nan where all layouts succeed, or none.
+    nan where all layouts succeed, or none. Layouts are the last axis, as they are of `brier`.
     """
     y = np.asarray(success, bool)
-    won, lost = int(y.sum()), int((~y).sum())
-    if not won or not lost:
-        return np.nan
-    ranks = stats.rankdata(score)
-    return float((ranks[y].sum() - won * (won + 1) / 2) / (won * lost))
+    won, lost = y.sum(axis=-1), (~y).sum(axis=-1)
+    ranks = np.where(y, stats.rankdata(score, axis=-1), 0).sum(axis=-1)
+    with np.errstate(invalid="ignore"):  # 0 / 0
+        return (ranks - won * (won + 1) / 2) / (won * lost)
 
 
-def brier(probability: Vector, success: Vector) -> float:
+def brier(probability: Vector, success: Vector) -> Any:
     """Mean squared difference of the probability and what happened: 0 is perfect."""
-    return float(np.mean((np.asarray(probability) - np.asarray(success, float)) ** 2))
+    return np.mean((np.asarray(probability) - np.asarray(success, float)) ** 2, axis=-1)
 
 
 def over_layouts(
-    statistic: Callable[..., float], *columns: Vector, resamples: int = RESAMPLES
+    statistic: Callable[..., Any], *columns: Vector, resamples: int = RESAMPLES
 ) -> Estimate:
     """A statistic of columns with one row a layout, and its percentile interval.
 
     A draw in which the statistic is nan, such as one without a failure, does not count.
 
     Args:
-        statistic: of the columns.
-        columns: each of shape (layouts, ...).
+        statistic: of the columns, over their last axis.
+        columns: each of shape (layouts,).
         resamples: of the bootstrap.
 
     Raises:
@@ -98,11 +98,9 @@ def over_layouts(
     (count,), rng = layouts, np.random.default_rng(SEED)
     arrays = [np.asarray(one) for one in columns]
     value = statistic(*arrays)
-    drawn = [
-        statistic(*(one[chosen] for one in arrays))
-        for chosen in rng.integers(count, size=(resamples, count))
-    ]
-    known = np.array(drawn)[np.isfinite(drawn)]
+    chosen = rng.integers(count, size=(resamples, count))
+    drawn = statistic(*(one[chosen] for one in arrays))
+    known = drawn[np.isfinite(drawn)]
     tail = (1 - CONFIDENCE) / 2
     bounds = np.quantile(known, (tail, 1 - tail)) if known.size else (np.nan, np.nan)
     return Estimate(float(value), float(bounds[0]), float(bounds[1]))

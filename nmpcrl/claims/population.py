@@ -156,7 +156,7 @@ def _fitted(measure: pd.Series, success: pd.Series) -> Logistic:
     return fit(measure[success.index].to_numpy(float), success.to_numpy(bool), RIDGE)
 
 
-def _ahead(first: np.ndarray, second: np.ndarray, success: np.ndarray) -> float:
+def _ahead(first: np.ndarray, second: np.ndarray, success: np.ndarray) -> Any:
     return auc(first, success) - auc(second, success)
 
 

@@ -4,8 +4,9 @@ A layout is the unit, so that each has noise of its own: two seeds that no other
 readings of the decay and the seeds within a layout make its answer surer, and the sample no larger.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 from nmpcrl.study import paper, population
@@ -105,10 +106,11 @@ def arms(episodes: int = paper.EPISODES) -> dict[str, tuple[Experiment, ...]]:
     return parts
 
 
-def whole_population(episodes: int = paper.EPISODES) -> dict[Experiment, str]:
+@cache
+def whole_population(episodes: int = paper.EPISODES) -> Mapping[Experiment, str]:
     """Every run with the part that it belongs to; each has its frozen arm among them."""
     named: dict[Experiment, str] = {}
     for part, experiments in arms(episodes).items():
         for experiment in experiments:
             named.setdefault(experiment.canonical, part)
-    return named
+    return MappingProxyType(named)

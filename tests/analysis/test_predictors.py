@@ -1,5 +1,7 @@
 """Predictors: closed forms, an independent count of pairs, and what a bootstrap must give."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -62,7 +64,7 @@ def test_a_measure_that_is_not_finite_is_refused():
 
 def test_the_bootstrap_of_a_share_is_about_as_wide_as_wilsons_interval():
     held = np.arange(120) < 60
-    found, wilson = over_layouts(np.mean, held), rate(60, 120)
+    found, wilson = over_layouts(partial(np.mean, axis=-1), held), rate(60, 120)
     assert found.value == 0.5
     assert (found.low, found.high) == pytest.approx((wilson.low, wilson.high), abs=0.01)
 
