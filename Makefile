@@ -73,11 +73,11 @@ test-clusters: .venv/ready  ## The programs for clusters against a SLURM, which 
 test-fast: .venv/ready  ## The fast tests: no book, no training
 	@$(BIN)/python -m pytest -m "not slow and not built and not browser and not slurm and not lab and not course"
 
-check: .venv/ready  ## Lint, format, types, and the structure of the notebooks
+check: .venv/ready  ## Lint, format, types, and the structure of the notebooks without executing any
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
-	@$(BIN)/python -m pytest tests/book/test_notebooks.py tests/test_architecture.py
+	@$(BIN)/python -m pytest -m "not slow" tests/book/test_notebooks.py tests/test_architecture.py
 
 locks: .venv/ready  ## Make locks/ anew from environment.txt; any target takes them with LOCKED=1
 	@$(BIN)/python locks/make.py $(PYTHONS)

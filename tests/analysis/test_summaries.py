@@ -40,7 +40,7 @@ LOG = Path({log!r})
 def make(experiment, *expected):
     first = f"began {{experiment.seed}} " not in LOG.read_text()
     note("began", experiment)
-    time.sleep({pause})
+    time.sleep({pause} if experiment.seed > 1 else 0)
     if experiment.seed in {killed} and first:
         os.kill(os.getpid(), signal.{by})
     made = summaries.make(experiment, *expected)
@@ -395,22 +395,21 @@ def test_an_interrupt_that_a_worker_meets_first_begins_nothing_anew(workers):
 
 @pytest.mark.slow
 def test_an_interrupted_study_goes_on_where_it_was(workers, folder, request):
-    log = workers(pause=2)
+    log = workers(pause=1000)
     program = request.getfixturevalue("interrupted")
-    # once the caller has kept all that was made: on a busy machine it may be behind its workers
-    wait_until(lambda: 0 < len(times(log, "ended")) == len(list(folder.glob("*.npz"))))
-    began = len(times(log, "began"))
+    # the caller has kept the first two, and both workers are at a run that will not end by itself
+    wait_until(lambda: len(times(log, "began")) == 4 and len(list(folder.glob("*.npz"))) == 2)
     os.killpg(program.pid, signal.SIGINT)  # as a terminal does: the whole group is told
     said = program.communicate(timeout=240)[1]
     assert program.returncode != 0
     assert said.count("Traceback") <= 1  # of the program, and of none of its workers
     stored = {path: path.stat().st_mtime_ns for path in folder.glob("*.npz")}
-    assert 1 <= len(stored) < 6
-    assert began - len(stored) <= 2  # as many as there were workers
-    assert len(times(log, "began")) == began  # none is begun after the interruption
+    assert len(stored) == 2
+    assert len(times(log, "began")) == 4  # none is begun after the interruption
+    workers()
     log.write_text("")
     fetch_summaries(SIX, workers=2, progress=False)
-    assert len(times(log, "began")) == 6 - len(stored)
+    assert len(times(log, "began")) == 4
     assert {path: path.stat().st_mtime_ns for path in stored} == stored
 
 
