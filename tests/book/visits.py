@@ -41,8 +41,8 @@ THIN = """() => {
   document.body.normalize();
 }"""
 
-# After the first view, text of one look stands for all text that has it: the same element and class
-# in the same, in the same colour and size, above the same backgrounds.
+# In a view, text of one look stands for all text that has it: the same element and class in the
+# same, in the same colour and size, above the same backgrounds.
 FIRST_OF_EACH_LOOK = """() => {
   const beneath = new Map([[null, ""]]), seen = new Set();
   for (const one of document.querySelectorAll("*")) {
@@ -163,13 +163,12 @@ def judge(tab: Any, seen: Visit) -> None:
     """Let axe look at a page in every width and theme."""
     tab.evaluate(THIN)
     tab.evaluate(Axe().axe_script)
-    for number, ((width, theme), rules) in enumerate(VIEWS.items()):
+    for (width, theme), rules in VIEWS.items():
         tab.set_viewport_size({"width": width, "height": 900})
         tab.emulate_media(color_scheme=theme)
         tab.evaluate(SETTLED)
         seen.themes.append(tab.evaluate("document.documentElement.dataset.theme"))
-        if number:
-            tab.evaluate(FIRST_OF_EACH_LOOK)
+        tab.evaluate(FIRST_OF_EACH_LOOK)
         found = tab.evaluate("rules => axe.run(rules)", rules)
         seen.findings += [f"{width} {theme}: {one}" for one in sentences(found)]
 
