@@ -62,10 +62,10 @@ test-site: .venv/ready  ## The built book in browsers; needs a built book, a Chr
 	@$(PYTEST) -m "built and not lab and not course" tests/book
 
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
-	@$(BIN)/python -m pytest -m lab tests/book/test_lab.py
+	@$(BIN)/python -m pytest -m lab $(if $(ONLY),-k "$(ONLY)") tests/book/test_lab.py
 
 test-course: .venv/ready  ## Run every notebook of the course, as students and as teachers get it, and grade it
-	@$(PYTEST) -m course tests/book/test_course.py tests/course/test_graded_chapters.py
+	@$(PYTEST) -m course $(if $(ONLY),-k "$(ONLY)") tests/book/test_course.py tests/course/test_graded_chapters.py
 
 test-clusters: .venv/ready  ## The programs for clusters against a SLURM, which it installs as root, and an operator
 	@$(if $(filter-out 0,$(shell id -u)),sudo) .ci/clusters
