@@ -65,17 +65,26 @@ each_state = pytest.mark.parametrize("state", ["source", "executed"])
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Iterator[Path]:
-    """The sources, and what papermill makes of them with a smoke build's parameters."""
+def folder(tmp_path_factory, request) -> Iterator[Path]:
+    """The sources, and what papermill makes of them with a smoke build's parameters.
+
+    Executed is every chapter, unless all that is tested is about some.
+    """
     place = tmp_path_factory.mktemp("lab")
     for state in ("source", "executed", "src/book"):
         (place / state).mkdir(parents=True)
     jobs: dict[Path, dict[str, Any]] = {}
-    for path in project.notebooks().values():
+    tested = [one for one in request.session.items if one.path == Path(__file__)]
+    named = [getattr(one, "callspec", None) and one.callspec.params.get("name") for one in tested]
+    for name, path in project.notebooks().items():
         nbformat.write(nbformat.read(ROOT / path, 4), place / "source" / path.name)
+        if None not in named and name not in named:
+            continue
         names = chapters.parameters(ROOT / path)
         jobs[path] = {name: book.SMOKE[name] for name in names if name in book.SMOKE}
-    jobs[chapters.known("02_expected_sarsa")]["layout"] = LAYOUT
+    of_a_layout = chapters.known("02_expected_sarsa")
+    if of_a_layout in jobs:
+        jobs[of_a_layout]["layout"] = LAYOUT
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
         patch.setenv("NMPCRL_RUNS", str(place / "runs"))
