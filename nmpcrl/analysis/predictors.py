@@ -73,7 +73,7 @@ def auc(score: Vector, success: Vector) -> Any:
 
 
 def brier(probability: Vector, success: Vector) -> Any:
-    """Mean squared difference of the probability and what happened: 0 is perfect."""
+    """Mean squared difference of the probability and what happened, over the last axis: 0 is perfect."""
     return np.mean((np.asarray(probability) - np.asarray(success, float)) ** 2, axis=-1)
 
 
@@ -90,7 +90,8 @@ def over_layouts(
         resamples: of the bootstrap.
 
     Raises:
-        ValueError: there is no layout, or the columns differ in length.
+        ValueError: there is no layout, the columns differ in length, or the statistic is over
+            all axes.
     """
     layouts = {len(one) for one in columns}
     if len(layouts) != 1 or not min(layouts):
@@ -99,7 +100,9 @@ def over_layouts(
     arrays = [np.asarray(one) for one in columns]
     value = statistic(*arrays)
     chosen = rng.integers(count, size=(resamples, count))
-    drawn = statistic(*(one[chosen] for one in arrays))
+    drawn = np.asarray(statistic(*(one[chosen] for one in arrays)))
+    if drawn.shape != (resamples,):
+        raise ValueError(f"a statistic of shape {drawn.shape}: one over the last axis is needed")
     known = drawn[np.isfinite(drawn)]
     tail = (1 - CONFIDENCE) / 2
     bounds = np.quantile(known, (tail, 1 - tail)) if known.size else (np.nan, np.nan)

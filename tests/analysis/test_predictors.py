@@ -72,3 +72,8 @@ def test_the_bootstrap_of_a_share_is_about_as_wide_as_wilsons_interval():
 def test_columns_of_different_length_are_refused():
     with pytest.raises(ValueError, match=r"columns of \[2, 3\] layouts"):
         over_layouts(auc, np.zeros(2), np.zeros(3, bool))
+
+
+def test_a_statistic_over_all_axes_is_refused():
+    with pytest.raises(ValueError, match="over the last axis is needed"):
+        over_layouts(np.mean, np.arange(4.0))

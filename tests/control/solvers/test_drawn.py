@@ -347,7 +347,7 @@ def worse_than_ipopts_best(layouts: range, starts: tuple[int, ...]) -> tuple[int
     compared, worse = 0, dict.fromkeys(starts, 0)
     for layout in layouts:
         rng = np.random.default_rng([5, layout])
-        nmpc = controller(rng, longest=10)
+        nmpc = controller(rng)
         solvers = {
             k: Nmpc(
                 nmpc.plant,
