@@ -73,7 +73,7 @@ def auc(score: Vector, success: Vector) -> Any:
 
 
 def brier(probability: Vector, success: Vector) -> Any:
-    """Mean squared difference of the probability and what happened, over the last axis; best is 0."""
+    """Mean squared difference of probability and outcome, over the last axis: 0 is perfect."""
     return np.mean((np.asarray(probability) - np.asarray(success, float)) ** 2, axis=-1)
 
 
