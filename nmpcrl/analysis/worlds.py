@@ -7,7 +7,8 @@
 - once, every 50, random: learner, what is known and the reaction, "RDES told recent"; or
   "remedy ENTRY", the entry begun anew after the change; in a sequence of layouts, S01 and so on;
 - carry: an entry, whose theta of a layout is judged in all of `JUDGE`;
-- gradient: the deviation of the measured state, in a layout.
+- gradient: the deviation of the measured state, in a layout;
+- terminal: a terminal cost of `study.world.TERMINALS`, learned by ES in a layout.
 
 A policy is "init", "grid" over theta_c, "CMA-ES", "ES", and where the model can be learned
 "ES+model", "oracle" and "oracle+ES".
@@ -223,8 +224,17 @@ def gradient(arm: str, one: Wanted) -> Ran:
     return Ran(float(exact @ noisy / np.prod(lengths)), series=[float(lengths[1] / lengths[0])])
 
 
+def terminal(arm: str, one: Wanted) -> Ran:
+    """ES with a terminal cost, in the paper's world; costs are shares of theta_init's."""
+    nmpc, world = controller(terminal=arm), World(still(JUDGE[one.layout]))
+    start = nmpc.nmpc.problem.theta  # type: ignore[union-attr]
+    theta = learned(nmpc, world, start, one.budget, one.seed)
+    initial, made = (judged(nmpc, each, world) for each in (start, theta))
+    return Ran(made.cost / initial.cost, *made.counted, made.arrived, series=theta.tolist())
+
+
 JOBS: dict[str, Callable[[str, Wanted], Ran]] = {
-    "moving": moving, "model": model, "carry": carry, "gradient": gradient,
+    "moving": moving, "model": model, "carry": carry, "gradient": gradient, "terminal": terminal,
     **dict.fromkeys(RATES, shifting),
 }  # fmt: skip
 
@@ -239,7 +249,8 @@ def compile_ahead(missing: Iterable[Wanted]) -> None:
     for one in missing:
         part, _, arm = one.entry.partition(": ")
         size = len(load()[one.layout]) if part == "moving" else 4
-        nmpc = controller(size, learned_model="ES+" in arm or "oracle" in arm)
+        kind = {"terminal": arm} if part == "terminal" else {}
+        nmpc = controller(size, learned_model="ES+" in arm or "oracle" in arm, **kind)
         nmpc.solve(np.array(paper.START), nmpc.nmpc.problem.theta)  # type: ignore[union-attr]
 
 

@@ -1,5 +1,7 @@
 """What worlds that move, change, or are not the model say, by `world_questions`.
 
+And what a richer terminal cost is worth, by `terminal_questions`.
+
 All of it is made of one table, a row a run, with `world_runs.COLUMNS`. What is missing is left out.
 """
 
@@ -14,6 +16,7 @@ from nmpcrl.analysis.encounters import crowding
 from nmpcrl.analysis.worlds import EVERY, sequence
 from nmpcrl.claims.population import Answer
 from nmpcrl.claims.rule import read
+from nmpcrl.claims.terminal_questions import ARMS, TERMINAL_QUESTIONS
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
 from nmpcrl.claims.world_questions import (
     ALIGNED,
@@ -24,7 +27,6 @@ from nmpcrl.claims.world_questions import (
     LITTLE,
     MISFIT,
     ORACLES,
-    PARTS,
     PROMPT,
     RARE,
     REMEDY,
@@ -34,8 +36,10 @@ from nmpcrl.claims.world_questions import (
     WITHOUT,
     WORLD_QUESTIONS,
 )
+from nmpcrl.claims.world_runs import PARTS
 from nmpcrl.study.scenarios import load
 
+QUESTIONS = {**WORLD_QUESTIONS, **TERMINAL_QUESTIONS}
 EACH = 50  # episodes of a layout in "every 50", which a change that is not noticed counts
 AFTER = {  # what is compared where the layout changes every 50 episodes
     "a raised rate": ("ES told raised", "ES told plain"),
@@ -48,16 +52,17 @@ AFTER = {  # what is compared where the layout changes every 50 episodes
 
 
 def answers(table: pd.DataFrame) -> tuple[Answer, ...]:
-    """All questions of `WORLD_QUESTIONS`."""
+    """All of `QUESTIONS`."""
     found = (
         *_moving(table),
         *_model(table),
         _gradient(table),
         *_changing(table),
         _carried(table),
+        *terminal(table),
     )
     by = {one.question: one for one in found}
-    return tuple(by[name] for name in WORLD_QUESTIONS)
+    return tuple(by[name] for name in QUESTIONS)
 
 
 def means(table: pd.DataFrame, part: str, column: str = "cost") -> pd.DataFrame:
@@ -251,3 +256,23 @@ def _carried(table: pd.DataFrame) -> Answer:
     }
     numbers = {f"median share, {arm}": float(one.median()) for arm, one in better.items()}
     return _read("carried over", better["ES"] > 0.5, "layouts", numbers)
+
+
+def terminal(table: pd.DataFrame) -> Iterable[Answer]:
+    """What ES with a richer terminal cost does in the compared layouts.
+
+    Args:
+        table: with `world_runs.COLUMNS`.
+    """
+    there = table[table.part == "terminal"]
+    solved = there.assign(solved=there.arrived.astype(bool) & (there.cost < 1))
+    improves = means(solved, "terminal", "solved") == 1  # with every seed
+    costs = means(table, "terminal")
+    paper_s, full, learned = ARMS
+    for name, arm in (("full terminal cost", full), ("learned terminal cost", learned)):
+        known = costs[[paper_s, arm]].dropna().index
+        failing = improves.loc[known][~improves.loc[known, paper_s]]
+        yield _read(name, ~failing[arm], "layouts")
+    ratio = (costs[learned] / costs[paper_s]).dropna()
+    yield _read("a richer terminal cost pays", ratio < 1, "layouts",
+                {"median ratio": float(ratio.median())})  # fmt: skip

@@ -1,11 +1,11 @@
 """Worlds that move, change, or are not the model, as they were run once: `worlds.json`.
 
-It has by part and arm what was run there, run by run in the order of `world_questions.PARTS`.
+It has by part and arm what was run there, run by run in the order of `world_runs.PARTS`.
 """
 
 from nmpcrl.claims.extendable import Arms, Extendable
-from nmpcrl.claims.world_questions import PARTS, REMEDY
-from nmpcrl.claims.world_runs import COLUMNS
+from nmpcrl.claims.world_questions import REMEDY
+from nmpcrl.claims.world_runs import COLUMNS, PARTS
 
 FILE = "worlds.json"
 HELD = Extendable(FILE, "what was run in worlds that change", "nmpcrl world --publish")

@@ -1,5 +1,7 @@
 """The runs of worlds that move, change, or are not the model: which are wanted, and what is kept.
 
+Those with a richer terminal cost are beside them, since they have the same controller.
+
 All are kept by `analysis.worlds`, so that an interrupted call goes on.
 """
 
@@ -16,15 +18,18 @@ from nmpcrl.claims import remedies, remedy_published
 from nmpcrl.claims.extendable import RUN, whole_arms
 from nmpcrl.claims.published import Damaged
 from nmpcrl.claims.remedy_questions import EXPECTED_FIRST, FIRST
-from nmpcrl.claims.world_questions import PARTS, REMEDY
+from nmpcrl.claims.terminal_questions import TERMINAL
+from nmpcrl.claims.world_questions import PARTS as OF_WORLDS
+from nmpcrl.claims.world_questions import REMEDY, Part
 from nmpcrl.study.storage.refusal import Refusal
 
+PARTS: Mapping[str, Part] = {**OF_WORLDS, "terminal": TERMINAL}
 ORDER = tuple(PARTS)
 COLUMNS = (*RUN, *(one.name for one in fields(Ran)))
 SECONDS: Mapping[str, float] = {  # of processor time an episode, by a word of an arm or its part
     "init": 0.002, "oracle": 0.002, "grid": 0.007, "remedy": 0.03, "RDES": 0.076, "DES": 0.07,
     "moving": 0.035, "model": 0.03, "carry": 0.035, "gradient": 0.06,
-    "once": 0.027, "every": 0.027, "random": 0.027,
+    "once": 0.027, "every": 0.027, "random": 0.027, "terminal": 0.05,
 }  # fmt: skip
 
 

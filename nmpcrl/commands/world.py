@@ -12,9 +12,10 @@ from nmpcrl.commands import by_parts
 def world(parts: tuple[str, ...], **asked: Any) -> None:
     """Learn where obstacles move or the model is wrong.
 
-    Or where layouts change between episodes. What is asked, and how, was
-    fixed before. The parts are moving, model, once, "every 50", random,
-    carry and gradient, in this order. Each run is stored, so it can be
+    Or where layouts change between episodes, or the terminal cost is
+    richer. What is asked, and how, was fixed before. The parts are moving,
+    model, once, "every 50", random, carry, gradient and terminal, in this
+    order. Each run is stored, so it can be
     interrupted and started again.
 
     \b
@@ -40,6 +41,5 @@ def world(parts: tuple[str, ...], **asked: Any) -> None:
 def _say() -> None:
     """Each question's answer, and whether it was expected."""
     from nmpcrl.claims import world, world_published
-    from nmpcrl.claims.world_questions import WORLD_QUESTIONS
 
-    by_parts.say_answers(world.answers(world_published.load().table), WORLD_QUESTIONS)
+    by_parts.say_answers(world.answers(world_published.load().table), world.QUESTIONS)

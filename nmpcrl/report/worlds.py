@@ -11,7 +11,8 @@ from nmpcrl.analysis.encounters import Encounters
 from nmpcrl.analysis.leaderboard import Judged, Row
 from nmpcrl.claims.population import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.claims.world_questions import ORACLES, PARTS, VIEWS, WITHOUT, WORLD_QUESTIONS
+from nmpcrl.claims.world import QUESTIONS
+from nmpcrl.claims.world_questions import ORACLES, PARTS, VIEWS, WITHOUT
 from nmpcrl.report.cited import cited
 from nmpcrl.report.remedies import answer_items, entry_named
 from nmpcrl.report.tables import html_table
@@ -81,7 +82,7 @@ def nearest(one: Encounters, motions: Sequence[Motion]) -> Vector:
 def answered(answers: Iterable[Answer]) -> str:
     """The questions that published runs answer, one item each, in Markdown."""
     there = [one for one in answers if one.outcome != UNDECIDABLE]
-    return answer_items(there, WORLD_QUESTIONS, expected=True)
+    return answer_items(there, QUESTIONS, expected=True)
 
 
 def suite_rows(table: pd.DataFrame) -> dict[tuple[str, str], Row]:

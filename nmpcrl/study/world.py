@@ -35,18 +35,28 @@ from nmpcrl.study.motions import Motion, Predictor, centres, known
 TARGET, LOWER, UPPER = map(np.array, (paper.TARGET, paper.LOWER, paper.UPPER))
 TASK: Task = paper.task_among(())  # its numbers are those of the charge
 CLEARANCE = 2.5  # d_rob + d_obs [m]
+TERMINALS = ("diagonal", "full", "learned")  # costs V^f: the paper's first
+BELOW = ((1, 0), (2, 0), (2, 1))  # entries of a triangular factor of V^f that the paper has not
+BUMPS = np.array([(x, y) for x in np.linspace(-1, 7, 5) for y in np.linspace(-1, 5, 5)])  # [m]
+WIDTHS = np.array([2.0, 1.5])  # of a bump, along x and y [m]: as far as one is from the next
+HEIGHT = 1000.0  # of a bump of weight 1: V_theta(s) itself is some thousands
 TURNS, MOVES = np.array([0.0, 1.0]), np.eye(2, 3)  # which input a bias adds to, which states drift
 
 
-def problem(obstacles: int = 4, *, learned_model: bool = False) -> Problem:
+def problem(
+    obstacles: int = 4, *, learned_model: bool = False, terminal: str = TERMINALS[0]
+) -> Problem:
     """Eq. (2) among obstacles whose centres are data.
 
     theta is that of the paper, and in its order. With `learned_model` the model's own parameters
-    follow: f(x, u) is that of the robot under gain u + (0, bias), and then drift.
+    follow: f(x, u) is that of the robot under gain u + (0, bias), and then drift. A richer terminal
+    cost has parameters behind those, which are 0 where learning begins.
 
     Args:
         obstacles: M.
         learned_model: whether the model has parameters, too.
+        terminal: of `TERMINALS`. "full" is any quadratic of x - s_ref that is nowhere negative,
+            by a triangular factor; "learned" adds a weight for each of `BUMPS`.
     """
     first = np.array(paper.THETA_INIT)
     theta: dict[str, Any] = {"x": first[:3], "u": first[3:5], "f": first[5:8], "c": first[8]}
@@ -56,6 +66,10 @@ def problem(obstacles: int = 4, *, learned_model: bool = False) -> Problem:
             "bias": Parameter(0.0, -1.0, 1.0),
             "drift": Parameter(np.zeros(2), -0.5, 0.5),
         }
+    if terminal == "full":
+        theta["below"] = np.zeros(len(BELOW))
+    if terminal == "learned":
+        theta["bumps"] = np.zeros(len(BUMPS))
 
     def model(x: Any, u: Any, th: Any, _: Any) -> Any:
         if not learned_model:
@@ -66,8 +80,17 @@ def problem(obstacles: int = 4, *, learned_model: bool = False) -> Problem:
     def stage(x: Any, u: Any, th: Any, _: Any) -> Any:
         return _square(th["x"] * (x - TARGET), 3) + _square(th["u"] * u, 2)
 
-    def terminal(x: Any, th: Any, _: Any) -> Any:
-        return _square(th["f"] * (x - TARGET), 3)
+    def final(x: Any, th: Any, _: Any) -> Any:
+        away = x - TARGET
+        scaled = [th["f"][i] * away[i] for i in range(3)]
+        if terminal == "full":
+            for k, (i, j) in enumerate(BELOW):
+                scaled[i] += th["below"][k] * away[j]
+        cost = _square(scaled, 3)
+        if terminal == "learned":
+            for k, bump in enumerate(BUMPS):
+                cost += HEIGHT * th["bumps"][k] / (1 + _square((x[:2] - bump) / WIDTHS, 2)) ** 2
+        return cost
 
     def discs(x: Any, _: Any, th: Any, d: Any) -> Any:
         at = d["centres"]
@@ -79,16 +102,18 @@ def problem(obstacles: int = 4, *, learned_model: bool = False) -> Problem:
 
     return Problem(
         states=3, inputs=2, horizon=paper.HORIZON, gamma=paper.GAMMA, theta=theta,
-        model=model, stage=stage, terminal=terminal,
+        model=model, stage=stage, terminal=final,
         soft=[Soft(discs, paper.SLACK_WEIGHT), Soft(walls, paper.SLACK_WEIGHT, slice(1, None))],
         lower=robot().lower, upper=robot().upper, data={"centres": np.zeros((obstacles, 2))},
     )  # fmt: skip
 
 
 @cache
-def controller(obstacles: int = 4, *, learned_model: bool = False) -> Persistent:
+def controller(
+    obstacles: int = 4, *, learned_model: bool = False, terminal: str = TERMINALS[0]
+) -> Persistent:
     """The NMPC of `problem`, made once, since it is compiled."""
-    return Persistent(Nmpc(problem(obstacles, learned_model=learned_model)))
+    return Persistent(Nmpc(problem(obstacles, learned_model=learned_model, terminal=terminal)))
 
 
 def oracle(fault: Fault) -> Vector:

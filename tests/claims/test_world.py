@@ -6,9 +6,8 @@ import pytest
 
 from nmpcrl.claims.population_questions import WORDS
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.claims.world import after, answers, back, changes, noticing
-from nmpcrl.claims.world_questions import PARTS, WORLD_QUESTIONS
-from nmpcrl.claims.world_runs import COLUMNS
+from nmpcrl.claims.world import QUESTIONS, after, answers, back, changes, noticing
+from nmpcrl.claims.world_runs import COLUMNS, PARTS
 
 
 def rows(part, arm, **values):
@@ -30,7 +29,7 @@ def answered(*some):
 
 def test_of_nothing_no_question_can_be_decided():
     found = answered()
-    assert [*found] == [*WORLD_QUESTIONS]
+    assert [*found] == [*QUESTIONS]
     assert {one.outcome for one in found.values()} == {UNDECIDABLE}
     assert {one.outcome for one in found.values()}.isdisjoint(WORDS)
 
@@ -107,3 +106,20 @@ def test_theta_is_carried_over_if_it_costs_less_in_most_others():
         rows("carry", "frozen", series=[1.0] * 120)[:1], rows("carry", "ES", series=half)
     )
     assert found["carried over"].counts == {"layouts": (60, 120)}
+
+
+def test_a_richer_terminal_cost_is_asked_where_the_paper_s_fails():
+    """Of 30 layouts the paper's fails in 20: 12 cost more, and in 8 a seed does not arrive."""
+    paper_s = rows("terminal", "diagonal", cost=lambda i: 1.2 if i < 12 else 0.9)
+    for one in paper_s[24:40:2]:
+        one["arrived"] = False
+    found = answered(
+        paper_s,
+        rows("terminal", "full", cost=0.95),
+        rows("terminal", "learned", cost=lambda i: 1.1 if i < 19 else 0.8),
+    )
+    assert found["full terminal cost"].counts == {"layouts": (0, 20)}
+    assert found["learned terminal cost"].counts == {"layouts": (19, 20)}
+    pays = found["a richer terminal cost pays"]
+    assert pays.counts == {"layouts": (23, 30)}
+    assert pays.numbers["median ratio"] == pytest.approx(1.1 / 1.2)

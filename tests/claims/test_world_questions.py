@@ -6,7 +6,7 @@ from fixed_questions import assert_older, assert_unmoved
 
 from nmpcrl.analysis.shifts import RATES
 from nmpcrl.analysis.worlds import JOBS
-from nmpcrl.claims import world_questions
+from nmpcrl.claims import world_questions, world_runs
 from nmpcrl.claims.world_questions import (
     CHANGES,
     DEVIATIONS,
@@ -34,7 +34,7 @@ def test_the_questions_are_older_than_the_runs_that_are_published():
 
 
 def test_every_part_is_one_that_can_be_run_in_places_that_there_are():
-    assert {*PARTS} == {*JOBS}
+    assert {*world_runs.PARTS} == {*JOBS}
     assert {*CHANGES} == {*RATES}
     assert PARTS["moving"].places == tuple(load())
     for name in ("model", "carry", "gradient"):

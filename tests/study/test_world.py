@@ -6,7 +6,16 @@ import pytest
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.motions import PREDICTORS, Straight, frozen, known, still
-from nmpcrl.study.world import TASK, World, charge, controller, inside, problem, robot
+from nmpcrl.study.world import (
+    TASK,
+    TERMINALS,
+    World,
+    charge,
+    controller,
+    inside,
+    problem,
+    robot,
+)
 
 THETA = np.array(paper.THETA_INIT)
 LAYOUT = paper.LAYOUTS["A"]
@@ -82,3 +91,21 @@ def test_a_state_is_inside_where_the_overlap_of_its_own_step_is_positive():
     states = np.array([[0.0, 1.2, 0.0], [1.46, 0.0, 0.0], [0.4, 1.26, 0.0]])
     assert inside(states, motions)[:, 0].tolist() == [True, False, False]
     assert TASK.obstacles == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("terminal", TERMINALS[1:])
+def test_a_richer_terminal_cost_begins_as_the_paper_s_and_can_become_another(nmpc, terminal):
+    richer, data = controller(terminal=terminal), {"centres": np.array(LAYOUT)}
+    theta, state = richer.nmpc.problem.theta, np.array([4.0, 1.4, -0.3])
+    np.testing.assert_array_equal(theta[:9], THETA)
+    printed, same = (one.solve(state, each, data=data)
+                     for one, each in ((nmpc, THETA), (richer, theta)))  # fmt: skip
+    assert same.value == pytest.approx(printed.value, rel=1e-9)
+    for k in range(9, theta.size):
+        step = 1e-5 * np.eye(theta.size)[k]
+        ahead, behind = (
+            richer.solve(state, one, data=data).value for one in (theta + step, theta - step)
+        )
+        assert same.features[k] == pytest.approx((ahead - behind) / 2e-5, rel=1e-3, abs=1e-4)
+        assert same.features[k] != 0
