@@ -21,6 +21,8 @@ TELEPHONES = (390, 320)  # [px]
 UNREADABLE = "[data-mjx-error], mjx-container mtext[mathcolor=red]"  # errors, unknown macros
 
 TYPESET = "window.MathJax?.startup?.promise"
+BEGUN = """() => [...document.querySelectorAll("figure.live")]
+  .every(one => one.querySelector("[role=status][aria-busy=false]"))"""
 WIDTH = "document.documentElement.scrollWidth"
 OPEN = "document.querySelectorAll('details').forEach(box => (box.open = true))"
 SETTLED = """new Promise(done => {  // a browser may stop drawing
@@ -105,6 +107,7 @@ class Visit:
 
     requests: list[str] = field(default_factory=list)  # addresses
     errors: list[str] = field(default_factory=list)  # as the console has them
+    figures: list[str] = field(default_factory=list)  # live ones that show results
     formulas: int = 0  # that the page holds
     typeset: int = 0  # of them, by MathJax
     broken: list[str] = field(default_factory=list)  # those that MathJax could not read
@@ -160,7 +163,11 @@ def look_at(browser: Any, path: Path) -> Visit:
 
 
 def judge(tab: Any, seen: Visit) -> None:
-    """Let axe look at a page in every width and theme."""
+    """Let axe look at a page in every width and theme, its live figures begun."""
+    tab.wait_for_function(BEGUN, timeout=300_000)
+    seen.figures = tab.locator("figure.live:has(.results)").evaluate_all(
+        "all => all.map(one => one.dataset.figure)"
+    )
     tab.evaluate(THIN)
     tab.evaluate(Axe().axe_script)
     for (width, theme), rules in VIEWS.items():
@@ -171,6 +178,25 @@ def judge(tab: Any, seen: Visit) -> None:
         tab.evaluate(FIRST_OF_EACH_LOOK)
         found = tab.evaluate("rules => axe.run(rules)", rules)
         seen.findings += [f"{width} {theme}: {one}" for one in sentences(found)]
+
+
+def assert_figures_pass(tab: Any, width: int) -> None:
+    """Axe finds nothing in the live figures of a page of this width, in either theme, nor too wide.
+
+    Args:
+        tab: of Playwright, with its figures in a state that no visit finds them in.
+        width: one of `VIEWS`.
+    """
+    tab.add_style_tag(content=STILL)
+    tab.evaluate(Axe().axe_script)
+    for theme in ("light", "dark"):
+        tab.emulate_media(color_scheme=theme)
+        tab.evaluate(SETTLED)
+        assert tab.evaluate("document.documentElement.dataset.theme") == theme
+        found = tab.evaluate("rules => axe.run('figure.live', rules)", EVERYTHING)
+        assert found["passes"]
+        assert found["violations"] == []
+        assert tab.evaluate(WIDTH) <= width
 
 
 def sentences(found: dict[str, Any]) -> Iterator[str]:
