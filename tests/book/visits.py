@@ -31,11 +31,14 @@ SETTLED = """new Promise(done => {  // a browser may stop drawing
 })"""
 STILL = "*, ::before, ::after { transition: none !important; animation: none !important; }"
 
-# A page repeats formulas and words of code by the thousand: the first of each kind stands for all.
+# A page repeats formulas, words of code and signatures by the thousand: the first of each kind
+# stands for all.
 THIN = """() => {
   const seen = new Set();
-  for (const one of document.querySelectorAll("pre span[class], mjx-container")) {
-    const kind = one.className + one.getAttribute("display");
+  const many = ":is(pre, code, dt.sig) span[class], mjx-container";
+  for (const one of document.querySelectorAll(many)) {
+    const within = one.closest("a, code, dt, pre")?.className;
+    const kind = [one.className, one.getAttribute("display"), within].join();
     if (!seen.has(kind)) seen.add(kind);
     else if (one.matches("span")) one.replaceWith(...one.childNodes);
     else one.querySelectorAll("svg > *, math > *").forEach(part => part.remove());
