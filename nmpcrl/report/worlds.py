@@ -12,7 +12,7 @@ from nmpcrl.analysis.leaderboard import Judged, Row
 from nmpcrl.claims.population import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.claims.world import QUESTIONS
-from nmpcrl.claims.world_questions import ORACLES, PARTS, VIEWS, WITHOUT
+from nmpcrl.claims.world_questions import ORACLES, PARTS, VIEWS, WITHOUT, WORLD_QUESTIONS
 from nmpcrl.report.cited import cited
 from nmpcrl.report.remedies import answer_items, entry_named
 from nmpcrl.report.tables import html_table
@@ -51,8 +51,8 @@ def by_policy(found: Saved) -> dict[str, dict[str, pd.Series]]:
 
 
 def decided(answers: Iterable[Answer]) -> dict[str, str]:
-    """How many questions are answered how."""
-    outcomes = [one.outcome for one in answers]
+    """How many of `WORLD_QUESTIONS` are answered how."""
+    outcomes = [one.outcome for one in answers if one.question in WORLD_QUESTIONS]
     return {
         "asked": str(len(outcomes)),
         "confirmed": str(outcomes.count(REPRODUCED)),

@@ -31,7 +31,8 @@ def test_what_is_not_decided_is_not_listed():
     outcomes = (REPRODUCED, REPRODUCED, PARTLY, NOT, UNDECIDABLE)
     given = [Answer(name, outcome, {"layouts": (1, 2)})
              for name, outcome in zip(WORLD_QUESTIONS, outcomes, strict=False)]  # fmt: skip
-    said = worlds.decided(given)
+    of_another_chapter = Answer("full terminal cost", REPRODUCED, {"layouts": (1, 2)})
+    said = worlds.decided([*given, of_another_chapter])
     assert said == dict(zip(("asked", "confirmed", "partly", "contradicted"), "5211", strict=True))
     assert [line[:4] for line in worlds.answered(given).splitlines()] == ["- **"] * 4
 
