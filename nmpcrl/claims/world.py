@@ -258,16 +258,23 @@ def _carried(table: pd.DataFrame) -> Answer:
     return _read("carried over", better["ES"] > 0.5, "layouts", numbers)
 
 
+def improves_with(table: pd.DataFrame) -> pd.DataFrame:
+    """Whether ES improves under every seed, by layout and terminal cost.
+
+    Args:
+        table: with `world_runs.COLUMNS`.
+    """
+    solved = table.assign(solved=table.arrived.astype(bool) & (table.cost < 1))
+    return means(solved, "terminal", "solved") == 1
+
+
 def terminal(table: pd.DataFrame) -> Iterable[Answer]:
     """What ES with a richer terminal cost does in the compared layouts.
 
     Args:
         table: with `world_runs.COLUMNS`.
     """
-    there = table[table.part == "terminal"]
-    solved = there.assign(solved=there.arrived.astype(bool) & (there.cost < 1))
-    improves = means(solved, "terminal", "solved") == 1  # with every seed
-    costs = means(table, "terminal")
+    improves, costs = improves_with(table), means(table, "terminal")
     paper_s, full, learned = ARMS
     for name, arm in (("full terminal cost", full), ("learned terminal cost", learned)):
         known = costs[[paper_s, arm]].dropna().index
