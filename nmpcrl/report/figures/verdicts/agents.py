@@ -14,7 +14,7 @@ from nmpcrl.report.figures.style import LIMIT, SUBTITLE, TEAL, WINE, Look, heade
 
 AGENT_LOOKS = {"SAC": Look(WINE, "-", "o"), "TD3": Look(TEAL, (0, (5, 1)), "s")}
 SEARCHED: dict[str, Any] = {"color": "0.25", "linewidth": 1.2, "linestyle": "-."}
-TICKS = (25, 50, 100, 300, 1600)  # episodes
+TICKS = (25, 50, 100, 300, 600, 1600)  # episodes
 DEAREST = 3.0  # in parts of theta_init's cost; what is dearer is not drawn
 
 
