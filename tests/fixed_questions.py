@@ -33,7 +33,15 @@ def assert_unmoved(file: Path) -> None:
     assert code(git("show", f"{added(path)}:{path}")) == code(file.read_text("utf-8"))
 
 
-def assert_older(file: Path, runs: str) -> None:
-    """The commit that added a file comes before that of the runs that answer it."""
+def assert_older(file: Path, runs: str, part: str = "") -> None:
+    """The commit that added a file comes before that of the runs that answer it.
+
+    Args:
+        file: with the questions.
+        runs: the path of what is published.
+        part: a word that came into it with these runs; by default they came with the file.
+    """
     path = file.relative_to(ROOT).as_posix()
-    assert added(path) in git("rev-list", f"{added(runs)}^").split()
+    since = git("log", "--format=%H", f"-S{part}", "--", runs).splitlines() if part else []
+    published = since[-1] if part else added(runs)
+    assert added(path) in git("rev-list", f"{published}^").split()

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from fixed_questions import assert_unmoved
+from fixed_questions import assert_older, assert_unmoved
 
 from nmpcrl.claims import terminal_questions
 from nmpcrl.claims.terminal_questions import ARMS, TERMINAL, TERMINAL_QUESTIONS
@@ -14,6 +14,10 @@ FILE = Path(terminal_questions.__file__)
 
 def test_the_questions_are_those_of_the_commit_that_added_them():
     assert_unmoved(FILE)
+
+
+def test_the_questions_are_older_than_the_runs_that_are_published():
+    assert_older(FILE, "book/published/worlds.json", '"terminal"')
 
 
 def test_each_terminal_cost_is_learned_in_the_layouts_in_which_horizons_were_compared():
