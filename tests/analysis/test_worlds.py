@@ -8,7 +8,7 @@ from nmpcrl.analysis.encounters import judged
 from nmpcrl.analysis.kept import Wanted
 from nmpcrl.analysis.worlds import EVERY, JOBS, KEPT, Ran, compile_ahead, run, seed_of, sequence
 from nmpcrl.study import paper
-from nmpcrl.study.motions import frozen
+from nmpcrl.study.motions import frozen, still
 from nmpcrl.study.population import JUDGE
 from nmpcrl.study.scenarios import load
 from nmpcrl.study.world import World, controller
@@ -91,6 +91,13 @@ def test_theta_is_carried_to_every_layout_and_theta_init_costs_what_it_costs_at_
     assert ran.cost == ran.series[1]
 
 
+def test_with_a_terminal_cost_the_share_is_of_what_theta_init_costs_in_the_same_layout():
+    ran = run(wanted("terminal: diagonal", "J002", 1))
+    costs = [judged(controller(), theta, World(still(JUDGE["J002"]))).cost
+             for theta in (np.array(ran.series), np.array(paper.THETA_INIT))]  # fmt: skip
+    assert ran.cost == costs[0] / costs[1] != 1
+
+
 def test_what_is_run_is_kept_and_read_again(tmp_path, monkeypatch, trains_here):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
     one = wanted("moving: known init", FOUR)
@@ -102,5 +109,6 @@ def test_what_is_run_is_kept_and_read_again(tmp_path, monkeypatch, trains_here):
 
 
 def test_nothing_is_said_of_what_a_part_does_not_have():
-    assert {*JOBS} == {"moving", "model", "once", "every 50", "random", "carry", "gradient"}
+    parts = {"moving", "model", "once", "every 50", "random", "carry", "gradient", "terminal"}
+    assert {*JOBS} == parts
     assert np.isnan(Ran().cost)
