@@ -57,7 +57,12 @@ def problem(
         learned_model: whether the model has parameters, too.
         terminal: of `TERMINALS`. "full" is any quadratic of x - s_ref that is nowhere negative,
             by a triangular factor; "learned" adds a weight for each of `BUMPS`.
+
+    Raises:
+        ValueError: there is no such terminal cost.
     """
+    if terminal not in TERMINALS:
+        raise ValueError(f"terminal = {terminal!r} is none of {', '.join(TERMINALS)}")
     first = np.array(paper.THETA_INIT)
     theta: dict[str, Any] = {"x": first[:3], "u": first[3:5], "f": first[5:8], "c": first[8]}
     if learned_model:

@@ -109,3 +109,8 @@ def test_a_richer_terminal_cost_begins_as_the_paper_s_and_can_become_another(nmp
         )
         assert same.features[k] == pytest.approx((ahead - behind) / 2e-5, rel=1e-3, abs=1e-4)
         assert same.features[k] != 0
+
+
+def test_a_terminal_cost_that_there_is_not_is_refused():
+    with pytest.raises(ValueError, match="terminal = 'cubic' is none of diagonal, full, learned"):
+        problem(terminal="cubic")
