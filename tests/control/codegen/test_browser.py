@@ -154,7 +154,7 @@ def test_what_was_made_once_is_kept_and_damage_is_noticed(tmp_path, monkeypatch)
     monkeypatch.setenv("NMPCRL_CACHE", str(tmp_path))
     texts = {"one": FREE.format("x + 1.0")}
     first = from_texts(texts)
-    monkeypatch.setattr(ir, "functions", lambda texts: pytest.fail("it was made once"))
+    monkeypatch.setattr(ir, "compiled", lambda texts: pytest.fail("it was made once"))
     assert from_texts(texts) == first
     (kept,) = tmp_path.glob("*.wasm")
     kept.write_bytes(kept.read_bytes()[:-1] + b"?")

@@ -27,9 +27,9 @@ def from_texts(texts: Mapping[str, str], pages: int = PAGES) -> bytes:
     kept = _kept(called)
     if kept is not None:
         return kept
-    functions = ir.functions(texts)
-    exports = [function["name"] for function in functions]
-    module = link.link(emit.emit(functions), [*emit.RUNTIME, *exports], pages)
+    package = ir.compiled(texts)
+    exports = [function["name"] for function in package["functions"]]
+    module = link.link(emit.emit(package), [*emit.RUNTIME, *exports], pages)
     with suppress(OSError):  # it is made, and the next process makes it once more
         _keep(module, folder.private(folder.chosen()) / called)
     return module

@@ -1,11 +1,12 @@
-"""LLVM IR of numba's functions to an object file for wasm32, with `runtime.ll` linked to it."""
+"""LLVM IR of a package's functions to an object file for wasm32, with `runtime.ll` linked to it."""
 
 import re
-from collections.abc import Iterable
 from importlib.resources import files
 from typing import Any
 
 import llvmlite.binding as llvm
+
+from nmpcrl.control.codegen.browser.ir import Function, Package
 
 TRIPLE = "wasm32-unknown-unknown"
 FEATURES = "+sign-ext,+nontrapping-fptoint,+bulk-memory"  # in every browser since 2021
@@ -37,24 +38,20 @@ returns:
 """
 
 
-def emit(functions: Iterable[dict[str, str]]) -> bytes:
-    """One object file of all functions, each as `ir.functions` describes it."""
-    functions = list(functions)
+def emit(package: Package) -> bytes:
+    """One object file of a package's functions."""
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     target = llvm.Target.from_triple(TRIPLE)
     machine = target.create_target_machine(opt=3, reloc="static", features=FEATURES)
-    modules = [_parsed(function["ir"]) for function in functions]
-    wrappers = [
-        _wrapper(function, module) for function, module in zip(functions, modules, strict=True)
-    ]
+    module = _parsed(package["ir"])
+    wrappers = [_wrapper(function, module) for function in package["functions"]]
     runtime = files(__package__).joinpath("runtime.ll").read_text("utf-8")
     whole = llvm.parse_assembly("\n".join([runtime, *wrappers]))
-    for module in modules:
-        whole.link_in(module)
+    whole.link_in(module)
     whole.triple = TRIPLE
     whole.data_layout = str(machine.target_data)
-    _keep(whole, {*RUNTIME, *SET_LATER, *(function["name"] for function in functions)})
+    _keep(whole, {*RUNTIME, *SET_LATER, *(function["name"] for function in package["functions"])})
     whole.verify()
     _optimise(whole, machine)
     return bytes(machine.emit_object(whole))
@@ -65,7 +62,7 @@ def _parsed(ir: str) -> Any:
     return llvm.parse_assembly(ir)
 
 
-def _wrapper(function: dict[str, str], module: Any) -> str:
+def _wrapper(function: Function, module: Any) -> str:
     _, _, *types = (str(one.type) for one in module.get_function(function["symbol"]).arguments)
     return WRAPPER.format(
         symbol=function["symbol"],
@@ -84,16 +81,18 @@ def _keep(module: Any, exported: set[str]) -> None:
 
 
 def _optimise(module: Any, machine: Any) -> None:
-    """As numba does for a machine, without vectors: they were slower."""
+    """As numba does for a machine, without vectors: they were slower.
+
+    Functions are made small before they are inlined: what is inlined large takes longest.
+    """
     options = llvm.create_pipeline_tuning_options(speed_level=3)
     options.loop_vectorization = options.slp_vectorization = False
     builder = llvm.create_pass_builder(machine, options)
     first = llvm.create_new_module_pass_manager()
     first.add_global_dead_code_eliminate_pass()
+    _add_passes_that_shrink(first)
     first.add_always_inliner_pass()
-    first.add_sroa_pass()
-    first.add_instruction_combine_pass()
-    first.add_simplify_cfg_pass()
+    _add_passes_that_shrink(first)
     first.add_refprune_pass()
     first.run(module, builder)
     for _ in range(2):
@@ -101,3 +100,9 @@ def _optimise(module: Any, machine: Any) -> None:
         pruned = llvm.create_new_module_pass_manager()
         pruned.add_refprune_pass()
         pruned.run(module, builder)
+
+
+def _add_passes_that_shrink(passes: Any) -> None:
+    passes.add_sroa_pass()
+    passes.add_instruction_combine_pass()
+    passes.add_simplify_cfg_pass()

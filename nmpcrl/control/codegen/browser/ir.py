@@ -1,7 +1,8 @@
 """A package of modules by their texts to LLVM IR.
 
 A process of its own, because numba reads what it may assume of a machine when it is imported: here
-nothing, so that the IR fits any machine with 64-bit floats.
+nothing, so that the IR fits any machine with 64-bit floats. Nor does numba optimise it there and
+make machine code of it, which took most of the time and which nobody would call.
 """
 
 import json
@@ -9,7 +10,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
-from typing import Any
+from typing import TypedDict
 
 from nmpcrl.control.codegen import importing
 
@@ -26,8 +27,23 @@ PACKAGE = "in_browser"
 TYPES = {"float64": "double", "int32": "i32"}  # of results, as LLVM calls them
 
 
-def functions(texts: Mapping[str, str]) -> list[dict[str, str]]:
-    """Every function in the `EXPORTS` of the modules: its name, symbol, result type and LLVM IR.
+class Function(TypedDict):
+    """One that the module exports."""
+
+    name: str
+    symbol: str  # in the IR
+    result: str  # its type
+
+
+class Package(TypedDict):
+    """Functions, and the LLVM IR of these and of all that they call."""
+
+    functions: list[Function]
+    ir: str
+
+
+def compiled(texts: Mapping[str, str]) -> Package:
+    """Every function in the `EXPORTS` of the modules.
 
     Raises:
         RuntimeError: numba cannot compile them; with the end of what it says.
@@ -44,29 +60,31 @@ def functions(texts: Mapping[str, str]) -> list[dict[str, str]]:
         said = done.stderr.strip() or "it says nothing"
         why = said.rpartition("numba.core.errors.")[2] if "numba.core.errors." in said else said
         raise RuntimeError(f"numba cannot compile these functions for a browser: {why[-1000:]}")
-    found: list[dict[str, str]] = json.loads(done.stdout)
-    return found
-
-
-def _written(function: Any) -> dict[str, str]:
-    """A compiled function of one signature."""
-    (signature,) = function.signatures
-    compiled = function.overloads[signature]
-    return {
-        "name": function.__name__,
-        "symbol": compiled.fndesc.llvm_func_name,
-        "result": TYPES[str(compiled.signature.return_type)],
-        "ir": compiled.library.get_llvm_str(),
-    }
+    package: Package = json.loads(done.stdout)
+    return package
 
 
 def main() -> None:
-    """Texts on standard input, functions on standard output, both as JSON."""
+    """Texts on standard input, the package on standard output, both as JSON."""
+    from llvmlite import binding as llvm
+
+    from nmpcrl.control.codegen.browser import context
+
+    context.install()
     texts = {
         module: text.replace(", cache=True", "") for module, text in json.load(sys.stdin).items()
     }
     exporting = [module for module, text in texts.items() if "\nEXPORTS = " in text]
     texts["__init__"] = "\n".join(f"from . import {module}" for module in exporting)
     package = importing.from_memory(PACKAGE, texts)
-    modules = [getattr(package, module) for module in exporting]
-    json.dump([_written(each) for module in modules for each in module.EXPORTS], sys.stdout)
+    functions, whole = [], llvm.parse_assembly("")
+    for exported in (one for module in exporting for one in getattr(package, module).EXPORTS):
+        result = exported.overloads[exported.signatures[0]]
+        described = Function(
+            name=exported.__name__,
+            symbol=result.fndesc.llvm_func_name,
+            result=TYPES[str(result.signature.return_type)],
+        )
+        functions.append(described)
+        whole.link_in(llvm.parse_bitcode(result.library.emit_bitcode()))
+    json.dump(Package(functions=functions, ir=str(whole)), sys.stdout)
