@@ -1,4 +1,4 @@
-# `make book` trains, executes and builds everything; `make test` passes the tests.
+# `make book` trains, executes and builds everything; `make test` passes those tests that take little.
 
 PYTHONS := 3.11 3.12 3.13 3.14
 PYTHON ?= $(PYTHONS:%=python%) python3
@@ -15,7 +15,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book pdf article course release smoke chapter lab study bench test test-site test-lab test-course test-clusters test-fast check locks clean anew
+.PHONY: help book pdf article course release smoke chapter lab study bench test test-slow test-site test-lab test-course test-clusters check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -54,9 +54,14 @@ bench: .venv/ready  ## Measure how long solves, steps and runs take, and print w
 # On all cores, up to four. A target that names files does so to read no others: tests/conftest.py
 # lets no test with its marker stand elsewhere.
 PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
+DEMANDING := slow or browser or network or slurm
+ELSEWHERE := built or lab or course
 
-test: .venv/ready  ## All tests of the library, its commands and the sources of the book
-	@$(PYTEST) -m "not built and not lab and not course"
+test: .venv/ready  ## What takes little of the tests of the library, its commands and the book's sources
+	@$(PYTEST) -m "not ($(DEMANDING)) and not ($(ELSEWHERE))"
+
+test-slow: .venv/ready  ## The others of them: they train, compile, or need a browser or the network
+	@$(PYTEST) -m "($(DEMANDING)) and not ($(ELSEWHERE))"
 
 test-site: .venv/ready  ## The built book in browsers; needs a built book, a Chromium and a Firefox
 	@$(PYTEST) -m "built and not lab and not course" tests/book
@@ -69,9 +74,6 @@ test-course: .venv/ready  ## Run every notebook of the course, as students and a
 
 test-clusters: .venv/ready  ## The programs for clusters against a SLURM, which it installs as root, and an operator
 	@$(if $(filter-out 0,$(shell id -u)),sudo) .ci/clusters
-
-test-fast: .venv/ready  ## The fast tests: no book, no training
-	@$(BIN)/python -m pytest -m "not slow and not built and not browser and not slurm and not lab and not course"
 
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks without executing any
 	@$(BIN)/ruff check .

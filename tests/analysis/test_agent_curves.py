@@ -23,6 +23,7 @@ def small(monkeypatch):
     monkeypatch.setattr("nmpcrl.analysis.agents.RANDOM", 1)
 
 
+@pytest.mark.slow
 def test_the_last_checkpoint_is_what_the_suite_says_of_the_entry():
     found = curve(QUICK, A, A, [1, 2], seed=3)
     judged = judge_once(QUICK, A["A"], 2, 3)

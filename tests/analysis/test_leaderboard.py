@@ -217,6 +217,7 @@ def test_a_search_among_moving_obstacles_ends_where_the_published_one_did(entry,
     assert (found.inside, found.arrived) == (known.inside, known.arrived)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["ES", "DES", "RDES", "QL", "TDRC", "undone-LSTD-Q", "DPG", "SPSA"]
 )

@@ -85,6 +85,7 @@ def test_a_remedy_is_begun_anew_in_the_second_layout_with_what_is_left():
     assert ran.series == []
 
 
+@pytest.mark.slow
 def test_theta_is_carried_to_every_layout_and_theta_init_costs_what_it_costs_at_home():
     ran = run(wanted("carry: frozen", "J002", 1))
     assert len(ran.series) == 120

@@ -544,6 +544,7 @@ def test_a_notebook_of_ones_own_runs_with_few_episodes_and_one_seed(name, tmp_pa
     assert kept <= {"trials"}  # nothing of it belongs to the study
 
 
+@pytest.mark.slow
 def test_the_forty_lines_of_your_problem_are_a_script_that_learns_the_mass(tmp_path):
     cells = {cell.id: cell.source for cell in code("your_problem")}
     script = "\n".join(cells[f"drone-{part}"] for part in ("model", "problem", "learned"))

@@ -116,6 +116,7 @@ def test_runs_contradict_published_ones_of_the_same_layouts(made_up):
     assert "not reproduced (0%" in told[0]
 
 
+@pytest.mark.slow
 def test_runs_do_not_contradict_themselves_nor_a_part_the_whole(made_up):
     whole = made_up(lambda e: diverges(e) if e.layout == "A" else {})
     assert of_runs(whole.summaries, published_of(whole)) == ()

@@ -218,6 +218,7 @@ def test_the_table_of_the_whole_study_takes_100_megabytes_at_most(command, train
     assert size / len(noisy) * WHOLE < 100e6
 
 
+@pytest.mark.slow
 def test_what_is_published_verifies_the_runs_it_was_made_of(command, trained):
     asked = command("study", "--publish")
     assert asked.exit_code == 0, asked.output

@@ -226,6 +226,7 @@ def test_a_shorter_run_does_not_make_the_name_of_the_papers_ambiguous(tmp_path, 
         file_of("GES-A")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [("evaluate",), ("show",), ("compare", "ES-A-step-seed0")])
 def test_a_run_under_the_name_of_another_is_refused(words, tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))

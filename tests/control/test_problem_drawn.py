@@ -97,6 +97,7 @@ def random_problem(seed: int) -> Problem:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("interpreted")
 @settings(
     derandomize=True,

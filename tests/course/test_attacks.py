@@ -50,6 +50,7 @@ root_of_six = Lies(3)""",
 }
 
 
+@pytest.mark.slow
 def test_a_notebook_that_changes_the_checks_in_its_memory_wins_nothing(graded):
     lies = dict(zip(ASKED, OF_VALUES.values(), strict=True))
     rows = graded(one=solved_by_student(**lies))["one"]
@@ -129,6 +130,7 @@ def functions(edition):
     return editions.student(source, set())
 
 
+@pytest.mark.slow
 def test_a_function_that_lies_ends_or_looks_around_wins_nothing(graded, functions):
     for name, (code, _) in OF_FUNCTIONS.items():
         cell_of(functions, f"{name}-answer").source = code

@@ -135,6 +135,7 @@ def rows(tmp_path_factory):
     )
 
 
+@pytest.mark.slow
 def test_points_of_samples_and_a_sentence_for_each_loss(rows):
     assert points(rows["untouched"]) == expected(*POINTS)
     assert points(rows["half"]) == expected("1.2", "1.4", "1.5", "1.6", "1.7")
@@ -149,6 +150,7 @@ def test_points_of_samples_and_a_sentence_for_each_loss(rows):
     assert (total["points"], total["of"]) == ("4", "28")
 
 
+@pytest.mark.slow
 def test_an_answer_that_hangs_ends_the_process_or_takes_memory_costs_its_own_points(graded):
     fatal = {
         "one": SLEEPS,
@@ -269,6 +271,7 @@ def test_what_an_earlier_call_graded_stays_if_this_one_cannot_begin(tmp_path, ed
     assert out.read_text() == "known"
 
 
+@pytest.mark.slow
 def test_copies_and_files_that_windows_wrote_are_graded(tmp_path, edition):
     for name, mark in ((f"anna_{SMALL}-Copy1", ""), (f"ben_{SMALL} (2)", "\ufeff")):
         (tmp_path / "in").mkdir(exist_ok=True)

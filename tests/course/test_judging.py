@@ -98,6 +98,7 @@ def test_a_process_that_left_the_notebook_ends_with_it(submission, judge, tmp_pa
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "line",
     ["if os.fork(): os._exit(0)", "if os.fork(): time.sleep(1); os._exit(0)"],

@@ -30,6 +30,7 @@ def test_a_box_may_have_any_number_of_sides():
     assert found == pytest.approx(0.3, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_best_action_of_a_network_is_that_of_a_fine_grid():
     """Networks with weights up to three times as large as at the start, in states of the whole box.
 

@@ -162,6 +162,7 @@ def test_three_seeds_of_a_random_start_are_three_runs():
     assert [one.seed for one in found.select(seed=1)] == [1]
 
 
+@pytest.mark.slow
 def test_trials_of_a_notebook_are_done_in_other_processes(runs):
     """A cell's functions have no module that a worker could import."""
     cell = {"__name__": "__main__", "np": np, "lstd_q": lstd_q}

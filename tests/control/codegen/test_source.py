@@ -133,6 +133,7 @@ def test_the_stages_have_the_arguments_that_model_promises(plant):
     assert {function.name() for function in functions(plant)} == promised
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("plant", PLANTS, indirect=True)
 def test_the_compiled_stages_are_casadis(plant):
     texts = {"__init__": "", "model": write(plant).replace("forceinline=True", "cache=True")}

@@ -94,6 +94,7 @@ def test_columns_stay_together_or_rows_do(options, expected):
     assert places(narrow(draw())) == expected
 
 
+@pytest.mark.slow
 def test_a_figure_that_is_too_high_for_a_slide_is_drawn_for_one(monkeypatch):
     monkeypatch.setenv(sheet.FOR_PAGE, "1")
     for height, expected in ((3.6, False), (5.0, True)):

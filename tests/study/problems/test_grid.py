@@ -18,6 +18,7 @@ def cost_of(policy, gamma=gz.GAMMA, episodes=60, steps=80) -> float:
     return total / episodes
 
 
+@pytest.mark.slow
 def test_the_value_is_what_the_policy_costs_and_a_finer_grid_has_the_same():
     coarse, fine = grid.best(points=61, inputs=41), grid.best(points=121, inputs=41)
     simulated = cost_of(fine.action)

@@ -44,6 +44,7 @@ def arms() -> Callable[[str], Records]:
     return cache(lambda name: run(frozen_arm(RUNS[name])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 @pytest.mark.parametrize("with_arm", [False, True])
 def test_every_run_has_a_page_whose_titles_state_what_is_seen(
@@ -59,6 +60,7 @@ def test_every_run_has_a_page_whose_titles_state_what_is_seen(
     assert not plt.get_fignums()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_any_run_can_be_read_wide_and_on_a_telephone(known, arms, name):
     wide = run_page(known[name], arms(name))

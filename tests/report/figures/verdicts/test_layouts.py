@@ -206,6 +206,7 @@ def values(found: Evidence) -> dict[str, pd.DataFrame]:
     return {claim: one.measure(found.runs, paths(found)) for claim, one in BY_RUNS.items()}
 
 
+@pytest.mark.slow
 def test_the_borders_are_drawn_where_they_were_fixed():
     figure = figures.borders(values(study().main), "")
     for axes, claim in zip(figure.axes, BY_RUNS.values(), strict=True):
