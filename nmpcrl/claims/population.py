@@ -36,7 +36,6 @@ from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.population_design import HORIZONS, name_of
 
-PICTURE = ("C1", "C2", "C5", "C9")  # the paper's whole picture
 JUDGED = ("judge", "judge imitating", "judge again")  # parts
 
 
@@ -291,48 +290,12 @@ def extrapolation(compared: pd.DataFrame, intervention: str = "theta held") -> A
     return Answer("extrapolation", read(*count), {f"survive, {intervention}": count})
 
 
-def picture(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
-    """How much of the paper's picture holds in each layout and reading, the most first.
-
-    Args:
-        runs: of one setting, with all four of the paper's learners.
-        paths: as `paper_claims.judge` takes them.
-
-    Returns:
-        Columns layout and decay, of each of `PICTURE` the share of yes, whole (how many claims have
-        nothing but yes) and answers (the mean share); cells in which all four were answered.
-    """
-    known, columns = asked(), {}
-    for name in PICTURE:
-        claim = known[name]
-        answers = claim.yes(claim.measure(runs, paths), claim.threshold).dropna().astype(float)
-        columns[name] = answers.groupby(level=["layout", "decay"]).mean()
-    found = pd.DataFrame(columns).dropna()
-    found["whole"] = (found[[*PICTURE]] == 1).sum(axis=1)
-    found["answers"] = found[[*PICTURE]].mean(axis=1)
-    return found.sort_values(["whole", "answers"], ascending=False, kind="stable").reset_index()
-
-
-def whole_picture(tried: Mapping[str, pd.DataFrame]) -> Answer:
-    """The question "whole picture"; `tried` has `picture` of each setting."""
-    everywhere = pd.concat(tried.values())
-    if everywhere.empty:
-        return Answer("whole picture", UNDECIDABLE)
-    found = int((everywhere.whole == len(PICTURE)).sum())
-    numbers = {"tried": float(len(everywhere)), "most": float(everywhere.whole.max())}
-    outcome = REPRODUCED if found else NOT
-    return Answer("whole picture", outcome, {"whole": (found, len(everywhere))}, numbers)
-
-
 def answers(
-    runs: pd.DataFrame, paths: Paths, difficulty: pd.DataFrame, stops: pd.DataFrame
+    runs: pd.DataFrame, difficulty: pd.DataFrame, stops: pd.DataFrame
 ) -> tuple[Answer, ...]:
-    """All questions that the population decides; arguments as each function takes them."""
+    """All questions that the population alone decides; arguments as each function takes them."""
     main = runs[runs.part.isin(JUDGED)]
     tuned, judged = succeeds(runs[runs.part == "tune"]), succeeds(main)
-    settings = {"main": main}
-    for part in runs.part[runs.part.str.startswith("alpha")].unique():
-        settings[part] = runs[runs.part == part]
     return (
         closing_gaps(difficulty, judged),
         _predictors(difficulty, tuned, judged),
@@ -340,7 +303,6 @@ def answers(
         gaps_and_horizon(stops),
         *trap(main),
         early_overshoot(main),
-        whole_picture({name: picture(some, paths) for name, some in settings.items()}),
     )
 
 

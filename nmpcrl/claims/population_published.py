@@ -11,7 +11,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ import pandas as pd
 from nmpcrl.analysis import difficulty, trap
 from nmpcrl.analysis.rows import OUTCOME, as_text, cost_ratios, row
 from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.claims import published, whole_picture
 from nmpcrl.claims.population import Answer, answers, held, shares
 from nmpcrl.claims.population_questions import RAISED_TO, SAME_CLOSING
 from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place, sealed, sums
@@ -68,9 +69,16 @@ class PopulationRuns:
         """As `population.shares`."""
         return shares(held(self.main, self.paths))
 
+    @cached_property
+    def tried(self) -> pd.DataFrame:
+        """As `whole_picture.everywhere`, with what is published of layouts A to F."""
+        six = published.load()
+        return whole_picture.everywhere(self.runs, self.paths, six.table, six.paths)
+
     def answers(self) -> tuple[Answer, ...]:
-        """As `population.answers`."""
-        return answers(self.runs, self.paths, self.layouts[[*difficulty.MEASURES]], self.stops)
+        """As `population.answers`, and `whole_picture.answer`."""
+        found = answers(self.runs, self.layouts[[*difficulty.MEASURES]], self.stops)
+        return (*found, whole_picture.answer(self.tried))
 
 
 def measured() -> pd.DataFrame:

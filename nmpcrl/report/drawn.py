@@ -1,4 +1,4 @@
-"""The drawn layouts as a page shows them: in short, and claim by claim beside what was expected."""
+"""The drawn layouts as a page shows them: in short, claim by claim, the nearest to the paper."""
 
 from html import escape
 
@@ -7,9 +7,13 @@ import pandas as pd
 from nmpcrl.claims.population import asked, at_the_gap, succeeds
 from nmpcrl.claims.population_published import PopulationRuns
 from nmpcrl.claims.population_questions import EXPECTED
+from nmpcrl.claims.whole_picture import PICTURE
 from nmpcrl.report.cited import Count
 from nmpcrl.report.prose import filled
 from nmpcrl.report.tables import BADGES, html_table
+from nmpcrl.report.text import listed
+from nmpcrl.study.design import LAYOUTS, MAIN_TABLE, VARIANTS
+from nmpcrl.study.population_design import name_of
 
 
 def in_short(found: PopulationRuns) -> str:
@@ -30,6 +34,19 @@ def in_short(found: PopulationRuns) -> str:
         es=int(es.sum()),
         **counts,
     )
+
+
+def nearest(tried: pd.DataFrame) -> str:
+    """The cell that comes nearest to the paper's whole picture, in Markdown.
+
+    Args:
+        tried: of `whole_picture.everywhere`, not empty.
+    """
+    one = tried.iloc[0]
+    place = one.layout if one.layout in LAYOUTS else name_of(one.layout)
+    changed = "" if one.setting == MAIN_TABLE else f" and {VARIANTS[one.setting].changed}"
+    shares = listed(f"{claim} {one[claim]:.0%}" for claim in PICTURE)
+    return f"layout {place} with the decay per {one.decay}{changed}, where yes are {shares}"
 
 
 def label(claim: str) -> str:

@@ -11,7 +11,7 @@ from nmpcrl.claims.population_questions import EXPECTED, QUESTIONS
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.study.experiment import MAIN, Experiment
 from nmpcrl.study.population import JUDGE, LAYOUTS, TUNE
-from nmpcrl.study.population_design import COMPARED, name_of, seeds
+from nmpcrl.study.population_design import COMPARED, seeds
 
 NAMES = [*JUDGE][:20]
 FAILING = NAMES[:4]
@@ -162,26 +162,12 @@ def test_early_overshoot_is_of_the_runs_that_were_stopped():
     assert population.early_overshoot(table(late)).outcome == NOT
 
 
-def test_the_nearest_to_the_whole_picture_comes_first():
-    runs = judged()
-    wild = [
-        row | {"late_cost_range": 0.2} if row["learner"] == "ES" else row
-        for row in runs
-        if name_of(row["layout"]) == NAMES[9] or row["learner"] != "ES"
-    ]
-    found = population.picture(table(wild), paths(wild))
-    assert name_of(found.layout[0]) == NAMES[9]
-    assert found.whole[0] == 3  # all but C1: DES does not diverge
-    answer = population.whole_picture({"main": found})
-    assert (answer.outcome, answer.numbers["most"]) == (NOT, 3.0)
-
-
 def test_every_answer_is_to_a_question(difficulty):
     tuned = [made("tune", "ES", name, better=name != "T01") for name in TUNE]
     runs = judged() + tuned
     runs += [made(f"N = {n}", "ES", name) for n in (20, 40) for name in COMPARED]
     stops = pd.DataFrame({n: [0.2] for n in (10, 20, 40)})
-    found = population.answers(table(runs), paths(runs), difficulty, stops)
+    found = population.answers(table(runs), difficulty, stops)
     assert {one.question for one in found} <= {*QUESTIONS}
 
 
