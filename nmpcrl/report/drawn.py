@@ -1,6 +1,7 @@
 """The drawn layouts as a page shows them: in short, claim by claim, the nearest to the paper."""
 
 from html import escape
+from typing import Any
 
 import pandas as pd
 
@@ -36,17 +37,23 @@ def in_short(found: PopulationRuns) -> str:
     )
 
 
-def nearest(tried: pd.DataFrame) -> str:
-    """The cell that comes nearest to the paper's whole picture, in Markdown.
+def whole_or_nearest(tried: pd.DataFrame) -> str:
+    """Where the paper's whole picture appears, or what comes nearest to it: a sentence in Markdown.
 
     Args:
         tried: of `whole_picture.everywhere`, not empty.
     """
-    one = tried.iloc[0]
+    appears = tried[tried.whole == len(PICTURE)]
+    if len(appears):
+        return f"It does in {listed(map(_cell, appears.itertuples()))}."
+    shares = listed(f"{claim} {tried.loc[0, claim]:.0%}" for claim in PICTURE)
+    return f"Nearest comes {_cell(next(tried.itertuples()))}, where yes are {shares}."
+
+
+def _cell(one: Any) -> str:
     place = one.layout if one.layout in LAYOUTS else name_of(one.layout)
     changed = "" if one.setting == MAIN_TABLE else f" and {VARIANTS[one.setting].changed}"
-    shares = listed(f"{claim} {one[claim]:.0%}" for claim in PICTURE)
-    return f"layout {place} with the decay per {one.decay}{changed}, where yes are {shares}"
+    return f"layout {place} with the decay per {one.decay}{changed}"
 
 
 def label(claim: str) -> str:

@@ -6,7 +6,8 @@ import pandas as pd
 
 from nmpcrl.claims.population import shares
 from nmpcrl.claims.population_published import PopulationRuns
-from nmpcrl.report.drawn import in_short, nearest, share_table
+from nmpcrl.claims.whole_picture import PICTURE
+from nmpcrl.report.drawn import in_short, share_table, whole_or_nearest
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.population import JUDGE
 
@@ -41,14 +42,18 @@ def test_in_short_counts_layouts_and_the_runs_on_either_side_of_the_gap(made_up)
 
 
 def test_the_nearest_is_named_with_what_is_changed_and_its_shares_of_yes():
-    shares = {"C1": 1.0, "C2": 0.0, "C5": 0.8, "C9": 1.0}
-    drawn = Experiment(layout=JUDGE["J001"]).layout
-    known = [
-        {"layout": "D", "decay": "step", "setting": "lagged"} | shares,
-        {"layout": drawn, "decay": "episode", "setting": "main"} | shares,
-    ]
-    assert nearest(pd.DataFrame(known)) == (
-        "layout D with the decay per step and a copy of the network, refreshed once an episode,"
-        " predicts, where yes are C1 100%, C2 0%, C5 80% and C9 100%"
+    shares = {"C1": 1.0, "C2": 0.0, "C5": 0.8, "C9": 1.0, "whole": 2}
+    tried = pd.DataFrame([{"layout": "D", "decay": "step", "setting": "lagged"} | shares])
+    assert whole_or_nearest(tried) == (
+        "Nearest comes layout D with the decay per step and a copy of the network, refreshed once"
+        " an episode, predicts, where yes are C1 100%, C2 0%, C5 80% and C9 100%."
     )
-    assert nearest(pd.DataFrame(known[1:])).startswith("layout J001 with the decay per episode, wh")
+
+
+def test_every_place_is_named_where_the_whole_picture_appears():
+    drawn = Experiment(layout=JUDGE["J001"]).layout
+    whole = dict.fromkeys(PICTURE, 1.0) | {"layout": drawn, "setting": "main", "whole": 4}
+    known = [whole | {"decay": "step"}, whole | {"decay": "episode"}, whole | {"whole": 3}]
+    assert whole_or_nearest(pd.DataFrame(known)) == (
+        "It does in layout J001 with the decay per step and layout J001 with the decay per episode."
+    )
