@@ -1,7 +1,6 @@
 """The drawn layouts as a page shows them: in short, claim by claim, the nearest to the paper."""
 
 from html import escape
-from typing import Any
 
 import pandas as pd
 
@@ -45,15 +44,20 @@ def whole_or_nearest(tried: pd.DataFrame) -> str:
     """
     appears = tried[tried.whole == len(PICTURE)]
     if len(appears):
-        return f"It does in {listed(map(_cell, appears.itertuples()))}."
-    shares = listed(f"{claim} {tried.loc[0, claim]:.0%}" for claim in PICTURE)
-    return f"Nearest comes {_cell(next(tried.itertuples()))}, where yes are {shares}."
+        places = appears.groupby(["layout", "setting"], sort=False).decay.agg(list)
+        cells = (_cell(layout, setting, found) for (layout, setting), found in places.items())
+        return f"It appears in {listed(cells)}."
+    one = tried.loc[0]
+    shares = listed(f"{claim} {one[claim]:.0%}" for claim in PICTURE)
+    nearest = _cell(one.layout, one.setting, [one.decay])
+    return f"Nearest comes {nearest}, where yes are {shares}."
 
 
-def _cell(one: Any) -> str:
-    place = one.layout if one.layout in LAYOUTS else name_of(one.layout)
-    changed = "" if one.setting == MAIN_TABLE else f" and {VARIANTS[one.setting].changed}"
-    return f"layout {place} with the decay per {one.decay}{changed}"
+def _cell(layout: str, setting: str, decays: list[str]) -> str:
+    centres = ", ".join(f"({at.replace(',', ', ')})" for at in layout.split())
+    place = layout if layout in LAYOUTS else f"{name_of(layout)}, with obstacles at {centres},"
+    changed = "" if setting == MAIN_TABLE else f" and {VARIANTS[setting].changed}"
+    return f"layout {place} with the decay {listed(f'per {one}' for one in decays)}{changed}"
 
 
 def label(claim: str) -> str:

@@ -55,5 +55,6 @@ def test_every_place_is_named_where_the_whole_picture_appears():
     whole = dict.fromkeys(PICTURE, 1.0) | {"layout": drawn, "setting": "main", "whole": 4}
     known = [whole | {"decay": "step"}, whole | {"decay": "episode"}, whole | {"whole": 3}]
     assert whole_or_nearest(pd.DataFrame(known)) == (
-        "It does in layout J001 with the decay per step and layout J001 with the decay per episode."
+        "It appears in layout J001, with obstacles at (-0.9, 0.7), (-0.5, 4.8), (4.5, 4.9),"
+        " (5, 1.7), with the decay per step and per episode."
     )
