@@ -79,7 +79,8 @@ def main() -> None:
     package = importing.from_memory(PACKAGE, texts)
     functions, whole = [], llvm.parse_assembly("")
     for exported in (one for module in exporting for one in getattr(package, module).EXPORTS):
-        result = exported.overloads[exported.signatures[0]]
+        (signature,) = exported.signatures
+        result = exported.overloads[signature]
         described = Function(
             name=exported.__name__,
             symbol=result.fndesc.llvm_func_name,
