@@ -9,7 +9,7 @@ import pytest
 from bs4 import BeautifulSoup
 from filelock import FileLock
 from live_page import Tab
-from visits import Visit, look_at
+from visits import PATIENCE, Visit, look_at
 
 
 @pytest.fixture(scope="session")
@@ -36,7 +36,6 @@ def visit(site, browser, shared) -> Callable[[str], Visit]:
 MATHJAX = "**/tex-svg-full.js*"
 AS_TYPED = """document.head.insertAdjacentHTML(
     "beforeend", "<style>.math { overflow: hidden }</style>")"""
-PATIENCE = 300_000  # ms until a figure counts as stuck: a busy machine trains several times slower
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ VIEWS = {  # every rule in both widths, and those of colours in both themes, too
     (390, "light"): COLOURS,
 }
 TELEPHONES = (390, 320)  # [px]
+PATIENCE = 300_000  # ms until a page counts as stuck: a busy machine trains several times slower
 UNREADABLE = "[data-mjx-error], mjx-container mtext[mathcolor=red]"  # errors, unknown macros
 
 TYPESET = "window.MathJax?.startup?.promise"
@@ -129,6 +130,7 @@ def opened(browser: Any, address: str, width: int) -> Any:
     """A page that does not move, with its formulas."""
     size = {"width": width, "height": 900}
     tab = browser.new_page(viewport=size, color_scheme="light", reduced_motion="reduce")
+    tab.set_default_timeout(PATIENCE)
     tab.goto(address)
     tab.add_style_tag(content=STILL)
     tab.evaluate(TYPESET)
@@ -139,6 +141,7 @@ def look_at(browser: Any, path: Path) -> Visit:
     """What is found on a page: as it opens, with all open on telephones, and by axe."""
     seen = Visit()
     tab = browser.new_page(viewport={"width": TELEPHONES[0], "height": 900})
+    tab.set_default_timeout(PATIENCE)
     tab.on("request", lambda request: seen.requests.append(request.url))
     tab.on("pageerror", lambda error: seen.errors.append(str(error)))
     tab.on("requestfailed", lambda request: seen.errors.append(f"failed: {request.url}"))
@@ -167,7 +170,7 @@ def look_at(browser: Any, path: Path) -> Visit:
 
 def judge(tab: Any, seen: Visit) -> None:
     """Let axe look at a page in every width and theme, its live figures begun."""
-    tab.wait_for_function(BEGUN, timeout=300_000)
+    tab.wait_for_function(BEGUN)
     seen.figures = tab.locator("figure.live:has(.results)").evaluate_all(
         "all => all.map(one => one.dataset.figure)"
     )

@@ -125,7 +125,7 @@ def printed(decks: Iterable[Path]) -> list[Path]:
         playwright.chromium.launch(executable_path=browser, args=pdf.FLAGS) as chromium,
     ):
         for path in decks:
-            tab = chromium.new_page(viewport=LANDSCAPE)
+            tab = pdf.opened(chromium, LANDSCAPE)
             tab.goto(f"{path.resolve().as_uri()}?print-pdf")
             tab.wait_for_selector("html[data-ready] .pdf-page", state="attached")
             printed = tab.pdf(prefer_css_page_size=True, print_background=True)

@@ -40,6 +40,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-sync")
 PAPER: dict[str, Any] = {"format": "A4", "print_background": True, "tagged": True, "outline": True}
 COLUMN: Any = {"width": 643, "height": 957}  # [px] of A4 that the margins of print.css leave
+PATIENCE = 600_000  # [ms] until a page counts as stuck: a busy machine needs many times its load
 
 READY = """async () => {
   await MathJax.startup.promise;
@@ -106,10 +107,17 @@ def printed(document: Path, browser: str) -> bytes:
         return _printed(chromium, document, numbers(_printed(chromium, document, {})))
 
 
+def opened(chromium: Any, viewport: Mapping[str, int]) -> Any:
+    """A tab of this size [px], which waits for a page as long as a busy machine takes."""
+    tab = chromium.new_page(viewport=viewport)
+    tab.set_default_timeout(PATIENCE)
+    return tab
+
+
 def _printed(chromium: Any, document: Path, on: Mapping[str, int]) -> bytes:
     """A document, printed by a tab of its own: a second print of one tab may break elsewhere."""
     missing: list[str] = []
-    tab = chromium.new_page(viewport=COLUMN)
+    tab = opened(chromium, COLUMN)
     tab.on("requestfailed", lambda request: missing.append(request.url))
     tab.emulate_media(media="print")
     tab.goto(document.resolve().as_uri())
