@@ -127,10 +127,25 @@ def read(yes: int, of: int) -> Outcome:
     return PARTLY
 
 
-def count(answers: pd.Series) -> Answers:
-    """The answers of some runs: True, False, or missing."""
-    known = answers.dropna().astype(bool)
-    return Answers(int(known.sum()), int((~known).sum()), int(answers.isna().sum()))
+def counted(answers: pd.Series, level: str = "") -> dict[str, Answers]:
+    """How runs answer for each value of a level, in the order in which they come, or as "all".
+
+    Args:
+        answers: True, False or missing.
+        level: of their index; without one all are counted together.
+    """
+    known = answers.astype("boolean")
+    missing, yes = known.isna().to_numpy(), known.to_numpy(bool, na_value=False)
+    if level:
+        place, names = pd.factorize(answers.index.get_level_values(level))
+    else:
+        place, names = np.zeros(len(answers), int), pd.Index(["all"])
+    found = [np.bincount(place[where], minlength=len(names)) for where in (yes, missing)]
+    of = np.bincount(place, minlength=len(names))
+    return {
+        name: Answers(int(yeses), int(all_of - yeses - unknown), int(unknown))
+        for name, all_of, yeses, unknown in zip(names, of, *found, strict=True)
+    }
 
 
 def settle(
@@ -152,25 +167,36 @@ def settle(
         unit: what was asked, in the plural.
     """
 
-    def outcome(group: pd.Series) -> Outcome:
-        strict = count(group).outcome
-        if weaker is None or strict != NOT:
-            return strict
-        lenient = count(weaker[group.index]).outcome
-        return lenient if lenient in (NOT, UNDECIDABLE) else PARTLY
+    levels = [level for level in ("layout", "decay") if level in answers.index.names]
+    found = {level: counted(answers, level) for level in ("", *levels)}
+    forgiven = answers if weaker is None else weaker[answers.index]
+    lenient = {level: counted(forgiven, level) for level in found}
 
-    whole = count(answers)
-    layouts, decays = _groups(answers, "layout"), _groups(answers, "decay")
-    parts = {"all": answers} | layouts | decays
+    outcomes = {
+        level: {name: _forgiving(one, lenient[level][name]) for name, one in parts.items()}
+        for level, parts in found.items()
+    }
+    whole = found[""]["all"]
     return claim.verdict(
-        outcome(answers),
+        outcomes[""]["all"],
         f"{evidence} {_held(whole, unit)} {scope(answers)}",
         share=whole.share.value if whole.share else None,
         interval=(whole.share.low, whole.share.high) if whole.share else None,
-        by_layout={name: outcome(group) for name, group in layouts.items()},
-        by_decay={name: outcome(group) for name, group in decays.items()},
-        counts={name: (count(part).yes, int(part.notna().sum())) for name, part in parts.items()},
+        by_layout=outcomes.get("layout", {}),
+        by_decay=outcomes.get("decay", {}),
+        counts={
+            name: (one.yes, one.yes + one.no)
+            for parts in found.values()
+            for name, one in parts.items()
+        },
     )
+
+
+def _forgiving(strict: Answers, lenient: Answers) -> Outcome:
+    """What is refuted is partly reproduced where the weaker question is not refuted."""
+    if strict.outcome != NOT:
+        return strict.outcome
+    return lenient.outcome if lenient.outcome in (NOT, UNDECIDABLE) else PARTLY
 
 
 def arms(
@@ -216,13 +242,6 @@ def scope(answers: pd.Series) -> str:
     ]
     parts = [f"{n} {name}{'' if n == 1 else 's'}{rest}" for n, name, rest in counts]
     return f"({', '.join(parts)}.)"
-
-
-def _groups(answers: pd.Series, level: str) -> dict[str, pd.Series]:
-    if level not in answers.index.names:
-        return {}
-    labels = answers.index.get_level_values(level)
-    return {name: answers[labels == name] for name in labels.unique()}
 
 
 def _held(answers: Answers, unit: str) -> str:

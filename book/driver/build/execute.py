@@ -33,11 +33,14 @@ KERNEL = {  # the environment of what executes a chapter
     "PYDEVD_DISABLE_FILE_VALIDATION": "1",
 }
 
+# In chapters that compile a plant or problem of their own, or read the runs of drawn layouts.
+LONG = (b"Plant(", b"Problem(", b"study.problems", b"population_published")
+
 
 def weight(job: tuple[Path, Given]) -> tuple[bool, int]:
-    """What compiles a plant or problem of its own is begun first, and then the largest in bytes."""
+    """What is begun first: what compiles, or reads every run; and then the largest in bytes."""
     text = job[0].read_bytes()
-    return any(word in text for word in (b"Plant(", b"Problem(", b"study.problems")), len(text)
+    return any(word in text for word in LONG), len(text)
 
 
 def execute_all(place: Path, jobs: dict[Path, Given]) -> None:
