@@ -103,25 +103,37 @@ def in_short(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     return f"{_head(judged, _by(table, suite))}." if judged else waiting(table)
 
 
-def longer(table: pd.DataFrame, suite: pd.DataFrame) -> str:
-    """What it takes to match theta_init, as far as that is published, and what is not."""
-    by = _by(table, suite)
-    said = [
-        f"In layout A, {one.agent} matches {INIT} within {PARTS['one'].budget} episodes under"
-        f" {_counted(by[f'{one.agent} matches in one layout'])} seeds; the median {_when(one)}."
-        f" Under {_counted(by[f'{one.agent} or the best search in one layout'])} it costs less at"
-        f" the end than `{SEARCH}` with {SHORT}."
-        for one in _courses(table, "one")
-    ]
-    for one in _courses(table, "all", [*TUNE]):
-        said.append(
-            f"One {one.agent} for all, with {PARTS['all'].budget} episodes, matches in"
-            f" {_counted(by[f'{one.agent} matches over the 60'])} layouts in which it was trained;"
-            f" the median {_when(one)}. In layouts that it never saw it matches in"
-            f" {_counted(by[f'{one.agent} matches on the 120'])}, and costs less than `{SEARCH}`"
-            f" in {_counted(by[f'{one.agent} or the best search on the 120'])}."
-        )
-    return " ".join(filter(None, [*said, waiting(table)]))
+def longer_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
+    """What it takes to match theta_init, in HTML: one row an agent and where it is judged.
+
+    Args:
+        table: with `agent_published.COLUMNS`.
+        suite: the published comparison of remedies.
+    """
+    by, one = _by(table, suite), PARTS["one"]
+    asked: dict[str, tuple[str, Sequence[str], str]] = {  # where: part, layouts, in a question
+        f"for layout A, {one.seeds} seeds": ("one", (), "in one layout"),
+        f"for {len(TUNE)} layouts, in these": ("all", [*TUNE], f"over the {len(TUNE)}"),
+        f"for {len(TUNE)} layouts, in {len(JUDGE)} others": (
+            "all",
+            [*JUDGE],
+            f"on the {len(JUDGE)}",
+        ),
+    }
+    found = []
+    for where, (part, among, on) in asked.items():
+        for each in _courses(table, part, among):
+            search = by.get(f"{each.agent} or the best search {on}")
+            found.append((
+                f"{each.agent} {where}",
+                f"{each.episodes[-1]:,}",
+                _counted(by[f"{each.agent} matches {on}"]),
+                _when(each),
+                _counted(search) if search else "not asked",
+            ))  # fmt: skip
+    header = ("Agent", "Episodes", "Matches theta_init", "Its median", f"Below `{SEARCH}`")
+    caption = f"Agents with more episodes, beside `{SEARCH}` with {SHORT} a layout."
+    return html_table(caption, header, found, headed=True)
 
 
 def tuned() -> str:
@@ -167,11 +179,11 @@ def _when(one: Course) -> str:
     """From when on the median matches."""
     first, always = one.matched
     if np.isinf(first):
-        return f"never does by episode {one.episodes[-1]}"
-    stays = "always does" if first == always else f"does from {always:.0f} on"
+        return "never matches"
     if np.isinf(always):
-        stays = "does not stay there"
-    return f"first does after {first:.0f} episodes and {stays}"
+        return f"first matches after {first:,.0f}, and not at the end"
+    begins = "" if first == always else f"first after {first:,.0f}, and "
+    return f"matches {begins}always from {always:,.0f} on"
 
 
 def _count(answer: Answer) -> int:

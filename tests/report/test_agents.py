@@ -8,8 +8,17 @@ from bs4 import BeautifulSoup
 from nmpcrl.claims.agent_published import COLUMNS, order
 from nmpcrl.claims.agent_questions import AGENTS, PARTS
 from nmpcrl.claims.agent_runs import judged_in
+from nmpcrl.claims.agents import Course
 from nmpcrl.claims.remedies import COLUMNS as COMPARED
-from nmpcrl.report.agents import finding, in_short, longer, panels, row_table, waiting
+from nmpcrl.report.agents import (
+    _when,
+    finding,
+    in_short,
+    longer_table,
+    panels,
+    row_table,
+    waiting,
+)
 from nmpcrl.study.population import JUDGE
 
 NOTHING = pd.DataFrame(columns=[*COLUMNS])
@@ -48,9 +57,16 @@ def plain(text):
     return " ".join(BeautifulSoup(text, "html.parser").get_text().split())
 
 
+def cells(table):
+    """The texts of a table's rows."""
+    rows = BeautifulSoup(table, "html.parser").select("tbody tr")
+    return [[cell.get_text() for cell in row.select("th, td")] for row in rows]
+
+
 def test_of_nothing_only_what_is_missing_is_said(suite):
     assert finding(NOTHING, suite) == ""
-    assert in_short(NOTHING, suite) == longer(NOTHING, suite) == waiting(NOTHING)
+    assert in_short(NOTHING, suite) == waiting(NOTHING)
+    assert cells(longer_table(NOTHING, suite)) == []
     assert waiting(NOTHING).count("what") == len(PARTS) - 2
     assert panels(NOTHING, suite) == ({}, {})
 
@@ -75,17 +91,32 @@ def test_an_agent_that_is_published_alone_is_shown_and_the_other_one_waited_for(
     assert [len(each) for each in panels(alone, suite)[0].values()] == [1, 1, 1, 1]
 
 
-def test_what_it_takes_is_said_part_by_part(suite):
-    some = longer(made("judge", "one"), suite)
-    assert "SAC matches" in some
-    assert "under 4 of 4 seeds; the median first does after 600 episodes and always does" in (
-        plain(some)
-    )
-    assert "what one agent for all layouts comes to are not published yet" in some
-    every = plain(longer(made("judge", "one", "all"), suite))
-    assert "One SAC for all, with 1600 episodes, matches in 0 of 60 layouts" in every
-    assert "never saw it matches in 120 of 120, and costs less than `Bayes` in 0 of 120" in every
-    assert "not published" not in every
+def test_what_it_takes_has_a_row_an_agent_and_where_it_is_judged(suite):
+    always = "matches always from 600 on"
+    assert cells(longer_table(made("judge", "one"), suite)) == [
+        ["SAC for layout A, 4 seeds", "600", "0 of 4", "never matches", "0 of 4"],
+        ["TD3 for layout A, 4 seeds", "600", "4 of 4", always, "0 of 4"],
+    ]
+    *_, seen, sac, td3 = cells(longer_table(made("judge", "one", "all"), suite))
+    always = "matches always from 1,600 on"
+    assert seen == [
+        "TD3 for 60 layouts, in these", "1,600", "60 of 60", always, "not asked"
+    ]  # fmt: skip
+    assert sac[0] == "SAC for 60 layouts, in 120 others"
+    assert td3[1:] == ["1,600", "120 of 120", always, "0 of 120"]
+
+
+@pytest.mark.parametrize(
+    ("shares", "said"),
+    [
+        ((1.2, 0.9, 1.1), "first matches after 300, and not at the end"),
+        ((1.2, 0.9, 1.1, 0.9), "matches first after 300, and always from 1,000 on"),
+    ],
+)
+def test_a_median_that_does_not_stay_is_said_so(shares, said):
+    episodes, alike = (100, 300, 600, 1000)[: len(shares)], np.array(shares)
+    there = np.ones((len(shares), 1), bool)
+    assert _when(Course("SAC", ("A",), episodes, alike[:, None], there)) == said
 
 
 def test_a_figure_has_a_panel_for_what_is_published_and_the_search_where_it_is_known(suite):
@@ -95,10 +126,9 @@ def test_a_figure_has_a_panel_for_what_is_published_and_the_search_where_it_is_k
 
 
 def test_the_rows_are_those_of_the_suite_in_the_layouts_of_the_agents(suite):
-    rows = BeautifulSoup(row_table(made("judge"), suite), "html.parser").select("tbody tr")
-    cells = [[cell.get_text() for cell in row.select("th, td")] for row in rows]
-    assert [one[0] for one in cells] == ["SAC", "TD3", "Bayes"]
-    assert [one[1].split()[0] for one in cells] == ["−2.00", "0.30", "0.50"]
-    assert [one[2:] for one in cells] == [
+    rows = cells(row_table(made("judge"), suite))
+    assert [one[0] for one in rows] == ["SAC", "TD3", "Bayes"]
+    assert [one[1].split()[0] for one in rows] == ["−2.00", "0.30", "0.50"]
+    assert [one[2:] for one in rows] == [
         ["0 of 6", "300", "60.0 s"], ["6 of 6", "300", "60.0 s"], ["6 of 6", "50", "2.0 s"]
     ]  # fmt: skip

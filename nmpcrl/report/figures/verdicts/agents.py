@@ -14,7 +14,8 @@ from nmpcrl.report.figures.style import LIMIT, SUBTITLE, TEAL, WINE, Look, heade
 
 AGENT_LOOKS = {"SAC": Look(WINE, "-", "o"), "TD3": Look(TEAL, (0, (5, 1)), "s")}
 SEARCHED: dict[str, Any] = {"color": "0.25", "linewidth": 1.2, "linestyle": "-."}
-TICKS = (25, 50, 100, 300, 600, 1600)  # episodes
+TICKS = (100, 300)  # episodes, between the first and the last
+APART = 2.5  # factor between two ticks, so that their numbers do not touch
 DEAREST = 3.0  # in parts of theta_init's cost; what is dearer is not drawn
 
 
@@ -52,8 +53,10 @@ def _draw(axes: Axes, one: Course) -> None:
                       edgecolor=look.color, linewidth=0.7, linestyle=look.linestyle)  # fmt: skip
     axes.plot(one.episodes, one.median, label=one.agent, marker=look.marker, markersize=4,
               **look.line)  # fmt: skip
-    ticks = [tick for tick in TICKS if one.episodes[0] <= tick <= one.episodes[-1]]
-    axes.set_xticks(ticks, [str(tick) for tick in ticks])
+    first, last = one.episodes[0], one.episodes[-1]
+    between = [tick for tick in TICKS if APART * first <= tick <= last / APART]
+    ticks = [first, *between, last]
+    axes.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
     axes.xaxis.set_minor_locator(NullLocator())
 
 
@@ -63,7 +66,7 @@ def _finding(each: Sequence[Course]) -> str:
     for one in each:
         _, always = one.matched
         until = f"from {always:.0f} episodes on" if np.isfinite(always) else (
-            f"not by episode {one.episodes[-1]}"
+            f"not by episode {one.episodes[-1]:,}"
         )  # fmt: skip
         alike.setdefault(until, []).append(one.agent)
     said = [f"{' and '.join(names)} {until}" for until, names in alike.items()]
