@@ -8,25 +8,20 @@ from bs4 import BeautifulSoup
 from nmpcrl.claims.agent_published import COLUMNS, order
 from nmpcrl.claims.agent_questions import AGENTS, PARTS
 from nmpcrl.claims.agent_runs import judged_in
-from nmpcrl.claims.agents import Course
 from nmpcrl.claims.remedies import COLUMNS as COMPARED
-from nmpcrl.report.agents import (
-    _when,
-    finding,
-    in_short,
-    longer_table,
-    panels,
-    row_table,
-    waiting,
-)
+from nmpcrl.report.agents import finding, in_short, longer_table, panels, row_table, waiting
 from nmpcrl.study.population import JUDGE
 
 NOTHING = pd.DataFrame(columns=[*COLUMNS])
 SHARES = {"SAC": 1.2, "TD3": 0.97}  # of theta_init's cost, at the end
 
 
-def made(*parts, agents=AGENTS, there="a"):
-    """Runs of some parts, which cost twice as much as theta_init until the end."""
+def made(*parts, agents=AGENTS, there="a", meanwhile=()):
+    """Runs of some parts, which cost twice as much as theta_init until the end.
+
+    Args:
+        meanwhile: episodes after which they cost 0.9 times as much.
+    """
     found = []
     for part, agent in ((part, agent) for part in parts for agent in agents):
         points = PARTS[part].checkpoints
@@ -34,6 +29,7 @@ def made(*parts, agents=AGENTS, there="a"):
             count = len(judged_in(place))
             costs = np.full((len(points), count), 200.0)
             costs[-1] = 100 * SHARES[agent]
+            costs[[points.index(episodes) for episodes in meanwhile]] = 90
             arrived = [there * count] * len(points)
             row = (part, agent, place, k, [100.0] * count, costs.tolist(), arrived, points[-1])
             found.append((*row, 130 * points[-1], 60.0))
@@ -106,17 +102,10 @@ def test_what_it_takes_has_a_row_an_agent_and_where_it_is_judged(suite):
     assert td3[1:] == ["1,600", "120 of 120", always, "0 of 120"]
 
 
-@pytest.mark.parametrize(
-    ("shares", "said"),
-    [
-        ((1.2, 0.9, 1.1), "first matches after 300, and not at the end"),
-        ((1.2, 0.9, 1.1, 0.9), "matches first after 300, and always from 1,000 on"),
-    ],
-)
-def test_a_median_that_does_not_stay_is_said_so(shares, said):
-    episodes, alike = (100, 300, 600, 1000)[: len(shares)], np.array(shares)
-    there = np.ones((len(shares), 1), bool)
-    assert _when(Course("SAC", ("A",), episodes, alike[:, None], there)) == said
+def test_a_median_that_matches_and_no_longer_does_is_said_so(suite):
+    sac, td3 = cells(longer_table(made("one", meanwhile=[100]), suite))
+    assert sac[3] == "first matches after 100, and not at the end"
+    assert td3[3] == "matches first after 100, and always from 600 on"
 
 
 def test_a_figure_has_a_panel_for_what_is_published_and_the_search_where_it_is_known(suite):
