@@ -48,7 +48,7 @@ def drawn(target: Path) -> str:
 
 def tags(page: str, path: Path, html: Path, alt: str) -> str:
     """The tags of a page, which a page without a title has none of."""
-    title = BeautifulSoup(page, "html.parser").title
+    title = BeautifulSoup(page.partition("</head>")[0], "html.parser").title
     if title is None:
         return ""
     config = from_yaml("_config.yml")
