@@ -110,15 +110,11 @@ def longer_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
         table: with `agent_published.COLUMNS`.
         suite: the published comparison of remedies.
     """
-    by, one = _by(table, suite), PARTS["one"]
+    by, one, seen, new = _by(table, suite), PARTS["one"], len(TUNE), len(JUDGE)
     asked: dict[str, tuple[str, Sequence[str], str]] = {  # where: part, layouts, in a question
         f"for layout A, {one.seeds} seeds": ("one", (), "in one layout"),
-        f"for {len(TUNE)} layouts, in these": ("all", [*TUNE], f"over the {len(TUNE)}"),
-        f"for {len(TUNE)} layouts, in {len(JUDGE)} others": (
-            "all",
-            [*JUDGE],
-            f"on the {len(JUDGE)}",
-        ),
+        f"for {seen} layouts, in these": ("all", [*TUNE], f"over the {seen}"),
+        f"for {seen} layouts, in {new} others": ("all", [*JUDGE], f"on the {new}"),
     }
     found = []
     for where, (part, among, on) in asked.items():

@@ -102,6 +102,12 @@ def test_what_it_takes_has_a_row_an_agent_and_where_it_is_judged(suite):
     assert td3[1:] == ["1,600", "120 of 120", always, "0 of 120"]
 
 
+def test_what_is_not_published_is_waited_for_until_it_is():
+    missing = "what one agent for all layouts comes to are not published yet"
+    assert missing in waiting(made("judge", "one"))
+    assert waiting(made("judge", "one", "all")) == ""
+
+
 def test_a_median_that_matches_and_no_longer_does_is_said_so(suite):
     sac, td3 = cells(longer_table(made("one", meanwhile=[100]), suite))
     assert sac[3] == "first matches after 100, and not at the end"
