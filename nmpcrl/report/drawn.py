@@ -1,5 +1,6 @@
 """The drawn layouts as a page shows them: in short, claim by claim, the nearest to the paper."""
 
+import re
 from html import escape
 
 import pandas as pd
@@ -81,4 +82,9 @@ def _cells(row: pd.Series) -> tuple[str, ...]:
     expected = EXPECTED[row.claim]
     counted = f"{row.holding} of {row.layouts}<br>{row.share:.0%} [{row.low:.0%}, {row.high:.0%}]"
     badge = f'<span class="{BADGES[row.outcome]}">{row.outcome}</span>'
-    return (escape(label(row.claim)), counted, badge, f"{expected.low:.0%} to {expected.high:.0%}")
+    return (_claim(row.claim), counted, badge, f"{expected.low:.0%} to {expected.high:.0%}")
+
+
+def _claim(name: str) -> str:
+    """A claim's label as HTML, its formulas as those of a page, which are typeset there."""
+    return re.sub(r"\$([^$]*)\$", r'<span class="math">\(\1\)</span>', escape(label(name)))

@@ -24,6 +24,15 @@ def test_a_row_has_count_interval_outcome_and_what_was_expected():
     assert "85% to 97%" in table
 
 
+def test_a_formula_of_a_claim_is_typeset_in_its_row():
+    rows = pd.DataFrame(
+        [("C9", "J000", 1, 2, True)], columns=["claim", "layout", "yes", "of", "holds"]
+    )
+    table = share_table(shares(rows))
+    assert r'beat <span class="math">\(\theta_\mathrm{init}\)</span>' in table
+    assert "$" not in table
+
+
 def test_in_short_counts_layouts_and_the_runs_on_either_side_of_the_gap(made_up):
     names = ["J001", "J002"]
     layouts = tuple(JUDGE[name] for name in names)
