@@ -63,14 +63,6 @@ class Chart:
         return bool(fires)
 
 
-def false_alarms(episodes: int) -> float:
-    """Of a chart on independent normal values: the expected share of episodes with one."""
-    from scipy.stats import t  # takes a second
-
-    each = 2 * t.sf(LIMIT / np.sqrt(1 + 1 / WINDOW), WINDOW - 1)
-    return float(each * max(episodes - WINDOW, 0) / episodes)
-
-
 class Recent(np.random.Generator):
     """Draws mini-batches of which the late examples are part most often: a replay's generator.
 

@@ -2,18 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import t
 
 from nmpcrl.analysis import shifts
-from nmpcrl.analysis.shifts import (
-    FOR,
-    RAISED,
-    WINDOW,
-    Chart,
-    Recent,
-    changing,
-    false_alarms,
-    schedule,
-)
+from nmpcrl.analysis.shifts import FOR, LIMIT, RAISED, WINDOW, Chart, Recent, changing, schedule
 from nmpcrl.learning import Diverged, Exploration
 from nmpcrl.learning.training import Step
 from nmpcrl.study import paper
@@ -31,10 +23,11 @@ def test_a_layout_changes_once_every_fifty_episodes_or_by_chance():
 
 
 def test_the_false_alarms_of_stationary_costs_are_as_many_as_the_law_of_t_says():
-    rng, episodes = RNG(0), 60_000
+    rng, values = RNG(0), 60_000
     chart = Chart()
-    fired = sum(chart(one) for one in rng.normal(4000.0, 30.0, episodes))
-    assert fired / episodes == pytest.approx(false_alarms(episodes), rel=0.35)
+    fired = sum(chart(one) for one in rng.normal(4000.0, 30.0, values))
+    falsely = 2 * t.sf(LIMIT / np.sqrt(1 + 1 / WINDOW), WINDOW - 1)  # each, as its class says
+    assert fired == pytest.approx(falsely * (values - WINDOW), rel=0.35)
     assert 20 < fired < 100
 
 
