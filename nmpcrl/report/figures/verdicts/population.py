@@ -60,7 +60,8 @@ def shares(found: pd.DataFrame, six: pd.DataFrame, verdicts: Mapping[str, Outcom
         six: the same of A to F.
         verdicts: the outcomes of A to F by claim, for the title.
     """
-    figure, axes = subplots(height=ROW * len(found) + 1.3)
+    height = ROW * len(found) + 1.3
+    figure, axes = subplots(height=height, tall=height + 0.5)  # its legend has a line more
     for y, row in enumerate(found.itertuples()):
         colour, mark = LOOK.get(row.outcome, OTHER)
         expected = EXPECTED[str(row.claim)]

@@ -1,12 +1,16 @@
 """Figures of the drawn layouts: the title counts, and every claim and measure has its row."""
 
+from itertools import cycle, pairwise
+
 import pandas as pd
 import pytest
 
 from nmpcrl.analysis.difficulty import MEASURES, PILOT
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims.population import shares
+from nmpcrl.claims.population_questions import EXPECTED
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED
+from nmpcrl.report.figures.sheet import NARROW
 from nmpcrl.report.figures.verdicts import population as figures
 
 
@@ -36,6 +40,16 @@ def test_the_title_counts_the_verdicts_that_stand_and_others_have_none():
     marks = {outcome: look[1] for outcome, look in figures.LOOK.items()}
     drawn = [line.get_marker() for line in axes.get_lines() if len(line.get_xdata()) == 1]
     assert drawn == [marks[PARTLY], "|", marks[NOT], "|", marks[REPRODUCED]]
+
+
+def test_no_two_claims_of_a_narrow_sheet_are_written_over_each_other():
+    found = shares(where(**dict(zip(EXPECTED, cycle((0, 20, 40)), strict=False))))
+    assert found.outcome.nunique() == 3  # each has its entry in the legend
+    figure = figures.shares(found, found, {}).again(NARROW)
+    figure.draw_without_rendering()  # lays it out
+    boxes = [text.get_window_extent() for text in figure.axes[0].get_yticklabels()]
+    assert len(boxes) == len(EXPECTED)
+    assert all(above.y0 >= below.y1 for above, below in pairwise(boxes))
 
 
 @pytest.mark.parametrize(("pilot", "place"), [(0.9, "best"), (0.55, "9th of 9")])
