@@ -84,10 +84,9 @@ def arms(episodes: int = paper.EPISODES) -> dict[str, tuple[Experiment, ...]]:
     """The parts of the population's study, in the order in which they are wanted.
 
     "judge" has the learners that solve for Q with a layout's first seed, "judge imitating" those
-    that imitate it, and "judge again" all of them with the second: the longest part, which changes
-    least, since a layout has only further answers. "tune" has what predictors are fitted to. The
-    others change one thing in the layouts that are `COMPARED`, with one seed, and the step size in
-    the paper's reading only: so that all of them take less than five hours on two cores.
+    that imitate it, and "judge again" all of them with the second, the longest part. "tune" has
+    what predictors are fitted to. The others change one thing in the layouts that are `COMPARED`,
+    with one seed, and the step size in the paper's reading only, to save time.
     """
     judged, tuned = [*population.JUDGE], [*population.TUNE]
     learning = ("frozen", *SOLVING_TWICE)
