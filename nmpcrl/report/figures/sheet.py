@@ -21,6 +21,9 @@ import numpy as np
 from IPython.display import display
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -46,6 +49,7 @@ HEAVY = 300_000  # bytes of an SVG from which on a page shows a PNG
 SHARP = 216  # dots an inch of a narrow PNG: telephones show several where a page counts one
 TALL = 2.0  # inches of a panel that stands above others, at most
 REST = 1.1  # inches of a narrow figure for what is not a panel
+CANVASES = {"svg": FigureCanvasSVG, "pdf": FigureCanvasPdf, "png": FigureCanvasAgg}
 DATES = {"svg": "Date", "pdf": "CreationDate"}  # what a file would say of when it was made
 
 Parameters = ParamSpec("Parameters")
@@ -133,16 +137,12 @@ class Drawn(Figure):
             TooHeavy: it has `most` bytes or more, and is not written to its end.
         """
         file = Limited(most)
-        with plt.rc_context(PAGE):
-            options: dict[str, Any] = {"metadata": {DATES[kind]: None}} if kind in DATES else {}
+        options: dict[str, Any] = {"metadata": {DATES[kind]: None}} if kind in DATES else {}
+        with plt.rc_context(PAGE), self._dots():
+            self._settle()
             if kind == "png" and self.get_figwidth() <= NARROW.width:
-                options["dpi"] = SHARP
-            if isinstance(self.get_layout_engine(), ConstrainedLayoutEngine):
-                self.draw_without_rendering()  # equal scales settle first, and the layout after
-            try:
-                self.savefig(file, format=kind, **options)
-            finally:
-                self.set_layout_engine("none")  # what is laid out stays so
+                self.set_dpi(SHARP)
+            getattr(CANVASES[kind](self), f"print_{kind}")(file, **options)
         data = file.getvalue()
         if kind == "svg" and self.ways:
             return playing(data.decode(), self.ways).encode()
@@ -159,6 +159,25 @@ class Drawn(Figure):
                 if self.get_figheight() > SLIDE.height:
                     shown[MIME]["slide"] = self._on(SLIDE)
         display(shown, raw=True)  # type: ignore[no-untyped-call]
+
+    def _settle(self) -> None:
+        """Lay the figure out, once for all its files; `savefig` would do so anew for each."""
+        engine = self.get_layout_engine()
+        if isinstance(engine, ConstrainedLayoutEngine):
+            engine.execute(self)
+            for axes in self.axes:
+                axes.apply_aspect()  # equal scales settle first, and the layout after
+            engine.execute(self)
+            self.set_layout_engine("none")  # what is laid out stays so
+
+    @contextmanager
+    def _dots(self) -> Iterator[None]:
+        """However many an inch a file has, there are as many as before after it."""
+        before = self.get_dpi()
+        try:
+            yield
+        finally:
+            self.set_dpi(before)
 
     def _on(self, other: Sheet) -> dict[str, Any]:
         """The file of the figure on another sheet: SVG, or PNG where that is heavy."""
