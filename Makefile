@@ -87,6 +87,10 @@ locks: .venv/ready  ## Make locks/ anew from environment.txt; any target takes t
 clean:  ## Remove the built book; stored runs stay
 	rm -rf _build
 
+# pip makes byte code on one core, and this on all; what is not for this Python is passed over.
+QUICKLY := -qq --disable-pip-version-check --no-compile
+byte_code = $(1)/bin/python -m compileall -qq -j 0 $(1)/lib >/dev/null 2>&1 || true
+
 .venv/ready: environment.txt pyproject.toml $(LOCKS)
 	@test -n "$(FOUND)" || { \
 	  echo "Python $(firstword $(PYTHONS)) to $(lastword $(PYTHONS)), with venv and ensurepip, is needed, and not found" \
@@ -96,8 +100,9 @@ clean:  ## Remove the built book; stored runs stay
 	@echo "Taking $$($(FOUND) --version), $(FOUND), and installing the pinned packages of" \
 	  "$(if $(LOCKS),locks,environment.txt) into .venv: some minutes, once."
 	@$(FOUND) -m venv --clear .venv
-	@$(BIN)/pip install -qq --disable-pip-version-check $(if $(LOCKS),--require-hashes -r locks/python$$( \
+	@$(BIN)/pip install $(QUICKLY) $(if $(LOCKS),--require-hashes -r locks/python$$( \
 	  $(BIN)/python -c 'import sys; print("%d.%d" % sys.version_info[:2])').txt,-r environment.txt)
+	@$(call byte_code,.venv)
 	@$(BIN)/pip install -qq --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $(if $(LOCKS),.venv/locked) $@
 
@@ -111,6 +116,7 @@ clean:  ## Remove the built book; stored runs stay
 .venv-lab/ready: book/lab.txt .venv/ready
 	@echo "Installing JupyterLab, the pinned packages of $<, into .venv-lab: a minute, once."
 	@$(BIN)/python -m venv --clear .venv-lab
-	@.venv-lab/bin/pip install -qq --disable-pip-version-check -r $<
+	@.venv-lab/bin/pip install $(QUICKLY) -r $<
+	@$(call byte_code,.venv-lab)
 	@$(BIN)/python -m ipykernel install --prefix .venv-lab --name python3 >/dev/null 2>&1
 	@touch $@
