@@ -199,6 +199,16 @@ def test_the_same_figure_gives_the_same_bytes(kind):
     assert bars().written(kind) == bars().written(kind)
 
 
+@pytest.mark.parametrize("first", ["svg", "pdf", "png"])
+def test_files_of_a_figure_are_laid_out_alike_whatever_is_written_first(first):
+    figure = bars()
+    figure.written(first)
+    dots = figure.get_dpi()
+    for kind in ("svg", "pdf", "png"):
+        assert figure.written(kind) == bars().written(kind)
+    assert figure.get_dpi() == dots == sheet.PAGE["figure.dpi"]
+
+
 def test_a_title_above_a_map_with_equal_scales_is_within_the_figure():
     figure, axes = sheet.subplots(height=3.7)
     draw_task(axes, paper.task("A"))
