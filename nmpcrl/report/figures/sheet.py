@@ -139,10 +139,10 @@ class Drawn(Figure):
         file = Limited(most)
         options: dict[str, Any] = {"metadata": {DATES[kind]: None}} if kind in DATES else {}
         with plt.rc_context(PAGE), self._dots():
-            self._settle()
+            canvas = self._settled(kind)
             if kind == "png" and self.get_figwidth() <= NARROW.width:
                 self.set_dpi(SHARP)
-            getattr(CANVASES[kind](self), f"print_{kind}")(file, **options)
+            getattr(canvas, f"print_{kind}")(file, **options)
         data = file.getvalue()
         if kind == "svg" and self.ways:
             return playing(data.decode(), self.ways).encode()
@@ -160,15 +160,21 @@ class Drawn(Figure):
                     shown[MIME]["slide"] = self._on(SLIDE)
         display(shown, raw=True)  # type: ignore[no-untyped-call]
 
-    def _settle(self) -> None:
-        """Lay the figure out, once for all its files; `savefig` would do so anew for each."""
+    def _settled(self, kind: str) -> Any:
+        """What draws a file of this kind, on a figure that is laid out.
+
+        The first kind that is written lays it out, for all: `savefig` would do so anew for each.
+        """
         engine = self.get_layout_engine()
-        if isinstance(engine, ConstrainedLayoutEngine):
-            engine.execute(self)
-            for axes in self.axes:
-                axes.apply_aspect()  # equal scales settle first, and the layout after
-            engine.execute(self)
-            self.set_layout_engine("none")  # what is laid out stays so
+        if not isinstance(engine, ConstrainedLayoutEngine):
+            return CANVASES[kind](self)
+        engine.execute(self)
+        for axes in self.axes:
+            axes.apply_aspect()  # equal scales settle first, and the layout after
+        canvas = CANVASES[kind](self)
+        engine.execute(self)  # where letters are as wide as they will be: titles wrap
+        self.set_layout_engine("none")  # what is laid out stays so
+        return canvas
 
     @contextmanager
     def _dots(self) -> Iterator[None]:

@@ -199,14 +199,26 @@ def test_the_same_figure_gives_the_same_bytes(kind):
     assert bars().written(kind) == bars().written(kind)
 
 
-@pytest.mark.parametrize("first", ["svg", "pdf", "png"])
-def test_files_of_a_figure_are_laid_out_alike_whatever_is_written_first(first):
-    figure = bars()
-    figure.written(first)
-    dots = figure.get_dpi()
-    for kind in ("svg", "pdf", "png"):
-        assert figure.written(kind) == bars().written(kind)
-    assert figure.get_dpi() == dots == sheet.PAGE["figure.dpi"]
+@sheet.page
+def titled() -> sheet.Figure:
+    """Some of its titles fit on a telephone by a hair, or do not, by how wide letters are drawn."""
+    figure, panels = sheet.subplots(6, 1, height=12.0)
+    for count, axes in enumerate(panels, start=17):
+        axes.set(xticks=[], yticks=[])
+        axes.set_title(" ".join(["il"] * count), loc="left")
+    return figure
+
+
+@pytest.mark.parametrize("kind", ["svg", "pdf"])
+def test_a_file_is_what_matplotlib_writes_and_the_next_one_is_the_same(kind):
+    """One drawing for each, where `savefig` lays out and draws anew."""
+    here, there = titled().again(sheet.NARROW), titled().again(sheet.NARROW)
+    expected = BytesIO()
+    with plt.rc_context(sheet.PAGE):
+        there.draw_without_rendering()
+        there.savefig(expected, format=kind, metadata={sheet.DATES[kind]: None})
+    assert here.written(kind) == here.written(kind) == expected.getvalue()
+    assert here.get_dpi() == sheet.PAGE["figure.dpi"]
 
 
 def test_a_title_above_a_map_with_equal_scales_is_within_the_figure():
