@@ -18,9 +18,6 @@ BASE = 0.45e9  # bytes of a process that trains: the libraries
 ROW = 900  # bytes a step, while the table of steps is copied
 NETWORK_ROW = 250  # bytes a step: a network's examples, whose buffer doubles
 ROLLOUT_ROW = 120  # bytes a step of a rollout without noise
-STORED_ROW = 260  # bytes a step on the disk
-SUMMARY = 10_000  # bytes of a summary on the disk
-SUMMARY_ROW = 200  # bytes an episode
 START = 0.2  # [s] until the problem is set up
 STEP = 15e-6  # [s]; all of a step but its solves
 FIT = 150e-6  # [s]
@@ -37,8 +34,6 @@ class Estimate:
     runs: int = 0
     seconds: float = 0.0  # of one core
     memory: float = 0.0  # bytes of the process that trains the largest run
-    disk: float = 0.0  # bytes of all runs once they are stored, as `fetch` does
-    summaries: float = 0.0  # bytes of all summaries, where nothing else is stored
     longest: Experiment | None = None
     largest: Experiment | None = None
 
@@ -79,8 +74,6 @@ def estimate(experiments: Iterable[Experiment]) -> Estimate:
         runs=len(runs),
         seconds=sum(map(seconds_of, runs)),
         memory=memory_of(largest),
-        disk=sum(STORED_ROW * e.episodes * e.steps for e in runs),
-        summaries=sum(SUMMARY + SUMMARY_ROW * e.episodes for e in runs),
         longest=longest,
         largest=largest,
     )
