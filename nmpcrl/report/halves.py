@@ -32,14 +32,12 @@ def apart(verdict: Verdict) -> str:
     return verdict.each or " ".join(_counted(list(group)) for _, group in groups)
 
 
-def as_claimed(verdict: Verdict) -> str:
-    """Where its two learners clearly differ as claimed, in sentences."""
-    return " ".join(_sentences(verdict.as_claimed, reverse=False))
-
-
-def reverse(verdict: Verdict) -> str:
-    """And where they clearly differ the other way round."""
-    return " ".join(_sentences(verdict.reverse, reverse=True))
+def clear(verdict: Verdict) -> tuple[str, ...]:
+    """Where its two learners clearly differ, as claimed and then the other way round."""
+    return (
+        *_sentences(verdict.as_claimed, reverse=False),
+        *_sentences(verdict.reverse, reverse=True),
+    )
 
 
 def stopped_early(runs: pd.DataFrame, learners: tuple[str, ...]) -> str:
@@ -76,10 +74,7 @@ def _beside(verdict: Verdict, runs: pd.DataFrame) -> tuple[str, ...]:
     asked_twice = {"C7": BY_RUNS["C7"], "W7": WIDER_CLAIMS["W7"]}.get(verdict.claim)
     if asked_twice:
         return (stopped_early(runs, asked_twice.learners),)
-    return (
-        *_sentences(verdict.as_claimed, reverse=False),
-        *_sentences(verdict.reverse, reverse=True),
-    )
+    return clear(verdict)
 
 
 def _counted(readings: list[Halves]) -> str:

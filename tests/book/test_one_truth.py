@@ -106,8 +106,7 @@ def badly_counted(text: str, known: dict[str, Verdict]) -> list[str]:
     if len(names) != 1:
         return []
     verdict = known[names.pop()]
-    sentences = (halves.apart(verdict), halves.as_claimed(verdict), halves.reverse(verdict))
-    said = " ".join((verdict.evidence, *sentences))
+    said = " ".join((verdict.evidence, halves.apart(verdict), *halves.clear(verdict)))
     every = {str(of) for _, of in verdict.counts.values()}
     counts = [found[0] for found in COUNT.finditer(text) if found[1] in every]
     return [f"{verdict.claim} {count}" for count in counts if count not in said]

@@ -27,25 +27,23 @@ def test_how_often_each_went_wrong_is_one_sentence_a_way_of_going_wrong():
 
 def test_where_two_learners_clearly_differ_is_said_with_counts_and_interval():
     found = replace(VERDICT, as_claimed=(CLAIMED,), reverse=(REVERSE,))
-    assert halves.as_claimed(found) == (
+    assert halves.clear(found) == (
         "With noise that decays per step, as claimed: DES diverged in 20 of 20 runs and RDES in"
-        " 10 (10 of 10 pairs that differ: 100% [72%, 100%])."
-    )
-    assert halves.reverse(found) == (
+        " 10 (10 of 10 pairs that differ: 100% [72%, 100%]).",
         "With noise that decays per episode, in layouts B and C, the reverse was seen: RDES"
-        " diverged in 11 of 11 runs and DES in 0 (11 of 11 pairs that differ: 100% [74%, 100%])."
+        " diverged in 11 of 11 runs and DES in 0 (11 of 11 pairs that differ: 100% [74%, 100%]).",
     )
     one = replace(REVERSE, layouts=("B",))
-    assert ", in layout B, the" in halves.reverse(replace(VERDICT, reverse=(one,)))
+    assert ", in layout B, the" in "".join(halves.clear(replace(VERDICT, reverse=(one,))))
 
 
 def test_the_parts_of_a_claim_are_listed_with_what_is_clear(some_stopped):
     both = replace(
         VERDICT, claim="C2", halves=(CLAIMED,), as_claimed=(CLAIMED,), reverse=(REVERSE,)
     )
-    head, *clear = halves.items([VERDICT, both], some_stopped).splitlines()
+    head, *beside = halves.items([VERDICT, both], some_stopped).splitlines()
     assert head == f"- **C2.** {halves.apart(both)}"
-    assert clear == [f"  - {halves.as_claimed(both)}", f"  - {halves.reverse(both)}"]
+    assert beside == [f"  - {one}" for one in halves.clear(both)]
 
 
 @pytest.mark.parametrize(
