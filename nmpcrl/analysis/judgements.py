@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import Any
 
 from nmpcrl.analysis.entries import ENTRIES
@@ -54,11 +53,6 @@ def judge_named(one: Wanted) -> Judged:
 def stored(wanted: Iterable[Wanted]) -> dict[Wanted, Judged]:
     """Those of them that are kept."""
     return KEPT.stored(wanted)
-
-
-def path_of(one: Wanted) -> Path:
-    """The file in which it is kept."""
-    return KEPT.path_of(one)
 
 
 def depends_on() -> dict[str, Any]:

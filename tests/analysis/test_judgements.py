@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis import judgements
-from nmpcrl.analysis.judgements import LAYOUTS, judge_all, path_of, seed_of, stored
+from nmpcrl.analysis.judgements import KEPT, LAYOUTS, judge_all, seed_of, stored
 from nmpcrl.analysis.kept import Wanted
 from nmpcrl.analysis.leaderboard import HELD_OUT, MOST_SEEDS, Judged, judge_once
 from nmpcrl.study.population import JUDGE
@@ -67,11 +67,11 @@ def test_a_failed_solve_is_kept_as_infinite(counted, monkeypatch):
 
 def test_a_damaged_file_is_judged_again(counted, capsys):
     judge_all([ONE], progress=False)
-    path_of(ONE).write_text("{")
+    KEPT.path_of(ONE).write_text("{")
     judge_all([ONE], progress=False)
     assert counted == [ONE, ONE]
     assert "is damaged" in capsys.readouterr().err
-    assert json.loads(path_of(ONE).read_text())["entry"] == "frozen"
+    assert json.loads(KEPT.path_of(ONE).read_text())["entry"] == "frozen"
 
 
 @pytest.mark.parametrize("change", [{"EPOCH": 2}, {"versions": lambda: {"numpy": "0"}}])
@@ -85,7 +85,7 @@ def test_another_epoch_or_library_is_judged_anew(counted, monkeypatch, change):
 
 def test_settings_and_budgets_have_files_of_their_own():
     others = [ONE._replace(entry="ES"), ONE._replace(entry="ES[alpha=3e-07]"), ONE]
-    paths = {path_of(one) for one in (*others, ONE._replace(budget=2))}
+    paths = {KEPT.path_of(one) for one in (*others, ONE._replace(budget=2))}
     assert len(paths) == 4
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from nmpcrl.analysis import judgements
-from nmpcrl.analysis.judgements import path_of, stored
+from nmpcrl.analysis.judgements import KEPT, stored
 from nmpcrl.analysis.leaderboard import Judged
 from nmpcrl.claims import remedy_runs
 from nmpcrl.claims.remedy_questions import PARTS, SETTINGS, YARDSTICK
@@ -82,7 +82,7 @@ def test_a_part_that_is_not_whole_is_left_out():
 
 def test_without_the_best_of_a_layout_nothing_is_told(quick):
     judge_parts(["best", "tune"], ["ES"], progress=False)
-    path_of(next(iter(yardsticks().values()))).unlink()
+    KEPT.path_of(next(iter(yardsticks().values()))).unlink()
     assert whole(["ES"]).empty
     with pytest.raises(NotTuned):
         chosen("ES")
