@@ -47,7 +47,6 @@ class Difficulty:
     closes: float  # theta_c at which the first gap of the path closes, at most `OPEN`
 
 
-BARN = ("closest", "visibility", "dispersion", "dimension", "tortuosity")
 PILOT = "closes"  # what predicted every failure of the pilot
 MEASURES = tuple(one.name for one in fields(Difficulty))
 RIVALS = tuple(name for name in MEASURES if name != PILOT)

@@ -31,7 +31,6 @@ RATES: dict[str, Callable[[int, np.random.Generator], Any]] = {  # which episode
     "random": lambda episodes, rng: (rng.random(episodes) < 1 / 50) & (np.arange(episodes) > 0),
 }
 RAISED, FOR = 10.0, 20  # times alpha after a change, and for how many episodes
-REACTIONS = ("plain", "raised", "reset")
 
 
 def schedule(rate: str, episodes: int, rng: np.random.Generator) -> list[int]:
@@ -108,7 +107,7 @@ def changing(
         make: (factor of alpha) -> learner; called at most once for each factor.
         explore: the noise, of as many episodes.
         knows: "told", "cost", "delta" or "never".
-        reaction: of `REACTIONS`, to what is known.
+        reaction: "plain", "raised" or "reset", to what is known.
     """
     make, world_of = cache(make), cache(partial(_world, layouts))
     first = Weights(np.array(paper.THETA_INIT), np.full(len(paper.THETA_INIT), paper.W_INIT))

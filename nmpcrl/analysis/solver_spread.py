@@ -21,7 +21,6 @@ from nmpcrl.learning import td_error
 from nmpcrl.study.problems import gros_zanon as gz
 
 STEPS, SEEDS = 100, 50  # of mpcrl's own test, whose seed is 69
-STORED, STORED_SEED = 317.71, 69  # J in mpcrl's own test data
 RATE, RIDGE = 0.05, 1e-3
 NUDGE = 1e-10  # of theta as it begins
 PEERS = ("ipopt", "ipopt, 1e-10", "fatrop")

@@ -96,7 +96,6 @@ class Symbol:
     name: str
     index: int  # of the function, or of the data's segment
     offset: int = 0  # in the segment
-    defined: bool = True
 
 
 def link(data: bytes, exports: Iterable[str], pages: int) -> bytes:
