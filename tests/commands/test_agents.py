@@ -13,25 +13,6 @@ def here(trains_here):
     """Everything in this process."""
 
 
-def test_a_dry_run_counts_the_runs_and_says_what_they_take(command):
-    said = command("agents", "--dry-run")
-    assert said.exit_code == 0, said.output
-    assert "tune: 0 of 24 runs are stored; the others take about" in said.stdout
-    assert "all: 0 of 4 runs" in said.stdout
-    assert "all that is missing: about" in said.stdout
-
-
-def test_what_there_is_not_is_refused_with_what_there_is(command):
-    refused = command("agents", "--part", "best")
-    assert refused.exit_code == 1
-    assert "there is no part 'best'; there are tune, judge, one, all" in refused.stderr
-
-
-def test_nothing_is_judged_before_it_is_tuned_or_published(command):
-    assert "SAC is not tuned yet" in command("agents", "--part", "judge").stderr
-    assert "nmpcrl agents --publish" in command("agents", "--judge").stderr
-
-
 def test_without_the_extra_one_sentence_says_what_is_missing(command, monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
     refused = command("agents", "--part", "tune", "--workers", "1")
