@@ -40,10 +40,10 @@ def against_mpcrl(rounds: int, steps: int) -> Columns:
     return transposed("learner seconds", rows)
 
 
-def _time_es(steps: int, episodes: int = 5) -> list[float]:
-    """Seconds of as many first steps of some episodes of ES, each with noise of its own."""
+def _time_es(steps: int) -> list[float]:
+    """Seconds of as many first steps of five episodes of ES, each with noise of its own."""
     times = []
-    for seed in range(episodes):
+    for seed in range(5):
         learning = learn("ES", seed=seed)
         next(learning)  # the first call loads the solver
         for _ in range(steps):
@@ -60,14 +60,14 @@ def time_learners(
     learners: tuple[str, ...] = ("ES", "GES", "RDES", "DES"),
     solvers: tuple[str, ...] = tuple(SOLVERS),
     steps: int = 3 * paper.STEPS,
-    turn: int = TURN,
 ) -> pd.DataFrame:
     """Time of one learning step, one row a learner and solver.
 
-    All take some steps each in turn, in this process and with one thread, so that a change of the
+    All take `TURN` steps each in turn, in this process and with one thread, so that a change of the
     machine's speed affects all of them; in a new order each time, because a solve after a
-    network's fit finds the processor's cache full of it. Counting starts with the second episode,
-    when the networks are fitted; by default it covers whole episodes.
+    network's fit finds the processor's cache full of it. With one step at a time, a solver as fast
+    as riccati would spend half of its time on fetching its code back. Counting starts with the
+    second episode, when the networks are fitted; by default it covers whole episodes.
 
     All times are the processor's, and the parts of a step get their share of it. `paired` says why,
     and how the steps of two learners are compared.
@@ -76,8 +76,6 @@ def time_learners(
         learners: names, as `Experiment` knows them.
         solvers: names, as `Experiment` knows them.
         steps: how many steps of each count.
-        turn: how many steps each takes at a time. With one, a solver as fast as riccati spends half
-            of its time on fetching its code back into the cache.
 
     Returns:
         Columns solver, learner, solves (per step), ms_per_step, ms_per_solve, ms_per_fit (nan where
@@ -93,9 +91,9 @@ def time_learners(
     }
     times: dict[tuple[str, str], list[tuple[float, ...]]] = {name: [] for name in runs}
     names, rng = list(runs), np.random.default_rng(0)
-    for first in range(0, SETTLED + steps, turn):
+    for first in range(0, SETTLED + steps, TURN):
         for i in rng.permutation(len(names)):
-            for _ in range(min(turn, SETTLED + steps - first)):
+            for _ in range(min(TURN, SETTLED + steps - first)):
                 times[names[i]].append(_timed(runs[names[i]]))
     counted = {name: np.array(rows[SETTLED:]).T for name, rows in times.items()}
     rows = [

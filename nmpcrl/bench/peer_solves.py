@@ -21,7 +21,7 @@ from nmpcrl.study.problems import lqr, lqr_csnlp
 
 SOLVES = 60  # of each, after some that do not count
 FIRST = 5
-EPISODE = 100  # learning steps
+EPISODES, EPISODE = 3, 100  # how many count, and learning steps of each
 TIGHT = "ipopt, 1e-10"
 
 
@@ -90,17 +90,12 @@ def robot(solver: str = "riccati") -> Peers:
 PROBLEMS: tuple[Callable[..., Peers], ...] = (robot, gros_zanon, linear)
 
 
-def side_by_side(peers: Peers, solves: int = SOLVES) -> Pair:
-    """V of the states of one closed loop, each solved by both in turns, from their last plans.
-
-    Args:
-        peers: ours and theirs.
-        solves: how many count.
-    """
+def side_by_side(peers: Peers) -> Pair:
+    """V of the states of one closed loop, each solved by both in turns, from their last plans."""
     rng, state, theta = np.random.default_rng(0), peers.start, peers.theta
     plan, spent = peers.nmpc.solve(state, theta), []
     with peer.silent():
-        for _ in range(FIRST + solves):
+        for _ in range(FIRST + SOLVES):
             plan, ours = timed(partial(peers.nmpc.solve, state, theta, plan))
             _, theirs = timed(partial(peers.agent.state_value, state, True))
             spent.append((ours, theirs))
@@ -108,19 +103,15 @@ def side_by_side(peers: Peers, solves: int = SOLVES) -> Pair:
     return Pair(*np.mean(spent[FIRST:], axis=0).tolist())
 
 
-def learning(peers: Peers, episodes: int = 3) -> Pair:
+def learning(peers: Peers) -> Pair:
     """A step of Q-learning, an episode of each in turns.
 
     Both solve for V(s), Q(s, a) and the next value and move theta; mpcrl acts with what it planned
     for the next value, and ours plans anew.
-
-    Args:
-        peers: ours and theirs.
-        episodes: how many count, of `EPISODE` steps.
     """
     spent = []
     with peer.silent():
-        for episode in range(1 + episodes):
+        for episode in range(1 + EPISODES):
             _, ours = timed(partial(list, _steps(peers, episode)))
             world = peers.world(EPISODE)
             _, theirs = timed(partial(peers.agent.train, world, episodes=1, seed=episode))

@@ -103,19 +103,12 @@ def time_learners_afresh(processes: int = PROCESSES, steps: int = paper.STEPS) -
     return together([_time_learners(steps) for _ in range(processes)])
 
 
-def time_learners_repeatedly(
-    repetitions: int = REPETITIONS, processes: int = PROCESSES, steps: int = paper.STEPS
-) -> pd.DataFrame:
-    """`time_learners_afresh` so many times, one after the other, with the coverage of each.
+def time_learners_repeatedly() -> pd.DataFrame:
+    """`time_learners_afresh` `REPETITIONS` times, one after the other, with the coverage of each.
 
     The intervals cover what changes from one repetition to the next as well.
-
-    Args:
-        repetitions: how many, two or more.
-        processes: of each, two or more.
-        steps: as of `time_learners_afresh`.
     """
-    return repeated([time_learners_afresh(processes, steps) for _ in range(repetitions)])
+    return repeated([time_learners_afresh() for _ in range(REPETITIONS)])
 
 
 def together(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:

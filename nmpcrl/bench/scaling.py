@@ -60,17 +60,16 @@ def _crowded(count: int) -> Nmpc:
 def time_horizons(
     states: Sequence[Vector],
     theta: Vector,
-    horizons: Sequence[int] = (5, 10, 20, 40, 80),
+    horizons: Sequence[int] = HORIZONS,
     *,
     layout: str = "A",
-    solvers: Sequence[str] = ("riccati", "fatrop"),
     repetitions: int = 3,
 ) -> pd.DataFrame:
     """Time of a solve from a standing start, one row a state, horizon and solver.
 
-    The solvers take turns, in this process and with one thread, so that a change of the machine's
-    speed meets all alike. Each solve is made twice and the second one counts: the first finds the
-    processor's caches full of the other solver.
+    Riccati and fatrop take turns, in this process and with one thread, so that a change of the
+    machine's speed meets both alike. Each solve is made twice and the second one counts: the first
+    finds the processor's caches full of the other solver.
 
     Returns:
         Columns state (its number), horizon, solver, ms (the median of the repetitions), iterations,
@@ -79,7 +78,7 @@ def time_horizons(
     controllers = {
         (horizon, solver): paper.nmpc(layout, horizon=horizon, solver=solver)
         for horizon in horizons
-        for solver in solvers
+        for solver in ("riccati", "fatrop")
     }
     for controller in controllers.values():
         controller.solve(paper.task(layout).start, theta)  # transcribes
