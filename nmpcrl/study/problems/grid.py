@@ -18,6 +18,7 @@ from nmpcrl.study.problems import gros_zanon as gz
 
 LEAST, MOST = np.array([-0.6, -1.2]), np.array([1.4, 1.2])  # of the states on the grid
 SWEEPS = 100  # policy iteration ends after fewer
+NODES = 8  # of the disturbance
 
 Axes = tuple[Vector, Vector]
 
@@ -46,29 +47,27 @@ class Grid:
         return float(found(np.clip(state, LEAST, MOST))[0])
 
 
-def best(gamma: float = gz.GAMMA, points: int = 81, inputs: int = 81, nodes: int = 8) -> Grid:
+def best(points: int, inputs: int) -> Grid:
     """The best policy of the plant.
 
     Args:
-        gamma: discount factor, below 1.
         points: of either state.
         inputs: in [-1, 1] that are tried; the best is refined by a parabola.
-        nodes: of the disturbance.
     """
     axes = (np.linspace(LEAST[0], MOST[0], points), np.linspace(LEAST[1], MOST[1], points))
     states = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2)
     actions = np.linspace(-1, 1, inputs)
     low, high = gz.DISTURBANCE
-    e = low + (np.arange(nodes) + 0.5) / nodes * (high - low)
+    e = low + (np.arange(NODES) + 0.5) / NODES * (high - low)
     moves = [_transition(states, a, e, axes) for a in actions]
     costs = np.stack([_costs(states, a) for a in actions])
     chosen, everyone = np.zeros(len(states), int), np.arange(len(states))
     for _ in range(SWEEPS):
         closed = sparse.vstack([moves[k] for k in range(inputs)], format="csr")
         closed = closed[chosen * len(states) + everyone]
-        value = spsolve(sparse.eye(len(states), format="csc") - gamma * closed.tocsc(),
+        value = spsolve(sparse.eye(len(states), format="csc") - gz.GAMMA * closed.tocsc(),
                         costs[chosen, everyone])  # fmt: skip
-        q = costs + gamma * np.stack([move @ value for move in moves])
+        q = costs + gz.GAMMA * np.stack([move @ value for move in moves])
         better = q.argmin(axis=0)
         gained = q[chosen, everyone] - q[better, everyone] > 1e-10
         if not gained.any():

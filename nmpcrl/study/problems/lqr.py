@@ -88,12 +88,10 @@ def worth(k: Matrix) -> Truth:
     return Truth(k, solve_discrete_lyapunov(closed.T, Q + k.T @ R @ k))
 
 
-def recursion(
-    a: Matrix, b: Matrix, q: Matrix, r: Matrix, p: Matrix, horizon: int = HORIZON
-) -> Truth:
+def recursion(a: Matrix, b: Matrix, q: Matrix, r: Matrix, p: Matrix) -> Truth:
     """Riccati's recursion of a plan: its policy u = -K x and its value x' P x."""
     k = np.zeros((b.shape[1], a.shape[0]))
-    for _ in range(horizon):
+    for _ in range(HORIZON):
         k = gain(a, b, r, p)
         closed: Matrix = a - b @ k
         p = q + k.T @ r @ k + GAMMA * closed.T @ p @ closed
