@@ -21,17 +21,13 @@ STYLES = ("intro.css",)
 OPEN, CLOSED = "A", "E"  # layouts: the first, and the first of the study in which ES closes a gap
 
 
-def intro(learner: str = "ES") -> HTML:
-    """Obstacles to be moved, a learner that trains among them, and a layout in which it fails.
-
-    Args:
-        learner: with the defaults of `Experiment`, so that it trains what the study has trained.
-    """
-    experiment = Experiment(learner=learner, layout=OPEN)
+def intro() -> HTML:
+    """Obstacles to be moved, ES that trains among them, and a layout in which it fails."""
+    experiment = Experiment("ES", layout=OPEN)  # as the study has trained it
     nmpc = controller_of(experiment).nmpc
 
     def data() -> dict[str, Any]:
-        own = settings(experiment, learner, nmpc)
+        own = settings(experiment, "ES", nmpc)
         own |= {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")}
         begun = begin(nmpc, nmpc.task.start, np.array(experiment.theta))
         return begun | {
