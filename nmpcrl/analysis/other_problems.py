@@ -3,11 +3,9 @@
 `nmpcrl bench --problems` makes it, in some ten minutes; `book/published` has a copy.
 """
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,14 +16,12 @@ from nmpcrl import Vector
 from nmpcrl.analysis import solver_spread, wrong_model
 from nmpcrl.analysis.solver_spread import Spread
 from nmpcrl.analysis.wrong_model import ARMS, Course
-from nmpcrl.study import provenance, store
+from nmpcrl.study import sealed, store
 from nmpcrl.study.parameters import Refusal
 from nmpcrl.study.problems import grid
 from nmpcrl.study.problems import gros_zanon as gz
-from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.executor import execute
-from nmpcrl.study.storage.machine import machine
-from nmpcrl.study.storage.place import check_folder, keep
+from nmpcrl.study.storage.place import check_folder
 
 FILE = "other_problems.json"
 POINTS, INPUTS = 161, 121  # of the grid on which the best policy is found
@@ -114,21 +110,13 @@ def jobs() -> dict[Any, Callable[[], Any]]:
 def kept(results: Sequence[Any], seconds: float) -> OtherProblems:
     """What all jobs returned, kept in `path`."""
     (found,) = (one for one in results if isinstance(one, References))
-    about = {
-        "date": datetime.now(UTC).date().isoformat(),
-        "seconds": seconds,
-        "machine": machine(),
-        "versions": provenance.environment(),
-    }
     whole = OtherProblems(
         tuple(one for one in results if isinstance(one, Course)),
         tuple(one for one in results if isinstance(one, Spread)),
         found,
-        about,
+        sealed.about(seconds),
     )
-    content = _rounded(asdict(whole))
-    content["seal"] = provenance.hash_of(content)
-    keep(path(), partial(write_json, content=content))
+    sealed.keep(path(), _rounded(asdict(whole)))
     return whole
 
 
@@ -168,20 +156,16 @@ def read(place: Path) -> OtherProblems:
     Raises:
         DamagedProblems: it is missing, or something else.
     """
-    try:
-        found = json.loads(place.read_text("utf-8"))
-        if found.pop("seal") != provenance.hash_of(found):
-            raise ValueError("it is not what was written")
-        return OtherProblems(
-            tuple(Course(**_lists(one)) for one in found["courses"]),
-            tuple(Spread(**_lists(one)) for one in found["spreads"]),
-            References(**_lists(found["references"])),
-            found["about"],
-        )
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        raise DamagedProblems(
-            f"{place} is missing or damaged ({error}); `nmpcrl bench --problems` makes one"
-        ) from error
+    return sealed.read(place, _restored, DamagedProblems, "nmpcrl bench --problems")
+
+
+def _restored(found: dict[str, Any]) -> OtherProblems:
+    return OtherProblems(
+        tuple(Course(**_lists(one)) for one in found["courses"]),
+        tuple(Spread(**_lists(one)) for one in found["spreads"]),
+        References(**_lists(found["references"])),
+        found["about"],
+    )
 
 
 def _lists(fields: dict[str, Any]) -> dict[str, Any]:

@@ -3,12 +3,9 @@
 `nmpcrl bench --sizes` makes it, in some ten minutes.
 """
 
-import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +15,10 @@ from tqdm import tqdm
 from nmpcrl.bench import processes
 from nmpcrl.bench.problem_sizes import VARIED, Sizes, times
 from nmpcrl.bench.solves import columns_of
-from nmpcrl.study import provenance, store
+from nmpcrl.study import sealed, store
 from nmpcrl.study.limits import need_numba
 from nmpcrl.study.parameters import Refusal
-from nmpcrl.study.storage.atomic import write_json
-from nmpcrl.study.storage.machine import machine
-from nmpcrl.study.storage.place import check_folder, keep
+from nmpcrl.study.storage.place import check_folder
 
 FILE = "problem_times.json"
 STEPS = 1000  # of a run in Chapter 10
@@ -59,19 +54,9 @@ def make(*, progress: bool = True) -> ProblemTimes:
     peers = beside_mpcrl()
     with tqdm(total=sum(map(len, VARIED.values())), disable=not progress, leave=False) as bar:
         sizes = times(measure=_noticed(processes.problem_of_sizes, bar))
-    about = {
-        "date": datetime.now(UTC).date().isoformat(),
-        "seconds": time.perf_counter() - began,
-        "machine": machine(),
-        "versions": provenance.environment(),
-    }
-    content: dict[str, Any] = {
-        "sizes": columns_of(sizes),
-        "peers": columns_of(peers),
-        "about": about,
-    }
-    content["seal"] = provenance.hash_of(content)
-    keep(path(), partial(write_json, content=content, indent=1))
+    about = sealed.about(time.perf_counter() - began)
+    content = {"sizes": columns_of(sizes), "peers": columns_of(peers), "about": about}
+    sealed.keep(path(), content, indent=1)
     return ProblemTimes(sizes, peers, about)
 
 
@@ -131,13 +116,9 @@ def read(place: Path) -> ProblemTimes:
     Raises:
         DamagedTimes: it is missing, or something else.
     """
-    try:
-        found = json.loads(place.read_text("utf-8"))
-        if found.pop("seal") != provenance.hash_of(found):
-            raise ValueError("it is not what was written")
-        sizes, peers = (pd.DataFrame(found[name]) for name in ("sizes", "peers"))
-        return ProblemTimes(sizes, peers, found["about"])
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        raise DamagedTimes(
-            f"{place} is missing or damaged ({error}); `nmpcrl bench --sizes` makes one"
-        ) from error
+    return sealed.read(place, _times, DamagedTimes, "nmpcrl bench --sizes")
+
+
+def _times(kept: dict[str, Any]) -> ProblemTimes:
+    sizes, peers = (pd.DataFrame(kept[name]) for name in ("sizes", "peers"))
+    return ProblemTimes(sizes, peers, kept["about"])

@@ -4,10 +4,8 @@ Layouts, states, theta and actions are drawn from where a run may take them: fou
 state anywhere in the box, the eight weights of theta log-uniform, so that some are all but zero.
 """
 
-import json
 import time
 from dataclasses import asdict, dataclass
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,16 +14,13 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
-from nmpcrl.study import paper, provenance, store
+from nmpcrl.study import paper, sealed, store
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import need_numba
 from nmpcrl.study.parameters import Whole
 from nmpcrl.study.setup import compile_ahead
-from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.executor import execute
-from nmpcrl.study.storage.machine import machine
 from nmpcrl.study.storage.place import check_folder
-from nmpcrl.study.storage.place import keep as keep_file
 
 SEED = 2025
 PROBLEMS = Whole(1, 10**9)  # that a sweep may have
@@ -138,10 +133,8 @@ def sweep(problems: int, *, workers: int | None = None, progress: bool = True) -
     )
     for error in failures.values():
         raise error
-    table = SweepTable(total, _about(time.perf_counter() - began))
-    content: dict[str, Any] = {"about": table.about, "tally": asdict(total)}
-    content["seal"] = provenance.hash_of(content)
-    keep_file(path(), partial(write_json, content=content, indent=1))
+    table = SweepTable(total, {"seed": SEED, **sealed.about(time.perf_counter() - began)})
+    sealed.keep(path(), {"about": table.about, "tally": asdict(total)}, indent=1)
     return table
 
 
@@ -156,15 +149,12 @@ def read(place: Path) -> SweepTable:
     Raises:
         DamagedSweep: it is missing, or something else.
     """
-    try:
-        kept = json.loads(place.read_text("utf-8"))
-        if kept.pop("seal") != provenance.hash_of(kept):
-            raise ValueError("it is not what was written")
-        return SweepTable(Tally(**kept["tally"]), kept["about"])
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        raise DamagedSweep(
-            f"{place} is missing or damaged ({error}); `nmpcrl bench --sweep` makes one"
-        ) from error
+    return sealed.read(
+        place,
+        lambda kept: SweepTable(Tally(**kept["tally"]), kept["about"]),
+        DamagedSweep,
+        "nmpcrl bench --sweep",
+    )
 
 
 def tally_of(layout: int, problems: int) -> Tally:
@@ -229,13 +219,3 @@ def _against(ipopt: Nmpc, solution: Solution, action: Vector | None) -> Tally:
     if abs(solution.value - other) <= SAME * max(1.0, abs(other)):
         return Tally(equal=1)
     return Tally(better=1) if solution.value < other else Tally(worse=1)
-
-
-def _about(seconds: float) -> dict[str, Any]:
-    return {
-        "seed": SEED,
-        "date": datetime.now(UTC).date().isoformat(),
-        "seconds": seconds,
-        "machine": machine(),
-        "versions": provenance.environment(),
-    }

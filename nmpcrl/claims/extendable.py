@@ -1,6 +1,5 @@
 """A file of its own beside the published study, to which parts are added and none is changed."""
 
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from functools import cache
@@ -11,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.kept import Kept, Wanted
-from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place, sealed
+from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place
+from nmpcrl.study import sealed
 from nmpcrl.study.storage.atomic import write_json
 
 
@@ -43,11 +43,8 @@ class Extendable:
             Damaged: it is not there, or not what was written.
         """
         try:
-            content: dict[str, Any] = json.loads(path.read_text("utf-8"))
-            if content["seal"] != sealed(content):
-                raise ValueError("it is not what was written")
-            return content
-        except (OSError, ValueError, LookupError, TypeError) as error:
+            return sealed.content_of(path)
+        except sealed.DAMAGE as error:
             raise self.damaged(path, error) from error
 
     def write(self, content: Mapping[str, Any]) -> Path:
@@ -55,7 +52,7 @@ class Extendable:
         plain = {name: one for name, one in content.items() if name != "seal"}
         plain["about"] = [*content["about"], made_here()]
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        write_json(self.path, plain | {"seal": sealed(plain)})
+        write_json(self.path, plain | {"seal": sealed.seal_of(plain)})
         return self.path
 
     def damaged(self, path: Path, error: Exception) -> Damaged:

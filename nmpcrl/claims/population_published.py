@@ -24,13 +24,14 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import published, whole_picture
 from nmpcrl.claims.population import Answer, answers, held, shares
 from nmpcrl.claims.population_questions import RAISED_TO, SAME_CLOSING
-from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place, sealed, sums
+from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place, sums
 from nmpcrl.claims.rule import Paths
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.population import LAYOUTS
 from nmpcrl.study.population_design import COMPARED, HORIZONS, name_of, whole_population
 from nmpcrl.study.records import Column
+from nmpcrl.study.sealed import seal_of
 from nmpcrl.study.storage.atomic import write_json
 
 TABLE, PATHS, MEASURED, ABOUT = (
@@ -155,7 +156,7 @@ def _effort(runs: pd.DataFrame) -> dict[str, Any]:
 
 def _seal(folder: Path, about: Mapping[str, Any]) -> None:
     whole = {**about, "files": sums(folder, (TABLE, PATHS, MEASURED))}
-    write_json(folder / ABOUT, whole | {"seal": sealed(whole)}, indent=1)
+    write_json(folder / ABOUT, whole | {"seal": seal_of(whole)}, indent=1)
     _load.cache_clear()
 
 
@@ -172,7 +173,7 @@ def load() -> PopulationRuns:
 def _load(folder: Path) -> PopulationRuns:
     try:
         about = json.loads((folder / ABOUT).read_text("utf-8"))
-        if about["seal"] != sealed(about) or about["files"] != sums(
+        if about["seal"] != seal_of(about) or about["files"] != sums(
             folder, (TABLE, PATHS, MEASURED)
         ):
             raise ValueError("a file is not the one that was written")

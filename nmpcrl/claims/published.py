@@ -45,8 +45,9 @@ from nmpcrl.claims.verdict import Halves, Outcome, Verdict
 from nmpcrl.study import design
 from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.parameters import Refusal, shortened
-from nmpcrl.study.provenance import EPOCHS, environment, hash_of, summary_key
+from nmpcrl.study.provenance import EPOCHS, environment, summary_key
 from nmpcrl.study.records import Column
+from nmpcrl.study.sealed import seal_of
 from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.machine import fingerprint
 
@@ -325,7 +326,7 @@ def _load(folder: Path) -> Published:
 
 def _read(folder: Path) -> Published:
     about = json.loads((folder / "about.json").read_text("utf-8"))
-    if about["seal"] != sealed(about) or about["files"] != sums(folder, FILES[:-1]):
+    if about["seal"] != seal_of(about) or about["files"] != sums(folder, FILES[:-1]):
         raise ValueError("a file is not the one that was written")
     runs = pd.read_csv(folder / "runs.csv", dtype=dict.fromkeys(WORDS, str))
     runs = runs.fillna(dict.fromkeys(WORDS, ""))
@@ -364,13 +365,8 @@ def sums(folder: Path, files: Iterable[str]) -> dict[str, str]:
 def _seal(folder: Path, about: Mapping[str, Any]) -> None:
     """Write about.json, by which the other files and itself are known again."""
     whole = {**about, "files": sums(folder, FILES[:-1])}
-    write_json(folder / "about.json", whole | {"seal": sealed(whole)}, indent=1)
+    write_json(folder / "about.json", whole | {"seal": seal_of(whole)}, indent=1)
     _load.cache_clear()
-
-
-def sealed(about: Mapping[str, Any]) -> str:
-    """What tells that a file such as about.json is whole."""
-    return hash_of({name: value for name, value in about.items() if name != "seal"})
 
 
 def _curves(summaries: list[RunSummary]) -> dict[str, Column]:
