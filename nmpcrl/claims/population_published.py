@@ -24,7 +24,7 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import published, whole_picture
 from nmpcrl.claims.population import Answer, answers, held, shares
 from nmpcrl.claims.population_questions import RAISED_TO, SAME_CLOSING
-from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place, sums
+from nmpcrl.claims.published import Damaged, Unpublishable, effort, made_here, place, sums
 from nmpcrl.claims.rule import Paths
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
@@ -112,7 +112,7 @@ def publish(
     np.savez_compressed(folder / PATHS, **arrays)
     known = measured() if layouts is None else layouts
     known.to_csv(folder / MEASURED, index_label="layout", float_format="%.9g")
-    _seal(folder, made_here() | _effort(runs))
+    _seal(folder, made_here() | effort(runs, "part"))
     return folder
 
 
@@ -142,16 +142,10 @@ def extend(summaries: Mapping[Experiment, RunSummary]) -> Path:
     with (folder / TABLE).open("a", encoding="utf-8") as table:
         runs.to_csv(table, index=False, header=False, float_format="%.6g")
     np.savez_compressed(folder / PATHS, **arrays)
-    addition, about = made_here() | _effort(runs), dict(found.about)
+    addition, about = made_here() | effort(runs, "part"), dict(found.about)
     more = {"additions": [*about.get("additions", []), addition]}
     _seal(folder, about | more | {"runs": about["runs"] | addition["runs"]})
     return folder
-
-
-def _effort(runs: pd.DataFrame) -> dict[str, Any]:
-    """How many runs each part has, and how long all took."""
-    counts = runs.part.value_counts(sort=False).to_dict()
-    return {"runs": counts, "hours": float(runs.seconds.sum() / 3600)}
 
 
 def _seal(folder: Path, about: Mapping[str, Any]) -> None:

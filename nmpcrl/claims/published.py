@@ -172,7 +172,7 @@ def publish(
     write_json(folder / "searches.json", policy_search.as_lists(searches))
     _write(folder, verdicts, pd.DataFrame() if timings is None else timings)
     made = _timed(timings) | ({"searches": made_here()} if searches else {})
-    _seal(folder, made_here() | made | _effort(runs) | _fixed(folder))
+    _seal(folder, made_here() | made | effort(runs, "variant") | _fixed(folder))
     return folder
 
 
@@ -229,7 +229,7 @@ def extend(summaries: Mapping[Experiment, RunSummary], variants: Mapping[Experim
     with (folder / "runs.csv").open("a", encoding="utf-8") as table:
         runs.to_csv(table, index=False, header=False)
     np.savez_compressed(folder / "curves.npz", **joined)
-    addition = made_here() | _effort(runs)
+    addition = made_here() | effort(runs, "variant")
     about = {**found.about, "runs": found.about["runs"] | addition["runs"]}
     _seal(folder, about | {"additions": [*found.about.get("additions", []), addition]})
     return folder
@@ -245,9 +245,9 @@ def made_here() -> dict[str, Any]:
     }
 
 
-def _effort(runs: pd.DataFrame) -> dict[str, Any]:
-    """How many runs each part of the study has, and how long all took."""
-    counts = runs.variant.value_counts(sort=False).to_dict()
+def effort(runs: pd.DataFrame, part: str) -> dict[str, Any]:
+    """How many runs each part has, which a column tells, and how long all took."""
+    counts = runs[part].value_counts(sort=False).to_dict()
     return {"runs": counts, "hours": float(runs.seconds.sum() / 3600)}
 
 
