@@ -53,7 +53,7 @@ def number(
 
 
 def _meanings(answer: Any, unit: str) -> list[float]:
-    """What a number can mean; as a text, 2,600 is read with either comma, 20 % as 20 and as 0.2."""
+    """What a number can mean; as a text, 2,600 is read with either comma, and 20 % is 0.2."""
     try:
         if not isinstance(answer, str):
             return [float(answer)]
@@ -64,7 +64,7 @@ def _meanings(answer: Any, unit: str) -> list[float]:
         read = [evaluated(one, {}) for one in texts if "," not in one]
         if not read:
             raise FormulaError("it has too many commas")
-        return [*read, *(one / 100 for one in read)] if share else read
+        return [one / 100 for one in read] if share else read
     except (TypeError, ValueError):
         raise Unsolved(f"{shortened(repr(answer))} is no number.") from None
 

@@ -138,6 +138,7 @@ def answered(tab, name: str, answer: str) -> str:
         ("weight", "5", "That is </script> twice as much. The next hint is open above."),
         ("weight", "-2.5", "Not right: look at the sign."),
         ("weight", "250", "Not right: it is too large by a power of ten."),
+        ("weight", "2.5 %", "Not right: it is too small by a power of ten."),
         ("weight", "2", "Not right: it is too small."),
         ("path", "0.5*x", "Right."),
         ("path", "x^1/2", "Right."),

@@ -64,6 +64,7 @@ def test_a_number_is_right_within_its_tolerance(expected, share):
         (-1.5, "sign"),
         (1500.0, "too large by a power of ten"),
         (0.15, "too small by a power of ten"),
+        ("1.5 %", "too small by a power of ten"),
         (1.9, "too large"),
         (1.2, "too small"),
         (float("nan"), "finite"),

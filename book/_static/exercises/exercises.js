@@ -19,7 +19,7 @@
 
   const near = (value, other, within) => Math.abs(value - other) <= within;
 
-  /* What a number can mean as it was typed: 2,600 is read with either comma, 20 % as 20 and as 0.2. */
+  /* What a number can mean as it was typed: 2,600 is read with either comma, and 20 % is 0.2. */
   function meanings(typed, unit) {
     let text = typed.trim();
     if (unit && text.endsWith(unit)) text = text.slice(0, -unit.length);
@@ -28,7 +28,7 @@
     const texts = [text.replace(",", "."), text.replace(/,(?=\d{3}(?!\d))/g, "")].filter((one) => !one.includes(","));
     const read = texts.map((one) => formula.value(one, {}));
     if (!read.length) throw new SyntaxError("it has too many commas");
-    return share ? [...read, ...read.map((value) => value / 100)] : read;
+    return share ? read.map((value) => value / 100) : read;
   }
 
   function number(typed, { expected, within, mistakes, said, unit }) {
