@@ -19,7 +19,7 @@ from nmpcrl.course.judge import Judge
 from nmpcrl.course.judging import losses
 from nmpcrl.course.submissions import CannotGrade, Chapter, chapters, matched, notebook_of
 
-COPY = re.compile(r"(-Copy\d+| ?\(\d+\))$")
+COPY = re.compile(r"(-Copy\d+| ?\(\d+\)| -? ?copy(?: \d+)?)+$", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def _graded(
 
 
 def _stem(file: Path) -> str:
-    """The name of a notebook, without what a browser or JupyterLab adds to that of a copy."""
+    """The name of a notebook, without what JupyterLab, a browser or a system adds to a copy's."""
     return COPY.sub("", file.stem)
 
 

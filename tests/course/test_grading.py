@@ -3,6 +3,7 @@
 import json
 from contextlib import closing
 from itertools import chain
+from pathlib import Path
 
 import nbformat
 import pytest
@@ -21,6 +22,7 @@ from small_course import (
 
 from nmpcrl.commands import main
 from nmpcrl.commands.grade import cell
+from nmpcrl.course import grading
 from nmpcrl.course.execution import Limits
 from nmpcrl.course.exercises import exercises, solved
 from nmpcrl.course.grading import grade
@@ -269,6 +271,14 @@ def test_what_an_earlier_call_graded_stays_if_this_one_cannot_begin(tmp_path, ed
     refused = CliRunner().invoke(main, words)
     assert "has no notebook" in refused.output
     assert out.read_text() == "known"
+
+
+@pytest.mark.parametrize(
+    "added",
+    ["-Copy1", " (2)", "(2)", " - Copy", " - Copy (2)", " copy", " copy 2", "-Copy1-Copy2", ""],
+)
+def test_what_is_added_to_the_name_of_a_copy_does_not_matter(added):
+    assert grading._stem(Path(f"anna_{SMALL}{added}.ipynb")) == f"anna_{SMALL}"
 
 
 @pytest.mark.slow
