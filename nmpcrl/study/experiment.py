@@ -137,7 +137,8 @@ class Experiment:
     def canonical(self) -> "Experiment":
         """The same run, with the default in every field that its learner does not read."""
         unread: dict[str, Any] = {one.name: one.default for one in fields(self) if self._skips(one)}
-        return replace(self, **unread)
+        said = {name: default for name, default in unread.items() if getattr(self, name) != default}
+        return replace(self, **said) if said else self
 
     def _skips(self, one: "Field[Any]") -> bool:
         return one.metadata["optional"] and one.name not in LEARNERS[self.learner].reads

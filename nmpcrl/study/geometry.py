@@ -13,6 +13,7 @@ from nmpcrl.study.parameters import Number, ParameterError, is_list, refused
 
 MOST_OBSTACLES = 16  # of a layout: what the controller in the browser has room for
 FARTHEST = 100.0  # of a centre from the origin, along an axis [m]
+NEAR = Number.within(-FARTHEST, FARTHEST)
 MOST_HEADING = tau  # of a start or a target, to either side [rad]
 
 Centres = tuple[tuple[float, float], ...]
@@ -60,10 +61,9 @@ class Layout:
 
     def _checked(self, name: str, value: Any) -> Centres:
         """Centres, of which there are neither none nor too many, and none out of range."""
-        each = Number.within(-FARTHEST, FARTHEST)
         try:
             rows = _pairs(value) if isinstance(value, str) else value
-            rows = [[each.check(name, one) + 0.0 for one in row] for row in _listed(rows)]
+            rows = [[NEAR.check(name, one) + 0.0 for one in row] for row in _listed(rows)]
         except (ParameterError, TypeError, ValueError):
             raise refused(name, value, self.text) from None
         if not 1 <= len(rows) <= MOST_OBSTACLES or any(len(row) != 2 for row in rows):

@@ -109,6 +109,9 @@ class Number:
         return float(value)
 
 
+SENSIBLE = Number.within(-ABSURD, ABSURD)
+
+
 @dataclass(frozen=True)
 class Truth:
     """True or false."""
@@ -139,9 +142,8 @@ class Numbers:
         """See `Allowed`."""
         if not is_list(value) or len(value) != self.size:
             raise refused(name, value, self.text)
-        each = Number.within(-ABSURD, ABSURD)
         try:
-            return tuple(each.check(name, one) for one in value)
+            return tuple(SENSIBLE.check(name, one) for one in value)
         except ParameterError:
             raise refused(name, value, self.text) from None
 

@@ -9,6 +9,10 @@ from collections.abc import Collection
 
 import casadi as ca
 
+# Stands above what machine code alone calls: a wrapper for Python takes long to compile.
+INNER = (
+    '@njit(error_model="numpy", forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)\n'
+)
 UNARY = {
     ca.OP_ASSIGN: "{}",
     ca.OP_NEG: "-{}",

@@ -49,10 +49,11 @@ from .model import (
 # numba takes plain numbers; a tuple below has one entry a start.
 COLD, SHIFTED, NEAR, SAME = map(int, Start)
 SOLVED, STALLED, LIMIT, BROKEN = map(int, End)
-START_MU = (10.0, 1e-3, 1e-3, 1e-9)
+START_MU = (10.0, 1e-3, 1e-3, 1e-9)  # the barrier parameter
 PUSH = (1e-2, 1e-3, 1e-3, 1e-9)  # inside its bounds an input starts, in parts of their distance
 
-BOX_WEIGHT = 1e4  # W of the box: an exact penalty, so that no state is infeasible
+BOX_WEIGHT = 1e4  # W of the box, scaled: an exact penalty, so that no state is infeasible
+BOX_TO_SLACK = 100.0  # so many times an obstacle's W it is at least
 
 # The barrier's fall, Eqs. (7) and (8), and inertia, Algorithm IC, of Wächter and Biegler (2006);
 # their values in brackets. On 2,200 drawn problems a solve takes 11.5 iterations on average, 11.9
@@ -68,6 +69,7 @@ DELTA_LEAST = 1e-12  # the least of later ones, likewise [1e-20, absolute]
 DELTA_GROWS = 6.0  # kappa_w^+, its factor after a factorisation that failed [8]
 DELTA_SHRINKS = 4.0  # 1 / kappa_w^-, what the next delta is first divided by [3]
 DELTA_LARGEST = 1e12  # beyond which no factorisation is tried [1e40]
+BACKTRACKS = 0.5  # the part to which a step is cut that falls too little [0.5]
 ARMIJO = 1e-4  # eta_phi, the part of its predicted fall that the barrier function must make [1e-4]
 
 LEAST_VALUE = 1e-4  # of the objective that the error is compared with, in largest multipliers
@@ -80,7 +82,9 @@ RIGID = 1e-12  # barrier parameter of a solution that is differentiated
 
 fast = {"contract", "arcp", "nsz", "reassoc", "afn"}  # not nnan, ninf: bad numbers must show
 options: dict[str, Any] = {"error_model": "numpy", "fastmath": fast}
-inlined = njit(forceinline=True, **options)
+# To be called from machine code alone: a wrapper for Python takes a quarter of the compiling.
+inner: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inlined = njit(**inner, **options)
 
 
 class Task(NamedTuple):
@@ -540,7 +544,7 @@ def search(task, point, trial, mu, step, length, total, derivative):
         objective, reached = evaluate(task, trial, mu)
         if reached <= total + ARMIJO * length * derivative + ROUNDING * abs(total):
             return objective, reached
-        length *= 0.5
+        length *= BACKTRACKS
     return np.nan, np.nan
 
 
@@ -565,7 +569,7 @@ def scaled(theta, target, lower, upper, discs, sides, discount, slack_weight, so
         factor = max(factor, theta[a] * theta[a])
     rate = np.empty(len(discount))
     weights = np.empty((len(discount) - 1, len(discs) + len(sides)))
-    strict = max(BOX_WEIGHT, 100.0 * slack_weight / factor)
+    strict = max(BOX_WEIGHT, BOX_TO_SLACK * slack_weight / factor)
     for i in range(len(discount)):
         rate[i] = discount[i] / factor
         for j in range(weights.shape[1]):

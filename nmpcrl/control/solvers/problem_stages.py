@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from nmpcrl.control.codegen.source import source
+from nmpcrl.control.codegen.source import INNER, source
 from nmpcrl.control.problem import Problem
 
 HEADER = '''"""A problem's functions."""
@@ -34,8 +34,7 @@ def write(problem: Problem) -> dict[str, str]:
     """
     sizes = (problem.states, problem.inputs, problem.names.size)
     bodies = [
-        '@njit(error_model="numpy", forceinline=True)\n'
-        + source(f, returned=f.name_out() == ["cost"], matrices=MATRICES)
+        INNER + source(f, returned=f.name_out() == ["cost"], matrices=MATRICES)
         for f in functions(problem)
     ]
     header = HEADER.format(rows=problem.weights.size)

@@ -6,7 +6,7 @@ and layout of a plant.
 
 import casadi as ca
 
-from nmpcrl.control.codegen.source import source
+from nmpcrl.control.codegen.source import INNER, source
 from nmpcrl.control.ocp import Theta, stage_cost, terminal_cost
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.task import overlap
@@ -35,8 +35,7 @@ def write(plant: Plant) -> str:
     sizes = (plant.n, plant.m, 2 * plant.n + plant.m + 1)
     header = HEADER.format(about=", ".join(plant.state_names), sizes=sizes)
     bodies = [
-        '@njit(error_model="numpy", forceinline=True)\n'
-        + source(f, returned=f.name() in RETURNED, matrices=MATRICES)
+        INNER + source(f, returned=f.name() in RETURNED, matrices=MATRICES)
         for f in functions(plant)
     ]
     return "\n\n".join([header, *bodies])

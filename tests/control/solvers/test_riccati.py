@@ -1,5 +1,7 @@
 """riccati: the box as a penalty, second tries, how it gives up, and what replaces it."""
 
+import sys
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -147,3 +149,17 @@ def test_where_nothing_can_be_compiled_plant_and_task_compute_as_before(monkeypa
         np.testing.assert_allclose(stepped, [1, 2] + 0.2 * erfinv([0.5, -0.5]))
         assert isinstance(stepped, np.ndarray)
         assert isinstance(field().stage_cost(np.zeros(2), np.zeros(2)), float)
+
+
+def test_only_what_is_called_from_python_is_compiled_for_it(riccati):
+    solve = front.machine_code(riccati.plant).solve
+    package = solve.__module__.rpartition(".")[0]
+    jitted = {
+        found.__name__: found.targetoptions.get("no_cpython_wrapper", False)
+        for name, module in list(sys.modules.items())
+        if name.startswith(f"{package}.")
+        for found in vars(module).values()
+        if hasattr(found, "targetoptions")
+    }
+    assert {"factorise", "expand_stage"} < set(jitted)
+    assert {name for name, inner in jitted.items() if not inner} == {"solve", "hessian_times"}
