@@ -72,7 +72,7 @@ test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; n
 test-course: .venv/ready  ## Run every notebook of the course, as students and as teachers get it, and grade it
 	@$(PYTEST) -m course $(if $(ONLY),-k "$(ONLY)") tests/book/test_course.py tests/course/test_graded_chapters.py
 
-test-clusters: .venv/ready  ## The programs for clusters against a SLURM, which it installs as root, and an operator
+test-clusters: .venv/ready  ## The programs for clusters against a SLURM, which it installs as root
 	@$(if $(filter-out 0,$(shell id -u)),sudo) .ci/clusters
 
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks without executing any
