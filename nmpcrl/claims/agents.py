@@ -23,8 +23,7 @@ from nmpcrl.claims.agent_questions import (
     SEARCHED,
 )
 from nmpcrl.claims.agent_runs import judged_in
-from nmpcrl.claims.population import Answer
-from nmpcrl.claims.rule import read
+from nmpcrl.claims.population import Answer, by_share
 from nmpcrl.study.population import JUDGE, TUNE
 
 RESAMPLES = 2000  # of the bootstrap over layouts or seeds
@@ -105,7 +104,7 @@ def answers(table: pd.DataFrame, suite: pd.DataFrame | None = None) -> tuple[Ans
     pair = pd.DataFrame({one.agent: _last(one) for one in (first, second) if one}, columns=AGENTS)
     both = pair.dropna()
     ratio = both[AGENTS[0]] / both[AGENTS[1]]
-    found.append(_read("SAC or TD3", ratio < 1, "layouts", {"median ratio": _median(ratio)}))
+    found.append(by_share("SAC or TD3", ratio < 1, "layouts", {"median ratio": _median(ratio)}))
     by = {one.question: one for one in found}
     return tuple(by[name] for name in AGENT_QUESTIONS)
 
@@ -116,11 +115,11 @@ def _answers(table: pd.DataFrame, suite: pd.DataFrame | None, agent: str) -> Ite
     seen, unseen = (course(table, "all", agent, [*each]) for each in (TUNE, JUDGE))
     short, named = (searched(suite, part) for part in SEARCHED)
     matches = _last(judged) <= 1 + TOLERANCE
-    yield _read(f"{agent} matches in 300 episodes", matches, "layouts", _median_of(judged))
-    yield _read(f"{agent} solves in 300 episodes", matches & _there(judged), "layouts")
+    yield by_share(f"{agent} matches in 300 episodes", matches, "layouts", _median_of(judged))
+    yield by_share(f"{agent} solves in 300 episodes", matches & _there(judged), "layouts")
     yield _against(f"{agent} or the best search", judged, short, "layouts")
     best = one.shares.min(axis=0) if one else []
-    yield _read(
+    yield by_share(
         f"{agent} matches in one layout",
         pd.Series(best, dtype=float) <= 1 + TOLERANCE, "seeds", _median_of(one),
     )  # fmt: skip
@@ -129,7 +128,7 @@ def _answers(table: pd.DataFrame, suite: pd.DataFrame | None, agent: str) -> Ite
     yield _against(f"{agent} or the best search in one layout", one, in_one, "seeds")
     for name, each in (("over the 60", seen), ("on the 120", unseen)):
         yes = _last(each) <= 1 + TOLERANCE
-        yield _read(f"{agent} matches {name}", yes, "layouts", _median_of(each))
+        yield by_share(f"{agent} matches {name}", yes, "layouts", _median_of(each))
     yield _against(f"{agent} or the best search on the 120", unseen, short, "layouts")
 
 
@@ -174,12 +173,6 @@ def agents_of(table: pd.DataFrame) -> pd.Series:
     return table.arm.map(lambda arm: arm.partition("[")[0])
 
 
-def _read(name: str, yes: pd.Series, of: str, numbers: dict[str, float] | None = None) -> Answer:
-    """The answer that a share gives."""
-    count = int(yes.sum()), len(yes)
-    return Answer(name, read(*count), {of: count}, numbers or {})
-
-
 def _last(one: Course | None) -> pd.Series:
     """The shares at the end."""
     return pd.Series(dtype=float) if one is None else pd.Series(one.shares[-1], one.units)
@@ -208,4 +201,4 @@ def _against(name: str, one: Course | None, other: pd.Series, of: str) -> Answer
     if one is not None:
         both = both.loc[[unit for unit in one.units if unit in both.index]]
     ratio = both["agent"] / both["other"]
-    return _read(name, ratio < 1, of, {"median ratio": _median(ratio)})
+    return by_share(name, ratio < 1, of, {"median ratio": _median(ratio)})

@@ -54,6 +54,14 @@ class Answer:
         return WORDS.get(self.outcome, str(self.outcome))
 
 
+def by_share(
+    name: str, yes: pd.Series, of: str = "layouts", numbers: Mapping[str, float] | None = None
+) -> Answer:
+    """The answer that a share gives, of layouts unless said."""
+    count = _count(yes)
+    return Answer(name, read(*count), {of: count}, numbers or {})
+
+
 def asked() -> dict[str, RunClaim]:
     """The claims that are put to each layout, by their names in `EXPECTED`."""
     known = {**BY_RUNS, **WIDER_CLAIMS, **OWN_CLAIMS}
@@ -215,8 +223,7 @@ def gaps_and_horizon(stops: pd.DataFrame) -> Answer:
     """
     known = stops[stops[paper.HORIZON].notna()]
     apart = known.max(axis=1, skipna=False) - known.min(axis=1, skipna=False)
-    count = _count(apart <= SAME_CLOSING + 1e-9)
-    return Answer("gaps and horizon", read(*count), {"same": count})
+    return by_share("gaps and horizon", apart <= SAME_CLOSING + 1e-9, "same")
 
 
 def trap(runs: pd.DataFrame) -> tuple[Answer, Answer]:
@@ -272,8 +279,7 @@ def early_overshoot(runs: pd.DataFrame) -> Answer:
 
 def cliff(raised: pd.Series) -> Answer:
     """The question "cliff"; by which share the best theta's cost rises, by layout."""
-    count = _count(raised >= CLIFF_COST)
-    return Answer("cliff", read(*count), {"layouts": count}, {"most": float(raised.max())})
+    return by_share("cliff", raised >= CLIFF_COST, "layouts", {"most": float(raised.max())})
 
 
 def extrapolation(compared: pd.DataFrame, intervention: str = "theta held") -> Answer:
@@ -286,8 +292,8 @@ def extrapolation(compared: pd.DataFrame, intervention: str = "theta held") -> A
     names = ["layout", "seed"]
     by = {name: some.set_index(names) for name, some in compared.groupby("intervention")}
     dead = by["none"].index[by["none"].stopped]
-    count = _count(~by[intervention].stopped.reindex(dead).dropna().astype(bool))
-    return Answer("extrapolation", read(*count), {f"survive, {intervention}": count})
+    survive = ~by[intervention].stopped.reindex(dead).dropna().astype(bool)
+    return by_share("extrapolation", survive, f"survive, {intervention}")
 
 
 def answers(

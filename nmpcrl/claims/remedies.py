@@ -12,7 +12,7 @@ import pandas as pd
 
 from nmpcrl.analysis.leaderboard import TOLERANCE
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
-from nmpcrl.claims.population import Answer
+from nmpcrl.claims.population import Answer, by_share
 from nmpcrl.claims.remedy_questions import (
     ADVISED,
     DIGITS,
@@ -28,7 +28,7 @@ from nmpcrl.claims.remedy_questions import (
     SECOND,
     SETTINGS,
 )
-from nmpcrl.claims.rule import MAJORITY, read
+from nmpcrl.claims.rule import MAJORITY
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
 
 COLUMNS = (
@@ -218,12 +218,6 @@ def _of(table: pd.DataFrame, part: str, entry: str) -> pd.DataFrame:
     return table[(table.part == part) & (table.entry == entry)]
 
 
-def _read(name: str, yes: pd.Series, numbers: Mapping[str, float] | None = None) -> Answer:
-    """The answer that a share of layouts gives."""
-    count = int(yes.sum()), len(yes)
-    return Answer(name, read(*count), {"layouts": count}, numbers or {})
-
-
 def _paired(table: pd.DataFrame, part: str, entries: tuple[str, str]) -> pd.DataFrame:
     """The shares of two entries in the layouts that both were judged in."""
     found = {one: shares(_of(table, part, one)) for one in entries}
@@ -237,11 +231,11 @@ def _search_and_learning(table: pd.DataFrame, part: str) -> Answer:
         for entry in both
         for layout, share in shares(_of(table, "named 300", str(entry))).items()
     }
-    return _read("search and learning", both["CMA-ES"] > both["ES"], numbers)
+    return by_share("search and learning", both["CMA-ES"] > both["ES"], numbers=numbers)
 
 
 def _nears(table: pd.DataFrame, part: str) -> Answer:
-    return _read("search nears the best", shares(_of(table, part, "CMA-ES")) >= NEARLY)
+    return by_share("search nears the best", shares(_of(table, part, "CMA-ES")) >= NEARLY)
 
 
 def _costs(runs: pd.DataFrame) -> pd.DataFrame:
@@ -251,14 +245,14 @@ def _costs(runs: pd.DataFrame) -> pd.DataFrame:
 
 def _gains(table: pd.DataFrame, part: str, entry: str, name: str) -> Answer:
     costs = _costs(_of(table, part, entry))
-    return _read(name, costs.cost < costs.initial)
+    return by_share(name, costs.cost < costs.initial)
 
 
 def _by_hand(table: pd.DataFrame, part: str) -> Answer:
     by_hand = _of(table, part, "grid")
     there = by_hand[by_hand.arrived.astype(bool)].groupby("layout").cost.mean()
     both = pd.DataFrame({"grid": there, "GES": _costs(_of(table, part, "GES")).cost}).dropna()
-    return _read("one number by hand", both["grid"] < both["GES"])
+    return by_share("one number by hand", both["grid"] < both["GES"])
 
 
 def _guard(table: pd.DataFrame) -> Answer:
@@ -278,7 +272,7 @@ def _guard(table: pd.DataFrame) -> Answer:
     asked = both[~both["RDES"].astype(bool)]["guarded-RDES"].astype(float)
     if asked.empty:
         return Answer("guard", UNDECIDABLE, {"layouts": (0, 0)})
-    return _read("guard", asked.groupby(level=0).mean() > MAJORITY)
+    return by_share("guard", asked.groupby(level=0).mean() > MAJORITY)
 
 
 def _set(name: str) -> str:

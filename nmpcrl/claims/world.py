@@ -5,7 +5,7 @@ And what a richer terminal cost is worth, by `terminal_questions`.
 All of it is made of one table, a row a run, with `world_runs.COLUMNS`. What is missing is left out.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +14,7 @@ from scipy.stats import rankdata
 
 from nmpcrl.analysis.encounters import crowding
 from nmpcrl.analysis.worlds import EVERY, sequence
-from nmpcrl.claims.population import Answer
+from nmpcrl.claims.population import Answer, by_share
 from nmpcrl.claims.rule import read
 from nmpcrl.claims.terminal_questions import ARMS, TERMINAL_QUESTIONS
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
@@ -73,12 +73,6 @@ def means(table: pd.DataFrame, part: str, column: str = "cost") -> pd.DataFrame:
     return by.reindex(columns=PARTS[part].arms)
 
 
-def _read(name: str, yes: pd.Series, of: str, numbers: Mapping[str, float] | None = None) -> Answer:
-    """The answer that a share gives."""
-    count = int(yes.sum()), len(yes)
-    return Answer(name, read(*count), {of: count}, numbers or {})
-
-
 def _lower(costs: pd.DataFrame, first: str, second: str) -> pd.Series:
     """Whether the first costs less, in the places in which both are known."""
     both = costs[[first, second]].dropna()
@@ -91,20 +85,21 @@ def _moving(table: pd.DataFrame) -> Iterable[Answer]:
     init = costs[[f"{view} init" for view in VIEWS]].dropna().set_axis(list(VIEWS), axis=1)
     ratios = {view: init[view] / init["known"] for view in VIEWS[1:]}
     medians = {view: {"median ratio": float(one.median())} for view, one in ratios.items()}
-    yield _read("a velocity is enough", ratios["extrapolated"] <= 1 + CLEARLY, of,
-                medians["extrapolated"])  # fmt: skip
-    yield _read("a frozen view costs more", ratios["frozen"] >= 1 + CLEARLY, of, medians["frozen"])
+    yield by_share("a velocity is enough", ratios["extrapolated"] <= 1 + CLEARLY, of,
+                   medians["extrapolated"])  # fmt: skip
+    yield by_share("a frozen view costs more", ratios["frozen"] >= 1 + CLEARLY, of,
+                   medians["frozen"])  # fmt: skip
     met = inside[[f"{view} init" for view in VIEWS]].dropna()
     met = met[(met > 0).any(axis=1)]
-    yield _read("collisions", (met.iloc[:, :2] == 0).all(axis=1), of)
+    yield by_share("collisions", (met.iloc[:, :2] == 0).all(axis=1), of)
     yield _crowding(inside["extrapolated init"].dropna())
-    yield _read("learning among moving obstacles",
-                _lower(costs, "extrapolated ES", "extrapolated init"), of)  # fmt: skip
-    yield _read("learning or looking", _lower(costs, "frozen ES", "extrapolated init"), of)
-    yield _read("one number by hand among moving obstacles",
-                _lower(costs, "extrapolated grid", "extrapolated ES"), of)  # fmt: skip
+    yield by_share("learning among moving obstacles",
+                   _lower(costs, "extrapolated ES", "extrapolated init"), of)  # fmt: skip
+    yield by_share("learning or looking", _lower(costs, "frozen ES", "extrapolated init"), of)
+    yield by_share("one number by hand among moving obstacles",
+                   _lower(costs, "extrapolated grid", "extrapolated ES"), of)  # fmt: skip
     both = inside[["extrapolated ES", "extrapolated init"]].dropna()
-    yield _read("safer by learning", _lower(both[(both > 0).any(axis=1)], *both.columns), of)
+    yield by_share("safer by learning", _lower(both[(both > 0).any(axis=1)], *both.columns), of)
 
 
 def _crowding(inside: pd.Series) -> Answer:
@@ -137,25 +132,26 @@ def _saved(costs: pd.DataFrame, faults: Iterable[str], how: str) -> pd.Series:
 def _model(table: pd.DataFrame) -> Iterable[Answer]:
     costs, of = means(table, "model"), "faults and layouts"
     perfect = _saved(costs, ORACLES, "oracle")
-    yield _read("a perfect model", perfect < LITTLE, of,
-                {f"{fault}, median": float(perfect[fault].median()) for fault in ORACLES
-                 if fault in perfect})  # fmt: skip
+    yield by_share("a perfect model", perfect < LITTLE, of,
+                   {f"{fault}, median": float(perfect[fault].median()) for fault in ORACLES
+                    if fault in perfect})  # fmt: skip
     by_hand = _saved(costs, (*ORACLES, *WITHOUT), "grid")
-    yield _read("misfit of theta_c", by_hand >= MISFIT, of, {"median": float(by_hand.median())})
+    yield by_share("misfit of theta_c", by_hand >= MISFIT, of, {"median": float(by_hand.median())})
     adds = {one: _lower(costs, f"{one} ES+model", f"{one} ES") for one in (*ORACLES, *WITHOUT)}
-    drift = _read("only drift adds", adds["drift"], "layouts")
+    drift = by_share("only drift adds", adds["drift"], "layouts")
     others = {one: (int(yes.sum()), len(yes)) for one, yes in adds.items() if one != "drift"}
     also = any(read(*others[one]) == REPRODUCED for one in ORACLES if one in others)
     outcome: Outcome = PARTLY if also and drift.outcome == REPRODUCED else drift.outcome
     yield Answer(drift.question, outcome, {**drift.counts, **others})
     both = _saved(costs, ORACLES, "ES").to_frame("ES").join(perfect.rename("oracle")).dropna()
-    yield _read("recovered by weights", both["ES"] > both["oracle"], of)
+    yield by_share("recovered by weights", both["ES"] > both["oracle"], of)
 
 
 def _gradient(table: pd.DataFrame) -> Answer:
     cosines = means(table, "gradient")
     numbers = {f"median cosine at {one}": float(cosines[one].median()) for one in DEVIATIONS}
-    return _read("noise and the gradient", cosines["0.05"].dropna() >= ALIGNED, "layouts", numbers)
+    aligned = cosines["0.05"].dropna() >= ALIGNED
+    return by_share("noise and the gradient", aligned, numbers=numbers)
 
 
 def changes(part: str, place: str) -> list[int]:
@@ -192,23 +188,23 @@ def _changing(table: pd.DataFrame) -> Iterable[Answer]:
     until = pd.Series(
         [back(row.series, changes("once", row.place)[0]) for row in told.itertuples()], dtype=float
     )
-    yield _read("back soon", until <= SOON, of, {"median episodes": float(until.median())})
+    yield by_share("back soon", until <= SOON, of, {"median episodes": float(until.median())})
     fifty = shares(table, "every 50")
     for name, (first, second) in AFTER.items():
         medians = {one: float(fifty[one].median()) for one in (first, second)}
-        yield _read(name, _lower(fifty, first, second), of, medians)
+        yield by_share(name, _lower(fifty, first, second), of, medians)
     for name, arm in (("a chart on the cost", "ES cost plain"),
                       ("a chart on the TD error", "ES delta plain")):  # fmt: skip
         yield _chart(name, table[(table.part == "every 50") & (table.arm == arm)])
     every = pd.concat([shares(table, part)["ES told plain"] for part in CHANGES], axis=1).dropna()
     mean = every.mean(axis=1)
     numbers = {"median share": float(mean.median()), "largest share": float(mean.max())}
-    yield _read("learning pays in a changing world", mean < 1, of, numbers)
+    yield by_share("learning pays in a changing world", mean < 1, of, numbers)
     last = {
         "remedy": once[once.arm.str.startswith(REMEDY)].set_index("place").cost,
         "ES": told.set_index("place").cost,
     }
-    yield _read("begun anew", _lower(pd.DataFrame(last, columns=[*last]), "remedy", "ES"), of)
+    yield by_share("begun anew", _lower(pd.DataFrame(last, columns=[*last]), "remedy", "ES"), of)
 
 
 def _chart(name: str, runs: pd.DataFrame) -> Answer:
@@ -216,8 +212,8 @@ def _chart(name: str, runs: pd.DataFrame) -> Answer:
     noticed = [noticing(changes("every 50", row.place), row.events) for row in runs.itertuples()]
     yes = pd.Series([d <= PROMPT and f <= RARE for d, f in noticed], dtype=bool)
     delay, false = np.median(noticed, axis=0) if noticed else (np.nan, np.nan)
-    return _read(name, yes, "sequences",
-                 {"median delay": float(delay), "median false alarms": float(false)})  # fmt: skip
+    numbers = {"median delay": float(delay), "median false alarms": float(false)}
+    return by_share(name, yes, "sequences", numbers)
 
 
 def noticing(begin: list[int], alarms: list[int]) -> tuple[float, float]:
@@ -255,7 +251,7 @@ def _carried(table: pd.DataFrame) -> Answer:
         for arm in ("ES", "CMA-ES")
     }
     numbers = {f"median share, {arm}": float(one.median()) for arm, one in better.items()}
-    return _read("carried over", better["ES"] > 0.5, "layouts", numbers)
+    return by_share("carried over", better["ES"] > 0.5, "layouts", numbers)
 
 
 def improves_with(table: pd.DataFrame) -> pd.DataFrame:
@@ -279,7 +275,7 @@ def terminal(table: pd.DataFrame) -> Iterable[Answer]:
     for name, arm in (("full terminal cost", full), ("learned terminal cost", learned)):
         known = costs[[paper_s, arm]].dropna().index
         failing = improves.loc[known][~improves.loc[known, paper_s]]
-        yield _read(name, ~failing[arm], "layouts")
+        yield by_share(name, ~failing[arm], "layouts")
     ratio = (costs[learned] / costs[paper_s]).dropna()
-    yield _read("a richer terminal cost pays", ratio < 1, "layouts",
-                {"median ratio": float(ratio.median())})  # fmt: skip
+    yield by_share("a richer terminal cost pays", ratio < 1, "layouts",
+                   {"median ratio": float(ratio.median())})  # fmt: skip
