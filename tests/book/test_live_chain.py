@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from live_page import MOST, loaded
 from visits import assert_figures_pass
 
 from nmpcrl.analysis.two_state import FIRST, SECOND, Chain, follow, sampled_step
@@ -10,7 +9,6 @@ from nmpcrl.learning import Weights
 from nmpcrl.learning.learners import gradient_td, semi_gradient
 
 FIGURE = "chain"
-PICTURES = ["Two panels. One shows the absolute value", "Four panels: the cost of a training"]
 ALPHA, BETA, GAMMA = "alpha, step size of theta", "beta, step size of w", "gamma, discount"
 UPDATES = "Updates made"
 MOVES = """figure => {
@@ -114,24 +112,6 @@ def test_with_reduced_motion_there_are_steps_and_a_slider_alone(opened):
     assert tab.shown()["given"]["at"] == 1
 
 
-def test_without_javascript_and_on_paper_there_are_the_pictures_alone(opened, tab):
-    plain = opened(FIGURE, java_script_enabled=False)
-    tab.page.emulate_media(media="print")
-    for page in (plain.page, tab.page):
-        for picture in PICTURES:
-            assert page.locator(f"article figure img[alt*='{picture}']").is_visible()
-        assert page.locator("figure.live:visible").count() == 0
-
-
-def test_without_webassembly_there_is_a_sentence(opened):
-    tab = opened(FIGURE, script="delete window.WebAssembly")
-    tab.page.wait_for_selector("figure.live p")
-    for figure in tab.page.locator("figure.live").all():
-        assert "does not run WebAssembly" in figure.inner_text()
-        assert figure.locator("svg").count() == 0
-    assert tab.errors == []
-
-
 @pytest.mark.parametrize("width", [390, 1400])
 def test_axe_finds_nothing_in_the_chapters_figures(opened, width):
     size = {"width": width, "height": 900}
@@ -147,7 +127,3 @@ def test_axe_finds_nothing_in_the_chapters_figures(opened, width):
     ).all():
         box = target.bounding_box()
         assert min(box["width"], box["height"]) >= 24
-
-
-def test_what_the_chapters_live_figures_load_is_light(site):
-    assert loaded(site, FIGURE) <= MOST

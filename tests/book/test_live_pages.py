@@ -26,13 +26,10 @@ def test_what_a_chapters_live_figures_load_is_light(site, figure):
 @each_chapter
 def test_without_javascript_there_are_the_pictures_alone(opened, figure):
     tab = opened(figure, java_script_enabled=False)
-    for live in tab.page.locator("figure.live").all():
-        assert not live.is_visible()
+    assert_pictures_alone(tab.page)
     opening, *order = tab.page.evaluate(IN_ORDER)  # which is above all pictures
     for before, name in pairwise([opening, *order]):
         assert "picture" in (before, name), f"{name} stands on no picture"
-    for picture in tab.page.locator(PICTURE).all():
-        assert picture.is_visible()
 
 
 @each_chapter
@@ -50,9 +47,15 @@ def test_without_webassembly_there_are_the_pictures_and_a_sentence(opened, figur
 def test_on_paper_there_are_the_pictures_alone(opened, figure):
     tab = opened(figure).begun()
     tab.page.emulate_media(media="print")
-    assert tab.page.locator(PICTURE).first.is_visible()
-    for live in tab.page.locator("figure.live").all():
-        assert not live.is_visible()
+    assert_pictures_alone(tab.page)
+
+
+def assert_pictures_alone(page):
+    pictures, figures = page.locator(PICTURE).all(), page.locator("figure.live").all()
+    assert pictures
+    assert all(one.is_visible() for one in pictures)
+    assert figures
+    assert not any(one.is_visible() for one in figures)
 
 
 @each_chapter
