@@ -41,11 +41,6 @@ def entry(monkeypatch):
 
 
 @pytest.fixture
-def here(trains_here):
-    """Everything in this process."""
-
-
-@pytest.fixture
 def module(tmp_path, monkeypatch):
     """A module in the working directory, with some text."""
 
@@ -146,7 +141,7 @@ def test_a_module_that_fails_says_why(module):
         entry_of("of_my_own:factory")
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("trains_here")
 def test_an_entry_that_fails_says_where(module):
     module("def factory(robot): raise KeyError('x')")
     with pytest.raises(NoEntry, match="'of_my_own:factory' failed in J001: KeyError: 'x'"):
@@ -162,7 +157,7 @@ def test_a_number_that_makes_no_sense_is_refused(nonsense):
         judge("ES", **nonsense)
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("trains_here")
 def test_two_calls_give_the_same_row_but_for_its_time():
     first, again = (
         replace(judge("CMA-ES", budget=3, layouts=2, seeds=2, progress=False), seconds=0)

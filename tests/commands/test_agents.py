@@ -7,10 +7,7 @@ import pytest
 from nmpcrl.analysis.agent_curves import Curve
 from nmpcrl.claims import agent_published, agent_runs
 
-
-@pytest.fixture(autouse=True)
-def here(trains_here):
-    """Everything in this process."""
+pytestmark = pytest.mark.usefixtures("trains_here")
 
 
 def test_without_the_extra_one_sentence_says_what_is_missing(command, monkeypatch):

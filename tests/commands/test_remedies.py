@@ -1,15 +1,8 @@
 """`nmpcrl remedies` as a user calls it."""
 
-import pytest
-
 from nmpcrl.claims import remedy_published
 from nmpcrl.claims.remedies import COLUMNS
 from nmpcrl.claims.remedy_questions import PARTS
-
-
-@pytest.fixture(autouse=True)
-def here(trains_here):
-    """Everything in this process."""
 
 
 def test_what_is_published_is_advised_on(command):

@@ -4,10 +4,7 @@ import pytest
 
 from nmpcrl.analysis.entries import ENTRIES
 
-
-@pytest.fixture(autouse=True)
-def here(trains_here):
-    """Everything in this process."""
+pytestmark = pytest.mark.usefixtures("trains_here")
 
 
 def said(ended):

@@ -5,10 +5,7 @@ import pytest
 from nmpcrl.claims import world_published, world_runs
 from nmpcrl.claims.world_questions import PARTS
 
-
-@pytest.fixture(autouse=True)
-def here(trains_here):
-    """Everything in this process."""
+pytestmark = pytest.mark.usefixtures("trains_here")
 
 
 def test_a_part_is_run_published_and_judged(command, monkeypatch):
