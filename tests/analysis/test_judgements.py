@@ -65,6 +65,15 @@ def test_a_failed_solve_is_kept_as_infinite(counted, monkeypatch):
     assert stored([ONE])[ONE].cost == np.inf
 
 
+def test_what_other_code_judged_is_judged_again(counted, capsys):
+    judge_all([ONE], progress=False)
+    path = KEPT.path_of(ONE)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"sources": "another"}))
+    judge_all([ONE], progress=False)
+    assert counted == [ONE, ONE]
+    assert "is of code that is neither this nor locked" in capsys.readouterr().err
+
+
 def test_a_damaged_file_is_judged_again(counted, capsys):
     judge_all([ONE], progress=False)
     KEPT.path_of(ONE).write_text("{")
