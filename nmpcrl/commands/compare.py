@@ -28,6 +28,7 @@ def compare(run: str, other: str) -> None:
     paths = file_of(run), file_of(other)
     from nmpcrl.analysis import comparison
     from nmpcrl.report.run import figures
+    from nmpcrl.study.storage.place import harmless
 
     first, second = map(records_of, paths)
     found = comparison.compare(first, second)
@@ -35,9 +36,10 @@ def compare(run: str, other: str) -> None:
     rows += [[name, *map(_word, pair)] for name, pair in found.fields.items()]
     one, two = figures(first), figures(second)
     rows += [[name, value, two[name]] for name, value in one.items() if name != "theta"]
-    click.echo(f"first   {paths[0].stem}\nsecond  {paths[1].stem}\n")
+    click.echo(harmless(f"first   {paths[0].stem}"))
+    click.echo(harmless(f"second  {paths[1].stem}\n"))
     for line in columns(rows):
-        click.echo(line)
+        click.echo(harmless(line))
     click.echo(f"\ntheta   {one['theta']}\n        {two['theta']}\n")
     _print_differences(found)
     if found.warning:

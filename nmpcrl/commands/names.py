@@ -13,6 +13,7 @@ from nmpcrl.commands.tables import counted
 if TYPE_CHECKING:
     from nmpcrl.study import Records
 
+OTHER_CODE = "code that is neither this nor locked: its numbers may be others"
 SHOWN = 5  # names that a refusal lists
 WHOLE = re.compile(r"(?P<learner>[^-]+)-(?P<layout>[^-]+)-(?P<decay>[a-z]+)-seed(?P<seed>\d+)")
 
@@ -103,21 +104,40 @@ def _as_in_the_paper(wanted: str) -> str:
 def records_of(path: Path) -> "Records":
     """What a file of `file_of` holds, if it is the run that its name in the folder says.
 
+    A run of code that makes other numbers is read, and that is said.
+
     Raises:
         click.ClickException: it is another run, or of a trial.
         DamagedRecords: it cannot be read whole.
     """
     from nmpcrl.study import Experiment, Records
-    from nmpcrl.study.store import folder, name_of
+    from nmpcrl.study.provenance import is_accepted, locked_hash, warn_of_changes
+    from nmpcrl.study.storage.place import say
+    from nmpcrl.study.store import name_of
 
     records = Records.load(path)
     if "layout" not in records.experiment:
         raise _no_experiment(path)
-    key = records.facts.get("key", "")[:10]
-    said = f"{name_of(Experiment(**records.experiment))}-{key}"
-    if key and path.parent == folder() and path.stem != said:
-        raise click.ClickException(f"{path} holds another run, {said}: give it that name")
+    name, key = name_of(Experiment(**records.experiment)), records.facts.get("key", "")[:10]
+    for kept in _kept_as(path):
+        if not key:
+            raise click.ClickException(
+                f"{path} does not say which code made it: keep it in another folder"
+            )
+        if kept != f"{name}-{key}":
+            raise click.ClickException(f"{path} holds another run, {name}-{key}: give it that name")
+    if not is_accepted(records.facts.get("sources", locked_hash())):
+        say(f"{path} holds a run of {OTHER_CODE}")
+    warn_of_changes()
     return records
+
+
+def _kept_as(path: Path) -> list[str]:
+    """The names that a file has in the folder of the runs, however its path is written."""
+    from nmpcrl.study.store import folder
+
+    places = {path.parent.resolve() / path.name, path.resolve()}
+    return [place.stem for place in places if place.parent == folder().resolve()]
 
 
 def _listed(found: list[str]) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nmpcrl.commands.fields import Conditions
-from nmpcrl.commands.names import say_of_trials
+from nmpcrl.commands.names import OTHER_CODE, say_of_trials
 from nmpcrl.commands.tables import columns, counted, duration, size
 
 if TYPE_CHECKING:
@@ -92,6 +92,7 @@ def runs(sort: str, reverse: bool, as_json: bool, **conditions: Any) -> None:
     """
     wanted = _wanted(conditions)
     _refuse_unknown(sort)
+    from nmpcrl.study.provenance import is_accepted, locked_hash, warn_of_changes
     from nmpcrl.study.store import folder, stored
 
     rows = [
@@ -108,6 +109,11 @@ def runs(sort: str, reverse: bool, as_json: bool, **conditions: Any) -> None:
         click.echo(f"No run in {folder()} matches; `nmpcrl runs` lists all.")
     else:
         click.echo(f"No run is stored in {folder()}; `nmpcrl train` trains one.")
+    others = [row for row in rows if not is_accepted(row.facts.get("sources", locked_hash()))]
+    if others:
+        count = counted(len(others), "run")
+        click.echo(f"{count} of {OTHER_CODE}; the first is {others[0].path.stem}", err=True)
+    warn_of_changes()
     say_of_trials("`nmpcrl.study.fetch` reads them, and they are not listed")
 
 

@@ -36,11 +36,12 @@ def show(run: str, out: Path | None, kind: str | None, frozen: bool) -> None:
     out, kind = _place(path, out, kind)
     from nmpcrl.report.figures.runs.run import run_page, write
     from nmpcrl.study.storage.atomic import write_whole
+    from nmpcrl.study.storage.place import harmless
 
     records = records_of(path)
     figure = run_page(records, _frozen_arm(records, train=frozen))
     write_whole(out, lambda file: write(figure, file, kind))
-    click.echo(out)
+    click.echo(harmless(str(out)))
 
 
 def _place(run: Path, out: Path | None, kind: str | None) -> tuple[Path, str]:
@@ -60,14 +61,21 @@ def _place(run: Path, out: Path | None, kind: str | None) -> tuple[Path, str]:
 def _frozen_arm(records: "Records", *, train: bool) -> "Records | None":
     """The frozen arm of a run, if it has one and that is stored or to be trained."""
     from nmpcrl.commands.progress import fetched
-    from nmpcrl.study import Experiment, Records
+    from nmpcrl.study import Experiment
     from nmpcrl.study.experiment import frozen_arm
-    from nmpcrl.study.store import path_of
+    from nmpcrl.study.records import DamagedRecords
+    from nmpcrl.study.storage.place import say
+    from nmpcrl.study.store import read
 
     if records.experiment["learner"] == "frozen":
         return None
     arm = frozen_arm(Experiment(**records.experiment))
     if train:
         return fetched(arm)
-    path = path_of(arm)
-    return Records.load(path) if path.is_file() else None
+    try:
+        return read(arm)
+    except FileNotFoundError:
+        return None
+    except DamagedRecords as error:
+        say(f"{error}; it is not drawn")
+        return None

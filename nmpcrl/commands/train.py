@@ -26,6 +26,7 @@ def train(yes: bool, **fields: Any) -> None:
     from nmpcrl.report.run import verdict
     from nmpcrl.study import Experiment
     from nmpcrl.study.limits import estimate, need_numba
+    from nmpcrl.study.storage.place import harmless
     from nmpcrl.study.store import check_folder, path_of, size_of
 
     experiment = Experiment(**fields)
@@ -37,11 +38,11 @@ def train(yes: bool, **fields: Any) -> None:
         check_folder(size_of(experiment))
     records = fetched(experiment)
     if not path.is_file():  # the store has said why
-        click.echo(f"{experiment}: {records.facts['stopped']}")
-        click.echo(verdict(records))
+        click.echo(harmless(f"{experiment}: {records.facts['stopped']}"))
+        click.echo(harmless(verdict(records)))
         raise SystemExit(1)
-    click.echo(f"{path}: {records.facts['stopped']}")
-    click.echo(verdict(records))
+    click.echo(harmless(f"{path}: {records.facts['stopped']}"))
+    click.echo(harmless(verdict(records)))
     click.echo(f"Next: nmpcrl show {path.stem}")
     click.echo(f"      nmpcrl compare {path.stem} {_other(experiment)}")
 

@@ -13,9 +13,10 @@ from nmpcrl.commands import main
 from nmpcrl.commands.names import file_of
 from nmpcrl.commands.tables import columns, counted, duration, size
 from nmpcrl.learning import expected_sarsa
-from nmpcrl.study import Experiment, Trial, fetch, fetch_all, paper, store, sweep
+from nmpcrl.study import Experiment, Trial, fetch, fetch_all, paper, run, store, sweep
 from nmpcrl.study.records import Records
 
+TRAIN = "train --episodes 2 --steps 5 --evaluate-every 1"
 DRAWN = ((0.5, 2.2), (3.0, 0.5))
 SHORT = {"episodes": 2, "steps": 5, "evaluate_every": 1}
 STORED = sweep(learner=("ES", "GES", "frozen"), seed=(0, 1), **SHORT) + sweep(
@@ -233,9 +234,34 @@ def test_a_run_under_the_name_of_another_is_refused(words, tmp_path, monkeypatch
     right, wrong = (Experiment(name, **SHORT) for name in ("ES", "GES"))
     fetch_all([right], progress=False)
     shutil.copy(store.path_of(right), store.path_of(wrong))
-    refused = CliRunner().invoke(main, [*words, "GES-A-step-seed0"])
-    assert refused.exit_code == 1
-    assert f"holds another run, {store.path_of(right).stem}" in refused.output
+    (tmp_path / "below").mkdir()
+    for name in ("GES-A-step-seed0", str(tmp_path / "below/.." / store.path_of(wrong).name)):
+        refused = CliRunner().invoke(main, [*words, name])
+        assert refused.exit_code == 1
+        assert f"holds another run, {store.path_of(right).stem}" in refused.output
+
+
+def test_what_does_not_say_which_code_made_it_is_no_run_of_the_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    path = store.path_of(Experiment(**SHORT))
+    path.parent.mkdir()
+    run(Experiment(**SHORT)).save(path)
+    said = CliRunner().invoke(main, ["evaluate", path.stem]).output
+    assert "does not say which code made it" in said
+    elsewhere = path.rename(tmp_path / "mine.npz")
+    assert CliRunner().invoke(main, ["evaluate", str(elsewhere)]).exit_code == 0
+
+
+@pytest.mark.parametrize("words", ["runs", "evaluate ES", "show ES", "compare ES ES"])
+def test_a_run_of_other_code_is_read_and_that_is_said(words, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
+    records = fetch(Experiment(**SHORT))
+    assert CliRunner().invoke(main, words.split()).stderr == ""
+    records.facts["sources"] = "another"
+    records.save(store.path_of(Experiment(**SHORT)))
+    done = CliRunner().invoke(main, words.split())
+    assert done.exit_code == 0
+    assert "code that is neither this nor locked" in done.stderr
 
 
 def test_nothing_in_a_file_is_a_command_to_the_terminal(tmp_path, monkeypatch):
@@ -244,7 +270,7 @@ def test_nothing_in_a_file_is_a_command_to_the_terminal(tmp_path, monkeypatch):
     records.facts["stopped"] = "diverged: \x1b[31mred\x1b]0;title\x07"
     records.save(store.path_of(Experiment(**SHORT)))
     (tmp_path / "none\x1b[31m\x07.npz").write_text("damaged")
-    asked = ("runs", "evaluate ES", "compare ES ES", "clean", "evaluate non", "show nobody")
+    asked = ("runs", TRAIN, "evaluate ES", "compare ES ES", "clean", "evaluate non", "show nobody")
     for words in map(str.split, asked):
         said = CliRunner().invoke(main, words).output
         assert "\x1b" not in said

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -159,6 +160,16 @@ def test_what_is_compared_goes_as_far_as_both_do(known):
 def test_other_layouts_are_not_comparable(known):
     assert "layout" in compare(known["ES"], known["other layout"]).warning
     assert "steps" in compare(known["ES"], run(Experiment(episodes=1, steps=4))).warning
+
+
+def test_a_file_that_is_not_the_frozen_arm_is_not_drawn_as_one(command):
+    fetch(RUNS["ES"])
+    alone = command("show", "ES-A").stdout
+    drawn = Path(alone.strip()).read_bytes()
+    fetch(RUNS["GES"]).save(store.path_of(RUNS["frozen"]))
+    done = command("show", "ES-A")
+    assert "it is not drawn" in done.stderr
+    assert Path(done.stdout.strip()).read_bytes() == drawn
 
 
 def test_compare_prints_fields_figures_and_differences(command):
