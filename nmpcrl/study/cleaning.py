@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.provenance import key
+from nmpcrl.study.provenance import is_accepted, key, locked_hash
 from nmpcrl.study.storage.archive import ABOUT
 
 RUN = re.compile(r"[A-Za-z]+-\w+-[a-z]+-seed\d+-\d+ep-[0-9a-f]{10}")  # what a run's file is called
@@ -102,6 +102,7 @@ def _kind_of_run(path: Path, file_of: Callable[[Experiment], Path]) -> str:
         return "old"
     own = file_of(experiment)
     if own.name == path.name:
-        return "runs"
-    renamed = own.stem.rpartition("-")[0] != path.stem.rpartition("-")[0]
+        return "runs" if is_accepted(facts.get("sources", locked_hash())) else "old"
+    parts, others = own.stem.rpartition("-"), path.stem.rpartition("-")
+    renamed = parts[0] != others[0] or key(experiment).startswith(parts[2])
     return "" if renamed and facts.get("key") == key(experiment) else "old"

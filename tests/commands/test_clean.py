@@ -96,11 +96,18 @@ def test_finished_runs_go_only_if_they_are_asked_for(command, folder):
     assert before - files(folder) == set(GOING) | own
 
 
-def test_a_run_of_this_code_that_somebody_renamed_stays(command, folder):
-    renamed = folder / NAME.replace("seed0", "seed7")
-    renamed = store.path_of(RUN).rename(renamed.with_suffix(".npz"))
+@pytest.mark.parametrize("name", [NAME.replace("seed0", "seed7"), f"{NAME[:-1]}8"])
+def test_a_run_of_this_code_that_somebody_renamed_stays(command, folder, name):
+    renamed = store.path_of(RUN).rename(folder / f"{name}.npz")
     command("clean", "--yes")
     assert renamed.exists()
+
+
+def test_a_run_that_would_be_trained_again_goes(command, folder):
+    records = fetch(RUN)
+    replace(records, facts=records.facts | {"sources": "another"}).save(store.path_of(RUN))
+    command("clean", "--yes")
+    assert not store.path_of(RUN).exists()
 
 
 def test_a_run_that_cannot_be_read_now_stays(command, folder):
