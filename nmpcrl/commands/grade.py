@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -88,11 +89,12 @@ def grade(
 
     limits = Limits(time_limit, cell_limit, memory)
     rows = []
-    graded = grading.grade(folder, edition, limits, workers)  # refuses before anything is written
+    graded = grading.grade(folder, edition, limits, workers)
+    first = next(graded)  # an earlier table stays until there is something to write
     with out.open("w", newline="", encoding="utf-8", errors="replace") as file:
         writer = csv.writer(file)
         writer.writerow(FIELDS)
-        for each in graded:
+        for each in chain([first], graded):
             rows.append(total(each))
             student, notebook, got, of, by_hand = rows[-1]
             writer.writerows([cell(getattr(mark, name)) for name in FIELDS] for mark in each)
@@ -106,8 +108,12 @@ def grade(
 
 
 def cell(value: object) -> object:
-    """What a table shows, and never computes: a text that begins as a formula is quoted."""
-    return f"'{value}" if isinstance(value, str) and value[:1] in FORMULA else value
+    """What a table shows and never computes, nor a terminal obeys: formulas are quoted."""
+    from nmpcrl.study.storage.place import harmless
+
+    if not isinstance(value, str):
+        return value
+    return harmless(f"'{value}" if value[:1] in FORMULA else value)
 
 
 def total(marks: "list[Mark]") -> tuple[str, ...]:

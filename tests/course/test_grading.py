@@ -253,6 +253,7 @@ def test_an_edition_that_is_not_there_is_refused(tmp_path):
 
 
 def test_a_table_never_computes_what_a_student_calls_a_folder():
+    assert cell("\x1b]0;anna\x07") == "?]0;anna?"
     assert [cell(one) for one in ("=1+1", "+1", "@x", "-1", "anna", 3)] == [
         "'=1+1",
         "'+1",
@@ -270,6 +271,19 @@ def test_what_an_earlier_call_graded_stays_if_this_one_cannot_begin(tmp_path, ed
     words = ["grade", str(tmp_path / "in"), "--out", str(out), "--edition", str(edition)]
     refused = CliRunner().invoke(main, words)
     assert "has no notebook" in refused.output
+    assert out.read_text() == "known"
+
+
+def test_an_earlier_table_stays_until_a_notebook_is_graded(tmp_path, edition, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+        yield
+
+    monkeypatch.setattr(grading, "grade", interrupted)
+    out = tmp_path / "grades.csv"
+    out.write_text("known")
+    words = ["grade", str(tmp_path), "--out", str(out), "--edition", str(edition)]
+    assert CliRunner().invoke(main, words).exit_code == 1
     assert out.read_text() == "known"
 
 
