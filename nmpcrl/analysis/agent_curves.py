@@ -19,6 +19,7 @@ from nmpcrl.analysis.leaderboard import followed
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.provenance import installed
 from nmpcrl.study.robot import RobotEnv
 
 EPOCH = 1  # raised by hand where an edit of agents or of this changes a number
@@ -81,7 +82,7 @@ def _judged(robot: Robot, policy: Policy) -> tuple[float, bool]:
 
 def depends_on() -> dict[str, Any]:
     """All that the numbers depend on, beside what is wanted."""
-    library = judgements.installed(LIBRARY)
+    library = installed(LIBRARY)
     return {**judgements.depends_on(), "agents": EPOCH, LIBRARY: library}
 
 

@@ -1,8 +1,6 @@
 """Entries of the suite judged and kept: one that ships, as `entries.called` names it, by layout."""
 
 from collections.abc import Iterable, Mapping
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from nmpcrl.analysis.entries import ENTRIES
@@ -11,7 +9,7 @@ from nmpcrl.analysis.leaderboard import HELD_OUT, MOST_SEEDS, Judged, judge_once
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.population import JUDGE, TUNE
-from nmpcrl.study.provenance import epochs, versions
+from nmpcrl.study.provenance import epochs, installed, versions
 
 EPOCH = 1  # raised by hand where an edit of the suite or its entries changes a number
 FOLDER = "suite"  # in that of the runs
@@ -58,15 +56,6 @@ def stored(wanted: Iterable[Wanted]) -> dict[Wanted, Judged]:
 def depends_on() -> dict[str, Any]:
     """All that the numbers depend on, beside the entry, the layout and the seed."""
     return {"epochs": epochs(), "suite": EPOCH, **versions(), **_libraries()}
-
-
-@cache
-def installed(library: str) -> str:
-    """Its version, which a process asks the disk for once; "absent" where an extra is missing."""
-    try:
-        return version(library)
-    except PackageNotFoundError:
-        return "absent"
 
 
 def _libraries() -> dict[str, str]:

@@ -146,12 +146,12 @@ def versions(experiment: Experiment | Trial | None = None) -> dict[str, str]:
     """
     learns = not isinstance(experiment, Experiment) or LEARNERS[experiment.learner].network
     names = (*LIBRARIES, "torch") if learns else LIBRARIES
-    return {name: _version(name).partition("+")[0] for name in names}
+    return {name: installed(name).partition("+")[0] for name in names}
 
 
 def environment() -> dict[str, str]:
     """All that must be the same, beside key and machine, for the same bits."""
-    libraries = {name: _version(name) for name in (*LIBRARIES, "torch")}
+    libraries = {name: installed(name) for name in (*LIBRARIES, "torch")}
     return {"python": platform.python_version(), **libraries}
 
 
@@ -176,7 +176,8 @@ def epochs() -> dict[str, int]:
 
 
 @cache
-def _version(library: str) -> str:
+def installed(library: str) -> str:
+    """The version of a library; "absent" if it is not there."""
     try:
         return version(library)
     except PackageNotFoundError:  # only numba may be missing: fatrop then solves
@@ -283,12 +284,13 @@ def warn_of_changes() -> None:
 def code(text: str) -> str:
     """A module's syntax tree as text, without comments, docstrings and functions' types.
 
-    Of its imports it has what can change a number: under which name something of ours is known that
-    has another, and all that comes from elsewhere. So a module of ours can be moved. Empty if there
-    is nothing else in it. The same text on every version of Python that we know.
+    Of its imports it has what can change a number: of what is used in it, the name of the module
+    that it comes from and its own. Of modules of ours that is the last part alone, so that they can
+    be moved. Empty if nothing but imports is in it, which rename nothing of ours. The same text on
+    every version of Python that we know.
     """
     tree = ast.parse(text)
-    renamed, foreign = _imports(tree)
+    renamed, used = _imports(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             node.returns = None
@@ -298,24 +300,26 @@ def code(text: str) -> str:
             documented = ast.get_docstring(node) is not None
             node.body = [one for one in node.body[documented:] if not _is_bookkeeping(one)]
     body = list(map(_shape, tree.body))
-    return "\n".join([*renamed, *(foreign if body else ()), *body])
+    return "\n".join([*renamed, *(used if body else ()), *body])
 
 
 def _imports(tree: ast.AST) -> tuple[list[str], list[str]]:
-    """What a module imports: ours under another name; and of others, what it uses in its code."""
-    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    renamed, foreign = set(), set()
+    """What a module imports: ours under another name; and all that it uses, with where it is."""
+    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    renamed, used = set(), set()
     for node in ast.walk(tree):
         if not isinstance(node, ast.Import | ast.ImportFrom):
             continue
         module = (node.module or "") if isinstance(node, ast.ImportFrom) else ""
+        own = module.split(".")[0] == "nmpcrl"
         for one in node.names:
             bound = one.asname or one.name.partition(".")[0]
-            if module.split(".")[0] == "nmpcrl":
-                renamed |= {f"import {one.name} as {bound}"} if bound != one.name else set()
-            elif bound in used and module not in UNCOUNTED:
-                foreign.add(f"from {module} import {one.name} as {bound}")
-    return sorted(renamed), sorted(foreign)
+            if own and bound != one.name:
+                renamed.add(f"import {one.name} as {bound}")
+            if bound in names and module not in UNCOUNTED:
+                place = module.rpartition(".")[2] if own else module
+                used.add(f"from {place} import {one.name} as {bound}")
+    return sorted(renamed), sorted(used)
 
 
 def _is_bookkeeping(node: ast.stmt) -> bool:

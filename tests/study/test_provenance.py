@@ -76,6 +76,11 @@ NUMBERS = [
         "    auxiliary_step as semi_gradient_step,\n",
     ),
     ("learning/updates.py", "import numpy as np", "import jax.numpy as np"),
+    (
+        "learning/training.py",
+        "from nmpcrl.control.nmpc import ABSURD",
+        "from nmpcrl.control.solvers.rows import ABSURD",
+    ),
 ]
 NO_NUMBERS = [
     ("learning/updates.py", '"""The update rules', '"""All update rules'),
@@ -177,7 +182,7 @@ def test_a_key_depends_on_what_differs_from_the_original(other, names):
 )
 def test_stored_runs_keep_their_keys(monkeypatch, fields, begins):
     """Those of the first epoch and of libraries that are all of version 1."""
-    monkeypatch.setattr(provenance, "_version", lambda _: "1")
+    monkeypatch.setattr(provenance, "installed", lambda _: "1")
     monkeypatch.setattr(provenance, "EPOCHS", dict.fromkeys(provenance.EPOCHS, 1))
     assert key(Experiment(**fields))[:10] == begins
 
@@ -235,23 +240,26 @@ def test_an_epoch_that_is_raised_makes_other_runs(monkeypatch, room):
 @pytest.mark.parametrize("library", ["casadi", "numba", "numpy", "torch"])
 @pytest.mark.parametrize("learner", ["ES", "RDES"])
 def test_a_version_counts_where_the_library_touches_the_numbers(monkeypatch, library, learner):
-    before, version = key(Experiment(learner)), provenance._version
+    before, version = key(Experiment(learner)), provenance.installed
     other = {library: "0.0.1"}
-    monkeypatch.setattr(provenance, "_version", lambda name: other.get(name) or version(name))
+    monkeypatch.setattr(provenance, "installed", lambda name: other.get(name) or version(name))
     assert (key(Experiment(learner)) != before) == (library != "torch" or learner == "RDES")
 
 
 def test_what_a_build_adds_to_a_version_does_not_count(monkeypatch):
-    monkeypatch.setattr(provenance, "_version", lambda name: "1.2")
+    monkeypatch.setattr(provenance, "installed", lambda name: "1.2")
     before = key(Experiment("RDES"))
-    monkeypatch.setattr(provenance, "_version", lambda name: "1.2+cpu")
+    monkeypatch.setattr(provenance, "installed", lambda name: "1.2+cpu")
     assert key(Experiment("RDES")) == before
 
 
-def test_what_changes_last_digits_is_part_of_the_machine(monkeypatch):
+def test_what_changes_last_digits_is_part_of_the_machine(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     for name in machine.SETTINGS:
         monkeypatch.delenv(name, raising=False)
     common = machine.fingerprint()
     assert "settings" not in common
     monkeypatch.setenv("ATEN_CPU_CAPABILITY", "default")
     assert machine.fingerprint() == common | {"settings": {"ATEN_CPU_CAPABILITY": "default"}}
+    (tmp_path / ".numba_config.yaml").write_text("disable_jit: 1")
+    assert ".numba_config.yaml" in machine.fingerprint()["settings"]

@@ -22,7 +22,9 @@ SETTINGS = (  # environment variables by which the same code gives other last di
     "OPENBLAS_CORETYPE",
     "ATEN_CPU_CAPABILITY",
     "MKL_CBWR",
+    "GLIBC_TUNABLES",
 )
+CONFIGURED = Path(".numba_config.yaml")  # in the working folder, where numba looks for it
 
 
 class Machine(TypedDict):
@@ -39,7 +41,7 @@ class Fingerprint(Machine):
 
     library: str  # of C
     abilities: str  # a hash of what its processor can do
-    settings: NotRequired[dict[str, str]]  # what `SETTINGS` say, where one of them is set
+    settings: NotRequired[dict[str, str]]  # what `SETTINGS` and numba's file say, if anything
 
 
 def machine() -> Machine:
@@ -59,6 +61,8 @@ def fingerprint() -> Fingerprint:
     cosines come from the second.
     """
     settings = {name: os.environ[name] for name in SETTINGS if os.environ.get(name)}
+    if CONFIGURED.is_file():
+        settings[CONFIGURED.name] = sha256(CONFIGURED.read_bytes()).hexdigest()[:16]
     known = _fingerprint().copy()
     if settings:
         known["settings"] = settings
