@@ -1,4 +1,4 @@
-"""Every equation by hand, and the two-state chain that tells the update rules apart."""
+"""Every equation by hand."""
 
 import numpy as np
 import pytest
@@ -122,43 +122,3 @@ def test_a_state_that_leads_to_itself_is_worth_its_discounted_cost_for_ever():
         delta = td_error(2.0, 0.9, q=theta[0], q_next=theta[0])
         theta = semi_gradient_step(theta, delta, np.ones(1), alpha=0.1)
     assert theta[0] == pytest.approx(2.0 / (1 - 0.9))
-
-
-# Two states with values theta and 2 theta, no cost, and only the step from the first to the second
-# is seen (Tsitsiklis and Van Roy 1996; Sutton and Barto 2018, Section 11.2). The true theta is 0.
-ONE, TWO, GAMMA = np.array([1.0]), np.array([2.0]), 0.9
-
-
-def chain(step, steps):
-    theta, w = np.ones(1), np.zeros(1)
-    for _ in range(steps):
-        delta = td_error(0.0, GAMMA, q=ONE @ theta, q_next=TWO @ theta)
-        theta, w = step(theta, w, delta)
-    return theta[0]
-
-
-def test_semi_gradient_diverges_on_the_two_state_chain():
-    def step(theta, w, delta):
-        return semi_gradient_step(theta, delta, ONE, alpha=0.1), w
-
-    # every step multiplies theta by 1 + alpha (2 gamma - 1) = 1.08
-    assert chain(step, 100) == pytest.approx(1.08**100)
-
-
-def test_gradient_td_converges_on_the_two_state_chain():
-    def step(theta, w, delta):
-        moved = gradient_td_step(theta, w, delta, ONE, TWO, alpha=0.05, gamma=GAMMA)
-        return moved, auxiliary_step(w, delta, ONE, beta=0.5)
-
-    assert abs(chain(step, 100)) < 0.2
-    assert abs(chain(step, 1000)) < 1e-6
-
-
-def test_with_the_tables_order_of_step_sizes_the_chain_turns_around_only_later():
-    """beta a tenth of alpha, as in Table I: theta first grows, then w has learned enough."""
-
-    def step(theta, w, delta):
-        moved = gradient_td_step(theta, w, delta, ONE, TWO, alpha=0.1, gamma=GAMMA)
-        return moved, auxiliary_step(w, delta, ONE, beta=0.01)
-
-    assert chain(step, 20) > 1.5
