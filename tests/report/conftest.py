@@ -1,5 +1,7 @@
-"""What is asked of every figure."""
+"""What is asked of every figure, and what a live one is given."""
 
+import json
+import re
 from collections.abc import Callable, Iterator
 
 import pandas as pd
@@ -78,6 +80,12 @@ def assert_readable(texts) -> Callable[[Figure], None]:
             assert "[" in label or "(no unit)" in label or label.endswith(COUNTED), label
 
     return check
+
+
+@pytest.fixture
+def data(shown) -> dict:
+    """What the script of a live figure is given, whose HTML is `shown`."""
+    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
 
 
 @pytest.fixture

@@ -37,11 +37,6 @@ def shown(nmpc, small) -> str:
     return live.controller(nmpc, THETA, 130).data
 
 
-@pytest.fixture
-def data(shown) -> dict:
-    return given(shown)
-
-
 def given(shown: str) -> dict:
     """What the script is given."""
     return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])

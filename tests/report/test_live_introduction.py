@@ -1,6 +1,5 @@
 """What the introduction's live figure is given: the study's own run, and two of its layouts."""
 
-import json
 import re
 
 import numpy as np
@@ -19,11 +18,6 @@ def shown() -> str:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(browser, "module", lambda plant, task: b"abc")
         return live.intro().data
-
-
-@pytest.fixture(scope="module")
-def data(shown) -> dict:
-    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
 
 
 def test_it_trains_the_run_of_the_study(data):

@@ -27,11 +27,6 @@ def shown() -> str:
         return live.laboratory([FIND]).data
 
 
-@pytest.fixture(scope="module")
-def data(shown) -> dict:
-    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
-
-
 def test_its_settings_begin_as_an_experiment_does(data):
     experiment = Experiment()
     for field in data["fields"]:

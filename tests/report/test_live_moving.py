@@ -1,6 +1,5 @@
 """The figure of moving obstacles: what it is given, and that its modules drive as Python does."""
 
-import json
 import re
 
 import numpy as np
@@ -26,11 +25,6 @@ def shown() -> str:
         patch.setattr(browser, "module", lambda plant, task: b"abc")
         patch.setattr(alone, "module", lambda problem: b"def")
         return live.moving().data
-
-
-@pytest.fixture(scope="module")
-def data(shown) -> dict:
-    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
 
 
 def test_its_files_are_those_of_a_figure_that_solves_and_a_second_module(shown):

@@ -35,11 +35,6 @@ def shown(monkeypatch) -> str:
     return live.runs("DES", "RDES").data
 
 
-@pytest.fixture
-def data(shown) -> dict:
-    return json.loads(re.search(r'application/json">(.*)</script>', shown)[1])
-
-
 def unpacked(packed: dict) -> dict:
     """Training costs, costs without noise, and theta, by learner, decay and seed."""
     planes = np.frombuffer(gzip.decompress(b64decode(packed["numbers"])), np.uint8)
