@@ -1,4 +1,4 @@
-"""One run on one page, wide and narrow."""
+"""One run on one page, wide and narrow, and in words."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,7 +11,7 @@ from matplotlib import pyplot as plt
 
 from nmpcrl.report.figures import sheet
 from nmpcrl.report.figures.runs.run import run_page
-from nmpcrl.report.run import finding
+from nmpcrl.report.run import finding, verdict
 from nmpcrl.study import Experiment, run
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.records import Records
@@ -100,3 +100,34 @@ def test_the_frozen_arm_is_drawn_beside_the_costs_only_if_it_is_there(known):
     lines = [len(figure.axes[3].get_lines()) for figure in (without, with_arm)]
     assert lines == [1, 2]
     assert any("times the frozen arm" in title for title in titles(with_arm))
+
+
+def test_the_title_has_the_numbers(known):
+    assert finding(known["frozen"]).startswith("A frozen theta keeps")
+    assert "in episode 1 of 3, where a component of theta was" in finding(known["diverged"])
+    before = known["ES"].evaluations["cost"][0]
+    assert f"{before:.0f}" in finding(known["ES"])
+    assert "no noise-free cost at the end" in verdict(known["diverged"])
+
+
+@pytest.mark.parametrize(
+    ("factor", "said", "title"),
+    [
+        (
+            0.9,
+            "10.0% less than the 1000.0",
+            "lowers the noise-free cost by 10.0%, from 1000 to 900",
+        ),
+        (1.1, "10.0% more than the 1000.0", "raises the noise-free cost by 10.0%"),
+        (0.9999, "within 0.1% of the 1000.0 of theta_init", "within 0.1% of 1000"),
+        (1.0, "within 0.1% of the 1000.0 of theta_init", "within 0.1% of 1000"),
+    ],
+)
+def test_a_cost_that_did_not_change_has_not_changed_by_0_percent(known, factor, said, title):
+    records = known["ES"]
+    cost = np.append(1000.0, np.full(len(records.evaluations["cost"]) - 1, 1000.0 * factor))
+    facts = records.facts | {"final_cost": 1000.0 * factor}
+    changed = replace(records, evaluations=records.evaluations | {"cost": cost}, facts=facts)
+    assert said in verdict(changed)
+    assert title in finding(changed)
+    assert "by 0.0%" not in finding(changed)
