@@ -1,6 +1,8 @@
 """Checks of every chapter: right answers that look different, and wrong ones that look right."""
 
+import ast
 import re
+import sys
 from functools import cache
 from math import comb
 from pathlib import Path
@@ -27,6 +29,7 @@ from nmpcrl.course.checks import (
     why_learning_stops,
 )
 from nmpcrl.course.exercises import exercises
+from nmpcrl.course.variants import values
 from nmpcrl.study import paper
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
@@ -143,6 +146,39 @@ def searched_at_once(cost, start, rounds, seed):
     return best
 
 
+def drawn_once(cost, start, rounds, seed, around="best", **size):
+    """Rounds of eight steps; `size` is for another shape of them."""
+    best, rng = start, np.random.default_rng(seed)
+    for _ in range(rounds):
+        steps = 0.3 * rng.normal(size=size.get("size", (8, best.size)))
+        best = min([best, *((best if around == "best" else start) + steps)], key=cost)
+    return best
+
+
+def seeded_by_round(cost, start, rounds, seed):
+    best = start
+    for k in range(rounds):
+        steps = 0.3 * np.random.default_rng([seed, k]).normal(size=(8, best.size))
+        best = min([best, *(best + steps)], key=cost)
+    return best
+
+
+def narrowing(cost, start, rounds, seed):
+    best, least, rng = start, cost(start), np.random.default_rng(seed)
+    for k in range(rounds):
+        for theta in best + 0.5 * 0.9**k * rng.normal(size=(8, best.size)):
+            if cost(theta) < least:
+                best, least = theta, cost(theta)
+    return best
+
+
+def of_last_round(cost, start, rounds, seed):
+    last, rng = start, np.random.default_rng(seed)
+    for _ in range(rounds):
+        last = min(last + 0.3 * rng.normal(size=(8, last.size)), key=cost)
+    return min([start, last], key=cost)
+
+
 def in_turns(first, second, turns):
     return np.exp(np.median([np.log(second()) - np.log(first()) for _ in range(turns)]))
 
@@ -178,6 +214,27 @@ def missed(gradient, jacobian, g, multipliers):
 def missed_by_list(gradient, jacobian, g, multipliers):
     balance = [gradient + jacobian.T @ multipliers, multipliers * g]
     return np.linalg.norm(np.concatenate([*balance, g.clip(0), multipliers.clip(None, 0)]))
+
+
+def by_the_smaller(gradient, jacobian, g, multipliers):
+    """Fischer and Burmeister's other form: of a multiplier and -g the smaller one is 0."""
+    return np.abs(np.r_[gradient + jacobian.T @ multipliers, np.minimum(multipliers, -g)]).max()
+
+
+def missed_but(balance, multipliers, g, rows=slice(None)):
+    """What is right but for a balance of the gradients, or for rows that are not looked at."""
+    mu, g = multipliers[rows], g[rows]
+    return max(balance, g.max(), -mu.min(), np.abs(mu * g).max(), 0.0)
+
+
+def stands(path, cost, value, gamma, steps=10, limit=0.05):
+    way = sum(np.hypot(*step) for step in np.diff(path, axis=0)[-steps:])
+    return bool(way < limit and value < cost / (1 - gamma))
+
+
+def in_short_steps(path, cost, value, gamma):
+    steps = np.hypot(*np.diff(path[-11:], axis=0).T)
+    return bool((steps < 0.005).all() and value < cost / (1 - gamma))
 
 
 def by_running_minimum(costs):
@@ -226,6 +283,8 @@ CHECKS = {
             lambda overlaps: 50 * max(0, overlaps.max() + 0.35),
             lambda overlaps: 50 * np.maximum(0, overlaps - 0.35).sum(),
             lambda overlaps: 50 * np.maximum(0, overlaps + 0.35).mean(),
+            lambda overlaps: 50 * np.maximum(0, np.sort(overlaps)[-2:] + 0.35).sum(),
+            lambda overlaps: 50 * np.maximum(0, np.sort(overlaps)[-3:] + 0.35).sum(),
         ],
     ),
     mdp_and_nmpc.discounted: (
@@ -255,11 +314,19 @@ CHECKS = {
         [
             lambda training, frozen: np.mean(1 - training[-20:] / frozen[-20:]),
             lambda training, frozen: (frozen - training)[-20:].sum() / frozen[-20:].sum(),
+            lambda training, frozen: 1 - np.median(training[-20:] / frozen[-20:]),
         ],
         [
             lambda training, frozen: training[-20:].mean() / frozen[-20:].mean() - 1,
             lambda training, frozen: frozen[-20:].mean() / training[-20:].mean() - 1,
             lambda training, frozen: 1 - training[:20].mean() / frozen[:20].mean(),
+            lambda training, frozen: 1 - training[-20:-1].mean() / frozen[-20:-1].mean(),
+            lambda training, frozen: 1 - training[-19:].mean() / frozen[-19:].mean(),
+            lambda training, frozen: 1 - training[-19:-1].mean() / frozen[-19:-1].mean(),
+            lambda training, frozen: 1 - training[-21:].mean() / frozen[-21:].mean(),
+            lambda training, frozen: 1 - np.mean(training[-21:] / frozen[-21:]),
+            lambda training, frozen: 1 - training[-10:].mean() / frozen[-10:].mean(),
+            lambda training, frozen: 1 - training[-20:].mean() / frozen[-40:].mean(),
         ],
     ),
     rdes.floor: ([173, "173.2"], [200, 150, 30000]),
@@ -411,9 +478,12 @@ CHECKS = {
         ],
     ),
     beyond.search: (
-        [searched, searched_at_once],
+        [searched, searched_at_once, drawn_once, seeded_by_round, narrowing],
         [
             unseeded,
+            of_last_round,
+            lambda *given: drawn_once(*given, size=(8, 1)),
+            lambda *given: drawn_once(*given, around="start"),
             lambda cost, start, rounds, seed: start,
             lambda cost, start, rounds, seed: searched(cost, start, rounds, seed) + 0.1,
         ],
@@ -432,8 +502,23 @@ CHECKS = {
         ],
     ),
     solver.residual: (
-        [missed, missed_by_list],
+        [missed, missed_by_list, by_the_smaller],
         [
+            lambda gradient, jacobian, g, multipliers: missed_but(
+                (gradient + jacobian.T @ multipliers).max(), multipliers, g
+            ),
+            lambda gradient, jacobian, g, multipliers: missed_but(
+                -(gradient + jacobian.T @ multipliers).min(), multipliers, g
+            ),
+            lambda gradient, jacobian, g, multipliers: missed_but(
+                abs((gradient + jacobian.T @ multipliers).sum()), multipliers, g
+            ),
+            lambda gradient, jacobian, g, multipliers: missed_but(
+                abs((gradient + jacobian.T @ multipliers)[0]), multipliers, g
+            ),
+            lambda gradient, jacobian, g, multipliers: missed_but(
+                np.abs(gradient + jacobian.T @ multipliers).max(), multipliers, g, [0, 2]
+            ),
             lambda gradient, jacobian, g, multipliers: np.abs(
                 gradient + jacobian.T @ multipliers
             ).max(),
@@ -490,16 +575,24 @@ CHECKS = {
         ],
     ),
     why_learning_stops.standing: ([9, "54 - 0.03 * 1500"], [54, 1800, -9]),
-    why_learning_stops.growth: ([0.0108, "100 * 1e-7 * 9 * 120"], [0.000108, 0.0012, 9e-5]),
+    why_learning_stops.growth: ([0.0144, "100 * 1e-7 * 12 * 120"], [0.000144, 0.0012, 1.2e-4]),
     why_learning_stops.evidence: letters("c"),
     why_learning_stops.left: (
         ["1 - step * (1 - f)", "1 - step + step * f"],
         ["1 - step", "1 - step * (1 + f)", "1 - step * f"],
     ),
     why_learning_stops.trapped: (
-        [why_learning_stops.in_trap, lambda **case: np.bool_(why_learning_stops.in_trap(**case))],
+        [
+            why_learning_stops.in_trap,
+            stands,
+            lambda **case: np.bool_(why_learning_stops.in_trap(**case)),
+        ],
         [
             why_learning_stops.ends_only,
+            in_short_steps,
+            lambda **case: stands(**case, steps=9),
+            lambda **case: stands(**case, limit=0.1),
+            lambda **case: stands(**case, limit=0.01),
             lambda **case: why_learning_stops.in_trap(**case, steps=11),
             lambda **case: not why_learning_stops.in_trap(**case),
         ],
@@ -554,11 +647,17 @@ CHECKS = {
         [
             lambda old, new: np.median(old) / np.median(new),
             lambda old, new: np.prod(old / new) ** (1 / len(old)),
+            lambda old, new: np.median(old / new),
+            lambda old, new: old.sum() / new.sum(),
         ],
         [
             lambda old, new: (old / new).mean(),
             lambda old, new: 1 / (new / old).mean(),
             lambda old, new: np.median(old - new),
+            lambda old, new: old[0] / new[0],
+            lambda old, new: old[:2].sum() / new[:2].sum(),
+            lambda old, new: old.max() / new.max(),
+            lambda old, new: old.min() / new.min(),
         ],
     ),
 }
@@ -602,30 +701,128 @@ def texts() -> dict[str, str]:
     return found
 
 
+PRECISION = re.compile(r"\b(two|three|four) digits( after the point)?|to the centimetre")
+DIGITS = {"two": 2, "three": 3, "four": 4}
+
+
 def rounded(number: float, text: str) -> float:
-    """A number as a text asks for it, at worst; to three digits if it says nothing."""
-    if found := re.search(r"within (\d+) %", text):
-        return number * (1 + 0.0099 * int(found[1]))
-    if "to the centimetre" in text:
-        return round(number, 2)
-    if found := re.search(r"\b(two|three|four) digits( after the point)?", text):
-        digits = {"two": 2, "three": 3, "four": 4}[found[1]]
-        return round(number, digits) if found[2] else float(f"{number:.{digits}g}")
-    return float(f"{number:.3g}")
+    """A number as a text asks for it; as it is if that says nothing, or something in percent."""
+    found = PRECISION.search(text)
+    if not found:
+        return number
+    digits = DIGITS.get(found[1], 2)
+    return float(f"{number:.{digits}g}") if found[1] and not found[2] else round(number, digits)
 
 
-def test_a_numeric_exercise_says_a_precision_that_its_check_accepts_or_has_an_exact_answer():
-    numeric = 0
-    for check, (right, _) in CHECKS.items():
-        about = check.__wrapped__(right[0], *known(check)).page or {}
-        if about.get("kind") == "number":
-            numeric += 1
-            expected, text = about["expected"], texts()[named(check)]
-            given = rounded(expected, text)
-            assert abs(given - expected) <= about["within"], (named(check), text)
-            if not re.search("digits|centimetre|within", text):
-                assert given == pytest.approx(expected, rel=1e-9), (named(check), text)
-    assert numeric > 20
+def exactly(number: float) -> bool:
+    """Whether a number has four digits or fewer."""
+    return number == pytest.approx(float(f"{number:.4g}"), rel=1e-9, abs=1e-12)
+
+
+def drawn(check) -> list[dict]:
+    """The number that a question prints, by the name of its argument, and those that may be."""
+    numbers = getattr(check, "varied", {}).items()
+    more = [{name: ast.literal_eval(one)} for name, within in numbers for one in values(within)]
+    return [{}, *more]
+
+
+def asked(check, monkeypatch, **number) -> tuple[float, dict[float, str]]:
+    """The right number of a check and the wrong ones that it knows."""
+    heard, module = [], sys.modules[check.__module__]
+    said = module.number
+
+    def hears(answer, expected, **more):
+        heard.append((float(expected), more.get("mistakes", {})))
+        return said(answer, expected, **more)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(module, "number", hears)
+        check(0.0, *known(check), **number)
+    return heard[0]
+
+
+NUMERIC = [check for check in CHECKS if "number" in check.__wrapped__.__code__.co_names]
+VARIED = [check for check in CHECKS if hasattr(check, "varied")]
+
+
+@pytest.mark.parametrize("check", NUMERIC, ids=named)
+def test_of_every_number_that_may_be_asked_the_right_one_as_it_is_asked_for_is_right_and_no_mistake(
+    check, monkeypatch
+):
+    text = texts()[named(check)]
+    for number in drawn(check):
+        expected, mistakes = asked(check, monkeypatch, **number)
+        right = rounded(expected, text)
+        assert check.__wrapped__(right, *known(check), **number).right, (number, right)
+        assert re.search(f"{PRECISION.pattern}|within", text) or exactly(expected), number
+        alike = {}  # sentences by what is typed
+        for wrong, why in mistakes.items():
+            alike.setdefault(rounded(wrong, text), set()).add(why)
+        for wrong in mistakes:
+            typed = rounded(wrong, text)
+            assert typed != right, (number, typed)
+            for one in (wrong, typed):
+                with pytest.raises(Unsolved) as refused:
+                    check.__wrapped__(one, *known(check), **number)
+                said = str(refused.value)
+                assert said in alike[typed] or (one != wrong and "is not right" in said), number
+
+
+@pytest.mark.parametrize("check", NUMERIC, ids=named)
+def test_a_number_is_accepted_within_half_a_unit_of_the_digit_that_is_asked_for(check, monkeypatch):
+    found = PRECISION.search(texts()[named(check)])
+    for number in drawn(check) if found else ():
+        expected, _ = asked(check, monkeypatch, **number)
+        digits = DIGITS.get(found[1], 2)
+        if found[1] and not found[2]:
+            digits -= int(f"{expected:e}".partition("e")[2]) + 1
+        for half in (-0.5, 0.5):
+            one = expected + half * 10.0**-digits
+            assert check.__wrapped__(one, *known(check), **number).right, (number, one)
+
+
+def test_the_numbers_that_may_be_asked_are_those_of_the_exercises_that_count():
+    assert len(NUMERIC) > 20
+    assert len(VARIED) == 24
+    assert [named(check) for check in VARIED if check not in NUMERIC] == [
+        "expected_sarsa.saved",
+        "solver.exact",
+    ]
+
+
+def test_of_every_edge_the_formula_is_right_and_its_parts_are_not():
+    for number in drawn(solver.exact):
+        edge = number.get("edge", 3)
+        assert solver.exact.__wrapped__(f"min({edge}, W / 2)", **number).right
+        for wrong in (f"{edge}", "W / 2", f"max({edge}, W / 2)", f"max({edge} - W / 2, 0)"):
+            with pytest.raises(Unsolved):
+                solver.exact.__wrapped__(wrong, **number)
+
+
+def saved_in(first, last=None):
+    return lambda training, frozen: 1 - training[first:last].mean() / frozen[first:last].mean()
+
+
+def test_of_every_number_of_late_episodes_these_are_right_and_no_one_more_or_less():
+    check = expected_sarsa.saved.__wrapped__
+    for number in drawn(expected_sarsa.saved):
+        late = number.get("late", 20)
+        for right in (
+            saved_in(-late),
+            lambda training, frozen, late=late: 1 - (training / frozen)[-late:].mean(),
+            lambda training, frozen, late=late: 1 - np.median((training / frozen)[-late:]),
+        ):
+            assert check(right, **number).right
+        for wrong in ((-late, -1), (-late + 1, None), (-late + 1, -1), (-late - 1, None)):
+            with pytest.raises(Unsolved):
+                check(saved_in(*wrong), **number)
+
+
+def test_the_growth_of_theta_c_is_asked_with_all_its_factors():
+    text = texts()["why_learning_stops.growth"]
+    for factor in (r"\delta = 12$", r"\phi_c = 120$", r"\alpha = 10^{-7}$", "100 steps"):
+        assert factor in text
+    assert why_learning_stops.growth.__wrapped__(100 * 1e-7 * 12 * 120).right
 
 
 def test_every_exercise_is_tried_here_or_marked_by_hand():

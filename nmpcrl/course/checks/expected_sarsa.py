@@ -7,6 +7,7 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
 from nmpcrl.course import Outcome, choice, exercise, function, number, varied
+from nmpcrl.course.checks.precision import to_digits
 from nmpcrl.study import paper
 
 
@@ -35,7 +36,7 @@ def alpha(answer: Any, features: Vector) -> Outcome:
     return number(
         answer,
         1 / squared,
-        tolerance=0.01,
+        tolerance=to_digits(1 / squared, 3, least=0.01),
         mistakes={
             squared**-0.5: "The step has the length alpha delta times the norm of phi, and the "
             "value moves by that length times the norm once more.",
@@ -134,10 +135,14 @@ def saved(answer: Any, *, late: int = 20) -> Outcome:
     """The late training cost of a run beside that of its frozen arm at the same time."""
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
-        episodes = rng.integers(60, 120)
-        noise = np.exp(-np.arange(episodes) / rng.uniform(10, 40))
-        frozen = rng.uniform(3000, 5000) * (1 + noise) + rng.normal(0, 50, episodes)
-        learned = np.linspace(1, rng.uniform(0.7, 1.1), episodes)
+        before = rng.integers(40, 100)
+        noise = np.r_[np.linspace(1, 0.3, before), np.zeros(late)]
+        frozen = rng.uniform(3000, 5000) * (1 + noise) + rng.normal(0, 10, before + late)
+        learned = np.r_[np.linspace(1, end := rng.uniform(0.7, 1.1), before), np.full(late, end)]
+        ends = [-late - 1, -late, -1]  # they show who counts one too many or one too few,
+        amid = -2 - rng.choice(late - 2, 2, replace=False)  # and these keep mean and median
+        learned[ends] += (size := rng.uniform(0.3, 0.5, 3))
+        learned[amid] -= size[1:]
         return {"training": frozen * learned, "frozen": frozen}
 
     return function(
@@ -156,6 +161,14 @@ def saved(answer: Any, *, late: int = 20) -> Outcome:
             ),
             "Over all episodes most of the cost is from before anything was learned: take the "
             f"last {late}.": lambda training, frozen: 1 - training.mean() / frozen.mean(),
+            "The last episode is left out: a slice ends before the index behind its colon.": (
+                lambda training, frozen: 1 - training[-late:-1].mean() / frozen[-late:-1].mean()
+            ),
+            f"Those are {late + 1} episodes.": (
+                lambda training, frozen: (
+                    1 - training[-late - 1 :].mean() / frozen[-late - 1 :].mean()
+                )
+            ),
             "That is the share which is left; what was saved is the rest.": (
                 lambda training, frozen: training[-late:].mean() / frozen[-late:].mean()
             ),

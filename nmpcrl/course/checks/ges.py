@@ -8,6 +8,7 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.two_state import Chain, expected_matrix
 from nmpcrl.course import Outcome, choice, exercise, function, number, varied
+from nmpcrl.course.checks.precision import to_digits
 from nmpcrl.learning.learners import semi_gradient
 from nmpcrl.learning.updates import curvature_correction, gradient_td_step
 from nmpcrl.study import paper
@@ -52,6 +53,7 @@ def parallel(answer: Any, *, kappa: float = 0.9) -> Outcome:
     return number(
         answer,
         1 - paper.GAMMA * kappa,
+        tolerance=to_digits(1 - paper.GAMMA * kappa, 3),
         mistakes={
             1 - kappa: "The correction has a factor of gamma, too.",
             paper.GAMMA * kappa: "That is the length of the correction; what is left of ES?",

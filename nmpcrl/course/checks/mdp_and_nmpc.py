@@ -7,6 +7,7 @@ import numpy as np
 from nmpcrl.control import Nmpc
 from nmpcrl.control.task import overlap
 from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
+from nmpcrl.course.checks.precision import to_places
 from nmpcrl.study import paper
 
 
@@ -15,9 +16,11 @@ from nmpcrl.study import paper
 def distance(answer: Any, *, theta_c: float = 0.21) -> Outcome:
     """Where the overlap, Eq. (1.4), is minus theta_c."""
     radius = 2.5 / 2
+    kept = radius * float(np.sqrt(1 + theta_c))
     return number(
         answer,
-        radius * np.sqrt(1 + theta_c),
+        kept,
+        tolerance=to_places(kept, 2),
         unit="m",
         mistakes={
             radius
@@ -84,7 +87,7 @@ def penalty(answer: Any) -> Outcome:
     task = paper.task()
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
-        x, y = rng.normal(0, 1.1, (2, 4))
+        x, y = rng.normal(0, rng.choice([0.3, 1.1]), (2, 4))
         return {"overlaps": overlap(0.0, 0.0, x, y, task.discs[2])}
 
     def charge(overlaps: Any, *, margin: float = task.margin) -> Any:
@@ -104,6 +107,9 @@ def penalty(answer: Any) -> Outcome:
             ),
             "Where the margins of two obstacles are entered, both are charged.": (
                 lambda overlaps: task.penalty * max(0, overlaps.max() + task.margin)
+            ),
+            "Where four margins are entered, all four are charged.": lambda overlaps: charge(
+                np.sort(overlaps)[-3:]
             ),
             "The penalty begins before the circles touch: the 0.35 is missing.": (
                 lambda overlaps: charge(overlaps, margin=0.0)

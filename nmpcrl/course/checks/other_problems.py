@@ -6,6 +6,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.course import Outcome, choice, exercise, function, number, varied
+from nmpcrl.course.checks.precision import to_digits
 
 
 @varied(delta=(3.0, 6.0, 0.5))
@@ -28,10 +29,11 @@ def moved(answer: Any, *, delta: float = 2.0) -> Outcome:
 @exercise
 def factor(answer: Any) -> Outcome:
     """What a difference is multiplied by in each step, from 1e-10 to 1e-3 in 100 steps."""
+    grown = 10 ** (7 / 100)
     return number(
         answer,
-        10 ** (7 / 100),
-        tolerance=0.005,
+        grown,
+        tolerance=to_digits(grown, 3),
         mistakes={
             7 / 100: "That is the exponent of ten, not the factor.",
             1e5: "The factors of 100 steps are multiplied, not added.",

@@ -7,6 +7,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number, varied
+from nmpcrl.course.checks.precision import to_digits
 
 Clock = Callable[[], float]  # makes one call and returns how long it took [s]
 
@@ -48,10 +49,11 @@ def faster(answer: Any, *, before: float = 0.7) -> Outcome:
 def amdahl(answer: Any, *, times: float = 10) -> Outcome:
     """Of a step of which four fifths become many times as fast."""
     part = 0.8
+    faster = 1 / (1 - part + part / times)
     return number(
         answer,
-        1 / (1 - part + part / times),
-        tolerance=0.02,
+        faster,
+        tolerance=to_digits(faster, 2, least=0.02),
         mistakes={
             part * times: "Add times, not speeds: the other fifth takes as long as before.",
             times: "The other fifth takes as long as before.",
@@ -137,11 +139,12 @@ def speed_up(answer: Any) -> Outcome:
     """A factor that is one over itself with the arguments exchanged."""
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
-        size = 2 * int(rng.integers(3, 10)) + 1
+        size = 2 * int(rng.integers(3, 6)) + 1
         return {"old": np.exp(rng.normal(size=size)), "new": np.exp(rng.normal(size=size))}
 
     def seen(answer: Any, old: Vector, new: Vector) -> dict[str, Any]:
         forth, back = answer(old, new), answer(new, old)
+        times = 1000 ** np.vstack([np.eye(old.size), -np.eye(old.size)])  # one problem in a row
         return {
             "Where the old one takes three times as long everywhere, the answer is 3.": np.isclose(
                 answer(3 * new, new), 3
@@ -152,6 +155,12 @@ def speed_up(answer: Any) -> Outcome:
             "Exchanged, it must give the inverse; here each is faster than the other.": np.isclose(
                 forth * back, 1
             ),
+            "The order of the problems must not matter.": np.isclose(
+                answer(np.roll(old, 1), np.roll(new, 1)), forth
+            ),
+            "One problem decides alone: all are to count.": [
+                forth / 990 < answer(one * old, new) < 990 * forth for one in times
+            ],
         }
 
     return behaves(answer, seen, draw)

@@ -10,6 +10,7 @@ from nmpcrl.bench import learners
 from nmpcrl.claims import rule
 from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.course import Outcome, choice, exercise, function, number, varied
+from nmpcrl.course.checks.precision import to_digits
 from nmpcrl.study import paper
 
 
@@ -70,7 +71,7 @@ def step(answer: Any) -> Outcome:
         answer,
         seconds,
         unit="s",
-        tolerance=0.01,
+        tolerance=to_digits(seconds, 2, least=0.01),
         mistakes={
             seconds / 60: "An hour has 3600 seconds.",
             2 * seconds: "Table II gives 18 hours for ES and 9 for RDES.",

@@ -1,5 +1,6 @@
 """The exercises of the appendix on the solver."""
 
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
 from nmpcrl.course import Outcome, behaves, choice, exercise, formula, function, number, varied
+from nmpcrl.course.checks.precision import to_digits
 
 
 @varied(weight=(90, 200, 5))
@@ -28,9 +30,11 @@ def price(answer: Any, *, weight: float = 80) -> Outcome:
 @exercise
 def golden(answer: Any) -> Outcome:
     """The fixed point of V = 1 + V - V^2 / (1 + V)."""
+    limit = (1 + 5**0.5) / 2
     return number(
         answer,
-        (1 + 5**0.5) / 2,
+        limit,
+        tolerance=to_digits(limit, 3),
         mistakes={
             1.5: "That is after one step from V = 1: go on, or set V equal on both sides.",
             1.6: "That is after two steps from V = 1: go on, or set V equal on both sides.",
@@ -134,21 +138,24 @@ def _first_gain_by_one_solve(
 
 @exercise
 def residual(answer: Any) -> Outcome:
-    """Points that satisfy all KKT conditions, and points that miss one of them."""
+    """Points that satisfy all KKT conditions, and points that miss one of them.
+
+    They miss each condition in each constraint and each component once, with either sign.
+    """
+    points = cycle(_missing())
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
-        jacobian, active = rng.normal(size=(4, 3)), np.array([True, True, False, False])
-        g = np.where(active, 0.0, -rng.uniform(0.5, 2, 4))
-        multipliers = np.where(active, rng.uniform(0.5, 2, 4), 0.0)
-        broken = rng.choice(["nothing", "complementarity", "sign", "feasibility", "gradient"])
+        broken, row, off = next(points)
+        jacobian, size = rng.normal(size=(4, 3)), rng.uniform(0.5, 2, 4)
+        active = np.roll([True, True, False, False], row)
+        g, multipliers = np.where(active, 0.0, -size), np.where(active, size, 0.0)
         if broken == "complementarity":
-            multipliers[2] = rng.uniform(0.5, 2)
+            multipliers[row - 1] = rng.uniform(0.5, 2)
         if broken == "sign":
-            multipliers[0] *= -1
+            multipliers[row] *= -1
         if broken == "feasibility":
-            g[0] = rng.uniform(0.5, 2)
-            multipliers[0] = 0.0
-        gradient = -jacobian.T @ multipliers + (broken == "gradient")
+            g[row], multipliers[row] = size[row], 0.0
+        gradient = rng.uniform(0.5, 2) * off - jacobian.T @ multipliers
         return {"gradient": gradient, "jacobian": jacobian, "g": g, "multipliers": multipliers}
 
     def seen(
@@ -171,4 +178,12 @@ def residual(answer: Any) -> Outcome:
             f"At an optimum it gives {found:.3g} instead of 0.": any(missed.values()) or is_zero
         }
 
-    return behaves(answer, seen, draw, times=40)
+    return behaves(answer, seen, draw, times=len(_missing()))
+
+
+def _missing() -> list[tuple[str, int, Vector]]:
+    """What is missed, in which constraint, and the direction in which the gradients are off."""
+    units, broken = np.eye(3), ("nothing", "complementarity", "sign", "feasibility")
+    off = [*units, *-units, *(units - np.roll(units, 1, 0))]  # the last ones add up to 0
+    balanced = [(why, row, np.zeros(3)) for row in range(4) for why in broken]
+    return balanced + [("gradient", k % 4, one) for k, one in enumerate(off)]

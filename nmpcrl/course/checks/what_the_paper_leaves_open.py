@@ -8,6 +8,7 @@ from scipy.stats import fisher_exact
 from nmpcrl import Vector
 from nmpcrl.claims.rule import read
 from nmpcrl.course import Outcome, choice, exercise, function, number, varied
+from nmpcrl.course.checks.precision import to_places
 
 RADIUS = 2.5 / 2  # [m] of the circle on which the overlap is 0
 
@@ -16,10 +17,11 @@ RADIUS = 2.5 / 2  # [m] of the circle on which the overlap is 0
 @exercise
 def gap(answer: Any, *, apart: float = 2.8) -> Outcome:
     """The theta_c at which the circles around two centres touch."""
+    closes = (apart / 2.5) ** 2 - 1
     return number(
         answer,
-        (apart / 2.5) ** 2 - 1,
-        tolerance=0.02,
+        closes,
+        tolerance=to_places(closes, 2, least=0.02),
         mistakes={
             (apart / 1.25) ** 2 - 1: f"Each of the two takes its part of the {apart} m.",
             apart / 2.5 - 1: "The square is missing: theta_c stands below a root.",
@@ -32,10 +34,11 @@ def gap(answer: Any, *, apart: float = 2.8) -> Outcome:
 def metres(answer: Any) -> Outcome:
     """The margin of the overlap that is 0.35 m wide."""
     printed = 0.35
+    margin = (1 + printed / RADIUS) ** 2 - 1
     return number(
         answer,
-        (1 + printed / RADIUS) ** 2 - 1,
-        tolerance=0.01,
+        margin,
+        tolerance=to_places(margin, 2, least=0.01),
         mistakes={
             printed / RADIUS: "The overlap has the square of the distance.",
             (1 + printed / (2 * RADIUS)) ** 2 - 1: "The circle's radius is 1.25 m, half of 2.5 m.",
@@ -52,7 +55,7 @@ def fisher(answer: Any) -> Outcome:
     return number(
         answer,
         p,
-        tolerance=0.01,
+        tolerance=to_places(p, 4, least=0.01),
         mistakes={
             p / 2: "The test has two sides: the opposite table is as extreme as this one.",
             2 / 70: "That is for four runs on each side.",
@@ -66,10 +69,11 @@ def fisher(answer: Any) -> Outcome:
 def smallest(answer: Any, *, cells: int = 120) -> Outcome:
     """That at least one of many cells has a small p."""
     small = 0.01
+    some = 1 - (1 - small) ** cells
     return number(
         answer,
-        1 - (1 - small) ** cells,
-        tolerance=0.01,
+        some,
+        tolerance=to_places(some, 2, least=0.01),
         mistakes={
             cells * small: "That is how many are to be expected; a probability is at most 1.",
             (1 - small) ** cells: "That is the probability that none has.",

@@ -6,6 +6,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.course import Outcome, behaves, choice, exercise, function, number, varied
+from nmpcrl.course.checks.precision import to_digits, to_places
 
 
 @varied(times=(3.0, 7.5, 0.5))
@@ -15,7 +16,7 @@ def guarded(answer: Any, *, times: float = 8.0) -> Outcome:
     return number(
         answer,
         1 / times,
-        tolerance=0.005,
+        tolerance=to_digits(1 / times, 2),
         mistakes={
             times: "The guard makes the step shorter, not longer.",
             2 / times: "2 is where an error grows; the guard closes it, which takes 1.",
@@ -27,10 +28,11 @@ def guarded(answer: Any, *, times: float = 8.0) -> Outcome:
 @exercise
 def middle(answer: Any) -> Outcome:
     """The interquartile mean of eight shares."""
+    middle = (0.8 + 0.7 + 0.6 + 0.2) / 4
     return number(
         answer,
-        (0.8 + 0.7 + 0.6 + 0.2) / 4,
-        tolerance=0.001,
+        middle,
+        tolerance=to_places(middle, 3, least=0.001),
         mistakes={
             -28 / 8: "That is the mean of all; the interquartile mean leaves out a quarter on each"
             " side.",

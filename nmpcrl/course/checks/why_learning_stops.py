@@ -1,5 +1,6 @@
 """The exercises of the chapter on why learning stops."""
 
+from itertools import cycle, product
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,8 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.claims.population_questions import STANDING, STOOD
 from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
+
+WAYS = STANDING * np.array([0.1, 0.5, 0.98, 1.02, 1.5, 4.0])  # [m] near the limit, and far from it
 
 
 @varied(value=(1520, 1760, 20))
@@ -29,15 +32,16 @@ def standing(answer: Any, *, value: float = 1500) -> Outcome:
 @exercise
 def growth(answer: Any) -> Outcome:
     """By how much theta_c grows in 100 steps of Eq. (12.2)."""
-    step = 1e-7 * 9 * 120
+    delta, slope = 12, 120
+    step = 1e-7 * delta * slope
     return number(
         answer,
         100 * step,
         tolerance=0.01,
         mistakes={
             step: "That is one step; the robot stands for 100 of them.",
-            100 * step / 9: "The TD error of the exercise before is a factor, too.",
-            100 * step / 120: "The slope of V in theta_c is a factor, too.",
+            100 * step / delta: "The TD error is a factor, too.",
+            100 * step / slope: "The slope of V in theta_c is a factor, too.",
         },
     )
 
@@ -76,15 +80,19 @@ def left(answer: Any) -> Outcome:
 @exercise
 def trapped(answer: Any) -> Outcome:
     """Whether a robot stands where the plan is worth less than standing."""
+    below, above = product(WAYS, range(3), [0.5, 0.98]), product(WAYS[:1], range(3), [1.02, 1.5])
+    cases = cycle(np.random.default_rng().permutation([*below, *above]))
 
     def draw(rng: np.random.Generator) -> dict[str, Any]:
-        radius = rng.choice([0.0, 0.001, 0.02])
-        turned = np.arange(12) * 2 * np.pi / 10  # after ten steps it is where it was
-        circle = radius * np.stack([np.cos(turned), np.sin(turned)], axis=1)
-        way = rng.choice([0.0, 1.0]) * np.r_[1.0, np.zeros(11)]  # the step before the last ten
+        way, shape, worth = next(cases)
+        equal, first = np.full(STOOD, 1 / STOOD), np.eye(STOOD)[0]
+        parts = [equal, first, rng.dirichlet(np.ones(STOOD))][int(shape)]
+        lengths = np.r_[rng.choice([0.0, 1.0]), way * parts]
+        turned = np.arange(11) * 2 * np.pi / 10  # after ten equal steps it is where it was
+        steps = lengths[:, None] * np.stack([np.cos(turned), np.sin(turned)], axis=1)
+        path = rng.normal(size=2) + np.vstack([np.zeros(2), steps]).cumsum(axis=0)
         gamma, cost = float(rng.uniform(0.9, 0.98)), float(rng.uniform(1, 60))
-        path = rng.normal(size=2) + circle + way[:, None]
-        value = float(rng.uniform(0.5, 1.5) * cost / (1 - gamma))
+        value = float(worth * cost / (1 - gamma))
         return {"path": path, "cost": cost, "value": value, "gamma": gamma}
 
     return function(
@@ -96,6 +104,16 @@ def trapped(answer: Any) -> Outcome:
             "Ten steps have eleven positions, and no more count.": lambda **one: in_trap(
                 **one, steps=11
             ),
+            "Ten positions have nine steps; ten steps count.": lambda **one: in_trap(
+                **one, steps=9
+            ),
+            "The ten steps together are to be shorter than 0.05 m, not than 0.1 m.": (
+                lambda **one: in_trap(**one, limit=0.1)
+            ),
+            "The ten steps together may have up to 0.05 m, not 0.01 m.": lambda **one: in_trap(
+                **one, limit=0.01
+            ),
+            "A step may be longer than the tenth part of 0.05 m: add up the steps.": each_short,
             "Standing for ever costs l / (1 - gamma).": lambda **one: in_trap(
                 **one | {"gamma": 0.0}
             ),
@@ -103,10 +121,23 @@ def trapped(answer: Any) -> Outcome:
     )
 
 
-def in_trap(path: Matrix, cost: float, value: float, gamma: float, steps: int = STOOD) -> bool:
+def in_trap(
+    path: Matrix,
+    cost: float,
+    value: float,
+    gamma: float,
+    steps: int = STOOD,
+    limit: float = STANDING,
+) -> bool:
     """The last steps are short, and V < l / (1 - gamma)."""
     way = np.linalg.norm(np.diff(path[-steps - 1 :], axis=0), axis=1).sum()
-    return bool(way < STANDING and value < cost / (1 - gamma))
+    return bool(way < limit and value < cost / (1 - gamma))
+
+
+def each_short(path: Matrix, cost: float, value: float, gamma: float) -> bool:
+    """What compares each step with its tenth part of the limit."""
+    steps = np.linalg.norm(np.diff(path[-STOOD - 1 :], axis=0), axis=1)
+    return bool(steps.max() < STANDING / STOOD and value < cost / (1 - gamma))
 
 
 def ends_only(path: Matrix, cost: float, value: float, gamma: float) -> bool:
