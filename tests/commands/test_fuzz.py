@@ -12,6 +12,7 @@ from nmpcrl.claims import publish, published, verification
 from nmpcrl.commands import main
 from nmpcrl.study import Experiment, Records, cluster, run, store
 from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.provenance import provenance
 from nmpcrl.study.storage import executor
 
 LINES = 1500
@@ -39,7 +40,8 @@ def fast(command, monkeypatch, tmp_path):
     one = run(SHORT)
     for experiment, learner in ((SHORT, "ES"), (frozen_arm(SHORT), "frozen")):
         fields = one.experiment | {"learner": learner}
-        Records(fields, one.steps, one.evaluations, one.facts).save(store.path_of(experiment))
+        facts = one.facts | provenance(experiment)
+        Records(fields, one.steps, one.evaluations, facts).save(store.path_of(experiment))
     monkeypatch.setattr("nmpcrl.study.fetch", refuse)
     monkeypatch.setattr(summaries, "fetch_summaries", refuse)
     monkeypatch.setattr(cluster, "executor", refuse)

@@ -92,7 +92,7 @@ def test_what_is_stored_says_what_it_depends_on():
 
 def test_a_run_of_other_versions_is_not_reused(monkeypatch, no_run):
     fetch(QUICK)
-    monkeypatch.setattr(provenance, "_version", lambda library: "0.0.1")
+    monkeypatch.setattr(provenance, "installed", lambda library: "0.0.1")
     no_run()
     with pytest.raises(AssertionError, match="trained again"):
         fetch(QUICK)
@@ -192,7 +192,7 @@ def test_a_run_that_lies_under_the_name_of_another_is_listed_under_none(runs, ca
 
 def test_a_run_of_other_versions_under_this_name_is_damaged(runs, monkeypatch, capsys):
     with monkeypatch.context() as patch:
-        patch.setattr(provenance, "_version", lambda library: "0.0.1")
+        patch.setattr(provenance, "installed", lambda library: "0.0.1")
         fetch(QUICK)
         (path,) = runs.glob("*.npz")
     path.rename(path_of(QUICK))
