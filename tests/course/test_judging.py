@@ -79,17 +79,25 @@ if not os.fork():
     if os.fork():
         os._exit(0)
     os.chdir("/")
-    Path({file!r}).write_text(str(os.getpid()))
-    time.sleep(600)
+    {goes_on}
 os.wait()
 while not Path({file!r}).exists() or not Path({file!r}).read_text():
     time.sleep(0.01)
 """
 
 
-def test_a_process_that_left_the_notebook_ends_with_it(submission, judge, tmp_path):
+@pytest.mark.parametrize(
+    "goes_on",
+    [
+        "Path({0!r}).write_text(str(os.getpid())); time.sleep(600)",
+        "os.execve('/bin/sh', ['sh', '-c', 'echo $$ > {0}; exec sleep 600'], {{}})",
+    ],
+    ids=["as itself", "without environment"],
+)
+def test_a_process_that_left_the_notebook_ends_with_it(submission, judge, tmp_path, goes_on):
     file = tmp_path / "daemon"
-    _, handed = submission(solved_by_student(one=DAEMON.format(file=str(file))))
+    daemon = DAEMON.format(file=str(file), goes_on=goes_on.format(str(file)))
+    _, handed = submission(solved_by_student(one=daemon))
     judging.run(judge, handed.steps, Limits(), time.monotonic() + 60)
     left = int(file.read_text())
     until = time.monotonic() + 5
