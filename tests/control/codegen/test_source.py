@@ -8,7 +8,7 @@ import pytest
 
 from nmpcrl.control import differential_drive
 from nmpcrl.control.codegen.jit import callable_of, compiled, load
-from nmpcrl.control.codegen.source import BINARY, UNARY, CannotCompile, source
+from nmpcrl.control.codegen.source import BINARY, INNER, UNARY, CannotCompile, source
 from nmpcrl.control.solvers import model
 from nmpcrl.control.solvers.stages import functions, write
 
@@ -136,8 +136,8 @@ def test_the_stages_have_the_arguments_that_model_promises(plant):
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", PLANTS, indirect=True)
 def test_the_compiled_stages_are_casadis(plant):
-    texts = {"__init__": "", "model": write(plant).replace("forceinline=True", "cache=True")}
-    package = load("stages", {"__init__": "from . import model\n", "model": texts["model"]})
+    called = write(plant).replace(INNER, '@njit(error_model="numpy", cache=True)\n')
+    package = load("stages", {"__init__": "from . import model\n", "model": called})
     module, rng = package.model, np.random.default_rng(2)
     assert (plant.n, plant.m, 2 * plant.n + plant.m + 1) == (module.NX, module.NU, module.NTHETA)
     for function in functions(plant):
