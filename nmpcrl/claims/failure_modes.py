@@ -21,7 +21,7 @@ import pandas as pd
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.claims.thresholds import BETTER, divergence, was_stopped
+from nmpcrl.claims.thresholds import BETTER, divergence, was_stopped, worsens
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
@@ -122,7 +122,7 @@ def went_wrong(runs: pd.DataFrame) -> list[Failure | None]:
     signs = {
         Failure.STOPPED: was_stopped(runs),
         Failure.TRAINING: divergence(runs).fillna(False),
-        Failure.WITHOUT_NOISE: runs.final_cost > (1 + BETTER) * runs.initial_cost,
+        Failure.WITHOUT_NOISE: worsens(runs),
     }
     found = zip(*(sign.to_numpy(bool) for sign in signs.values()), strict=True)
     return [next((f for f, seen in zip(signs, row, strict=True) if seen), None) for row in found]

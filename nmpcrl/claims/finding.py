@@ -1,8 +1,8 @@
 """What was found, in a few numbers: whether a gap closed, theta_c by hand, and how RDES ended.
 
 theta_c tightens the obstacle constraint, Eq. (2f). A gap that the first rollout goes through closes
-at a theta_c that is known before anything is trained (`trajectory.closes_at`). So each run of ES
-and GES is sorted by the theta_c that it ends with, and not by how it ended.
+at a theta_c that is known before anything is trained (`trajectory.closes_at`). Each run of ES and
+GES is sorted by the theta_c that it ends with, which is known only afterwards.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ import pandas as pd
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.failure_modes import Ending, ending
 from nmpcrl.claims.published import Published
-from nmpcrl.claims.thresholds import was_stopped
+from nmpcrl.claims.thresholds import cost_reduction, was_stopped, worsens
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
 from nmpcrl.study import paper
 
@@ -33,14 +33,21 @@ class Finding:
 
     arrived_open: Count  # runs of `LEARNERS` at the target at a lower cost, every gap being open
     arrived_closed: Count  # such runs, theta_c having closed a gap
+    open_in: tuple[str, ...]  # the layouts of the former
+    closed_in: tuple[str, ...]  # and of the latter
     learned: float  # median reduction of the noise-free cost by the former
-    by_hand: Count  # layouts in which the robot arrives with theta_c = d_o and all else as it was
+    by_hand: Count  # layouts that are solved with theta_c = d_o and all else as it was
     better: Count  # of these, where that costs less than each run of `LEARNERS` ends at
     saved_by_hand: float  # median of these layouts
-    saved_there: float  # median of the runs in these layouts
+    lost_by_hand: tuple[float, float]  # least and most that it costs more in the others
+    saved_there: float  # median of the runs in the layouts that are solved
     stopped: Count  # runs of RDES, with noise that decays per episode
     stopped_early: int  # of these, within `EARLY` episodes
+    stopped_per_step: Count  # the same with noise that decays per step
+    early_per_step: int
     not_there: Mapping[str, Count]  # runs that did not end at the target, of some learners
+    above: Mapping[str, Count]  # runs that end at a higher cost than theta_init's
+    worse: Mapping[str, Count]  # and by more than `BETTER`
     seconds: float  # of one core, a run of ES with the compiled solver
     hours: float  # that the robot moves in a run
 
@@ -52,24 +59,30 @@ def finding(found: Published) -> Finding | None:
     runs = _with_gaps(found.main[found.main.learner.isin(LEARNERS)])
     arrived = (runs.ending == Ending.ARRIVED) & (runs.saved > 0)
     hand = {layout: _by_hand(layout) for layout in dict.fromkeys(runs.layout)}
-    there = {layout: saved for layout, saved in hand.items() if saved is not None}
+    there = {layout: saved for layout, (saved, is_solved) in hand.items() if is_solved}
+    others = [-saved for saved, is_solved in hand.values() if not is_solved] or [np.nan]
     most = runs.groupby("layout").saved.max()
-    rdes = found.main[(found.main.learner == "RDES") & (found.main.decay == "episode")]
-    stopped = rdes[was_stopped(rdes)]
+    mine = {name: found.main[found.main.learner == name] for name in (*LEARNERS, "TDC")}
+    stopped, early = _stopped(found.main, "episode")
+    per_step, early_per_step = _stopped(found.main, "step")
     return Finding(
         arrived_open=_count(arrived[~runs.closed]),
         arrived_closed=_count(arrived[runs.closed]),
+        open_in=tuple(dict.fromkeys(runs.layout[~runs.closed])),
+        closed_in=tuple(dict.fromkeys(runs.layout[runs.closed])),
         learned=float(runs.saved[arrived & ~runs.closed].median()),
         by_hand=(len(there), len(hand)),
         better=(sum(bool(saved > most[name]) for name, saved in there.items()), len(there)),
         saved_by_hand=float(np.median(list(there.values()))),
+        lost_by_hand=(min(others), max(others)),
         saved_there=float(runs.saved[runs.layout.isin(list(there))].median()),
-        stopped=(len(stopped), len(rdes)),
-        stopped_early=int((stopped.steps_done <= EARLY * paper.STEPS).sum()),
-        not_there={
-            name: _count(found.main.ending[found.main.learner == name] != Ending.ARRIVED)
-            for name in (*LEARNERS, "TDC")
-        },
+        stopped=stopped,
+        stopped_early=early,
+        stopped_per_step=per_step,
+        early_per_step=early_per_step,
+        not_there={name: _count(one.ending != Ending.ARRIVED) for name, one in mine.items()},
+        above={name: _count(cost_reduction(one) < 0) for name, one in mine.items()},
+        worse={name: _count(worsens(one)) for name, one in mine.items()},
         seconds=3600 * float(found.timings.set_index(["solver", "learner"]).hours["riccati", "ES"]),
         hours=paper.EPISODES * paper.STEPS * paper.nmpc().plant.period / 3600,
     )
@@ -87,11 +100,20 @@ def _with_gaps(runs: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def _by_hand(layout: str) -> float | None:
-    """The reduction of the cost with theta_c = d_o; None if the robot does not arrive."""
+def _stopped(main: pd.DataFrame, decay: str) -> tuple[Count, int]:
+    """How many runs of RDES were stopped in one reading, and how many of these within `EARLY`."""
+    rdes = main[(main.learner == "RDES") & (main.decay == decay)]
+    stopped = rdes[was_stopped(rdes)]
+    early = int((stopped.steps_done <= EARLY * paper.STEPS).sum())
+    return (len(stopped), len(rdes)), early
+
+
+def _by_hand(layout: str) -> tuple[float, bool]:
+    """The reduction of the cost with theta_c = d_o, and whether that solves the layout."""
     task = paper.task(layout)
     before, after = (_rollout(layout, c) for c in (paper.THETA_INIT[THETA_C], task.margin))
-    return 1 - after.cost / before.cost if ending(after.states, task) == Ending.ARRIVED else None
+    saved = 1 - after.cost / before.cost
+    return saved, saved >= 0 and ending(after.states, task) == Ending.ARRIVED
 
 
 def _rollout(layout: str, theta_c: float) -> Rollout:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nmpcrl.analysis.difficulty import MEASURES, PILOT, RIVALS
+from nmpcrl.analysis.difficulty import MEASURES, OPEN, PILOT, RIVALS
 from nmpcrl.analysis.predictors import Logistic, auc, brier, fit, over_layouts
 from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.claims.by_runs import RunClaim
@@ -29,7 +29,7 @@ from nmpcrl.claims.population_questions import (
     WORDS,
 )
 from nmpcrl.claims.rule import MAJORITY, Observations, Paths, read
-from nmpcrl.claims.thresholds import was_stopped
+from nmpcrl.claims.thresholds import improves, was_stopped
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
 from nmpcrl.claims.wider_claims import WIDER_CLAIMS
 from nmpcrl.study import paper
@@ -66,11 +66,11 @@ def asked() -> dict[str, RunClaim]:
     """The claims that are put to each layout, by their names in `EXPECTED`."""
     known = {**BY_RUNS, **WIDER_CLAIMS, **OWN_CLAIMS}
     alone = {name: name.partition(" ")[0] for name in EXPECTED if name not in known}
-    improves = {
+    by_itself = {
         name: replace(BY_RUNS["C9"], name=name, **cost_reduced((learner,)))
         for name, learner in alone.items()
     }
-    return {name: (known | improves)[name] for name in EXPECTED}
+    return {name: (known | by_itself)[name] for name in EXPECTED}
 
 
 def held(
@@ -241,19 +241,35 @@ def trap(runs: pd.DataFrame) -> tuple[Answer, Answer]:
 def at_the_gap(runs: pd.DataFrame, difficulty: pd.DataFrame) -> pd.DataFrame:
     """What became of each run of ES, and of the first gap of its layout; it was not asked before.
 
+    `closed` is known when training has ended: a split by it depends on the outcome.
+
     Args:
         runs: of `rows.table`.
         difficulty: columns `MEASURES`, a row a layout.
 
     Returns:
-        Columns improves, away (from the target, at the end), closes (theta_c at which the gap
-        does, `difficulty.OPEN` where there is none) and closed (whether theta_c is above that).
+        Columns improves (as `thresholds.improves`), away (from the target, at the end), closes
+        (theta_c at which the gap does, `difficulty.OPEN` where there is none), gap (whether there
+        is one) and closed (whether theta_c ended above the value at which it closes).
     """
     es = _of(runs, "ES").reset_index(drop=True)
     closes = difficulty[PILOT][es.layout.map(name_of)].to_numpy()
-    improves, away = es.final_cost < es.initial_cost, es.distance > ARRIVED
-    found = {"improves": improves, "away": away, "closes": closes, "closed": es.theta_8 > closes}
-    return pd.DataFrame(found)
+    gap = closes < OPEN
+    found = {"improves": improves(es), "away": es.distance > ARRIVED, "closes": closes, "gap": gap}
+    return pd.DataFrame(found | {"closed": gap & (es.theta_8 > closes)})
+
+
+def improve_by_gap(ends: pd.DataFrame) -> dict[str, tuple[int, int]]:
+    """How many runs improve, of those in layouts with a gap: by whether it ended open or closed.
+
+    Args:
+        ends: of `at_the_gap`.
+    """
+    there = ends[ends.gap]
+    return {
+        "open": _count(there.improves[~there.closed]),
+        "closed": _count(there.improves[there.closed]),
+    }
 
 
 def early_overshoot(runs: pd.DataFrame) -> Answer:

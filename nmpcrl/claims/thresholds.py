@@ -17,6 +17,7 @@ import pandas as pd
 from nmpcrl.analysis import metrics
 from nmpcrl.claims.rule import CELL
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records, Stopped
 from nmpcrl.study.store import Runs
 
@@ -83,6 +84,21 @@ def cost_reduction(runs: pd.DataFrame) -> pd.Series:
     Minus infinity where a rollout failed, and where training had to be stopped.
     """
     return (1 - runs.final_cost / runs.initial_cost).mask(was_stopped(runs), -np.inf)
+
+
+def improves(runs: pd.DataFrame) -> pd.Series:
+    """Which runs end at a noise-free cost that is lower than theta_init's by at least `BETTER`."""
+    return cost_reduction(runs) >= BETTER
+
+
+def worsens(runs: pd.DataFrame) -> pd.Series:
+    """Which runs were stopped, or end at a cost above theta_init's by more than `BETTER`."""
+    return was_stopped(runs) | (runs.final_cost > (1 + BETTER) * runs.initial_cost)
+
+
+def solved(runs: pd.DataFrame) -> pd.Series:
+    """Which runs end at the target without noise, at no more than theta_init's cost."""
+    return (runs.distance <= ARRIVED) & (cost_reduction(runs) >= 0)
 
 
 def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:

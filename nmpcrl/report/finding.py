@@ -1,6 +1,7 @@
 """What the introduction says first: the finding in two sentences, and four numbers with links."""
 
 from nmpcrl.claims.finding import EARLY, LEARNERS, Finding
+from nmpcrl.claims.thresholds import BETTER
 from nmpcrl.report.cited import Count
 from nmpcrl.report.prose import filled
 from nmpcrl.report.text import NOTHING, listed
@@ -17,14 +18,22 @@ def sentences(found: Finding | None) -> str:
         """
         **Without a network, reinforcement learning tunes this robot's controller well as long as
         the gaps on its way stay open, and leads the robot to a dead end where learning itself
-        closes one.** One number set by hand saves {saved_by_hand:.0%} of the cost where learning
-        saves {saved_there:.0%}, wherever the robot still arrives; and with a network, as in RDES,
-        the paper's first method, learning can break down within {early} episodes.
+        closes one.** One number set by hand saves {saved_by_hand:.0%} of the cost in the
+        {solved_by_hand} layouts in which the robot still arrives, where learning saves
+        {saved_there:.0%}; in the others it costs {least_lost_by_hand:.0%} to
+        {most_lost_by_hand:.0%} more. With a network, as in RDES, the paper's first method, learning
+        broke down within {early} episodes in {early_per_episode} runs if noise decays per episode,
+        and in {early_per_step} if it decays per step, as the paper's equation has it.
         """,
         origin=ORIGIN,
         saved_by_hand=found.saved_by_hand,
+        solved_by_hand=Count(*found.by_hand),
+        least_lost_by_hand=found.lost_by_hand[0],
+        most_lost_by_hand=found.lost_by_hand[1],
         saved_there=found.saved_there,
         early=str(EARLY),
+        early_per_episode=Count(found.stopped_early, found.stopped[1]),
+        early_per_step=Count(found.early_per_step, found.stopped_per_step[1]),
     )
 
 
@@ -34,28 +43,34 @@ def numbers(found: Finding | None) -> str:
         return NOTHING
     return filled(
         """
-        - **{arrived_with_open_gaps}** runs of {learners} end at the target, at a cost that is
-          {saved_where_it_arrived:.1%} lower (median), in which every gap stayed open.
+        - **{arrived_with_open_gaps}** runs of {learners} reach the target in layouts {open_in},
+          where no gap closed, at a cost that is {saved_where_it_arrived:.1%} lower (median).
           [Fig. 5.6](05_results.ipynb#fig-results-c9)
-        - **{arrived_with_a_closed_gap}** runs of {learners} end at the target at a lower cost in
-          which $\\theta_c$, which keeps plans away from obstacles, grew until a gap closed.
+        - **{arrived_with_a_closed_gap}** runs of {learners} reach it in layouts {closed_in}: there
+          learning raised $\\theta_c$, which keeps plans away from obstacles, until a gap closed.
           [Fig. 5.1](05_results.ipynb#fig-results-reasons)
-        - **{layouts_solved_by_hand}** layouts are solved with $\\theta_c$ set by hand to the margin
-          that the cost names, in {better_by_hand} of them at a lower cost than in any run of
-          {learners}. [In plain words](07_beyond.ipynb#beyond-plain-words)
+        - **{layouts_solved_by_hand}** layouts are solved with $\\theta_c$ set by hand to
+          {by_hand}, the margin that the cost names: the robot arrives at no higher cost. In
+          {better_by_hand} of them it costs less than any run of {learners}.
+          [In plain words](07_beyond.ipynb#beyond-plain-words)
         - **{stopped_runs_of_RDES}** runs of RDES had to be stopped when the noise decays per
-          episode, {stopped_early} of them within {early} episodes.
-          [Fig. 5.3](05_results.ipynb#fig-results-c1)
+          episode, {stopped_early} of them within {early} episodes; per step {stopped_per_step} and
+          {early_per_step}. [Fig. 5.3](05_results.ipynb#fig-results-c1)
         """,
         origin=ORIGIN,
         arrived_with_open_gaps=Count(*found.arrived_open),
         arrived_with_a_closed_gap=Count(*found.arrived_closed),
+        open_in=listed(found.open_in),
+        closed_in=listed(found.closed_in),
         saved_where_it_arrived=found.learned,
         learners=listed(LEARNERS),
+        by_hand=str(paper.task().margin),
         layouts_solved_by_hand=Count(*found.by_hand),
         better_by_hand=Count(*found.better),
         stopped_runs_of_RDES=Count(*found.stopped),
         stopped_early=found.stopped_early,
+        stopped_per_step=Count(*found.stopped_per_step),
+        early_per_step=str(found.early_per_step),
         early=str(EARLY),
     )
 
@@ -66,10 +81,12 @@ def use(found: Finding | None) -> str:
         return NOTHING
     return filled(
         """
-        **Which learner.** ES or GES, which fit no network. TDC is the careful one: {astray_TDC} of
-        its runs did not end at the target, against {astray_ES} of ES and {astray_GES} of GES, and
-        it saves less ([Fig. 7.3](07_beyond.ipynb#fig-beyond-tdc)). A network pays only where a
-        solve is slow ([Chapter 9](performance.ipynb)).
+        **Which learner.** ES or GES, which fit no network. TDC gets stuck less often: {astray_TDC}
+        of its runs did not end at the target, against {astray_ES} of ES and {astray_GES} of GES.
+        But {above_TDC} of its runs end above the cost that they began with, {worse_TDC} by more
+        than {better:.0%}; of ES {worse_ES} do, of GES {worse_GES}
+        ([Fig. 7.3](07_beyond.ipynb#fig-beyond-tdc)). A network pays only where a solve is slow
+        ([Chapter 9](performance.ipynb)).
 
         **What it costs.** {episodes} episodes, in which the robot moves for
         {hours_of_the_robot:.1f} hours; simulated, {seconds_of_a_run_of_ES:.0f} seconds of one core
@@ -79,5 +96,8 @@ def use(found: Finding | None) -> str:
         episodes=str(paper.EPISODES),
         hours_of_the_robot=found.hours,
         seconds_of_a_run_of_ES=found.seconds,
+        above_TDC=Count(*found.above["TDC"]),
+        better=BETTER,
         **{f"astray_{name}": Count(*count) for name, count in found.not_there.items()},
+        **{f"worse_{name}": Count(*count) for name, count in found.worse.items()},
     )

@@ -3,9 +3,11 @@
 from dataclasses import asdict
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.claims import thresholds
 from nmpcrl.claims.failure_modes import (
     CUT_SHORT,
     MECHANISMS,
@@ -244,3 +246,24 @@ def test_a_run_without_its_frozen_arm_is_refused():
     with pytest.raises(KeyError) as error:
         failure_modes([run])
     assert error.value.args == (frozen_arm(run.name),)
+
+
+# Final cost beside theta_init's 100, and whether the run improves, worsens and solves.
+@pytest.mark.parametrize(
+    ("stopped", "cost", "distance", "expected"),
+    [
+        ("finished", 99.0, 0.0, (True, False, True)),
+        ("finished", 99.5, 0.0, (False, False, True)),
+        ("finished", 99.0, 1.0, (True, False, False)),
+        ("finished", 100.0, 0.5, (False, False, True)),
+        ("finished", 101.0, 0.0, (False, False, False)),
+        ("finished", 101.1, 0.0, (False, True, False)),
+        ("finished", np.inf, np.nan, (False, True, False)),
+        ("no optimum", 90.0, 0.0, (False, True, False)),
+    ],
+)
+def test_a_run_improves_stays_or_worsens_and_solves(stopped, cost, distance, expected):
+    numbers = {"initial_cost": 100.0, "final_cost": cost, "distance": distance}
+    runs = pd.DataFrame([{"stopped": stopped} | numbers])
+    judged = (thresholds.improves, thresholds.worsens, thresholds.solved)
+    assert tuple(bool(one(runs).item()) for one in judged) == expected

@@ -42,7 +42,7 @@ def test_arrived_are_those_whose_last_rollout_ends_at_the_target_and_costs_less(
 
 
 def test_one_number_by_hand_is_a_rollout_with_the_margin(found):
-    saved = {}
+    saved, lost = {}, []
     for layout in paper.LAYOUTS:
         task, nmpc = paper.task(layout), paper.nmpc(layout)
         theta = np.array(paper.THETA_INIT)
@@ -51,6 +51,9 @@ def test_one_number_by_hand_is_a_rollout_with_the_margin(found):
         after = evaluate(nmpc, theta, paper.STEPS)
         if task.distance(after.states[-1]) <= layouts.ARRIVED:
             saved[layout] = 1 - after.cost / before.cost
+        else:
+            lost.append(after.cost / before.cost - 1)
+    assert found.lost_by_hand == pytest.approx((min(lost), max(lost)))
     assert found.by_hand == (len(saved), len(paper.LAYOUTS))
     assert found.saved_by_hand == pytest.approx(np.median(list(saved.values())))
     best = runs("ES", "GES").assign(saved=lambda r: 1 - r.final_cost / r.initial_cost)
@@ -58,19 +61,25 @@ def test_one_number_by_hand_is_a_rollout_with_the_margin(found):
     assert found.better == (sum(beaten), len(beaten))
 
 
-def test_rdes_is_counted_in_one_reading_of_the_decay(found):
-    rdes = runs("RDES")
-    rdes = rdes[rdes.decay == "episode"]
-    stopped = rdes[rdes.stopped != "finished"]
-    assert found.stopped == (len(stopped), len(rdes))
-    assert found.stopped_early == (stopped.steps_done / paper.STEPS <= 20).sum()
-    assert 0 < found.stopped_early < len(stopped)
+@pytest.mark.parametrize(
+    ("decay", "stopped", "early"),
+    [("episode", "stopped", "stopped_early"), ("step", "stopped_per_step", "early_per_step")],
+)
+def test_rdes_is_counted_in_each_reading_of_the_decay(found, decay, stopped, early):
+    rdes = runs("RDES").query(f"decay == '{decay}'")
+    ended = rdes[rdes.stopped != "finished"]
+    assert getattr(found, stopped) == (len(ended), len(rdes))
+    assert getattr(found, early) == (ended.steps_done / paper.STEPS <= 20).sum()
+    assert 0 < getattr(found, early) < len(ended)
 
 
 def test_runs_that_are_not_at_the_target_are_counted_by_learner(found):
     for learner, count in found.not_there.items():
         mine = runs(learner)
         assert count == ((mine.ending != "arrived").sum(), len(mine))
+        for factor, named in ((1, found.above), (1.01, found.worse)):
+            bad = (mine.final_cost > factor * mine.initial_cost) | (mine.stopped != "finished")
+            assert named[learner] == (bad.sum(), len(mine))
 
 
 def test_without_anything_published_there_is_no_finding():

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.difficulty import MEASURES, PILOT
+from nmpcrl.analysis.difficulty import MEASURES, OPEN, PILOT
 from nmpcrl.analysis.rows import FIELDS, OUTCOME, as_text
 from nmpcrl.claims import population
 from nmpcrl.claims.population_questions import EXPECTED, QUESTIONS
@@ -185,3 +185,13 @@ def test_extrapolation_is_asked_of_the_runs_that_are_stopped_without_an_interven
     assert population.extrapolation(compared).counts == {"survive, theta held": (1, 2)}
     slope = population.extrapolation(compared, "true slope")
     assert slope.counts == {"survive, true slope": (1, 1)}
+
+
+def test_of_open_and_closed_gaps_only_runs_where_there_is_one_are_counted():
+    ends = [("J001", 0.3, 0.2, True), ("J002", 0.1, 0.2, False), ("J003", OPEN, 1.2, True)]
+    rows = [made("judge", "ES", name, better=one, theta_8=c) for name, _, c, one in ends]
+    rows.append(made("judge", "ES", "J001", final_cost=99.5, theta_8=0.2))
+    closes = pd.DataFrame({PILOT: {name: closed for name, closed, *_ in ends}})
+    found = population.at_the_gap(table(rows), closes)
+    assert found.gap.tolist() == [True, True, False, True]
+    assert population.improve_by_gap(found) == {"open": (1, 2), "closed": (0, 1)}

@@ -4,6 +4,7 @@ import re
 
 import pandas as pd
 
+from nmpcrl.analysis.difficulty import OPEN
 from nmpcrl.claims.population import shares
 from nmpcrl.claims.population_published import PopulationRuns
 from nmpcrl.claims.whole_picture import PICTURE
@@ -33,21 +34,25 @@ def test_a_formula_of_a_claim_is_typeset_in_its_row():
     assert "$" not in table
 
 
-def test_in_short_counts_layouts_and_the_runs_on_either_side_of_the_gap(made_up):
-    names = ["J001", "J002"]
+def test_in_short_counts_as_improved_what_saves_a_per_cent_and_asks_of_gaps_where_there_is_one(
+    made_up,
+):
+    names = ["J001", "J002", "J003"]
     layouts = tuple(JUDGE[name] for name in names)
     found = made_up(layouts=layouts, seeds=(0,))
     runs = found.runs.assign(part="judge", theta_8=0.2)
     costs = {
         Experiment(layout=JUDGE[name]).layout: cost
-        for name, cost in zip(names, (0.9, 1.1), strict=True)
+        for name, cost in zip(names, (0.9, 0.995, 1.1), strict=True)
     }
     runs["final_cost"] = runs.initial_cost * [costs[layout] for layout in runs.layout]
-    closes = pd.DataFrame({"closes": {"J001": 0.3, "J002": 0.1}})
+    closes = pd.DataFrame({"closes": {"J001": 0.3, "J002": 0.1, "J003": OPEN}})
     said = re.sub(r"<[^>]+>", "", in_short(PopulationRuns(runs, {}, closes)))
-    each = len(runs[runs.learner == "ES"]) // 2
-    assert "Of 2 drawn layouts ES improves 1." in said
-    assert f"{each} of {each} of its runs improved; where it passed it, 0 of {each}." in said
+    said, each = " ".join(said.split()), len(runs[runs.learner == "ES"]) // 3
+    assert "Of 3 drawn layouts ES improves 1." in said
+    assert "it does not improve 1 of 1 layouts" in said
+    assert "and 1 of 2 others" in said
+    assert f"{each} of {each} improve where it stayed open, and 0 of {each} where" in said
 
 
 def test_the_nearest_is_named_with_what_is_changed_and_its_shares_of_yes():
