@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -112,7 +112,15 @@ class Task(Described):
 
     def stage_cost(self, state: Vector, action: Vector) -> float:
         """The RL stage cost l(s, a), Eq. (20)."""
-        return _compiled_charge(self, len(action))(state, action)
+        inputs, known = len(action), self._charges
+        if inputs not in known:
+            known[inputs] = callable_of(self.charge(inputs))
+        return known[inputs](state, action)
+
+    @cached_property
+    def _charges(self) -> dict[int, Callable[[Vector, Vector], float]]:
+        """The same as machine code, by the number of inputs."""
+        return {}
 
     def charge(self, inputs: int) -> ca.Function:
         """Eq. (20) in symbols, as a CasADi function of the state and so many inputs."""
@@ -129,11 +137,6 @@ class Task(Described):
         near = ca.norm_2(away) < self.near
         cost: ca.SX = ca.dot(self.weights, away**2) + ca.if_else(near, ca.norm_2(action), upsilon)
         return cost
-
-
-@cache
-def _compiled_charge(task: Task, inputs: int) -> Callable[[Vector, Vector], float]:
-    return callable_of(task.charge(inputs))
 
 
 def overlap(x: Any, y: Any, centre_x: Any, centre_y: Any, clearance: Any) -> Any:

@@ -1,9 +1,11 @@
 """A controller is a value: pickled or copied it solves alike, and its key says what it is."""
 
 import copy
+import gc
 import pickle
 import subprocess
 import sys
+import weakref
 
 import casadi as ca
 import numpy as np
@@ -119,6 +121,24 @@ def test_a_solution_that_was_pickled_is_a_warm_start(k):
         assert nmpc.kkt_residual(copied) == nmpc.kkt_residual(solution)
         again, with_copy = (nmpc.solve(state, theta, one, action) for one in (solution, copied))
         assert with_copy.value == pytest.approx(again.value, rel=1e-9)
+
+
+@pytest.mark.usefixtures("interpreted")
+@pytest.mark.parametrize("k", [0, 2])
+def test_what_nobody_holds_any_more_is_forgotten(k):
+    """A search over plants, tasks and problems keeps none of them."""
+    nmpc, state, theta = controllers()[k]
+    nmpc = Nmpc(cart()) if nmpc.problem else Nmpc(nmpc.plant, copy.copy(nmpc.task), 2)
+    known = [nmpc, nmpc.problem or nmpc.plant, nmpc.problem or nmpc.task]
+    solution = nmpc.solve(state, theta)
+    nmpc.value_hessian_times(solution, theta)
+    nmpc.policy_jacobian(solution)
+    if not nmpc.problem:
+        nmpc.task.stage_cost(state, nmpc.clip(np.zeros(nmpc.m)))
+    left = [weakref.ref(one) for one in known]
+    del nmpc, known, solution
+    gc.collect()
+    assert [one() for one in left] == [None] * 3
 
 
 def test_what_was_not_to_be_changed_cannot_be_changed_in_a_copy():

@@ -4,7 +4,6 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from importlib.resources import files
 from typing import Any, ClassVar, NamedTuple
 
@@ -15,6 +14,7 @@ from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.ocp import Ocp, ProblemOcp, TaskOcp
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
+from nmpcrl.control.remembered import remembered
 from nmpcrl.control.solution import Solution, SolverError, check_shape
 from nmpcrl.control.solvers import problem_stages
 from nmpcrl.control.solvers.codes import End, Start
@@ -83,7 +83,7 @@ class Code(NamedTuple):
     hessian_times: Any
 
 
-@cache
+@remembered
 def machine_code(plant: Plant) -> Code:
     """`solve` and `hessian_times` compiled for a plant.
 
@@ -94,13 +94,13 @@ def machine_code(plant: Plant) -> Code:
     return Code(*_loaded(entries[::-1], {"model": write(plant)}, STAGES, NOTICE))
 
 
-@cache
+@remembered
 def plan_code(plant: Plant) -> Any:
     """`plan_slopes` compiled for a plant, where its policy is differentiated."""
     return _loaded(("plan_slopes",), {"model": write(plant)}, STAGES, PLAN_NOTICE)[0]
 
 
-@cache
+@remembered
 def problem_code(problem: Problem) -> Any:
     """`rows_solve.solve` compiled for a problem.
 
@@ -111,7 +111,7 @@ def problem_code(problem: Problem) -> Any:
     return _loaded(("solve",), model, ("codes", "kernel", "rows"), NOTICE, "rows_")[0]
 
 
-@cache
+@remembered
 def problem_slopes(problem: Problem) -> Any:
     """`rows_slopes.slopes` compiled for a problem."""
     model = problem_stages.write(problem)
