@@ -1,6 +1,7 @@
 """What describes a problem: all that is pickled of it, and all that its key is made of."""
 
 import hashlib
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -8,8 +9,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from nmpcrl.control.content import content, instructions, is_ours
 
-class Described:
+
+class Described(ABC):
     """Something that is pickled and copied by its fields, without what was worked out from them."""
 
     def __getstate__(self) -> dict[str, Any]:
@@ -19,6 +22,25 @@ class Described:
             for name, value in vars(self).items()
             if not isinstance(getattr(kind, name, None), cached_property)
         }
+
+    @property
+    def key(self) -> str:
+        """A hash of all that it does, the same in every process.
+
+        Of a class of the user's, or an object with a method of its own, that is the code, too, with
+        all that it reads of its module.
+
+        Raises:
+            NoContent: such a class or object holds what may be different each time.
+        """
+        kind, state = type(self), self.__getstate__()
+        replaced = any(callable(getattr(kind, name, None)) for name in state)
+        added = () if is_ours(kind) and not replaced else (repr(content([kind, state])),)
+        return key(*self._described(), *added)
+
+    @abstractmethod
+    def _described(self) -> tuple[Any, ...]:
+        """What it is, in numbers, text and expressions."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """The fields; an array is as unchangeable as it was made."""
@@ -38,6 +60,11 @@ class Recorded:
     def __call__(self, *arguments: ca.SX) -> Any:
         return self.function(*arguments)
 
+    @property
+    def key(self) -> str:
+        """A hash of the expression."""
+        return key(self.function)
+
 
 def key(*parts: Any) -> str:
     """A hash, in hexadecimal, of what these say: the same in every process and on every machine."""
@@ -49,28 +76,10 @@ def _said(part: Any) -> str:
     if part is None or isinstance(part, str):
         return repr(part)
     if isinstance(part, ca.Function):
-        return _instructions(part)
+        return instructions(part)
     if isinstance(part, Mapping):
         part = tuple(part.items())
     if isinstance(part, tuple):
         return f"({', '.join(map(_said, part))})"
     array = np.asarray(part, float)
     return f"{array.shape}{array.tolist()}"
-
-
-def _instructions(function: ca.Function) -> str:
-    """What an SX function does, a line a step; all that CasADi knows where it calls others."""
-    if ca.OP_CALL in map(function.instruction_id, range(function.n_instructions())):
-        text: str = function.serialize()
-        return text
-    steps = [
-        (
-            function.instruction_id(k),
-            function.instruction_input(k),
-            function.instruction_output(k),
-            function.instruction_constant(k),
-        )
-        for k in range(function.n_instructions())
-    ]
-    sizes = [function.size_in(k) for k in range(function.n_in())]
-    return "\n".join(map(str, (sizes, *steps)))

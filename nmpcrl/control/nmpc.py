@@ -15,7 +15,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.source import CannotCompile
-from nmpcrl.control.description import Described, key
+from nmpcrl.control.description import Described
 from nmpcrl.control.diagnosis import FARTHEST
 from nmpcrl.control.ocp import Ocp, transcribe, transcribe_problem
 from nmpcrl.control.plant import Plant
@@ -102,7 +102,6 @@ class Nmpc(Described):
             box = np.abs([task.lower, task.upper])
             self._far = max(FAR, 100 * box[np.isfinite(box)].max(initial=0))
         self.lower, self.upper = plant.lower, plant.upper
-        self._solves = self.solver  # or what took over
         self.ties_active = ties_active
 
     def solve(
@@ -194,14 +193,14 @@ class Nmpc(Described):
         """
         return self._variant(solution).kkt_residual(solution, relative=relative)
 
-    @property
-    def key(self) -> str:
-        """A hash of all that its solutions depend on, the same in every process."""
-        how = (self.solver.name, self.solver.tolerance, self.ties_active)
+    def _described(self) -> tuple[Any, ...]:
+        """Without numba, riccati's key is that of fatrop, which then solves."""
+        solver = self.solver if self.solver.available else Fatrop(self.solver.tolerance)
+        how = (solver.name, solver.tolerance, self.ties_active, *solver.described)
         if self.problem is not None:
-            return key("nmpc", self.problem.key, *how)
+            return "nmpc", self.problem.key, *how
         said = (self.horizon, self.gamma, self._slack_weight)
-        return key("nmpc", self._plant.key, self._task.key, *said, *how)
+        return "nmpc", self._plant.key, self._task.key, *said, *how
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""
@@ -256,6 +255,11 @@ class Nmpc(Described):
 
     def _variant(self, solution: Solution) -> Variant:
         return self._fixed if solution.ocp.fixed_action.size else self._free
+
+    @cached_property
+    def _solves(self) -> Solver:
+        """The solver, or what took over."""
+        return self.solver
 
     @cached_property
     def _free(self) -> Variant:

@@ -10,7 +10,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
-from nmpcrl.control.description import Described, Recorded, key
+from nmpcrl.control.description import Described, Recorded
 from nmpcrl.control.expression import column, expression
 from nmpcrl.control.vectors import kept, whole
 
@@ -75,11 +75,9 @@ class Plant(Described):
         """The fields, with the dynamics as an expression: a function need not have a name."""
         return super().__getstate__() | {"dynamics": Recorded(self._derivative)}
 
-    @property
-    def key(self) -> str:
-        """A hash of all that describes the plant, the same in every process."""
+    def _described(self) -> tuple[Any, ...]:
         fields = (self.state_names, self.action_names, self.lower, self.upper)
-        return key("plant", self._derivative, *fields, self.period, self.substeps)
+        return "plant", self._derivative, *fields, self.period, self.substeps
 
     @property
     def n(self) -> int:

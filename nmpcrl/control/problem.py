@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.blocks import Blocks, Symbols, numbers
-from nmpcrl.control.description import Described, key
+from nmpcrl.control.description import Described
 from nmpcrl.control.expression import expression
 from nmpcrl.control.vectors import kept, whole
 
@@ -164,10 +164,8 @@ class Problem(Described):
         arguments = self._function.sx_in()
         return Expressions(*arguments, *self._function.call(arguments))
 
-    @cached_property
-    def key(self) -> str:
-        """A hash of all that describes the problem, the same in every process."""
-        return key(
+    def _described(self) -> tuple[Any, ...]:
+        return (
             "problem", self._function, self.horizon, self.gamma, self.lower, self.upper,
             self.names, self.theta, self.theta_lower, self.theta_upper,
             self.weights, self.active, self.data_names, self.data, self.sizes,

@@ -1,7 +1,7 @@
 """The task: where to go, what to avoid, and the cost that reinforcement learning minimises."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
-from nmpcrl.control.description import Described, key
+from nmpcrl.control.description import Described
 from nmpcrl.control.vectors import kept
 
 
@@ -70,11 +70,10 @@ class Task(Described):
         if self.obstacles and self.start.size < 2:
             raise ValueError("obstacles stand in a plane: a task with one state has none")
 
-    @property
-    def key(self) -> str:
-        """A hash of all that describes the task, the same in every process."""
+    def _described(self) -> tuple[Any, ...]:
         discs = tuple((one.x, one.y, one.diameter) for one in self.obstacles)
-        return key("task", {**self.__getstate__(), "obstacles": discs})
+        named = {one.name: getattr(self, one.name) for one in fields(Task)}
+        return "task", {**named, "obstacles": discs}
 
     def _refuse_outside(self, name: str) -> None:
         point = getattr(self, name)

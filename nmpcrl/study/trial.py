@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.control import Nmpc
+from nmpcrl.control.content import NoContent, content
 from nmpcrl.learning import Learner
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study.parameters import LARGEST_SEED, ParameterError, Whole
-from nmpcrl.study.storage.content import NoContent, content
 
 AT_LEAST_ONE = ("episodes", "steps", "evaluate_every", "rollouts")
 ABOUT = ("learner", "seed", *AT_LEAST_ONE, "theta")  # fields that its records state

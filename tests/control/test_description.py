@@ -8,10 +8,13 @@ import sys
 import weakref
 
 import casadi as ca
+import cloudpickle
 import numpy as np
 import pytest
 
 from nmpcrl.control import Fatrop, Ipopt, Nmpc, Plant, Problem, Riccati, Series, Soft, Task
+from nmpcrl.control.codegen import jit
+from nmpcrl.control.content import NoContent
 from nmpcrl.control.solvers import problem_stages, stages
 from nmpcrl.study import paper
 
@@ -25,7 +28,7 @@ sys.stdout.buffer.write(pickle.dumps(found))
 """
 
 
-def cart(gain=1.0, **changes) -> Problem:
+def cart(gain=1.0, kind=Problem, **changes) -> Problem:
     """A problem of lambdas, with everything that one may have."""
     fields = {
         "states": 2,
@@ -42,12 +45,12 @@ def cart(gain=1.0, **changes) -> Problem:
         "upper": 1.0,
         "data": {"wind": Series(np.linspace(0, 0.1, 5))},
     }
-    return Problem(**fields | changes)
+    return kind(**fields | changes)
 
 
-def pendulum(**changes) -> tuple[Plant, Task]:
+def pendulum(kind=Plant, **changes) -> tuple[Plant, Task]:
     """A plant of a lambda, with a task."""
-    plant = Plant(
+    plant = kind(
         **{
             "dynamics": lambda s, a: [s[1], -ca.sin(s[0]) + a],
             "state_names": ("angle", "speed"),
@@ -58,6 +61,23 @@ def pendulum(**changes) -> tuple[Plant, Task]:
         | changes
     )
     return plant, Task([1.0, 0.0], [0.0, 0.0], [-5, -5], [5, 5], weights=[1.0, 1.0])
+
+
+class Rough(Riccati):
+    """A solver of the user's."""
+
+    def prepare(self, ocp):
+        return super().prepare(ocp)
+
+
+def rewritten(kind: type, method: str, gain: float) -> type:
+    """A class with a method that a user wrote, as a cell of a notebook has it."""
+
+    def wrong(self, *arguments, **others):
+        return gain * getattr(super(made, self), method)(*arguments, **others)
+
+    made = type(kind.__name__, (kind,), {method: wrong, "__module__": "__main__"})
+    return made
 
 
 def controllers() -> list[tuple[Nmpc, np.ndarray, np.ndarray]]:
@@ -164,6 +184,31 @@ def test_the_key_is_that_of_the_content():
     assert pendulum()[0].key == pendulum()[0].key
 
 
+def test_a_key_says_what_a_user_wrote():
+    """With all that his code reads, and not where it stands."""
+    one, again, other = (rewritten(Nmpc, "solve", gain)(cart()) for gain in (1, 1, 2))
+    assert one.key == again.key == pickle.loads(cloudpickle.dumps(one)).key != other.key
+    again.bias = 0.5
+    assert again.key != one.key
+    plain = Nmpc(cart())
+    plain.solve = lambda *_: None
+    assert plain.key != Nmpc(cart()).key
+    plain.solve = np.random.default_rng(0)
+    with pytest.raises(NoContent, match="a Generator"):
+        _ = plain.key
+
+
+def test_a_key_of_the_papers_controller_names_runs_that_are_stored():
+    assert paper.nmpc().key.startswith("739cdfb231ec78f3cad5")
+
+
+def test_without_numba_the_key_is_that_of_what_solves(monkeypatch):
+    key, other = paper.nmpc().key, Nmpc(cart(), solver=Fatrop()).key
+    monkeypatch.setattr(jit, "numba_version", lambda: None)
+    assert paper.nmpc().key == paper.nmpc(solver="fatrop").key != key
+    assert Nmpc(cart(), solver=Riccati(starts=3)).key == other
+
+
 def test_any_other_number_or_name_is_another_key():
     others = [
         cart(),
@@ -184,4 +229,8 @@ def test_any_other_number_or_name_is_another_key():
     keys += [Nmpc(cart(), ties_active=True).key, paper.nmpc().key, paper.nmpc("B").key]
     keys += [paper.nmpc(horizon=9).key, Nmpc(*pendulum()).key, Nmpc(*pendulum(period=0.1)).key]
     keys += [Nmpc(*pendulum(), gamma=0.9).key, Nmpc(*pendulum(), slack_weight=9).key]
+    keys += [Nmpc(cart(), solver=how).key for how in (Riccati(starts=3), Rough(), Rough(starts=3))]
+    keys += [rewritten(Nmpc, "solve", gain)(cart()).key for gain in (1, 2)]
+    keys += [cart(kind=rewritten(Problem, "stage_data", gain)).key for gain in (1, 2)]
+    keys += [Nmpc(*pendulum(rewritten(Plant, "step", gain))).key for gain in (1, 2)]
     assert len(set(keys)) == len(keys)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control.codegen import jit
 from nmpcrl.control.codegen.jit import load
 from nmpcrl.control.ocp import Ocp, ProblemOcp, TaskOcp
 from nmpcrl.control.plant import Plant
@@ -149,6 +150,11 @@ class Riccati(Solver):
         super().__post_init__()
         if self.starts is not None and whole("starts", self.starts) > MOST:
             raise ValueError(f"starts = {self.starts} must be at most {MOST}")
+
+    @property
+    def available(self) -> bool:
+        """Whether numba is installed."""
+        return jit.numba_version() is not None
 
     def starts_of(self, ocp: Ocp) -> int:
         """How many cold starts are compared: 1 for a task, as published, 9 for a `Problem`.

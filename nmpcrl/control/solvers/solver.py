@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control.content import content, is_ours
 from nmpcrl.control.diagnosis import SUBSTEPS
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.solution import Solution
@@ -50,6 +51,18 @@ class Solver(ABC):
             allowed = f"[{LEAST_TOLERANCE:g}, {LARGEST_TOLERANCE:g}]"
             raise ValueError(f"tolerance = {self.tolerance} must lie in {allowed}")
         object.__setattr__(self, "tolerance", float(self.tolerance))
+
+    @property
+    def available(self) -> bool:
+        """Whether what it needs is installed."""
+        return True
+
+    @property
+    def described(self) -> tuple[str, ...]:
+        """What a key says of it besides name and tolerance: fields that are not the usual ones."""
+        kind, fields = type(self), {n: v for n, v in vars(self).items() if n != "tolerance"}
+        changed = {n: v for n, v in fields.items() if v is not getattr(kind, n, fields)}
+        return (repr(content([kind, changed])),) if changed or not is_ours(kind) else ()
 
     def check(self, task: Task) -> None:
         """Refuse a task that this solver cannot do.

@@ -10,9 +10,9 @@ import gymnasium
 import numpy as np
 import pytest
 
+from nmpcrl.control.content import NoContent, content
 from nmpcrl.learning import Adam, expected_sarsa
 from nmpcrl.study import paper
-from nmpcrl.study.storage.content import NoContent, content
 
 GAIN = 2.0
 

@@ -9,14 +9,17 @@ import dis
 import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from importlib.metadata import PackageNotFoundError, version
 from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 PLAIN = (type(None), bool, int, float, complex, str, bytes, range, type(Ellipsis))
+AROUND = (property, cached_property, staticmethod, classmethod, type(cache(abs)))
+WITHIN = ("fget", "fset", "func", "__wrapped__")  # the functions of these
 OWN = "nmpcrl"  # whose code the epochs of `provenance` stand for
 
 
@@ -42,6 +45,10 @@ def content(value: Any, inside: tuple[int, ...] = ()) -> Any:
     if isinstance(value, tuple | list | frozenset | set):
         parts = [content(one, inside) for one in value]
         return parts if isinstance(value, tuple | list) else sorted(map(str, parts))
+    if isinstance(value, ca.Function):
+        return instructions(value)
+    if isinstance(value, AROUND):
+        return [content(getattr(value, name, None), inside) for name in WITHIN]
     if isinstance(value, partial):
         return [content(one, inside) for one in (value.func, value.args, value.keywords)]
     if isinstance(value, MethodType):
@@ -111,6 +118,11 @@ def _reads(code: CodeType) -> Iterator[str]:
             yield from _reads(one)
 
 
+def is_ours(kind: type) -> bool:
+    """Whether a class is part of this library."""
+    return kind.__module__.partition(".")[0] == OWN
+
+
 @cache
 def _is_library(module: str) -> bool:
     """Whether a module is Python's, an installed one or ours, and not the user's."""
@@ -129,3 +141,21 @@ def _version(library: str) -> str:
         return version(library)
     except PackageNotFoundError:
         return ""
+
+
+def instructions(function: ca.Function) -> str:
+    """What an SX function does, a line a step; all that CasADi knows where it calls others."""
+    if ca.OP_CALL in map(function.instruction_id, range(function.n_instructions())):
+        text: str = function.serialize()
+        return text
+    steps = [
+        (
+            function.instruction_id(k),
+            function.instruction_input(k),
+            function.instruction_output(k),
+            function.instruction_constant(k),
+        )
+        for k in range(function.n_instructions())
+    ]
+    sizes = [function.size_in(k) for k in range(function.n_in())]
+    return "\n".join(map(str, (sizes, *steps)))
