@@ -47,7 +47,18 @@ def test_every_equation_has_a_line_that_says_where_it_is():
     lines = rows(CELLS["equations"])
     assert [what.split()[0] for what, *_ in lines] == EQUATIONS
     for what, where, _ in lines:
-        assert re.search(r"\]\([\w.]+#(eq|alg|fig)-|^not (solved|computed): ", where), what
+        assert (links := re.findall(r"\(([\w.]+)#((?:eq|alg)-[\w-]+)\)", where)), what
+        for page, anchor in links:
+            assert f'<a id=\\"{anchor}\\"></a>' in (ROOT / "book" / page).read_text(), what
+
+
+def test_both_maps_of_the_equations_lead_to_the_same_places():
+    here = {what.split()[0]: where for what, where, _ in rows(CELLS["equations"])}
+    there = dict(re.findall(r"^\| (\(\d+[a-f]?\)) \| (.*?) \| ", NOTATION, flags=re.M))
+    for number, what in there.items():
+        for link in re.findall(r"\[Eq\. [^]]*\]\([^)]*\)", what):
+            assert link in here[number], number
+        assert number[-2].isalpha() or "#eq-" in what or "#alg-" in what, number
 
 
 def test_every_figure_is_drawn_under_its_number_in_the_paper():

@@ -2,8 +2,10 @@
 
 import ast
 import inspect
+import re
 import textwrap
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -12,7 +14,7 @@ from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.learning import updates
 from nmpcrl.learning.learners import Learner
 from nmpcrl.report import prose
-from nmpcrl.report.cited import Count
+from nmpcrl.report.cited import Count, by_reading
 from nmpcrl.report.prose import (
     PLACEHOLDER,
     filled,
@@ -24,6 +26,7 @@ from nmpcrl.report.prose import (
     share,
     source,
 )
+from nmpcrl.study import Experiment
 
 LATEX = (
     r"$\mathbf{s}$, $\boldsymbol{\theta}_{init}$, $\frac{a}{b}$, $x^{ref}$, $\sqrt[3]{x}$,"
@@ -199,3 +202,14 @@ def test_words_formulas_and_code_stay_as_they_are():
     said = filled("{a} $x = {b}$ `{c}` {d:g}", origin="us", a="one", b=1, c=2, d=3)
     assert said == 'one $x = 1$ `2` <data value="3.0" title="d: us">3</data>'
     assert filled("{a} {b}", a=1, b=2) == "1 2"
+
+
+def test_a_median_is_said_for_each_reading_of_the_decay_and_never_for_both():
+    runs = [Experiment(decay=decay, seed=seed) for decay in ("step", "episode") for seed in (0, 1)]
+    found = dict(zip(runs, (0.7, 0.8, 0.4, np.inf), strict=True))
+    text = by_reading("share", ".0%", found, "4 runs")
+    assert re.sub("<[^>]*>", "", text) == "75% (per step) and ∞ (per episode)"
+    assert re.findall('title="([^"]*)"', text) == [
+        "share per step: 4 runs",
+        "share per episode: 4 runs",
+    ]

@@ -81,7 +81,7 @@ def kappa(answer: Any) -> Outcome:
         {"kappa": (0, 2)},
         mistakes={
             "The second term has w squared.": lambda kappa: kappa,
-            "That is of the first term; J is half as large at its maximum.": (
+            "That is of the first term; the maximum is half as large.": (
                 lambda kappa: kappa - kappa**2 / 2
             ),
             "That is the share of the second term alone.": lambda kappa: kappa**2,

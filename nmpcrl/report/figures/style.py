@@ -101,8 +101,8 @@ STEP_PARTS = {  # of a learning step: colour and hatching
 
 
 def shades(count: int) -> list[str]:
-    """Colours of lines that are in an order, from dark to pale; all can be seen on white."""
-    return [to_hex(color) for color in colormaps["cividis"](np.linspace(0.0, 0.6, count))]
+    """Colours of lines that are in an order, from dark to pale; none is grey or lost on white."""
+    return [to_hex(color) for color in colormaps["plasma"](np.linspace(0.0, 0.62, count))]
 
 
 def line(learner: str) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from legibility import CONTRAST, contrast, flaws
+from matplotlib.colors import to_rgb
 
 from nmpcrl.report.figures import sheet, style
 from nmpcrl.report.figures.axes import below, draw_task
@@ -273,6 +274,7 @@ def test_colours_in_an_order_can_all_be_seen(count):
     shades = [contrast(color) for color in style.shades(count)]
     assert min(shades) >= CONTRAST
     assert shades == sorted(shades, reverse=True)
+    assert min(np.ptp(to_rgb(color)) for color in style.shades(count)) > 0.3  # none is a grey
 
 
 def test_learners_are_told_apart_without_colour():

@@ -71,7 +71,7 @@ def receding_horizon(task: Task, rollout: Rollout, plans: Sequence[Solution]) ->
     low, high = drawn.min(axis=0) - [0.3, 0.5], drawn.max(axis=0) + [0.3, 0.5]
     axes.set(xlabel="x [m]", ylabel="y [m]", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_title(
-        f"A plan of {horizon} steps ends up to {apart[farthest]:.2f} m from where the robot then is"
+        f"The end of a plan is up to {apart[farthest]:.2f} m from the place reached at that time"
     )
     below(figure, axes.get_legend_handles_labels()[0])
     return figure
@@ -98,7 +98,7 @@ def action_values(
     axes.plot(policy[1], value, "D", color=WINE, ms=7, label="the policy's action")
     above = np.nanmin(values) > value - 1e-4
     axes.set(
-        title="Q meets V at the policy's action, never below"
+        title="Q equals V at the policy's action, and is no lower elsewhere"
         if above
         else "Q falls below V: V was a local optimum",
         xlabel="turn rate of the first action [rad/s]",

@@ -83,12 +83,12 @@ def test_the_plan_that_ends_farthest_from_the_closed_loop_is_drawn_and_named(
     apart = np.linalg.norm(ends - loop.states[4:, :2], axis=1)
     figure = draw.receding_horizon(nmpc.task, loop, plans)
     assert_readable(figure)
-    assert f"A plan of 4 steps ends up to {apart.max():.2f} m from" in texts(figure)
+    assert f"The end of a plan is up to {apart.max():.2f} m from" in texts(figure)
     drawn = [line.get_xydata() for line in figure.axes[0].lines]
     assert any(np.array_equal(line, plans[apart.argmax()].states[:, :2]) for line in drawn)
 
 
-@pytest.mark.parametrize(("lowest", "says"), [(10.0, "never below"), (9.0, "falls below")])
+@pytest.mark.parametrize(("lowest", "says"), [(10.0, "no lower elsewhere"), (9.0, "falls below")])
 def test_the_title_says_whether_q_stays_above_v(lowest, says, assert_readable, texts):
     speeds, turn_rates = np.array([0.0, 0.6]), np.linspace(-1, 1, 3)
     values = np.array([[12.0, 11.0], [12.0, lowest], [12.0, 11.0]])
