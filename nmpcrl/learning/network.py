@@ -3,7 +3,9 @@
 import sys
 import threading
 from collections.abc import Callable, Iterable
+from copy import deepcopy
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import torch
@@ -16,16 +18,23 @@ torch.set_num_threads(1)  # matrices this small only get slower with more
 KEPT = 256  # rows: room for more predictions at once is made anew
 DRAWING = threading.Lock()  # torch draws first weights from one generator a process
 
+
+def _tanh_slope(y: Tensor, out: Tensor) -> Tensor:
+    return torch.mul(y, y, out=out).neg_().add_(1)
+
+
 # In place, and its slope from what it made, put into `out`; that of a ReLU is its output's sign.
 Activation = tuple[Callable[[Tensor], Tensor], Callable[..., Tensor]]
 ACTIVATIONS: dict[str, Activation] = {
     "relu": (Tensor.relu_, torch.sign),
-    "tanh": (Tensor.tanh_, lambda y, out: torch.mul(y, y, out=out).neg_().add_(1)),
+    "tanh": (Tensor.tanh_, _tanh_slope),
 }
 
 
 class Predictor:
     """What some weights predict: inputs - 64 - 64 - 1."""
+
+    _views = ("_matrices", "_rooms")  # of the weights: made anew in a copy or a pickle
 
     def __init__(
         self,
@@ -48,9 +57,21 @@ class Predictor:
         self._weights, self._gradient, self._widths = weights, gradient, widths
         self._activation = activation
         self._input_scale, self._target_scale = scales
-        self._matrices = _matrices(weights, widths), _matrices(gradient, widths)
-        self._rooms = dict[int, _Room]()  # by the number of rows; of few, which are asked for often
         self.fitted = False  # whether the weights know of a fit
+        self._view()
+
+    def _view(self) -> None:
+        """Make what looks at the weights."""
+        self._matrices = [_matrices(one, self._widths) for one in (self._weights, self._gradient)]
+        self._rooms = dict[int, _Room]()  # by the number of rows; of few, which are asked for often
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the views, which would look at the original."""
+        return {name: value for name, value in vars(self).items() if name not in self._views}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._view()
 
     def predict(self, inputs: Vector) -> Vector:
         """The value of one input (k,) or of many (..., k); the result drops the last axis."""
@@ -78,13 +99,16 @@ class Predictor:
 class QNetwork(Predictor):
     """Inputs - 64 - 64 - 1 with ReLU, trained by Adam on a growing replay buffer: Eq. (10).
 
-    Learns in place. Activation, initialisation (torch's own), no normalisation, an unlimited buffer
-    and one mini-batch a step are this package's reading: the paper names none, and the options
-    read it otherwise.  # departure H
+    Learns in place; a copy, or what is read from a pickle, goes on as the original would.
+    Activation, initialisation (torch's own), no normalisation, an unlimited buffer and one
+    mini-batch a step are this package's reading: the paper names none, and the options read it
+    otherwise.  # departure H
 
     Backpropagation is written out, in place and without autograd: on matrices this small, modules
     and `torch.optim` take longer than the arithmetic.
     """
+
+    _views = (*Predictor._views, "_count", "_batch", "_targets", "_error")
 
     def __init__(
         self,
@@ -126,11 +150,18 @@ class QNetwork(Predictor):
         weights = _first_weights(widths, seed=int(rng.integers(2**63)))
         gradient, self._mean, self._square = torch.zeros(3, len(weights), dtype=torch.float32)
         self._fits = torch.zeros((), dtype=torch.float32)
-        self._count = self._fits.numpy()  # that very number
         super().__init__(weights, gradient, widths, ACTIVATIONS[activation], scales)
+
+    def _view(self) -> None:
+        super()._view()
+        self._count = self._fits.numpy()  # that very number
         self._batch = self._room_of(torch.from_numpy(self._drawn[:, :-1]))  # looks at those rows
         self._targets = self._drawn[:, -1:]
         self._error = np.empty_like(self._targets)
+
+    def __copy__(self) -> "QNetwork":
+        """A deep one: two networks cannot learn in the same weights."""
+        return deepcopy(self)
 
     def __len__(self) -> int:
         """How many examples are remembered."""

@@ -1,5 +1,7 @@
 """The network: it learns, forgets no row, disturbs no generator, and seeds decide its bits."""
 
+import copy
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -7,6 +9,7 @@ import pytest
 import torch
 
 from nmpcrl.learning import QNetwork
+from nmpcrl.learning.network import Target
 
 SCALED = {"scales": (np.array([4.0, 0.3]), 250.0)}  # for two inputs
 OPTIONS = [{}, {"activation": "tanh"}, SCALED, {"activation": "tanh", **SCALED}]
@@ -300,3 +303,38 @@ def test_what_a_program_makes_torchs_default_type_changes_no_bit():
         torch.set_default_dtype(torch.float32)
     assert before[0] == after[0]
     np.testing.assert_array_equal(before[1], after[1])
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+@pytest.mark.parametrize(
+    "again", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
+)
+def test_a_copy_goes_on_as_the_original_does_without_it(again, options):
+    def begun():
+        learner = taught(rows(140), memory=200, capacity=8, **options)
+        learner.fit()
+        learner.predict(rows(9)[0])
+        return learner
+
+    def go_on(learner):
+        for inputs, value in zip(*rows(150, seed=3), strict=True):
+            learner.remember(inputs, value)
+            learner.fit()
+        return learner.predict(rows(9)[0])
+
+    original, expected = begun(), go_on(begun())
+    twin = again(original)
+    np.testing.assert_array_equal(go_on(twin), expected)
+    np.testing.assert_array_equal(go_on(original), expected)
+
+
+@pytest.mark.parametrize("again", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_the_copy_of_a_target_follows_the_copy_of_its_network(again):
+    learner = taught(rows(140))
+    target, twin = again((Target(learner, rate=0.5), learner))
+    before = target.predict(rows(9)[0])
+    twin.fit()
+    target.follow()
+    assert not np.array_equal(target.predict(rows(9)[0]), before)
+    assert target.fitted
+    assert not learner.fitted
