@@ -29,10 +29,11 @@ for words in {words}:
 """
 WORDS = ("--help", "train --help", "runs", "runs --json", "evaluate ES", "compare ES ES", "clean")
 NETWORK = """
+import torch
+torch.set_num_threads(2)
 import nmpcrl.learning
 network = nmpcrl.learning.QNetwork
-import torch
-assert torch.get_num_threads() == 1
+assert torch.get_num_threads() == 2
 assert "QNetwork" in nmpcrl.learning.__all__
 """
 

@@ -211,9 +211,10 @@ class _Drawing:
 
     @contextmanager
     def own(self) -> Iterator[None]:
-        """Go on drawing; after it both generators are as they were before."""
+        """Go on drawing; after it generators and threads are as they were before."""
         import torch
 
+        threads = torch.get_num_threads()
         torch.set_num_threads(1)  # with another number, last bits are others
         before = np.random.get_state(), torch.get_rng_state()  # noqa: NPY002 as SB3 draws
         if self.state:
@@ -223,6 +224,7 @@ class _Drawing:
         finally:
             self.state = np.random.get_state(), torch.get_rng_state()  # noqa: NPY002
             _put(*before)
+            torch.set_num_threads(threads)
 
 
 def _put(numpys: Any, torchs: Any) -> None:

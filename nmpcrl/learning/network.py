@@ -13,8 +13,6 @@ from torch import Tensor
 
 from nmpcrl import Vector
 
-torch.set_num_threads(1)  # matrices this small only get slower with more
-
 KEPT = 256  # rows: room for more predictions at once is made anew
 DRAWING = threading.Lock()  # torch draws first weights from one generator a process
 
@@ -29,6 +27,20 @@ ACTIVATIONS: dict[str, Activation] = {
     "relu": (Tensor.relu_, torch.sign),
     "tanh": (Tensor.tanh_, _tanh_slope),
 }
+
+
+class _OneThread:
+    """Within it torch computes with one thread; after it, with as many as the program had chosen.
+
+    More threads make matrices this small slower, and may change last bits.
+    """
+
+    def __enter__(self) -> None:
+        self._before = torch.get_num_threads()
+        torch.set_num_threads(1)
+
+    def __exit__(self, *_: object) -> None:
+        torch.set_num_threads(self._before)
 
 
 class Predictor:
@@ -53,7 +65,6 @@ class Predictor:
             activation: of the hidden layers.
             scales: what inputs and target are divided by.
         """
-        torch.set_num_threads(1)  # this thread's own number: with another, last bits are others
         self._weights, self._gradient, self._widths = weights, gradient, widths
         self._activation = activation
         self._input_scale, self._target_scale = scales
@@ -79,7 +90,8 @@ class Predictor:
         rows = inputs.reshape(-1, k)
         room = self._room(len(rows))
         np.divide(rows, self._input_scale, out=room.inputs, casting="same_kind")
-        room.forward()
+        with _OneThread():
+            room.forward()
         return room.values.astype(float).reshape(shape) * self._target_scale
 
     def _room(self, rows: int) -> "_Room":
@@ -188,11 +200,12 @@ class QNetwork(Predictor):
             raise ValueError(f"{len(self)} examples are too few for a batch of {batch}")
         rows = self._rng.choice(len(self), batch, replace=False)
         self._buffer.take(rows, axis=0, out=self._drawn, mode="clip")
-        self._batch.forward()
-        error = np.subtract(self._batch.values, self._targets, out=self._error)
-        np.multiply(2 / batch, error, out=self._batch.slopes)
-        self._batch.backward()
-        self._descend()
+        with _OneThread():
+            self._batch.forward()
+            error = np.subtract(self._batch.values, self._targets, out=self._error)
+            np.multiply(2 / batch, error, out=self._batch.slopes)
+            self._batch.backward()
+            self._descend()
         self.fitted = True
         return float(np.vdot(error, error)) / batch * self._target_scale**2
 

@@ -338,3 +338,13 @@ def test_the_copy_of_a_target_follows_the_copy_of_its_network(again):
     assert not np.array_equal(target.predict(rows(9)[0]), before)
     assert target.fitted
     assert not learner.fitted
+
+
+def test_the_programs_number_of_threads_is_left_alone_and_changes_no_bit():
+    found = []
+    for count in (1, 2):
+        torch.set_num_threads(count)
+        found.append(train(5))
+        assert torch.get_num_threads() == count
+    torch.set_num_threads(1)
+    np.testing.assert_array_equal(found[0][1], found[1][1])
