@@ -18,6 +18,7 @@ from nmpcrl.learning.learners import (
     Weights,
     gradient_td,
     semi_gradient,
+    theta_bounds,
 )
 from nmpcrl.learning.updates import of_length
 
@@ -34,7 +35,7 @@ def frozen(nmpc: Controller) -> Learner:
 def step_matched(nmpc: Controller, alpha: float, beta: float) -> Learner:
     """ES with steps as long as those of GES: it separates direction and length."""
     rule = as_far_as(gradient_td(alpha, beta, nmpc.gamma), semi_gradient(alpha))
-    return Learner("matched", SecondSolve(nmpc), rule, nmpc.gamma)
+    return Learner("matched", SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
 
 
 def random_direction(nmpc: Controller, alpha: float, rng: np.random.Generator) -> Learner:
@@ -50,7 +51,7 @@ def random_direction(nmpc: Controller, alpha: float, rng: np.random.Generator) -
         return Weights(weights.theta + rng.normal(size=weights.theta.size), weights.w)
 
     rule = as_far_as(semi_gradient(alpha), anywhere)
-    return Learner("random", SecondSolve(nmpc), rule, nmpc.gamma)
+    return Learner("random", SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
 
 
 def as_far_as(length: UpdateRule, direction: UpdateRule) -> UpdateRule:

@@ -18,6 +18,8 @@ from nmpcrl.learning import (
     expected_sarsa,
     lstd_q,
     policy_gradient,
+    random_direction,
+    step_matched,
     train,
 )
 from nmpcrl.study import paper
@@ -190,6 +192,8 @@ def test_learners_keep_theta_within_the_bounds_of_the_problem(tank):
         (expected_sarsa(tank, 1e3), False),
         (lstd_q(tank, regularisation=1e-6, every=1), True),
         (policy_gradient(tank, 1e3, every=3), False),
+        (step_matched(tank, 1e3, 1e-3), False),
+        (random_direction(tank, 1e3, np.random.default_rng(0)), False),
     ):
         steps = list(trained(learner, tank, weights, noise(1, 8), constrained))
         gains = np.array([step.weights.theta[0] for step in steps if not step.failure])
