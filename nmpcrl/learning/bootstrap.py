@@ -27,6 +27,7 @@ class Transition:
     end: bool = False  # whether s+ ends the episode, and is worth 0
     last: bool = False  # whether the episode is over: by `end`, or since its time is
     next_data: Mapping[str, Any] | None = None  # what a `Problem` knows of the stages from s+ on
+    first: bool = False  # whether it is the first of its episode
 
 
 @dataclass(frozen=True, eq=False)

@@ -117,6 +117,8 @@ class ClosedLoop:
         successor: Successor,
     ) -> tuple[Weights, Sensitivities]:
         """Carry the sensitivities on; move theta where the episode is over."""
+        if transition.first:  # the one before may have ended in a failed solve
+            memory = self.init(weights)._replace(optimiser=memory.optimiser)
         state, action = transition.state, transition.action
         inputs = self.policy_slopes(transition, weights.theta, memory.states)
         plant, task = self.nmpc.plant, self.nmpc.task

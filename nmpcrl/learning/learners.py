@@ -30,6 +30,7 @@ from nmpcrl.learning.bootstrap import (
     Successor,
     Transition,
 )
+from nmpcrl.learning.optimisers import Bounds
 from nmpcrl.learning.updates import (
     auxiliary_step,
     curvature_correction,
@@ -73,10 +74,45 @@ class StatefulRule(Protocol):
         delta: float,
         successor: Successor,
     ) -> tuple[Weights, Any]:
-        """New weights and memory; `transition.last` says whether the episode is over.
+        """New weights and memory; `transition` says whether an episode begins or is over.
 
-        A failed solve ends an episode without a transition: the next one begins a new episode.
+        A failed solve ends an episode without a last transition, and perhaps without any. A rule
+        with a method `interrupted(memory, weights)`, which returns both, is told.
         """
+
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """A rule of either kind as a `StatefulRule` whose theta stays within the bounds."""
+
+    rule: UpdateRule | StatefulRule
+    bounds: Bounds | None
+
+    def init(self, weights: Weights) -> Any:
+        """The memory of the rule; None where it has none."""
+        return None if callable(self.rule) else self.rule.init(weights)
+
+    def step(
+        self,
+        memory: Any,
+        weights: Weights,
+        transition: Transition,
+        delta: float,
+        successor: Successor,
+    ) -> tuple[Weights, Any]:
+        """As the rule does, then project."""
+        if callable(self.rule):
+            moved = self.rule(weights, delta, transition.solution, successor)
+        else:
+            moved, memory = self.rule.step(memory, weights, transition, delta, successor)
+        if self.bounds is not None:
+            moved = replace(moved, theta=project(moved.theta, *self.bounds))
+        return moved, memory
+
+    def interrupted(self, memory: Any, weights: Weights) -> tuple[Weights, Any]:
+        """Tell the rule, if it asks."""
+        tell = getattr(self.rule, "interrupted", None)
+        return tell(memory, weights) if tell else (weights, memory)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +132,7 @@ class Learner:
     bootstrap: Bootstrap  # values the next state
     rule: UpdateRule | StatefulRule  # moves the weights
     gamma: float  # discount factor of the TD error
-    bounds: tuple[Vector, Vector] | None = None  # into which theta is projected after each step
+    bounds: Bounds | None = None  # into which theta is projected after each step
     values_actions: bool = False  # whether it is meant for Q(s, a), and not for V(s)
 
     def step(self, weights: Weights, transition: Transition) -> Update:
@@ -110,18 +146,23 @@ class Learner:
             return Update(weights)
         solution = transition.solution
         delta = td_error(transition.cost, self.gamma, solution.value, successor.value)
-        if callable(self.rule):
-            moved = self.rule(weights, delta, solution, successor)
-        else:
-            memory = self.rule.init(weights) if weights.memory is None else weights.memory
-            moved, memory = self.rule.step(memory, weights, transition, delta, successor)
-            moved = replace(moved, memory=memory)
-        if self.bounds is not None:
-            moved = replace(moved, theta=project(moved.theta, *self.bounds))
-        return Update(moved, successor, delta)
+        rule, memory = self._remembered(weights)
+        moved, memory = rule.step(memory, weights, transition, delta, successor)
+        return Update(replace(moved, memory=memory), successor, delta)
+
+    def interrupted(self, weights: Weights) -> Weights:
+        """The weights after an episode that a failed solve ended."""
+        rule, memory = self._remembered(weights)
+        moved, memory = rule.interrupted(memory, weights)
+        return replace(moved, memory=memory)
+
+    def _remembered(self, weights: Weights) -> tuple[Projected, Any]:
+        """The projected rule, and its memory."""
+        rule = Projected(self.rule, self.bounds)
+        return rule, rule.init(weights) if weights.memory is None else weights.memory
 
 
-def theta_bounds(nmpc: Any) -> tuple[Vector, Vector] | None:
+def theta_bounds(nmpc: Any) -> Bounds | None:
     """The bounds of a `Problem`'s theta; None where there is no problem, or nothing is bounded."""
     problem = getattr(nmpc, "problem", None)
     if problem is None or not np.isfinite([problem.theta_lower, problem.theta_upper]).any():

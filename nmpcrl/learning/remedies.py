@@ -22,7 +22,7 @@ from nmpcrl.learning.baselines import as_far_as
 from nmpcrl.learning.bootstrap import Controller, SecondSolve, Successor, Transition
 from nmpcrl.learning.learners import (
     Learner,
-    StatefulRule,
+    Projected,
     UpdateRule,
     Weights,
     gradient_td,
@@ -119,22 +119,6 @@ def _plain_rule(learner: Learner, who: str) -> UpdateRule:
     return learner.rule
 
 
-class _Inner(NamedTuple):
-    """A learner's rule in one shape, with a memory or without."""
-
-    rule: UpdateRule | StatefulRule
-
-    def init(self, weights: Weights) -> Any:
-        return None if callable(self.rule) else self.rule.init(weights)
-
-    def step(
-        self, memory: Any, weights: Weights, transition: Transition, delta: float, then: Successor
-    ) -> tuple[Weights, Any]:
-        if callable(self.rule):
-            return self.rule(weights, delta, transition.solution, then), None
-        return self.rule.step(memory, weights, transition, delta, then)
-
-
 class Mean(NamedTuple):
     """What `Averaging` remembers."""
 
@@ -150,26 +134,32 @@ class Averaging:
     Source: Polyak and Juditsky (1992).
     """
 
-    rule: UpdateRule | StatefulRule
+    rule: Projected
     skip: int = 0  # steps before the mean begins
 
     def init(self, weights: Weights) -> Mean:
         """The mean of one theta."""
-        return Mean(weights.theta, 0, _Inner(self.rule).init(weights))
+        return Mean(weights.theta, 0, self.rule.init(weights))
 
     def step(
         self, memory: Mean, weights: Weights, transition: Transition, delta: float, then: Successor
     ) -> tuple[Weights, Mean]:
         """mean <- mean + (theta - mean) / n; until n = 1, the mean is theta."""
-        moved, inner = _Inner(self.rule).step(memory.inner, weights, transition, delta, then)
+        moved, inner = self.rule.step(memory.inner, weights, transition, delta, then)
         steps = memory.steps + 1
         part = 1 / max(steps - self.skip, 1)
         return moved, Mean(memory.theta + part * (moved.theta - memory.theta), steps, inner)
 
+    def interrupted(self, memory: Mean, weights: Weights) -> tuple[Weights, Mean]:
+        """Tell the rule."""
+        moved, inner = self.rule.interrupted(memory.inner, weights)
+        return moved, memory._replace(inner=inner)
+
 
 def averaged(learner: Learner, skip: int = 0) -> Learner:
     """A learner that keeps the mean of its theta, which `judged_theta` returns."""
-    return replace(learner, name=f"{learner.name} averaged", rule=Averaging(learner.rule, skip))
+    rule = Averaging(Projected(learner.rule, learner.bounds), skip)
+    return replace(learner, name=f"{learner.name} averaged", rule=rule)
 
 
 class Best(NamedTuple):
@@ -186,40 +176,49 @@ class Best(NamedTuple):
 class Undoing:
     """A `StatefulRule` that goes back to the best theta where a confirming rollout got worse.
 
-    It begins with a rollout of the first theta, and makes one after every `every` episodes. What a
-    rollout cannot judge costs infinitely much. After a step back the rule begins anew.
+    It begins with a rollout of the first theta, and makes one after every `every` episodes, those
+    that a failed solve ended among them. What a rollout cannot judge costs infinitely much. After a
+    step back the rule begins anew.
     """
 
-    rule: UpdateRule | StatefulRule
+    rule: Projected
     confirm: Callable[[Vector], float]  # theta -> cost without noise; each call is interaction
     every: int = 1  # episodes
 
     def init(self, weights: Weights) -> Best:
         """The first rollout."""
         cost = self.confirm(weights.theta)
-        return Best(weights.theta, weights.w, cost, 0, _Inner(self.rule).init(weights))
+        return Best(weights.theta, weights.w, cost, 0, self.rule.init(weights))
 
     def step(
         self, memory: Best, weights: Weights, transition: Transition, delta: float, then: Successor
     ) -> tuple[Weights, Best]:
-        """Move as the rule does; at the end of some episodes keep that, or go back."""
-        moved, inner = _Inner(self.rule).step(memory.inner, weights, transition, delta, then)
-        episodes = memory.episodes + transition.last
-        memory = memory._replace(episodes=episodes, inner=inner)
-        if not transition.last or episodes % self.every:
+        """Move as the rule does; judge that at the end of an episode."""
+        moved, inner = self.rule.step(memory.inner, weights, transition, delta, then)
+        memory = memory._replace(inner=inner)
+        return self._judged(memory, moved) if transition.last else (moved, memory)
+
+    def interrupted(self, memory: Best, weights: Weights) -> tuple[Weights, Best]:
+        """As at the end of any other episode."""
+        moved, inner = self.rule.interrupted(memory.inner, weights)
+        return self._judged(memory._replace(inner=inner), moved)
+
+    def _judged(self, memory: Best, moved: Weights) -> tuple[Weights, Best]:
+        """After `every` episodes keep the weights, or go back."""
+        memory = memory._replace(episodes=memory.episodes + 1)
+        if memory.episodes % self.every:
             return moved, memory
         cost = self.confirm(moved.theta)
         if cost <= memory.cost:
             return moved, memory._replace(theta=moved.theta, w=moved.w, cost=cost)
         back = Weights(memory.theta, memory.w)
-        return back, memory._replace(inner=_Inner(self.rule).init(back))
+        return back, memory._replace(inner=self.rule.init(back))
 
 
 def undo(learner: Learner, confirm: Callable[[Vector], float], every: int = 1) -> Learner:
     """A learner that takes back what a rollout without noise finds worse: see `Undoing`."""
-    return replace(
-        learner, name=f"{learner.name} undone", rule=Undoing(learner.rule, confirm, every)
-    )
+    rule = Undoing(Projected(learner.rule, learner.bounds), confirm, every)
+    return replace(learner, name=f"{learner.name} undone", rule=rule)
 
 
 def judged_theta(weights: Weights) -> Vector:

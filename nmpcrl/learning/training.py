@@ -196,6 +196,7 @@ class _Trainer:
             try:
                 plan = controller.solve(state, weights.theta, warm_start, None, known)
             except SolverError as error:
+                weights = self.learner.interrupted(weights)
                 yield Step(episode, t, state, weights, nothing, failure=str(error), last=True)
                 return
             action = self.explore(plan.action, episode, t)
@@ -209,9 +210,11 @@ class _Trainer:
                     if constrained
                     else plan
                 )
-                transition = Transition(state, action, cost, next_state, solution, end, last, later)
+                transition = Transition(state, action, cost, next_state, solution, end, last, later,
+                                        first=t == 0)  # fmt: skip
                 update = self.learner.step(weights, transition)
             except SolverError as error:
+                weights = self.learner.interrupted(weights)
                 what = (state, weights, action, cost, plan, solution)
                 yield Step(episode, t, *what, failure=str(error), last=True)
                 return

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from nmpcrl.control import Nmpc, Problem, Task, differential_drive
+from nmpcrl.control import Nmpc, Problem, SolverError, Task, differential_drive
 from nmpcrl.learning import Exploration, Persistent, Transition, Weights, evaluate, train
 from nmpcrl.learning.bootstrap import Successor
 from nmpcrl.learning.gauss_newton import ClosedLoop, TrustRegion, closed_loop, lstd_q_within
@@ -121,6 +121,30 @@ def test_the_curvature_of_j_is_that_of_the_sensitivities(free):
     S = np.array(ends)  # (d, steps, n)
     wanted = 2 * np.einsum("itn,n,jtn->ij", S, free.nmpc.task.weights, S)
     np.testing.assert_allclose(curvature, wanted, rtol=5e-3, atol=1e-5 * np.abs(wanted).max())
+
+
+def test_an_episode_after_one_that_failed_or_was_left_is_as_it_is_alone(free, monkeypatch):
+    both = Exploration.draw(np.random.default_rng(1), (2, STEPS, 2), deviation=0.02)
+    alone = Exploration(both.noise[1:], both.scale[1:])
+    wanted = one_episode(free, THETA, alone)[1:]
+    held, solve, calls = Held(), Nmpc.solve, 0
+
+    def failing(*given, **more):  # which the plan of t = 4 meets, after seven solves a step
+        nonlocal calls
+        calls += 1
+        if calls in (29, 30):
+            raise SolverError("broken", np.zeros(3), THETA)
+        return solve(*given, **more)
+
+    monkeypatch.setattr(Nmpc, "solve", failing)
+    learner = closed_loop(free, held)
+    steps = list(train(learner, free, Weights(THETA, np.zeros(9)), both))
+    assert [step.time for step in steps if step.failure] == [4]
+    for found, right in zip((held.gradient, held.curvature), wanted, strict=True):
+        np.testing.assert_array_equal(found, right)
+    left = steps[2].weights
+    list(train(learner, free, left, alone))
+    np.testing.assert_array_equal(held.gradient, wanted[0])
 
 
 def test_gauss_newton_on_j_lowers_the_cost_of_the_robot(free):

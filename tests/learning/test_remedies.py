@@ -195,6 +195,45 @@ def test_undo_confirms_only_where_its_episodes_are_over(controller, transition, 
     assert len(judge.asked) == 3
 
 
+def test_undo_judges_an_episode_that_failed_as_any_other(controller, transition, weights):
+    """Whether it had a step or none, and under an average, too."""
+    for wrap in (lambda one: one, averaged):
+        judge = Judge(10.0, np.inf, 9.0, 8.0)
+        learner = wrap(undo(expected_sarsa(controller, 0.01), judge))
+        moved = learner.step(weights, transition(weights.theta)).weights
+        back = learner.interrupted(moved)
+        np.testing.assert_array_equal(back.theta, weights.theta)
+        kept = learner.interrupted(learner.step(back, transition(weights.theta)).weights)
+        assert not np.array_equal(kept.theta, weights.theta)
+        np.testing.assert_array_equal(learner.interrupted(kept).theta, kept.theta)
+        np.testing.assert_array_equal(
+            judge.asked, [weights.theta, moved.theta, kept.theta, kept.theta]
+        )
+
+
+@pytest.mark.parametrize("make", [expected_sarsa, lambda c, _: lstd_q(c)])
+def test_other_rules_learn_nothing_from_an_episode_that_failed(
+    controller, transition, weights, make
+):
+    learner = make(controller, 0.01)
+    moved = learner.step(weights, transition(weights.theta)).weights
+    for before in (weights, moved):
+        after = learner.interrupted(before)
+        np.testing.assert_array_equal(after.theta, before.theta)
+        np.testing.assert_array_equal(after.w, before.w)
+
+
+def test_what_is_undone_or_averaged_stays_within_the_bounds(controller, transition, weights):
+    judge, bounds = Judge(2.0, 1.0), (np.full(3, -1.5), np.ones(3))
+    base = replace(expected_sarsa(controller, 1.0), bounds=bounds)
+    one = replace(transition(weights.theta, cost=50.0), last=True)
+    for learner in (averaged(base), undo(base, judge), averaged(averaged(base))):
+        found = learner.step(weights, one).weights
+        np.testing.assert_array_equal(judged_theta(found), found.theta)
+        np.testing.assert_array_equal(found.theta, np.clip(found.theta, *bounds))
+    np.testing.assert_array_equal(judge.asked[-1], found.theta)
+
+
 def test_undo_that_never_has_to_is_the_learner(controller, transition, weights):
     base = expected_sarsa(controller, 0.01)
     given = [replace(transition(weights.theta, cost=c), last=True) for c in (1.0, -2.0, 4.0)]

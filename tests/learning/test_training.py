@@ -263,6 +263,29 @@ def test_a_second_solve_that_fails_twice_ends_the_episode_and_keeps_theta():
     np.testing.assert_array_equal(steps[2].solution.theta, steps[0].weights.theta)
 
 
+@pytest.mark.parametrize("failing", [(2, 3), (3, 4)])  # a plan, or the solve after it
+def test_the_learner_is_told_of_a_failed_episode_and_of_each_first_step(failing):
+    told = []
+
+    class Told:
+        def init(self, weights):
+            return None
+
+        def step(self, memory, weights, transition, delta, successor):
+            told.append(transition.first)
+            return weights, memory
+
+        def interrupted(self, memory, weights):
+            return dataclasses.replace(weights, theta=1.01 * weights.theta), memory
+
+    controller = Persistent(Faulty(lambda call: call in failing))
+    steps = training(controller, quiet(2, 3), lambda c: dataclasses.replace(es(c), rule=Told()))
+    assert told == [True, True, False, False]
+    failed = next(k for k, step in enumerate(steps) if step.failure)
+    for step in steps[failed:]:
+        np.testing.assert_array_equal(step.weights.theta, 1.01 * THETA)
+
+
 def test_ten_failed_episodes_in_a_row_are_a_divergence():
     controller = Persistent(Faulty(lambda call: True))
     steps = []
