@@ -22,9 +22,9 @@ PARTS: dict[
     "GES": LOOKS["GES"].line,
 }
 WITHOUT = {
-    "without h": "Without h",
-    "not projected": "Without projection",
-    "slow w": "With a slow w",
+    "without h": "Leaving out h",
+    "not projected": "Leaving out the projection",
+    "slow w": "Slowing w down",
 }
 
 
@@ -36,7 +36,7 @@ def step_of_w(runs: Mapping[float, RunSummary]) -> Figure:
         runs: by beta.
     """
     figure, axes = subplots(height=2.9)
-    first, lost = "", ""
+    name, first, stopped = r"$\beta\,\|\phi\|^2$", "", ""
     for (beta, run), line in zip(runs.items(), ("--", "-", ":"), strict=False):
         size = run.episodes["alpha_phi2"] * beta / run.name.alpha
         episode = np.arange(1, len(size) + 1)
@@ -44,13 +44,14 @@ def step_of_w(runs: Mapping[float, RunSummary]) -> Figure:
         axes.plot(episode, size, color=LOOKS["TDC"].color, linestyle=line, label=label)
         over = np.flatnonzero(size > OVERSHOOT)
         if over.size and not first:
-            first = f"With {label}, it passes {OVERSHOOT:g} in episode {over[0] + 1}"
-            lost = " and w is lost" if run.facts["stopped"] != Stopped.FINISHED else ""
+            first = f"With {label}, {name} passes {OVERSHOOT:g} in episode {over[0] + 1}"
+            if run.facts["stopped"] != Stopped.FINISHED:
+                stopped = ", and the run is stopped"
     axes.axhline(OVERSHOOT, **LIMIT)
-    axes.set(ylabel=r"largest $\beta\,\|\phi\|^2$", ylim=(0, 1.5 * OVERSHOOT))
+    axes.set(ylabel=f"largest {name}", ylim=(0, 1.5 * OVERSHOOT))
     over_episodes(axes)
     axes.legend(loc="lower right")
-    return headed(figure, f"{first}{lost}" if first else f"It stays below {OVERSHOOT:g}")
+    return headed(figure, f"{first}{stopped}" if first else f"{name} stays below {OVERSHOOT:g}")
 
 
 @page
@@ -73,9 +74,8 @@ def parts_of_tdc(runs: Mapping[str, RunSummary]) -> Figure:
     below(figure, *left.get_legend_handles_labels())
     moved = {name: _end(runs[name]) - _end(runs["TDC"]) for name in WITHOUT}
     most = max(moved, key=lambda name: abs(moved[name]))
-    side = "lower" if moved[most] < 0 else "higher"
-    end = f"TDC ends {abs(moved[most]):.1%} of the first cost {side}"
-    return headed(figure, f"{WITHOUT[most]}, {end}; no other part does more")
+    by = f"{'lowers' if moved[most] < 0 else 'raises'} the final cost by {abs(moved[most]):.1%}"
+    return headed(figure, f"{WITHOUT[most]} {by} of the first, more than the other two parts do")
 
 
 def _scientific(value: float) -> str:

@@ -39,7 +39,9 @@ def test_a_w_that_is_lost_is_named_with_its_episode():
     fast, slow = (replace(TDC, beta_tdc=beta) for beta in (2e-7, 1e-7))
     lost = run(fast, size=2.0, stopped="diverged: it went")  # beta ||phi||^2 is twice that
     figure = tdc.step_of_w({2e-7: lost, 1e-7: run(slow, size=1.9)})
-    assert title(figure).endswith("it passes 2 in episode 20 and w is lost")
+    assert title(figure).endswith(
+        r"$\beta\,\|\phi\|^2$ passes 2 in episode 20, and the run is stopped"
+    )
     (axes,) = figure.axes
     drawn = [
         line.get_ydata().max() for line in axes.get_lines() if len(line.get_xdata()) == EPISODES
@@ -48,13 +50,13 @@ def test_a_w_that_is_lost_is_named_with_its_episode():
 
 
 def test_a_w_that_keeps_is_named_too():
-    assert title(tdc.step_of_w({1e-7: run(TDC)})) == "It stays below 2"
+    assert title(tdc.step_of_w({1e-7: run(TDC)})) == r"$\beta\,\|\phi\|^2$ stays below 2"
 
 
 def test_the_part_that_moves_the_end_of_tdc_most_is_in_the_title():
     ends = {"TDC": 0.96, "without h": 0.92, "not projected": 0.97, "slow w": 0.95, "GES": 0.5}
     figure = tdc.parts_of_tdc({name: run(TDC, cost=cost) for name, cost in ends.items()})
-    assert title(figure).startswith("Without h, TDC ends 4.0% of the first cost lower")
+    assert title(figure).startswith("Leaving out h lowers the final cost by 4.0% of the first")
     assert set(ends) == set(tdc.PARTS)
     for axes in figure.axes:
         assert len(axes.get_lines()) == len(ends)
