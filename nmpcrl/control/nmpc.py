@@ -149,7 +149,7 @@ class Nmpc(Described):
             why = variant.diagnosis.why(state, theta, known)
             if not why:
                 raise
-            raise SolverError(f"{error.status}; {why}", state, theta) from error
+            raise type(error)(f"{error.status}; {why}", state, theta) from error
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""

@@ -24,6 +24,10 @@ class SolverError(RuntimeError):
         return type(self), (self.status, self.state, self.theta)
 
 
+class NoStartLeft(SolverError):
+    """The solver began anew by itself, from a standing start, too: to ask again is in vain."""
+
+
 class Status(StrEnum):
     """How an optimum was found."""
 

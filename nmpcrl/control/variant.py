@@ -40,7 +40,7 @@ class Variant:
         try:
             found = self._solver.solve(state / units.states, theta, begin, *scaled, **others)
         except SolverError as error:
-            raise SolverError(error.status, state, theta) from None
+            raise type(error)(error.status, state, theta) from None
         return units.outside(found, state)
 
     def _inside(self, solution: Solution) -> Solution:

@@ -8,12 +8,13 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc, Plant, Problem, Solution, SolverError
+from nmpcrl.control.solution import NoStartLeft
 from nmpcrl.learning.environment import Data, GymnasiumEnv, StepFunction, environment, forecasts
 
 
 @dataclass(frozen=True)
 class Persistent:
-    """An NMPC that tries a failed solve once more, from a standing start.
+    """An NMPC that tries a failed solve once more, from a standing start, unless its solver did so.
 
     With `train`, the one place that decides what a failed solve means.  # departure M
     """
@@ -43,6 +44,8 @@ class Persistent:
             if data is None:
                 return self.nmpc.solve(state, theta, warm_start, action)
             return self.nmpc.solve(state, theta, warm_start, action, data=data)
+        except NoStartLeft:
+            raise
         except SolverError:
             if warm_start is None:
                 raise

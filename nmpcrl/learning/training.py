@@ -125,7 +125,7 @@ def train(
 ) -> Iterator[Step]:
     """Algorithm 1: as many episodes, and at most as many steps, as `explore` has noise for.
 
-    A solve that fails twice ends the episode, and learning goes on from the next one.
+    A solve that fails ends the episode, and learning goes on from the next one: see `Persistent`.
 
     Args:
         learner: moves the weights.

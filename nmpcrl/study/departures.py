@@ -132,9 +132,9 @@ DEPARTURES = {
         " of the box, where Eq. (2) may have no solution.",
         reading="The box holds for the predicted states $1, \\dots, N$. riccati holds it by an"
         " exact penalty: where no plan can keep to the box, it returns one that leaves it least,"
-        " and records by how much. A solve that fails, as CasADi's solvers do there, is tried once"
-        " more from a standing start; then the episode ends, is recorded, and the next begins. Ten"
-        " such episodes in a row end the run.",
+        " and records by how much. CasADi's solvers fail there; a failed solve of theirs is tried"
+        " once more from a standing start, as riccati does by itself. Then the episode ends, is"
+        " recorded, and the next begins. Ten such episodes in a row end the run.",
         why="The paper does not say; this keeps what was learned and counts what failed.",
         variant="box = 'soft'",
     ),

@@ -173,7 +173,7 @@ class NmpcPolicy:
     """The NMPC with some theta as a policy of `RobotEnv`: observation -> action.
 
     It keeps its last plan as a warm start, and forgets it with `reset` and in another layout. A
-    failed solve is tried once more from a standing start, and then raised.
+    failed solve is tried from a standing start, too, and then raised.
     """
 
     def __init__(self, theta: Vector | None = None, **options: Any) -> None:

@@ -8,7 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from nmpcrl.control import Nmpc, SolverError, differential_drive
+from nmpcrl.control import Nmpc, Riccati, SolverError, differential_drive
+from nmpcrl.control.solvers.codes import End
+from nmpcrl.control.solvers.riccati import machine_code
 from nmpcrl.learning import Weights, expected_sarsa, frozen, q_learning
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import (
@@ -225,6 +227,28 @@ def test_a_standing_start_that_failed_is_not_repeated():
     with pytest.raises(SolverError):
         controller.solve(paper.task().start, THETA)
     assert len(controller.nmpc.warm_starts) == 1
+
+
+def test_riccati_has_begun_anew_by_itself_and_is_not_asked_again():
+    """After the warm start come a standing one and four random ones, each once."""
+    tried = []
+
+    def failing(plant):
+        code = machine_code(plant)
+
+        def solve(*given):
+            tried.append((given[-5], given[-2].tobytes()))  # the kind of start, and the point
+            value, iterations, _, violation, error = code.solve(*given)
+            return value, iterations, float(End.LIMIT), violation, error
+
+        return code._replace(solve=solve)
+
+    start = paper.task().start
+    warm_start = paper.nmpc().solve(start, THETA)
+    controller = Persistent(paper.nmpc(solver=Riccati(code=failing)))
+    with pytest.raises(SolverError, match="from 6 starts"):
+        controller.solve(start + 0.1, THETA, warm_start)
+    assert len(tried) == len(set(tried)) == 6
 
 
 def test_a_restart_keeps_the_action_that_was_fixed():

@@ -16,7 +16,7 @@ from nmpcrl.control.ocp import Ocp, ProblemOcp, TaskOcp
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.remembered import remembered
-from nmpcrl.control.solution import Solution, SolverError, check_shape
+from nmpcrl.control.solution import NoStartLeft, Solution, check_shape
 from nmpcrl.control.solvers import problem_stages
 from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
@@ -234,7 +234,7 @@ class Compiled(ABC):
                     violation,
                     data,
                 )
-        raise SolverError(
+        raise NoStartLeft(
             f"{Riccati.name} found no optimum from {restarts + 1} starts (the last"
             f" {ENDS[End(int(end))]} after {iterations:.0f} iterations with a relative error of"
             f" {error:.1e})",
