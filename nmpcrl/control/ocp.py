@@ -83,6 +83,11 @@ class Ocp(ABC):
         return -TIE if self.ties_active else TIE
 
     @property
+    def bound_prices(self) -> Vector:
+        """The most that a multiplier of a bound on z can be: what a unit beyond it costs."""
+        return np.full(self.lower.size, np.inf)
+
+    @property
     @abstractmethod
     def slack_weights(self) -> Any:
         """The cost of a unit of each slack of stage 0, a number or shape (M,)."""
@@ -110,6 +115,15 @@ class TaskOcp(Ocp):
     def slack_weights(self) -> float:
         """omega."""
         return self.slack_weight
+
+    @property
+    def bound_prices(self) -> Vector:
+        """omega gamma^i of a box that may be left."""
+        prices = super().bound_prices
+        if self.task.soft_box:
+            stages = np.arange(len(self.states))[:, None]
+            prices[self.states] = self.slack_weight * self.gamma**stages
+        return prices
 
     def settled(self, p: Vector) -> tuple[Any, Vector]:
         """All of them: Xi(s) + theta_c."""

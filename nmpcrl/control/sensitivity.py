@@ -46,7 +46,8 @@ class Sensitivity:
 
         With A the rows of the active constraints and bounds, the KKT conditions give (dz, dlam) as
         -K^-1 (L_z theta, A_theta) with K = [[L_zz, A'], [A, 0]]; the chain rule does the rest. A
-        constraint is active where its multiplier exceeds its distance (Nocedal and Wright 2006).
+        constraint is active where its multiplier exceeds its distance (Nocedal and Wright 2006);
+        a bound that may be left at a price, where what is left of the price does so as well.
 
         Raises:
             numpy.linalg.LinAlgError: K is singular, so the optimum is not a strict one.
@@ -66,7 +67,9 @@ class Sensitivity:
         ocp = self._ocp
         g, l_zz, l_zt, l_tt, g_z, g_t = (b.full() for b in self._second_derivatives(z, p, lam))
         row = ocp.equality | (lam > np.abs(g.ravel()))
-        bound = (-nu > np.abs(z - ocp.lower)) | (nu > np.abs(ocp.upper - z))
+        bound = np.full(z.size, False)
+        for multiplier, distance in ((-nu, np.abs(z - ocp.lower)), (nu, np.abs(ocp.upper - z))):
+            bound |= (multiplier > distance) & (ocp.bound_prices - multiplier > distance)
         active = np.vstack([g_z[row], np.eye(z.size)[bound]])
         active_t = np.vstack([g_t[row], np.zeros((bound.sum(), len(l_tt)))])
         kkt = np.block([[l_zz, active.T], [active, np.zeros((len(active), len(active)))]])
@@ -79,23 +82,26 @@ class Sensitivity:
         """The largest violation of the KKT conditions, 0 at an optimum.
 
         Stationarity counts relative to the largest multiplier; complementarity as the smaller of a
-        multiplier and its constraint's distance. Where it is to be `relative`, multipliers are
+        multiplier and its constraint's distance, or where a bound is left at a price, as what is
+        left of the price. Where it is to be `relative`, multipliers are
         taken in parts of the largest, and distances in parts of the largest variable.
         """
         ocp = self._ocp
         g, slope = (part.full().ravel() for part in self._conditions(z, p, lam))
         inequality, largest = ~ocp.equality, max(1.0, np.abs(lam).max(), np.abs(nu).max())
         slope = (slope + nu) / largest
-        lower, upper = ocp.lower, ocp.upper
+        lower, upper, prices = ocp.lower, ocp.upper, ocp.bound_prices
         if relative:
             lam, nu, size = lam / largest, nu / largest, max(1.0, np.abs(z).max())
+            prices = prices / largest
             z, g, lower, upper = z / size, g / size, lower / size, upper / size
+        below, above = np.maximum(-nu, 0), np.maximum(nu, 0)
         violations = (
             slope,
             g[ocp.equality],
             np.minimum(-g, lam)[inequality],
-            np.minimum(z - lower, np.maximum(-nu, 0)),
-            np.minimum(upper - z, np.maximum(nu, 0)),
+            np.maximum(np.minimum(z - lower, below), below - prices),
+            np.maximum(np.minimum(upper - z, above), above - prices),
         )
         return float(max(np.abs(violation).max(initial=0) for violation in violations))
 

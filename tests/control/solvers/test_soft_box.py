@@ -120,11 +120,13 @@ def test_the_value_is_what_the_plan_costs_and_what_leaving_the_box_costs():
         assert solution.value == pytest.approx(discount @ costs, rel=1e-9)
 
 
-def test_the_violation_still_says_how_far_the_box_is_left():
+def test_a_plan_that_leaves_the_box_is_optimal_and_says_how_far_it_is_left():
     nmpc, left = soft(3.0, 6.0), 0
     for solution in drawn(nmpc, 12, seed=62):
         furthest = beyond(nmpc, solution).max()
         assert solution.violation == pytest.approx(furthest, abs=1e-9)
+        assert nmpc.kkt_residual(solution) < 1e-5
+        assert nmpc.kkt_residual(solution, relative=True) < 1e-5
         left += furthest > 1e-2
     assert left >= 4
 
@@ -163,8 +165,10 @@ def test_the_product_with_the_hessian_is_the_difference_of_the_features_outside_
         scale = np.abs(slopes[0]).max()
         if np.abs(slopes[0] - slopes[1]).max() > 1e-5 * scale:  # a kink lies between
             continue
-        product = nmpc.value_hessian_times(solution, along)
-        np.testing.assert_allclose(product, slopes[0], atol=1e-5 * scale)
+        for product in (
+            nmpc.value_hessian_times(solution, along), nmpc.value_hessian(solution) @ along,
+        ):  # fmt: skip
+            np.testing.assert_allclose(product, slopes[0], atol=1e-5 * scale)
         compared += solution.violation > 1e-3
     assert compared >= 4
 
