@@ -7,6 +7,7 @@ the constraints. That order is the block structure which a structure-exploiting 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -79,12 +80,15 @@ class Ocp(ABC):
 
     @property
     def tie(self) -> float:
-        """A start whose Xi + theta_c exceeds this is in the obstacle, not on its boundary."""
+        """A start whose Xi + theta_c exceeds this is in the obstacle, not on its boundary.
+
+        Of a `Problem`, in parts of a row's own size.
+        """
         return -TIE if self.ties_active else TIE
 
     @property
     def bound_prices(self) -> Vector:
-        """The most that a multiplier of a bound on z can be: what a unit beyond it costs."""
+        """What a unit beyond each bound on z costs, the most that its multiplier can be."""
         return np.full(self.lower.size, np.inf)
 
     @property
@@ -93,8 +97,8 @@ class Ocp(ABC):
         """The cost of a unit of each slack of stage 0, a number or shape (M,)."""
 
     @abstractmethod
-    def settled(self, p: Vector) -> tuple[Any, Vector]:
-        """The rows of stage 0 that no plan can change: which of the M, and h of those."""
+    def settled(self, p: Vector) -> tuple[Any, Vector, Any]:
+        """The rows of stage 0 that no plan can change: which of the M, h and the tie of those."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,10 +129,10 @@ class TaskOcp(Ocp):
             prices[self.states] = self.slack_weight * self.gamma**stages
         return prices
 
-    def settled(self, p: Vector) -> tuple[Any, Vector]:
+    def settled(self, p: Vector) -> tuple[Any, Vector, Any]:
         """All of them: Xi(s) + theta_c."""
         n, last = self.plant.n, self.plant.n + self.theta.numel()
-        return slice(None), self.task.overlap(p[:n]) + p[last - 1]
+        return slice(None), self.task.overlap(p[:n]) + p[last - 1], self.tie
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,10 +152,11 @@ class ProblemOcp(Ocp):
         """W, shape (M,)."""
         return self.problem.weights
 
-    def settled(self, p: Vector) -> tuple[Any, Vector]:
+    def settled(self, p: Vector) -> tuple[Any, Vector, Any]:
         """Those without u; all where u_0 is fixed. One that does not hold there is at -1."""
         (which,) = np.nonzero(self.settled_rows)
-        return which, self._start_rows(p).full().ravel()[which]
+        rows, sizes = (one.full().ravel()[which] for one in self._start_rows(p))
+        return which, rows, self.tie * sizes
 
     @property
     def settled_rows(self) -> NDArray[np.bool_]:
@@ -161,11 +166,14 @@ class ProblemOcp(Ocp):
 
     @cached_property
     def _start_rows(self) -> ca.Function:
-        rows = self.constraints[self.obstacles[0].tolist()]
-        slacks = self.variables[self.slacks[0].tolist()]
-        others = self.variables[self.inputs[0].tolist()]
-        at_start = ca.substitute(rows + slacks, others, ca.SX.zeros(others.shape))
-        return ca.Function("start_rows", [self.parameters], [ca.densify(at_start)])
+        of, fixed = self.problem, self.fixed_action.size
+        ends = np.cumsum([0, of.states, of.names.size, fixed, of.data_names.size]).tolist()
+        s, theta, a, d = (self.parameters[i:j] for i, j in pairwise(ends))
+        e, given = of.expressions, a if fixed else ca.SX.zeros(of.inputs)
+        rows = ca.Function("rows", [e.x, e.u, e.theta, e.d], [e.rows, of.row_sizes])
+        h, sizes = rows(s, given, theta, d)
+        held = ca.vertcat(ca.SX(0, 1), *(h[j] if on else -1 for j, on in enumerate(of.active[0])))
+        return ca.Function("start_rows", [self.parameters], [ca.densify(held), sizes])
 
 
 def transcribe(

@@ -25,7 +25,7 @@ from nmpcrl.control.expression import expression
 from nmpcrl.control.vectors import kept, whole
 
 SMALL, LARGE = 1e-2, 1e4  # sizes of states that every solver takes as they are
-LEAST = 1e-200  # curvature
+LEAST = 1e-200  # curvature, or slope
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +177,16 @@ class Problem(Described):
         curvature, slope = self._bends
         found = max(np.abs(curvature).max() / 2, np.abs(slope).max())
         return float(found) if 0 < found < np.inf else 1.0
+
+    @cached_property
+    def row_sizes(self) -> ca.SX:
+        """The size of each row, its slope along `sizes`, or 1 between `SMALL` and `LARGE`."""
+        e = self.expressions
+        slopes = ca.jacobian(e.rows, ca.vertcat(e.x, e.u))
+        found = ca.densify(ca.mtimes(ca.fabs(slopes), ca.DM(np.concatenate(self.sizes))))
+        usual = ca.logic_and(found > SMALL, found < LARGE)
+        unknown = ca.logic_not(found < 1 / LEAST)  # or nan
+        return ca.if_else(ca.logic_or(usual, unknown), 1, found + LEAST)
 
     @cached_property
     def solved(self) -> "Problem":

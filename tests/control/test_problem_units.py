@@ -138,3 +138,24 @@ def test_a_parameter_may_be_as_large_as_it_starts():
     assert Nmpc(problem).solve(STATE, problem.theta).value > 0
     with pytest.raises(ValueError, match=r"theta .* of size at most 7.2e\+13"):
         Nmpc(problem).solve(STATE, problem.theta * 1e4)
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=lambda one: one.name)
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-7, 1e3])
+@pytest.mark.parametrize("of", ["a state of that unit", "a state", "an input"])
+def test_on_which_side_of_a_row_a_start_lies_does_not_depend_on_its_unit(solver, unit, of):
+    """dV/dm has the price where h is 0.4 units; where it is 0, as `ties_active` says."""
+    size, given = (unit if "that unit" in of else 1.0), of == "an input"
+    problem = Problem(
+        states=1, inputs=1, horizon=3, theta={"m": 0.5}, lower=-1.0, upper=1.0, scale=size,
+        model=lambda x, u, th: x + size * u,
+        stage=lambda x, u, th: ca.sumsqr(x / size) + ca.sumsqr(u),
+        soft=[Soft(lambda x, u, th: unit * (th["m"] - (u if given else x / size)),
+                   weight=10.0 / unit, stages=[0])],
+    )  # fmt: skip
+    for active in (False, True):
+        nmpc = Nmpc(problem, solver=solver, ties_active=active)
+        for beyond, price in ((0.4, 10.0), (0.0, 10.0 * active), (-0.4, 0.0)):
+            start = np.array([0.5 - beyond])
+            found = nmpc.solve(size * start, problem.theta, action=start if given else None)
+            assert found.features == pytest.approx(price)

@@ -35,6 +35,11 @@ def path_rows(x: Any, u: Any, theta: Any, d: Any, h_: Any) -> None:
     raise NotImplementedError
 
 
+def row_sizes(x: Any, u: Any, theta: Any, d: Any, size_: Any) -> None:
+    """The size of each row, see `Problem.row_sizes`."""
+    raise NotImplementedError
+
+
 def last_rows(x: Any, theta: Any, d: Any, h_: Any) -> None:
     """h at stage N, where there is no u; 0 for rows that depend on it."""
     raise NotImplementedError

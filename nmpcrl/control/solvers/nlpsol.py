@@ -200,9 +200,9 @@ class Program:
         theta_c is omega inside an obstacle and 0 outside. On the boundary any number in between
         satisfies KKT and each solver returns another; here it is 0.  # departure L
         """
-        which, beyond = self._ocp.settled(p)
+        which, beyond, ties = self._ocp.settled(p)
         weights = np.broadcast_to(self._ocp.slack_weights, self._ocp.slacks.shape[1:])[which]
-        inside = beyond > self._ocp.tie
+        inside = beyond > ties
         lam[self._ocp.obstacles[0][which]] = np.where(inside, weights, 0.0)
         nu[self._ocp.slacks[0][which]] = np.where(inside, 0.0, -weights)
 

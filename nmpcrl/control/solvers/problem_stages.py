@@ -109,6 +109,7 @@ def functions(problem: Problem) -> list[ca.Function]:
         _function("terminal_cost", end, {"cost": e.terminal}),
         _function("initial_cost", end, {"cost": e.initial}),
         _function("path_rows", point, {"h": e.rows}),
+        _function("row_sizes", point, {"size": problem.row_sizes}),
         _function("last_rows", end, {"h": at_end}),
         _function("expand_stage", held, expand),
         _function("expand_last", end_held, expand_last),

@@ -21,6 +21,7 @@ from .expressions import (
     last_gradient,
     last_rows,
     path_rows,
+    row_sizes,
     stage_cost,
     stage_gradient,
     terminal_cost,
@@ -261,10 +262,12 @@ def initialise_rows(task, point, duals, start, mu, factor, warm_start):
 @inlined
 def settle(task, point, tie, h, held):
     """h of the rows of stage 0, and the multipliers of those that no plan can change."""
+    size = np.empty(NROWS)
     path_rows(point.x[0], point.u[0], task.theta, task.data[0], h)
+    row_sizes(point.x[0], point.u[0], task.theta, task.data[0], size)
     for j in range(NROWS):
         if task.kind[0, j] == SETTLED:
-            held[j] = task.weights[0, j] if h[j] > tie else 0.0
+            held[j] = task.weights[0, j] if h[j] > tie * size[j] else 0.0
 
 
 @inlined

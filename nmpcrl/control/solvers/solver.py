@@ -59,7 +59,7 @@ class Solver(ABC):
 
     @property
     def described(self) -> tuple[str, ...]:
-        """What a key says of it besides name and tolerance: fields that are not the usual ones."""
+        """The fields besides the tolerance that are not the default, for a key."""
         kind, fields = type(self), {n: v for n, v in vars(self).items() if n != "tolerance"}
         changed = {n: v for n, v in fields.items() if v is not getattr(kind, n, fields)}
         return (repr(content([kind, changed])),) if changed or not is_ours(kind) else ()

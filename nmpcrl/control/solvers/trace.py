@@ -125,7 +125,7 @@ def _settled(ocp: TaskOcp | ProblemOcp, state: Vector, theta: Vector, data: Matr
         return float(ocp.slack_weight * beyond)
     e, known = ocp.problem.expressions, ocp.problem.data if data is None else data
     initial = ca.Function("initial", [e.x, e.theta, e.d], [e.initial])(state, theta, known[0])
-    which, rows = ocp.settled(np.concatenate([state, theta, known.ravel()]))
+    which, rows, _ = ocp.settled(np.concatenate([state, theta, known.ravel()]))
     return float(initial) + float(ocp.slack_weights[which] @ np.maximum(0, rows))
 
 
