@@ -12,7 +12,8 @@ from nmpcrl import Vector
 from nmpcrl.analysis.trap import Stand, stretch
 from nmpcrl.claims.population_questions import STANDING
 from nmpcrl.control import Task
-from nmpcrl.report.figures.axes import draw_task, over_episodes
+from nmpcrl.report.figures.axes import MAPS, draw_task, over_episodes
+from nmpcrl.report.figures.sheet import sheet
 from nmpcrl.report.figures.style import (
     BAND,
     INK,
@@ -96,9 +97,10 @@ def cliffs(
         best: theta_c of the best theta, by layout.
         raised: the largest share of the best cost that 2 % more of it adds.
     """
-    rows = -(-len(costs) // 3)
-    options: dict[str, Any] = {"sharex": True, "squeeze": False, "across": 2}
-    figure, axes = subplots(rows, min(3, len(costs)), 1.9 * rows + 0.6, **options)
+    columns = min(MAPS[sheet().narrow], len(costs))
+    rows = -(-len(costs) // columns)
+    options: dict[str, Any] = {"sharex": True, "squeeze": False, "across": columns}
+    figure, axes = subplots(rows, columns, 1.9 * rows + 0.6, **options)
     for panel, (layout, (along_best, along_init)) in zip(axes.flat, costs.items(), strict=False):
         panel.plot(grid, along_init / 1000, label=r"all else as $\theta_\mathrm{init}$", **FIRST)
         panel.plot(grid, along_best / 1000, label="all else best", **BEST)

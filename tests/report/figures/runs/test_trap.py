@@ -7,6 +7,7 @@ import pytest
 
 from nmpcrl.analysis.trap import Stand
 from nmpcrl.report.figures.runs import trap as figures
+from nmpcrl.report.figures.sheet import NARROW
 from nmpcrl.study import paper
 
 WAY = np.array([[-2.5, 1.5, 0.0], [2.0, 2.0, 0.0]])
@@ -60,3 +61,17 @@ def test_every_layout_has_its_two_lines_and_its_best_theta_c(texts):
         assert along[:, 1].tolist() == [4.0, 4.0, 7.0]
         assert border[0, 0] == where
     assert figure.axes[0].get_lines()[0].get_ydata()[2] == 14.0
+
+
+def test_on_a_narrow_sheet_layouts_are_read_in_order_and_each_column_has_its_ticks():
+    costs, best = dict.fromkeys("ABCDEF", (COSTS, COSTS)), dict.fromkeys("ABCDEF", 0.3)
+    wide = figures.cliffs(np.array([0.0, 0.2, 0.4]), costs, best, 0.004)
+    narrow = wide.again(NARROW)
+    narrow.draw_without_rendering()
+    at = [axes.get_subplotspec() for axes in narrow.axes]
+    assert [(one.rowspan.start, one.colspan.start) for one in at] == [
+        (i // 2, i % 2) for i in range(6)
+    ]
+    shown = [any(one.get_visible() and one.get_text() for one in axes.get_xticklabels())
+             for axes in narrow.axes]  # fmt: skip
+    assert shown[-2:] == [True, True]
