@@ -47,11 +47,13 @@ class Answer:
     outcome: Outcome
     counts: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # yes of layouts, by part
     numbers: Mapping[str, float] = field(default_factory=dict)
+    beside: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # decides nothing
+    said: str = ""  # of the outcome, where its own word says another thing than the rule did
 
     @property
     def words(self) -> str:
         """The outcome as a page says it."""
-        return WORDS.get(self.outcome, str(self.outcome))
+        return self.said or WORDS.get(self.outcome, str(self.outcome))
 
 
 def by_share(
@@ -188,7 +190,9 @@ def predictors(scores: pd.DataFrame) -> Answer:
         outcome = NOT
     if not np.isfinite(lows).all():
         outcome = UNDECIDABLE
-    return Answer("predictors", outcome, numbers={name: e.value for name, e in ahead.items()})
+    numbers = {name: e.value for name, e in ahead.items()}
+    beside = {"other measures surely behind": (sum(low > 0 for low in lows), len(lows))}
+    return Answer("predictors", outcome, numbers=numbers, beside=beside)
 
 
 def _predictors(difficulty: pd.DataFrame, tuned: pd.Series, judged: pd.Series) -> Answer:
@@ -289,8 +293,8 @@ def early_overshoot(runs: pd.DataFrame) -> Answer:
         outcome = REPRODUCED
     elif min(one.high for one in known) < MAJORITY:
         outcome = NOT
-    runs_stopped = {"stopped": (len(stopped), len(rdes))}
-    return Answer("early overshoot", outcome, counts | runs_stopped)
+    runs_stopped = {"runs stopped": (len(stopped), len(rdes))}
+    return Answer("early overshoot", outcome, counts, beside=runs_stopped)
 
 
 def cliff(raised: pd.Series) -> Answer:

@@ -43,6 +43,7 @@ COLUMNS = (
     "seconds",  # of processor time
 )  # fmt: skip
 NEARLY = 0.9  # of the possible gain, in "search nears the best"
+NO_DIFFERENCE = "no difference shown"  # an interval that holds 0 confirms nothing in part
 UNTUNED = "frozen"  # the control, on which nothing is advised
 
 
@@ -291,4 +292,6 @@ def _difference(table: pd.DataFrame, part: str, entries: tuple[str, str], name: 
     found = gain(more)
     outcome: Outcome = REPRODUCED if found.low > 0 else NOT if found.high < 0 else PARTLY
     numbers = {"difference": found.value, "low": found.low, "high": found.high}
-    return Answer(name, outcome, {"layouts": (int((more > 0).sum()), len(more))}, numbers)
+    beside = {"layouts with more": (int((more > 0).sum()), len(more))}
+    said = NO_DIFFERENCE if outcome == PARTLY else ""
+    return Answer(name, outcome, numbers=numbers, beside=beside, said=said)

@@ -67,7 +67,8 @@ def answer(tried: pd.DataFrame) -> Answer:
     found = int((tried.whole == len(PICTURE)).sum())
     numbers = {"tried": float(len(tried)), "most": float(tried.whole.max())}
     outcome = REPRODUCED if found else NOT
-    return Answer("whole picture", outcome, {"whole": (found, len(tried))}, numbers)
+    beside, said = {"settings": (found, len(tried))}, "found by search" if found else ""
+    return Answer("whole picture", outcome, numbers=numbers, beside=beside, said=said)
 
 
 def _drawn_settings(runs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:

@@ -113,8 +113,9 @@ def _crowding(inside: pd.Series) -> Answer:
     low, high = np.nanquantile([_correlation(one) for one in drawn], [0.025, 0.975])
     outcome: Outcome = REPRODUCED if low > 0 else NOT if high < 0 else PARTLY
     numbers = {"correlation": _correlation(pairs), "low": float(low), "high": float(high)}
-    return Answer("crowding", outcome, {"scenarios": (int((inside > 0).sum()), len(inside))},
-                  numbers)  # fmt: skip
+    beside = {"scenarios with any": (int((inside > 0).sum()), len(inside))}
+    said = "no correlation shown" if outcome == PARTLY else ""
+    return Answer("crowding", outcome, numbers=numbers, beside=beside, said=said)
 
 
 def _correlation(pairs: np.ndarray) -> float:
@@ -254,8 +255,8 @@ def _carried(table: pd.DataFrame) -> Answer:
     return by_share("carried over", better["ES"] > 0.5, "layouts", numbers)
 
 
-def improves_with(table: pd.DataFrame) -> pd.DataFrame:
-    """Whether ES improves under every seed, by layout and terminal cost.
+def solved_with(table: pd.DataFrame) -> pd.DataFrame:
+    """Whether ES ends at the target at a lower cost under every seed, by layout and terminal cost.
 
     Args:
         table: with `world_runs.COLUMNS`.
@@ -270,11 +271,11 @@ def terminal(table: pd.DataFrame) -> Iterable[Answer]:
     Args:
         table: with `world_runs.COLUMNS`.
     """
-    improves, costs = improves_with(table), means(table, "terminal")
+    solved, costs = solved_with(table), means(table, "terminal")
     paper_s, full, learned = ARMS
     for name, arm in (("full terminal cost", full), ("learned terminal cost", learned)):
         known = costs[[paper_s, arm]].dropna().index
-        failing = improves.loc[known][~improves.loc[known, paper_s]]
+        failing = solved.loc[known][~solved.loc[known, paper_s]]
         yield by_share(name, ~failing[arm], "layouts")
     ratio = (costs[learned] / costs[paper_s]).dropna()
     yield by_share("a richer terminal cost pays", ratio < 1, "layouts",

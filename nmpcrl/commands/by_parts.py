@@ -125,7 +125,8 @@ def say_answers(answers: Iterable[Any], questions: Mapping[str, Any] | None = No
     from nmpcrl.claims.population_questions import WORDS
 
     for answer in answers:
-        said = ", ".join(f"{yes} of {of} {name}" for name, (yes, of) in answer.counts.items())
+        counts = {**answer.counts, **answer.beside}
+        said = ", ".join(f"{yes} of {of} {name}" for name, (yes, of) in counts.items())
         click.echo(f"{answer.question}: {answer.words} ({said})")
         expected = questions[answer.question].expected if questions else answer.outcome
         if expected != answer.outcome:

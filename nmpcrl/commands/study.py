@@ -108,7 +108,8 @@ def _judge_population() -> None:
         where = f"{row.holding} of {row.layouts} layouts, {interval}"
         click.echo(f"{row.claim}: {where}; {row.outcome}")
     for answer in found.answers():
-        counts = ", ".join(f"{name} {yes} of {of}" for name, (yes, of) in answer.counts.items())
+        every = {**answer.counts, **answer.beside}
+        counts = ", ".join(f"{name} {yes} of {of}" for name, (yes, of) in every.items())
         click.echo(f"{answer.question}: {answer.words}" + (f" ({counts})" if counts else ""))
 
 

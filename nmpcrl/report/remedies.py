@@ -66,7 +66,9 @@ def advice_table(advice: Iterable[Advice], caption: str) -> str:
         advice: of `remedies.advice`, in its order.
         caption: of the table.
     """
-    header = ("Entry", "Try it", *(f"With {PARTS[part].budget} episodes" for part in ADVISED))
+    judged = (PARTS[part] for part in ADVISED)
+    budgets = (f"With {one.budget} episodes (seeds a layout: {one.seeds})" for one in judged)
+    header = ("Entry", "Try it", *budgets)
     return html_table(caption, header, map(_cells, advice), headed=True)
 
 
@@ -211,10 +213,12 @@ def answer_items(
     Args:
         answers: in the order in which they are shown.
         questions: that they answer, by name; those on remedies unless said.
-        expected: whether to say which outcome was expected, where it is another.
+        expected: whether to say of what it is asked, and which outcome was expected, where it is
+            another.
     """
     return "\n".join(
-        _item(one, asked) + _otherwise(one, asked) * expected
+        _item(one, asked, f" *Asked of {asked.asked_of}.*" * expected)
+        + _otherwise(one, asked) * expected
         for one, asked in ((one, questions[one.question]) for one in answers)
     )
 
@@ -225,15 +229,18 @@ def _otherwise(answer: Answer, asked: Question) -> str:
     return f" Expected: {WORDS.get(asked.expected, asked.expected)}." if other else ""
 
 
-def _item(answer: Answer, asked: Question) -> str:
-    pilot = f" The pilot: “{asked.pilot}”" if asked.pilot else ""
+def _item(answer: Answer, asked: Question, of_what: str) -> str:
+    """The pilot and the question; the outcome, what decided it, and what stands beside that."""
+    pilot = f"The pilot: “{asked.pilot}” " if asked.pilot else ""
     said = [f"{yes} of {of} {name}{_bounds(yes, of)}" for name, (yes, of) in answer.counts.items()]
-    if "difference" in answer.numbers:
-        found = Estimate(*(answer.numbers[name] for name in ("difference", "low", "high")))
-        said.append(f"the difference is {share_shown(found)}")
+    for name in ("difference", "correlation"):
+        if name in answer.numbers:
+            found = Estimate(*(answer.numbers[one] for one in (name, "low", "high")))
+            said.append(f"the {name} is {share_shown(found)}")
+    said += [f"{yes} of {of} {name}" for name, (yes, of) in answer.beside.items()]
     said += [f"{entry} has {', '.join(each)}" for entry, each in _by_layout(answer.numbers).items()]
     because = f": {'; '.join(said)}" if said else ""
-    return f"- **{asked.question}** {answer.words.capitalize()}{because}.{pilot}"
+    return f"- {pilot}**{asked.question}**{of_what} {answer.words.capitalize()}{because}."
 
 
 def _bounds(yes: int, of: int) -> str:

@@ -157,7 +157,7 @@ def test_early_overshoot_is_of_the_runs_that_were_stopped():
     rows += [made("judge", "RDES", name, decay="step") for name in NAMES]
     answer = population.early_overshoot(table(rows))
     assert answer.outcome == REPRODUCED
-    assert answer.counts["stopped"] == (20, 20)
+    assert answer.beside == {"runs stopped": (20, 20)}
     late = [row | {"steps_done": 100 * 130} for row in rows]
     assert population.early_overshoot(table(late)).outcome == NOT
 

@@ -202,11 +202,18 @@ def test_the_grid_is_asked_only_where_the_robot_arrives():
 
 
 @pytest.mark.parametrize(
-    ("more", "outcome"), [(0.1, REPRODUCED), (-0.1, NOT), (np.tile([0.1, -0.1], 10), PARTLY)]
+    ("more", "outcome", "words"),
+    [
+        (0.1, REPRODUCED, "confirmed"),
+        (-0.1, NOT, "contradicted"),
+        (np.tile([0.1, -0.1], 10), PARTLY, "no difference shown"),
+    ],
 )
-def test_a_difference_is_read_by_its_interval(more, outcome):
+def test_a_difference_is_read_by_its_interval_and_confirms_nothing_in_part(more, outcome, words):
     found = table(block("GES", gains=0.5), block("GES-3", gains=0.5 + more))
-    assert answer(found, "faster auxiliary weights").outcome == outcome
+    one = answer(found, "faster auxiliary weights")
+    assert (one.outcome, one.words, one.counts) == (outcome, words, {})
+    assert sum(yes for yes, _ in one.beside.values()) == np.sum(np.resize(more, 20) > 0)
 
 
 def test_who_fails_together_does_not_differ():

@@ -53,5 +53,6 @@ def test_the_nearest_comes_first_and_only_a_whole_one_confirms(tried):
     assert whole_picture.answer(some).outcome == NOT
     assert whole_picture.answer(some).numbers == {"tried": 2.0, "most": 3.0}
     found = whole_picture.answer(pd.DataFrame({"whole": [4, 1]}))
-    assert (found.outcome, found.counts) == (REPRODUCED, {"whole": (1, 2)})
+    assert (found.outcome, found.beside) == (REPRODUCED, {"settings": (1, 2)})
+    assert found.words == "found by search"
     assert whole_picture.answer(some[:0]).outcome == UNDECIDABLE

@@ -40,7 +40,7 @@ def test_what_is_published_is_judged_and_what_is_missing_is_left_undecided(comma
     assert "C9: 1 of 1 layouts, 100%" in judged.output
     assert "predictors: not decidable here" in judged.output
     tried = population_published.load().tried
-    assert f"whole picture: contradicted (whole 0 of {len(tried)})" in judged.output
+    assert f"whole picture: contradicted (settings 0 of {len(tried)})" in judged.output
     assert (~tried.layout.isin([*"ABCDEF"])).sum() == 2
 
 

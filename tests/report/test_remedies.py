@@ -23,6 +23,7 @@ from nmpcrl.claims.remedy_questions import (
     SETTINGS,
 )
 from nmpcrl.claims.verdict import NOT, REPRODUCED
+from nmpcrl.claims.world_questions import WORLD_QUESTIONS
 from nmpcrl.report import remedies
 from nmpcrl.report.remedies import (
     COLOURS,
@@ -161,6 +162,21 @@ def test_an_answer_stands_beside_its_pilot():
     assert "The pilot" not in second
 
 
+def test_what_decides_comes_before_what_stands_beside_it():
+    numbers = {"correlation": 0.35, "low": 0.02, "high": 0.6}
+    one = Answer("crowding", REPRODUCED, numbers=numbers, beside={"scenarios with any": (21, 40)})
+    said = answer_items([one], WORLD_QUESTIONS, expected=True)
+    assert "Confirmed: the correlation is 0.35 [0.02, 0.60]; 21 of 40 scenarios with any." in said
+    assert WORLD_QUESTIONS["crowding"].asked_of in said
+
+
+def test_two_questions_with_the_same_words_are_told_apart():
+    charts = [Answer(name, NOT) for name in WORLD_QUESTIONS if name.startswith("a chart")]
+    cost, error = answer_items(charts, WORLD_QUESTIONS, expected=True).splitlines()
+    assert "chart on the cost" in cost
+    assert "|delta|" in error
+
+
 def test_an_answer_that_was_not_expected_says_which_one_was():
     both = [Answer("guard", one, {"layouts": (14, 15)}) for one in (REPRODUCED, NOT)]
     same, other = answer_items(both, expected=True).splitlines()
@@ -180,7 +196,7 @@ def test_an_answer_says_what_it_knows_of_single_layouts():
 
 def test_an_answer_without_counts_is_a_word():
     said = answer_items([Answer("guard", NOT), Answer("guard", NOT, {"layouts": (0, 0)})])
-    assert [line.split("** ")[1].split(" The pilot")[0] for line in said.splitlines()] == [
+    assert [line.split("** ")[1] for line in said.splitlines()] == [
         "Contradicted.", "Contradicted: 0 of 0 layouts."
     ]  # fmt: skip
 
