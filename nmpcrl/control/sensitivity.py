@@ -4,15 +4,28 @@ With the Lagrangian L(z, lam, nu; p) = f + lam' g + nu' z of Eq. (2), the envelo
 the derivative of the optimal value is the *partial* derivative of L: how z moves does not matter to
 first order (Fiacco 1983; Gros and Zanon 2020). How z moves does matter to second order, and the
 implicit function theorem on the KKT conditions supplies it.
+
+Where more rows and bounds are active than the inputs can follow, the plan has a kink. The value's
+gradient then lies between those of the two sides, and every other derivative is that of one side:
+theta + t (1, ..., 2) for a small t > 0, where all parameters grow, the last twice as fast as the
+first. The multipliers of that side are those of largest growth along it, a linear program.
 """
 
+from contextlib import suppress
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
+from scipy.linalg import qr
+from scipy.optimize import linprog
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.ocp import Ocp
+
+DEPENDENT = 1e-9  # of the largest: less is left of an active gradient beside the others
+INACTIVE = 1e-6  # of itself: less is left of a multiplier on the side that is taken
+PULLED = 1e-6  # of the largest pull of a parameter: more of it is left where no step answers it
+STIFF, FLAT = 1e6, 1e-8  # an active row and no curvature, in parts of the largest curvature
 
 
 def lagrangian(ocp: Ocp) -> tuple[ca.SX, ca.SX]:
@@ -50,7 +63,8 @@ class Sensitivity:
         a bound that may be left at a price, where what is left of the price does so as well.
 
         Raises:
-            numpy.linalg.LinAlgError: K is singular, so the optimum is not a strict one.
+            numpy.linalg.LinAlgError: K is singular on every side: a direction in which theta pulls
+                has no curvature.
         """
         l_tt, right, moved = self._moved(z, p, lam, nu)
         result: Matrix = l_tt - right.T @ moved
@@ -72,9 +86,36 @@ class Sensitivity:
             bound |= (multiplier > distance) & (ocp.bound_prices - multiplier > distance)
         active = np.vstack([g_z[row], np.eye(z.size)[bound]])
         active_t = np.vstack([g_t[row], np.zeros((bound.sum(), len(l_tt)))])
+        if _dependent(active):
+            held, multipliers = _one_side(
+                active, active_t, np.concatenate([lam[row], nu[bound]]), ocp.equality[row]
+            )
+            lam = lam.copy()
+            lam[row] = multipliers[: row.sum()]
+            _, l_zz, l_zt, l_tt, _, _ = (b.full() for b in self._second_derivatives(z, p, lam))
+            active, active_t = active[held], active_t[held]
         kkt = np.block([[l_zz, active.T], [active, np.zeros((len(active), len(active)))]])
         right = np.vstack([l_zt, active_t])
-        return l_tt, right, np.linalg.solve(kkt, right)
+        return l_tt, right, _solved(kkt, right)
+
+    def is_minimum(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> bool:
+        """Whether the optimum is a strict minimum: the Lagrangian curves up wherever inputs lead.
+
+        By the Riccati recursion, in which active rows and bounds are springs; true where no
+        curvature can be had.
+        """
+        ocp, N = self._ocp, len(self._ocp.inputs)
+        g, bends, end, *others = self._stages(z, p, lam)
+        size = float(ca.fmax(ca.norm_inf(ca.vec(bends)), ca.norm_inf(ca.vec(end))))
+        if not 0 < size < np.inf:
+            return bool(size)  # inf: true
+        rows = (lam > np.abs(g.full().ravel()))[ocp.obstacles] & (-nu > z)[ocp.slacks]
+        bounds = (-nu > np.abs(z - ocp.lower)) | (nu > np.abs(ocp.upper - z))
+        bounds[ocp.inputs[: int(ocp.fixed_action.size > 0)]] = True
+        springs = STIFF * size * np.hstack([bounds[ocp.inputs], bounds[ocp.states[:N]], rows[:N]])
+        final = STIFF * size * np.append(bounds[ocp.states[N]], rows[N])
+        least = self._recursion(bends, end, *others, springs[::-1].T, final)
+        return float(least) > FLAT * size
 
     def kkt_residual(
         self, z: Vector, p: Vector, lam: Vector, nu: Vector, *, relative: bool = False
@@ -123,3 +164,98 @@ class Sensitivity:
             ca.jacobian(ocp.constraints, ocp.theta),
         ]
         return ca.Function("second_derivatives", self._arguments, blocks)
+
+    @cached_property
+    def _stages(self) -> ca.Function:
+        """g, L'' in (u, x) and the slopes of dynamics and rows; the last stages first.
+
+        What belongs to stage N, which has no input, follows what belongs to the others.
+        """
+        ocp, N = self._ocp, len(self._ocp.inputs)
+        bends = ca.jacobian(ca.gradient(self._lagrangian, ocp.variables), ocp.variables)
+        slopes = ca.jacobian(ocp.constraints, ocp.variables)
+        y = [[*ocp.inputs[i].tolist(), *ocp.states[i].tolist()] for i in range(N)]
+        y.append(ocp.states[N].tolist())
+        rows, to = ocp.obstacles.tolist(), ocp.dynamics.tolist()
+        back = range(N - 1, -1, -1)
+        blocks = [
+            ca.horzcat(*(bends[y[i], y[i]] for i in back)),
+            bends[y[N], y[N]],
+            ca.horzcat(*(-slopes[to[i], y[i]] for i in back)),
+            ca.horzcat(*(slopes[rows[i], y[i]] for i in back)),
+            slopes[rows[N], y[N]],
+        ]
+        dense = [ocp.constraints, *map(ca.densify, blocks)]
+        return ca.Function("stages", self._arguments, dense)
+
+    @cached_property
+    def _recursion(self) -> ca.Function:
+        """The least pivot of any stage's Q_uu, from `_stages` and the stiffness of the springs."""
+        ocp, N = self._ocp, len(self._ocp.inputs)
+        n, m, M = (part.shape[1] for part in (ocp.states, ocp.inputs, ocp.slacks))
+        V, H = ca.SX.sym("V", n, n), ca.SX.sym("H", m + n, m + n)
+        F, C, k = (ca.SX.sym("F", n, m + n), ca.SX.sym("C", M, m + n), ca.SX.sym("k", m + n + M))
+        K = H + F.T @ V @ F + C.T @ ca.diag(k[m + n :]) @ C + ca.diag(k[: m + n])
+        least = ca.SX(ca.inf)
+        for _ in range(m):  # eliminate an input
+            least = ca.fmin(least, K[0, 0])
+            K = K[1:, 1:] - K[1:, 0] @ K[0, 1:] / K[0, 0]
+        stage = ca.Function("stage", [V, H, F, C, k], [K, least])
+        each = stage.mapaccum("recursion", N)
+        ends = ca.MX.sym("end", n, n), ca.MX.sym("Cn", M, n), ca.MX.sym("kn", n + M)
+        along = [ca.MX.sym(name, *each.size_in(i)) for i, name in enumerate("HFCk", 1)]
+        last, rows, springs = ends
+        start = last + rows.T @ ca.diag(springs[n:]) @ rows + ca.diag(springs[:n])
+        _, pivots = each(start, *along)
+        bends, dynamics, held, stiff = along
+        arguments = [bends, last, dynamics, held, rows, stiff, springs]
+        return ca.Function("least", arguments, [ca.mmin(pivots)])
+
+
+def _dependent(active: Matrix) -> bool:
+    """Whether some active constraint follows from the others to first order."""
+    left = np.abs(np.diag(qr(active.T, mode="r", pivoting=True)[0]))
+    return len(active) > active.shape[1] or left.min() < DEPENDENT * left.max()
+
+
+def _one_side(
+    active: Matrix, active_t: Matrix, multipliers: Vector, equality: Vector
+) -> tuple[Vector, Vector]:
+    """Which of the active constraints hold on the side that is taken, and all multipliers there.
+
+    Raises:
+        numpy.linalg.LinAlgError: no multipliers are largest, for the constraints contradict
+            each other on that side.
+    """
+    size = np.where(multipliers == 0, 1.0, np.abs(multipliers))
+    signed = np.where(equality, 1.0, np.sign(multipliers)) * size
+    columns = (signed[:, None] * active).T
+    columns /= np.maximum(np.abs(columns).max(axis=1, keepdims=True), np.finfo(float).tiny)
+    growth = signed * (active_t @ np.linspace(1, 2, active_t.shape[1]))
+    found = linprog(
+        -growth / max(np.abs(growth).max(), np.finfo(float).tiny),
+        A_eq=columns,
+        b_eq=columns @ (multipliers / signed),
+        bounds=[(None, None) if one else (0, None) for one in equality],
+        method="highs-ds",
+    )
+    if not found.success:
+        raise np.linalg.LinAlgError(f"no multipliers on one side: {found.message}")
+    held = equality | (found.x > INACTIVE)
+    return held, np.where(held, signed * found.x, 0.0)
+
+
+def _solved(kkt: Matrix, right: Matrix) -> Matrix:
+    """K^-1 right; a variable without curvature that no parameter pulls at stays where it is.
+
+    Raises:
+        numpy.linalg.LinAlgError: a parameter pulls at one.
+    """
+    enough, result = PULLED * np.abs(right).max(initial=0.0), np.full(right.shape, np.inf)
+    with suppress(np.linalg.LinAlgError):
+        result = np.linalg.solve(kkt, right)
+    if not np.abs(kkt @ result - right).max(initial=0.0) <= enough:
+        result = np.linalg.lstsq(kkt, right, rcond=DEPENDENT)[0]
+        if not np.abs(kkt @ result - right).max() <= enough:
+            raise np.linalg.LinAlgError("the optimum has no curvature where a parameter pulls")
+    return result

@@ -28,6 +28,10 @@ class NoStartLeft(SolverError):
     """The solver began anew by itself, from a standing start, too: to ask again is in vain."""
 
 
+class DerivativeError(SolverError):
+    """An optimum without a derivative in theta, though a gradient of its value there is."""
+
+
 class Status(StrEnum):
     """How an optimum was found."""
 

@@ -1,9 +1,17 @@
-"""CasADi's solvers on one transcription of the OCP: where warm starts are made and results read."""
+"""CasADi's solvers on one transcription of the OCP: where warm starts are made and results read.
+
+A `Problem` is solved in units in which no slack costs more than `HIGHEST_PRICE` and no curvature
+of the cost is below 1, for tolerances are absolute. Its cold starts lie a little off rest, where symmetry may make
+a maximum stationary. A solve that fails begins again, at last with Ipopt, and one that ends at no
+strict minimum is compared with solves from elsewhere: see `Solution.restarts` and `.solver`.
+"""
 
 import time
 from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from functools import cache
+from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -12,14 +20,21 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.diagnosis import FARTHEST
 from nmpcrl.control.ocp import Ocp, ProblemOcp
 from nmpcrl.control.sensitivity import Sensitivity
-from nmpcrl.control.solution import Solution, SolverError, check_shape
+from nmpcrl.control.solution import NoStartLeft, Solution, SolverError, check_shape
 from nmpcrl.control.solvers.codes import Start
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
+from nmpcrl.control.solvers.starts import random_inputs
 
 PrimalDual = tuple[Vector, Vector, Vector]  # z, lam and nu
 
 MAX_ITERATIONS = 300
 MAX_SECONDS = 5.0  # fatrop has no clock, but its 300 iterations take about 30 ms
+HIGHEST_PRICE = (
+    100.0  # the price of a slack, above which its unit becomes smaller; that of the paper
+)
+OFF_REST = 1e-3  # where a cold solve of a `Problem` begins, in parts of the bounds
+ELSEWHERE = 2  # starts that are compared with a plan that is no strict minimum
+CLEARLY = 1e-6  # another plan is better if its value is less by this share
 
 
 @dataclass(frozen=True)
@@ -27,6 +42,11 @@ class Nlpsol(Solver):
     """A solver that CasADi's `nlpsol` calls by its name."""
 
     starts: ClassVar[dict[Start, dict[str, Any]]]  # the better the start, the less it is moved
+
+    @property
+    def others(self) -> tuple["Nlpsol", ...]:
+        """Those that take over where this one finds no plan of a `Problem`."""
+        return ()
 
     @property
     @abstractmethod
@@ -52,6 +72,11 @@ class Fatrop(Nlpsol):
         Start.SHIFTED: {"bound_push": 1e-3},
         Start.SAME: {"mu_init": 1e-4, "bound_push": 1e-6},
     }
+
+    @property
+    def others(self) -> tuple[Nlpsol, ...]:
+        """Ipopt, slower and sturdier."""
+        return (Ipopt(self.tolerance),)
 
     @property
     def options(self) -> dict[str, Any]:
@@ -95,23 +120,36 @@ class Ipopt(Nlpsol):
         }
 
 
+class Found(NamedTuple):
+    """What one start led to."""
+
+    z: Vector
+    lam: Vector
+    nu: Vector
+    iterations: int
+    solver: str
+    value: float
+    features: Vector
+
+
 class Program:
     """An OCP and one of CasADi's solvers."""
 
     def __init__(self, ocp: Ocp, solver: Nlpsol) -> None:
-        self._ocp = ocp
-        self._name = solver.name
+        self._ocp, self._solver = ocp, solver
+        self._problem = ocp.problem if isinstance(ocp, ProblemOcp) else None
         self._sensitivity = Sensitivity(ocp)
-        self._solvers = {
-            start: _function(ocp, solver, options) for start, options in solver.starts.items()
-        }
-        self._at_start = _start_of(ocp) if isinstance(ocp, ProblemOcp) else None
+        self._factor, self._units = _scales(ocp)
+        self._at_start = None if self._problem is None else _start_of(ocp)
         self._bounds = {
-            "lbx": ca.DM(ocp.lower),
-            "ubx": ca.DM(ocp.upper),
+            "lbx": ca.DM(ocp.lower / self._units),
+            "ubx": ca.DM(ocp.upper / self._units),
             "lbg": ca.DM(np.where(ocp.equality, 0, -np.inf)),
             "ubg": ca.DM.zeros(ocp.equality.size),
         }
+        self._function = cache(self._written)
+        for start in solver.starts:
+            self._function(solver, start)
 
     def solve(
         self,
@@ -124,39 +162,93 @@ class Program:
     ) -> Solution:
         """Solve for p = (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         p = np.concatenate([state, theta, *action, *([] if data is None else [data.ravel()])])
-        if warm_start is None:
-            start, (z, lam, nu) = Start.COLD, self._standing(state)
+        failed: list[str] = []
+        for solver, start, point in self._starts(state, warm_start):
+            found = self._attempt(solver, start, point, p)
+            if isinstance(found, Found):
+                break
+            failed.append(found)
         else:
-            same = np.array_equal(warm_start.state, state)
-            start = Start.SAME if same else Start.SHIFTED
-            z, lam, nu = self._from(warm_start, state, same=same)
-        if self._at_start is not None and not np.isfinite(self._at_start(z, p).full()).all():
-            raise SolverError(
-                f"{self._name} cannot begin where a number is not finite", state, theta
-            )
-        solver = self._solvers[start]
-        result = solver(p=p, x0=z, lam_g0=lam, lam_x0=nu, **self._bounds)
-        stats = solver.stats()
-        z, lam, nu = (result[key].full().ravel() for key in ("x", "lam_g", "lam_x"))
-        if not (stats["success"] and np.isfinite([z.sum(), lam.sum(), nu.sum()]).all()):
-            raise SolverError(_status(self._name, stats), state, theta)
-        if np.abs(z[self._ocp.states]).max() > FARTHEST:
-            raise SolverError(f"{self._name} {LED_ASTRAY}", state, theta)
-        z = np.clip(z, self._ocp.lower, self._ocp.upper)  # fatrop relaxes bounds by 1e-8
-        self._settle_stage_zero(lam, nu, p)
-        value, features = self._sensitivity.value_and_gradient(z, p, lam)
+            kind = SolverError if self._problem is None else NoStartLeft
+            raise kind("; ".join(failed), state, theta)
+        restarts, best = len(failed), found
+        if self._problem is not None:
+            strict = self._sensitivity.is_minimum(found.z, p, found.lam, found.nu)
+            if not strict:
+                restarts, best = self._elsewhere(found, state, p, restarts)
         return Solution(
             state=state,
             theta=theta,
-            value=value,
-            features=features,
-            iterations=int(stats["iter_count"]),
+            value=best.value,
+            features=best.features,
+            iterations=best.iterations,
             seconds=time.perf_counter() - began,
-            point=np.concatenate([z, lam, nu]),
+            point=np.concatenate(best[:3]),
             ocp=self._ocp,
-            solver=self._name,
+            solver=best.solver,
+            restarts=restarts,
             data=data,
         )
+
+    def _starts(
+        self, state: Vector, warm_start: Solution | None
+    ) -> Iterator[tuple[Nlpsol, Start, PrimalDual]]:
+        """The warm start, and of a `Problem` a cold one, and the same by others."""
+        if warm_start is not None:
+            same = np.array_equal(warm_start.state, state)
+            start = Start.SAME if same else Start.SHIFTED
+            yield self._solver, start, self._from(warm_start, state, same=same)
+        if warm_start is None or self._problem is not None:
+            yield self._solver, Start.COLD, self._standing(state)
+        for other in () if self._problem is None else self._solver.others:
+            yield other, Start.COLD, self._standing(state)
+
+    def _attempt(self, solver: Nlpsol, start: Start, point: PrimalDual, p: Vector) -> Found | str:
+        """An optimum, or why there is none."""
+        ocp, factor, units = self._ocp, self._factor, self._units
+        z, lam, nu = point
+        if self._at_start is not None and not np.isfinite(self._at_start(z, p).full()).all():
+            return f"{solver.name} cannot begin where a number is not finite"
+        function = self._function(solver, start)
+        result = function(
+            p=p, x0=z / units, lam_g0=lam / factor, lam_x0=nu * units / factor, **self._bounds
+        )
+        stats = function.stats()
+        z, lam, nu = (result[key].full().ravel() for key in ("x", "lam_g", "lam_x"))
+        if not (stats["success"] and np.isfinite([z.sum(), lam.sum(), nu.sum()]).all()):
+            return _status(solver.name, stats)
+        z, lam, nu = z * units, lam * factor, nu * factor / units
+        if np.abs(z[ocp.states]).max() > FARTHEST:
+            return f"{solver.name} {LED_ASTRAY}"
+        z = np.clip(z, ocp.lower, ocp.upper)  # fatrop relaxes bounds by 1e-8
+        self._settle_stage_zero(lam, nu, p)
+        value, features = self._sensitivity.value_and_gradient(z, p, lam)
+        return Found(z, lam, nu, int(stats["iter_count"]), solver.name, value, features)
+
+    def _elsewhere(
+        self, found: Found, state: Vector, p: Vector, restarts: int
+    ) -> tuple[int, Found]:
+        """A plan from drawn inputs if it is clearly better, and how often a solve has begun."""
+        for seed in range(ELSEWHERE):
+            start = self._standing(state, seed, share=1.0)
+            other = self._attempt(self._solver, Start.COLD, start, p)
+            least = found.value - CLEARLY * abs(found.value)
+            if isinstance(other, Found) and other.value < least:
+                return restarts + seed + 1, other
+        return restarts, found
+
+    def _written(self, solver: Nlpsol, start: Start) -> ca.Function:
+        """`nlpsol` with the objective in parts of its factor, and variables in their units."""
+        ocp, factor = self._ocp, self._factor
+        z, f, g = ocp.variables, ocp.objective, ocp.constraints
+        if factor != 1 or (self._units != 1).any():
+            f, g = ca.substitute([f / factor, g], [z], [ca.DM(self._units) * z])
+        nlp = {"x": z, "p": ocp.parameters, "f": f, "g": g}
+        settings: dict[str, Any] = {
+            "print_time": False,
+            solver.name: solver.options | solver.starts[start],
+        }
+        return ca.nlpsol(solver.name, solver.name, nlp, settings | solver.structure(ocp))
 
     def hessian_times(self, solution: Solution, vector: Vector) -> None:
         """None: CasADi's solvers have the dense Hessian only."""
@@ -164,11 +256,17 @@ class Program:
     def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> None:
         """None, as well."""
 
-    def _standing(self, state: Vector) -> PrimalDual:
-        """Stay at `state` for the whole horizon; slacks take up what overlaps there."""
-        ocp = self._ocp
+    def _standing(self, state: Vector, seed: int = 0, *, share: float = OFF_REST) -> PrimalDual:
+        """Stay at `state` for the whole horizon; slacks take up what overlaps there.
+
+        A problem's inputs are this share of drawn ones.
+        """
+        ocp, problem = self._ocp, self._problem
         z = np.zeros(ocp.lower.size)
         z[ocp.states] = state
+        if problem is not None:
+            rest = np.clip(0.0, problem.lower, problem.upper)
+            z[ocp.inputs] = rest + share * (random_inputs(problem, seed, len(ocp.inputs)) - rest)
         return z, np.zeros(ocp.equality.size), np.zeros(ocp.lower.size)
 
     def _from(self, warm_start: Solution, state: Vector, *, same: bool) -> PrimalDual:
@@ -215,10 +313,12 @@ def _start_of(ocp: Ocp) -> ca.Function:
     )
 
 
-def _function(ocp: Ocp, solver: Nlpsol, start: dict[str, Any]) -> ca.Function:
-    nlp = {"x": ocp.variables, "p": ocp.parameters, "f": ocp.objective, "g": ocp.constraints}
-    settings: dict[str, Any] = {"print_time": False, solver.name: solver.options | start}
-    return ca.nlpsol(solver.name, solver.name, nlp, settings | solver.structure(ocp))
+def _scales(ocp: Ocp) -> tuple[float, Vector]:
+    """What the objective is divided by, and the units of z."""
+    factor = min(1.0, ocp.problem.cost_scale) if isinstance(ocp, ProblemOcp) else 1.0
+    units = np.ones(ocp.lower.size)
+    units[ocp.slacks] = np.minimum(1.0, HIGHEST_PRICE * factor / ocp.slack_weights)
+    return factor, units
 
 
 def _status(name: str, stats: dict[str, Any]) -> str:
