@@ -19,6 +19,15 @@ ORDERS = {  # what is not finite -> what to write instead
     "the derivative of ": "write ca.sqrt(ca.sumsqr(x) + 1e-9) for ca.norm_2(x), and so on",
     "the second derivative of ": "write a power of 2 or more, or add a small number to its base",
 }
+KINKS = {
+    getattr(ca, f"OP_{name.upper()}"): name
+    for name in ("fabs", "fmin", "fmax", "sign", "floor", "ceil", "fmod", "copysign")
+} | {ca.OP_IF_ELSE_ZERO: "if_else"}
+ROUND = (
+    "where plans come to rest on one, no solver descends: write w |h| of a cost as rows,"
+    " Soft(lambda x, u, th: ca.vertcat(h, -h), weight=w), and w max(0, h) as one, or round it,"
+    " ca.sqrt(h**2 + 1e-4) for ca.fabs(h)"
+)
 
 
 class Diagnosis:
@@ -32,13 +41,15 @@ class Diagnosis:
             z = ca.vertcat(e.x, e.u)
             given, self._model = [e.x, e.u, e.theta, e.d], "model"
             parts = {"model": e.next_x, "stage": e.stage, "soft": e.rows, "initial": e.initial}
+            sharp = {"model": e.next_x, "stage": e.stage, "terminal": e.terminal, "soft": e.rows}
         else:
             assert isinstance(ocp, TaskOcp)
             of = ocp.plant
             x, u = of.transition.sx_in()
             z = ca.vertcat(x, u)
             given, self._model = [x, u, ocp.theta, ca.SX(0, 1)], "dynamics"
-            parts = {"dynamics": of.transition(x, u)}
+            parts = sharp = {"dynamics": of.transition(x, u)}
+        self._kinks = {name: kinks_in(written, z) for name, written in sharp.items()}
         self._still = np.clip(np.zeros(of.lower.size), of.lower, of.upper)
         self._orders: dict[str, dict[str, Callable[..., Any]]] = {order: {} for order in ORDERS}
         for name, written in parts.items():
@@ -57,6 +68,9 @@ class Diagnosis:
             if said:
                 return said.format(f"at x = {short(state)}, u = {short(self._still)}")
             state = self._orders[""][self._model](*given).full().ravel()
+        for name, kinks in self._kinks.items():
+            if kinks:
+                return f"{name} has a kink ({', '.join(kinks)}); {ROUND}"
         return ""
 
     def _not_finite(self, *given: Vector) -> str:
@@ -77,3 +91,19 @@ class Diagnosis:
             does = f"makes {growth:.1g} times as much of a small deviation in one step"
             return f"{self._model} {does}, {{}}: {SUBSTEPS}"
         return ""
+
+
+def kinks_in(written: ca.SX, moved: ca.SX) -> list[str]:
+    """What CasADi calls the operations with a kink whose arguments a plan moves."""
+    others = [one for one in ca.symvar(written) if not ca.depends_on(moved, one)]
+    function = ca.Function("written", [moved, ca.vertcat(*others)], [written])
+    moving: set[int] = set()  # places that the plan moves, each written to several times
+    found = set()
+    for k in range(function.n_instructions()):
+        operation, of = function.instruction_id(k), function.instruction_input(k)
+        moves = of[0] == 0 if operation == ca.OP_INPUT else bool(moving & {*of})
+        if moves and operation in KINKS:
+            found.add(KINKS[operation])
+        into = set(function.instruction_output(k)[:1])
+        moving = moving | into if moves else moving - into
+    return sorted(found)

@@ -8,7 +8,7 @@
 f, l, V_f, V0 and h are written once, in CasADi's SX; all their derivatives follow from that.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -84,7 +84,7 @@ class Problem(Described):
         stage: Callable[..., Any],
         terminal: Callable[..., Any] | None = None,
         initial: Callable[..., Any] | None = None,
-        soft: Sequence[Soft] = (),
+        soft: Soft | Sequence[Soft] = (),
         lower: Any = -np.inf,
         upper: Any = np.inf,
         gamma: float = 1.0,
@@ -106,7 +106,8 @@ class Problem(Described):
             stage: (x, u, th) -> l.
             terminal: (x, th) -> V_f, 0 if absent.
             initial: (x, th) -> V0 of the state in which the plan begins, 0 if absent.
-            soft: rows that may be violated at a price.
+            soft: rows that may be violated at a price, a `Soft` or several. A kink in a cost is
+                written as rows: w |h| is Soft(lambda x, u, th: ca.vertcat(h, -h), weight=w).
             lower: least input, a number or one an input.
             upper: largest input.
             gamma: discount factor, 0 < gamma <= 1.
@@ -151,7 +152,7 @@ class Problem(Described):
         self.data_names = Blocks("data", shapes)
         empty: Matrix = np.zeros((self.horizon + 1, self.data_names.size))
         self.data = kept(self.data_names.filled(empty, defaults))
-        soft = tuple(soft)
+        soft = _rows(soft)
         self._function, sizes = self._written(model, stage, terminal, initial, soft)
         self.weights = kept(_weights(soft, sizes))
         self.on_inputs = _depends(self.expressions.rows, self.expressions.u)
@@ -356,6 +357,16 @@ def _bounds(lower: Any, upper: Any, inputs: int) -> tuple[Vector, Vector]:
             f"lower = {sides[0]} must lie below upper = {sides[1]}, or no input is allowed"
         )
     return sides[0], sides[1]
+
+
+def _rows(soft: Any) -> tuple[Soft, ...]:
+    found = tuple(soft) if isinstance(soft, Iterable) else (soft,)
+    for k, one in enumerate(found):
+        if not isinstance(one, Soft):
+            raise ValueError(
+                f"soft[{k}] = {one!r} must be a Soft: write soft=[Soft(row, weight=10.0)]"
+            )
+    return found
 
 
 def _weights(soft: tuple[Soft, ...], sizes: list[int]) -> Vector:

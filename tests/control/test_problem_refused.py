@@ -71,6 +71,12 @@ def problem(**changes) -> Problem:
         ({"horizon": 0}, "horizon = 0 must be a whole number"),
         ({"states": 1.5}, "states = 1.5 must be a whole number"),
         ({"gamma": 1.2}, r"gamma = 1.2 must lie in \(0, 1\]"),
+        (
+            {"soft": (lambda x, u, th: x, 3.0)},
+            r"soft\[0\] = <function .* write soft=\[Soft\(row, w",
+        ),
+        ({"soft": [Soft(lambda x, u, th: x), 3.0]}, r"soft\[1\] = 3.0 must be a Soft"),
+        ({"soft": None}, r"soft\[0\] = None must be a Soft"),
         ({"soft": [Soft(lambda x, u, th: th["alpha"])]}, r"soft\[0\] has a row that depends on"),
         ({"soft": [Soft(lambda x, u, th: u, stages=[3])]}, r"soft\[0\] depends on u, and there"),
         ({"soft": [Soft(lambda x, u, th: x, stages=7)]}, r"soft\[0\].stages = 7 must lie among"),
@@ -160,6 +166,34 @@ def test_what_is_not_finite_where_a_plan_begins_is_named(solver, changes, state,
     with pytest.raises((SolverError, ValueError), match=message) as caught:
         nmpc.solve(np.array(state), nmpc.problem.theta)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "kink"),
+    [
+        ({"stage": lambda x, u, th: ca.sumsqr(x) + 0.3 * ca.fabs(u)}, "stage has a kink (fabs); "),
+        ({"terminal": lambda x, th: ca.fmax(x[0], th["alpha"])}, "terminal has a kink (fmax); "),
+        ({"model": lambda x, u, th: ca.sign(x) * ca.fmin(u, 1)}, "model has a kink (fmin, sign); "),
+        ({"soft": Soft(lambda x, u, th: ca.if_else(u > 1, u, 1))}, "soft has a kink (if_else); "),
+        ({"stage": lambda x, u, th: ca.sumsqr(u) * ca.fmax(th["alpha"], 1)}, ""),  # of theta alone
+    ],
+)
+def test_a_kink_where_a_solve_fails_is_told_how_to_be_written(changes, kink):
+    one = problem(**changes)
+    why = Nmpc(one, solver="ipopt")._free.diagnosis.why(np.ones(2), one.theta, one.data)
+    assert why.startswith(kink)
+    assert ("Soft(lambda x, u, th: ca.vertcat(h, -h), weight=w)" in why) == bool(kink)
+
+
+def test_a_kink_can_be_written_as_rows():
+    """|u| as a cost, where plans come to rest at u = 0, is nothing that a solver can do."""
+    sharp = problem(stage=lambda x, u, th: ca.sumsqr(x) + 9 * ca.fabs(u), lower=-1, upper=1)
+    with pytest.raises(SolverError, match=r"; stage has a kink \(fabs\); .* Soft\("):
+        Nmpc(sharp, solver="ipopt").solve(np.array([0.4, 0.2]), sharp.theta)
+    rows = Soft(lambda x, u, th: ca.vertcat(u, -u), weight=9)
+    same = problem(stage=lambda x, u, th: ca.sumsqr(x), soft=rows, lower=-1, upper=1)
+    solution = Nmpc(same, solver="ipopt").solve(np.array([0.4, 0.2]), same.theta)
+    assert solution.value == pytest.approx(3 * (0.4**2 + 0.2**2))  # and u = 0
 
 
 def test_numpys_functions_write_what_casadis_do():
