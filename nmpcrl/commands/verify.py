@@ -1,5 +1,6 @@
 """`nmpcrl verify`: compares the runs of this machine with the published ones."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -15,7 +16,7 @@ RELOCKED = 60  # runs that are trained afresh before the code is locked anew
 
 @click.command()
 @click.option(
-    "--sample", type=click.IntRange(0), default=0, help="Train so many runs for the comparison."
+    "--sample", type=click.IntRange(0), default=0, help="Train so many more runs and compare them."
 )
 @click.option("--relock", is_flag=True, help="Check that an edit changes no bit; lock the code.")
 @click.option("--workers", metavar="N", type=int, help="Processes; by default one per core.")
@@ -59,8 +60,10 @@ def _compare(known: "Published", sample: int, workers: int | None) -> None:
     from nmpcrl.analysis import summaries
     from nmpcrl.claims import comparison, verification
 
-    drawn = set(verification.sample(known, sample)) if sample else set()
-    own = [e for e in known.rows if e in drawn or summaries.path_of(e).exists()]
+    stored = {e for e in known.rows if summaries.path_of(e).exists()}
+    rest = {e: part for e, part in known.variants.items() if e not in stored}
+    drawn = verification.sample(replace(known, variants=rest), sample) if sample else ()
+    own = [e for e in known.rows if e in {*stored, *drawn}]
     if not own:
         raise click.ClickException(
             "no run of the study was trained here; --sample 5 trains five for the comparison"

@@ -258,17 +258,22 @@ def test_verify_makes_a_damaged_summary_again(command, trained, trains_here, sha
     assert "6 runs compared with the published ones, 6 bit for bit: " in verified.output
 
 
-def test_verify_trains_a_sample_where_nothing_was_trained(command, trained, trains_here):
+@pytest.mark.parametrize("stored", [0, 1, 5])
+def test_verify_trains_as_many_runs_as_are_asked_for_besides_those_that_are_stored(
+    command, trained, trains_here, stored
+):
     command("study", "--publish")
-    for experiment in STUDY:
+    for experiment in list(STUDY)[stored:]:
         summaries.path_of(experiment).unlink()
-    refused = command("verify")
-    assert refused.exit_code == 1
-    assert "--sample 5 trains five for the comparison" in refused.output
+    if not stored:
+        refused = command("verify")
+        assert refused.exit_code == 1
+        assert "--sample 5 trains five for the comparison" in refused.output
     verified = command("verify", "--sample", "2")
     assert verified.exit_code == 0, verified.output
-    assert "2 runs compared with the published ones, 2 bit for bit: " in verified.output
-    assert sum(map(summaries.is_stored, STUDY)) == 2
+    now = min(stored + 2, len(STUDY))
+    assert f"{now} runs compared with the published ones, {now} bit for bit: " in verified.output
+    assert sum(map(summaries.is_stored, STUDY)) == now
 
 
 def test_verify_says_that_nothing_is_published(command, small):
