@@ -48,13 +48,9 @@ def train(yes: bool, **fields: Any) -> None:
 
 
 def _other(experiment: "Experiment") -> str:
-    """A stored run to compare this one with; without one, a placeholder for its name."""
-    from nmpcrl.commands.names import names
+    """The frozen arm of this run if it is stored; otherwise a placeholder for a name."""
     from nmpcrl.study.experiment import frozen_arm
-    from nmpcrl.study.geometry import short_name
     from nmpcrl.study.store import path_of
 
-    own, arm = path_of(experiment).stem, path_of(frozen_arm(experiment)).stem
-    stored = [name for name in names() if name != own]
-    alike = [name for name in stored if f"-{short_name(experiment.layout)}-" in name]
-    return arm if arm in stored else next(iter(alike), "RUN")
+    arm = path_of(frozen_arm(experiment))
+    return arm.stem if arm.is_file() and arm != path_of(experiment) else "RUN"

@@ -1,6 +1,6 @@
 """`nmpcrl train`: an option for every field, made from the class, and refusals before any work."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import pytest
 from click.testing import CliRunner
@@ -146,10 +146,16 @@ def test_a_trained_run_says_where_it_is_and_what_to_type_next(command, tmp_path)
     assert f"{tmp_path / 'runs' / path.name}: finished" in done.stdout
     assert f"Next: nmpcrl show {name}\n" in done.stdout
     assert f"nmpcrl compare {name} RUN\n" in done.stdout
-    arm = frozen_arm(Experiment(episodes=1, steps=5))
-    command("train", "--learner", "frozen", "--episodes", "1", "--steps", "5")
-    again = command("train", "--episodes", "1", "--steps", "5")
-    assert f"nmpcrl compare {name} {store.path_of(arm).stem}\n" in again.stdout
+
+
+@pytest.mark.parametrize("other", [{"layout": "B"}, {"steps": 6}, {"learner": "GES"}, {}])
+def test_a_trained_run_is_to_be_compared_with_its_frozen_arm_and_with_no_other(command, other):
+    own = Experiment(episodes=1, steps=5)
+    stored = replace(own, **other) if other else frozen_arm(own)
+    store.fetch(stored)
+    done = command("train", "--episodes", "1", "--steps", "5")
+    name = "RUN" if other else store.path_of(stored).stem
+    assert f"nmpcrl compare {store.path_of(own).stem} {name}\n" in done.stdout
 
 
 def test_a_run_that_cannot_be_stored_is_refused_before_it_is_trained(command, asked, tmp_path):
