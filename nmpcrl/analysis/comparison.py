@@ -19,7 +19,7 @@ class Comparison:
     fields: dict[str, tuple[Any, Any]]  # those that differ
     differing: tuple[str, ...]  # columns, "table/name", whose bits are not the same
     theta: tuple[float, str, int] | None  # largest difference, of which component, in which episode
-    cost: tuple[float, int] | None  # largest difference of the noise-free cost, after which episode
+    cost: tuple[float, int] | None  # largest difference of a rollout without noise, after how many
 
     @property
     def same_bits(self) -> bool:

@@ -19,7 +19,7 @@ def compare(run: str, other: str) -> None:
 
     Prints the fields in which they differ, the results of both, whether their
     numbers are the same bit for bit, and the largest differences of theta and of
-    the noise-free cost.
+    the cost of a noise-free rollout.
 
     \b
     Example:
@@ -27,7 +27,7 @@ def compare(run: str, other: str) -> None:
     """
     paths = file_of(run), file_of(other)
     from nmpcrl.analysis import comparison
-    from nmpcrl.report.run import figures
+    from nmpcrl.report.run import figures, verdict
     from nmpcrl.study.storage.place import harmless
 
     first, second = map(records_of, paths)
@@ -36,8 +36,8 @@ def compare(run: str, other: str) -> None:
     rows += [[name, *map(_word, pair)] for name, pair in found.fields.items()]
     one, two = figures(first), figures(second)
     rows += [[name, value, two[name]] for name, value in one.items() if name != "theta"]
-    click.echo(harmless(f"first   {paths[0].stem}"))
-    click.echo(harmless(f"second  {paths[1].stem}\n"))
+    click.echo(harmless(f"first   {paths[0].stem}: {verdict(first)}"))
+    click.echo(harmless(f"second  {paths[1].stem}: {verdict(second)}\n"))
     for line in columns(rows):
         click.echo(harmless(line))
     click.echo(f"\ntheta   {one['theta']}\n        {two['theta']}\n")
@@ -61,7 +61,7 @@ def _print_differences(found: "Comparison") -> None:
     if found.cost:
         cost, after = found.cost
         when = f"after {counted(after, 'episode')}"
-        click.echo(f"Largest difference of the noise-free cost: {cost:.4g} ({when}).")
+        click.echo(f"Largest difference of the cost of a noise-free rollout: {cost:.4g} ({when}).")
 
 
 def _word(value: object) -> str:

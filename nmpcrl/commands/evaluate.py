@@ -1,4 +1,4 @@
-"""`nmpcrl evaluate`: the figures of a run's last rollout."""
+"""`nmpcrl evaluate`: a run's noise-free cost, and its last rollout."""
 
 import click
 
@@ -8,7 +8,7 @@ from nmpcrl.commands.names import RunName, file_of, records_of
 @click.command()
 @click.argument("run", type=RunName())
 def evaluate(run: str) -> None:
-    """Print the figures of the last noise-free rollout of RUN.
+    """Print the noise-free cost and the last rollout of RUN.
 
     RUN is a name that `nmpcrl runs` lists, or its beginning.
 

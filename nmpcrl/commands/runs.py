@@ -82,9 +82,9 @@ def runs(sort: str, reverse: bool, as_json: bool, **conditions: Any) -> None:
 
     With --json, each run is an object with its name `run`, its `path`, its size
     in `bytes`, the fields of its `experiment`, and its `facts`: how it stopped
-    (`stopped`), its noise-free `final_cost`, `seconds`, the `solver`, and where
-    it was trained. A number that is not finite is null. Runs of a `Trial` of your
-    own are only counted.
+    (`stopped`), its noise-free cost `final_cost`, which is the mean of the last
+    three rollouts, `seconds`, the `solver`, and where it was trained. A
+    number that is not finite is null. Runs of a `Trial` of your own are only counted.
 
     \b
     Example:

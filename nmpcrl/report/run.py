@@ -5,32 +5,32 @@ import numpy as np
 from nmpcrl import Matrix
 from nmpcrl.analysis import metrics
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.records import Records, StepStatus, Stopped
+from nmpcrl.study.records import LAST, Records, StepStatus, Stopped
 
 SAME = f"{0:.1%}"  # how a change is shown that is less than half of the last digit
 
 
 def verdict(records: Records) -> str:
-    """The noise-free cost before and after, in a sentence."""
+    """The noise-free cost before and after, in a sentence; after is `metrics.final_cost`."""
     before, after = metrics.initial_cost(records), metrics.final_cost(records)
     if not np.isfinite(after):
         return f"no noise-free cost at the end; theta_init's was {before:.1f}"
     change = f"{abs(1 - after / before):.1%}"
+    end = f"noise-free cost {after:.1f} (mean of the last {LAST} rollouts)"
     if change == SAME:
-        return f"noise-free cost {after:.1f}, within 0.1% of the {before:.1f} of theta_init"
+        return f"{end}, within 0.1% of the {before:.1f} of theta_init"
     word = "less" if after <= before else "more"
-    return f"noise-free cost {after:.1f}, {change} {word} than the {before:.1f} of theta_init"
+    return f"{end}, {change} {word} than the {before:.1f} of theta_init"
 
 
 def figures(records: Records) -> dict[str, str]:
-    """What a rollout without noise shows, ready to print."""
+    """What the last rollout without noise shows besides its cost, ready to print."""
     task = Experiment(**records.experiment).task
     states, actions = metrics.final_rollout(records)
     overlap = task.overlap(states).max(axis=-1)
     theta = ", ".join(f"{value:.4g}" for value in records.evaluations["theta"][-1])
     failed = records.steps["status"] == StepStatus.FAILED
     return {
-        "cost of the last rollout": f"{records.evaluations['cost'][-1]:.1f}",
         "steps": f"{np.isfinite(states[:, 0]).sum()} of {len(states)}",
         "distance to the target at the end": f"{task.distance(states[-1]):.3f}",
         "largest overlap Xi (above 0: inside)": f"{np.nanmax(overlap):.4f}",

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.comparison import compare
+from nmpcrl.report.run import verdict
 from nmpcrl.study import Experiment, fetch, run, store
 from nmpcrl.study.experiment import frozen_arm
 
@@ -146,7 +147,8 @@ def test_compare_prints_fields_figures_and_differences(command):
     done = command("compare", "ES-A", "GES-A")
     assert done.exit_code == 0, done.output
     assert "learner   " in done.stdout
-    assert "cost of the last rollout" in done.stdout
+    for name in ("ES", "GES"):
+        assert verdict(fetch(RUNS[name])) in done.stdout
     assert "Numbers differ in " in done.stdout
     assert "Largest difference of theta: " in done.stdout
     assert not done.stderr
