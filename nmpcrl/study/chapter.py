@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
+from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import estimate
-from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.parameters import ParameterError, shown
 from nmpcrl.study.sweeps import AXES, FIELDS
 
 INJECTED = "# Parameters\n"  # so begins the cell in which papermill sets what it is given
@@ -37,6 +38,9 @@ def check(**declared: Any) -> None:
         allowed = (FIELDS | AXES).get(name)
         if allowed:
             allowed.check(name, value)
+        if name in ("layout", "layouts"):
+            for layout in value if name == "layouts" else [value]:
+                _keep_ends_free(layout)
         if name in MOST and value > MOST[name]:
             raise ParameterError(
                 f"{name} = {value:g} must be at most {MOST[name]:g} in a chapter: with larger ones"
@@ -51,6 +55,18 @@ def afford(experiments: Iterable[Experiment]) -> None:
         ParameterError: in one sentence, which says how to train them nevertheless.
     """
     estimate(experiments).refuse()
+
+
+def _keep_ends_free(layout: Any) -> None:
+    """Refuse an obstacle in which the robot would start, or in which its target would be."""
+    task = paper.task(layout)
+    for end, place in (("start", task.start), ("target", task.target)):
+        if task.overlap(place).max() > 0:
+            raise ParameterError(
+                f"layout = {shown(layout)} has an obstacle on the robot's {end},"
+                f" ({place[0]:g}, {place[1]:g}): each centre must be"
+                f" {max(task.discs[2]) / 2:g} m or more away from it in a chapter"
+            )
 
 
 def _injected() -> set[str]:

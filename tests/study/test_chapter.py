@@ -34,6 +34,11 @@ def test_what_is_allowed_passes_outside_of_a_notebook_too():
     chapter.check(**PARAMETERS | {"layout": [[0.5, 2.2], [3, 0.5]]})
 
 
+ON_START = (
+    "has an obstacle on the robot's start, (-2.5, 1.5): each centre must be 1.25 m or more away"
+    " from it in a chapter"
+)
+ON_TARGET = ON_START.replace("start, (-2.5, 1.5)", "target, (8.5, 2)")
 AT_ONCE = "with larger ones a run ends before there is anything to show"
 
 
@@ -43,6 +48,8 @@ AT_ONCE = "with larger ones a run ends before there is anything to show"
         ("episodes", 10**8, "episodes = 100000000 must be a whole number from 1 to 100000"),
         ("episodes", "300", "episodes = '300' must be a whole number from 1 to 100000"),
         ("layout", ["A"], f"layout = ['A'] must be {FIELDS['layout'].text}"),
+        ("layout", [[3, 4], [-2.5, 0.5]], f"layout = [[3, 4], [-2.5, 0.5]] {ON_START}"),
+        ("layouts", ["A", [[8, 2]]], f"layout = [[8, 2]] {ON_TARGET}"),
         ("seeds", 3, "seeds = 3 must be a list, such as [3]"),
         ("seeds", [-1], "seed = -1 must be a whole number from 0 to 2147483647"),
         ("alpha", 1e3, f"alpha = 1000 must be at most 1e-05 in a chapter: {AT_ONCE}"),
