@@ -13,6 +13,7 @@ from nmpcrl.claims.verdict import Verdict
 from nmpcrl.report import halves
 from nmpcrl.report.prose import filled
 from nmpcrl.report.tables import BADGES, WORDS
+from nmpcrl.report.timing import of_steps
 
 PAGES = project.pages()
 each_page = pytest.mark.parametrize("page", PAGES)
@@ -134,6 +135,20 @@ def test_no_two_numbers_of_one_quantity_differ(html):
     said = [one for page in PAGES for one in statements(html(f"{page}.html"), page)]
     assert len({one.page for one in said}) >= 5
     assert disagreements(said) == ()
+
+
+@pytest.mark.parametrize(
+    ("page", "quantity"),
+    [
+        ("03_rdes", "early: the published main table"),
+        ("03_rdes", of_steps("RDES", "ipopt")),
+        ("06_what_the_paper_leaves_open", "alone: rollouts of this page"),
+        ("07_beyond", "at margin: the published searches"),
+        ("07_beyond", "by hand: rollouts of this page"),
+    ],
+)
+def test_a_number_beside_those_of_a_pages_runs_says_its_own_source(html, page, quantity):
+    assert quantity in {one.quantity for one in statements(html(f"book/{page}.html"), page)}
 
 
 @pytest.mark.parametrize("page", ["intro", "05_results", "reproducibility"])
