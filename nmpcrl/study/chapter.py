@@ -40,7 +40,7 @@ def check(**declared: Any) -> None:
             allowed.check(name, value)
         if name in ("layout", "layouts"):
             for layout in value if name == "layouts" else [value]:
-                _keep_ends_free(layout)
+                _placed(layout)
         if name in MOST and value > MOST[name]:
             raise ParameterError(
                 f"{name} = {value:g} must be at most {MOST[name]:g} in a chapter: with larger ones"
@@ -57,8 +57,8 @@ def afford(experiments: Iterable[Experiment]) -> None:
     estimate(experiments).refuse()
 
 
-def _keep_ends_free(layout: Any) -> None:
-    """Refuse an obstacle in which the robot would start, or in which its target would be."""
+def _placed(layout: Any) -> None:
+    """Refuse an obstacle on the robot's start or target, or where the robot never comes."""
     task = paper.task(layout)
     for end, place in (("start", task.start), ("target", task.target)):
         if task.overlap(place).max() > 0:
@@ -66,6 +66,14 @@ def _keep_ends_free(layout: Any) -> None:
                 f"layout = {shown(layout)} has an obstacle on the robot's {end},"
                 f" ({place[0]:g}, {place[1]:g}): each centre must be"
                 f" {max(task.discs[2]) / 2:g} m or more away from it in a chapter"
+            )
+    (left, bottom, _), (right, top, _) = task.lower, task.upper
+    for x, y in paper.centres_of(layout):
+        if not (left <= x <= right and bottom <= y <= top):
+            raise ParameterError(
+                f"layout = {shown(layout)} has an obstacle where the robot never comes,"
+                f" ({x:g}, {y:g}): each centre must be in its box,"
+                f" [{left:g}, {right:g}] x [{bottom:g}, {top:g}], in a chapter"
             )
 
 

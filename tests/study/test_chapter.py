@@ -39,6 +39,10 @@ ON_START = (
     " from it in a chapter"
 )
 ON_TARGET = ON_START.replace("start, (-2.5, 1.5)", "target, (8.5, 2)")
+NEVER = (
+    "has an obstacle where the robot never comes, (3, 9.5): each centre must be in its box,"
+    " [-3, 9] x [-3, 9], in a chapter"
+)
 AT_ONCE = "with larger ones a run ends before there is anything to show"
 
 
@@ -50,6 +54,7 @@ AT_ONCE = "with larger ones a run ends before there is anything to show"
         ("layout", ["A"], f"layout = ['A'] must be {FIELDS['layout'].text}"),
         ("layout", [[3, 4], [-2.5, 0.5]], f"layout = [[3, 4], [-2.5, 0.5]] {ON_START}"),
         ("layouts", ["A", [[8, 2]]], f"layout = [[8, 2]] {ON_TARGET}"),
+        ("layout", [[3, 4], [3, 9.5]], f"layout = [[3, 4], [3, 9.5]] {NEVER}"),
         ("seeds", 3, "seeds = 3 must be a list, such as [3]"),
         ("seeds", [-1], "seed = -1 must be a whole number from 0 to 2147483647"),
         ("alpha", 1e3, f"alpha = 1000 must be at most 1e-05 in a chapter: {AT_ONCE}"),
