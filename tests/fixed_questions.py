@@ -1,5 +1,6 @@
 """What git says of questions that were fixed before the runs, for the tests of such a file."""
 
+import os
 import subprocess
 from pathlib import Path
 
@@ -10,12 +11,19 @@ from nmpcrl.study.provenance import code
 ROOT = Path(__file__).resolve().parents[1]
 
 
+def no_history(reason: str) -> None:
+    """Skip a test of the history; where that must be tested, fail."""
+    if os.environ.get("NMPCRL_REQUIRE_HISTORY") or os.environ.get("CI"):
+        pytest.fail(f"no history: {reason}, and NMPCRL_REQUIRE_HISTORY or CI is set")
+    pytest.skip(f"no history: {reason}")
+
+
 def git(*arguments: str) -> str:
     asked = ["git", "-C", str(ROOT), *arguments]
     shallow = ["git", "-C", str(ROOT), "rev-parse", "--is-shallow-repository"]
     done, whole = (subprocess.run(one, capture_output=True, text=True) for one in (asked, shallow))
     if done.returncode or whole.stdout.strip() != "false":
-        pytest.skip(f"the history is not here: {done.stderr}")
+        no_history(done.stderr or "this is a shallow clone")
     return done.stdout.strip()
 
 
@@ -23,7 +31,7 @@ def added(path: str) -> str:
     """The commit that added a file."""
     found = git("log", "--format=%H", "--diff-filter=A", "--", path)
     if not found:
-        pytest.skip(f"{path} is not committed yet")
+        no_history(f"{path} is not committed yet")
     return found.splitlines()[-1]
 
 

@@ -5,7 +5,9 @@ import re
 import subprocess
 from pathlib import Path
 
+import fixed_questions
 import pytest
+from fixed_questions import no_history
 
 from nmpcrl.claims import prespecified, published
 from nmpcrl.claims.prespecified import NUMBERS, SINCE, Commit, Fixed, fixed
@@ -15,18 +17,31 @@ ASSIGNED = f"^({'|'.join(NUMBERS)}) = "
 
 
 def git(*arguments: str) -> str:
-    """What git says of this project; without its whole history a test of that is skipped."""
+    """What git says of this project; without its whole history, as `no_history` says."""
     asked = ["git", "-C", str(ROOT), *arguments]
     done = subprocess.run(asked, capture_output=True, text=True, env={"TZ": "UTC", "LC_ALL": "C"})
     if done.returncode > 1:
-        pytest.skip(f"there is no history here: {done.stderr}")
+        no_history(done.stderr)
     return done.stdout.strip()
 
 
 @pytest.fixture
 def history():
     if not (ROOT / ".git").exists() or git("rev-parse", "--is-shallow-repository") == "true":
-        pytest.skip("the history is not here")
+        no_history("this is a shallow clone, or none")
+
+
+@pytest.mark.usefixtures("history")
+@pytest.mark.parametrize("required", ["CI", "NMPCRL_REQUIRE_HISTORY", "ANYTHING_ELSE"])
+def test_without_the_history_questions_are_skipped_aloud(tmp_path, monkeypatch, required):
+    for name in ("CI", "NMPCRL_REQUIRE_HISTORY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv(required, "true")
+    subprocess.run(["git", "clone", "-q", "--depth=1", ROOT.as_uri(), tmp_path], check=True)
+    monkeypatch.setattr(fixed_questions, "ROOT", tmp_path)
+    loud = pytest.skip.Exception if required == "ANYTHING_ELSE" else pytest.fail.Exception
+    with pytest.raises(loud, match="this is a shallow clone"):
+        fixed_questions.git("log")
 
 
 def commit(name: str) -> Commit:
