@@ -15,7 +15,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book pdf article course release smoke chapter lab study bench test test-slow test-site test-lab test-course test-clusters check locks clean anew
+.PHONY: help book pdf article course release smoke chapter lab study bench test test-slow test-site test-weekly test-lab test-course test-clusters check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -55,7 +55,7 @@ bench: .venv/ready  ## Measure how long solves, steps and runs take, and print w
 # lets no test with its marker stand elsewhere.
 PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
 DEMANDING := slow or browser or network or slurm
-ELSEWHERE := built or lab or course
+ELSEWHERE := built or lab or course or weekly
 
 test: .venv/ready  ## What takes little of the tests of the library, its commands and the book's sources
 	@$(PYTEST) -m "not ($(DEMANDING)) and not ($(ELSEWHERE))"
@@ -63,8 +63,11 @@ test: .venv/ready  ## What takes little of the tests of the library, its command
 test-slow: .venv/ready  ## The others of them: they train, compile, or need a browser or the network
 	@$(PYTEST) -m "($(DEMANDING)) and not ($(ELSEWHERE))"
 
-test-site: .venv/ready  ## The built book in browsers; needs a built book, a Chromium and a Firefox
-	@$(PYTEST) -m "built and not lab and not course" tests/book
+test-site: .venv/ready  ## The built book in a browser; needs a built book and a Chromium
+	@$(PYTEST) -m "built and not lab and not course and not weekly" tests/book
+
+test-weekly: .venv/ready  ## What no push waits for: Firefox, all themes, many problems; needs a built book, too
+	@$(PYTEST) -m "weekly and not lab and not course"
 
 test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; needs a Chromium
 	@$(BIN)/python -m pytest -m lab $(if $(ONLY),-k "$(ONLY)") tests/book/test_lab.py

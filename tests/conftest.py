@@ -32,10 +32,10 @@ settings.register_profile("no clock", deadline=None)  # the machine may be busy
 settings.load_profile("no clock")
 
 ROOT = Path(__file__).resolve().parent.parent
-NEEDS = {  # fixture -> the marker of a test that asks for it, directly or through others
+NEEDS = {  # fixture -> the markers of a test that asks for it, directly or through others
     "site": "built",
     "browser": "browser",
-    "distributed_firefox": "browser",
+    "distributed_firefox": "browser weekly",
     "jupyter_lab": "lab",
     "nbgrader": "network",
 }
@@ -56,7 +56,8 @@ FLAGS = (
 def pytest_itemcollected(item: pytest.Item) -> None:
     """Mark a test with what it needs, so that none can forget to say so, and see that it is run."""
     for fixture in NEEDS.keys() & set(getattr(item, "fixturenames", ())):
-        item.add_marker(NEEDS[fixture])
+        for marker in NEEDS[fixture].split():
+            item.add_marker(marker)
     for marker, places in PLACES.items():
         there = any(item.path.is_relative_to(ROOT / place) for place in places)
         if not there and item.get_closest_marker(marker):

@@ -64,6 +64,21 @@ def test_actions_of_others_are_named_by_a_hash_that_nobody_can_move(path):
         assert re.fullmatch(r"[\w./-]+@[0-9a-f]{40}", step.get("uses", f"a@{'0' * 40}"))
 
 
+@each_workflow
+def test_a_job_that_tests_has_the_whole_history_and_one_that_needs_a_browser_says_so(path):
+    for job in jobs(path):
+        runs = [step.get("run", "") for step in job["steps"]]
+        if any(re.match(r"make test(-slow|-weekly)?$", one) for one in runs):
+            assert job["steps"][0]["with"] == {"fetch-depth": 0}
+        if {"make test-site", "make test-weekly", "make test-lab"} & {*runs}:
+            assert job["env"]["NMPCRL_REQUIRE_BROWSER"]
+
+
+def test_every_test_target_is_run_by_a_workflow():
+    run = {step.get("run") for path in PATHS for step in steps(path)}
+    assert {f"make {name}" for name in TARGETS if name.startswith("test")} <= run
+
+
 LINUX = {"${{ matrix.os == 'ubuntu-latest' && '1' || '' }}": "1"}  # what an expression is there
 
 

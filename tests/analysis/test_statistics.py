@@ -72,6 +72,7 @@ def test_a_quarter_of_failures_leaves_the_interquartile_mean_finite_and_more_do_
     assert interquartile_mean(scores, ["A"] * 8).value == np.inf
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_the_interval_of_the_interquartile_mean_covers_it_about_as_often_as_it_says():
     rng, scale = np.random.default_rng(2), np.repeat([1.0, 1.1, 1.2, 1.3, 1.4, 1.5], 20)
@@ -125,6 +126,7 @@ def test_a_failure_loses_against_any_run_and_ties_with_a_failure():
     assert probability_of_improvement(failed, failed, ["A"] * 2).value == 0.5
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_the_interval_of_the_probability_of_improvement_covers_it_about_as_often_as_it_says():
     rng, noise = np.random.default_rng(5), 1.0

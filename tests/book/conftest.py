@@ -9,7 +9,7 @@ import pytest
 from bs4 import BeautifulSoup
 from filelock import FileLock
 from live_page import Tab
-from visits import PATIENCE, Visit, look_at
+from visits import EACH_PUSH, PATIENCE, Visit, look_at
 
 
 @pytest.fixture(scope="session")
@@ -20,14 +20,15 @@ def html(site) -> Callable[[str], BeautifulSoup]:
 
 @pytest.fixture(scope="session")
 def visit(site, browser, shared) -> Callable[[str], Visit]:
-    """Open a page of the site, once for all tests and workers, and look at it in every way."""
+    """Open a page of the site, once for all tests and workers, and look at it."""
 
     @functools.cache
     def seen(page: str) -> Visit:
         kept = shared / f"{page.replace('/', '-')}.json"
         with FileLock(kept.with_suffix(".lock")):
             if not kept.exists():
-                kept.write_text(json.dumps(asdict(look_at(browser, site / f"{page}.html"))))
+                found = look_at(browser, site / f"{page}.html", EACH_PUSH)
+                kept.write_text(json.dumps(asdict(found)))
             return Visit(**json.loads(kept.read_text()))
 
     return seen

@@ -460,6 +460,7 @@ def test_a_find_fills_the_form_trains_and_says_what_to_look_at(tab):
     assert not tab.figure.locator(".told").is_visible()
 
 
+@pytest.mark.weekly
 def test_the_find_about_a_gap_shows_that_it_closes(tab):
     tab.click("A gap that closes")
     assert "does not arrive" in told(tab)
@@ -472,6 +473,7 @@ def test_the_find_about_a_gap_shows_that_it_closes(tab):
     assert not tab.figure.locator(".told").is_visible()
 
 
+@pytest.mark.weekly
 def test_the_find_about_a_tie_lays_the_one_that_passes_over_the_one_that_stands(tab):
     tab.click("A tie")
     tab.page.wait_for_function("() => document.querySelector('figure.live').shown.over")
@@ -552,6 +554,7 @@ def test_every_policy_of_a_run_can_be_seen_again(tab):
     assert policy.get_attribute("aria-valuetext") == "after episode 20"
 
 
+@pytest.mark.weekly
 def test_the_lesson_on_the_trap_is_six_steps_that_run(tab):
     """By keyboard; the first step closes a gap by hand, the second by learning."""
     steps = data_of(tab)["trap"]

@@ -75,7 +75,9 @@ def test_a_finger_can_hit_everything_on_a_telephone(opened, figure):
         assert min(box["width"], box["height"]) >= 24
 
 
-@pytest.mark.parametrize("motion", ["no-preference", "reduce"])
+@pytest.mark.parametrize(
+    "motion", ["no-preference", pytest.param("reduce", marks=pytest.mark.weekly)]
+)
 @each_figure
 def test_nothing_moves_by_itself(opened, figure, motion):
     tab = opened(figure, reduced_motion=motion).begun().quiet()

@@ -399,6 +399,11 @@ def test_whatever_a_chapter_is_given_it_takes_little_or_refuses_in_a_sentence(dr
         ("06_what_the_paper_leaves_open", ["-p", "layouts", "A"], "must be a list, such as ['A']"),
         ("07_beyond", ["-p", "budget", "1000000000"], "budget = 1000000000 must be a whole"),
         ("01_mdp_and_nmpc", ["-p", "horizon", "21"], "must be 20 or less here: a longer plan"),
+        (
+            "01_mdp_and_nmpc",
+            ["-y", "{layout: [[-2, 1.5]]}"],
+            "has an obstacle on the robot's start",
+        ),
         ("performance", ["-p", "lenght", "smoke"], "(did you mean 'length'?)"),
         ("solver", ["-p", "horizon", "1000000000000"], "from 1 to 500"),
     ],
@@ -529,17 +534,44 @@ def test_a_notebook_of_ones_own_says_what_it_takes_and_ends_with_the_readers_tur
     assert "try" in tags(box)
 
 
-@pytest.mark.slow
-@each_own
-def test_a_notebook_of_ones_own_runs_with_few_episodes_and_one_seed(name, tmp_path, monkeypatch):
+def assert_runs(name: str, tmp_path: Path, monkeypatch, **few) -> None:
+    """Papermill executes a notebook with those of these parameters that it has."""
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    few = {"episodes": 2, "seeds": [3]}
     given = {one: few[one] for one in NOTEBOOKS[name].metadata.nmpcrl.parameters if one in few}
     command = [sys.executable, "-m", "papermill", f"book/{name}.ipynb", str(tmp_path / "o.ipynb")]
     done = subprocess.run(
         [*command, "-y", str(given)], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+
+
+CENTRES = [[x, y] for y in (3.6, 0.2, 6.6, -2.9) for x in (0.2, 3.0, 5.8, -2.9)]
+WITH_CENTRES = [
+    one
+    for one in GIVEN
+    if "layout" in (names := NOTEBOOKS[one].metadata.nmpcrl.parameters)
+    if "layouts" not in names
+]
+
+
+@pytest.mark.slow
+def test_chapter_1_runs_with_one_obstacle(tmp_path, monkeypatch):
+    assert_runs("01_mdp_and_nmpc", tmp_path, monkeypatch, layout=[[0, 2]])
+
+
+@pytest.mark.slow
+@pytest.mark.weekly
+@pytest.mark.parametrize("count", [1, 2, 5, 16])
+@pytest.mark.parametrize("name", WITH_CENTRES)
+def test_a_chapter_runs_with_any_number_of_obstacles(name, count, tmp_path, monkeypatch):
+    few = {"episodes": 4, "seeds": [3], "overshot": ["B"], "overshot_episodes": 2}
+    assert_runs(name, tmp_path, monkeypatch, layout=CENTRES[:count], **few)
+
+
+@pytest.mark.slow
+@each_own
+def test_a_notebook_of_ones_own_runs_with_few_episodes_and_one_seed(name, tmp_path, monkeypatch):
+    assert_runs(name, tmp_path, monkeypatch, episodes=2, seeds=[3])
     kept = {path.name for path in (tmp_path / "runs").glob("[!.]*")}
     assert kept <= {"trials"}  # nothing of it belongs to the study
 

@@ -16,6 +16,7 @@ UNITS = {name: text for name, text, _ in slides.units()}
 LIVE = [name for name, text in UNITS.items() if "-live)" in text]
 
 each_unit = pytest.mark.parametrize("name", UNITS)
+pytestmark = pytest.mark.weekly  # as all of the course
 
 SMALL = """(() => {
     const words = document.createTreeWalker(Reveal.getCurrentSlide(), NodeFilter.SHOW_TEXT);

@@ -11,12 +11,14 @@ WCAG = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 BRIEF = {"resultTypes": ["violations"], "preload": False}  # preloading would request the styles
 EVERYTHING = {"runOnly": WCAG, "rules": {"target-size": {"enabled": True}}} | BRIEF
 COLOURS = {"runOnly": ["color-contrast", "link-in-text-block"]} | BRIEF
-VIEWS = {  # every rule in both widths, and those of colours in both themes, too
+Views = dict[tuple[int, str], dict[str, Any]]
+VIEWS: Views = {  # every rule in both widths, and those of colours in both themes, too
     (1400, "light"): EVERYTHING,
     (1400, "dark"): COLOURS,
     (390, "dark"): EVERYTHING,
     (390, "light"): COLOURS,
 }
+EACH_PUSH = dict([*VIEWS.items()][:1])  # the others are looked at once a week
 TELEPHONES = (390, 320)  # [px]
 PATIENCE = 300_000  # ms until a page counts as stuck: a busy machine trains several times slower
 UNREADABLE = "[data-mjx-error], mjx-container mtext[mathcolor=red]"  # errors, unknown macros
@@ -117,7 +119,7 @@ class Visit:
     broken: list[str] = field(default_factory=list)  # those that MathJax could not read
     width: int = 0  # of the page on a telephone, as it opens [px]
     findings: list[str] = field(default_factory=list)  # of axe, a sentence each
-    themes: list[str | None] = field(default_factory=list)  # in the order of `VIEWS`
+    themes: list[str | None] = field(default_factory=list)  # in the order of the views
     widths: list[int] = field(default_factory=list)  # of the page on `TELEPHONES`, all open [px]
     cut: list[str] = field(default_factory=list)  # is wider than its place and cannot scroll
     silent: list[str] = field(default_factory=list)  # scrolls without focus, name or shadow
@@ -137,8 +139,8 @@ def opened(browser: Any, address: str, width: int) -> Any:
     return tab
 
 
-def look_at(browser: Any, path: Path) -> Visit:
-    """What is found on a page: as it opens, with all open on telephones, and by axe."""
+def look_at(browser: Any, path: Path, views: Views) -> Visit:
+    """What is found on a page: as it opens, with all open on telephones, and by axe in `views`."""
     seen = Visit()
     tab = browser.new_page(viewport={"width": TELEPHONES[0], "height": 900})
     tab.set_default_timeout(PATIENCE)
@@ -163,20 +165,20 @@ def look_at(browser: Any, path: Path) -> Visit:
         seen.silent += tab.evaluate(SILENT)
         seen.nameless += tab.evaluate(NAMELESS)
     seen.stops, seen.small = tab.evaluate(STOPS), tab.evaluate(SMALL)
-    judge(tab, seen)
+    judge(tab, seen, views)
     tab.close()
     return seen
 
 
-def judge(tab: Any, seen: Visit) -> None:
-    """Let axe look at a page in every width and theme, its live figures begun."""
+def judge(tab: Any, seen: Visit, views: Views) -> None:
+    """Let axe look at a page in some widths and themes, its live figures begun."""
     tab.wait_for_function(BEGUN)
     seen.figures = tab.locator("figure.live:has(.results)").evaluate_all(
         "all => all.map(one => one.dataset.figure)"
     )
     tab.evaluate(THIN)
     tab.evaluate(Axe().axe_script)
-    for (width, theme), rules in VIEWS.items():
+    for (width, theme), rules in views.items():
         tab.set_viewport_size({"width": width, "height": 900})
         tab.emulate_media(color_scheme=theme)
         tab.evaluate(SETTLED)

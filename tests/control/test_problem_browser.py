@@ -62,7 +62,13 @@ PROBLEMS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("make", PROBLEMS, ids=["Gros and Zanon", "quadrotor"])
+@pytest.mark.parametrize(
+    "make",
+    [
+        pytest.param(gros_zanon.problem, id="Gros and Zanon"),
+        pytest.param(quadrotor, id="quadrotor", marks=pytest.mark.weekly),
+    ],
+)
 def test_values_gradients_and_slopes_are_those_of_the_machine_code(make):
     """Cold, warm and shifted; with u_0 free and given; and the model's step and cost."""
     problem, (most, box, actions) = make(), PROBLEMS[make]

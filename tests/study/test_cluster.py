@@ -291,6 +291,7 @@ def victims(log: Path) -> list[tuple[int, int]]:
     ]
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_a_run_that_kills_every_worker_fails_and_the_others_end(address, worker, log, gate):
     """Dask gives it up after `distributed.scheduler.allowed-failures`; nannies replace workers."""
@@ -325,6 +326,7 @@ def test_workers_that_would_make_other_numbers_are_refused_in_a_sentence(
     assert not any(map(summaries.is_stored, TEN))
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_a_worker_with_other_versions_that_joins_late_trains_nothing(address, worker, log, gate):
     worker(noting(log))
@@ -471,6 +473,7 @@ def test_an_address_goes_with_certificates_if_it_says_so(certificate):
     assert f"no scheduler answers at tls://{at}" in refusal(at, security=certificate)
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_only_who_has_the_key_of_a_cluster_is_let_in(certificate, dask, tmp_path, monkeypatch):
     """With the commands of the page, except for the port."""

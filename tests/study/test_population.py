@@ -30,6 +30,7 @@ def test_a_layout_passes_the_screening(name):
     assert screen(LAYOUTS[name]).passed
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_every_layout_is_drawn_again():
     assert dict(zip(population.names(), population.drawn(), strict=False)) == LAYOUTS

@@ -93,6 +93,7 @@ def test_a_state_is_inside_where_the_overlap_of_its_own_step_is_positive():
     assert TASK.obstacles == ()
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 @pytest.mark.parametrize("terminal", TERMINALS[1:])
 def test_a_richer_terminal_cost_begins_as_the_paper_s_and_can_become_another(nmpc, terminal):

@@ -289,6 +289,7 @@ def mass(point_mass) -> Plant:
     return point_mass(bound=2.0)
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "layouts", "failures"), [("robot", 16, 4), ("mass", 6, 3)])
 def test_of_a_thousand_problems_nearly_all_are_solved_and_none_wrongly(
@@ -378,6 +379,7 @@ def worse_than_ipopts_best(layouts: range, starts: tuple[int, ...]) -> tuple[int
     return compared, worse
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_nine_cold_starts_leave_few_worse_plans_than_ten_of_ipopts():
     compared, worse = worse_than_ipopts_best(range(4), starts=(1, 9))
@@ -402,6 +404,7 @@ def test_inside_the_box_the_solution_is_that_of_the_hard_box(controllers, draw):
     assert same >= 92
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_from_the_same_warm_start_no_more_than_one_in_two_hundred_is_worse_than_ipopts():
     """After a step, after a noisy one, and after a change of theta."""

@@ -74,8 +74,7 @@ def test_the_products_with_unit_vectors_are_the_columns_of_the_dense_hessian(exa
     np.testing.assert_allclose(np.transpose(columns), dense, atol=1e-6 * np.abs(dense).max())
 
 
-@pytest.mark.parametrize("horizon", [1, 2, 25])
-@pytest.mark.parametrize("count", [0, 1, 7])
+@pytest.mark.parametrize(("horizon", "count"), [(1, 7), (2, 1), (25, 0)])
 def test_horizon_and_number_of_obstacles_do_not_matter_to_it(horizon, count):
     obstacles = tuple(Obstacle(-1.0 + x, 2.5) for x in range(count))
     box = np.array([9.0, 9.0, np.inf])
