@@ -29,14 +29,14 @@ from nmpcrl.report.figures.style import (
 from nmpcrl.report.worlds import signed
 
 POLICIES = {  # by arm
-    "init": r"$\theta_\mathrm{init}$", "ES": "ES", "grid": r"$\theta_c$ by hand",
+    "init": r"$\theta_\mathrm{init}$", "ES": "ES", "grid": r"grid over $\theta_c$",
     "CMA-ES": "CMA-ES",
 }  # fmt: skip
 OWN: Mapping[str, tuple[str, str, str]] = {  # of a wrong model: label, colour, mark
     "oracle": ("true model", INK, "s"),
     "ES": ("ES", "#0072B2", "o"),
     "ES+model": ("ES, model learned, too", "#B37A00", "^"),
-    "grid": (r"$\theta_c$ by hand", TEAL, "D"),
+    "grid": (r"grid over $\theta_c$", TEAL, "D"),
 }
 FAULTS = {  # as a figure names them
     "speed": "speed lost", "turn": "turns too much", "drift": "drift", "slip": "wheels slip",
@@ -91,8 +91,8 @@ def policies(costs: pd.DataFrame, met: pd.DataFrame) -> Figure:
     ends = {how: _inside(met[f"extrapolated {how}"]) for how in ("grid", "ES", "init")}
     return headed(
         figure,
-        rf"With extrapolation, $\theta_c$ by hand saves {grid:.0%} and ES {es:.0%}; the robot gets"
-        f" inside in {ends['grid']} and {ends['ES']} scenarios instead of {ends['init']}",
+        rf"With extrapolation, a grid over $\theta_c$ saves {grid:.0%} and ES {es:.0%}; the robot"
+        f" is inside in {ends['grid']} and {ends['ES']} scenarios instead of {ends['init']}",
     )
 
 
@@ -148,12 +148,12 @@ def models(saved: Mapping[str, Mapping[str, pd.Series]]) -> Figure:
     axes.set(xlabel=r"saved of the cost of $\theta_\mathrm{init}$", ylim=(len(saved) - 0.5, -0.5))
     axes.xaxis.set_major_formatter(PercentFormatter(1, 0))
     below(figure, axes.get_legend_handles_labels()[0])
-    perfect, by_hand = (
+    perfect, by_grid = (
         pd.concat([by[how] for by in saved.values() if how in by]).median()
         for how in ("oracle", "grid")
     )
-    changed = rf"The true model changes the cost by {signed(-perfect)}, $\theta_c$ by hand by"
-    return headed(figure, f"{changed} {signed(-by_hand)}")
+    changed = rf"The true model changes the cost by {signed(-perfect)}, a grid over $\theta_c$ by"
+    return headed(figure, f"{changed} {signed(-by_grid)}")
 
 
 @page
