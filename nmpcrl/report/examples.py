@@ -63,8 +63,8 @@ def kink() -> Example:
     below, above = (_slope(experiment, side * BESIDE) for side in (-1, 1))
     sentence = (
         "The robot starts exactly on the boundary of an obstacle, and the value has a kink there:"
-        " dV/dtheta_c is {below:.1f} where theta_c is a little below 0 and {above:.1f} where it is"
-        " a little above, {jump:.0f} more."
+        " its slope in {{c}} is {below:.1f} where {{c}} is a little below 0, and {above:.1f} where"
+        " it is a little above, {jump:.0f} more."
     )
     numbers = {"below": below, "above": above, "jump": above - below}
     look = (

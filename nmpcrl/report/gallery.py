@@ -63,7 +63,7 @@ def closed_gap(rows: list[Row]) -> Example | None:
     row = max(closed, key=lambda row: row["final_cost"] / row["initial_cost"])
     experiment = experiment_of(row)
     sentence = (
-        "{learner} raises theta_c to {theta_c:.2f}. The gap that the first rollout goes through"
+        "{learner} raises {{c}} to {theta_c:.2f}. The gap that the first rollout goes through"
         " closes at {closes_at:.2f}, and the noise-free cost rises from {first:.0f} to {last:.0f}."
     )
     numbers = {
@@ -73,7 +73,7 @@ def closed_gap(rows: list[Row]) -> Example | None:
         "last": row["final_cost"],
     }
     look = (
-        "Look at theta_c and at the cost without noise: where the one passes the closing of the"
+        "Look at {c} and at the cost without noise: where the one passes the closing of the"
         " gap, the other jumps. On the map, the dashed circles then overlap."
     )
     return example("A gap that closes", sentence, numbers, experiment, look=look)
@@ -85,7 +85,7 @@ def overshoot(rows: list[Row]) -> Example | None:
     if not row["over"]:
         return None
     sentence = (
-        "With alpha = {alpha:.0e}, alpha ||phi||² is above {limit:.0f} in {share:.1%} of the steps"
+        "With α = {alpha:.0e}, α‖φ‖² is above {limit:.0f} in {share:.1%} of the steps"
         " of {learner}: these steps overshoot, and the noise-free cost goes from {first:.0f} to"
         " {last:.0f}."
     )
@@ -96,7 +96,7 @@ def overshoot(rows: list[Row]) -> Example | None:
         "first": row["initial_cost"],
         "last": row["final_cost"],
     }
-    look = "Look at the largest alpha ||phi||²: above the line at {limit:.0f} a step overshoots."
+    look = "Look at the largest α‖φ‖²: above the line at {limit:.0f} a step overshoots."
     return example(
         "A run that overshoots",
         sentence,
@@ -120,8 +120,8 @@ def one_fails(study: Published, wrong: str, well: str) -> Example | None:
         f"In layout {experiment.layout}, with noise that decays per {experiment.decay},"
         f" {{wrong:.0%}} of the runs of {wrong} go wrong and {{well:.0%}} of those of {well}. With"
         f" seed {experiment.seed}, {wrong} {end}, and {well} ends at a cost of {{other:.0f}};"
-        " theta_init's is {first:.0f}. The network of this page rounds otherwise, so that a run may"
-        " end with other numbers."
+        " at the start it is {first:.0f}. The network of this page rounds otherwise, so that a run"
+        " may end with other numbers."
     )
     numbers = {
         **dict(zip(("wrong", "well"), shares, strict=True)),

@@ -1,4 +1,4 @@
-"""The introduction's live figure: the robot plans anew, learns, and fails where a gap closes."""
+"""The introduction's live figure: the robot plans anew, learns, and fails where a gap is narrow."""
 
 import json
 
@@ -10,7 +10,7 @@ from nmpcrl.claims import published
 from nmpcrl.control import Obstacle
 from nmpcrl.control.task import Task
 from nmpcrl.learning.rollout import Persistent, evaluate
-from nmpcrl.report.live.introduction import CLOSED, OPEN
+from nmpcrl.report.live.introduction import NARROW, WIDE
 from nmpcrl.study import Experiment, paper
 
 FIGURE = "intro"
@@ -26,7 +26,7 @@ TOP = "document.querySelector('figure.live svg').getBoundingClientRect()"
 
 def task_of(given: dict) -> Task:
     centres = [Obstacle(x, y) for x, y, _ in given["discs"]]
-    return Task(**vars(paper.task(OPEN)) | {"obstacles": tuple(centres)})
+    return Task(**vars(paper.task(WIDE)) | {"obstacles": tuple(centres)})
 
 
 def by_python(given: dict):
@@ -61,10 +61,10 @@ def published_run(layout: str) -> dict:
 
 def test_it_begins_with_the_study_and_with_what_python_finds(tab):
     shown = tab.shown()
-    assert centres(shown) == [list(one) for one in paper.LAYOUTS[OPEN]]
+    assert centres(shown) == [list(one) for one in paper.LAYOUTS[WIDE]]
     assert shown["given"]["theta"] == list(paper.THETA_INIT)
     assert shown["found"]["now"]["arrived"]
-    assert shown["found"]["now"]["cost"] == pytest.approx(published_run(OPEN)["initial_cost"])
+    assert shown["found"]["now"]["cost"] == pytest.approx(published_run(WIDE)["initial_cost"])
     assert_equal_to_python(shown)
     assert "Before learning, the robot arrives" in status(tab)
 
@@ -81,7 +81,7 @@ def test_an_obstacle_that_is_dragged_changes_the_trajectory_at_once(tab):
 
 def test_learning_ends_where_the_published_run_does_and_the_cost_falls(tab):
     before, after = tab.shown(), learn(tab)
-    run = published_run(OPEN)
+    run = published_run(WIDE)
     assert after["given"]["theta"][8] == pytest.approx(run["theta_8"], rel=1e-3)
     assert after["found"]["now"]["cost"] == pytest.approx(run["final_cost"], rel=0.01)
     assert after["found"]["now"]["cost"] < before["found"]["now"]["cost"]
@@ -93,21 +93,21 @@ def test_learning_ends_where_the_published_run_does_and_the_cost_falls(tab):
     assert f"% less than before learning ({before['found']['now']['cost']:.0f})" in said
 
 
-def test_where_the_gap_closes_learning_fails_and_opening_it_goes_back(tab):
+def test_where_learning_closes_the_gap_it_fails_and_widening_goes_back(tab):
     begin = tab.shown()
-    tab.click("Close the gap")
+    tab.click("Narrow a gap")
     closed = tab.shown()
-    assert centres(closed) == [list(one) for one in paper.LAYOUTS[CLOSED]]
+    assert centres(closed) == [list(one) for one in paper.LAYOUTS[NARROW]]
     assert closed["found"]["now"]["arrived"]
     after = learn(tab)
     first = by_python(closed["given"])
     assert after["given"]["theta"][8] > closes_at(task_of(closed["given"]), first.states[:, :2])
     assert not after["found"]["now"]["arrived"]
-    assert published_run(CLOSED)["ending"] == "stuck"
+    assert published_run(NARROW)["ending"] == "stuck"
     assert after["found"]["now"]["cost"] > 1.2 * closed["found"]["now"]["cost"]
     assert "is stuck before the target" in status(tab)
     assert "% more than before learning" in status(tab)
-    tab.click("Open the gap again")
+    tab.click("Widen it again")
     assert tab.shown() == begin
 
 
@@ -142,7 +142,7 @@ def test_the_keyboard_learns_and_moves(tab):
     tab.figure.get_by_role("button", name="Learn").focus()
     tab.page.keyboard.press("Tab")
     tab.page.keyboard.press("Enter")
-    assert centres(tab.shown()) == [list(one) for one in paper.LAYOUTS[CLOSED]]
+    assert centres(tab.shown()) == [list(one) for one in paper.LAYOUTS[NARROW]]
     tab.page.keyboard.press("Tab")
     assert tab.page.evaluate("document.activeElement.ariaLabel") == "Obstacle 1"
     tab.page.keyboard.press("Shift+ArrowUp")

@@ -312,6 +312,32 @@ def test_runs_share_the_plots_and_can_be_removed(tab):
     assert sorted(names.all_text_contents()) == ["1", "2", "4"]
 
 
+def test_only_runs_in_the_chosen_place_share_the_plots(tab):
+    fill(tab, Episodes=1)
+    tab.click("Train")
+    tab.press("Obstacle 1", "ArrowUp")
+    tab.click("Train")
+    trained(tab)
+    names = tab.quiet().figure.locator(".plots svg").first.locator("text.right")
+    assert names.all_text_contents() == ["2"]
+    tab.figure.get_by_role("radio", name="1: ES, seed 0, episodes 1").check()
+    tab.later()
+    assert names.all_text_contents() == ["1"]
+    press(tab, "Lay 2: ES, seed 0, episodes 1, own places over the chosen one")
+    tab.later()
+    assert sorted(names.all_text_contents()) == ["1", "2"]
+
+
+def test_on_a_telephone_the_plots_of_a_step_stand_right_below_it(opened):
+    tab = opened(FIGURE, viewport={"width": 390, "height": 844}, reduced_motion="reduce").begun()
+    tab.click("Lesson: the trap")
+    told(tab)
+    parts = (tab.figure.locator(part).first for part in (".told", ".panel.look", ".side"))
+    text, plot, map_ = (part.bounding_box()["y"] for part in parts)
+    assert text < plot < map_
+    assert plot - text < 500
+
+
 def test_a_link_restores_everything_and_the_browsers_arrows_lead_back(tab, opened):
     tab.press("Obstacle 1", "Shift+ArrowDown")
     first = settled(tab)
@@ -444,9 +470,8 @@ def test_a_find_fills_the_form_trains_and_says_what_to_look_at(tab):
     assert buttons.all_inner_texts() == ["Lesson: the trap", *finds]
     for name, find in finds.items():
         press(tab, name)
-        assert tab.figure.locator(".told p").nth(1).inner_text() == " ".join(
-            (find["sentence"], find["look"])
-        )
+        said = f"{find['sentence']} {find['look']}".replace("{c}", "θc")
+        assert tab.figure.locator(".told p").nth(1).inner_text() == said
         tab.page.wait_for_function("() => document.querySelector('figure.live').shown.last")
         assert tab.shown()["given"] == find["settings"]
         asked = [find["settings"], *([find["against"]] if find["against"] else [])]
@@ -571,13 +596,13 @@ def test_the_lesson_on_the_trap_is_six_steps_that_run(tab):
         assert tab.figure.get_by_label("Seed", exact=True).input_value() == str(given["seed"])
         assert tab.figure.locator(".panel.look").count() >= 1
     by_hand, learned, value, slower, exact, low = said
-    assert re.match(r"Without learning, with θ_c = 0\.100, the robot does not arrive", by_hand)
-    assert "with θ_c = 0.001, the robot arrives" in by_hand
+    assert re.match(r"Without learning, with θc = 0\.100, the robot does not arrive", by_hand)
+    assert "with θc = 0.001, the robot arrives" in by_hand
     assert "the robot does not arrive" in learned
     assert "The value got more accurate while the policy got worse" in value
     assert "closed after episode" in slower
     assert "The gap stays open" in exact
-    assert "with θ_c = 0.050, the robot arrives" in low
+    assert "with θc = 0.050, the robot arrives" in low
     runs = tab.shown()["runs"]
     assert len(runs) == 6  # ES is trained once, and steps 1 and 6 have two more of theta_c
     assert tab.figure.get_by_role("button", name="Next").get_attribute("aria-disabled") == "true"
@@ -586,17 +611,20 @@ def test_the_lesson_on_the_trap_is_six_steps_that_run(tab):
     assert len(tab.shown()["runs"]) == 6
 
 
-def test_a_find_about_a_network_fails_here_as_in_python(tab):
+def test_a_find_about_a_network_fails_here_as_in_python_and_says_when(tab):
     tab.click("RDES fails, DES does not")
     tab.page.wait_for_function(
         "() => document.querySelector('figure.live').shown.runs[0]?.state === 'diverged'"
     )
     found, well = tab.shown()["runs"]
     assert well["given"] == {**found["given"], "learner": "DES"}
-    expected = run(Experiment(**tab.shown()["given"]))
+    expected, last = run(Experiment(**tab.shown()["given"])), found["rows"][-1]["episode"]
     assert found["state"] == "diverged"
-    assert found["rows"][-1]["episode"] == expected.steps["episode"][-1] + 1
+    assert last == expected.steps["episode"][-1] + 1
     assert expected.facts["stopped"].startswith("diverged")
+    assert told(tab).startswith(f"RDES was stopped in episode {last}, with θ")
+    drawn = tab.figure.locator(".panel svg").nth(2).locator("text").all_text_contents()
+    assert not [text for text in drawn if len(text) > 4]  # no axis that only the last theta fills
 
 
 def test_the_link_is_copied(opened):

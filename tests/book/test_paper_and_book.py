@@ -47,7 +47,8 @@ def test_every_equation_has_a_line_that_says_where_it_is():
     lines = rows(CELLS["equations"])
     assert [what.split()[0] for what, *_ in lines] == EQUATIONS
     for what, where, _ in lines:
-        assert (links := re.findall(r"\(([\w.]+)#((?:eq|alg)-[\w-]+)\)", where)), what
+        links = re.findall(r"\(([\w.]+)#((?:eq|alg)-[\w-]+)\)", where)
+        assert links, what
         for page, anchor in links:
             assert f'<a id=\\"{anchor}\\"></a>' in (ROOT / "book" / page).read_text(), what
 

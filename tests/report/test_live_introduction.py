@@ -29,11 +29,11 @@ def test_it_trains_the_run_of_the_study(data):
 
 
 def test_one_layout_is_open_and_the_other_closing(data):
-    for kind, name in (("open", introduction.OPEN), ("closed", introduction.CLOSED)):
+    for kind, name in (("wide", introduction.WIDE), ("narrow", introduction.NARROW)):
         centres = [disc[:2] for disc in data["layouts"][kind]]
         assert centres == [list(one) for one in paper.LAYOUTS[name]]
-    assert layouts.screen(paper.LAYOUTS[introduction.OPEN]).kind == "open"
-    assert layouts.screen(paper.LAYOUTS[introduction.CLOSED]).kind == "closing"
+    assert layouts.screen(paper.LAYOUTS[introduction.WIDE]).kind == "open"
+    assert layouts.screen(paper.LAYOUTS[introduction.NARROW]).kind == "closing"
 
 
 def test_the_map_shows_both_layouts_whole(data):

@@ -1,6 +1,6 @@
-// The introduction's live figure: move the obstacles, let it learn before your eyes, close the gap and see it fail.
+// The introduction's live figure: move the obstacles, let it learn before your eyes, narrow a gap and see learning close it.
 //
-// `given`: { start, discs, horizon, closed, theta, episode, learning, moved, said }: which layout the obstacles come
+// `given`: { start, discs, horizon, narrow, theta, episode, learning, moved, said }: which layout the obstacles come
 // from, theta after so many episodes, whether they go on, and whether something was moved since they began.
 (() => {
   "use strict";
@@ -34,11 +34,11 @@
     const row = add(parent, "div", { class: "buttons" });
     const start = shared.button(row, words.learn, learn);
     set(start, { class: "main" });
-    const gap = shared.button(row, words.close, toggle);
+    const gap = shared.button(row, words.narrow, toggle);
     const bar = add(row, "progress", { "aria-label": words.progress, max: episodes, value: 0 });
-    return ({ learning, closed, episode }) => {
+    return ({ learning, narrow, episode }) => {
       start.textContent = learning ? words.stop : words.learn;
-      gap.textContent = closed ? words.open : words.close;
+      gap.textContent = narrow ? words.widen : words.narrow;
       set(bar, { value: episode });
       bar.style.visibility = learning ? "visible" : "hidden";
     };
@@ -63,7 +63,7 @@
     const { layouts, settings, theta: init } = data;
     const fresh = { theta: init, episode: 0, learning: false, moved: false, said: "" };
     const { read, move } = shared.state(
-      { start: data.start, horizon: data.horizon, discs: layouts.open, closed: false, ...fresh }, show,
+      { start: data.start, horizon: data.horizon, discs: layouts.wide, narrow: false, ...fresh }, show,
     );
     let stopped = () => {};
     let first = null, seen = ""; // before learning, and where that was
@@ -76,8 +76,8 @@
 
     const moved = (change) => end({ ...change, moved: read().episode > 0, said: "" });
     const toggle = () => {
-      const closed = !read().closed;
-      end({ ...fresh, closed, start: data.start, discs: closed ? layouts.closed : layouts.open });
+      const narrow = !read().narrow;
+      end({ ...fresh, narrow, start: data.start, discs: narrow ? layouts.narrow : layouts.wide });
     };
 
     function learn() {
@@ -104,7 +104,7 @@
     const map = plane(figure, data.view, words.handles);
     mapParts.background(map, data);
     const drawn = [
-      circles(map, { discs: layouts.open }),
+      circles(map, { discs: layouts.wide }),
       ...mapParts.handles(map, data, read, moved),
       trajectories(map, data),
     ];

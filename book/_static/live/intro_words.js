@@ -17,14 +17,14 @@
   words.intro = {
     map: "The robot, its trajectory among obstacles that can be moved, and a learner",
     handles: "What can be moved on the map",
-    title: "Drag an obstacle, or press Learn; then close the gap, and learn again.",
+    title: "Drag an obstacle, or press Learn; then narrow a gap, and learn again.",
     legend: "Line: the robot’s trajectory without noise; dotted: before learning. Dashed circles: the distance from an "
       + "obstacle that its plans keep, which learning changes; where two overlap, the gap between them is closed. "
       + "By keyboard: Tab to an obstacle, to the robot or to its arrow, then arrow keys, with Shift for larger steps.",
     learn: "Learn",
     stop: "Stop",
-    close: "Close the gap",
-    open: "Open the gap again",
+    narrow: "Narrow a gap",
+    widen: "Widen it again",
     progress: "Episodes learned",
     // Lines of words and numbers in turn.
     now: ({ episode, episodes, learning, rollout, first, moved }) => {

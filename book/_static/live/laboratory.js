@@ -27,7 +27,7 @@
   // A number that is refused stays in its field, with a sentence, and changes nothing.
   function number(line, field, move, tell) {
     const input = add(line, "input", {
-      type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": words.names[field.name],
+      type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": shared.plain(words.names[field.name]),
     });
     input.addEventListener("change", () => {
       const value = settings.parsed(input.value, field);
@@ -52,7 +52,7 @@
     };
     const rows = [...fields, thetaC].map((field) => {
       const line = add(field.name === "learner" ? lead : grid, "label", { class: "field" });
-      add(line, "span", {}, words.names[field.name]);
+      shared.write(add(line, "span"), words.names[field.name]);
       return { field, line, input: field.choices ? menu(line, field, move) : number(line, field, move, tell) };
     });
     return (given) => {
@@ -79,7 +79,8 @@
       const done = now?.rows.at(-1)?.episode ?? 0, all = now?.run.given.episodes ?? 1;
       set(bar, { value: done, max: all });
       const what = now && (now.rows === now.run.rows ? name(now.run) : words.arm(name(now.run)));
-      text.textContent = now ? words.training(what, done, all) + words.waiting(waiting) : "";
+      text.replaceChildren();
+      shared.write(text, now ? words.training(what, done, all) + words.waiting(waiting) : "");
     };
   }
 
@@ -207,7 +208,7 @@
     const curves = add(desk, "div", { class: "curves" });
     const note = shared.results(curves);
     const plots = laboratoryPlots(curves, data);
-    add(figure, "p", { class: "legend" }, words.legend);
+    shared.write(add(figure, "p", { class: "legend" }), words.legend);
     add(figure, "p", { class: "plot-title" }, words.runs);
     const drawList = laboratoryRuns.list(figure, data, { choose, keep, remove: removed, name });
     const drawAlong = takeAlong(figure, data, tell);

@@ -5,16 +5,19 @@
 
   const { add, set, laboratoryRuns: { judged }, parts: shared, words: { laboratory: words } } = window.nmpcrl;
 
-  // What became of a run: of what was judged, the first, where it first did not arrive, and the last; null of none.
-  function account({ rows, given }, { arrived }) {
+  // What became of a run: of what was judged, the first, where it first did not arrive, and the last; null of none. One
+  // that diverged was stopped: in which episode, and which component of theta was the largest then.
+  function account({ rows, given }, { arrived, names }) {
     const seen = judged(rows);
     if (!seen.length) return null;
     const told = ({ episode, theta, delta, judged: { states, cost, value, discounted } }) => ({
       episode, cost, delta, thetaC: theta.at(-1), error: Math.abs(value / discounted - 1),
       arrives: Number.isFinite(cost) && Math.hypot(...states.at(-1).map((each, k) => each - given.target[k])) <= arrived,
     });
-    const all = seen.map(told);
-    return { given, first: all[0], closed: all.find(({ arrives }) => !arrives) ?? null, last: all.at(-1) };
+    const all = seen.map(told), { episode, theta, diverged } = rows.at(-1);
+    const k = theta.map(Math.abs).reduce((most, size, at, sizes) => (size > sizes[most] ? at : most), 0);
+    const stopped = diverged ? { episode, name: names[k], value: theta[k] } : null;
+    return { given, first: all[0], closed: all.find(({ arrives }) => !arrives) ?? null, last: all.at(-1), stopped };
   }
 
   // `show({ settings, against, learned, replay, panels }, then)` trains what is to be seen and plays it; `then(run,
@@ -31,12 +34,17 @@
     set(next, { class: "main" });
     let at = -1; // step of the lesson
 
+    function say(paragraph, content) {
+      paragraph.replaceChildren();
+      shared.write(paragraph, content);
+    }
+
     function tell(heading, sentence) {
       told.hidden = !sentence;
       title.textContent = heading;
       title.hidden = !heading;
-      text.textContent = sentence;
-      answer.textContent = "";
+      say(text, sentence);
+      say(answer, "");
       steps.hidden = at < 0;
       set(back, { "aria-disabled": at <= 0 });
       set(next, { "aria-disabled": at === data.trap.length - 1 });
@@ -50,7 +58,7 @@
       const { heading, sentence, panels, replay = false, found } = words.trap[at];
       tell(words.step(at + 1, data.trap.length, heading), sentence);
       show({ ...data.trap[at], learned: true, replay, panels }, (run, other) => {
-        if (at === to) answer.textContent = found(account(run, data), other && account(other, data));
+        if (at === to) say(answer, found(account(run, data), other && account(other, data)));
       });
     }
 
@@ -68,7 +76,7 @@
       shared.button(row, example.title, () => {
         at = -1;
         tell("", `${example.sentence} ${example.look}`);
-        show({ ...example, panels: [] }, (run) => { answer.textContent = words.outcome(account(run, data)); });
+        show({ ...example, panels: [] }, (run) => say(answer, words.outcome(account(run, data))));
       });
     }
     leave();

@@ -81,8 +81,9 @@
 
   const after = (rows) => rows.filter(({ episode }) => episode);
 
-  // The four that move most have names.
-  function components({ rows }, data, color) {
+  // The four that move most have names. What ended a run that diverged is so large that it would hide the rest.
+  function components(run, data, color) {
+    const rows = run.rows.filter(({ diverged }) => !diverged);
     const moved = data.names.map((_, k) => {
       const values = rows.map(({ theta }) => theta[k]);
       return Math.max(...values) - Math.min(...values);
@@ -117,7 +118,10 @@
     };
     const heights = (lines) => lines.flatMap(({ points }) => points.map(([, y]) => y)).filter(Number.isFinite);
     const wide = (values) => Math.max(...values) > 20 * Math.min(...values.filter((value) => value > 0));
-    const drawn = (runs, chosen, kept) => {
+    // Costs among other obstacles cannot be compared: only runs in the chosen one's place share the axes.
+    const place = ({ given: { layout, start, target } }) => JSON.stringify([layout, start, target]);
+    const drawn = (all, chosen, kept) => {
+      const runs = all.filter((run) => !chosen || run === kept || place(run) === place(chosen));
       [none.hidden, grid.hidden] = [Boolean(runs.length), !runs.length];
       const x = [0, Math.max(...runs.map(({ given }) => given.episodes), 1)];
       const line = (run) => (run === chosen ? "line chosen" : "line");
@@ -141,8 +145,8 @@
       draw.delta({ x, lines: deltas, log: wide(heights(deltas)) });
       const steps = lines((rows) => after(rows).map(({ episode, alphaPhi2 }) => [episode, alphaPhi2]));
       const limit = { look: "level", name: `${data.overshoot}`, points: x.map((episode) => [episode, data.overshoot]) };
-      const all = [limit, ...steps];
-      draw.step({ x, lines: all, log: wide(heights(all)) });
+      const drawnSteps = [limit, ...steps];
+      draw.step({ x, lines: drawnSteps, log: wide(heights(drawnSteps)) });
     };
     return { draw: drawn, lookAt };
   }

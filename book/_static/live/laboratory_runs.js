@@ -117,13 +117,13 @@
       const input = add(label, "input", { type: "radio", name: "nmpcrl-run" });
       const swatch = add(label, "span", { class: "swatch" });
       swatch.style.setProperty("--look", data.looks[run.given.learner].color);
-      add(label, "span", {}, name(run));
+      shared.write(add(label, "span"), name(run));
       const found = add(line, "span", { class: "found" });
       input.addEventListener("change", () => choose(run));
       const over = shared.button(line, words.keep, () => keep(run));
-      set(over, { "aria-label": words.keepRun(name(run)) });
+      set(over, { "aria-label": shared.plain(words.keepRun(name(run))) });
       const button = shared.button(line, words.removeShort, () => remove(run));
-      set(button, { "aria-label": words.removeRun(name(run)) });
+      set(button, { "aria-label": shared.plain(words.removeRun(name(run))) });
       return { line, input, found, over };
     }
 

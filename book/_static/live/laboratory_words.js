@@ -3,14 +3,17 @@
   "use strict";
 
   const { words } = window.nmpcrl;
-  const { fixed } = words.parts;
+  const { fixed, sized } = words.parts;
   const percent = (share) => `${fixed(100 * Math.abs(share), 1)} %`;
   const LONG = 60; // letters of a link that are repeated
   const short = (text) => (text.length > LONG ? `${text.slice(0, LONG)}…` : text);
   const stands = ({ arrives }) => (arrives ? "arrives" : "does not arrive");
-  // What a run came to, and what one that is laid over it did.
-  const ended = ({ given, first, last }) => (
-    `${given.learner === "frozen" ? "Without learning" : `After ${last.episode} episodes of ${given.learner}`}, with θ_c = ${fixed(last.thetaC, 3)}, the robot `
+  const halted = ({ given, stopped }) => (
+    `${given.learner} was stopped in episode ${stopped.episode}, with {${stopped.name}} = ${sized(stopped.value)}. `
+  );
+  // What a run came to, and what one that is laid over it did. In braces stands the symbol of a component of theta.
+  const ended = ({ given, first, last, stopped }) => (
+    `${stopped ? halted({ given, stopped }) : ""}${given.learner === "frozen" ? "Without learning" : `After ${last.episode} episodes of ${given.learner}`}, with {c} = ${fixed(last.thetaC, 3)}, the robot `
     + `${stands(last)}, at a cost of ${fixed(last.cost, 0)}${given.learner === "frozen" ? "" : `; at the start it was ${fixed(first.cost, 0)}`}.`
   );
   const apart = ({ error }) => `${fixed(100 * error, 0)} %`;
@@ -21,10 +24,11 @@
     handles: "What can be moved on the map",
     title: "Place the obstacles, and train; or see what others found.",
     legend: "Line: closed loop without noise, of the chosen run, or of θ at the start, which is dotted beside a run. "
-      + "Dashed line: the run laid over it. Thick line: first plan. Dashed circles: what plans keep away from at this θ_c; "
+      + "Dashed line: the run laid over it. Thick line: first plan. Dashed circles: what plans keep away from at this {c}; "
       + "where two overlap, the gap is closed. Drag an obstacle, the robot, the target or the tip of an arrow; or click one and "
       + "then its new place; or reach it with Tab and press the arrow keys, with Shift for larger steps. Delete removes "
-      + "an obstacle. In the plots of costs, grey is the frozen arm: the same noise, and θ never moves.",
+      + "an obstacle. The plots are of the runs among the chosen run’s obstacles; in those of costs, grey is the frozen arm: the "
+      + "same noise, and θ never moves.",
     settings: "Settings",
     time: "Time of the closed loop",
     seconds: (time) => `${fixed(time, 1)} s`,
@@ -42,16 +46,16 @@
       {
         heading: "close the gap",
         panels: ["judged"],
-        sentence: "θ_c says how much farther than it must a plan stays from obstacles. Nothing learns here: in one run θ_c is raised by "
-          + "hand, and the dashed circles overlap; the dashed trajectory is that of θ_c at the start. Look at where the two robots end.",
+        sentence: "{c} says how much farther than it must a plan stays from obstacles. Nothing learns here: in one run {c} is raised by "
+          + "hand, and the dashed circles overlap; the dashed trajectory is that of {c} at the start. Look at where the two robots end.",
         found: (run, other) => `${ended(run)} ${ended(other)}`,
       },
       {
         heading: "let learning close it",
         panels: ["theta", "judged"],
-        sentence: "Now θ_c begins low, the gap is open, and ES learns. Look at θ_c and at the cost without noise while it trains.",
+        sentence: "Now {c} begins low, the gap is open, and ES learns. Look at {c} and at the cost without noise while it trains.",
         found: ({ first, closed, last }) => (
-          closed ? `After ${closed.episode} episodes θ_c is ${fixed(closed.thetaC, 3)}, and the robot does not arrive: the cost without noise is `
+          closed ? `After ${closed.episode} episodes {c} is ${fixed(closed.thetaC, 3)}, and the robot does not arrive: the cost without noise is `
             + `${fixed(closed.cost, 0)}, and was ${fixed(first.cost, 0)}. After ${last.episode} it is ${fixed(last.cost, 0)}.`
             : `The gap stays open for ${last.episode} episodes.`
         ),
@@ -60,8 +64,8 @@
         heading: "is the value wrong?",
         panels: ["value", "judged"],
         replay: true,
-        sentence: "The same run, its policies one after the other. Compare two lines: V, what the NMPC’s value says of the start, "
-          + "and the discounted cost that the robot then pays.",
+        sentence: "The same run, its policies one after the other. Compare the two lines of “V and discounted cost”: V, what the NMPC’s "
+          + "value says of the start, and the discounted cost that the robot then pays.",
         found: ({ first, closed, last }) => (
           `V and that cost are ${apart(first)} apart at the start, ${closed ? `${apart(closed)} once the gap is closed, ` : ""}`
           + `and ${apart(last)} at the end, where the cost without noise is ${fixed(last.cost, 0)} instead of ${fixed(first.cost, 0)}. `
@@ -72,19 +76,19 @@
       {
         heading: "a smaller step",
         panels: ["theta", "judged"],
-        sentence: "A remedy? α is a tenth. The dashed lines are the run before. Look at whether θ_c stops, or only comes later.",
+        sentence: "A remedy? α is a tenth. The dashed lines are the run before. Look at whether {c} stops, or only comes later.",
         found: (run) => `${ended(run)} ${run.closed ? `The gap is closed after episode ${run.closed.episode}.` : "The gap stays open."}`,
       },
       {
         heading: "another learner",
         panels: ["theta", "judged"],
-        sentence: "A remedy? TDC follows the exact gradient of the projected error, with the second derivatives that GES leaves out. Look at θ_c.",
+        sentence: "A remedy? TDC follows the exact gradient of the projected error, with the second derivatives that GES leaves out. Look at {c}.",
         found: (run) => `${ended(run)} ${run.closed ? `The gap is closed after episode ${run.closed.episode}.` : "The gap stays open."}`,
       },
       {
         heading: "one number by hand",
         panels: ["judged"],
-        sentence: "A remedy? Nothing learns; θ_c is set once, below where the gap closes. The dashed trajectory is where ES ended.",
+        sentence: "A remedy? Nothing learns; {c} is set once, below where the gap closes. The dashed trajectory is where ES ended.",
         found: (run, other) => `${ended(run)} ${ended(other)}`,
       },
     ],
@@ -97,7 +101,7 @@
     names: {
       learner: "Learner", alpha: "Step size α", beta: "Step size β", beta_tdc: "Step size β", zeta: "Learning rate ζ",
       decay: "Decay per", decay_rate: "Decay factor c", horizon: "Horizon N", seed: "Seed", episodes: "Episodes",
-      theta_c: "θ_c at the start",
+      theta_c: "{c} at the start",
     },
     learners: {
       ES: "ES: Expected Sarsa", DES: "DES: network of (s, a)", RDES: "RDES: network of (s, a, θ)",
@@ -119,7 +123,7 @@
       alpha: "α", beta: "β", beta_tdc: "β", zeta: "ζ", decay: "decay per", decay_rate: "c", horizon: "N",
       episodes: "episodes",
     },
-    startingAt: (thetaC) => `θ_c ${thetaC} at the start`,
+    startingAt: (thetaC) => `{c} ${thetaC} at the start`,
     layout: (letter) => `layout ${letter}`,
     elsewhere: "own places",
     runs: "Runs",

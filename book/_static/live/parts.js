@@ -84,6 +84,11 @@
     });
   }
 
+  // The same text where no symbol can stand: in a label that is read aloud.
+  const plain = (text) => text.replace(/\{(\w+)\}/g, (whole, name) => (
+    Object.hasOwn(words.symbols, name) ? words.symbols[name].join(" ") : whole
+  ));
+
   // Lines of texts and numbers in turn. A screen reader is given them once nothing changes any more.
   function results(parent) {
     const all = add(parent, "div", { class: "results", role: "status" });
@@ -110,6 +115,6 @@
   }
 
   window.nmpcrl = {
-    ...window.nmpcrl, add, set, parts: { clamp, points, begin, state, heading, symbol, write, results, button },
+    ...window.nmpcrl, add, set, parts: { clamp, points, begin, state, heading, symbol, write, plain, results, button },
   };
 })();

@@ -1,4 +1,4 @@
-"""The introduction's live figure: the robot, a learner, and a gap that closes."""
+"""The introduction's live figure: the robot, a learner, and a gap that learning closes."""
 
 from typing import Any
 
@@ -18,12 +18,12 @@ SCRIPTS = frame.scripts_of(
     "intro", *frame.MAP, "random.js", "learning.js", "trainer.js"
 )  # fmt: skip
 STYLES = ("intro.css",)
-OPEN, CLOSED = "A", "E"  # layouts: the first, and the first of the study in which ES closes a gap
+WIDE, NARROW = "A", "E"  # layouts: the first, and the first in which ES closes a gap
 
 
 def intro() -> HTML:
     """Obstacles to be moved, ES that trains among them, and a layout in which it fails."""
-    experiment = Experiment("ES", layout=OPEN)  # as the study has trained it
+    experiment = Experiment("ES", layout=WIDE)  # as the study has trained it
     nmpc = controller_of(experiment).nmpc
 
     def data() -> dict[str, Any]:
@@ -31,9 +31,9 @@ def intro() -> HTML:
         own |= {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")}
         begun = begin(nmpc, nmpc.task.start, np.array(experiment.theta))
         return begun | {
-            "view": view(paper.task(OPEN), paper.task(CLOSED)),
+            "view": view(paper.task(WIDE), paper.task(NARROW)),
             "steps": experiment.steps,
-            "layouts": {"open": discs(paper.task(OPEN)), "closed": discs(paper.task(CLOSED))},
+            "layouts": {"wide": discs(paper.task(WIDE)), "narrow": discs(paper.task(NARROW))},
             "arrived": ARRIVED,
             "settings": own,
             "widths": widths(),
