@@ -86,7 +86,7 @@ class Nmpc(Described):
             self.horizon, self.gamma = plant.horizon, plant.gamma
             self.n, self.m, self._theta_size = plant.states, plant.inputs, plant.names.size
             self._far = FARTHEST * max(1.0, *plant.sizes[0])
-            self._large = max(ABSURD, 1e3 * np.abs(plant.theta).max())
+            self.largest = max(ABSURD, 1e3 * float(np.abs(plant.theta).max()))  # number in theta
         else:
             if task is None:
                 raise ValueError("a plant needs a task: write Nmpc(plant, task)")
@@ -98,10 +98,12 @@ class Nmpc(Described):
             self._plant, self._task, self._slack_weight = plant, task, float(slack_weight)
             self.solver.check(task)
             self.n, self.m, self._theta_size = plant.n, plant.m, 2 * plant.n + plant.m + 1
-            self._large = ABSURD
+            self.largest = ABSURD
             box = np.abs([task.lower, task.upper])
             self._far = max(FAR, 100 * box[np.isfinite(box)].max(initial=0))
         self.lower, self.upper = plant.lower, plant.upper
+        bounds = np.abs([plant.lower, plant.upper])
+        self._strong = max(self._far, bounds[np.isfinite(bounds)].max(initial=0))
         self.ties_active = ties_active
 
     def solve(
@@ -129,7 +131,7 @@ class Nmpc(Described):
         """
         began = time.perf_counter()
         state = _checked("state", state, self.n, self._far)
-        theta = _checked("theta", theta, self._theta_size, self._large)
+        theta = _checked("theta", theta, self._theta_size, self.largest)
         known = None
         if self.problem is not None:
             known = self.problem.stage_data(data)
@@ -137,7 +139,7 @@ class Nmpc(Described):
             raise ValueError("data belong to a Problem: a task's target and obstacles stand still")
         given: tuple[Vector, ...] = ()
         if action is not None:
-            action = _checked("action", action, self.m, self._far)
+            action = _checked("action", action, self.m, self._strong)
             if (action < self.lower).any() or (action > self.upper).any():
                 bounds = f"{short(self.lower)} and {short(self.upper)}"
                 raise ValueError(f"action {short(action)} must lie between {bounds}")
@@ -161,7 +163,7 @@ class Nmpc(Described):
         Raises:
             ValueError: the vector has another shape, is not finite or is absurdly large.
         """
-        vector = _checked("vector", vector, solution.theta.size)
+        vector = _checked("vector", vector, solution.theta.size, self.largest)
         return self._variant(solution).hessian_times(solution, vector)
 
     def policy_jacobian(self, solution: Solution) -> Matrix:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nmpcrl.control import Nmpc, Obstacle, SolverError, Task, differential_drive
+from nmpcrl.control import Nmpc, Obstacle, Plant, SolverError, Task, differential_drive
 from nmpcrl.control import nmpc as module
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.study import paper
@@ -194,6 +194,18 @@ def test_an_absurd_action_is_refused_before_a_solver_sees_it(unreached, number):
 def test_arguments_of_the_wrong_shape_or_kind_are_refused(unreached, arguments, message):
     with pytest.raises(ValueError, match=message):
         unreached.solve(**{"state": START, "theta": THETA} | arguments)
+
+
+def test_an_action_may_be_as_large_as_its_bounds():
+    """A force in newton, beside a box of some metres."""
+    cart = Plant(lambda s, a: [s[1], a[0] / 1e5], ("x", "v"), ("force [N]",), [-2e5], [2e5])
+    box = np.full(2, 9.0)
+    task = Task(np.zeros(2), np.array([1.0, 0.0]), -box, box, (), weights=np.ones(2))
+    nmpc, theta = Nmpc(cart, task, solver="ipopt"), np.array([1, 1, 1e-5, 1, 1, 0.001])
+    plan = nmpc.solve(task.start, theta)
+    assert plan.action > 1e4
+    again = nmpc.solve(task.start, theta, plan, plan.action)
+    assert again.value == pytest.approx(plan.value)
 
 
 @pytest.mark.parametrize("action", [(0.61, 0.0), (-0.61, 0.0), (0.0, 1.58), (0.0, -1.58)])
