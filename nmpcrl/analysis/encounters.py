@@ -49,7 +49,8 @@ def judged(nmpc: Persistent, theta: Vector, world: World, seed: int = 0) -> Enco
         world: where.
         seed: of what the world draws.
     """
-    rollout = evaluate(nmpc, theta, paper.STEPS, rng=seed, **world.environment)
+    rng = np.random.default_rng(seed)  # the published draws
+    rollout = evaluate(nmpc, theta, paper.STEPS, rng=rng, **world.environment)
     states = np.array(world.states[: len(rollout.costs) + 1])
     arrived = not rollout.failure and TASK.distance(states[paper.STEPS - 1]) <= ARRIVED
     return Encounters(

@@ -213,7 +213,8 @@ def gradient(arm: str, one: Wanted) -> Ran:
         world = World(still(JUDGE[one.layout]), fault=Fault(noise=(deviation,) * 3))
         nmpc, summed = controller(), np.zeros(THETA.size)
         weights = Weights(THETA, np.zeros(THETA.size))
-        how: dict[str, Any] = {"rng": one.seed, **world.environment}
+        # the published draws: those of `explored`, since [seed, 0] is the stream of seed
+        how: dict[str, Any] = {"rng": np.random.default_rng(one.seed), **world.environment}
         explore = explored(one.budget, one.seed)
         for step in train(expected_sarsa(nmpc, 0.0), nmpc, weights, explore, **how):
             if step.update and step.solution and step.update.delta is not None:

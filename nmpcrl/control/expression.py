@@ -34,7 +34,7 @@ def expression(
     call = f"{name}({', '.join('th' if key == 'theta' else key for key in signature)})"
     if not callable(function):
         raise ValueError(f"{name} = {function!r} must be a function, called as {call}")
-    wrong = _mismatch(function, arguments)
+    wrong = mismatch(function, arguments)
     if wrong:
         raise ValueError(f"{name} is called as {call}, and does not take that: {wrong}")
     try:
@@ -58,7 +58,7 @@ def expression(
     return written
 
 
-def _mismatch(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
+def mismatch(function: Callable[..., Any], arguments: tuple[Any, ...]) -> str:
     """Why a function cannot be called with these; "" if it can, or does not say what it takes."""
     try:
         inspect.signature(function).bind(*arguments)

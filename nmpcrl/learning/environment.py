@@ -2,9 +2,12 @@
 
 A `gymnasium.Env` is one, too: a reward is a cost with the other sign. What Gymnasium calls
 terminated ends an episode in a state that is worth 0; after a truncation the state keeps its worth.
+
+Functions of the user are given copies, and what they return is copied, as numbers of type float.
 """
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
@@ -12,6 +15,9 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant
+from nmpcrl.control.blocks import numbers
+from nmpcrl.control.expression import mismatch
+from nmpcrl.control.solution import short
 
 # next state, cost l(s, a), whether the episode ends there, and whether only its time does
 Step = tuple[Vector, float, bool, bool]
@@ -19,6 +25,9 @@ StepFunction = Callable[[Vector, Vector, np.random.Generator], tuple[Any, ...]]
 # what is known at a time of an episode: of each, or one array a name with a time for each
 Data = Callable[[int], Mapping[str, Any]] | Mapping[str, Any]
 Start = Vector | Callable[[np.random.Generator], Vector]
+
+
+PLANT = "plant is called as plant(state, action, rng) and returns (next state, cost, end)"
 
 
 class GymnasiumEnv(Protocol):
@@ -43,14 +52,15 @@ class Environment:
 
 
 def environment(
-    nmpc: Nmpc,
+    nmpc: Nmpc | None,
     plant: Plant | StepFunction | GymnasiumEnv | None = None,
     start: Start | None = None,
 ) -> Environment:
     """The environment of an NMPC.
 
     Args:
-        nmpc: has bounds, and where it has a task a start and the cost of Eq. (20).
+        nmpc: has bounds, and where it has a task a start and the cost of Eq. (20). None if what
+            plans is another controller.
         plant: a `Plant`, whose cost is the task's; or (state, action, rng) -> (next state, cost,
             end), for any other, such as a disturbed one, with any cost and end of its own. A fourth
             value, if there is one, ends the episode in a state that keeps its worth. Or a
@@ -59,23 +69,28 @@ def environment(
             plant and no exploration, all seeds are one run: that they agree says nothing.
 
     Raises:
-        ValueError: the NMPC is of a `Problem`, and plant or start is missing; or a `gymnasium.Env`
-            has other sizes than the plan, or is given a start.
+        ValueError: the NMPC is of a `Problem`, or there is none, and plant or start is missing; a
+            function takes other arguments; or the plant has other sizes or narrower bounds than the
+            plan; or a `gymnasium.Env` is given a start.
     """
     if is_gymnasium(plant):
         return of_gymnasium(cast(GymnasiumEnv, plant), nmpc, start)
-    if nmpc.problem is not None and (start is None or plant is None or isinstance(plant, Plant)):
+    states = None if nmpc is None else nmpc.n
+    planned = plant is None or isinstance(plant, Plant)
+    if (nmpc is None or nmpc.problem is not None) and (planned or start is None):
         raise ValueError(
-            "a Problem plans, and says nothing of the environment, its start and its cost:"
+            "a Problem plans, and says nothing of the environment, its start and its cost; nor does"
+            " a controller without an Nmpc:"
             " give plant=(state, action, rng) -> (next state, cost, end), and start="
         )
-    if plant is None or isinstance(plant, Plant):
-        own, task = plant or nmpc.plant, nmpc.task
+    if nmpc is not None and planned:
+        own, task = cast(Plant, plant or nmpc.plant), nmpc.task
         if (own.n, own.m) != (nmpc.n, nmpc.m):
             raise ValueError(
                 f"the plant has {own.n} states and {own.m} inputs, and the plan {nmpc.n} and"
                 f" {nmpc.m}"
             )
+        refuse_narrower("the plant's inputs", own.lower, own.upper, nmpc)
 
         advance, charge = own.step, task.stage_cost
 
@@ -84,10 +99,11 @@ def environment(
 
         step = as_task
     else:
-        step = checked(cast(StepFunction, plant), nmpc.n)
+        refuse_other(PLANT, plant, 3)
+        step = checked(cast(StepFunction, plant), states)
     if start is None:
-        start = nmpc.task.start
-    return Environment(step, start if callable(start) else always(start))
+        start = cast(Nmpc, nmpc).task.start
+    return Environment(step, begun(start, states))
 
 
 def forecasts(data: Data | None, horizon: int) -> Callable[[int], Mapping[str, Any]] | None:
@@ -96,9 +112,12 @@ def forecasts(data: Data | None, horizon: int) -> Callable[[int], Mapping[str, A
     Of an array over the times of an episode, a plan at t sees t, ..., t + N; beyond its end the
     last one stays.
     """
-    if data is None or callable(data):
-        return data
-    whole = {name: np.asarray(values, float) for name, values in data.items()}
+    if data is None:
+        return None
+    if callable(data):
+        refuse_other("data is called as data(t) and returns arrays by name", data, 1)
+        return lambda t: {name: numbers(f"data {name}", one) for name, one in data(t).items()}
+    whole = {name: np.array(values, float) for name, values in data.items()}
     for name, values in whole.items():
         if not values.ndim or not len(values):
             raise ValueError(f"data {name!r} must be an array with an axis of time in front")
@@ -110,10 +129,44 @@ def forecasts(data: Data | None, horizon: int) -> Callable[[int], Mapping[str, A
     return window
 
 
-def always(start: Any) -> Callable[[np.random.Generator], Vector]:
-    """The same start for every episode."""
-    state = np.array(start, float)
-    return lambda _: state
+def begun(start: Any, states: int | None) -> Callable[[np.random.Generator], Vector]:
+    """The start of an episode, from a state or a function of the user."""
+    if callable(start):
+        refuse_other("start is called as start(rng) and returns a state", start, 1)
+        return lambda rng: state_of("start returned", start(rng), states)
+    state = state_of("start =", start, states)
+    return lambda _: state.copy()
+
+
+def state_of(said: str, given: Any, states: int | None) -> Vector:
+    """A copy of a state that the user gave, shape (n,); of any size where `states` is None.
+
+    Raises:
+        ValueError: it is none.
+    """
+    with suppress(TypeError, ValueError):
+        state = np.array(given, float).reshape(-1)
+        if state.size == (states or state.size) and np.isfinite(state).all():
+            return state
+    raise ValueError(f"{said} {given}; a state is {states or 'a vector of'} finite numbers")
+
+
+def refuse_other(usage: str, function: Any, arguments: int) -> None:
+    """Refuse what cannot be called with so many arguments."""
+    wrong = mismatch(function, (None,) * arguments)
+    if wrong:
+        raise ValueError(f"{usage}: {wrong}")
+
+
+def refuse_narrower(whose: str, low: Any, high: Any, nmpc: Nmpc) -> None:
+    """Refuse an environment that cannot apply all that is planned: another action is learned on."""
+    kind = np.asarray(low).dtype  # bounds of 32 bits need not be those of 64
+    if (nmpc.lower.astype(kind) < low).any() or (nmpc.upper.astype(kind) > high).any():
+        raise ValueError(
+            f"{whose} lie between {short(low)} and {short(high)}, and those of the plan between"
+            f" {short(nmpc.lower)} and {short(nmpc.upper)}: plan with lower= and upper= within the"
+            " former, or what is learned on is not what was applied"
+        )
 
 
 def is_gymnasium(plant: Any) -> bool:
@@ -121,7 +174,7 @@ def is_gymnasium(plant: Any) -> bool:
     return hasattr(plant, "reset") and hasattr(plant, "action_space")
 
 
-def of_gymnasium(env: GymnasiumEnv, nmpc: Nmpc, start: Any = None) -> Environment:
+def of_gymnasium(env: GymnasiumEnv, nmpc: Nmpc | None, start: Any = None) -> Environment:
     """The environment whose states are the observations of `env`, and its costs minus the rewards.
 
     Each episode resets `env` with a seed that the generator of the run draws.
@@ -131,24 +184,29 @@ def of_gymnasium(env: GymnasiumEnv, nmpc: Nmpc, start: Any = None) -> Environmen
     """
     if start is not None:
         raise ValueError("a gymnasium.Env draws its own start: leave start= out")
-    for name, size in (("observation_space", nmpc.n), ("action_space", nmpc.m)):
+    sizes = (nmpc.n, nmpc.m) if nmpc else (None, None)
+    for name, size in zip(("observation_space", "action_space"), sizes, strict=True):
         space = getattr(env, name)
-        if not hasattr(space, "low") or np.prod(space.shape) != size:
+        if not hasattr(space, "low") or (size and np.prod(space.shape) != size):
             raise ValueError(f"{name} = {space} must be a Box of {size} numbers, as in the plan")
+    if not np.issubdtype(space.dtype, np.floating):
+        raise ValueError(f"action_space = {space} must hold floats: whole numbers cut actions off")
+    if nmpc:
+        refuse_narrower("the environment's actions", space.low.ravel(), space.high.ravel(), nmpc)
 
     def begin(rng: np.random.Generator) -> Vector:
         observation, _ = env.reset(seed=int(rng.integers(2**31)))
-        return np.array(observation, float).ravel()
+        return state_of("env.reset returned", observation, sizes[0])
 
     def step(_: Vector, action: Vector, __: np.random.Generator) -> tuple[Any, ...]:
         applied = np.asarray(action, env.action_space.dtype).reshape(env.action_space.shape)
         observation, reward, terminated, truncated, _ = env.step(applied)
         return observation, -float(reward), terminated, truncated
 
-    return Environment(checked(step, nmpc.n), begin)
+    return Environment(checked(step, sizes[0]), begin)
 
 
-def checked(plant: StepFunction, states: int) -> Callable[..., Step]:
+def checked(plant: StepFunction, states: int | None) -> Callable[..., Step]:
     """A plant of the user, whose results are looked at.
 
     Raises:
@@ -156,16 +214,12 @@ def checked(plant: StepFunction, states: int) -> Callable[..., Step]:
     """
 
     def step(state: Vector, action: Vector, rng: np.random.Generator) -> Step:
+        result = plant(state.copy(), action.copy(), rng)
         try:
-            later, cost, end, *cut = plant(state, action, rng)
+            later, cost, end, *cut = result
+            paid, ended = np.array(cost, float).item(), bool(end)
         except (TypeError, ValueError) as error:
-            raise ValueError(
-                "plant is called as plant(state, action, rng) and returns (next state, cost, end):"
-                f" {error}"
-            ) from error
-        later = np.array(later, float).reshape(-1)
-        if later.size != states or not np.isfinite(later).all():
-            raise ValueError(f"plant returned {later}; a state is {states} finite numbers")
-        return later, float(cost), bool(end), any(cut)
+            raise ValueError(f"{PLANT}: {error}") from error
+        return state_of("plant returned", later, states), paid, ended, any(cut)
 
     return step

@@ -53,7 +53,8 @@ def as_gymnasium(
             return self.state.copy(), {}
 
         def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
-            self.state, cost, end, cut = around.step(self.state, action, self.np_random)
+            given = np.array(action, float).reshape(nmpc.m)
+            self.state, cost, end, cut = around.step(self.state, given, self.np_random)
             self.time += 1
             return self.state.copy(), -cost, end, cut or self.time == steps, {}
 

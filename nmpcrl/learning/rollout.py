@@ -80,13 +80,27 @@ class Rollout:
         return np.inf if self.failure else float(self.costs.sum())
 
 
-def persistent(controller: Nmpc | Persistent) -> Persistent:
-    """The controller, made to try a failed solve once more."""
+def persistent(controller: Any) -> Any:
+    """The controller, made to try a failed solve once more where it is an `Nmpc`."""
     return Persistent(controller) if isinstance(controller, Nmpc) else controller
 
 
+def nmpc_of(controller: Any) -> Nmpc | None:
+    """The `Nmpc` that a controller is or has among its attributes; None where there is none."""
+    near = [controller, *getattr(controller, "__dict__", {}).values()]
+    found = (one.nmpc if isinstance(one, Persistent) else one for one in near)
+    return next((one for one in found if isinstance(one, Nmpc)), None)
+
+
+def stream(rng: np.random.Generator | int, key: int) -> np.random.Generator:
+    """A generator as it is; of an int one whose numbers `default_rng` of that int does not draw."""
+    if isinstance(rng, int | np.integer):
+        rng = np.random.SeedSequence(int(rng), spawn_key=(key,))  # type: ignore[assignment]
+    return np.random.default_rng(rng)
+
+
 def evaluate(
-    controller: Nmpc | Persistent,
+    controller: Any,
     theta: Vector,
     steps: int,
     *,
@@ -100,35 +114,37 @@ def evaluate(
     A failed solve ends the rollout, which then says so and costs infinitely much.
 
     Args:
-        controller: acts.
+        controller: acts: an `Nmpc`, or an object with `solve(state, theta, plan before)`, whose
+            result has an `action`. One that holds an `Nmpc` has the environment of that by default.
         theta: NMPC parameters, shape (d,).
         steps: K + 1, the most states that are visited.
         plant: the environment, as in `train`; the plant that plans if absent.
         start: a state or rng -> state; the task's if absent.
         data: of a `Problem` at each time, as in `train`.
-        rng: for a plant or a start that draws.
+        rng: for a plant or a start that draws, as in `train`, with other numbers of the same int.
     """
-    controller = persistent(controller)
-    nmpc, rng = controller.nmpc, np.random.default_rng(rng)
+    controller, nmpc, rng = persistent(controller), nmpc_of(controller), stream(rng, 2)
     around = environment(nmpc, plant, start)
     state, plan, failure = around.start(rng), None, ""
     states, actions, costs = [], [], []
-    ahead = forecasts(data, nmpc.horizon)
+    ahead = forecasts(data, nmpc.horizon if nmpc else 0)
     for t in range(steps):
+        known = {"data": ahead(t)} if ahead else {}
         try:
-            plan = controller.solve(state, theta, plan, None, ahead and ahead(t))
+            plan = controller.solve(state.copy(), theta, plan, **known)
         except SolverError as error:
             failure = str(error)
             break
         states.append(state)
-        actions.append(plan.action)
-        state, cost, end, cut = around.step(state, plan.action, rng)
+        actions.append(np.array(plan.action, float))
+        state, cost, end, cut = around.step(state, actions[-1], rng)
         costs.append(cost)
         if end or cut:
             break
+    inputs = nmpc.m if nmpc else actions[0].size if actions else 0
     return Rollout(
-        states=np.reshape(states, (-1, nmpc.n)),
-        actions=np.reshape(actions, (-1, nmpc.m)),
+        states=np.reshape(states, (-1, state.size)),
+        actions=np.reshape(actions, (-1, inputs)),
         costs=np.array(costs),
         failure=failure,
     )

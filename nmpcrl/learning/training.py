@@ -1,7 +1,7 @@
 """Algorithm 1 as a generator of steps."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc, Plant, Solution, SolverError
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.control.solution import short
-from nmpcrl.learning.bootstrap import Transition
+from nmpcrl.learning.bootstrap import Controller, Transition
 from nmpcrl.learning.environment import (
     Data,
     Environment,
@@ -22,7 +22,7 @@ from nmpcrl.learning.environment import (
     forecasts,
 )
 from nmpcrl.learning.learners import Learner, Update, Weights
-from nmpcrl.learning.rollout import Persistent, persistent
+from nmpcrl.learning.rollout import nmpc_of, persistent, stream
 
 Counts = NDArray[np.int_]
 Count = Callable[[int, int], Counts]  # (episodes, steps) -> k of each step
@@ -112,7 +112,7 @@ def count_episodes(episodes: int, steps: int) -> Counts:
 
 def train(
     learner: Learner,
-    controller: Nmpc | Persistent,
+    controller: Controller,
     weights: Weights,
     explore: Exploration,
     *,
@@ -126,13 +126,15 @@ def train(
     """Algorithm 1: as many episodes, and at most as many steps, as `explore` has noise for.
 
     A solve that fails ends the episode, and learning goes on from the next one: see `Persistent`.
+    A step holds its solutions, 7 KB for the robot: of a long run, keep what you need of each.
 
     Args:
         learner: moves the weights.
         controller: acts, and is what is learned.
         weights: to start with.
         explore: the noise.
-        clipped: whether actions are kept in the action space.  # departure E
+        clipped: whether actions are kept in the action space; they must be where Q(s, a) is solved
+            for and inputs have bounds.  # departure E
         constrained: whether Q(s, a) is solved for, with u_0 = a, instead of V(s); what the learner
             is meant for if absent.  # departure F
         plant: the environment, as in `environment`: a `Plant`, whose cost is the task's, a function
@@ -142,31 +144,33 @@ def train(
         data: of a `Problem` at each time t of an episode: a function of t, that gives what
             `Nmpc.solve` takes; or by name an array over the episode, of which each plan sees its
             N + 1 stages.
-        rng: for a plant or a start that draws.
+        rng: for a plant or a start that draws; of an int, a stream of its own, which noise that
+            `default_rng` of the same int drew does not share.
 
     Raises:
-        ValueError: there is no environment, as for a `Problem` without `plant` and `start`.
+        ValueError: at the call: an argument is no such thing, or there is no environment, as for a
+            `Problem` without `plant` and `start`.
         Diverged: theta is no longer usable, or `PATIENCE` episodes in a row ended early.
     """
-    controller, rng = persistent(controller), np.random.default_rng(rng)
-    around = environment(controller.nmpc, plant, start)
-    known = forecasts(data, controller.nmpc.horizon)
-    if explore.noise.shape[2] != controller.nmpc.m:
+    nmpc = nmpc_of(controller)
+    if nmpc is None:
+        raise ValueError(f"controller = {controller!r} must be an Nmpc, or hold one")
+    if not isinstance(weights, Weights):
+        raise ValueError(f"weights = {weights!r} must be Weights: write Weights(theta, 0 * theta)")
+    if explore.noise.shape[2] != nmpc.m:
         raise ValueError(f"the noise has {explore.noise.shape[2]} numbers a step; the NMPC has"
-                         f" {controller.nmpc.m} inputs")  # fmt: skip
+                         f" {nmpc.m} inputs")  # fmt: skip
     fixed = learner.values_actions if constrained is None else constrained
-    trainer = _Trainer(learner, controller, explore, clipped, fixed, around, known, rng)
-    failed = 0
-    for episode in range(len(explore.scale)):
-        failure = ""
-        for step in trainer.episode(episode, weights):
-            weights, failure = step.weights, step.failure
-            yield step
-            if absurd(weights):
-                raise Diverged(f"{absurd(weights)} left the numbers that a solver is given")
-        failed = failed + 1 if failure else 0
-        if failed == PATIENCE:
-            raise Diverged(f"{PATIENCE} episodes in a row ended in a failed solve: {failure}")
+    if fixed and not clipped and np.isfinite([nmpc.lower, nmpc.upper]).any():
+        raise ValueError(
+            f"clipped = False lets actions leave {short(nmpc.lower)} and {short(nmpc.upper)}, where"
+            f" {learner.name} has no Q(s, a): leave it out, or learn V(s) by constrained=False"
+        )
+    around, known = environment(nmpc, plant, start), forecasts(data, nmpc.horizon)
+    controller, rng = persistent(controller), stream(rng, 1)
+    trainer = _Trainer(learner, controller, nmpc, explore, clipped, fixed, around, known, rng)
+    own = replace(weights, theta=np.array(weights.theta, float), w=np.array(weights.w, float))
+    return trainer.run(own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +178,8 @@ class _Trainer:
     """What an episode needs, as in `train`."""
 
     learner: Learner
-    controller: Persistent
+    controller: Any
+    nmpc: Nmpc
     explore: Exploration
     clipped: bool
     constrained: bool
@@ -182,17 +187,31 @@ class _Trainer:
     data: Callable[[int], Mapping[str, Any]] | None
     rng: np.random.Generator
 
+    def run(self, weights: Weights) -> Iterator[Step]:
+        """The steps of all episodes."""
+        failed = 0
+        for episode in range(len(self.explore.scale)):
+            failure = ""
+            for step in self.episode(episode, weights):
+                weights, failure = step.weights, step.failure
+                yield step
+                left = absurd(weights, self.nmpc.largest)
+                if left:
+                    raise Diverged(f"{left} left the numbers that a solver is given")
+            failed = failed + 1 if failure else 0
+            if failed == PATIENCE:
+                raise Diverged(f"{PATIENCE} episodes in a row ended in a failed solve: {failure}")
+
     def episode(self, episode: int, weights: Weights) -> Iterator[Step]:
         """The steps of one episode; the last one says so if a solve failed."""
         controller, constrained = self.controller, self.constrained
-        nmpc, rng = controller.nmpc, self.rng
+        nmpc, rng = self.nmpc, self.rng
         state, warm_start = self.environment.start(rng), None
         nothing = np.full(nmpc.m, np.nan)
         final = self.explore.scale.shape[1] - 1
         ahead = self.data
-        later = ahead and ahead(0)
+        known = ahead and ahead(0)
         for t in range(final + 1):
-            known, later = later, ahead and ahead(t + 1)
             try:
                 plan = controller.solve(state, weights.theta, warm_start, None, known)
             except SolverError as error:
@@ -203,6 +222,7 @@ class _Trainer:
             action = nmpc.clip(action) if self.clipped else action  # departure E
             next_state, cost, end, cut = self.environment.step(state, action, rng)
             last = end or cut or t == final
+            later = ahead(t + 1) if ahead and not end else None
             solution = None
             try:
                 solution = (
@@ -225,13 +245,16 @@ class _Trainer:
             if last:
                 return
             warm_start = (update.successor and update.successor.solution) or solution
-            state = next_state
+            state, known = next_state, later
 
 
-def absurd(weights: Weights) -> str:
-    """The name and value of a vector with which no solver can be called; "" if there is none."""
+def absurd(weights: Weights, largest: float = ABSURD) -> str:
+    """The name and value of a vector with which no solver can be called; "" if there is none.
+
+    `largest` is that of the `Nmpc`; its default is that of every task's.
+    """
     for name, vector in (("theta", weights.theta), ("w", weights.w)):
-        small = sum(map(abs, vector.tolist())) <= ABSURD  # false for nan, and faster than NumPy
-        if not small and not (np.abs(vector) <= ABSURD).all():
+        small = sum(map(abs, vector.tolist())) <= largest  # false for nan, and faster than NumPy
+        if not small and not (np.abs(vector) <= largest).all():
             return f"{name} = {short(vector)}"
     return ""

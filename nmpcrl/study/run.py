@@ -72,7 +72,7 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
             if step.last:
                 done = step.episode + 1
                 due = done % job.evaluate_every == 0 or done == job.episodes
-                if due and not absurd(step.weights):
+                if due and not absurd(step.weights, controller.nmpc.largest):
                     evaluations.append(_evaluation(job, step.weights, done))
                 if on_episode:
                     on_episode(done, cost)

@@ -1,5 +1,6 @@
 """The environment need not be what plans: other plants, costs, starts and ends."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import casadi as ca
@@ -7,7 +8,17 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import Ipopt, Nmpc, Plant, Problem, differential_drive
-from nmpcrl.learning import Exploration, Weights, evaluate, expected_sarsa, train
+from nmpcrl.learning import (
+    Exploration,
+    Weights,
+    evaluate,
+    expected_sarsa,
+    frozen,
+    gradient_tdc,
+    q_learning,
+    train,
+)
+from nmpcrl.learning.training import absurd
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -107,6 +118,7 @@ def test_a_problem_says_that_it_only_plans(tank, missing):
             r"plant is called as plant\(state",
         ),
         (lambda state, action, rng: state, r"returns \(next state, cost, end\)"),
+        (5, "plant is called as .* not a callable"),
         (lambda state, action, rng: ([1, 2], 0, False), "a state is 1 finite numbers"),
         (lambda state, action, rng: (np.nan * state, 0, False), "plant returned .nan."),
     ],
@@ -116,10 +128,126 @@ def test_what_is_no_plant_is_refused(tank, plant, message):
         evaluate(tank, tank.problem.theta, 5, plant=plant, start=[0.0])
 
 
-def test_a_plant_of_another_size_is_refused(robot):
-    plant = Plant(lambda s, a: [a, a, a], ("a", "b", "c"), ("u",), [-1], [1])
-    with pytest.raises(ValueError, match=r"the plant has 3 states and 1 inputs, and the plan 3"):
+@pytest.mark.parametrize("broken", ["plant", "start", "data"])
+def test_an_error_inside_a_function_of_the_user_is_that_error(shop, broken):
+    def fails(*given):
+        raise TypeError("mine")
+
+    options = {"plant": selling, "start": [0.2], "data": {"price": PRICES}, broken: fails}
+    with pytest.raises(ValueError, match=f"^{broken} is called as {broken}"):
+        evaluate(shop, shop.problem.theta, 2, **options | {broken: lambda: None})
+    with pytest.raises(TypeError, match=r"^mine$"):
+        evaluate(shop, shop.problem.theta, 2, **options)
+
+
+@pytest.mark.parametrize("start", [[np.nan], [1.0, 2.0], "here", lambda rng: [[0.1], [0.2]]])
+def test_what_is_no_start_is_refused(tank, start):
+    with pytest.raises(ValueError, match=r"^start .*; a state is 1 finite numbers"):
+        evaluate(tank, tank.problem.theta, 5, plant=filling, start=start)
+
+
+@pytest.mark.parametrize(
+    ("plant", "message"),
+    [
+        (
+            Plant(lambda s, a: [a, a, a], ("a", "b", "c"), ("u",), [-1], [1]),
+            "the plant has 3 states and 1 inputs, and the plan 3",
+        ),
+        (
+            replace(differential_drive(), upper=[0.5, 1.5]),
+            r"\[-0.6 .* and \[0.5 1.5\], and those of the plan between .* \[0.6    1.5708\]",
+        ),
+    ],
+)
+def test_a_plant_that_cannot_follow_the_plan_is_refused(robot, plant, message):
+    with pytest.raises(ValueError, match=message):
         evaluate(robot, THETA, 1, plant=plant)
+
+
+class Overwriting:
+    """A store that works in arrays that it is given or gave; in copies where it is careful."""
+
+    def __init__(self, *, careful):
+        self.own = np.copy if careful else np.asarray
+        self.state, self.price, self.asked = np.array([0.2]), np.zeros(4), []
+
+    def start(self, rng):
+        self.state[:] = 0.2
+        return self.own(self.state)
+
+    def plant(self, state, action, rng):
+        assert (state.dtype, action.dtype) == (float, float)
+        state, action = self.own(state), self.own(action)
+        self.asked.append("plant")
+        np.clip(action, 0.1, 0.2, out=action)
+        state *= 0.8
+        state += action
+        self.state[:] = state
+        return self.own(self.state), np.float32(action[0]), np.bool_(False)
+
+    def data(self, t):
+        self.asked.append(t)
+        self.price[:] = t % 3
+        return {"price": self.own(self.price)}
+
+
+def test_functions_of_the_user_may_work_in_place(shop):
+    theta, found = shop.problem.theta.copy(), []
+    for world in (Overwriting(careful=True), Overwriting(careful=False)):
+        for start in (world.start, np.array([0.2])):
+            how = {"plant": world.plant, "start": start, "data": world.data}
+            ran = evaluate(shop, theta, 4, **how)
+            weights = Weights(theta, np.zeros(1))
+            steps = list(train(q_learning(shop, 1e-2), shop, weights, noise(2, 3, 1), **how))
+            found.append([ran.states, ran.actions])
+            found[-1] += [[s.state for s in steps], [s.action for s in steps]]
+            found[-1] += [[s.weights.theta for s in steps], [s.plan.data for s in steps]]
+    for other in found[1:]:
+        for one, same in zip(found[0], other, strict=True):
+            np.testing.assert_array_equal(one, same)
+    np.testing.assert_array_equal(theta, shop.problem.theta)
+
+
+def test_nothing_is_asked_of_a_time_before_its_turn(shop):
+    world = Overwriting(careful=True)
+    how = {"plant": world.plant, "start": world.start, "data": world.data}
+    weights = Weights(shop.problem.theta, np.zeros(1))
+    list(train(expected_sarsa(shop, 1e-3), shop, weights, noise(1, 3, 1), **how))
+    assert world.asked == [0, "plant", 1, "plant", 2, "plant", 3]
+
+
+def test_an_int_seeds_another_stream_than_that_of_the_noise(tank):
+    """Each draw of noise, of a plant in training and of one in a rollout is a number of its own."""
+    drawn, theta = [], tank.problem.theta
+
+    def drawing(state, action, rng):
+        drawn.append(rng.normal())
+        return 0.9 * state, 0.0, False
+
+    how = {"plant": drawing, "start": [0.1]}
+    for rng in (0, np.int64(0), np.random.default_rng(0)):
+        list(train(frozen(tank), tank, Weights(theta, 0 * theta), noise(1, 3, 1), **how, rng=rng))
+        evaluate(tank, theta, 3, **how, rng=rng)
+    one, same, given = np.reshape(drawn, (3, 6))
+    np.testing.assert_array_equal(one, same)
+    np.testing.assert_array_equal(given, np.random.default_rng(0).normal(size=6))
+    assert np.unique([*one, *given[:3]]).size == 9
+
+
+def test_theta_may_be_learned_as_large_as_it_is_solved_with():
+    problem = Problem(
+        states=1, inputs=1, horizon=3, gamma=0.9, theta={"rate": 7e10}, lower=-1, upper=1,
+        model=lambda x, u, th: 0.9 * x + 0.1 * u - 1e-12 * th["rate"] * x,
+        stage=lambda x, u, th: ca.sumsqr(x) + ca.sumsqr(u),
+    )  # fmt: skip
+    nmpc, weights = Nmpc(problem, solver=Ipopt()), Weights(problem.theta, np.array([1e10]))
+    how = {"plant": lambda x, u, rng: (0.9 * x + 0.1 * u, x[0] ** 2, False), "start": [0.5]}
+    for learner in (frozen(nmpc), gradient_tdc(nmpc, 1.0, 1.0)):
+        assert len(list(train(learner, nmpc, weights, noise(1, 3, 1), **how))) == 3
+    far = [
+        absurd(Weights(np.array([one]), weights.w), nmpc.largest) for one in (7e13, 8e13, np.nan)
+    ]
+    assert [bool(one) for one in far] == [False, True, True]
 
 
 def test_a_state_in_which_only_time_ends_an_episode_keeps_its_worth(tank):

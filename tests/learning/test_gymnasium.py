@@ -114,11 +114,20 @@ def test_an_environment_of_gymnasiums_own_is_taken(car):
     np.testing.assert_allclose(rollout.costs, 0.1 * rollout.actions[:, 0] ** 2, rtol=1e-5)
 
 
+def narrowed(bound, dtype):
+    """`Slow` with another action space."""
+    env = Slow()
+    env.action_space = gymnasium.spaces.Box(-bound, bound, (1,), dtype)
+    return env
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: gymnasium.make("Pendulum-v1"), "observation_space = .* must be a Box of 2 numb"),
         (lambda: gymnasium.make("MountainCar-v0"), r"action_space = Discrete\(3\) must be a Box"),
+        (lambda: narrowed(0.5, np.float32), r"between \[-0.5\] and \[0.5\], .* \[-1.\] and \[1.\]"),
+        (lambda: narrowed(9, int), "action_space = .*int.* must hold floats"),
     ],
 )
 def test_an_environment_of_another_kind_is_refused(car, make, message):
@@ -155,6 +164,16 @@ def test_an_episode_of_ours_is_truncated_after_its_steps(robot):
     env.reset(seed=0)
     ends = [env.step(np.zeros(2))[2:4] for _ in range(3)]
     assert ends == [(False, False), (False, False), (False, True)]
+
+
+def test_an_environment_of_ours_takes_an_agents_own_numbers(robot):
+    env, given = as_gymnasium(robot), np.array([0.5, -0.25], np.float32)
+    found = []
+    for action in (given, given.tolist(), given.astype(float)):
+        env.reset(seed=0)
+        found.append(env.step(action)[0])
+        assert found[-1].dtype == float
+    np.testing.assert_array_equal(found, [found[0]] * 3)
 
 
 def test_gymnasium_is_imported_only_where_it_is_asked_for():

@@ -147,6 +147,33 @@ def test_noise_for_another_number_of_inputs_is_refused(sound):
         next(train(frozen(sound), sound, first_weights(), explore))
 
 
+@pytest.mark.parametrize(
+    ("given", "options", "message"),
+    [
+        (THETA, {}, r"weights = array.* must be Weights: write Weights\(theta, 0 \* theta\)"),
+        (None, {"clipped": False}, r"clipped = False .* \[0.6    1.5708\].* QL has no Q\(s, a\)"),
+        (None, {"controller": 5}, "controller = 5 must be an Nmpc"),
+    ],
+)
+def test_what_cannot_be_trained_is_refused_at_the_call(sound, given, options, message):
+    given = first_weights() if given is None else given
+    what = {"learner": q_learning(sound, 1e-7), "controller": sound} | options
+    with pytest.raises(ValueError, match=message):
+        train(weights=given, explore=noisy(1, 3), **what)
+
+
+def test_weights_may_be_lists_and_are_left_as_they_are(sound):
+    def in_place(weights, delta, *_):
+        weights.theta[:] += 1.0
+        return weights
+
+    given = Weights(THETA.tolist(), [0.0] * 9)
+    learner = dataclasses.replace(es(sound), rule=in_place)
+    *_, last = train(learner, sound, given, noisy(1, 3))
+    np.testing.assert_array_equal(last.weights.theta, THETA + 3)
+    assert given.theta == THETA.tolist()
+
+
 def test_weights_go_from_step_to_step_and_from_episode_to_episode(sound):
     weights = first_weights()
     for step in training(sound, noisy(2, 4), es):
@@ -406,6 +433,28 @@ def test_a_rollout_that_fails_costs_infinity_and_keeps_what_it_had():
     assert failed.states.shape == (3, 3)
     assert failed.actions.shape == (3, 2)
     assert "failed" in failed.failure
+
+
+@pytest.mark.parametrize("plant", [None, lambda x, u, rng: (x[:2], float(u @ u), False)])
+def test_a_rollout_needs_no_more_than_a_solve(sound, plant):
+    class Lower:
+        """The lower of two solves; what it holds says where, or plant and start do."""
+
+        def __init__(self, nmpc):
+            self.solve = lambda state, theta, plan: min(
+                nmpc.solve([*state, 0.0][:3], theta, plan), nmpc.solve([*state, 0.0][:3], theta),
+                key=lambda one: one.value,
+            )  # fmt: skip
+            self.inner = nmpc if plant is None else None
+
+    start = None if plant is None else [0.5, 0.2]
+    ran = evaluate(Lower(sound), THETA, 4, plant=plant, start=start)
+    assert ran.states.shape == (4, 3 if plant is None else 2)
+    if plant is None:
+        assert ran.cost == pytest.approx(evaluate(sound, THETA, 4).cost, rel=1e-6)
+    else:
+        with pytest.raises(ValueError, match=r"give plant=.* and start="):
+            evaluate(Lower(sound), THETA, 4)
 
 
 def test_a_rollout_that_fails_at_once_has_no_steps():
