@@ -28,8 +28,9 @@ from nmpcrl.learning import browser as in_browser
 from nmpcrl.study import Experiment, Runs, design, paper
 from nmpcrl.study.storage import executor
 
-settings.register_profile("no clock", deadline=None)  # the machine may be busy
-settings.load_profile("no clock")
+settings.register_profile("fixed", deadline=None, derandomize=True)  # the machine may be busy
+settings.register_profile("random", deadline=None, derandomize=False, print_blob=True)
+settings.load_profile(os.environ.get("NMPCRL_EXAMPLES", "fixed"))
 
 ROOT = Path(__file__).resolve().parent.parent
 NEEDS = {  # fixture -> the markers of a test that asks for it, directly or through others
