@@ -41,6 +41,24 @@ def test_episodes_say_what_the_steps_say(records, short):
     for k in range(4):
         expected = np.sqrt(np.mean(delta[k] ** 2)) if k in known else np.nan
         np.testing.assert_allclose(episodes["delta"][k], expected)
+    wrong = metrics.online_error(records)[of[3]]
+    wrong = wrong[np.isfinite(wrong)]
+    assert episodes["bias"][3] == pytest.approx(sum(wrong) / wrong.size)
+    assert episodes["error"][3] == pytest.approx(np.linalg.norm(wrong) / wrong.size**0.5)
+    assert np.isnan([episodes["bias"][0], episodes["error"][0]]).all()
+
+
+@pytest.mark.parametrize(("episodes", "window"), [(300, 20), (40, 20), (39, 19), (2, 1), (1, 1)])
+def test_the_end_of_training_is_its_last_20_episodes_or_its_second_half(short, episodes, window):
+    """The median of 0, 1, ... over the window tells how long it is."""
+    columns = {
+        name: np.resize(column, (episodes, *column.shape[1:]))
+        for name, column in short.episodes.items()
+    } | dict.fromkeys(("cost", "bias", "error"), np.arange(float(episodes)))
+    longer = replace(short, experiment=short.experiment | {"episodes": episodes}, episodes=columns)
+    found = row(longer)
+    for name in ("training_cost", "bias", "error"):
+        assert found[name] == episodes - (window + 1) / 2
 
 
 def test_every_state_in_an_obstacle_is_counted_by_how_far_it_is_in():

@@ -9,7 +9,6 @@ import pytest
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import thresholds
 from nmpcrl.claims.failure_modes import (
-    CUT_SHORT,
     MECHANISMS,
     OVER_PREDICTED,
     WELL,
@@ -150,7 +149,6 @@ def test_a_gap_that_was_closed_from_the_start_did_not_close():
 
 @pytest.mark.parametrize(("episodes", "name"), [(5, "solver"), (4, "none of these")])
 def test_the_solver_is_to_blame_where_it_cut_half_of_the_episodes_short(episodes, name):
-    assert CUT_SHORT == 0.5
     assert found(made(failed=(slice(12, 12 + episodes), 1))) == name
 
 

@@ -8,7 +8,6 @@ import pytest
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.study import Experiment, fetch, store
-from nmpcrl.study.cleaning import OLD
 
 RUN = Experiment(episodes=1, steps=5)
 NAME = "ES-A-step-seed0-1ep-0123456789"
@@ -134,4 +133,3 @@ def test_a_link_is_neither_followed_nor_deleted(command, folder, tmp_path):
 def test_where_no_folder_is_nothing_can_go(command, tmp_path):
     assert "Nothing in" in command("clean", "--yes").stdout
     assert not (tmp_path / "runs").exists()
-    assert OLD > 0

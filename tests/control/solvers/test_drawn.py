@@ -491,14 +491,22 @@ LAYOUTS = [controller(np.random.default_rng([5, layout])) for layout in range(30
 
 
 @pytest.mark.slow
-@settings(derandomize=True, deadline=None, max_examples=400)
-@given(problem=problems | typical, nmpc=st.sampled_from(LAYOUTS))
-def test_whatever_is_asked_the_answer_is_a_solution_or_an_error(problem, nmpc):
-    try:
-        solution = problem.solve(nmpc)
-    except SolverError:
-        return
-    judged(nmpc, solution)
+def test_whatever_is_asked_the_answer_is_a_solution_and_seldom_an_error():
+    ended = {"solved": 0, "failed": 0}
+
+    @settings(derandomize=True, deadline=None, max_examples=400)
+    @given(problem=problems | typical, nmpc=st.sampled_from(LAYOUTS))
+    def ask(problem, nmpc):
+        try:
+            solution = problem.solve(nmpc)
+        except SolverError:
+            ended["failed"] += 1
+            return
+        judged(nmpc, solution)
+        ended["solved"] += 1
+
+    ask()
+    assert ended["failed"] <= 0.1 * ended["solved"]
 
 
 def mirrored(nmpc: Nmpc) -> Nmpc:
@@ -537,10 +545,7 @@ def test_a_mirrored_world_has_mirrored_plans(problem, pair):
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(problem=typical, nmpc=st.sampled_from(LAYOUTS))
 def test_solving_again_from_the_solution_costs_an_iteration_or_two(problem, nmpc):
-    try:
-        solution = problem.solve(nmpc)
-    except SolverError:
-        return
+    solution = problem.solve(nmpc)
     again = problem.solve(nmpc, solution)
     assert again.iterations <= 4
     assert again.value == pytest.approx(solution.value, rel=1e-6, abs=1e-7)
