@@ -5,7 +5,7 @@ quantity, and two numbers of one quantity are one number, wherever they stand. A
 from all pages and puts them to `agreement.disagreements`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
 from typing import Any, NamedTuple
@@ -15,7 +15,6 @@ import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.bench.paired import Ratio
-from nmpcrl.study.experiment import Experiment
 
 
 class Count(NamedTuple):
@@ -57,17 +56,19 @@ def cited(text: str, value: Any, quantity: str) -> str:
     return f'<data value="{exact}" title="{what}">{text}</data>'
 
 
-def by_reading(name: str, form: str, found: Mapping[Experiment, float], origin: str) -> str:
+def by_reading(
+    name: str, form: str, values: Iterable[float], decays: Iterable[str], origin: str
+) -> str:
     """The median over the runs of each reading of the decay: "0.74 (per step) and 0.44 (...)".
 
     Args:
         name: of the number.
         form: of a median, ".2f".
-        found: the number of each run.
+        values: the number of each run.
+        decays: the reading of each run.
         origin: whose numbers these are and from where.
     """
-    readings = [experiment.decay for experiment in found]
-    medians = pd.Series([*found.values()], dtype=float).groupby(readings, sort=False).median()
+    medians = pd.Series([*values], dtype=float).groupby([*decays], sort=False).median()
     shown = {decay: format(median, form).replace("inf%", "∞") for decay, median in medians.items()}
     return " and ".join(
         f"{cited(text, medians[decay], f'{name} per {decay}: {origin}')} (per {decay})"
