@@ -33,6 +33,9 @@ class Obstacle:
 class Task(Described):
     """Go from `start` to `target` within a box and around the obstacles, at the cost of Eq. (20).
 
+    A heading is not wrapped: 3.1 and -3.1 rad count as 6.2 rad apart. Give start and target
+    headings less than half a turn apart; a `Problem` can weigh 2 (1 - cos(e)) in place of e^2.
+
     Raises:
         ValueError: a field makes no sense; the message has its value.
     """
