@@ -58,12 +58,14 @@ class Solution:
 
     Where no plan can keep to the box, riccati returns the one that leaves it least: `violation`
     says by how much, `value` is Eq. (2a) along it, and `features` is the gradient of that value
-    together with the penalty for leaving the box.
+    together with W times how far the box is left, at a fixed W. So outside of a hard box the two
+    belong to two functions, and W, the larger of 10^4 max(1, theta^2) and 100 omega, depends on
+    theta itself. The price of a `soft_box` is part of `value`, and `features` is its gradient.
     """
 
     state: Vector  # s, shape (n,)
     theta: Vector  # shape (2n + m + 1,)
-    value: float  # V_theta(s), or Q_theta(s, a) when u_0 was fixed
+    value: float  # V_theta(s), or Q_theta(s, a) when u_0 was fixed; without a hard box's charge
     features: Vector  # phi, the value's gradient in theta, shape (2n + m + 1,)
     iterations: int  # of the solver
     seconds: float  # wall time of the solve and the gradient [s]
