@@ -26,7 +26,8 @@ PAGE = """<!DOCTYPE html><html lang="en" data-theme="light"><head>
 <link rel="stylesheet" href="{static}/nmpcrl.css">
 <link rel="stylesheet" href="{static}/controls.css">
 <link rel="stylesheet" href="{static}/exercises/exercises.css">{scripts}</head>
-<body><main class="bd-article"><h1>Exercises</h1>{places}</main></body></html>"""
+<body><main class="bd-article"><h1>Exercises</h1>{places}
+<div class="exercise">Write code.</div></main></body></html>"""
 AROUND = """<div class="exercise">How?</div>
 <details class="folded"><summary>Hint 1 of {name}</summary><p>First.</p></details>
 <details class="folded"><summary>Hint 2 of {name}</summary><p>Second.</p></details>
@@ -225,6 +226,11 @@ def test_answers_and_progress_are_kept_until_they_are_reset(tab):
     assert said(tab, "path").inner_text() == "Half."
     progress = tab.locator(".exercise-progress")
     assert progress.inner_text().startswith("1 of 4 exercises")
+    assert "The other one is answered in the notebook." in progress.inner_text()
+    assert answered(tab, "weight", "7").startswith("Not right")  # which takes no mark away
+    assert progress.inner_text().startswith("1 of 4 exercises")
+    tab.reload()
+    assert said(tab, "weight").inner_text() == "Right: 2.5 kg."
     tab.locator('[data-exercise="weight"]').get_by_role("button", name="Reset").click()
     assert tab.locator("#answer-weight").input_value() == ""
     assert progress.inner_text().startswith("0 of 4 exercises")

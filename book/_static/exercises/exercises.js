@@ -169,10 +169,12 @@
         show(verdict.said, "");
         return;
       }
-      const misses = (kept()[name]?.misses || 0) + (verdict.solved ? 0 : 1);
+      const before = kept()[name];
+      const misses = (before?.misses || 0) + (verdict.solved ? 0 : 1);
       const hint = !verdict.solved && hintsOf(place)[misses - 1];
       if (hint) hint.open = true;
-      remember(name, { answer, solved: Boolean(verdict.solved), misses });
+      // what was right once stays, whatever is tried after it
+      if (verdict.solved || !before?.solved) remember(name, { answer, solved: Boolean(verdict.solved), misses });
       show([verdict.said, hint ? words.hint : ""].join(" ").trim(), verdict.solved ? "right" : "wrong");
       changed();
     });
@@ -194,9 +196,10 @@
     if (!places.length) return;
     const count = element("span", { role: "status" });
     const all = element("button", { type: "button" }, words.resetAll);
+    const others = Math.max(0, document.querySelectorAll(".exercise").length - places.length);
     const changed = () => {
       const solved = made.filter(({ name }) => kept()[name]?.solved).length;
-      count.textContent = `${words.progress(solved, made.length)} ${keeps ? words.kept : words.unkept}`;
+      count.textContent = `${words.progress(solved, made.length, others)} ${keeps ? words.kept : words.unkept}`;
     };
     const made = [];
     for (const place of places) made.push(exercise(place, changed));

@@ -15,7 +15,10 @@ window.nmpcrl = {
     sign: "Not right: look at the sign.",
     wrongFormula: (where, value) => `Not right: for ${where} it gives ${value}.`,
     hint: "The next hint is open above.",
-    progress: (solved, all) => `${solved} of ${all} exercises with a place for an answer are solved on this page.`,
+    progress: (solved, all, others) => [
+      `${solved} of ${all} exercises that are answered on this page are solved.`,
+      others ? `The other ${others === 1 ? "one is" : `${others} are`} answered in the notebook.` : "",
+    ].join(" ").trim(),
     kept: "Kept in this browser only.",
     unkept: "This browser keeps nothing: the answers are gone when the page closes.",
   },
