@@ -22,7 +22,7 @@ def standing(answer: Any, *, value: float = 1500) -> Outcome:
         cost - (1 - gamma) * value,
         tolerance=0.01,
         mistakes={
-            cost: "The next value is discounted: gamma V, not V, stands beside V.",
+            cost: "V does not cancel: the next value is discounted, so delta = l + gamma V - V.",
             cost / (1 - gamma): "That is what standing for ever costs, not the TD error.",
             (1 - gamma) * value - cost: "The TD error is what is paid and promised, minus V.",
         },
