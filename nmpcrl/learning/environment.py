@@ -63,8 +63,8 @@ def environment(
             plans is another controller.
         plant: a `Plant`, whose cost is the task's; or (state, action, rng) -> (next state, cost,
             end), for any other, such as a disturbed one, with any cost and end of its own. A fourth
-            value, if there is one, ends the episode in a state that keeps its worth. Or a
-            `gymnasium.Env`. The plant that plans if absent.
+            value, if there is one, ends the episode in a state that keeps its worth. It is given
+            copies. Or a `gymnasium.Env`. The plant that plans if absent.
         start: a state, or rng -> state; the task's if absent. With the same start, no noise in the
             plant and no exploration, all seeds are one run: that they agree says nothing.
 
