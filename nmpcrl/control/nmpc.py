@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.control.bending import Bending
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.description import Described
 from nmpcrl.control.diagnosis import FARTHEST
@@ -135,6 +136,8 @@ class Nmpc(Described):
         known = None
         if self.problem is not None:
             known = self.problem.stage_data(data)
+            if (theta < self._bending.least).any():
+                self._bending.judge(state, theta, known)
         elif data is not None:
             raise ValueError("data belong to a Problem: a task's target and obstacles stand still")
         given: tuple[Vector, ...] = ()
@@ -257,6 +260,12 @@ class Nmpc(Described):
 
     def _variant(self, solution: Solution) -> Variant:
         return self._fixed if solution.ocp.fixed_action.size else self._free
+
+    @cached_property
+    def _bending(self) -> Bending:
+        """Of a problem's costs."""
+        assert self.problem is not None
+        return Bending(self.problem)
 
     @cached_property
     def _solves(self) -> Solver:

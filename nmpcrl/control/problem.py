@@ -30,7 +30,10 @@ LEAST = 1e-200  # curvature, or slope
 
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """Numbers that are learned: where they start and, for learners that project, their bounds."""
+    """Numbers that are learned: where they start and, for learners that project, their bounds.
+
+    A weight of a cost, which must not turn negative, is Parameter(start, lower=0).
+    """
 
     start: Any  # a number or an array
     lower: Any = -np.inf  # a number, or one for each

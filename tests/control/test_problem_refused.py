@@ -1,6 +1,8 @@
 """What no `Problem` can be is refused where it is written, in one sentence with its name."""
 
 import math
+import warnings
+from contextlib import suppress
 
 import casadi as ca
 import numpy as np
@@ -194,6 +196,41 @@ def test_a_kink_can_be_written_as_rows():
     same = problem(stage=lambda x, u, th: ca.sumsqr(x), soft=rows, lower=-1, upper=1)
     solution = Nmpc(same, solver="ipopt").solve(np.array([0.4, 0.2]), same.theta)
     assert solution.value == pytest.approx(3 * (0.4**2 + 0.2**2))  # and u = 0
+
+
+WEIGHED = {
+    "theta": {"q": 1.0, "r": 0.1, "root": 0.5, "slope": 0.3, "off": np.eye(2) + 0.1, "a": 0.9},
+    "model": lambda x, u, th: th["a"] * x + u,
+    "stage": lambda x, u, th: th["q"] * ca.sumsqr(x) + th["r"] * u**2 + th["slope"] * x[0],
+    "terminal": lambda x, th: ca.sumsqr(th["root"] * x) + x.T @ th["off"] @ x,
+    "lower": -1.0,
+    "upper": 1.0,
+}
+
+
+@pytest.mark.parametrize(
+    ("values", "names"),
+    [
+        ([{"r": -1e-3}, {"r": -1.0}], ["r"]),  # once
+        ([{"q": -1e-3, "r": -1e-3}], ["q, r"]),
+        ([{"off": [[0.05, 0], [0, 1]]}, {"off": [[-0.05, 0], [0, 1]]}], []),  # 0.5^2 outweighs it
+        ([{"off": [[-0.05, 0], [0, 1]]}, {"off": [[-3, 0], [0, 1]]}], ["off"]),
+        ([{"off": [[1, -0.4], [-0.4, 1]]}], []),  # as positive as it was
+        ([{"root": -0.5}, {"slope": -2.0}, {"a": -0.9}], []),  # whose sign bends nothing
+    ],
+)
+def test_weights_that_turn_negative_are_named_once(values, names):
+    nmpc = Nmpc(problem(**WEIGHED), solver="ipopt")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for some in values:
+            with suppress(SolverError):
+                nmpc.solve(np.array([0.4, 0.2]), nmpc.problem.vector(**some))
+    assert len(caught) == len(names)
+    for one, name in zip(caught, names, strict=True):
+        assert f"theta {name} turned negative" in str(one.message)
+        assert "write Parameter(start, lower=0)" in str(one.message)
+        assert one.filename == __file__
 
 
 def test_numpys_functions_write_what_casadis_do():

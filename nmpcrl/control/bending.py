@@ -1,0 +1,51 @@
+"""Weights that turn negative while they are learned: whether a cost then bends downwards."""
+
+import warnings
+
+import casadi as ca
+import numpy as np
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control.problem import Problem
+from nmpcrl.control.solution import short
+
+ROUNDING = 1e-9  # of a curvature, in parts of the largest
+
+
+class Bending:
+    """The curvature of a problem's costs in state and input, as far as theta is part of it."""
+
+    def __init__(self, problem: Problem) -> None:
+        e = problem.expressions
+        z = ca.vertcat(e.x, e.u)
+        bends = [ca.hessian(cost, z)[0] for cost in (e.stage, e.terminal)]
+        weighs = np.array(ca.which_depends(ca.veccat(*bends), e.theta, 1), bool)
+        self._problem = problem
+        self._bends = ca.Function("bends", [e.x, e.u, e.theta, e.d], bends)
+        self.least = np.where(weighs & (problem.theta > 0), 0.0, -np.inf)
+
+    def judge(self, state: Vector, theta: Vector, data: Matrix) -> None:
+        """Warn of entries below `least` where a cost bends downwards and would not with their sign.
+
+        Those are judged again once they are twice as low, and no more after the warning.
+        """
+        of, fell = self._problem, theta < self.least
+        self.least = np.where(fell, 2 * theta, self.least)
+        still = np.clip(np.zeros(of.inputs), of.lower, of.upper)
+        now, before = (self._bends(state, still, one, data[0])
+                       for one in (theta, np.where(fell, -theta, theta)))  # fmt: skip
+        for pair in zip(now, before, strict=True):
+            bends = np.array([bend.full() for bend in pair])
+            if not np.isfinite(bends).all():
+                continue
+            (found, *_), (other, *_) = np.linalg.eigvalsh(bends)
+            if found < min(0.0, other) - ROUNDING * np.abs(bends).max():
+                self.least = np.where(fell, -np.inf, self.least)
+                names = [name for name in of.names if of.names.part(name, fell).any()]
+                warnings.warn(
+                    f"theta {', '.join(names)} turned negative, and a cost of the plan bends"
+                    f" downwards in state {short(state)}, so that a worst plan may be taken for"
+                    " the best: write Parameter(start, lower=0), and learners keep it positive",
+                    stacklevel=3,
+                )
+                return
