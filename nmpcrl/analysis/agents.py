@@ -89,13 +89,16 @@ class Agent:
             NoAgents: stable-baselines3 is not installed.
             OverBudget: as `env.reset`.
         """
+        from nmpcrl.learning.network import OneThread
+
         values = self.values
         scaled, drawing = _scaled(env, layouts, values), _Drawing()
         with drawing.own():
             model = _model(self.name, scaled, values, checkpoints[-1], seed)
 
         def policy(observation: Vector) -> Vector:
-            action, _ = model.predict(seen(observation), deterministic=True)
+            with OneThread():
+                action, _ = model.predict(seen(observation), deterministic=True)
             return _applied(action, values["turn"], env)
 
         for episodes in checkpoints:
@@ -211,20 +214,20 @@ class _Drawing:
 
     @contextmanager
     def own(self) -> Iterator[None]:
-        """Go on drawing; after it generators and threads are as they were before."""
+        """Go on drawing; after it both generators are as they were before."""
         import torch
 
-        threads = torch.get_num_threads()
-        torch.set_num_threads(1)  # with another number, last bits are others
+        from nmpcrl.learning.network import OneThread
+
         before = np.random.get_state(), torch.get_rng_state()  # noqa: NPY002 as SB3 draws
         if self.state:
             _put(*self.state)
         try:
-            yield
+            with OneThread():
+                yield
         finally:
             self.state = np.random.get_state(), torch.get_rng_state()  # noqa: NPY002
             _put(*before)
-            torch.set_num_threads(threads)
 
 
 def _put(numpys: Any, torchs: Any) -> None:

@@ -29,7 +29,7 @@ ACTIVATIONS: dict[str, Activation] = {
 }
 
 
-class _OneThread:
+class OneThread:
     """Within it torch computes with one thread; after it, with as many as the program had chosen.
 
     More threads make matrices this small slower, and may change last bits.
@@ -46,7 +46,7 @@ class _OneThread:
 class Predictor:
     """What some weights predict: inputs - 64 - 64 - 1."""
 
-    _views = ("_matrices", "_rooms")  # of the weights: made anew in a copy or a pickle
+    _views: tuple[str, ...] = ("_matrices", "_rooms")  # of the weights, and made anew in a copy
 
     def __init__(
         self,
@@ -90,7 +90,7 @@ class Predictor:
         rows = inputs.reshape(-1, k)
         room = self._room(len(rows))
         np.divide(rows, self._input_scale, out=room.inputs, casting="same_kind")
-        with _OneThread():
+        with OneThread():
             room.forward()
         return room.values.astype(float).reshape(shape) * self._target_scale
 
@@ -200,7 +200,7 @@ class QNetwork(Predictor):
             raise ValueError(f"{len(self)} examples are too few for a batch of {batch}")
         rows = self._rng.choice(len(self), batch, replace=False)
         self._buffer.take(rows, axis=0, out=self._drawn, mode="clip")
-        with _OneThread():
+        with OneThread():
             self._batch.forward()
             error = np.subtract(self._batch.values, self._targets, out=self._error)
             np.multiply(2 / batch, error, out=self._batch.slopes)
