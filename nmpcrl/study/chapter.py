@@ -9,11 +9,12 @@ from typing import Any
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import estimate
-from nmpcrl.study.parameters import ParameterError, shown
+from nmpcrl.study.parameters import OneOf, ParameterError, Several, shown
 from nmpcrl.study.sweeps import AXES, FIELDS
 
 INJECTED = "# Parameters\n"  # so begins the cell in which papermill sets what it is given
 OF_PAPERMILL = "PAPERMILL_"  # so begin the names that it sets on its own account
+NAMED = Several(OneOf(tuple(paper.LAYOUTS)), "layout")  # of which a study is published
 # Step sizes with which a chapter has something to show: with larger ones a run ends at once.
 MOST = {"alpha": 1e-5, "beta": 1e-4}  # 100 and 10,000 times the paper's
 
@@ -35,12 +36,11 @@ def check(**declared: Any) -> None:
             f"this chapter has no parameter {name!r}{meant}; it has {', '.join(declared) or 'none'}"
         )
     for name, value in declared.items():
-        allowed = (FIELDS | AXES).get(name)
+        allowed = (FIELDS | AXES | {"layouts": NAMED}).get(name)
         if allowed:
             allowed.check(name, value)
-        if name in ("layout", "layouts"):
-            for layout in value if name == "layouts" else [value]:
-                _placed(layout)
+        if name == "layout":
+            _placed(value)
         if name in MOST and value > MOST[name]:
             raise ParameterError(
                 f"{name} = {value:g} must be at most {MOST[name]:g} in a chapter: with larger ones"
