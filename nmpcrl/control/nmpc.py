@@ -157,7 +157,11 @@ class Nmpc(Described):
             raise type(error)(f"{error.status}; {why}", state, theta) from error
 
     def value_hessian(self, solution: Solution) -> Matrix:
-        """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`."""
+        """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`.
+
+        Raises:
+            DerivativeError: as `policy_jacobian`.
+        """
         return self._variant(solution).hessian(solution)
 
     def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
@@ -165,6 +169,7 @@ class Nmpc(Described):
 
         Raises:
             ValueError: the vector has another shape, is not finite or is absurdly large.
+            DerivativeError: as `policy_jacobian`.
         """
         vector = _checked("vector", vector, solution.theta.size, self.largest)
         return self._variant(solution).hessian_times(solution, vector)
@@ -173,7 +178,11 @@ class Nmpc(Described):
         """du_0 / dtheta, shape (m, d): how the policy answers to theta; 0 where u_0 is given.
 
         In microseconds an input by riccati. At a bound or row that is just reached, where the
-        policy has a kink, it lies between the derivatives of the two sides.
+        policy has a kink, it lies between the derivatives of the two sides; where more is reached
+        than the inputs can follow, it is that of the side to which theta grows: see `Sensitivity`.
+
+        Raises:
+            DerivativeError: a `SolverError`: the optimum moves in a direction without curvature.
         """
         return self._variant(solution).inputs_jacobian(solution, 0)
 
@@ -182,7 +191,7 @@ class Nmpc(Described):
 
         Raises:
             ValueError: there is no such stage.
-            numpy.linalg.LinAlgError: the optimum is not a strict one.
+            DerivativeError: as `policy_jacobian`.
         """
         if not 0 <= stage <= self.horizon:
             raise ValueError(f"stage = {stage} must lie among 0, ..., {self.horizon}")

@@ -7,7 +7,7 @@ implicit function theorem on the KKT conditions supplies it.
 
 Where more rows and bounds are active than the inputs can follow, the plan has a kink. The value's
 gradient then lies between those of the two sides, and every other derivative is that of one side:
-theta + t (1, ..., 2) for a small t > 0, where all parameters grow, the last twice as fast as the
+theta + t (1, ..., 2) for small t > 0, where all parameters grow, the last twice as fast as the
 first. The multipliers of that side are those of largest growth along it, a linear program.
 """
 
@@ -87,9 +87,8 @@ class Sensitivity:
         active = np.vstack([g_z[row], np.eye(z.size)[bound]])
         active_t = np.vstack([g_t[row], np.zeros((bound.sum(), len(l_tt)))])
         if _dependent(active):
-            held, multipliers = _one_side(
-                active, active_t, np.concatenate([lam[row], nu[bound]]), ocp.equality[row]
-            )
+            free = np.append(ocp.equality[row], np.zeros(bound.sum(), bool))
+            held, multipliers = _one_side(active, active_t, np.append(lam[row], nu[bound]), free)
             lam = lam.copy()
             lam[row] = multipliers[: row.sum()]
             _, l_zz, l_zt, l_tt, _, _ = (b.full() for b in self._second_derivatives(z, p, lam))
@@ -115,7 +114,7 @@ class Sensitivity:
         springs = STIFF * size * np.hstack([bounds[ocp.inputs], bounds[ocp.states[:N]], rows[:N]])
         final = STIFF * size * np.append(bounds[ocp.states[N]], rows[N])
         least = self._recursion(bends, end, *others, springs[::-1].T, final)
-        return float(least) > FLAT * size
+        return bool(least > FLAT * size)
 
     def kkt_residual(
         self, z: Vector, p: Vector, lam: Vector, nu: Vector, *, relative: bool = False
@@ -215,20 +214,22 @@ class Sensitivity:
 def _dependent(active: Matrix) -> bool:
     """Whether some active constraint follows from the others to first order."""
     left = np.abs(np.diag(qr(active.T, mode="r", pivoting=True)[0]))
-    return len(active) > active.shape[1] or left.min() < DEPENDENT * left.max()
+    return bool(len(active) > active.shape[1] or left.min() < DEPENDENT * left.max())
 
 
 def _one_side(
-    active: Matrix, active_t: Matrix, multipliers: Vector, equality: Vector
+    active: Matrix, active_t: Matrix, multipliers: Vector, free: Vector
 ) -> tuple[Vector, Vector]:
     """Which of the active constraints hold on the side that is taken, and all multipliers there.
+
+    Multipliers keep their signs, unless they are `free`.
 
     Raises:
         numpy.linalg.LinAlgError: no multipliers are largest, for the constraints contradict
             each other on that side.
     """
     size = np.where(multipliers == 0, 1.0, np.abs(multipliers))
-    signed = np.where(equality, 1.0, np.sign(multipliers)) * size
+    signed = np.where(free, 1.0, np.sign(multipliers)) * size
     columns = (signed[:, None] * active).T
     columns /= np.maximum(np.abs(columns).max(axis=1, keepdims=True), np.finfo(float).tiny)
     growth = signed * (active_t @ np.linspace(1, 2, active_t.shape[1]))
@@ -236,12 +237,12 @@ def _one_side(
         -growth / max(np.abs(growth).max(), np.finfo(float).tiny),
         A_eq=columns,
         b_eq=columns @ (multipliers / signed),
-        bounds=[(None, None) if one else (0, None) for one in equality],
+        bounds=[(None, None) if one else (0, None) for one in free],
         method="highs-ds",
     )
     if not found.success:
         raise np.linalg.LinAlgError(f"no multipliers on one side: {found.message}")
-    held = equality | (found.x > INACTIVE)
+    held = free | (found.x > INACTIVE)
     return held, np.where(held, signed * found.x, 0.0)
 
 
@@ -251,11 +252,15 @@ def _solved(kkt: Matrix, right: Matrix) -> Matrix:
     Raises:
         numpy.linalg.LinAlgError: a parameter pulls at one.
     """
-    enough, result = PULLED * np.abs(right).max(initial=0.0), np.full(right.shape, np.inf)
-    with suppress(np.linalg.LinAlgError):
-        result = np.linalg.solve(kkt, right)
-    if not np.abs(kkt @ result - right).max(initial=0.0) <= enough:
-        result = np.linalg.lstsq(kkt, right, rcond=DEPENDENT)[0]
-        if not np.abs(kkt @ result - right).max() <= enough:
-            raise np.linalg.LinAlgError("the optimum has no curvature where a parameter pulls")
-    return result
+    enough = PULLED * np.abs(right).max(initial=0.0)
+    for solve in (np.linalg.solve, _least):
+        with suppress(np.linalg.LinAlgError):
+            result: Matrix = np.asarray(solve(kkt, right), float)
+            if np.abs(kkt @ result - right).max(initial=0.0) <= enough:
+                return result
+    raise np.linalg.LinAlgError("the optimum has no curvature where a parameter pulls at it")
+
+
+def _least(kkt: Matrix, right: Matrix) -> Matrix:
+    """The least of the steps that solve the system as nearly as any."""
+    return np.asarray(np.linalg.lstsq(kkt, right, rcond=DEPENDENT)[0], float)

@@ -10,7 +10,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.diagnosis import Diagnosis
 from nmpcrl.control.ocp import Indices, Ocp
 from nmpcrl.control.sensitivity import Sensitivity
-from nmpcrl.control.solution import Solution, SolverError
+from nmpcrl.control.solution import DerivativeError, Solution, SolverError
 from nmpcrl.control.solvers import Prepared
 from nmpcrl.control.units import Units, units_of
 
@@ -49,7 +49,7 @@ class Variant:
 
     def hessian(self, solution: Solution) -> Matrix:
         """As `Nmpc.value_hessian`."""
-        return self._sensitivity.hessian(*_point(self._inside(solution)))
+        return self._dense(self._sensitivity.hessian, solution)
 
     def kkt_residual(self, solution: Solution, *, relative: bool) -> float:
         """As `Nmpc.kkt_residual`."""
@@ -80,15 +80,26 @@ class Variant:
         size = np.ones(chosen.shape[1])
         if self._units is not None:
             size = self._units.states if part is ocp.states else self._units.inputs
-        solution = self._inside(solution)
+        inside = self._inside(solution)
         for k in range(chosen.shape[1]):
             chosen[stage] = size * (np.arange(chosen.shape[1]) == k)
-            gradient = self._solver.plan_gradient(solution, states, inputs)
+            gradient = self._solver.plan_gradient(inside, states, inputs)
             if gradient is None:
-                dense = self._sensitivity.plan(*_point(solution))[part[stage]]
+                dense = self._dense(self._sensitivity.plan, solution)[part[stage]]
                 return np.asarray(size[:, None] * dense, float)
             found.append(gradient)
         return np.array(found)
+
+    def _dense(self, derivative: Callable[..., Matrix], solution: Solution) -> Matrix:
+        """A derivative of `Sensitivity` at a solution.
+
+        Raises:
+            DerivativeError: there is none.
+        """
+        try:
+            return derivative(*_point(self._inside(solution)))
+        except np.linalg.LinAlgError as error:
+            raise DerivativeError(str(error), solution.state, solution.theta) from error
 
     @cached_property
     def diagnosis(self) -> Diagnosis:

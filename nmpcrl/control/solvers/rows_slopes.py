@@ -6,6 +6,9 @@ then the change of its gradient along (step, w), L_tt w + G' step. A weighted su
 plan changes by -s' K^-1 G w, so its gradient in theta is G' step with K step + s = 0: the same
 sweep from the other side, one for each number of the plan and not one for each parameter.
 
+Where rows and bounds are active that no input can follow all at once, springs of the barrier would
+share what is left between them: `independent` finds out, and `Sensitivity` takes a side instead.
+
 See `hessian` for the barrier parameter and the source. The dynamics' share of G w, f_theta w, is
 taken up by a `drift` of the states in which no input moves.
 """
@@ -51,6 +54,11 @@ from .rows import (
     settle,
 )
 
+STIFF = 1e4  # at least, where a row is active
+GOLDEN = 0.6180339887498949
+LEFT = 1e-2  # of the motion that an active row was asked for: more, and it cannot have it
+FARTHEST = 1e7  # an input moves farther only where nothing but the barrier curves
+
 
 @inlined
 def restore_rows(task, duals, factor, solved):
@@ -63,6 +71,42 @@ def restore_rows(task, duals, factor, solved):
             weight = task.weights[i, j]
             old = solved[row + j] / factor if task.kind[i, j] == PLANNED else 0.0
             duals.lam[i, j] = min(max(old, INSIDE * weight), (1.0 - INSIDE) * weight)
+
+
+@inlined
+def independent(task, point, duals, stages, step):
+    """Whether all active rows can move as they like, and bounds stay; after `condense`.
+
+    Each active row is asked to move by another amount, and all have to.
+    """
+    last, rows = len(point.u), 0
+    for i in range(last + 1):
+        for a in range(NX):
+            stages.q[i, a] = 0.0
+        for a in range(NU if i < last else 0):
+            stages.r[i, a] = 0.0
+        for j in range(NROWS):
+            stages.off[i, j] = 0.0
+            if task.kind[i, j] == PLANNED and stages.stiff[i, j] > STIFF:
+                rows += 1
+                apart = 1.0 + (GOLDEN * rows) % 1.0
+                stages.off[i, j] = apart
+                pull = stages.stiff[i, j] * apart
+                for a in range(NX):
+                    stages.q[i, a] += pull * stages.hx[i, j, a]
+                for a in range(NU if i < last else 0):
+                    stages.r[i, a] += pull * stages.hu[i, j, a]
+    if rows == 0:
+        return True
+    if not factorise(stages, 0.0, task.first, step):
+        return False
+    sweep(task, stages, step)
+    rows_along(task, stages, step)
+    for i in range(last + 1):
+        for j in range(NROWS):
+            if stages.off[i, j] > 0.0 and abs(stages.off[i, j] + step.lam[i, j]) > LEFT:
+                return False
+    return True
 
 
 @inlined
@@ -154,7 +198,7 @@ def slopes(
     """The Hessian times w, plus the gradient of a weighted sum of the plan, shape (NTHETA,).
 
     `of_states` (N + 1, NX) and `of_inputs` (N, NU) are the sum's weights. Returns whether it could
-    be formed: not where the solution is no strict minimum.
+    be formed: not where the solution is no strict minimum, or inputs cannot follow what is active.
     """
     task = scaled(theta, data, lower, upper, kind, discount, weights, factor, fixed)
     N, mu = len(discount) - 1, RIGID
@@ -165,6 +209,8 @@ def slopes(
     restore_rows(task, duals, factor, solved)
     linearise(task, point, duals, stages)
     condense(task, point, duals, stages, mu)
+    if not independent(task, point, duals, stages, step):
+        return False
     right_hand_side(task, point, duals, stages, w, drift)
     for i in range(N + 1):
         for a in range(NX):
@@ -174,6 +220,10 @@ def slopes(
     if not factorise(stages, 0.0, task.first, step):
         return False
     sweep(task, stages, step)
+    for i in range(task.first, N):
+        for a in range(NU):
+            if not abs(step.u[i, a]) < FARTHEST:
+                return False
     costates_along(stages, step, dp)
     for i in range(N + 1):
         for a in range(NX):
