@@ -2,12 +2,14 @@
 
 from nmpcrl.claims.finding import EARLY, LEARNERS, Finding
 from nmpcrl.claims.thresholds import BETTER
-from nmpcrl.report.cited import Count
+from nmpcrl.report.cited import Cited, Count
 from nmpcrl.report.prose import filled
 from nmpcrl.report.text import NOTHING, listed
+from nmpcrl.report.timing import PUBLISHED
 from nmpcrl.study import paper
 
 ORIGIN = "the published study"
+BY_HAND = "by hand: rollouts of this build"
 
 
 def sentences(found: Finding | None) -> str:
@@ -26,10 +28,10 @@ def sentences(found: Finding | None) -> str:
         and in {early_per_step} if it decays per step, as the paper's equation has it.
         """,
         origin=ORIGIN,
-        saved_by_hand=found.saved_by_hand,
-        solved_by_hand=Count(*found.by_hand),
-        least_lost_by_hand=found.lost_by_hand[0],
-        most_lost_by_hand=found.lost_by_hand[1],
+        saved_by_hand=Cited(found.saved_by_hand, f"saved {BY_HAND}"),
+        solved_by_hand=Cited(Count(*found.by_hand), f"layouts solved {BY_HAND}"),
+        least_lost_by_hand=Cited(found.lost_by_hand[0], f"least lost {BY_HAND}"),
+        most_lost_by_hand=Cited(found.lost_by_hand[1], f"most lost {BY_HAND}"),
         saved_there=found.saved_there,
         early=str(EARLY),
         early_per_episode=Count(found.stopped_early, found.stopped[1]),
@@ -65,7 +67,7 @@ def numbers(found: Finding | None) -> str:
         saved_where_it_arrived=found.learned,
         learners=listed(LEARNERS),
         by_hand=str(paper.task().margin),
-        layouts_solved_by_hand=Count(*found.by_hand),
+        layouts_solved_by_hand=Cited(Count(*found.by_hand), f"layouts solved {BY_HAND}"),
         better_by_hand=Count(*found.better),
         stopped_runs_of_RDES=Count(*found.stopped),
         stopped_early=found.stopped_early,
@@ -95,7 +97,7 @@ def use(found: Finding | None) -> str:
         origin=ORIGIN,
         episodes=str(paper.EPISODES),
         hours_of_the_robot=found.hours,
-        seconds_of_a_run_of_ES=found.seconds,
+        seconds_of_a_run_of_ES=Cited(found.seconds, f"seconds of a run of ES: {PUBLISHED}"),
         above_TDC=Count(*found.above["TDC"]),
         better=BETTER,
         **{f"astray_{name}": Count(*count) for name, count in found.not_there.items()},

@@ -145,6 +145,7 @@ def test_no_two_numbers_of_one_quantity_differ(html):
         ("06_what_the_paper_leaves_open", "alone: rollouts of this page"),
         ("07_beyond", "at margin: the published searches"),
         ("07_beyond", "by hand: rollouts of this page"),
+        ("intro", "layouts solved by hand: rollouts of this build"),
     ],
 )
 def test_a_number_beside_those_of_a_pages_runs_says_its_own_source(html, page, quantity):
