@@ -217,7 +217,7 @@ def answer_items(
             another.
     """
     return "\n".join(
-        _item(one, asked, f" *Asked of {asked.asked_of}.*" * expected)
+        _item(one, asked, f" *Asked of: {asked.asked_of}.*" * expected)
         + _otherwise(one, asked) * expected
         for one, asked in ((one, questions[one.question]) for one in answers)
     )

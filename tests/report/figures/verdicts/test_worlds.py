@@ -44,7 +44,9 @@ def test_of_a_wrong_model_each_fault_has_its_policies_and_the_title_their_median
     layouts = pd.Series([0.02, 0.03, 0.04])
     by = {"ES": layouts, "ES+model": layouts - 0.01, "grid": layouts + 0.03}
     figure = figures.models({"speed": by | {"oracle": layouts - 0.035}, "lag": by})
-    assert figure.finding == "The true model changes the cost by +0.5%, a grid over theta_c by −6.0%"
+    assert (
+        figure.finding == "The true model changes the cost by +0.5%, a grid over theta_c by −6.0%"
+    )
     (axes,) = figure.axes
     counts = {line.get_label(): len(line.get_xdata()) for line in axes.get_lines()[:4]}
     assert counts["true model"] == 1
