@@ -30,7 +30,7 @@ COLOURS = {  # of a word, as of a verdict
     FIRST: REPRODUCED, SECOND: REPRODUCED, LATER: PARTLY, OPEN: UNDECIDABLE, NEVER: NOT,
 }  # fmt: skip
 NOTHING = "–"  # where an entry was not judged
-BACK = "undone where a rollout got worse"
+BACK = "taken back where a rollout got worse"
 COSTS, STEPS, MODEL = "costs of rollouts", "steps", "the plant's derivatives"
 WHAT: dict[str, tuple[str, str]] = {  # what an entry is, after "Try first", and what it is told
     "frozen": (r"$\boldsymbol{\theta}_\text{init}$ as it is", "nothing"),
@@ -165,15 +165,15 @@ def in_short(advice: Iterable[Advice]) -> str:
     for one in advice:
         by.setdefault(one.word, []).append(one)
     if FIRST not in by:
-        said = ["Nothing that was compared surely gains."]
+        said = ["Nothing that was compared gains by an interval above 0."]
     else:
         row = _known(by[FIRST][0])
-        said = [f"Try first {_tried(row)} and solves {_solved(row)} layouts."]
+        said = [f"Try first {_tried(row)}, and solves {_solved(row)} layouts."]
     if SECOND in by:
         said.append(f"Second, {_tried(_known(by[SECOND][0]))}.")
     if safe := [one for one in advice if one.rows and _solves_all(one)]:
         row = _known(safe[0])
-        said.append(f"If no run may fail, {_tried(row)} and solves all {row.layouts} layouts.")
+        said.append(f"If no run may fail, {_tried(row)}, and solves all {row.layouts} layouts.")
     if NEVER in by:
         said.append(f"Never try {listed(f'`{one.entry}`' for one in by[NEVER])}.")
     return " ".join(said)
@@ -190,8 +190,8 @@ def _known(one: Advice) -> RemedyRow:
 
 def _tried(row: RemedyRow) -> str:
     what, _ = WHAT[row.entry]
-    has = f"has {_gain(row)} of the possible gain after {row.rollouts} rollouts"
-    return f"{what} (`{row.entry}`), which {has}"
+    saves = f"saves {_gain(row)} of what a long search saves, in {row.rollouts} rollouts"
+    return f"{what} (`{row.entry}`), which {saves}"
 
 
 def expectation_items(expected: Mapping[str, bool]) -> str:

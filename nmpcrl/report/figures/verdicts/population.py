@@ -42,7 +42,7 @@ LABELS = {
     "dimension": "width [BARN]",
     "tortuosity": "tortuosity [BARN]",
     "cost": "initial cost",
-    "slope": r"its slope in $\theta_c$",
+    "slope": r"the cost's slope in $\theta_c$",
     "overshoot": r"initial $\alpha\Vert\phi\Vert^2$",
     "closes": r"$\theta_c$ that closes a gap",
 }
