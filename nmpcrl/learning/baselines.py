@@ -7,6 +7,8 @@
 | random  | a direction drawn uniformly, as far as ES would move           |
 """
 
+from functools import partial
+
 import numpy as np
 
 from nmpcrl import Vector
@@ -46,23 +48,30 @@ def random_direction(nmpc: Controller, alpha: float, rng: np.random.Generator) -
         alpha: step size of ES.
         rng: draws the directions.
     """
-
-    def anywhere(weights: Weights, *_: object) -> Weights:
-        return Weights(weights.theta + rng.normal(size=weights.theta.size), weights.w)
-
-    rule = as_far_as(semi_gradient(alpha), anywhere)
+    rule = as_far_as(semi_gradient(alpha), partial(_anywhere, rng))
     return Learner("random", SecondSolve(nmpc), rule, nmpc.gamma, theta_bounds(nmpc))
 
 
 def as_far_as(length: UpdateRule, direction: UpdateRule) -> UpdateRule:
     """Move theta where one rule would, as far as the other would, which also moves w."""
+    return partial(_as_far_as, length, direction)  # a copy of a closure shares what it draws from
 
-    def rule(weights: Weights, delta: float, solution: Solution, successor: Successor) -> Weights:
-        moved = length(weights, delta, solution, successor)
-        turned = direction(weights, delta, solution, successor)
-        step = of_length(
-            turned.theta - weights.theta, float(np.linalg.norm(moved.theta - weights.theta))
-        )
-        return Weights(weights.theta + step, moved.w)
 
-    return rule
+def _as_far_as(
+    length: UpdateRule,
+    direction: UpdateRule,
+    weights: Weights,
+    delta: float,
+    solution: Solution,
+    successor: Successor,
+) -> Weights:
+    moved = length(weights, delta, solution, successor)
+    turned = direction(weights, delta, solution, successor)
+    step = of_length(
+        turned.theta - weights.theta, float(np.linalg.norm(moved.theta - weights.theta))
+    )
+    return Weights(weights.theta + step, moved.w)
+
+
+def _anywhere(rng: np.random.Generator, weights: Weights, *_: object) -> Weights:
+    return Weights(weights.theta + rng.normal(size=weights.theta.size), weights.w)

@@ -1,5 +1,7 @@
 """The control arms: their direction from one rule, their length from another, and no more."""
 
+import copy
+
 import numpy as np
 import pytest
 from scipy.stats import kstest
@@ -93,6 +95,9 @@ def test_random_directions_come_from_the_given_generator_alone(controller, trans
         learner = at_random(controller, seed)
         return [moved(learner, weights, step).tolist() for _ in range(3)]
 
+    learner = at_random(controller, 5)
+    for one in (copy.deepcopy(learner), learner):
+        assert [moved(one, weights, step).tolist() for _ in range(3)] == path(5)
     first = path(5)
     assert path(5) == first
     assert path(6) != first
