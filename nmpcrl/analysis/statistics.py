@@ -54,6 +54,19 @@ def rate(held: int, of: int) -> Estimate:
     return Estimate(held / of, float(interval.low), float(interval.high))
 
 
+def paired_p(gained: int, lost: int) -> float:
+    """McNemar's exact two-sided p: pairs whose answer changed go either way with the same chance.
+
+    1 where no pair changed.
+
+    Args:
+        gained: pairs that answer yes only with the change.
+        lost: pairs that answer yes only without it.
+    """
+    changed = gained + lost
+    return float(stats.binomtest(gained, changed).pvalue) if changed else 1.0
+
+
 def interquartile_mean(scores: Vector, strata: Sequence[Hashable]) -> Estimate:
     """Mean of the middle half of the scores: a mean that a quarter of failures cannot move.
 

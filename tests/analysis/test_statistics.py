@@ -1,6 +1,7 @@
 """Estimates against closed forms, and intervals against how often they cover what is true."""
 
 import time
+from math import comb
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from nmpcrl.analysis.statistics import (
     CONFIDENCE,
     Estimate,
     interquartile_mean,
+    paired_p,
     performance_profile,
     probability_of_improvement,
     rate,
@@ -51,6 +53,13 @@ def test_the_interval_of_a_rate_covers_the_mean_over_layouts_that_differ():
     rng, chances = np.random.default_rng(1), np.array([0.02, 0.1, 0.4, 0.7, 0.9, 0.98])
     held = rng.binomial(20, chances, (1000, 6)).sum(axis=1)
     assert covered([rate(int(k), 120) for k in held], chances.mean()) >= CONFIDENCE
+
+
+@pytest.mark.parametrize(("gained", "lost"), [(0, 0), (4, 0), (0, 4), (3, 17), (8, 8)])
+def test_pairs_that_change_go_either_way_with_the_same_chance(gained, lost):
+    changed, fewer = gained + lost, min(gained, lost)
+    tail = sum(comb(changed, i) for i in range(fewer + 1)) / 2**changed
+    assert paired_p(gained, lost) == pytest.approx(min(1.0, 2 * tail))
 
 
 # The interquartile mean

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
+from nmpcrl.claims import evidence
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.report.baselines import READINGS, baselines, conclusion, table
 
@@ -37,16 +38,23 @@ def test_a_reading_with_which_des_does_not_diverge_changes_c1(study):
     (row,) = told.to_dict("records")
     assert (str(row["diverged"]), str(row["main"])) == ("0 of 16", "16 of 16")
     assert row["changes"]
-    assert "With `late` (not reproduced, p = " in conclusion(told)
-    assert "by more than chance explains with `late` (p = " in conclusion(told)
+    assert (row["gained"], row["lost"], row["p_diverged"]) == (0, 16, 2 / 2**16)
+    assert "another outcome with: `late` (not reproduced)." in conclusion(told)
     assert "| `late`: the network is one fit late" in table(told)
 
 
 def test_a_reading_that_diverges_alike_changes_nothing(study):
     found = study("lagged", stopped)
     told = baselines(found.runs, paths(found))
-    assert "to the same with every reading of the baseline as in the main table" in conclusion(told)
-    assert "No reading changes how often DES diverges by more" in conclusion(told)
+    assert told.p_diverged.item() == 1
+    assert "another outcome with: none." in conclusion(told)
+
+
+def test_how_often_des_diverges_is_tested_on_its_own_and_not_by_the_p_of_the_claim():
+    known = evidence.gather("published", variants=True)
+    told = baselines(known.runs, paths(known)).loc["averaged"]
+    assert (told.diverged, told.main, told.gained, told.lost) == ((15, 60), (29, 60), 3, 17)
+    assert told.p_diverged == pytest.approx(0.0026, abs=1e-4)
 
 
 def test_what_was_not_run_is_not_told(made_up):
