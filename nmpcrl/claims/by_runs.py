@@ -14,9 +14,9 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis.statistics import rate
-from nmpcrl.claims.halves import confirmations, halves, reversals
+from nmpcrl.claims.halves import halves
 from nmpcrl.claims.rule import Claim, Observations, Paths, arms, read, settle
-from nmpcrl.claims.verdict import WHOLE, Verdict
+from nmpcrl.claims.verdict import Verdict
 
 # One row a cell of layout, decay and seed, one column an arm; nan is unknown.
 Values: TypeAlias = pd.DataFrame
@@ -55,12 +55,17 @@ class RunClaim(Claim):
 
     def settled(self, observed: Observations, evidence: str = "") -> Verdict:
         """The verdict with its counts, without what else `judge` says of it, which takes longer."""
-        found = (observed.runs, observed.paths)
-        answers, weaker = self.yes(self.measure(*found), self.threshold), None
-        if self.besides:
-            weaker, counts = answers, _long(self.besides(*found))
-            answers = weaker & _known(counts == 0, counts)
+        answers, weaker = self.asked(observed)
         return settle(self, answers, evidence, weaker=weaker, unit=self.unit)
+
+    def asked(self, observed: Observations) -> tuple[pd.Series, pd.Series]:
+        """The answers to the claim's question, and to the weaker one, if it has one: else twice."""
+        found = (observed.runs, observed.paths)
+        answers = self.yes(self.measure(*found), self.threshold)
+        if not self.besides:
+            return answers, answers
+        counts = _long(self.besides(*found))
+        return answers & _known(counts == 0, counts), answers
 
     def at_borders(self, values: Values, borders: Iterable[float]) -> pd.DataFrame:
         """What would become of the claim at other borders than its own, which stays where it is.
@@ -114,15 +119,11 @@ class Contrast(RunClaim):
 
     def judge(self, observed: Observations) -> Verdict:
         """See `RunClaim.judge`; both halves of the claim are counted, too."""
-        verdict, (first, second) = super().judge(observed), self.learners
+        first, second = self.learners
         borders = {self.wrong: self.threshold, self.worst: np.finfo(float).max}
-        found = halves((first, second), self.measure(observed.runs, observed.paths), borders)
-        return replace(
-            verdict,
-            halves=tuple(one for one in found if one.layouts == (WHOLE,)),
-            as_claimed=tuple(confirmations(found)),
-            reverse=tuple(reversals(found)),
-        )
+        values = self.measure(observed.runs, observed.paths)
+        found = halves((first, second), values, borders)
+        return replace(super().judge(observed), halves=found)
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """See `RunClaim.yes`."""

@@ -13,7 +13,7 @@ import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, probability_of_improvement
 from nmpcrl.claims.by_runs import AtMost, RunClaim, Values
-from nmpcrl.claims.rule import Observations, Paths, arms, median, shown
+from nmpcrl.claims.rule import Observations, Paths, arms, drawn_anew, median, shown
 from nmpcrl.claims.thresholds import BETTER, SAME_COST, cost_difference, cost_reduction
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Verdict
 from nmpcrl.study.experiment import PAPER
@@ -80,6 +80,12 @@ def costs_less(runs: pd.DataFrame, first: str, second: str) -> Estimate:
     one, other = arms(runs, first, second)
     whole = (one.stopped.notna() & other.stopped.notna()).to_numpy(bool)
     return _costs_less(one[whole], other[whole]) if whole.any() else Estimate(*[np.nan] * 3)
+
+
+def costs_less_anew(runs: pd.DataFrame, first: str, second: str) -> Estimate:
+    """As `costs_less`, with the interval for layouts drawn anew (see `rule.drawn_anew`)."""
+    layouts = (of for _, of in runs[runs.learner.isin((first, second))].groupby("layout"))
+    return drawn_anew(costs_less(one, first, second).value for one in layouts)
 
 
 def _costs_less(first: pd.DataFrame, second: pd.DataFrame) -> Estimate:

@@ -28,7 +28,7 @@ from nmpcrl.claims.population_questions import (
     STANDING,
     WORDS,
 )
-from nmpcrl.claims.rule import MAJORITY, Observations, Paths, read
+from nmpcrl.claims.rule import MAJORITY, Observations, Paths, forgiving, read
 from nmpcrl.claims.thresholds import improves, was_stopped
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
 from nmpcrl.claims.wider_claims import WIDER_CLAIMS
@@ -90,18 +90,22 @@ def held(
         called: what a layout is called, in the population unless said; `str` for A to F.
 
     Returns:
-        Columns claim, layout (its name), yes, of (answers) and holds.
+        Columns claim, layout (its name), yes, of (answers), holds and weaker (whether the weaker
+        question holds there, if the claim has one; else as holds).
     """
     rows, known, there = [], asked(), {*runs.learner}
     for name in claims:
         if not {*known[name].learners} <= there:
             continue
-        counts = known[name].settled(Observations(runs, paths)).counts
-        for layout in runs.layout.unique():
-            yes, of = counts.get(layout, (0, 0))
-            if of:
-                rows.append((name, called(layout), yes, of, yes / of > MAJORITY))
-    return pd.DataFrame(rows, columns=["claim", "layout", "yes", "of", "holds"])
+        strict, weaker = (
+            one.dropna().astype(bool).groupby(level="layout", sort=False)
+            for one in known[name].asked(Observations(runs, paths))
+        )
+        counts = strict.agg(["sum", "size"]).join(weaker.mean().rename("weaker"))
+        for layout, (yes, of, share) in counts.iterrows():
+            held_there = (yes / of > MAJORITY, share > MAJORITY)
+            rows.append((name, called(layout), int(yes), int(of), *held_there))
+    return pd.DataFrame(rows, columns=["claim", "layout", "yes", "of", "holds", "weaker"])
 
 
 def shares(where: pd.DataFrame) -> pd.DataFrame:
@@ -112,17 +116,20 @@ def shares(where: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         Columns claim, holding, layouts, share, low, high (by `rate`: layouts are independent),
-        outcome (by `rule.read`), expected (an outcome) and within (the share that was expected).
+        outcome (by the rule, weaker questions included), weaker (layouts in which the weaker
+        question holds), expected (an outcome) and within (the share that was expected).
     """
     rows = []
     for name, group in where.groupby("claim", sort=False):
         holding, layouts = int(group.holds.sum()), len(group)
         share, expected = rate(holding, layouts), EXPECTED[str(name)]
         numbers = (share.value, share.low, share.high)
-        said = (read(holding, layouts), expected.outcome, share.value in expected)
+        weaker = int(group.weaker.sum())
+        outcome = forgiving(read(holding, layouts), read(weaker, layouts))
+        said = (outcome, weaker, expected.outcome, share.value in expected)
         rows.append((name, holding, layouts, *numbers, *said))
-    names = ["claim", "holding", "layouts", "share", "low", "high", "outcome", "expected", "within"]
-    return pd.DataFrame(rows, columns=names)
+    names = ["claim", "holding", "layouts", "share", "low", "high"]
+    return pd.DataFrame(rows, columns=[*names, "outcome", "weaker", "expected", "within"])
 
 
 def succeeds(runs: pd.DataFrame, learner: str = "ES") -> pd.Series:

@@ -13,7 +13,7 @@
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from functools import cache, cached_property
 from hashlib import sha256
@@ -438,13 +438,17 @@ def _verdict(stored: dict[str, Any]) -> Verdict:
         for name in ("by_layout", "by_decay")
     }
     parts |= {"outcome": Outcome(stored["outcome"]), "interval": interval, "counts": counts}
-    for name in ("halves", "as_claimed", "reverse"):
-        parts[name] = tuple(_halves(one) for one in stored[name])
-    return Verdict(**stored | parts)
+    parts["halves"] = tuple(_halves(one) for one in stored["halves"])
+    return Verdict(**_own(Verdict, stored) | parts)
 
 
 def _halves(stored: dict[str, Any]) -> Halves:
     parts: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value for name, value in stored.items()
     }
-    return Halves(**parts)
+    return Halves(**_own(Halves, parts))
+
+
+def _own(kind: type, stored: dict[str, Any]) -> dict[str, Any]:
+    """What is stored of the fields that there are; older files also have what is computed now."""
+    return {one.name: stored[one.name] for one in fields(kind) if one.name in stored}

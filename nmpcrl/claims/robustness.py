@@ -49,21 +49,6 @@ def not_run(runs: pd.DataFrame) -> tuple[str, ...]:
     return tuple(name for name in design.VARIANTS if name not in set(runs.variant))
 
 
-def clearest_changes(found: pd.DataFrame, count: int = 3) -> pd.DataFrame:
-    """The changed cells with the smallest p, of as many different claims and rows.
-
-    Args:
-        found: of `robustness_map`.
-        count: how many, at most.
-    """
-    rest = found[found.changes.astype(bool)].sort_values("p", kind="stable")
-    chosen: list[int] = []
-    while len(rest) and len(chosen) < count:
-        chosen.append(rest.index[0])
-        rest = rest[(rest.claim != rest.claim.iloc[0]) & (rest.variant != rest.variant.iloc[0])]
-    return found.loc[chosen]
-
-
 def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The runs behind a row of the map, and those that it is compared with.
 
@@ -103,7 +88,8 @@ def _part(variant: str) -> tuple[str, str]:
 
 # `base` is the outcome that `outcome` is compared with; `changes` says that both are decided and
 # differ; `share` and `base_share` are of yes; `pairs` answered; `p` is the chance of shares so
-# different if the choice changed nothing (Fisher's exact test, as if runs were independent).
+# different if the choice changed nothing (Fisher's exact test, as if runs were independent). A
+# layout has none: its runs hardly differ from seed to seed, so that it is one observation.
 COLUMNS = ("variant", "claim", "outcome", "base", "changes", "share", "base_share", "pairs", "p")
 
 
@@ -156,7 +142,8 @@ def part_changes(verdicts: Iterable[Verdict]) -> pd.DataFrame:
                 yes, of = verdict.counts[name]
                 rest = Cell(verdict.outcome, all_yes - yes, all_of - of)
                 row = _row(f"{words} {name}", verdict.claim, Cell(outcome, yes, of), rest)
-                rows.append(row | {"changes": row["changes"] and verdict.depends_on(field)})
+                row["changes"] = row["changes"] and verdict.depends_on(field)
+                rows.append(row | ({"p": np.nan} if field == "layout" else {}))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

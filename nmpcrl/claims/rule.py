@@ -11,10 +11,13 @@ any claim was put to the study, and is not to be moved after:
   interval about `MAJORITY`, or the answers that are missing would decide;
 - partly reproduced: all else, so that it depends on layout, decay or seed whether the claim holds.
 
+- a claim with a weaker question, which a yes to the first implies, is partly reproduced where it
+  would not be reproduced and the weaker question is not "not reproduced" (C7 and W7).
+
 The interval alone would not do: of 1000 runs, 55 % are surely more than half, and surely not what
 "DES diverges" says. Nor would the share alone: two of two runs are all there are. The interval is
-Wilson's everywhere, over all layouts too, where a bootstrap would be sure of what it saw in all
-runs; `statistics.rate` says why it is not too narrow there.
+Wilson's, over all layouts too: it is for other seeds in the same layouts, where it is not too
+narrow (see `statistics.rate`). What other layouts would say is another question: see `drawn_anew`.
 
 What is missing (a run that was not made, or is shorter than the paper's, or has no frozen arm to be
 compared with) is excluded; if it could change the verdict, the claim is undecidable.
@@ -23,11 +26,13 @@ compared with) is excluded; if it could change the verdict, the claim is undecid
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
+from nmpcrl.analysis.predictors import over_layouts
 from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import paper
@@ -37,6 +42,7 @@ from nmpcrl.study.records import Column, Stopped
 MAJORITY = 0.5
 NEARLY_ALL = 0.9
 NEARLY_NONE = 0.1
+FEWEST_LAYOUTS = 5  # of an interval for layouts drawn anew
 
 CELL = ["layout", "decay", "seed"]  # what two runs share that are compared
 NAMED = {"decay": ("reading", " of the decay")}  # a level that a sentence calls otherwise
@@ -173,7 +179,10 @@ def settle(
     lenient = {level: counted(forgiven, level) for level in found}
 
     outcomes = {
-        level: {name: _forgiving(one, lenient[level][name]) for name, one in parts.items()}
+        level: {
+            name: forgiving(one.outcome, lenient[level][name].outcome)
+            for name, one in parts.items()
+        }
         for level, parts in found.items()
     }
     whole = found[""]["all"]
@@ -192,11 +201,32 @@ def settle(
     )
 
 
-def _forgiving(strict: Answers, lenient: Answers) -> Outcome:
+def forgiving(strict: Outcome, weaker: Outcome) -> Outcome:
     """What is refuted is partly reproduced where the weaker question is not refuted."""
-    if strict.outcome != NOT:
-        return strict.outcome
-    return lenient.outcome if lenient.outcome in (NOT, UNDECIDABLE) else PARTLY
+    if strict != NOT:
+        return strict
+    return weaker if weaker in (NOT, UNDECIDABLE) else PARTLY
+
+
+def drawn_anew(values: Iterable[float]) -> Estimate:
+    """The mean of one value a layout, with the interval of 95 % for layouts drawn anew.
+
+    The bootstrap draws layouts. Where all layouts say 0, or all 1, it would be sure of what it saw,
+    and the interval is Wilson's of as many layouts. Below `FEWEST_LAYOUTS` the bounds are nan. Six
+    layouts are few for a bootstrap: the interval is, if anything, too narrow.
+    """
+    known = np.array([*values], float)
+    value = float(known.mean()) if known.size else np.nan
+    if known.size < FEWEST_LAYOUTS:
+        return Estimate(value, np.nan, np.nan)
+    if np.ptp(known) == 0 and value in (0, 1):
+        return rate(int(known.sum()), known.size)
+    return over_layouts(partial(np.mean, axis=-1), known)
+
+
+def anew(verdict: Verdict) -> Estimate:
+    """The share of yes with the interval of `drawn_anew`; nan where no layout was asked."""
+    return drawn_anew(yes / of for yes, of in map(verdict.counts.get, verdict.by_layout) if of)
 
 
 def arms(

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from nmpcrl.analysis.statistics import paired_p, rate
+
 
 class Outcome(StrEnum):
     """What becomes of a claim."""
@@ -14,8 +16,6 @@ class Outcome(StrEnum):
 
 
 REPRODUCED, PARTLY, NOT, UNDECIDABLE = Outcome
-
-WHOLE = "all"  # in the place of a layout
 
 
 def differ(first: Outcome, second: Outcome) -> bool:
@@ -30,25 +30,20 @@ class Halves:
     learners: tuple[str, str]  # the claim says that the first goes wrong, and the second does not
     wrong: str  # how: "diverged"
     decay: str
-    layouts: tuple[str, ...]  # (`WHOLE`,) for all of them together
     pairs: int  # of which both answers are known
     counts: tuple[int, int]  # of the first and of the second
     against: int  # pairs in which only the second went wrong
     apart: int  # pairs in which only one of them did
 
-    def __add__(self, other: "Halves") -> "Halves":
-        """Two cells of one reading together."""
-        first, second = (a + b for a, b in zip(self.counts, other.counts, strict=True))
-        return Halves(
-            self.learners,
-            self.wrong,
-            self.decay,
-            self.layouts + other.layouts,
-            self.pairs + other.pairs,
-            (first, second),
-            self.against + other.against,
-            self.apart + other.apart,
-        )
+    @property
+    def as_claimed(self) -> int:
+        """Pairs in which only the first went wrong."""
+        return self.apart - self.against
+
+    @property
+    def p(self) -> float:
+        """How likely pairs split as far by chance if both go wrong as often, by McNemar's test."""
+        return paired_p(self.as_claimed, self.against)
 
 
 @dataclass(frozen=True)
@@ -67,9 +62,7 @@ class Verdict:
     counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
     ratio: float | None = None  # of times, where the claim is about time
     each: str = ""  # what a claim on several learners comes to for each of them
-    halves: tuple[Halves, ...] = ()  # of a claim that joins two statements, in each reading
-    as_claimed: tuple[Halves, ...] = ()  # where the learners clearly differ as claimed
-    reverse: tuple[Halves, ...] = ()  # and where they clearly differ the other way round
+    halves: tuple[Halves, ...] = ()  # of a claim that joins two statements; see `claims.halves`
     said: str = ""  # the outcome in the claim's own words, where it has any
 
     @property
@@ -78,12 +71,19 @@ class Verdict:
         return self.said or str(self.outcome)
 
     @property
-    def turns(self) -> bool:
-        """Whether learners clearly differ as claimed in one reading, and not in another.
+    def own_halves(self) -> tuple[Halves, ...]:
+        """The halves by the claim's own measure, in each reading."""
+        return tuple(one for one in self.halves if one.wrong == self.halves[0].wrong)
 
-        There they differ the other way round, and a verdict on both together is about neither.
+    @property
+    def turns(self) -> bool:
+        """Whether most pairs that differ go as claimed in one reading, and not in another.
+
+        "Most" is sure (`rate` above one half) in the one; in the other more go against the claim.
         """
-        return any(one.decay != other.decay for one in self.as_claimed for other in self.reverse)
+        there = [one for one in self.own_halves if one.apart]
+        sure = any(rate(one.as_claimed, one.apart).low > 0.5 for one in there)
+        return sure and any(one.against > one.as_claimed for one in there)
 
     def differs_by(self, field: str) -> bool:
         """Whether not all layouts, or readings of the decay, have the same decided outcome.

@@ -95,6 +95,8 @@ def share_table(shares: pd.DataFrame) -> str:
 def _cells(row: pd.Series) -> tuple[str, ...]:
     expected = EXPECTED[row.claim]
     counted = f"{row.holding} of {row.layouts}<br>{row.share:.0%} [{row.low:.0%}, {row.high:.0%}]"
+    if row.weaker != row.holding:
+        counted += f"<br>weaker question: {row.weaker} of {row.layouts}"
     badge = f'<span class="{BADGES[row.outcome]}">{row.outcome}</span>'
     return (_claim(row.claim), counted, badge, f"{expected.low:.0%} to {expected.high:.0%}")
 

@@ -1,23 +1,26 @@
 """Verdicts, assumptions and departures as the book's pages show them: HTML and Markdown text."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from html import escape
+from math import isnan
+from types import MappingProxyType
 
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.bench.targets import Target
 from nmpcrl.claims.assumptions import THEOREMS
-from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS
-from nmpcrl.claims.rule import Assumption, Claim
+from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
+from nmpcrl.claims.published import Published
+from nmpcrl.claims.rule import Assumption, Claim, anew
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.report.cited import Cited, cited
-from nmpcrl.report.halves import differ
+from nmpcrl.report.halves import own
 from nmpcrl.report.text import SURE, audit_place, departure_link, listed
-from nmpcrl.report.timing import to_es
+from nmpcrl.report.timing import ratios_at_paper_speed, to_es
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 
@@ -62,7 +65,7 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
     others = {v.claim: v for v in beside}
     rows = (
         (
-            f"<strong>{_text(v.claim)}</strong> {_aside(v)}{_text(v.statement)}{_differ(v)}",
+            f"<strong>{_text(v.claim)}</strong> {_aside(v)}{_text(v.statement)}{_own(v)}",
             _outcome(v),
             *([_outcome(others[v.claim], "runs of this page")] if others else []),
         )
@@ -72,23 +75,38 @@ def verdict_table(verdicts: Iterable[Verdict], scope: str, beside: Iterable[Verd
     return html_table(scope, header if others else ("The paper claims", "Here"), rows)
 
 
-def plain_verdict_table(verdicts: Iterable[Verdict]) -> str:
+def plain_verdict_table(
+    verdicts: Iterable[Verdict], beside: Mapping[str, str] = MappingProxyType({})
+) -> str:
     """One row a claim of the paper, in HTML: what became of it, and a link to what that rests on.
 
     Args:
         verdicts: of `judge`; those on wider claims are left out.
+        beside: what else a claim rests on, of `asides`.
     """
     rows = (
         (
             f"<strong>{_text(v.claim)}</strong> {_text(v.statement)}",
             _labelled(v),
-            f'<a href="{audit_place(v.claim)}">{_text(_rests_on(v))}</a>',
+            f'<a href="{audit_place(v.claim)}">{_text(_rests_on(v) + beside.get(v.claim, ""))}</a>',
         )
         for v in verdicts
         if v.claim in CLAIMS
     )
     caption = "The claims of the paper, and what became of each in the runs of this book."
     return html_table(caption, ("The paper claims", "Here", "It rests on"), rows)
+
+
+def asides(found: Published) -> dict[str, str]:
+    """What two verdicts rest on besides: C3 with slower solves, and C7's weaker question."""
+    if not found.rows:
+        return {}
+    kept = kept_without_noise(found.main, BY_RUNS["C7"].learners).kept
+    slow, slowest = ratios_at_paper_speed(found.timings)
+    return {
+        "C3": f", and {slow:.2f} to {slowest:.2f} at the paper's time of a solve",
+        "C7": f"; without noise, the weaker question, in {kept.sum()} of {len(kept)}",
+    }
 
 
 def layout_table(verdicts: Iterable[Verdict], caption: str) -> str:
@@ -168,7 +186,7 @@ def evidence(verdicts: Iterable[Verdict]) -> str:
     """One item a claim, in Markdown: verdict, evidence, and where it would change."""
     return "\n\n".join(
         f"- **{v.claim}: {v.statement}**\n\n"
-        f"  {_labelled(v)} {v.evidence}\n\n"
+        f"  {_labelled(v)} {v.evidence}{_anew(v)}\n\n"
         f"  *Where it would change.* {_linked(v.would_change)}"
         for v in verdicts
     )
@@ -259,13 +277,26 @@ def _word(outcome: Outcome | None) -> str:
 
 
 def _share(verdict: Verdict, source: str = PUBLISHED) -> str:
-    """The share, or ratio, on which a verdict rests and its interval, below its badge."""
+    """The share, or ratio, on which a verdict rests, below its badge: see `text.legend`.
+
+    Its interval is for other seeds, or other steps; below it, the one for layouts drawn anew.
+    """
     if verdict.interval is None:
         return ""
     value, form = (verdict.ratio, ".2f") if verdict.share is None else (verdict.share, ".0%")
     assert value is not None
     number, kind = Estimate(value, *verdict.interval), "ratio" if form == ".2f" else "share"
-    return f"<br>{cited(format(number, form), number, f'{verdict.claim}, {kind}: {source}')}"
+    lines = [cited(format(number, form), number, f"{verdict.claim}, {kind}: {source}")]
+    if not isnan((other := anew(verdict)).low):
+        what = f"{verdict.claim}, share with layouts drawn anew: {source}"
+        lines.append(cited(f"layouts anew [{other.low:.0%}, {other.high:.0%}]", other, what))
+    return "".join(f"<br>{line}" for line in lines)
+
+
+def _anew(verdict: Verdict) -> str:
+    """The interval for layouts drawn anew, as a sentence after the evidence."""
+    other = anew(verdict)
+    return "" if isnan(other.low) else f" For layouts drawn anew: {other:.0%}."
 
 
 def _in_two_lines(ratio: Cited) -> str:
@@ -303,10 +334,10 @@ def _aside(verdict: Verdict) -> str:
     return "<em>Taken for granted:</em> " if implied else ""
 
 
-def _differ(verdict: Verdict) -> str:
-    """Below a claim, in a line: where two learners clearly differ, and which way round."""
-    said = differ(verdict)
-    return f"<br><em>Its two learners clearly differ: {_text(said)}.</em>" if said else ""
+def _own(verdict: Verdict) -> str:
+    """Below a claim on two learners: how often each went wrong."""
+    said = own(verdict)
+    return f"<br><em>{_text(said)}</em>" if said else ""
 
 
 def _letter(letter: str) -> str:

@@ -1,7 +1,6 @@
 """The sentences of the one-page summary that rest on numbers: Markdown, from what is published."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from math import isnan
 from typing import Any
 
 import pandas as pd
@@ -103,9 +102,12 @@ def legend(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
             f" {stopped} of which had to be stopped in training."
         )
     return (
-        "A percentage is the share of runs, or of pairs of runs, in which the claim held, with its"
-        " 95 % interval. Where a claim is about time, the number is the ratio of the times of a"
-        f" step, with its 95 % interval. A claim without a number rests on no sample.{asked_twice}"
+        "A percentage is the share of runs, or of pairs of runs, in which the claim held. The"
+        " interval of 95 % beside it is for other seeds in these layouts (Wilson's), and *layouts"
+        " anew* is the one for other layouts drawn like them (a bootstrap that draws the layouts;"
+        " six are few, so it is rather too narrow). Where a claim is about time, the number is the"
+        " ratio of the times of a step, with its interval of 95 %. A claim without a number rests"
+        f" on no sample.{asked_twice}"
     )
 
 
@@ -157,9 +159,9 @@ def _compared(found: Sequence[Verdict], count: int, other: str) -> str:
     """Of how many claims there is the outcome that is asked for, `count` others, or none."""
     undecided = [v.claim for v in found if v.outcome == UNDECIDABLE]
     same = len(found) - len(undecided) - count
-    parts = [f"for {number(same)} of {number(len(found))} claims"]
-    parts += [f"another one for {number(count)} ({other})"] * bool(count)
-    parts += [f"none for {number(len(undecided))} ({listed(undecided)})"] * bool(undecided)
+    parts = [f"for {same} of {len(found)} claims"]
+    parts += [f"another for {count} ({other})"] * bool(count)
+    parts += [f"none for {len(undecided)} (too few runs: {listed(undecided)})"] * bool(undecided)
     return listed(parts)
 
 
@@ -189,8 +191,8 @@ def by_layout_and_decay(verdicts: Iterable[Verdict]) -> str:
         return ""
     turned = [v.claim for v in asked if v.turns]
     beside = (
-        f" The learners of {listed(turned)} clearly differ as claimed in one reading of the decay,"
-        " and the other way round in the other."
+        f" The learners of {listed(turned)} differ as claimed in one reading of the decay; in the"
+        " other, more pairs go against the claim than with it."
     )
     return (
         f"Verdicts that are not the same in every layout: {listed(layouts)}; in both readings of"
@@ -278,28 +280,6 @@ def audit_place(claim: str) -> str:
 def departure_link(words: str, letter: str) -> str:
     """A link to a departure's entry, in Markdown."""
     return f"[{words}](departures.ipynb#departure-{letter})"
-
-
-def mean_and_pairs(best: str, other: str, wins: float) -> str:
-    """How a rank by the mean goes with the share of pairs of runs that the best learner wins.
-
-    Args:
-        best: ends at the lowest mean cost.
-        other: is compared with it.
-        wins: probability that a run of `best` costs less than one of `other`; nan if not known.
-    """
-    if isnan(wins):
-        return ""
-    said = (
-        f"In the same layout a run of {best} costs less than one of {other} with a probability of"
-        f" {wins:.2f}"
-    )
-    if wins > 0.5:
-        return f"{said}."
-    return (
-        f"Yet {said[:1].lower()}{said[1:]}: in a mean, a run that gets stuck weighs more than many"
-        " that cost a little less ([Chapter 7](07_beyond.ipynb))."
-    )
 
 
 def listed(names: Iterable[object]) -> str:

@@ -119,6 +119,12 @@ def of_steps(learner: str, solver: str, source: str = PUBLISHED) -> str:
     return f"step of {learner} in steps of ES, with {solver}: {source}"
 
 
+def ratios_at_paper_speed(timings: pd.DataFrame) -> tuple[float, float]:
+    """C3's ratio at the paper's time of a solve: if all solves took alike, and with warm starts."""
+    model, solve = summary.saving(timings), 1e3 * summary.PAPER_SOLVE
+    return model.ratio(solve, warm=1.0), model.ratio(solve)
+
+
 def at_paper_speed(timings: pd.DataFrame) -> str:
     """What C3's ratio would be with solves as slow as the paper's; `timings` of `time_learners`."""
     return slow_solves(summary.saving(timings), 1e3 * summary.PAPER_SOLVE)

@@ -7,8 +7,11 @@ import pytest
 from nmpcrl.analysis.difficulty import MEASURES, OPEN, PILOT
 from nmpcrl.analysis.rows import FIELDS, OUTCOME, as_text
 from nmpcrl.claims import population
+from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.population_questions import EXPECTED, QUESTIONS
+from nmpcrl.claims.rule import Observations
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.wider_claims import WIDER_CLAIMS
 from nmpcrl.study.experiment import MAIN, Experiment
 from nmpcrl.study.population import JUDGE, LAYOUTS, TUNE
 from nmpcrl.study.population_design import COMPARED, seeds
@@ -86,6 +89,18 @@ def test_shares_count_layouts_and_never_runs():
     assert found.loc["C5", "holding"] == 20  # all paths are the same
     assert found.loc["C2", "outcome"] == NOT
     assert found.loc["C9", "low"] < 0.8 < found.loc["C9", "high"]
+
+
+@pytest.mark.parametrize(
+    ("without_noise", "outcome"), [(0.0, PARTLY), (0.5, NOT)], ids=["kept", "not kept"]
+)
+def test_a_weaker_question_counts_in_drawn_layouts_as_it_does_in_a_to_f(without_noise, outcome):
+    runs = judged(inside_small=1.0, eval_worst_overlap=without_noise)
+    found = population.shares(population.held(table(runs), paths(runs))).set_index("claim")
+    for claim, verdict in zip(("C7", "W7"), (BY_RUNS["C7"], WIDER_CLAIMS["W7"]), strict=True):
+        assert found.loc[claim, "holding"] == 0
+        assert found.loc[claim, "outcome"] == outcome
+        assert verdict.settled(Observations(table(runs))).outcome == outcome
 
 
 def test_a_claim_whose_learners_are_not_there_yet_is_not_asked():

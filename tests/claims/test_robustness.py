@@ -11,7 +11,6 @@ from nmpcrl.analysis.rows import experiment_of
 from nmpcrl.claims import paper_claims
 from nmpcrl.claims.robustness import (
     WHOLE,
-    clearest_changes,
     departure,
     groups,
     not_run,
@@ -114,30 +113,11 @@ def test_a_variant_is_compared_with_its_own_cells_and_borrows_who_it_does_not_ch
     assert origin["ES"] == origin["GES"] == origin["frozen"] == [design.MAIN_TABLE]
 
 
-def cells(*rows: tuple[str, str, bool, float]) -> pd.DataFrame:
-    return pd.DataFrame(rows, columns=["variant", "claim", "changes", "p"])
-
-
-def test_the_clearest_changes_are_the_surest_of_different_claims_and_rows():
-    found = clearest_changes(
-        cells(
-            ("one", "C1", True, 0.02),
-            ("one", "C2", True, 0.001),
-            ("one", "C5", False, 1e-9),
-            ("two", "C2", True, 0.002),
-            ("two", "C9", True, 0.3),
-            ("three", "C1", True, 0.03),
-        )
-    )
-    assert list(zip(found.variant, found.claim, strict=True)) == [
-        ("one", "C2"),
-        ("three", "C1"),
-        ("two", "C9"),
-    ]
-
-
-def test_where_nothing_changes_there_is_no_clearest_change():
-    assert clearest_changes(cells(("one", "C1", False, 0.001))).empty
+def test_a_layout_is_one_observation_and_has_no_p(costly):
+    _, found = costly
+    layouts = found.variant.str.startswith("layout")
+    assert found.p[layouts].isna().all()
+    assert found.p[~layouts & (found.variant != WHOLE)].notna().all()
 
 
 def test_runs_that_are_too_short_decide_nothing():

@@ -15,6 +15,7 @@ from nmpcrl.claims.rule import (
     Answers,
     Claim,
     arms,
+    drawn_anew,
     median,
     read,
     settle,
@@ -231,3 +232,18 @@ def test_what_could_not_be_finished_is_shown_as_infinite_and_never_as_inf():
 def test_a_median_is_of_what_is_known():
     assert median([1.0, np.nan, 3.0, np.inf]) == 3
     assert np.isnan(median([np.nan]))
+
+
+@pytest.mark.parametrize(
+    ("values", "low", "high"),
+    [
+        ([0.65, 0, 0, 0, 0.65, 0], 0.0, 0.43),  # C1's shares: other seeds would give [0.15, 0.30]
+        ([0.0] * 6, 0.0, 0.39),  # Wilson's of none of six layouts: a bootstrap would be sure
+        ([1.0] * 6, 0.61, 1.0),
+        ([0.5] * 4, np.nan, np.nan),  # too few layouts
+    ],
+)
+def test_the_interval_for_layouts_drawn_anew_counts_layouts_and_no_runs(values, low, high):
+    found = drawn_anew(values)
+    assert found.value == pytest.approx(np.mean(values))
+    assert (found.low, found.high) == pytest.approx((low, high), abs=0.01, nan_ok=True)

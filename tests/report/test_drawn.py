@@ -12,12 +12,15 @@ from nmpcrl.report.drawn import in_short, share_table, whole_or_nearest
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.population import JUDGE
 
+HELD = ["claim", "layout", "yes", "of", "holds", "weaker"]
+
 
 def test_a_row_has_count_interval_outcome_and_what_was_expected():
-    rows = [("ES improves", f"J{i:03}", 1, 2, i < 38) for i in range(40)]
-    table = share_table(
-        shares(pd.DataFrame(rows, columns=["claim", "layout", "yes", "of", "holds"]))
-    )
+    rows = [("ES improves", f"J{i:03}", 1, 2, i < 38, i < 38) for i in range(40)]
+    rows += [("C7", f"J{i:03}", 0, 2, False, i < 39) for i in range(40)]
+    table = share_table(shares(pd.DataFrame(rows, columns=HELD)))
+    assert "0 of 40<br>0% [0%, 9%]<br>weaker question: 39 of 40" in table
+    assert '<span class="verdict-partly">partly reproduced</span>' in table
     assert '<th scope="row"' in table
     assert "ES improves" in table
     assert "38 of 40<br>95% [83%, 99%]" in table
@@ -26,9 +29,7 @@ def test_a_row_has_count_interval_outcome_and_what_was_expected():
 
 
 def test_a_formula_of_a_claim_is_typeset_in_its_row():
-    rows = pd.DataFrame(
-        [("C9", "J000", 1, 2, True)], columns=["claim", "layout", "yes", "of", "holds"]
-    )
+    rows = pd.DataFrame([("C9", "J000", 1, 2, True, True)], columns=HELD)
     table = share_table(shares(rows))
     assert r'beat <span class="math">\(\theta_\mathrm{init}\)</span>' in table
     assert "$" not in table

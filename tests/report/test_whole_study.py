@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from nmpcrl.claims.halves import WHOLE, halves
+from nmpcrl.claims.halves import halves
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.thresholds import divergence, instability
 from nmpcrl.report.whole_study import EVERY, main_table, went_wrong
@@ -40,9 +40,7 @@ def test_the_counts_are_those_of_the_verdict(runs, claim, wrong):
     counted = halves(asked.learners, asked.measure(runs, {}), {"": asked.threshold})
     assert counted
     for one in counted:
-        (layout,) = one.layouts
-        column = EVERY if layout == WHOLE else layout
-        assert tuple(found[column][one.decay][[*asked.learners]]) == one.counts
+        assert tuple(found[EVERY][one.decay][[*asked.learners]]) == one.counts
 
 
 def test_a_run_that_went_wrong_is_counted_where_it_was_made(runs):

@@ -42,6 +42,7 @@ NEAR = 0.05  # of theta_c from d_o
 NARROW = 1.0  # a gap that is drawn leaves less than this [m]
 SEEN = (-0.1, 0.6)  # of theta_c; what goes beyond ends at the edge
 FEW = 100  # high over low of borders for which powers of ten are too few
+DASHED = LIMIT | {"linestyle": (0, (7, 3))}  # told from dotted lines without colour
 
 
 @page
@@ -85,7 +86,7 @@ def theta_c(found: Evidence) -> Figure:
         for axes, name in zip(row, names, strict=True):
             runs = found.summaries.select(layout=name, decay=decay)
             ends += _ways_of_theta_c(axes, runs)
-            axes.axhline(margin, **LIMIT)
+            axes.axhline(margin, **DASHED)
             for run in list(runs.select(learner="frozen").values())[:1]:
                 shut = closes_at(paper.task(name), run.states[:, :2])
                 axes.axhline(shut, color=CLOSED, linewidth=0.9, linestyle=":")
@@ -95,7 +96,7 @@ def theta_c(found: Evidence) -> Figure:
     for axes in grid[-1]:
         over_episodes(axes)
     handles = [Line2D([], [], label=name, **LOOKS[name].line) for name in LEARNING]
-    handles.append(Line2D([], [], label="$d_o$", **LIMIT))
+    handles.append(Line2D([], [], label="$d_o$", **DASHED))
     handles.append(Line2D([], [], label="a gap closes", color=CLOSED, linestyle=":"))
     below(figure, handles)
     beyond = np.array(ends) - margin

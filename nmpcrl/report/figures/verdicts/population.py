@@ -13,6 +13,7 @@ from matplotlib.ticker import PercentFormatter
 
 from nmpcrl.analysis.difficulty import MEASURES, OPEN, PILOT
 from nmpcrl.claims.population_questions import EXPECTED
+from nmpcrl.claims.thresholds import improves
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.report.drawn import label
 from nmpcrl.report.figures.axes import below, plain
@@ -117,7 +118,7 @@ def predictors(scores: pd.DataFrame, runs: pd.DataFrame, closes: pd.Series) -> F
 
 def _ends(axes: Axes, runs: pd.DataFrame, closes: pd.Series) -> None:
     """The last theta_c of each run over that at which a gap closes."""
-    better = runs.final_cost < runs.initial_cost
+    better = improves(runs)
     for well, colour, mark, size, name in ENDS:
         there = better == well
         values = runs.theta_8[there].clip(lower=SHOWN)

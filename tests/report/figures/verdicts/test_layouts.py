@@ -13,7 +13,7 @@ from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.robustness import clearest_changes, robustness_map
+from nmpcrl.claims.robustness import robustness_map
 from nmpcrl.report.figures import sheet
 from nmpcrl.report.figures.verdicts import layouts as figures
 from nmpcrl.report.figures.verdicts import robustness as maps
@@ -114,6 +114,7 @@ def test_the_map_has_a_frame_and_an_arrow_for_every_change(changing):
     arrows = [text for text in written(figure) if "→" in text]
     assert len(arrows) == changes
     assert "yes → no" in arrows
+    assert "yes → no" in written(figure.again(sheet.NARROW))
     assert title(figure).startswith(f"{changes} of ")
 
 
@@ -142,44 +143,6 @@ def test_the_title_of_the_map_names_the_claims_that_never_change(changing):
     never = title(maps.verdict_map(rows, found.mark)).partition("those on ")[2]
     assert not any(claim in never for claim in changed_claims)
     assert "C7" in never
-
-
-def test_the_clearest_changes_are_drawn_a_row_a_cell_with_every_run_in_it(changing):
-    found, rows = changing
-    cells = clearest_changes(rows)
-    figure = maps.clearest_changes(cells, found)
-    assert len(figure.axes) == 2 * len(cells)
-    assert cells.claim.iloc[0] in title(figure)
-    assert maps.named(cells.variant.iloc[0]) in title(figure)
-    for axes, claim, variant in zip(figure.axes[::2], cells.claim, cells.variant, strict=True):
-        drawn = sum(
-            line.get_marker() not in ("None", "") and len(line.get_xdata())
-            for line in axes.get_lines()
-        )
-        groups = maps.groups(found.runs, variant)
-        values = [BY_RUNS[claim].measure(runs, paths(found)) for runs in groups]
-        assert drawn == sum(int(one.notna().sum().sum()) for one in values)
-    for axes in figure.axes[1::2]:
-        shares = np.concatenate([line.get_ydata() for line in axes.get_lines()])
-        assert ((shares >= 0) & (shares <= 1)).all()
-
-
-def test_what_is_infinite_is_drawn_at_the_edge(changing):
-    found, rows = changing
-    changed = found.runs.assign(
-        stopped=found.runs.stopped.where(found.runs.variant != VARIANT, "diverged")
-    )
-    figure = maps.clearest_changes(
-        clearest_changes(rows).head(1), Evidence(found.summaries, changed)
-    )
-    for line in figure.axes[0].get_lines():
-        assert np.isfinite(line.get_ydata()).all()
-
-
-def test_where_nothing_changes_the_figure_says_so():
-    found = study()
-    cells = clearest_changes(robustness_map(found.runs, paths(found)))
-    assert title(maps.clearest_changes(cells, found)) == "No verdict changes in what was run here"
 
 
 def test_a_study_that_is_too_short_has_a_map_on_which_all_is_open():

@@ -17,11 +17,11 @@ from nmpcrl.report.figures.verdicts import population as figures
 def where(**holding):
     """Of each claim, in how many of forty layouts it holds."""
     rows = [
-        (name.replace("_", " "), f"J{i:03}", int(i < count), 1, i < count)
+        (name.replace("_", " "), f"J{i:03}", int(i < count), 1, i < count, i < count)
         for name, count in holding.items()
         for i in range(40)
     ]
-    return pd.DataFrame(rows, columns=["claim", "layout", "yes", "of", "holds"])
+    return pd.DataFrame(rows, columns=["claim", "layout", "yes", "of", "holds", "weaker"])
 
 
 def test_the_title_counts_the_verdicts_that_stand_and_others_have_none():
@@ -57,9 +57,8 @@ def test_the_title_says_how_well_the_gap_tells(pilot, place):
     areas = {name: Estimate(0.6, 0.5, 0.7) for name in MEASURES}
     areas[PILOT] = Estimate(pilot, 0.5, 1.0)
     scores = pd.DataFrame({"auc": areas})
-    runs = pd.DataFrame(
-        {"final_cost": [9.0, 9.0, 11.0], "initial_cost": 10.0, "theta_8": [0.2, -1.0, 3.0]}
-    )
+    costs = {"final_cost": [9.0, 9.0, 11.0], "initial_cost": 10.0, "stopped": "finished"}
+    runs = pd.DataFrame(costs | {"theta_8": [0.2, -1.0, 3.0]})
     figure = figures.predictors(scores, runs, pd.Series([0.7, 1.0, 0.1]))
     said = f"Where a gap closes tells {place} where ES works: {pilot:.2f}"
     assert figure.get_suptitle() == said
