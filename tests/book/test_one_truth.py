@@ -107,7 +107,7 @@ def badly_counted(text: str, known: dict[str, Verdict]) -> list[str]:
     if len(names) != 1:
         return []
     verdict = known[names.pop()]
-    said = " ".join((verdict.evidence, halves.apart(verdict), *halves.clear(verdict)))
+    said = f"{verdict.evidence} {halves.apart(verdict)}"
     every = {str(of) for _, of in verdict.counts.values()}
     counts = [found[0] for found in COUNT.finditer(text) if found[1] in every]
     return [f"{verdict.claim} {count}" for count in counts if count not in said]

@@ -123,11 +123,9 @@ def _sentences(given: Source) -> dict[str, str]:
     parts = {
         "answer": text.answer(given.claims),
         "finding": said.sentences(seen),
-        "use": said.use(seen),
         "legend": text.legend(given.claims, found.main),
         "fixed": text.fixed(prespecified.fixed(found.about)),
         "effort": text.compute_effort(found),
-        "differences": halves.differences(given.claims),
         "layouts": text.by_layout_and_decay(given.claims),
         "variants": text.verdicts_changed(given.changed),
         "slow": timing.at_paper_speed(found.timings),
@@ -144,7 +142,9 @@ def _tables(given: Source) -> dict[str, Any]:
     asked = markup.rows(tables.claim_table(CLAIMS.values(), ""))
     return {
         "numbers": [markup.text(one) for one in numbers],
-        "verdicts": markup.rows(tables.plain_verdict_table(given.claims)),
+        "verdicts": markup.rows(
+            tables.plain_verdict_table(given.claims, tables.asides(given.found))
+        ),
         "thresholds": asked,
         "by_layout": markup.rows(tables.layout_table(given.claims, scope)),
         "evidence": {
@@ -166,7 +166,7 @@ def _tables(given: Source) -> dict[str, Any]:
 
 def _evidence(one: Verdict) -> list[str]:
     """Claim, verdict, evidence, and where another verdict is to be expected."""
-    evidence = markup.text(f"{one.evidence} {halves.apart(one)}".strip())
+    evidence = markup.text(f"{one.evidence} {halves.own(one) or one.each}".strip())
     return [one.claim, one.words, evidence, markup.text(one.would_change)]
 
 
