@@ -314,6 +314,7 @@ OBJECTS = {"1.2", "2.2", "2.5", "8.3"}  # exercises whose checks take what a cha
 
 
 @pytest.mark.slow
+@pytest.mark.weekly
 @pytest.mark.parametrize("name", course.chapters())
 def test_every_solution_is_right_although_nothing_but_plain_values_pass(name, tmp_path):
     source = course.chapters()[name]
