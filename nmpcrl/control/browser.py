@@ -30,7 +30,10 @@ RANDOM_INPUTS = np.array({inputs})
 
 @njit(error_model="numpy", forceinline=True)
 '''
-BEGIN = f'''"""What `Riccati` does where nothing is known: the best plan of several cold starts."""
+BEGIN = f'''"""What `Riccati` does where nothing is known: the best plan of its cold starts.
+
+But for the one that a `Regulator` holds by feedback.
+"""
 
 import numpy as np
 from numba import carray, float64, int32, njit

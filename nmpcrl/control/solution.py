@@ -37,6 +37,7 @@ class Status(StrEnum):
 
     SOLVED = "solved"
     RESTARTED = "restarted"  # not from the start that was asked for
+    TAKEN_OVER = "taken over"  # by `Solution.solver`, where the one asked for found no optimum
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +76,13 @@ class Solution:
     restarts: int = 0  # how often the solver had to begin again
     violation: float = 0.0  # how far the plan leaves the box, in the unit of the state
     data: Matrix | None = None  # d_0, ..., d_N of a `Problem`, shape (N + 1, size)
+    took_over: bool = False  # whether another solver found it than the one that was asked
 
     @property
     def status(self) -> Status:
-        """Whether the requested start succeeded."""
+        """Whether the requested solver and start succeeded."""
+        if self.took_over:
+            return Status.TAKEN_OVER
         return Status.RESTARTED if self.restarts else Status.SOLVED
 
     @property

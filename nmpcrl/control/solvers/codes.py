@@ -19,3 +19,4 @@ class End(IntEnum):
     STALLED = 1  # no step descends
     LIMIT = 2  # too many iterations
     BROKEN = 3  # numbers that are not finite
+    SADDLE = 4  # a stationary plan from which one curves down to less: a maximum, or a saddle

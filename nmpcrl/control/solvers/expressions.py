@@ -25,6 +25,11 @@ def terminal_cost(x: Any, theta: Any, d: Any) -> float:
     raise NotImplementedError
 
 
+def steepest(x: Any, u: Any, theta: Any, d: Any) -> float:
+    """The largest slope of l in x and u, or of V_f in x."""
+    raise NotImplementedError
+
+
 def initial_cost(x: Any, theta: Any, d: Any) -> float:
     """V0."""
     raise NotImplementedError

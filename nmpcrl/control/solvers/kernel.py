@@ -48,7 +48,7 @@ from .model import (
 
 # numba takes plain numbers; a tuple below has one entry a start.
 COLD, SHIFTED, NEAR, SAME = map(int, Start)
-SOLVED, STALLED, LIMIT, BROKEN = map(int, End)
+SOLVED, STALLED, LIMIT, BROKEN, SADDLE = map(int, End)
 START_MU = (10.0, 1e-3, 1e-3, 1e-9)  # the barrier parameter
 PUSH = (1e-2, 1e-3, 1e-3, 1e-9)  # inside its bounds an input starts, in parts of their distance
 

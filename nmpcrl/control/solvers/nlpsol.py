@@ -3,8 +3,7 @@
 A `Problem` is solved in units in which no slack costs more than `HIGHEST_PRICE` and no curvature
 of the cost is below 1, for tolerances are absolute. Its cold starts lie a little off rest, where
 symmetry may make a maximum stationary. A solve that fails begins again, at last with Ipopt, and one
-that ends at no strict minimum is compared with solves from elsewhere: see `Solution.restarts` and
-`Solution.solver`.
+that ends at no strict minimum is compared with solves from elsewhere: see `Solution.status`.
 """
 
 import time
@@ -189,6 +188,7 @@ class Program:
             solver=best.solver,
             restarts=restarts,
             data=data,
+            took_over=best.solver != self._solver.name,
         )
 
     def _starts(

@@ -58,6 +58,9 @@ def functions(problem: Problem) -> list[ca.Function]:
 
     path = discount * e.stage + ca.dot(costate, e.next_x) + ca.dot(lam, e.rows)
     last = discount * e.terminal + ca.dot(lam, at_end)
+    slope = ca.norm_inf(ca.vertcat(
+        ca.gradient(e.stage, ca.vertcat(x, u)), ca.gradient(e.terminal, x)
+    ))  # fmt: skip
     hessian, _ = ca.hessian(path, ca.vertcat(x, u))
     n = x.numel()
 
@@ -106,6 +109,7 @@ def functions(problem: Problem) -> list[ca.Function]:
     return [
         _function("transition", point, {"next_x": e.next_x}),
         _function("stage_cost", point, {"cost": e.stage}),
+        _function("steepest", point, {"cost": slope}),
         _function("terminal_cost", end, {"cost": e.terminal}),
         _function("initial_cost", end, {"cost": e.initial}),
         _function("path_rows", point, {"h": e.rows}),

@@ -3,8 +3,10 @@
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib.resources import files
+from itertools import chain
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -16,18 +18,19 @@ from nmpcrl.control.ocp import Ocp, ProblemOcp, TaskOcp
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.remembered import remembered
-from nmpcrl.control.solution import NoStartLeft, Solution, check_shape
+from nmpcrl.control.solution import NoStartLeft, Solution, SolverError, check_shape
 from nmpcrl.control.solvers import problem_stages
 from nmpcrl.control.solvers.codes import End, Start
+from nmpcrl.control.solvers.nlpsol import Fatrop, Program
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
 from nmpcrl.control.solvers.stages import write
-from nmpcrl.control.solvers.starts import MOST, cold_inputs, random_inputs
+from nmpcrl.control.solvers.starts import MOST, Regulator, cold_inputs, random_inputs
 from nmpcrl.control.vectors import whole
 
 WARM_LIMIT = 40  # iterations from a warm start
 COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
-SEVERAL = 9  # cold starts of a `Problem` with rows
+SEVERAL, FEW = 9, 2  # cold starts of a `Problem` with rows, and without
 CLEARLY = 1e-6  # a plan is better if its value is less by this share
 LEAVES = 1e-9  # and it leaves the box by no more than this
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
@@ -39,6 +42,7 @@ ENDS = {
     End.STALLED: "found no descent",
     End.LIMIT: "ran out of iterations",
     End.BROKEN: "met numbers that are not finite",
+    End.SADDLE: "stopped at a plan that is no minimum",
 }
 TEXTS = {  # compiled beside `model`; read with the other modules, so that an edit mixes nothing
     name: files(__package__).joinpath(f"{name}.py").read_text("utf-8")
@@ -157,12 +161,13 @@ class Riccati(Solver):
         return jit.numba_version() is not None
 
     def starts_of(self, ocp: Ocp) -> int:
-        """How many cold starts are compared: 1 for a task, as published, 9 for a `Problem`.
+        """How many cold starts are compared: 1 for a task, as published, 9 or 2 for a `Problem`.
 
-        Where a problem has no rows, and for a solve with a warm start, it is 1 as well.
+        9 if it has rows. A `Problem` for which none are said has one more, that of a `Regulator`.
         """
-        several = isinstance(ocp, ProblemOcp) and ocp.problem.weights.size > 0
-        return self.starts or (SEVERAL if several else 1)
+        if self.starts is not None or not isinstance(ocp, ProblemOcp):
+            return self.starts or 1
+        return SEVERAL if ocp.problem.weights.size else FEW
 
     def prepare(self, ocp: Ocp) -> "Compiled":
         """Load the machine code, or compile it.
@@ -209,13 +214,15 @@ class Compiled(ABC):
         given = action[0] if action else self._no_action
         problem = self.problem if data is None else (data, *self.problem[1:])
         code, fixed, tolerance, split = self._code, self._fixed, self._tolerance, self._split
-        for restarts, (start, point, limit) in enumerate(self._starts(state, warm_start)):
+        for restarts, (start, point, limit) in enumerate(
+            self._starts(warm_start, problem, state, theta, given)
+        ):
             out = np.empty(self._size)
             value, iterations, end, violation, error = code(
                 *problem, state, theta, given, fixed, start, limit, tolerance, point, out
             )
             if end == SOLVED and value < ABSURD:
-                if warm_start is None and self._others:
+                if start == COLD:
                     first = Found(value, iterations, violation, out)
                     value, iterations, violation, out = self._best(
                         first, problem, state, theta, given
@@ -245,7 +252,7 @@ class Compiled(ABC):
     def _best(self, first: Found, problem: tuple[Any, ...], *given: Vector) -> Found:
         """The best plan of all cold starts; the earlier one where they are as good."""
         best = first
-        for inputs in self._others:
+        for inputs in chain(self._others, self._regulated(problem, *given)):
             out, point = np.empty(self._size), self._standing.copy()
             point[self._ocp.inputs] = inputs
             value, iterations, end, violation, _ = self._code(
@@ -255,6 +262,10 @@ class Compiled(ABC):
             if end == SOLVED and less and violation <= best.violation + LEAVES:
                 best = Found(value, iterations, violation, out)
         return best
+
+    def _regulated(self, problem: tuple[Any, ...], *given: Vector) -> list[Matrix]:
+        """The inputs of a start that is held by feedback, if there is one."""
+        return []
 
     def _given(self, solution: Solution) -> tuple[Any, ...]:
         """The arguments of a derivative at a solution."""
@@ -270,19 +281,24 @@ class Compiled(ABC):
     def plan_gradient(self, solution: Solution, states: Matrix, inputs: Matrix) -> Vector | None:
         """The gradient in theta of a weighted sum of the plan; None at no strict minimum."""
 
-    def _starts(self, state: Vector, warm_start: Solution | None) -> Iterator[Attempt]:
-        """The warm start, standing still, and random inputs."""
+    def _starts(
+        self, warm_start: Solution | None, problem: tuple[Any, ...], *given: Vector
+    ) -> Iterator[Attempt]:
+        """The warm start, standing still, held by feedback, and random inputs."""
         if warm_start is not None:
             point = self._from(warm_start)
-            if warm_start.state.tolist() == state.tolist():  # a tenth of the time of np.array_equal
+            if (
+                warm_start.state.tolist() == given[0].tolist()
+            ):  # a tenth of the time of np.array_equal
                 yield SAME, point, WARM_LIMIT
                 yield NEAR, point, WARM_LIMIT
             else:
                 yield SHIFTED, point, WARM_LIMIT
         yield COLD, self._standing, COLD_LIMIT
-        for seed in range(PERTURBED):
+        drawn = (random_inputs(self._of, k, len(self._ocp.inputs)) for k in range(PERTURBED))
+        for inputs in chain(self._regulated(problem, *given), drawn):
             point = self._standing.copy()
-            point[self._ocp.inputs] = random_inputs(self._of, seed, len(self._ocp.inputs))
+            point[self._ocp.inputs] = inputs
             yield COLD, point, COLD_LIMIT
 
     def _from(self, warm_start: Solution) -> Vector:
@@ -351,6 +367,40 @@ class ProblemPoint(Compiled):
             problem.cost_scale,
             ocp.tie,
         )
+        self._solver = solver
+
+    def solve(
+        self,
+        state: Vector,
+        theta: Vector,
+        warm_start: Solution | None,
+        *action: Vector,
+        **others: Any,
+    ) -> Solution:
+        """As `Compiled` says; by fatrop where riccati finds no optimum."""
+        try:
+            return super().solve(state, theta, warm_start, *action, **others)
+        except SolverError as error:
+            try:
+                found = self._fatrop.solve(state, theta, None, *action, **others)
+            except SolverError:
+                raise error from None
+            return replace(found, took_over=True)
+
+    @cached_property
+    def _fatrop(self) -> Program:
+        return Program(self._ocp, Fatrop(self._tolerance))
+
+    @cached_property
+    def _regulator(self) -> Regulator:
+        return Regulator(self._problem)
+
+    def _regulated(self, problem: tuple[Any, ...], *given: Vector) -> list[Matrix]:
+        """As `Compiled` says."""
+        state, theta, action = given
+        fixed = (action,) if self._fixed else ()
+        inputs = self._regulator.inputs(state, theta, problem[0], *fixed)
+        return [] if self._solver.starts is not None or inputs is None else [inputs]
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """As `Compiled` says."""

@@ -24,13 +24,19 @@ from .expressions import (
     row_sizes,
     stage_cost,
     stage_gradient,
+    steepest,
     terminal_cost,
     transition,
 )
 from .kernel import (
+    ARMIJO,
+    BACKTRACKS,
     COLD,
     INSIDE,
+    ROUNDING,
     SHIFTED,
+    SHORTEST,
+    TAU_REST,
     Duals,
     Point,
     Step,
@@ -48,6 +54,10 @@ from .model import NTHETA, NU, NX
 
 PLANNED, SETTLED = 1, 2  # else absent
 ABSURD = 1e9  # no plan goes through such a state
+STEEP = 100.0  # slope of a stage at s beyond which it is scaled down to this, as by Ipopt
+STRAYS = 30.0  # times a first deviation from a plan that a rollout may be off before it is held
+ROUNDED = 1e-6  # deviation that is none
+WITHIN = 1.0 - TAU_REST  # the most of its way to a bound that an input may go along the feedback
 
 
 class Task(NamedTuple):
@@ -86,10 +96,17 @@ class Stages(NamedTuple):
 @inlined
 def evaluate(task, point, mu):
     """Step 1 for point.x[0] and point.u; the objective and the barrier function."""
+    for i in range(len(point.u)):
+        transition(point.x[i], point.u[i], task.theta, task.data[i], point.x[i + 1])
+    return measure(task, point, mu)
+
+
+@inlined
+def measure(task, point, mu):
+    """The objective and the barrier function of a plan that is rolled out."""
     x, u, h, last = point.x, point.u, point.h, len(point.u)
     objective = 0.0
     for i in range(last):
-        transition(x[i], u[i], task.theta, task.data[i], x[i + 1])
         path_rows(x[i], u[i], task.theta, task.data[i], h[i])
         objective += task.rate[i] * stage_cost(x[i], u[i], task.theta, task.data[i])
     last_rows(x[last], task.theta, task.data[last], h[last])
@@ -215,15 +232,68 @@ def descent(task, point, stages, mu, step):
 
 
 @inlined
-def scaled(theta, data, lower, upper, kind, discount, weights, factor, first):
-    """The problem divided by a factor."""
+def follow(task, plan, step, length, point):
+    """Roll out u + length k + K dx from point.x[0]: the feedback holds a model to the plan.
+
+    Source: Tassa, Mansard and Todorov (2014), there with bounds; here inputs stay inside them.
+    """
+    for i in range(len(plan.u)):
+        for a in range(NU):
+            move = 0.0
+            if i >= task.first:
+                move = length * step.k[i, a]
+                for b in range(NX):
+                    move += step.K[i, a, b] * (point.x[i, b] - plan.x[i, b])
+            low, high = plan.u[i, a] - task.lower[a], task.upper[a] - plan.u[i, a]
+            point.u[i, a] = plan.u[i, a] + min(max(move, -WITHIN * low), WITHIN * high)
+        transition(point.x[i], point.u[i], task.theta, task.data[i], point.x[i + 1])
+
+
+@inlined
+def search(task, point, trial, mu, step, length, total, derivative):
+    """Step 7, by rolling out along the feedback and not along the step of the inputs."""
+    while length > SHORTEST:
+        follow(task, point, step, length, trial)
+        objective, reached = measure(task, trial, mu)
+        if reached <= total + ARMIJO * length * derivative + ROUNDING * abs(total):
+            return objective, reached
+        length *= BACKTRACKS
+    return np.nan, np.nan
+
+
+@inlined
+def strays(task, point, plan, start, warm_start):
+    """Whether what is rolled out from a warm start leaves its plan, which is put into `plan`."""
+    last, most = len(point.u), 0.0
+    first = 0.0  # how far off it is in the first two stages
+    for i in range(last + 1):
+        at = offsets(task, min(i + (1 if start == SHIFTED else 0), last))[0]
+        for a in range(NX):
+            plan.x[i, a] = warm_start[at + a]
+            off = abs(point.x[i, a] - plan.x[i, a])
+            first = max(first, off) if i < 2 else first
+            most = off if not off <= most else most
+        if i < last:
+            for a in range(NU):
+                plan.u[i, a] = point.u[i, a]
+    return not most <= STRAYS * first + ROUNDED
+
+
+@inlined
+def scaled(theta, data, lower, upper, kind, discount, weights, factor, first, state):
+    """The problem divided by a factor, and that: more than asked for where costs are steep at s."""
+    still = np.empty(NU)
+    for a in range(NU):
+        still[a] = min(max(0.0, lower[a]), upper[a])
+    slope = steepest(state, still, theta, data[0]) / STEEP
+    factor = slope if factor < slope < np.inf else factor
     rate = np.empty(len(discount))
     scaled_weights = np.empty((len(discount), NROWS))
     for i in range(len(discount)):
         rate[i] = discount[i] / factor
         for j in range(NROWS):
             scaled_weights[i, j] = weights[j] * rate[i]
-    return Task(theta, data, lower, upper, kind, rate, scaled_weights, first)
+    return Task(theta, data, lower, upper, kind, rate, scaled_weights, first), factor
 
 
 @inlined
@@ -355,7 +425,7 @@ def allocate(N):
 
 
 for replaced in (
-    evaluate, linearise, condense, rows_along, descent, slacks_of,
+    evaluate, linearise, condense, rows_along, descent, search, slacks_of,
 ):  # fmt: skip
     setattr(kernel, replaced.__name__, replaced)  # before any of them is compiled
 

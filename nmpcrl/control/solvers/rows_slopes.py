@@ -10,7 +10,8 @@ Where rows and bounds are active that no input can follow all at once, springs o
 share what is left between them: `independent` finds out, and `Sensitivity` takes a side instead.
 
 See `hessian` for the barrier parameter and the source. The dynamics' share of G w, f_theta w, is
-taken up by a `drift` of the states in which no input moves.
+taken up by a `drift` of the states in which inputs move by the feedback alone, lest an unstable
+model carry it away.
 """
 
 import numpy as np
@@ -45,9 +46,9 @@ from .rows import (
     PROBLEM,
     allocate,
     condense,
-    evaluate,
     hold,
     linearise,
+    measure,
     place_of_rows,
     rows_along,
     scaled,
@@ -58,6 +59,7 @@ STIFF = 1e4  # at least, where a row is active
 GOLDEN = 0.6180339887498949
 LEFT = 1e-2  # of the motion that an active row was asked for: more, and it cannot have it
 FARTHEST = 1e7  # an input moves farther only where nothing but the barrier curves
+ROWS = 1e-10  # barrier parameter of the rows: of RIGID they lose digits, where h is exactly 0
 
 
 @inlined
@@ -75,7 +77,7 @@ def restore_rows(task, duals, factor, solved):
 
 @inlined
 def independent(task, point, duals, stages, step):
-    """Whether all active rows can move as they like, and bounds stay; after `condense`.
+    """Whether all active rows can move as they like, and bounds stay; `factorise` after `condense`.
 
     Each active row is asked to move by another amount, and all have to.
     """
@@ -96,10 +98,10 @@ def independent(task, point, duals, stages, step):
                     stages.q[i, a] += pull * stages.hx[i, j, a]
                 for a in range(NU if i < last else 0):
                     stages.r[i, a] += pull * stages.hu[i, j, a]
-    if rows == 0:
-        return True
     if not factorise(stages, 0.0, task.first, step):
         return False
+    if rows == 0:
+        return True
     sweep(task, stages, step)
     rows_along(task, stages, step)
     for i in range(last + 1):
@@ -110,8 +112,8 @@ def independent(task, point, duals, stages, step):
 
 
 @inlined
-def right_hand_side(task, point, duals, stages, w, drift):
-    """G w as q, r and `off`, and as the drift, after `condense`."""
+def right_hand_side(task, point, duals, stages, step, w, drift, steer):
+    """G w as q, r and `off`, and as the drift, after `condense` and `factorise`."""
     last = len(point.u)
     held, h, f = np.empty(NROWS), np.empty(NROWS), np.empty(NX)
     for a in range(NX):
@@ -124,10 +126,16 @@ def right_hand_side(task, point, duals, stages, w, drift):
                 point.x[i], point.u[i], task.theta, data, rate, stages.p[i + 1], held, w,
                 q, stages.r[i], f, h,
             )  # fmt: skip
+            for a in range(NU):
+                steer[i, a] = 0.0
+                for b in range(NX if i >= task.first else 0):
+                    steer[i, a] += step.K[i, a, b] * drift[i, b]
             for a in range(NX):
                 drift[i + 1, a] = f[a]
                 for b in range(NX):
                     drift[i + 1, a] += stages.A[i, a, b] * drift[i, b]
+                for b in range(NU):
+                    drift[i + 1, a] += stages.B[i, a, b] * steer[i, b]
         else:
             last_mixed(point.x[i], task.theta, data, rate, held, w, q, h)
         for j in range(NROWS):
@@ -145,6 +153,11 @@ def right_hand_side(task, point, duals, stages, w, drift):
             if i < last:
                 for a in range(NU):
                     stages.r[i, a] += stages.S[i, a, b] * drift[i, b]
+        for b in range(NU if i < last else 0):
+            for a in range(NX):
+                q[a] += stages.S[i, b, a] * steer[i, b]
+            for a in range(NU):
+                stages.r[i, a] += stages.R[i, a, b] * steer[i, b]
 
 
 @inlined
@@ -200,25 +213,28 @@ def slopes(
     `of_states` (N + 1, NX) and `of_inputs` (N, NU) are the sum's weights. Returns whether it could
     be formed: not where the solution is no strict minimum, or inputs cannot follow what is active.
     """
-    task = scaled(theta, data, lower, upper, kind, discount, weights, factor, fixed)
+    task, factor = scaled(theta, data, lower, upper, kind, discount, weights, factor, fixed, state)
     N, mu = len(discount) - 1, RIGID
     point, _, duals, stages, step = allocate(N)
-    drift, dp = np.empty((N + 1, NX)), np.empty((N + 1, NX))
+    drift, dp, steer = np.empty((N + 1, NX)), np.empty((N + 1, NX)), np.empty((N, NU))
     initialise(task, point, duals, state, action, SAME, mu, factor, solved)
-    evaluate(task, point, mu)
+    for i in range(N + 1):  # the plan itself: rolled out, an unstable model would leave it
+        at = offsets(task, i)[0]
+        for a in range(NX):
+            point.x[i, a] = solved[at + a]
+    measure(task, point, ROWS)
     restore_rows(task, duals, factor, solved)
     linearise(task, point, duals, stages)
     condense(task, point, duals, stages, mu)
     if not independent(task, point, duals, stages, step):
         return False
-    right_hand_side(task, point, duals, stages, w, drift)
+    right_hand_side(task, point, duals, stages, step, w, drift, steer)
     for i in range(N + 1):
         for a in range(NX):
             stages.q[i, a] += of_states[i, a] / factor
         for a in range(NU if i < N else 0):
             stages.r[i, a] += of_inputs[i, a] / factor
-    if not factorise(stages, 0.0, task.first, step):
-        return False
+    factorise(stages, 0.0, task.first, step)
     sweep(task, stages, step)
     for i in range(task.first, N):
         for a in range(NU):
@@ -228,6 +244,8 @@ def slopes(
     for i in range(N + 1):
         for a in range(NX):
             step.x[i, a] += drift[i, a]
+        for a in range(NU if i < N else 0):
+            step.u[i, a] += steer[i, a]
     rows_along(task, stages, step)
     scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
     gradient_along(task, point, duals, stages, step, dp, factor, tie, w, out)

@@ -3,17 +3,35 @@
 import numpy as np
 from numba import float64, int64, njit, types
 
-from .kernel import START_MU, initialise, iterate, options, vector
+from .kernel import (
+    COLD,
+    RIGID,
+    SADDLE,
+    SOLVED,
+    START_MU,
+    factorise,
+    initialise,
+    iterate,
+    options,
+    vector,
+)
 from .model import NX
 from .rows import (
     ABSURD,
     PROBLEM,
     allocate,
+    condense,
     evaluate,
+    follow,
     initialise_rows,
+    linearise,
+    measure,
     scaled,
+    strays,
     write_solution,
 )
+
+FLAT = 1e-6  # curvature of the scaled problem that counts as none
 
 SIGNATURE = types.UniTuple(float64, 5)(
     *PROBLEM,
@@ -32,7 +50,7 @@ def solve(
     Returns value, iterations, the end, 0, and the relative error. A plan with a state beyond
     `ABSURD` is none: its value is infinite.
     """
-    task = scaled(theta, data, lower, upper, kind, discount, weights, factor, fixed)
+    task, factor = scaled(theta, data, lower, upper, kind, discount, weights, factor, fixed, state)
     point, trial, duals, stages, step = allocate(len(discount) - 1)
     mu = START_MU[start]
     initialise(task, point, duals, state, action, start, mu, factor, warm_start)
@@ -40,9 +58,23 @@ def solve(
         trial.x[0, a] = state[a]
     objective, total = evaluate(task, point, mu)
     initialise_rows(task, point, duals, start, mu, factor, warm_start)
+    if start != COLD and strays(task, point, trial, start, warm_start):
+        measure(task, trial, mu)
+        linearise(task, trial, duals, stages)
+        condense(task, trial, duals, stages, mu)
+        if factorise(stages, 0.0, task.first, step):
+            follow(task, trial, step, 0.0, point)
+            objective, total = measure(task, point, mu)
+            initialise_rows(task, point, duals, start, mu, factor, warm_start)
+        for a in range(NX):
+            trial.x[0, a] = state[a]
     point, objective, iterations, ended, error = iterate(
         task, point, trial, duals, stages, step, mu, objective, total, limit, tolerance
     )
+    if ended == SOLVED and start == COLD:  # a plan that is no minimum is not left by chance
+        condense(task, point, duals, stages, RIGID)
+        if not factorise(stages, FLAT, task.first, step):
+            ended = SADDLE
     value, largest = write_solution(task, point, duals, stages, objective, factor, tie, out)
     if not largest <= ABSURD:
         value = np.inf

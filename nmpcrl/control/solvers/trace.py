@@ -81,7 +81,7 @@ def trace(
     of = ocp.plant if isinstance(ocp, TaskOcp) else ocp.problem
     plain = interpreted(of)
     rows: list[dict[str, float]] = []
-    factor = [of.cost_scale if isinstance(of, Problem) else 1.0]
+    factor: list[float] = []
 
     def judged(norms: Any, task: Any, point: Any, _duals: Any, _stages: Any, mu: float) -> None:
         stationarity, complementarity, largest = norms
@@ -94,8 +94,7 @@ def trace(
     def factorised(_done: bool, _stages: Any, delta: float, *_: Any) -> None:
         rows[-1]["delta"] = delta
 
-    if isinstance(ocp, TaskOcp):
-        _watch(plain, "scaled", lambda result, *_: factor.append(result[1]))
+    _watch(plain, "scaled", lambda result, *_: factor.append(result[1]))
     _watch(plain, "residuals", judged)
     _watch(plain, "factorise", factorised)
     if not curvature:

@@ -64,6 +64,6 @@ def test_where_fatrop_finds_no_plan_ipopt_takes_over_and_is_named():
     for state in np.linspace(-2.0, 2.0, 21):
         one, other = (nmpc.solve(np.array([state]), problem.theta) for nmpc in (fatrop, ipopt))
         assert one.value == pytest.approx(other.value, rel=1e-6)
-        assert one.status == (Status.SOLVED if one.solver == "fatrop" else Status.RESTARTED)
+        assert one.status == (Status.SOLVED if one.solver == "fatrop" else Status.TAKEN_OVER)
         taken_over += one.solver == "ipopt"
     assert 0 < taken_over < 21

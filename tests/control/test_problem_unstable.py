@@ -1,0 +1,136 @@
+"""`Problem` where a cold guess misleads: unstable models, maxima, and costs that are steep."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from nmpcrl.control import Nmpc, Problem, Riccati, SolverError, Status, rk4
+from nmpcrl.control.solvers.codes import End
+
+PERIOD = 0.1  # s
+
+
+def swing(x, u, gravity):
+    """A pendulum that stands where its angle is 0."""
+    return ca.vertcat(x[1], gravity * ca.sin(x[0]) + u[0])
+
+
+def pendulum(horizon: int) -> Problem:
+    return Problem(
+        states=2,
+        inputs=1,
+        horizon=horizon,
+        theta={"gravity": 9.81},
+        model=lambda x, u, th: rk4(lambda x, u: swing(x, u, th["gravity"]), x, u, PERIOD),
+        stage=lambda x, u, th: x[0] ** 2 + 0.1 * x[1] ** 2 + 0.01 * u[0] ** 2,
+        terminal=lambda x, th: 50 * x[0] ** 2 + 5 * x[1] ** 2,
+        lower=-5.0,
+        upper=5.0,
+    )
+
+
+def scalar(horizon: int = 3, model=None, stage=None, bound=np.inf, size=1.0) -> Problem:
+    return Problem(
+        states=1,
+        inputs=1,
+        horizon=horizon,
+        theta={"a": 1.5, "size": size},
+        model=model or (lambda x, u, th: th["a"] * x + u),
+        stage=stage or (lambda x, u, th: x**2 + u**2),
+        lower=-bound,
+        upper=bound,
+    )
+
+
+@pytest.fixture
+def plant():
+    """The pendulum, more exact than it is planned with, and pushed."""
+    x, u, rng = ca.SX.sym("x", 2), ca.SX.sym("u"), np.random.default_rng(1)
+    step = ca.Function("step", [x, u], [rk4(lambda x, u: swing(x, u, 9.81), x, u, PERIOD, 4)])
+    return lambda x, u: step(x, u).full().ravel() + 0.1 * rng.normal(size=2)
+
+
+@pytest.mark.parametrize("horizon", [20, 60, 100])
+@pytest.mark.parametrize("state", [(0.05, 0.0), (0.2, 0.0), (-0.4, 0.5)])
+def test_a_pendulum_that_stands_is_planned_to_stand(horizon, state):
+    problem = pendulum(horizon)
+    found, fatrop = (Nmpc(problem, solver=name).solve(state, problem.theta)
+                     for name in ("riccati", "fatrop"))  # fmt: skip
+    assert found.value == pytest.approx(fatrop.value, rel=1e-6)
+    np.testing.assert_allclose(found.features, fatrop.features, rtol=1e-5)
+
+
+@pytest.mark.parametrize("horizon", [20, 60])
+def test_a_pendulum_that_is_pushed_is_held_by_warm_solves_as_by_cold_ones(plant, horizon):
+    nmpc, warm, state = Nmpc(pendulum(horizon)), None, np.array([0.3, 0.0])
+    for _ in range(40):
+        warm = nmpc.solve(state, nmpc.problem.theta, warm)
+        cold = nmpc.solve(state, nmpc.problem.theta)
+        assert warm.value <= cold.value * (1 + 1e-6)
+        state = plant(state, warm.action)
+    assert abs(state[0]) < 0.5
+
+
+@pytest.mark.parametrize("horizon", [20, 60, 100])
+def test_derivatives_of_a_standing_pendulum_are_those_of_dense_algebra(horizon):
+    problem = pendulum(horizon)
+    ours, dense = (Nmpc(problem, solver=name) for name in ("riccati", "fatrop"))
+    found, other = (nmpc.solve([0.1, 0.0], problem.theta) for nmpc in (ours, dense))
+    along = np.ones(1)
+    np.testing.assert_allclose(
+        ours.value_hessian_times(found, along), dense.value_hessian(other) @ along, rtol=1e-4
+    )
+    np.testing.assert_allclose(ours.policy_jacobian(found), dense.policy_jacobian(other), rtol=1e-4)
+
+
+@pytest.mark.usefixtures("interpreted")
+@pytest.mark.parametrize("horizon", [25, 50])
+@pytest.mark.parametrize("fixed", [False, True])
+def test_an_unstable_linear_plant_costs_what_riccatis_recursion_says(horizon, fixed):
+    P = 0.0
+    for _ in range(horizon - fixed):
+        P = 1 + 1.5**2 * P / (1 + P)
+    value = 1 + (1 + P * (1.5 - 1) ** 2) if fixed else P
+    problem = scalar(horizon)
+    solution = Nmpc(problem).solve([1.0], problem.theta, action=[-1.0] if fixed else None)
+    assert solution.value == pytest.approx(value, rel=1e-8)
+
+
+@pytest.mark.usefixtures("interpreted")
+@pytest.mark.parametrize("act", [ca.fabs, lambda u: u**2])
+def test_a_plan_does_not_stay_at_a_maximum(act):
+    """A store that leaks is charged by an even function of the input, so that 0 is stationary."""
+    problem = scalar(
+        model=lambda x, u, th: 0.5 * x + act(u), stage=lambda x, u, th: (x - 2) ** 2, bound=3.0
+    )
+    assert Nmpc(problem).solve([0.0], problem.theta).value == pytest.approx(4.0, abs=1e-6)
+
+
+@pytest.mark.usefixtures("interpreted")
+@pytest.mark.parametrize("size", [1.0, 1e4, 1e8])
+def test_a_cost_that_is_flat_at_rest_and_steep_elsewhere_is_scaled(size):
+    problem = scalar(12, stage=lambda x, u, th: th["size"] * (x**4 + u**4), bound=1.0, size=size)
+    nmpc, unit = Nmpc(problem), scalar(12, stage=lambda x, u, th: x**4 + u**4, bound=1.0)
+    for state in (-1.5, 0.3, 1.9):
+        value = Nmpc(unit).solve([state], unit.theta).value
+        assert nmpc.solve([state], problem.theta).value == pytest.approx(size * value, rel=1e-6)
+
+
+@pytest.mark.usefixtures("interpreted")
+def test_fatrop_takes_over_where_riccati_finds_no_optimum(monkeypatch):
+    problem = scalar(5)
+    nmpc = Nmpc(problem)
+    code, best = nmpc._free._solver, nmpc.solve([1.0], problem.theta)
+    monkeypatch.setattr(code, "_code", lambda *_: (0.0, 1.0, float(End.STALLED), 0.0, 1.0))
+    found = nmpc.solve([1.0], problem.theta, best)
+    assert (found.status, found.solver) == (Status.TAKEN_OVER, "fatrop")
+    assert found.value == pytest.approx(best.value, rel=1e-6)
+
+
+@pytest.mark.usefixtures("interpreted")
+def test_what_no_solver_solves_is_an_error_of_the_one_that_was_asked():
+    problem = scalar(3, stage=lambda x, u, th: -(u**2) - x**2)
+    with pytest.raises(SolverError, match="riccati"):
+        Nmpc(problem, solver=replace(Riccati(), starts=1)).solve([1.0], problem.theta)
