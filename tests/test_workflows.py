@@ -74,6 +74,12 @@ def test_a_job_that_tests_has_the_whole_history_and_one_that_needs_a_browser_say
             assert job["env"]["NMPCRL_REQUIRE_BROWSER"]
 
 
+def test_each_push_builds_checks_and_tests_and_names_only_targets():
+    lines = re.findall(r"^make ([^#\n]+)", (ROOT / ".ci/run").read_text(), flags=re.M)
+    asked = {word for line in lines for word in line.split() if re.match(r"[a-z]", word)}
+    assert {"book", "check", "test", "test-slow", "test-site"} <= asked <= {*TARGETS}
+
+
 def test_every_test_target_is_run_by_a_workflow():
     run = {step.get("run") for path in PATHS for step in steps(path)}
     assert {f"make {name}" for name in TARGETS if name.startswith("test")} <= run
