@@ -532,12 +532,14 @@ def test_a_thing_is_added_in_the_files_of_its_row_and_in_no_other(name):
         assert any(fnmatch(file, pattern) for pattern in patterns), file
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROBES)
 def test_what_was_added_works(failures, name):
     assert name not in failures, failures[name]
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_the_live_figure_that_was_added_solves_in_a_browser(scratch, failures, browser):
     assert "live figure" not in failures
@@ -549,6 +551,7 @@ def test_the_live_figure_that_was_added_solves_in_a_browser(scratch, failures, b
     page.close()
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_the_projects_own_tests_take_what_was_added(scratch):
     done = called(scratch, "-m", "pytest", "-q", "-p", "no:cacheprovider", *OWN_TESTS)
@@ -560,6 +563,7 @@ def test_a_plant_is_added_by_the_example_of_the_readme():
     assert "plant = Plant(" in (ROOT / "README.md").read_text()
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_the_lock_is_made_anew_where_the_row_says_so(scratch):
     """No file of the package is in two rows, so one copy tells them apart."""

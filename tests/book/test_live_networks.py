@@ -68,6 +68,7 @@ def test_it_trains_until_it_is_stopped_and_the_network_with_theta_errs_less(tab)
     assert [one["episode"] for one in tab.shown()["found"]] == [0, 0]
 
 
+@pytest.mark.weekly
 def test_it_ends_by_itself_after_sixty_episodes(tab):
     tab.click("Train")
     arg = [tab.figure.element_handle(), two_learners.EPISODES]

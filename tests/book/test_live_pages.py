@@ -32,6 +32,7 @@ def test_without_javascript_there_are_the_pictures_alone(opened, figure):
         assert "picture" in (before, name), f"{name} stands on no picture"
 
 
+@pytest.mark.weekly
 @each_chapter
 def test_without_webassembly_there_are_the_pictures_and_a_sentence(opened, figure):
     tab = opened(figure, script="delete window.WebAssembly")
@@ -43,6 +44,7 @@ def test_without_webassembly_there_are_the_pictures_and_a_sentence(opened, figur
     assert tab.errors == []
 
 
+@pytest.mark.weekly
 @each_chapter
 def test_on_paper_there_are_the_pictures_alone(opened, figure):
     tab = opened(figure).begun()

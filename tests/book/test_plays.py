@@ -21,6 +21,7 @@ def moves(page, what) -> bool:
     return what.screenshot(animations="allow") != before
 
 
+@pytest.mark.weekly
 @pytest.mark.parametrize("key", [None, "Enter", "Space"])
 def test_a_figure_stands_until_it_is_asked_to_play_and_again_afterwards(page, key):
     image, button = page.locator(f"{LINK} img").first, page.get_by_role("button", name="Play")

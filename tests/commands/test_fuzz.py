@@ -85,6 +85,7 @@ def drawn(rng: random.Random) -> list[str]:
     return words
 
 
+@pytest.mark.weekly
 @pytest.mark.slow
 def test_no_command_line_ends_in_a_traceback(fast):
     rng = random.Random(0)
