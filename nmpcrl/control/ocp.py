@@ -86,6 +86,11 @@ class Ocp(ABC):
         """
         return -TIE if self.ties_active else TIE
 
+    @cached_property
+    def sizes(self) -> tuple[Vector, Vector]:
+        """The units of z and of g, which are 1 where rows have none of their own."""
+        return np.ones(self.lower.size), np.ones(self.equality.size)
+
     @property
     def bound_prices(self) -> Vector:
         """What a unit beyond each bound on z costs, the most that its multiplier can be."""
@@ -151,6 +156,13 @@ class ProblemOcp(Ocp):
     def slack_weights(self) -> Vector:
         """W, shape (M,)."""
         return self.problem.weights
+
+    @cached_property
+    def sizes(self) -> tuple[Vector, Vector]:
+        """Slacks and rows in their `Problem.typical_row_sizes`."""
+        z, g = np.ones(self.lower.size), np.ones(self.equality.size)
+        z[self.slacks] = g[self.obstacles] = self.problem.typical_row_sizes
+        return z, g
 
     def settled(self, p: Vector) -> tuple[Any, Vector, Any]:
         """Those without u; all where u_0 is fixed. One that does not hold there is at -1."""

@@ -193,6 +193,15 @@ class Problem(Described):
         return ca.if_else(ca.logic_or(usual, unknown), 1, found + LEAST)
 
     @cached_property
+    def typical_row_sizes(self) -> Vector:
+        """The largest of `row_sizes` among states of the sizes -1, 0 and 1, shape (M,)."""
+        e, still = self.expressions, np.clip(np.zeros(self.inputs), self.lower, self.upper)
+        sizes = ca.Function("sizes", [e.x, e.u, e.theta, e.d], [self.row_sizes])
+        at = [sizes(k * self.sizes[0], still, self.theta, self.data[0]) for k in (-1, 0, 1)]
+        found: Vector = np.max([one.full().ravel() for one in at], axis=0, initial=LEAST)
+        return found
+
+    @cached_property
     def solved(self) -> "Problem":
         """The same problem with states and inputs in parts of `sizes`, which is what is solved."""
         if all((size == 1).all() for size in self.sizes):

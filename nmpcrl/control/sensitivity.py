@@ -16,6 +16,7 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import qr
 from scipy.optimize import linprog
 
@@ -26,6 +27,8 @@ DEPENDENT = 1e-9  # of the largest: less is left of an active gradient beside th
 INACTIVE = 1e-6  # of itself: less is left of a multiplier on the side that is taken
 PULLED = 1e-6  # of the largest pull of a parameter: more of it is left where no step answers it
 STIFF, FLAT = 1e6, 1e-8  # an active row and no curvature, in parts of the largest curvature
+
+Flags = NDArray[np.bool_]
 
 
 def lagrangian(ocp: Ocp) -> tuple[ca.SX, ca.SX]:
@@ -80,10 +83,7 @@ class Sensitivity:
         """L_theta theta, (L_z theta, A_theta), and K^-1 times the latter."""
         ocp = self._ocp
         g, l_zz, l_zt, l_tt, g_z, g_t = (b.full() for b in self._second_derivatives(z, p, lam))
-        row = ocp.equality | (lam > np.abs(g.ravel()))
-        bound = np.full(z.size, False)
-        for multiplier, distance in ((-nu, np.abs(z - ocp.lower)), (nu, np.abs(ocp.upper - z))):
-            bound |= (multiplier > distance) & (ocp.bound_prices - multiplier > distance)
+        row, bound = self._active(z, g.ravel(), lam, nu)
         active = np.vstack([g_z[row], np.eye(z.size)[bound]])
         active_t = np.vstack([g_t[row], np.zeros((bound.sum(), len(l_tt)))])
         if _dependent(active):
@@ -97,6 +97,16 @@ class Sensitivity:
         right = np.vstack([l_zt, active_t])
         return l_tt, right, _solved(kkt, right)
 
+    def _active(self, z: Vector, g: Vector, lam: Vector, nu: Vector) -> tuple[Flags, Flags]:
+        """Which constraints and which bounds hold as equalities, each in its own unit."""
+        ocp, (of_z, of_g) = self._ocp, self._ocp.sizes
+        row: Flags = ocp.equality | (lam * of_g > np.abs(g) / of_g)
+        bound: Flags = np.full(z.size, False)
+        for multiplier, distance in ((-nu, np.abs(z - ocp.lower)), (nu, np.abs(ocp.upper - z))):
+            left = ocp.bound_prices - multiplier
+            bound |= np.minimum(multiplier, left) * of_z > distance / of_z
+        return row, bound
+
     def is_minimum(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> bool:
         """Whether the optimum is a strict minimum: the Lagrangian curves up wherever inputs lead.
 
@@ -108,8 +118,8 @@ class Sensitivity:
         size = float(ca.fmax(ca.norm_inf(ca.vec(bends)), ca.norm_inf(ca.vec(end))))
         if not 0 < size < np.inf:
             return bool(size)  # inf: true
-        rows = (lam > np.abs(g.full().ravel()))[ocp.obstacles] & (-nu > z)[ocp.slacks]
-        bounds = (-nu > np.abs(z - ocp.lower)) | (nu > np.abs(ocp.upper - z))
+        active, bounds = self._active(z, g.full().ravel(), lam, nu)
+        rows = active[ocp.obstacles] & bounds[ocp.slacks]
         bounds[ocp.inputs[: int(ocp.fixed_action.size > 0)]] = True
         springs = STIFF * size * np.hstack([bounds[ocp.inputs], bounds[ocp.states[:N]], rows[:N]])
         final = STIFF * size * np.append(bounds[ocp.states[N]], rows[N])
@@ -123,14 +133,18 @@ class Sensitivity:
 
         Stationarity counts relative to the largest multiplier; complementarity as the smaller of a
         multiplier and its constraint's distance, or where a bound is left at a price, as what is
-        left of the price. Where it is to be `relative`, multipliers are
-        taken in parts of the largest, and distances in parts of the largest variable.
+        left of the price; each in its unit of `Ocp.sizes`. Where it is to be `relative`,
+        multipliers are taken in parts of the largest, and distances in parts of the largest
+        variable.
         """
         ocp = self._ocp
         g, slope = (part.full().ravel() for part in self._conditions(z, p, lam))
+        of_z, of_g = ocp.sizes
+        z, lower, upper = z / of_z, ocp.lower / of_z, ocp.upper / of_z
+        nu, prices, slope = nu * of_z, ocp.bound_prices * of_z, slope * of_z
+        g, lam = g / of_g, lam * of_g
         inequality, largest = ~ocp.equality, max(1.0, np.abs(lam).max(), np.abs(nu).max())
         slope = (slope + nu) / largest
-        lower, upper, prices = ocp.lower, ocp.upper, ocp.bound_prices
         if relative:
             lam, nu, size = lam / largest, nu / largest, max(1.0, np.abs(z).max())
             prices = prices / largest

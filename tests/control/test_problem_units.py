@@ -141,7 +141,7 @@ def test_a_parameter_may_be_as_large_as_it_starts():
 
 
 @pytest.mark.parametrize("solver", SOLVERS, ids=lambda one: one.name)
-@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-7, 1e3])
+@pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-7, 1e5])
 @pytest.mark.parametrize("of", ["a state of that unit", "a state", "an input"])
 def test_on_which_side_of_a_row_a_start_lies_does_not_depend_on_its_unit(solver, unit, of):
     """dV/dm has the price where h is 0.4 units; where it is 0, as `ties_active` says."""
@@ -159,3 +159,26 @@ def test_on_which_side_of_a_row_a_start_lies_does_not_depend_on_its_unit(solver,
             start = np.array([0.5 - beyond])
             found = nmpc.solve(size * start, problem.theta, action=start if given else None)
             assert found.features == pytest.approx(price)
+
+
+@pytest.mark.parametrize("solver", SOLVERS, ids=lambda one: one.name)
+@pytest.mark.parametrize("unit", [1e-3, 1e-7, 1e6])
+def test_rows_of_any_unit_are_solved_alike(solver, unit):
+    """A tolerance of 1e-8 is nothing to a row of metres, and all that there is to one of 1e-7."""
+
+    def solved(unit):
+        problem = Problem(
+            states=1, inputs=1, horizon=3, theta={"m": 0.5}, lower=-1.0, upper=1.0,
+            model=lambda x, u, th: x + u, stage=lambda x, u, th: ca.sumsqr(x) + ca.sumsqr(u),
+            soft=Soft(lambda x, u, th: unit * (th["m"] - x[0]), weight=10.0 / unit),
+        )  # fmt: skip
+        nmpc = Nmpc(problem, solver=solver)
+        for state in ([0.1], [-0.7]):
+            one = nmpc.solve(np.array(state), problem.theta)
+            yield one.value, one.features, nmpc.value_hessian(one), nmpc.policy_jacobian(one)
+            yield one.states, one.slacks / unit, one.multipliers.obstacles * unit
+            assert nmpc.kkt_residual(one) < 1e-4
+
+    for one, other in zip(solved(1.0), solved(unit), strict=True):
+        for expected, found in zip(one, other, strict=True):
+            np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4)

@@ -1,7 +1,7 @@
 """CasADi's solvers on one transcription of the OCP: where warm starts are made and results read.
 
-A `Problem` is solved in units in which no slack costs more than `HIGHEST_PRICE` and no curvature
-of the cost is below 1, for tolerances are absolute. Its cold starts lie a little off rest, where
+A `Problem` is solved in units in which no slack costs more than `HIGHEST_PRICE`, no curvature of
+the cost is below 1 and rows are of size 1, for tolerances are absolute. Its cold starts lie a little off rest, where
 symmetry may make a maximum stationary. A solve that fails begins again, at last with Ipopt, and one
 that ends at no strict minimum is compared with solves from elsewhere: see `Solution.status`.
 """
@@ -139,7 +139,7 @@ class Program:
         self._ocp, self._solver = ocp, solver
         self._problem = ocp.problem if isinstance(ocp, ProblemOcp) else None
         self._sensitivity = Sensitivity(ocp)
-        self._factor, self._units = _scales(ocp)
+        self._factor, self._units, self._rows = _scales(ocp)
         self._at_start = None if self._problem is None else _start_of(ocp)
         self._bounds = {
             "lbx": ca.DM(ocp.lower / self._units),
@@ -206,19 +206,23 @@ class Program:
 
     def _attempt(self, solver: Nlpsol, start: Start, point: PrimalDual, p: Vector) -> Found | str:
         """An optimum, or why there is none."""
-        ocp, factor, units = self._ocp, self._factor, self._units
+        ocp, factor, units, rows = self._ocp, self._factor, self._units, self._rows
         z, lam, nu = point
         if self._at_start is not None and not np.isfinite(self._at_start(z, p).full()).all():
             return f"{solver.name} cannot begin where a number is not finite"
         function = self._function(solver, start)
         result = function(
-            p=p, x0=z / units, lam_g0=lam / factor, lam_x0=nu * units / factor, **self._bounds
+            p=p,
+            x0=z / units,
+            lam_g0=lam * rows / factor,
+            lam_x0=nu * units / factor,
+            **self._bounds,
         )
         stats = function.stats()
         z, lam, nu = (result[key].full().ravel() for key in ("x", "lam_g", "lam_x"))
         if not (stats["success"] and np.isfinite([z.sum(), lam.sum(), nu.sum()]).all()):
             return _status(solver.name, stats)
-        z, lam, nu = z * units, lam * factor, nu * factor / units
+        z, lam, nu = z * units, lam * factor / rows, nu * factor / units
         if np.abs(z[ocp.states]).max() > FARTHEST:
             return f"{solver.name} {LED_ASTRAY}"
         z = np.clip(z, ocp.lower, ocp.upper)  # fatrop relaxes bounds by 1e-8
@@ -242,8 +246,9 @@ class Program:
         """`nlpsol` with the objective in parts of its factor, and variables in their units."""
         ocp, factor = self._ocp, self._factor
         z, f, g = ocp.variables, ocp.objective, ocp.constraints
-        if factor != 1 or (self._units != 1).any():
-            f, g = ca.substitute([f / factor, g], [z], [ca.DM(self._units) * z])
+        if factor != 1 or (self._units != 1).any() or (self._rows != 1).any():
+            scaled = [f / factor, g / ca.DM(self._rows)]
+            f, g = ca.substitute(scaled, [z], [ca.DM(self._units) * z])
         nlp = {"x": z, "p": ocp.parameters, "f": f, "g": g}
         settings: dict[str, Any] = {
             "print_time": False,
@@ -314,12 +319,12 @@ def _start_of(ocp: Ocp) -> ca.Function:
     )
 
 
-def _scales(ocp: Ocp) -> tuple[float, Vector]:
-    """What the objective is divided by, and the units of z."""
+def _scales(ocp: Ocp) -> tuple[float, Vector, Vector]:
+    """What the objective is divided by, the units of z, and those of the constraints."""
     factor = min(1.0, ocp.problem.cost_scale) if isinstance(ocp, ProblemOcp) else 1.0
     units = np.ones(ocp.lower.size)
     units[ocp.slacks] = np.minimum(1.0, HIGHEST_PRICE * factor / ocp.slack_weights)
-    return factor, units
+    return factor, units, ocp.sizes[1]
 
 
 def _status(name: str, stats: dict[str, Any]) -> str:
