@@ -212,8 +212,9 @@ class _Trainer:
         ahead = self.data
         known = ahead and ahead(0)
         for t in range(final + 1):
+            data = {} if known is None else {"data": known}
             try:
-                plan = controller.solve(state, weights.theta, warm_start, None, known)
+                plan = controller.solve(state, weights.theta, warm_start, **data)
             except SolverError as error:
                 weights = self.learner.interrupted(weights)
                 yield Step(episode, t, state, weights, nothing, failure=str(error), last=True)
@@ -226,7 +227,7 @@ class _Trainer:
             solution = None
             try:
                 solution = (
-                    controller.solve(state, weights.theta, plan, action, known)
+                    controller.solve(state, weights.theta, plan, action, **data)
                     if constrained
                     else plan
                 )

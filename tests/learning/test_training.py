@@ -452,6 +452,8 @@ def test_a_rollout_needs_no_more_than_a_solve(sound, plant):
     assert ran.states.shape == (4, 3 if plant is None else 2)
     if plant is None:
         assert ran.cost == pytest.approx(evaluate(sound, THETA, 4).cost, rel=1e-6)
+        steps = train(frozen(sound), Lower(sound), first_weights(), quiet(1, 4))
+        np.testing.assert_array_equal([step.state for step in steps], ran.states)
     else:
         with pytest.raises(ValueError, match=r"give plant=.* and start="):
             evaluate(Lower(sound), THETA, 4)
