@@ -56,8 +56,8 @@ def audit(study: Runs[Records], curvature: Curvature) -> tuple[Assumption, ...]:
         ),
         Assumption(
             "the value is three times differentiable in theta",
-            f"it has a kink wherever an active set changes; {kinks:.1%} of the steps start"
-            " exactly on one",
+            f"it has a kink wherever an active set changes; {kinks:.1%} of the steps of a run"
+            " of GES start exactly on one",
             holds=kinks == 0,
             by=(SMOOTH,),
         ),

@@ -15,7 +15,7 @@ import pandas as pd
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.failure_modes import Ending, ending
 from nmpcrl.claims.published import Published
-from nmpcrl.claims.thresholds import cost_reduction, was_stopped, worsens
+from nmpcrl.claims.thresholds import cost_reduction, solved, was_stopped, worsens
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
 from nmpcrl.study import paper
 
@@ -31,7 +31,7 @@ Count: TypeAlias = tuple[int, int]  # yes, of
 class Finding:
     """What the published study found, in counts of runs or layouts, and in shares of the cost."""
 
-    arrived_open: Count  # runs of `LEARNERS` at the target at a lower cost, every gap being open
+    arrived_open: Count  # runs of `LEARNERS` that solve their layout, every gap being open
     arrived_closed: Count  # such runs, theta_c having closed a gap
     open_in: tuple[str, ...]  # the layouts of the former
     closed_in: tuple[str, ...]  # and of the latter
@@ -57,7 +57,7 @@ def finding(found: Published) -> Finding | None:
     if not found.rows:
         return None
     runs = _with_gaps(found.main[found.main.learner.isin(LEARNERS)])
-    arrived = (runs.ending == Ending.ARRIVED) & (runs.saved > 0)
+    arrived = solved(runs)
     hand = {layout: _by_hand(layout) for layout in dict.fromkeys(runs.layout)}
     there = {layout: saved for layout, (saved, is_solved) in hand.items() if is_solved}
     others = [-saved for saved, is_solved in hand.values() if not is_solved] or [np.nan]

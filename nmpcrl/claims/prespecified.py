@@ -101,6 +101,26 @@ SINCE = (  # in the order in which they were made
         " divide to it; it had been a median of ratios.",
         "C3 had been 0.63 and C4 1.00, on another machine as well; no outcome changed.",
     ),
+    Decision(
+        "79349da7d2",
+        "2026-11-28 09:51",
+        "after the verdicts had been seen",
+        "The halves of C1 and C2 are compared by the claim's own measure, over a whole reading of"
+        " the decay. C1 depends on the decay because it is as claimed in one reading, and in the"
+        " other more pairs go against it.",
+        "The reverse of C1 per episode, and of C2, is no longer said: it had rested on layouts and"
+        " on a second measure that were chosen after looking. No outcome changed.",
+    ),
+    Decision(
+        "79349da7d2",
+        "2026-11-28 09:51",
+        "after the drawn layouts had been seen",
+        "The weaker question of C7 and W7, which was fixed with the thresholds, counts in the drawn"
+        " layouts as it does in A to F. What was registered for these layouts reads the first"
+        ' question alone, and expected "not reproduced".',
+        "C7 and W7 are partly reproduced there, and had been not reproduced; 7 of 9 verdicts stand"
+        " there, and had been 5.",
+    ),
 )
 
 

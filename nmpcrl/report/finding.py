@@ -53,7 +53,8 @@ def numbers(found: Finding | None) -> str:
           [Fig. 5.1](05_results.ipynb#fig-results-reasons)
         - **{layouts_solved_by_hand}** layouts are solved with $\\theta_c$ set by hand to
           {by_hand}, the margin that the cost names: the robot arrives at no higher cost. In
-          {better_by_hand} of them it costs less than any run of {learners}.
+          {better_by_hand} of them it costs less than any run of {learners}; in the other layouts
+          the robot does not arrive.
           [In plain words](07_beyond.ipynb#beyond-plain-words)
         - **{stopped_runs_of_RDES}** runs of RDES had to be stopped when the noise decays per
           episode, {stopped_early} of them within {early} episodes; per step {stopped_per_step} and

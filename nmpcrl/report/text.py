@@ -208,8 +208,9 @@ def verdicts_changed(judged: pd.DataFrame) -> str:
     changed = _changed(judged)
     return (
         f"Of {len(variants)} variants, each with one thing changed, {changed.variant.nunique()}"
-        f" change at least one verdict, {changed[changed.p < SURE].variant.nunique()} of them by"
-        f" more than chance explains (p < {SURE})."
+        f" change at least one verdict, {changed[changed.p < SURE].variant.nunique()} of them with"
+        f" p < {SURE}. {judged.p.notna().sum()} verdicts were compared, so that chance alone would"
+        f" give about {SURE * judged.p.notna().sum():.0f} a p as small."
     )
 
 

@@ -100,7 +100,7 @@ def test_one_number_by_hand_is_said_with_the_layouts_in_which_it_fails():
 
 
 def test_the_commit_of_the_thresholds_is_the_published_one():
-    (commit,) = re.findall(r"fixed in commit `(\w+)`", README)
+    (commit,) = re.findall(r"fixed\s+in\s+commit\s+`(\w+)`", README)
     assert published.load().about["fixed"]["thresholds"]["hash"].startswith(commit)
 
 
