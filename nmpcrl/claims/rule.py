@@ -226,7 +226,8 @@ def drawn_anew(values: Iterable[float]) -> Estimate:
 
 def anew(verdict: Verdict) -> Estimate:
     """The share of yes with the interval of `drawn_anew`; nan where no layout was asked."""
-    return drawn_anew(yes / of for yes, of in map(verdict.counts.get, verdict.by_layout) if of)
+    counts = [verdict.counts[name] for name in verdict.by_layout]
+    return drawn_anew(yes / of for yes, of in counts if of)
 
 
 def arms(
