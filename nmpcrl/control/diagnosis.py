@@ -13,7 +13,8 @@ from nmpcrl.control.solution import short
 
 FASTEST = 10.0  # what one step of a model may multiply a small deviation by
 FARTHEST = 1e9  # no plan goes through such a state
-SUBSTEPS = "is the period too long for the dynamics? Then give rk4, or the plant, more substeps"
+UNSTABLE = "an unstable model takes a shorter horizon, or solver='fatrop'"
+SUBSTEPS = f"dynamics too fast for their period take more substeps, of rk4 or the plant; {UNSTABLE}"
 ORDERS = {  # what is not finite -> what to write instead
     "": "keep it finite, as ca.log(ca.fmax(x, 1e-6)) does",
     "the derivative of ": "write ca.sqrt(ca.sumsqr(x) + 1e-9) for ca.norm_2(x), and so on",
@@ -64,7 +65,7 @@ class Diagnosis:
         known = np.zeros((N, 0)) if data is None else data
         for i in range(N):
             given = state, self._still, theta, known[i]
-            said = self._not_finite(*given) or self._too_fast(*given)
+            said = self._not_finite(*given) or self._too_fast(i + 1, *given)
             if said:
                 return said.format(f"at x = {short(state)}, u = {short(self._still)}")
             state = self._orders[""][self._model](*given).full().ravel()
@@ -83,13 +84,15 @@ class Diagnosis:
                     return f"{called} is {what} {{}}: {ORDERS[order]}"
         return ""
 
-    def _too_fast(self, *given: Vector) -> str:
+    def _too_fast(self, steps: int, *given: Vector) -> str:
         value, slope, _ = (functions[self._model] for functions in self._orders.values())
         speed = slope(*given).full()[:, : self._ocp.states.shape[1]]
         growth, largest = np.abs(np.linalg.eigvals(speed)).max(), np.abs(value(*given).full()).max()
-        if growth > FASTEST or largest > FARTHEST:
+        if growth > FASTEST:
             does = f"makes {growth:.1g} times as much of a small deviation in one step"
             return f"{self._model} {does}, {{}}: {SUBSTEPS}"
+        if largest > FARTHEST:
+            return f"{self._model} leads to {largest:.1g} in {steps} steps at rest: {UNSTABLE}"
         return ""
 
 

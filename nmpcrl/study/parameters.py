@@ -1,5 +1,6 @@
 """What a parameter may be: each kind says so in words, and refuses all else in one sentence."""
 
+import re
 from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from nmpcrl.study.storage.refusal import Refusal as Refusal
 
 LARGEST_SEED = 2**31 - 1  # what every generator takes, whichever library's
 MOST_VALUES = 10_000  # of an axis
+POWER = re.compile(r"([+-]?\d*)(\.\d*)?[eE]([+-]?)(\d+)", re.ASCII)
 LONGEST = 100  # characters of a value in a message
 
 
@@ -103,6 +105,7 @@ class Number:
 
     def check(self, name: str, value: Any) -> float:
         """See `Allowed`."""
+        refuse_text(name, value)
         real = isinstance(value, Real) and not isinstance(value, bool)
         if not real or not self.least <= value <= self.most:  # which nan is not
             raise refused(name, value, self.text)
@@ -142,6 +145,8 @@ class Numbers:
         """See `Allowed`."""
         if not is_list(value) or len(value) != self.size:
             raise refused(name, value, self.text)
+        for one in value:
+            refuse_text(name, one)
         try:
             return tuple(SENSIBLE.check(name, one) for one in value)
         except ParameterError:
@@ -186,6 +191,19 @@ def is_list(value: Any) -> bool:
     """Whether it holds values in a row."""
     rows = isinstance(value, np.ndarray) and value.ndim == 1
     return rows or isinstance(value, list | tuple | range)
+
+
+def refuse_text(name: str, value: Any) -> None:
+    """Refuse a number that YAML 1.1 takes for text, for want of a point or of its power's sign.
+
+    Raises:
+        ParameterError: it is one.
+    """
+    found = POWER.fullmatch(value.strip()) if isinstance(value, str) else None
+    if found:
+        whole, part, sign, power = found.groups(default="")
+        number = f"{whole or 0}.{part.strip('.') or 0}e{sign or '+'}{power}"
+        raise ParameterError(f"{name} = {shown(value)} arrived as text; write {number}")
 
 
 def refused(name: str, value: Any, text: str) -> ParameterError:

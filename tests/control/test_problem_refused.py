@@ -1,6 +1,7 @@
 """What no `Problem` can be is refused where it is written, in one sentence with its name."""
 
 import math
+import re
 import warnings
 from contextlib import suppress
 
@@ -130,7 +131,7 @@ def test_a_plan_that_leaves_all_numbers_is_no_solution(solver):
     wild = problem(
         model=lambda x, u, th: 1e5 * x + u, stage=lambda x, u, th: th["alpha"] * ca.sumsqr(u)
     )
-    with pytest.raises(SolverError, match="is the period too long for the dynamics"):
+    with pytest.raises(SolverError, match="dynamics too fast for their period take more substeps"):
         Nmpc(wild, solver=solver).solve(np.ones(2), wild.theta)
 
 
@@ -252,6 +253,18 @@ def test_a_state_may_be_alone():
     assert Nmpc(alone, solver="ipopt").solve(np.ones(1), alone.theta).states.shape == (4, 1)
     with pytest.raises(ValueError, match=r"model cannot be written down.*out of bounds"):
         problem(states=1, model=lambda x, u, th: x[1])
+
+
+@pytest.mark.parametrize(
+    ("growth", "horizon", "said"),
+    [(1.5, 20, "^$"), (1.5, 60, "^model leads to 1e[+]09 in 52 steps at rest: an unstable model"),
+     (12.0, 5, "^model makes 1e[+]01 times as much .* an unstable model takes a shorter horizon")],
+)  # fmt: skip
+def test_what_an_unstable_model_needs_is_a_shorter_horizon(growth, horizon, said):
+    steps = problem(states=1, model=lambda x, u, th: growth * x + u, horizon=horizon,
+                    stage=lambda x, u, th: x[0] ** 2 + u**2)  # fmt: skip
+    why = Nmpc(steps, solver="fatrop")._free.diagnosis.why(np.ones(1), steps.theta, None)
+    assert re.search(said, why)
 
 
 @pytest.mark.parametrize("solver", ["riccati", "fatrop", "ipopt"])

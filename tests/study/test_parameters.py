@@ -1,7 +1,10 @@
 """What a parameter may be: said in words, checked, and refused in one sentence."""
 
+import re
+
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -134,6 +137,22 @@ def test_what_is_allowed_is_said_in_words(kind, text, choices):
 def test_texts_truths_and_lists_are_no_numbers(kind, given):
     with pytest.raises(ParameterError, match=r"^it = .* must be "):
         KINDS[kind].check("it", given)
+
+
+@pytest.mark.parametrize(
+    ("given", "write"),
+    [("1e-7", "1.0e-7"), ("-2E5", "-2.0e+5"), (".5e3", "0.5e+3"), ("1.5e5", "1.5e+5")],
+)
+def test_a_number_that_yaml_takes_for_text_is_written_as_one(given, write):
+    assert isinstance(yaml.safe_load(given), str)
+    assert yaml.safe_load(write) == float(given)
+    for kind, value in (
+        (Number.within(-1e6, 1e6), given), (Numbers(1), [given]),
+        (Several(Number.within(-1e6, 1e6), "it"), [given]),
+    ):  # fmt: skip
+        with pytest.raises(ParameterError, match=re.escape(f"'{given}' arrived as text; ")) as at:
+            kind.check("it", value)
+        assert str(at.value).endswith(f"write {write}")
 
 
 @pytest.mark.parametrize(
