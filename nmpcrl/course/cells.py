@@ -50,12 +50,36 @@ def adopt() -> None:
         ctypes.CDLL(None).prctl(ADOPTS, 1, 0, 0, 0)
 
 
+class Shell(InteractiveShell):
+    """A shell without a screen, in which a magic that cannot be done is left undone."""
+
+    def enable_gui(self, gui: str | None = None) -> None:
+        """There is none."""
+
+    def run_line_magic(self, magic_name: str, line: str, _stack_depth: int = 1) -> Any:
+        """What the magic gives, or nothing: `%matplotlib widget` costs no answer its points."""
+        shell: Any = super()
+        try:
+            return shell.run_line_magic(magic_name, line, _stack_depth + 1)
+        except MemoryError:
+            raise
+        except Exception:
+            return None
+
+    def run_cell_magic(self, magic_name: str, line: str, cell: str) -> Any:
+        """What the magic makes of the cell, or the cell without it where it is not known."""
+        shell: Any = super()
+        if shell.find_cell_magic(magic_name) is None:
+            return shell.run_cell(cell).raise_error()
+        return shell.run_cell_magic(magic_name, line, cell)
+
+
 class Cells:
     """A notebook that is executed, cell by cell."""
 
     def __init__(self, peer: Peer) -> None:
         self._peer = peer
-        shell: Any = InteractiveShell.instance()
+        shell: Any = Shell.instance()
         shell.history_manager.enabled = False
         self._shell = shell
         self._home = Path.cwd()

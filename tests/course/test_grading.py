@@ -112,6 +112,17 @@ def malformed():
     return json.dumps(notebook)
 
 
+def with_magics():
+    """Begins and answers with what only Jupyter understands, some of which no grader can do."""
+    lines = ("%matplotlib inline", "%matplotlib widget\n!echo hello", "%%time", "%%unknown",
+             "!false", "%config InlineBackend.rc = {}", "%load_ext unknown")  # fmt: skip
+    notebook = solved_by_student(
+        **{name: f"{line}\nroot_of_{name} = 2" for name, line in zip(ASKED, lines, strict=True)}
+    )
+    notebook.cells.insert(1, new_code_cell("%matplotlib notebook\n%unknown"))
+    return notebook
+
+
 TEXTS = {"broken": "{", "list": "[1]", "cells": '{"cells": 3}'}  # of no notebook
 
 
@@ -132,6 +143,7 @@ def rows(tmp_path_factory):
         clearing=silencing("os.environ.clear()"),
         gone=nearly_empty(),
         malformed=malformed(),
+        magics=with_magics(),
         long=solved_by_student(one='raise ValueError("much" * 100_000)'),
         **TEXTS,
     )
@@ -174,6 +186,10 @@ def test_an_answer_that_hangs_ends_the_process_or_takes_memory_costs_its_own_poi
 
 def test_other_meanings_of_names_and_a_folder_left_cost_no_points_elsewhere(rows):
     assert points(rows["renaming"]) == expected("1.1")
+
+
+def test_magics_and_lines_for_a_shell_cost_no_points(rows):
+    assert points(rows["magics"]) == expected()
 
 
 def test_what_a_student_gave_another_meaning_keeps_it_where_an_answer_relies_on_it(rows):
