@@ -72,7 +72,7 @@ def conclusion(found: pd.DataFrame) -> str:
         {count} readings were looked at. How often DES diverges changes most clearly with `{name}`:
         {diverged} runs diverged, against {main} of the main table in the same cells; {gained} pairs
         went one way and {lost} the other (McNemar's p = {p:.1g}; {corrected:.1g} when multiplied by
-        the number of readings). C1 comes to another outcome with: {changed}.
+        the number of readings). The claim comes to another outcome with: {changed}.
         """,
         count=number(len(found)).capitalize(),
         name=str(least.name),

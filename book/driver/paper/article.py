@@ -37,7 +37,7 @@ from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.verdict import Verdict
-from nmpcrl.report import drawn, halves, tables, text, timing
+from nmpcrl.report import drawn, halves, tables, text
 from nmpcrl.report import finding as said
 from nmpcrl.report.figures.verdicts import claims as verdicts
 from nmpcrl.report.figures.verdicts import failure_modes
@@ -123,12 +123,10 @@ def _sentences(given: Source) -> dict[str, str]:
     parts = {
         "answer": text.answer(given.claims),
         "finding": said.sentences(seen),
-        "legend": text.legend(given.claims, found.main),
         "fixed": text.fixed(prespecified.fixed(found.about)),
         "effort": text.compute_effort(found),
         "layouts": text.by_layout_and_decay(given.claims),
         "variants": text.verdicts_changed(given.changed),
-        "slow": timing.at_paper_speed(found.timings),
         "drawn": drawn.in_short(population_published.load()),
     }
     return {name: markup.text(one) for name, one in parts.items()}
