@@ -1,9 +1,10 @@
 """CasADi's solvers on one transcription of the OCP: where warm starts are made and results read.
 
 A `Problem` is solved in units in which no slack costs more than `HIGHEST_PRICE`, no curvature of
-the cost is below 1 and rows are of size 1, for tolerances are absolute. Its cold starts lie a little off rest, where
-symmetry may make a maximum stationary. A solve that fails begins again, at last with Ipopt, and one
-that ends at no strict minimum is compared with solves from elsewhere: see `Solution.status`.
+the cost is below 1 and rows are of size 1, for tolerances are absolute. Its cold starts lie a
+little off rest, where symmetry may make a maximum stationary. A solve that fails begins again, at
+last with Ipopt, and one that ends at no strict minimum is compared with solves from elsewhere: see
+`Solution.restarts` and `Solution.solver`.
 """
 
 import time
