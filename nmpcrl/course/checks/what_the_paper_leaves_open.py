@@ -43,8 +43,8 @@ def metres(answer: Any) -> Outcome:
             printed / RADIUS: "The overlap has the square of the distance.",
             (1 + printed / (2 * RADIUS)) ** 2 - 1: "The circle's radius is 1.25 m, half of 2.5 m.",
             (1 + printed / RADIUS) ** 2: "That is 1 + d_o.",
-            printed: "That is what is printed: with it the charge begins 1.45 m from a centre, and not"
-            " 1.25 + 0.35 = 1.60 m.",
+            printed: "That is what is printed: with it the charge begins 1.45 m from a centre, and"
+            " not 1.25 + 0.35 = 1.60 m.",
         },
     )
 
