@@ -56,8 +56,8 @@ def quadrotor() -> Problem:
 
 # At most in kB, with what is drawn around: states, actions.
 PROBLEMS = {
-    gros_zanon.problem: (95, ([0.0, -1.0], [1.0, 1.0]), (-1.0, 1.0)),
-    quadrotor: (140, ([-1, -1, -0.3, -1, -1, -0.5], [1, 1, 0.3, 1, 1, 0.5]), (1.0, 5.0)),
+    gros_zanon.problem: (125, ([0.0, -1.0], [1.0, 1.0]), (-1.0, 1.0)),
+    quadrotor: (220, ([-1, -1, -0.3, -1, -1, -0.5], [1, 1, 0.3, 1, 1, 0.5]), (1.0, 5.0)),
 }
 
 
