@@ -180,8 +180,8 @@ def closing_gaps(difficulty: pd.DataFrame, judged: pd.Series) -> Answer:
     """The question "closing gaps"."""
     closes = difficulty.loc[judged.index, PILOT] < CLOSES_BEFORE
     counts = {
-        "fails where it closes": _count(~judged[closes]),
-        "succeeds elsewhere": _count(judged[~closes]),
+        "layouts fail where it closes": _count(~judged[closes]),
+        "layouts succeed elsewhere": _count(judged[~closes]),
     }
     return Answer("closing gaps", _both(counts.values()), counts)
 
@@ -217,7 +217,7 @@ def horizon(runs: pd.DataFrame) -> Answer:
     asked_of = [name for name in base.index[~base] if all(name in one.index for one in longer)]
     yes = [not any(one[name] for one in longer) for name in asked_of]
     count = (sum(yes), len(yes))
-    return Answer("horizon", read(*count), {"still fails": count})
+    return Answer("horizon", read(*count), {"layouts still fail": count})
 
 
 def _first_seeds(runs: pd.DataFrame) -> set[int]:
@@ -234,7 +234,7 @@ def gaps_and_horizon(stops: pd.DataFrame) -> Answer:
     """
     known = stops[stops[paper.HORIZON].notna()]
     apart = known.max(axis=1, skipna=False) - known.min(axis=1, skipna=False)
-    return by_share("gaps and horizon", apart <= SAME_CLOSING + 1e-9, "same")
+    return by_share("gaps and horizon", apart <= SAME_CLOSING + 1e-9, "layouts the same")
 
 
 def trap(runs: pd.DataFrame) -> tuple[Answer, Answer]:
@@ -288,7 +288,7 @@ def early_overshoot(runs: pd.DataFrame) -> Answer:
     rdes = _of(runs, "RDES").query("decay == 'episode'")
     stopped = rdes[was_stopped(rdes)]
     early = stopped.steps_done < DEAD_BY * stopped.steps
-    answers = {"overshot": stopped.over > 0, "early": early}
+    answers = {"layouts overshot": stopped.over > 0, "layouts early": early}
     counts = {
         name: _count(yes.groupby(stopped.layout).mean() > MAJORITY) for name, yes in answers.items()
     }

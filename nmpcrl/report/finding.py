@@ -57,8 +57,8 @@ def numbers(found: Finding | None) -> str:
           the robot does not arrive.
           [In plain words](07_beyond.ipynb#beyond-plain-words)
         - **{stopped_runs_of_RDES}** runs of RDES had to be stopped when the noise decays per
-          episode, {stopped_early} of them within {early} episodes; per step {stopped_per_step} and
-          {early_per_step}. [Fig. 5.3](05_results.ipynb#fig-results-c1)
+          episode, {stopped_early} of them within {early} episodes; per step {stopped_per_step} were
+          stopped, and {early_per_step} so early. [Fig. 5.3](05_results.ipynb#fig-results-c1)
         """,
         origin=ORIGIN,
         arrived_with_open_gaps=Count(*found.arrived_open),

@@ -58,8 +58,8 @@ def _counted(readings: Sequence[Halves]) -> str:
     first, second = readings[0].learners
     parts = [
         f"with noise that decays per {one.decay} in {one.counts[0]} of {one.pairs} runs of {first}"
-        f" and {one.counts[1]} of {second} (of {one.apart} pairs that differ {one.as_claimed} go as"
-        f" claimed, McNemar's p = {one.p:.2g})"
+        f" and {one.counts[1]} of {second} (pairs that differ: {one.apart}, as claimed:"
+        f" {one.as_claimed}; McNemar's p = {one.p:.2g})"
         for one in readings
     ]
     return f"{readings[0].wrong.capitalize()}: {'; '.join(parts)}."

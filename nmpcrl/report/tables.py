@@ -289,7 +289,7 @@ def _share(verdict: Verdict, source: str = PUBLISHED) -> str:
     lines = [cited(format(number, form), number, f"{verdict.claim}, {kind}: {source}")]
     if not isnan((other := anew(verdict)).low):
         what = f"{verdict.claim}, share with layouts drawn anew: {source}"
-        lines.append(cited(f"layouts anew [{other.low:.0%}, {other.high:.0%}]", other, what))
+        lines += ["layouts anew", cited(f"[{other.low:.0%}, {other.high:.0%}]", other, what)]
     return "".join(f"<br>{line}" for line in lines)
 
 

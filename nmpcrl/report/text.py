@@ -97,7 +97,7 @@ def legend(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
         asked = kept_without_noise(runs, BY_RUNS["C7"].learners)
         stopped = (asked.kept & asked.stopped).sum()
         asked_twice = (
-            " C7 is asked twice: its percentage counts the runs that kept every constraint in"
+            " C7 has two questions: its percentage counts the runs that kept every constraint in"
             f" training, too. Without noise, {asked.kept.sum()} of {len(asked)} runs kept them,"
             f" {stopped} of which had to be stopped in training."
         )

@@ -96,9 +96,9 @@ def coverage(timings: pd.DataFrame) -> str:
     share = others.inside.sum() / others.repetitions.sum()
     return (
         f"The measurement was repeated {times} times, and the intervals are of how far the"
-        f" repetitions are apart. Of the {times} intervals that they have themselves, at least"
-        f" {least} hold what all come to together, for every learner and solver, and {share:.0%} of"
-        " all; at 95 % one in twenty should miss."
+        f" repetitions are apart. Each repetition has an interval of 95 % of its own: at least"
+        f" {least} of {times} contain the ratio of all repetitions together, for every learner and"
+        f" solver, and {share:.0%} over all."
     )
 
 

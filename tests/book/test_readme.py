@@ -13,7 +13,7 @@ from nmpcrl import learning
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import published
 from nmpcrl.claims.finding import finding
-from nmpcrl.claims.paper_claims import BY_TIME, CLAIMS
+from nmpcrl.claims.paper_claims import BY_RUNS, BY_TIME, CLAIMS, kept_without_noise
 from nmpcrl.claims.rule import anew
 from nmpcrl.claims.timing import decide
 from nmpcrl.claims.verdict import UNDECIDABLE
@@ -85,6 +85,17 @@ def test_c1_and_c3_are_said_with_both_of_their_intervals():
     assert said.format(*bounds) in text
     slow = "{:.2f} to {:.2f} at the paper's".format(*ratios_at_paper_speed(known.timings))
     assert f"{known.verdict('C3').ratio:.2f} with our faster Ipopt, {slow}" in text
+
+
+def test_c7_is_said_with_both_of_its_questions():
+    known = published.load()
+    kept = kept_without_noise(known.main, BY_RUNS["C7"].learners).kept
+    always, of = known.verdict("C7").counts["all"]
+    said = (
+        f"{kept.sum()} of {of} RDES runs keep the constraints without noise; in training, too,"
+        f" {always} do"
+    )
+    assert said in README.replace("\n", " ")
 
 
 def test_one_number_by_hand_is_said_with_the_layouts_in_which_it_fails():

@@ -132,7 +132,10 @@ def test_without_a_failure_no_predictor_is_ahead(difficulty):
 def test_closing_gaps_is_confirmed_by_both_halves_only(difficulty):
     success = population.succeeds(table(judged()))
     answer = population.closing_gaps(difficulty, success)
-    assert answer.counts == {"fails where it closes": (4, 4), "succeeds elsewhere": (16, 16)}
+    assert answer.counts == {
+        "layouts fail where it closes": (4, 4),
+        "layouts succeed elsewhere": (16, 16),
+    }
     assert answer.outcome == REPRODUCED
     assert answer.words == "confirmed"
     never = pd.Series(dict.fromkeys(NAMES, True))
@@ -146,13 +149,13 @@ def test_a_longer_horizon_is_asked_for_where_the_short_one_fails():
         helped = part == "N = 40"
         rows += [made(part, "ES", n, better=helped and n == names[1]) for n in names]
     answer = population.horizon(table(rows))
-    assert answer.counts == {"still fails": (6, 7)}
+    assert answer.counts == {"layouts still fail": (6, 7)}
 
 
 def test_the_same_gap_closes_at_the_same_theta_c_up_to_a_step_of_the_grid():
     stops = pd.DataFrame({10: [0.2, 0.2, np.nan, 0.1], 20: [0.25, 0.4, 0.1, np.nan]})
     answer = population.gaps_and_horizon(stops.assign(**{"40": 0.2}).rename(columns={"40": 40}))
-    assert answer.counts == {"same": (1, 3)}
+    assert answer.counts == {"layouts the same": (1, 3)}
 
 
 def test_the_trap_is_asked_of_the_runs_that_do_not_arrive():

@@ -17,14 +17,14 @@ def test_how_often_each_went_wrong_is_one_sentence_a_way_of_going_wrong():
     again = replace(CLAIMED, decay="episode", counts=(5, 6))
     both = replace(VERDICT, halves=(CLAIMED, again, stopped))
     assert halves.own(both) == (
-        "Diverged: with noise that decays per step in 20 of 20 runs of DES and 10 of RDES (of 10"
-        " pairs that differ 10 go as claimed, McNemar's p = 0.002); with noise that decays per"
-        " episode in 5 of 20 runs of DES and 6 of RDES (of 10 pairs that differ 10 go as claimed,"
+        "Diverged: with noise that decays per step in 20 of 20 runs of DES and 10 of RDES (pairs"
+        " that differ: 10, as claimed: 10; McNemar's p = 0.002); with noise that decays per"
+        " episode in 5 of 20 runs of DES and 6 of RDES (pairs that differ: 10, as claimed: 10;"
         " McNemar's p = 0.002)."
     )
     assert halves.apart(both) == (
         f"{halves.own(both)} Had to be stopped: with noise that decays per step in 3 of 20 runs of"
-        " DES and 1 of RDES (of 2 pairs that differ 2 go as claimed, McNemar's p = 0.5)."
+        " DES and 1 of RDES (pairs that differ: 2, as claimed: 2; McNemar's p = 0.5)."
     )
     assert halves.own(VERDICT) == ""
     assert halves.apart(replace(VERDICT, each="Each.")) == "Each."

@@ -62,8 +62,8 @@ def test_the_coverage_is_that_of_the_worst_and_of_all():
     rows = [("ES", 10, 10), ("GES", 10, 9), ("RDES", 10, 10)]
     said = timing.coverage(pd.DataFrame(rows, columns=["learner", "repetitions", "inside"]))
     assert "repeated 10 times" in said
-    assert "at least 9 hold" in said
-    assert "95% of all" in said
+    assert "at least 9 of 10 contain" in said
+    assert "95% over all" in said
 
 
 def test_a_ratio_has_its_interval_and_carries_what_it_is_of(measured):
