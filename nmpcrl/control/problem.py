@@ -194,12 +194,15 @@ class Problem(Described):
 
     @cached_property
     def typical_row_sizes(self) -> Vector:
-        """The largest of `row_sizes` among states of the sizes -1, 0 and 1, shape (M,)."""
+        """The largest of `row_sizes` among states of the sizes -1, 0 and 1, or 1, shape (M,).
+
+        A row that nothing moves there, as where its data are zeros, has no size to be read.
+        """
         e, still = self.expressions, np.clip(np.zeros(self.inputs), self.lower, self.upper)
         sizes = ca.Function("sizes", [e.x, e.u, e.theta, e.d], [self.row_sizes])
         at = [sizes(k * self.sizes[0], still, self.theta, self.data[0]) for k in (-1, 0, 1)]
-        found: Vector = np.max([one.full().ravel() for one in at], axis=0, initial=LEAST)
-        return found
+        found: Vector = np.max([one.full().ravel() for one in at], axis=0, initial=0.0)
+        return np.where(found > LEAST, found, 1.0)
 
     @cached_property
     def solved(self) -> "Problem":

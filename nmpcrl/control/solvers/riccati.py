@@ -163,7 +163,7 @@ class Riccati(Solver):
     def starts_of(self, ocp: Ocp) -> int:
         """How many cold starts are compared: 1 for a task, as published, 9 or 2 for a `Problem`.
 
-        9 if it has rows. A `Problem` for which none are said has one more, that of a `Regulator`.
+        9 if it has rows. A `Problem` whose model grows has one more, that of a `Regulator`.
         """
         if self.starts is not None or not isinstance(ocp, ProblemOcp):
             return self.starts or 1
@@ -224,8 +224,9 @@ class Compiled(ABC):
             if end == SOLVED and value < ABSURD:
                 if start == COLD:
                     first = Found(value, iterations, violation, out)
+                    others = self._others if warm_start is None else []
                     value, iterations, violation, out = self._best(
-                        first, problem, state, theta, given
+                        first, others, problem, state, theta, given
                     )
                 return Solution(
                     state,
@@ -249,10 +250,12 @@ class Compiled(ABC):
             theta,
         )
 
-    def _best(self, first: Found, problem: tuple[Any, ...], *given: Vector) -> Found:
-        """The best plan of all cold starts; the earlier one where they are as good."""
+    def _best(
+        self, first: Found, others: list[Matrix], problem: tuple[Any, ...], *given: Vector
+    ) -> Found:
+        """The best plan of the cold starts; the earlier one where they are as good."""
         best = first
-        for inputs in chain(self._others, self._regulated(problem, *given)):
+        for inputs in chain(others, self._regulated(problem, *given)):
             out, point = np.empty(self._size), self._standing.copy()
             point[self._ocp.inputs] = inputs
             value, iterations, end, violation, _ = self._code(

@@ -55,8 +55,8 @@ from .model import NTHETA, NU, NX
 PLANNED, SETTLED = 1, 2  # else absent
 ABSURD = 1e9  # no plan goes through such a state
 STEEP = 100.0  # slope of a stage at s beyond which it is scaled down to this, as by Ipopt
-STRAYS = 30.0  # times a first deviation from a plan that a rollout may be off before it is held
-ROUNDED = 1e-6  # deviation that is none
+GROWS = 30.0  # times a deviation that a plan is left by before feedback has to hold it
+SMALL = 1e-6  # deviation of which that is read
 WITHIN = 1.0 - TAU_REST  # the most of its way to a bound that an input may go along the feedback
 
 
@@ -71,6 +71,7 @@ class Task(NamedTuple):
     rate: np.ndarray  # scaled gamma^i, (N + 1,)
     weights: np.ndarray  # W, (N + 1, NROWS)
     first: int  # the first stage with a free input: 1 if u_0 is given, else 0
+    held: np.ndarray  # (1,): whether the model grows, so that feedback has to hold it to a plan
 
 
 class Stages(NamedTuple):
@@ -251,10 +252,16 @@ def follow(task, plan, step, length, point):
 
 @inlined
 def search(task, point, trial, mu, step, length, total, derivative):
-    """Step 7, by rolling out along the feedback and not along the step of the inputs."""
+    """Step 7; a model that grows is rolled out along the feedback, and not the inputs alone."""
     while length > SHORTEST:
-        follow(task, point, step, length, trial)
-        objective, reached = measure(task, trial, mu)
+        if task.held[0]:
+            follow(task, point, step, length, trial)
+            objective, reached = measure(task, trial, mu)
+        else:
+            for i in range(len(step.u)):
+                for a in range(NU):
+                    trial.u[i, a] = point.u[i, a] + length * step.u[i, a]
+            objective, reached = evaluate(task, trial, mu)
         if reached <= total + ARMIJO * length * derivative + ROUNDING * abs(total):
             return objective, reached
         length *= BACKTRACKS
@@ -262,21 +269,34 @@ def search(task, point, trial, mu, step, length, total, derivative):
 
 
 @inlined
-def strays(task, point, plan, start, warm_start):
-    """Whether what is rolled out from a warm start leaves its plan, which is put into `plan`."""
-    last, most = len(point.u), 0.0
-    first = 0.0  # how far off it is in the first two stages
+def recall(task, start, warm_start, inputs, plan):
+    """The states of a warm start, a stage later where it is shifted; its inputs are given."""
+    last = len(inputs)
     for i in range(last + 1):
         at = offsets(task, min(i + (1 if start == SHIFTED else 0), last))[0]
         for a in range(NX):
             plan.x[i, a] = warm_start[at + a]
-            off = abs(point.x[i, a] - plan.x[i, a])
-            first = max(first, off) if i < 2 else first
-            most = off if not off <= most else most
-        if i < last:
-            for a in range(NU):
-                plan.u[i, a] = point.u[i, a]
-    return not most <= STRAYS * first + ROUNDED
+        for a in range(NU if i < last else 0):
+            plan.u[i, a] = inputs[i, a]
+
+
+@inlined
+def grows(task, plan):
+    """Whether a deviation of the first state becomes `GROWS` times as large along a plan."""
+    moved, there, after = np.empty(NX), np.empty(NX), np.empty(NX)
+    for b in range(NX):
+        for a in range(NX):
+            after[a] = SMALL if a == b else 0.0
+        for i in range(len(plan.u)):
+            for a in range(NX):
+                moved[a] = plan.x[i, a] + after[a]
+            transition(plan.x[i], plan.u[i], task.theta, task.data[i], there)
+            transition(moved, plan.u[i], task.theta, task.data[i], after)
+            for a in range(NX):
+                after[a] -= there[a]
+                if not abs(after[a]) <= GROWS * SMALL:
+                    return True
+    return False
 
 
 @inlined
@@ -293,7 +313,8 @@ def scaled(theta, data, lower, upper, kind, discount, weights, factor, first, st
         rate[i] = discount[i] / factor
         for j in range(NROWS):
             scaled_weights[i, j] = weights[j] * rate[i]
-    return Task(theta, data, lower, upper, kind, rate, scaled_weights, first), factor
+    held = np.zeros(1, np.int64)
+    return Task(theta, data, lower, upper, kind, rate, scaled_weights, first, held), factor
 
 
 @inlined

@@ -23,11 +23,12 @@ from .rows import (
     condense,
     evaluate,
     follow,
+    grows,
     initialise_rows,
     linearise,
     measure,
+    recall,
     scaled,
-    strays,
     write_solution,
 )
 
@@ -58,14 +59,19 @@ def solve(
         trial.x[0, a] = state[a]
     objective, total = evaluate(task, point, mu)
     initialise_rows(task, point, duals, start, mu, factor, warm_start)
-    if start != COLD and strays(task, point, trial, start, warm_start):
-        measure(task, trial, mu)
-        linearise(task, trial, duals, stages)
-        condense(task, trial, duals, stages, mu)
-        if factorise(stages, 0.0, task.first, step):
-            follow(task, trial, step, 0.0, point)
-            objective, total = measure(task, point, mu)
-            initialise_rows(task, point, duals, start, mu, factor, warm_start)
+    if start == COLD:
+        task.held[0] = grows(task, point)
+    else:
+        recall(task, start, warm_start, point.u, trial)
+        task.held[0] = grows(task, trial)
+        if task.held[0]:
+            measure(task, trial, mu)
+            linearise(task, trial, duals, stages)
+            condense(task, trial, duals, stages, mu)
+            if factorise(stages, 0.0, task.first, step):
+                follow(task, trial, step, 0.0, point)
+                objective, total = measure(task, point, mu)
+                initialise_rows(task, point, duals, start, mu, factor, warm_start)
         for a in range(NX):
             trial.x[0, a] = state[a]
     point, objective, iterations, ended, error = iterate(

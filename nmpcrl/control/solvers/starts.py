@@ -12,6 +12,7 @@ from nmpcrl.control.problem import Problem
 
 SHARES = (0.4, 1.0)  # of the bounds near which inputs are held
 CORNERS = 8  # of the box of inputs, at most, with each share
+GROWS = 30.0  # what a deviation from rest has to become, in itself, for a start of its own
 LEAST = 1e-6  # curvature of a cost that is made convex, in parts of the largest
 PUSH = 1.01e-2  # inside its bounds an input stays, that of `kernel`, so that it is not moved there
 MOST = 64  # cold starts that can be asked for
@@ -50,7 +51,14 @@ class Regulator:
         self._end = ca.Function("end", [e.x, e.theta, e.d], [*ca.hessian(e.terminal, e.x)])
 
     def inputs(self, state: Vector, theta: Vector, data: Matrix, *action: Vector) -> Matrix | None:
-        """The inputs, shape (N, m), u_0 = `action` if given; None where a number is not finite."""
+        """The inputs, shape (N, m), u_0 = `action` if given; None if the model does not grow at s.
+
+        Nor are there any where a number is not finite.
+        """
+        slopes = self._stage(state, self._still, theta, data[0])[1].full()[:, : state.size]
+        growth = np.abs(np.linalg.matrix_power(slopes, self._problem.horizon)).max()
+        if growth <= GROWS:
+            return None
         still, gains = self._still, self._gains(state, theta, data)
         inputs: Matrix = np.empty((len(gains), still.size))
         x = state
