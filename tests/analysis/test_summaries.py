@@ -183,7 +183,7 @@ def rewritten(path: Path, change) -> None:
 
 
 DAMAGES = {
-    "two bytes garbled": lambda path: garble(path, 2),
+    "bytes garbled": lambda path: garble(path, 20),
     "cut short": lambda path: path.write_bytes(path.read_bytes()[:-300]),
     "empty": lambda path: path.write_bytes(b""),
     "of another run": lambda path: shutil.copy(summaries.path_of(THREE[1]), path),

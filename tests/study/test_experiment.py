@@ -89,7 +89,7 @@ REFUSED = [
     ("alpha", 0, "must be a number in (0, 1e+06]"),
     ("alpha", np.nan, "must be a number in (0, 1e+06]"),
     ("alpha", np.inf, "must be a number in (0, 1e+06]"),
-    ("alpha", "1e-7", "must be a number in (0, 1e+06]"),
+    ("alpha", "1e-7", "arrived as text; write 1.0e-7"),
     ("alpha", True, "must be a number in (0, 1e+06]"),
     ("beta", -1.0, "must be a number in (0, 1e+06]"),
     ("zeta", 0.0, "must be a number in (0, 1e+06]"),
