@@ -22,9 +22,9 @@ def pendulum(horizon: int) -> Problem:
         states=2,
         inputs=1,
         horizon=horizon,
-        theta={"gravity": 9.81},
+        theta={"gravity": 9.81, "price": 0.01},
         model=lambda x, u, th: rk4(lambda x, u: swing(x, u, th["gravity"]), x, u, PERIOD),
-        stage=lambda x, u, th: x[0] ** 2 + 0.1 * x[1] ** 2 + 0.01 * u[0] ** 2,
+        stage=lambda x, u, th: x[0] ** 2 + 0.1 * x[1] ** 2 + th["price"] * u[0] ** 2,
         terminal=lambda x, th: 50 * x[0] ** 2 + 5 * x[1] ** 2,
         lower=-5.0,
         upper=5.0,
@@ -78,7 +78,7 @@ def test_derivatives_of_a_standing_pendulum_are_those_of_dense_algebra(horizon):
     problem = pendulum(horizon)
     ours, dense = (Nmpc(problem, solver=name) for name in ("riccati", "fatrop"))
     found, other = (nmpc.solve([0.1, 0.0], problem.theta) for nmpc in (ours, dense))
-    along = np.ones(1)
+    along = np.array([1.0, 0.01])
     np.testing.assert_allclose(
         ours.value_hessian_times(found, along), dense.value_hessian(other) @ along, rtol=1e-4
     )
@@ -127,6 +127,9 @@ def test_fatrop_takes_over_where_riccati_finds_no_optimum(monkeypatch):
     found = nmpc.solve([1.0], problem.theta, best)
     assert (found.status, found.solver) == (Status.TAKEN_OVER, "fatrop")
     assert found.value == pytest.approx(best.value, rel=1e-6)
+    policy = nmpc.policy_jacobian(best)
+    monkeypatch.setattr("nmpcrl.control.solvers.riccati.problem_slopes", None)
+    np.testing.assert_allclose(nmpc.policy_jacobian(found), policy, atol=1e-5)
 
 
 @pytest.mark.usefixtures("interpreted")

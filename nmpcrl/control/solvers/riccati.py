@@ -417,6 +417,8 @@ class ProblemPoint(Compiled):
         return self._slopes(solution, np.zeros(solution.theta.size), states, inputs)
 
     def _slopes(self, solution: Solution, *directions: Matrix) -> Vector | None:
+        if solution.took_over:  # whose states are not rolled out: dense algebra answers
+            return None
         out = np.empty(solution.theta.size)
         formed = problem_slopes(self._problem)(*self._given(solution), *directions, out)
         return out if formed else None

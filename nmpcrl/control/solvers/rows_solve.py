@@ -5,6 +5,9 @@ from numba import float64, int64, njit, types
 
 from .kernel import (
     COLD,
+    DELTA_FIRST,
+    DELTA_GROWS,
+    DELTA_LARGEST,
     RIGID,
     SADDLE,
     SOLVED,
@@ -68,10 +71,12 @@ def solve(
             measure(task, trial, mu)
             linearise(task, trial, duals, stages)
             condense(task, trial, duals, stages, mu)
-            if factorise(stages, 0.0, task.first, step):
-                follow(task, trial, step, 0.0, point)
-                objective, total = measure(task, point, mu)
-                initialise_rows(task, point, duals, start, mu, factor, warm_start)
+            added = 0.0
+            while not factorise(stages, added, task.first, step) and added < DELTA_LARGEST:
+                added = max(DELTA_GROWS * added, DELTA_FIRST)
+            follow(task, trial, step, 0.0, point)
+            objective, total = measure(task, point, mu)
+            initialise_rows(task, point, duals, start, mu, factor, warm_start)
         for a in range(NX):
             trial.x[0, a] = state[a]
     point, objective, iterations, ended, error = iterate(
