@@ -36,7 +36,7 @@ def plain(markdown: str) -> str:
 
 def test_the_finding_says_both_readings_of_the_decay_and_both_kinds_of_layouts():
     said = plain(finding.sentences(FOUND))
-    assert "saves 21% of the cost in the 2 of 7 layouts" in said
+    assert "saves 21% in the 2 of 7 layouts" in said
     assert "it costs 30% to 90% more" in said
     assert "in 4 of 9 runs if noise decays per episode, and in 1 of 9 if" in said
 
