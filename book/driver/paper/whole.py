@@ -216,6 +216,9 @@ def entry(target: str, heading: Element) -> str:
 
 
 def section(one: Page) -> str:
+    for name, heading in one.sections:  # a section may begin on the page before its heading
+        heading["id"] = name
+        del heading.parent["id"]
     part = f'<h1 class="part">{escape(one.part)}</h1>' if one.part else ""
     return f'<section id="{identifier(one.name)}">{part}\n{one.article}\n</section>'
 
