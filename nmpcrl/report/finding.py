@@ -22,9 +22,9 @@ def sentences(found: Finding | None) -> str:
         the gaps on its way stay open, and leads the robot to a dead end where learning itself
         closes one.** One number set by hand saves {saved_by_hand:.0%} in the {solved_by_hand}
         layouts where the robot still arrives, and learning {saved_there:.0%}; in the others it
-        costs {least_lost_by_hand:.0%} to {most_lost_by_hand:.0%} more. With the paper's network
-        (RDES), learning broke down within {early} episodes in {early_per_episode} runs if noise
-        decays per episode, and in {early_per_step} if per step, as printed.
+        costs {least_lost_by_hand:.0%} to {most_lost_by_hand:.0%} more. The paper's network (RDES)
+        broke down within {early} episodes in {early_per_episode} runs if noise decays per episode,
+        and in {early_per_step} if per step.
         """,
         origin=ORIGIN,
         saved_by_hand=Cited(found.saved_by_hand, f"saved {BY_HAND}"),
