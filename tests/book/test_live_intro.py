@@ -19,7 +19,10 @@ LEARNED = """() => {
   const { given } = document.querySelector("figure.live").shown
   return !given.learning && given.episode === 300
 }"""
-GOING = "() => document.querySelector('figure.live').shown.given.episode > 2"
+GOING = """() => {
+  const { learning, episode } = document.querySelector('figure.live').shown.given;
+  return learning && episode > 2;
+}"""
 RESTING = "() => !document.querySelector('figure.live').shown.given.learning"
 TOP = "document.querySelector('figure.live svg').getBoundingClientRect()"
 
