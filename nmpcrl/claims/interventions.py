@@ -2,7 +2,8 @@
 
 `population_questions` asks whether RDES survives with theta held in the network ("extrapolation").
 The runs that answer are those of RDES that were stopped, with noise that decays per episode: all of
-layouts A to F, and of the drawn layouts the first `SAMPLE` in a drawn order, one run in each.
+layouts A to F, and all of the drawn layouts. Of these, the first `SAMPLE`, one in each layout in a
+drawn order, were registered and made first; the others were registered when those were known.
 
 **Arms.** "theta held" and "true slope", of `analysis.extrapolation`. "nudged" is the control: the
 run as it was, with 1e-9 added to each number of theta_init. Learning is chaotic, and a run that was
@@ -18,7 +19,7 @@ border, of A to F alone.
 least 90 %. Seen before: the two runs of Chapter 12 and three more, of which two lived with theta
 held and all with the true slope.
 
-**Price.** 23 s a run, 33 minutes of one core. If time ends, what is whole by then in the order of
+**Price.** 23 s a run, 65 minutes of one core. If time ends, what is whole by then in the order of
 `runs` is all there is; the order knows no result.
 """
 
@@ -38,7 +39,7 @@ from nmpcrl.claims.thresholds import was_stopped
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.population_design import name_of
 
-DRAW, SAMPLE = 41, 50  # the seed of the order; drawn layouts of which one run is made again
+DRAW, SAMPLE = 41, 50  # the seed of the order; drawn layouts of which one run was made again first
 NUDGE = 1e-9
 ARMS = ("theta held", "true slope", "nudged")
 HELD = Extendable(
@@ -47,21 +48,29 @@ HELD = Extendable(
 
 
 def runs() -> dict[str, Experiment]:
-    """The stopped runs that are made again, those of A to F first, each part in a drawn order."""
-    tables = {"six": published.load().main, "drawn": population_published.load().main}
+    """The stopped runs that are made again: those of A to F, the sample, the others."""
+    six = _stopped(published.load().main)
+    drawn = _stopped(population_published.load().main)
+    sample = _shuffled(drawn.drop_duplicates("layout"))[:SAMPLE]
+    others = _shuffled(drawn.drop(sample.index))
     chosen = {}
-    for part, table in tables.items():
-        stopped = table[was_stopped(table)].query("learner == 'RDES' and decay == 'episode'")
-        some, rng = stopped.sort_values(["layout", "seed"]), np.random.default_rng(DRAW)
-        if part == "drawn":
-            some = some.drop_duplicates("layout")
-        order = rng.permutation(len(some))[: SAMPLE if part == "drawn" else None]
-        for one in some.iloc[order].itertuples():
+    for part, table in (("six", _shuffled(six)), ("drawn", sample), ("drawn", others)):
+        for one in table.itertuples():
             place = name_of(one.layout) if part == "drawn" else one.layout
             chosen[f"{part} {place} {one.seed}"] = Experiment(
                 "RDES", layout=one.layout, decay="episode", seed=int(one.seed)
             )
     return chosen
+
+
+def _stopped(table: pd.DataFrame) -> pd.DataFrame:
+    """The stopped runs of RDES whose noise decays per episode, by layout and seed."""
+    stopped = table[was_stopped(table)].query("learner == 'RDES' and decay == 'episode'")
+    return stopped.sort_values(["layout", "seed"])
+
+
+def _shuffled(table: pd.DataFrame) -> pd.DataFrame:
+    return table.iloc[np.random.default_rng(DRAW).permutation(len(table))]
 
 
 def lived(experiment: Experiment, arm: str) -> int:

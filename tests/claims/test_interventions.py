@@ -4,22 +4,26 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from fixed_questions import assert_older, assert_unmoved
+from fixed_questions import assert_older, git
 
 from nmpcrl.analysis.extrapolation import Outcome
 from nmpcrl.claims import interventions
+from nmpcrl.study.provenance import code
 
 
 def test_the_runs_were_fixed_before_they_were_made():
     file = Path(interventions.__file__)
-    assert_unmoved(file)
     assert_older(file, "book/published/interventions.json")
+    path = file.relative_to(ROOT).as_posix()
+    assert code(git("show", f"{EXTENDED}:{path}")) == code(file.read_text("utf-8"))
+    others = git("log", "--format=%H", f"-S{LAST}", "--", "book/published/interventions.json")
+    assert git("rev-parse", EXTENDED) in git("rev-list", f"{others.splitlines()[-1]}^").split()
 
 
-def test_all_stopped_runs_of_the_six_layouts_are_made_again_and_one_of_each_of_50_drawn_ones():
+def test_all_stopped_runs_are_made_again_beginning_with_one_of_each_of_50_drawn_layouts():
     chosen = [name.split() for name in interventions.runs()]
-    assert [part for part, *_ in chosen] == ["six"] * 37 + ["drawn"] * 50
-    assert len({layout for part, layout, _ in chosen if part == "drawn"}) == 50
+    assert [part for part, *_ in chosen] == ["six"] * 37 + ["drawn"] * 133
+    assert len({layout for part, layout, _ in chosen[37:87]}) == 50
 
 
 def test_a_nudged_run_starts_a_little_beside_theta_init(monkeypatch):
