@@ -22,7 +22,7 @@ from nmpcrl.learning.bootstrap import Bootstrap, Imitation, Successor, Transitio
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Diverged, Step, train
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.setup import controller_of, environment_of, prepare
+from nmpcrl.study.setup import controller_of, prepare
 from nmpcrl.study.storage.executor import execute
 
 if TYPE_CHECKING:
@@ -131,11 +131,14 @@ def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
         return successor
 
     found, stopped = _Columns(), False
-    how: dict[str, Any] = environment_of(experiment) | {
-        "clipped": experiment.clipped,
-        "constrained": experiment.values_actions,
-    }
-    steps = train(replace(learner, bootstrap=watched), controller, weights, explore, **how)
+    steps = train(
+        replace(learner, bootstrap=watched),
+        controller,
+        weights,
+        explore,
+        clipped=experiment.clipped,
+        constrained=experiment.values_actions,
+    )
     try:
         for step in steps:
             found.add(step, experiment.alpha, fed)

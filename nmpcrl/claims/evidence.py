@@ -24,7 +24,7 @@ from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
 from nmpcrl.study.parameters import OneOf, Truth
 from nmpcrl.study.records import Column, Stopped
-from nmpcrl.study.setup import controller_of, environment_of
+from nmpcrl.study.setup import controller_of
 from nmpcrl.study.store import Runs
 
 SOURCES = ("published", "fresh")
@@ -168,8 +168,7 @@ def with_inputs(found: Evidence) -> Evidence:
 
 def _inputs(experiment: Experiment, theta: Vector) -> Column:
     """Of a rollout without noise, shape (K + 1, m); nan after a failed solve."""
-    around = environment_of(experiment)
-    actions = evaluate(controller_of(experiment), theta, experiment.steps, **around).actions
+    actions = evaluate(controller_of(experiment), theta, experiment.steps).actions
     missing = ((0, experiment.steps - len(actions)), (0, 0))
     return np.pad(actions, missing, constant_values=np.nan)
 

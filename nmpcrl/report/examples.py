@@ -9,7 +9,7 @@ from nmpcrl import Vector
 from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.setup import controller_of, environment_of
+from nmpcrl.study.setup import controller_of
 
 SETTINGS = (
     "learner", "alpha", "beta", "beta_tdc", "zeta", "decay", "decay_rate", "horizon", "seed",
@@ -112,8 +112,7 @@ def tie() -> Example:
 def first_rollout(experiment: Experiment) -> Rollout:
     """Without noise, with the theta that a run begins with."""
     theta: Vector = np.array(experiment.theta)
-    around = environment_of(experiment)
-    return evaluate(controller_of(experiment), theta, experiment.steps, **around)
+    return evaluate(controller_of(experiment), theta, experiment.steps)
 
 
 def _slope(experiment: Experiment, by: float) -> float:

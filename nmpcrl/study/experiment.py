@@ -20,7 +20,6 @@ from nmpcrl.study.parameters import (
     Truth,
     Whole,
 )
-from nmpcrl.study.plants import PLANTS
 
 PAPER = ("ES", "DES", "RDES", "GES")  # the paper's learners
 MAIN = (*PAPER, "TDC", "frozen")  # of the main table
@@ -97,7 +96,6 @@ class Experiment:
     steps: int = option(paper.STEPS, Whole(1, MOST_STEPS), "Of an episode.")
     start: tuple[float, ...] = option(paper.START, WITHIN, "Where an episode begins.")
     target: tuple[float, ...] = option(paper.TARGET, WITHIN, "Where the robot is to go.")
-    plant: str = option("model", OneOf(PLANTS), "In the loop, whatever the plan predicts.")
     horizon: int = option(paper.HORIZON, Whole(1, MOST_STAGES), "N, the inputs of a plan.")
     solver: str = option("riccati", OneOf(solvers.SOLVERS), "What solves Eq. (2).")
     tolerance: float = option(

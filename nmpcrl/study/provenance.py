@@ -72,7 +72,6 @@ ORIGINAL: dict[str, Any] = {
     "steps": 130,
     "start": (-2.5, 1.5, 0.0),
     "target": (8.5, 2.0, math.pi / 2),
-    "plant": "model",
     "horizon": 10,
     "solver": "riccati",
     "tolerance": 1e-8,

@@ -43,6 +43,7 @@ LAST = 3  # rollouts that the final cost averages
 STATES = len(paper.START)  # n of the robot
 INPUTS = len(paper.THETA_INIT) - 2 * STATES - 1  # m of the robot
 MOST = 10**9  # of anything
+REMOVED = {"plant": "model"}  # fields that old files have, and the value that is read
 
 Read = TypeVar("Read")
 
@@ -277,12 +278,14 @@ def _sizes(named: dict[str, Any]) -> Sizes:
 def _with_facts(about: dict[str, Any], read: Callable[[dict[str, Any]], Read]) -> Read:
     """What `read` makes of the name of a run that has all `Facts`; a ValueError if it has not."""
     try:
+        fields = about["experiment"].items()
+        about["experiment"] = {name: value for name, value in fields if REMOVED.get(name) != value}
         named = read(about["experiment"])
         for fact in Facts.__required_keys__:
             kind = Facts.__annotations__[fact]
             if not isinstance(about["facts"][fact], int | float if kind is float else kind):
                 raise ValueError(f"its {fact} is {about['facts'][fact]!r}")
-    except (LookupError, TypeError) as error:
+    except (AttributeError, LookupError, TypeError) as error:
         raise ValueError("it does not say which run it is, or what became of it") from error
     return named
 

@@ -17,7 +17,6 @@ from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import DECAYS, LEARNERS, Generators, Settings
 from nmpcrl.study.parameters import ParameterError
-from nmpcrl.study.plants import plant_of
 from nmpcrl.study.trial import Trial
 
 
@@ -57,7 +56,7 @@ def job_of(named: Experiment | Trial) -> Job:
     options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
     return Job(
         asdict(experiment), controller, *prepare(experiment, controller), step_size(experiment),
-        experiment.evaluate_every, options, environment_of(experiment),
+        experiment.evaluate_every, options,
     )  # fmt: skip
 
 
@@ -91,12 +90,6 @@ def _job_of_trial(trial: Trial) -> Job:
     )
 
 
-def environment_of(experiment: Experiment) -> dict[str, Any]:
-    """The plant in the loop, as `train` and `evaluate` take it; nothing where it is the plan's."""
-    plant = plant_of(experiment.plant)
-    return {"plant": plant} if plant else {}
-
-
 def controller_of(experiment: Experiment) -> Persistent:
     """The controller whose theta is learned."""
     nmpc = paper.controller(
@@ -113,7 +106,7 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
     named = tuple(named)
     _compile_trials(one for one in named if isinstance(one, Trial))
     kinds = {
-        (e.layout, e.start, e.target, e.box, e.solver, e.plant, LEARNERS[e.learner].curved): e
+        (e.layout, e.start, e.target, e.box, e.solver, LEARNERS[e.learner].curved): e
         for e in named
         if isinstance(e, Experiment)
     }
@@ -121,8 +114,7 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
         controller = controller_of(experiment)
         nmpc, theta = controller.nmpc, np.array(paper.THETA_INIT)
         solution = nmpc.solve(nmpc.task.start, theta)
-        plant = plant_of(experiment.plant) or nmpc.plant
-        plant.step(solution.state, solution.action)
+        nmpc.plant.step(solution.state, solution.action)
         nmpc.task.stage_cost(solution.state, solution.action)
         if LEARNERS[experiment.learner].curved:
             nmpc.value_hessian_times(solution, theta)

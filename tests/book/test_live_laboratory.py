@@ -14,7 +14,7 @@ from nmpcrl.learning.rollout import evaluate
 from nmpcrl.report import continuing
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.experiment import frozen_arm
-from nmpcrl.study.setup import controller_of, environment_of
+from nmpcrl.study.setup import controller_of
 
 FIGURE = "laboratory"
 FINISHED = """() => {
@@ -129,10 +129,10 @@ def assert_worth_as_in_python(rows: list[dict], experiment: Experiment, digits: 
         here = delta[(episode == row["episode"] - 1) & np.isfinite(delta)]
         if here.size:
             np.testing.assert_allclose(row["delta"], np.sqrt(np.mean(here**2)), rtol=digits)
-    controller, around = controller_of(experiment), environment_of(experiment)
+    controller = controller_of(experiment)
     for row in (row for row in rows if row["judged"]):
         theta = np.array(row["theta"])
-        rollout = evaluate(controller, theta, experiment.steps, **around)
+        rollout = evaluate(controller, theta, experiment.steps)
         pairs = zip(rollout.states, rollout.actions, strict=False)
         costs = [experiment.task.stage_cost(state, action) for state, action in pairs]
         discounted = np.sum(paper.GAMMA ** np.arange(len(costs)) * costs)

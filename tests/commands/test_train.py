@@ -20,7 +20,6 @@ OTHERS = {  # another value than the default, as one types it
     "decay": ("episode", "episode"),
     "network": ("tanh", "tanh"),
     "box": ("soft", "soft"),
-    "plant": ("slipping", "slipping"),
     "solver": ("fatrop", "fatrop"),
     "theta": (THETA, (*paper.THETA_INIT[:-1], 0.002)),
     "decay_rate": ("0.5", 0.5),

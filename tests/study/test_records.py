@@ -5,7 +5,7 @@ import json
 import os
 import pickle
 import zipfile
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -67,6 +67,16 @@ def path(tmp_path):
 def test_what_is_saved_is_loaded(path):
     example().save(path)
     assert_equal(Records.load(path), example())
+
+
+def test_a_run_of_the_first_edition_which_named_its_plant_is_read(path):
+    old = example()
+    replace(old, experiment={**old.experiment, "plant": "model"}).save(path)
+    assert_equal(Records.load(path), old)
+    assert "plant" not in Records.about(path).experiment
+    replace(old, experiment={**old.experiment, "plant": "slipping"}).save(path)
+    with pytest.raises(DamagedRecords, match="does not say which run"):
+        Records.load(path)
 
 
 def test_what_a_run_is_about_can_be_read_alone(path):
