@@ -1,0 +1,218 @@
+"""Jobs on many processes of this machine, or on any executor of `concurrent.futures`.
+
+`parallel` yields each result as it arrives, so that an interruption loses only jobs in progress.
+"""
+
+import os
+import pickle
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Sized
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import closing
+from itertools import chain, islice
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import psutil
+from tqdm import tqdm
+
+from nmpcrl.study.storage.refusal import ParameterError
+
+ATTEMPTS = 3  # how often a job is begun whose process is killed
+AHEAD = 128  # jobs given to an executor of the caller's at a time
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+MEMORY = 0.45e9  # [bytes] of a worker at the end of a full run of RDES
+LIMIT = Path("/sys/fs/cgroup/memory.max")  # of a Linux container
+WAIT = 0.5  # [s] between two looks for an interrupt, which Windows does not deliver to who waits
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+Outcomes = Generator[tuple[Any, Any], None, list[Any]]  # items with results or failures
+
+
+class Failure(NamedTuple):
+    """A job that failed, and why."""
+
+    item: Any
+    error: str  # type and message
+    traceback: str = ""
+
+
+class Failed(RuntimeError):
+    """Some jobs failed; the results of all others were yielded. The message names the first."""
+
+    def __init__(self, failures: Sequence[Failure], jobs: int) -> None:
+        first = failures[0]
+        super().__init__(f"{len(failures)} of {jobs} failed, {first.item} because of {first.error}")
+        self.failures = tuple(failures)
+        self.add_note(first.traceback)
+
+
+def parallel(
+    function: Callable[[Item], Result],
+    items: Iterable[Item],
+    workers: int | None = None,
+    label: str = "",
+    executor: Executor | None = None,
+) -> Iterator[tuple[Item, Result]]:
+    """Call a function with every item; yield each item and its result as soon as it has one.
+
+    A failed job stops no other one. When a process is killed, each job in progress is begun again
+    alone, so that none fails for what another one did. Leaving the loop early ends all processes.
+
+    Args:
+        function: called in a worker; it may be defined in a notebook.
+        items: drawn in order, each shortly before a worker is free for it.
+        workers: processes with one thread each; by default as many as `check_workers` says.
+        label: of a progress bar; without a label there is none.
+        executor: makes the calls in place of new processes, `AHEAD` at a time.
+
+    Raises:
+        ParameterError: `workers` is no number of processes.
+        Failed: jobs failed; raised at the end.
+    """
+    count = check_workers(workers, sure=True)
+    total = len(items) if isinstance(items, Sized) else None
+    count = count if total is None else min(count, max(total, 1))
+    fresh = iter(items)
+    if executor:
+        outcomes = _on_executor(executor, function, fresh)
+    else:
+        outcomes = _on_processes(count, function, fresh)
+    interval = 0.1 if sys.stderr.isatty() else 30.0  # [s]; a log keeps every state of the bar
+    failures, ended = list[Failure](), 0
+    with (
+        closing(outcomes),
+        tqdm(total=total, desc=label, disable=not label, mininterval=interval) as bar,
+    ):
+        for item, made in outcomes:
+            ended += 1
+            bar.update()
+            if isinstance(made, Failure):
+                failures.append(made)
+                bar.set_postfix_str(f"{len(failures)} failed", refresh=False)
+            else:
+                yield item, made
+    if failures:
+        raise Failed(failures, ended)
+
+
+def _on_processes(count: int, function: Callable[[Item], Any], items: Iterator[Item]) -> Outcomes:
+    """Every item with its result or its `Failure`."""
+    while lost := (yield from _in_pool(count, function, items)):
+        for item in lost:
+            for _ in range(ATTEMPTS - 1):
+                if not (yield from _in_pool(1, function, iter([item]))):
+                    break
+            else:
+                yield item, Failure(item, f"the loss of its process, {ATTEMPTS} times")
+    return []
+
+
+def _in_pool(count: int, function: Callable[[Item], Any], items: Iterator[Item]) -> Outcomes:
+    """As `_until_broken`, on new processes; one job waits while the results are stored."""
+    pool = processes(count)
+    try:
+        return (yield from _until_broken(pool, function, items, count + 1))
+    finally:
+        pool.shutdown(kill_workers=True)
+
+
+def _on_executor(
+    executor: Executor, function: Callable[[Item], Any], items: Iterator[Item]
+) -> Outcomes:
+    if lost := (yield from _until_broken(executor, function, items, AHEAD)):
+        for item in chain(lost, items):
+            yield item, Failure(item, "the loss of the executor")
+    return []
+
+
+def _until_broken(
+    pool: Executor, function: Callable[[Item], Any], items: Iterator[Item], ahead: int
+) -> Outcomes:
+    """Yield items with their outcomes; return the jobs that were in progress when it broke."""
+    pending, lost = dict[Future[bytes], Any](), list[Any]()
+    while True:
+        for item in islice(items, 0 if lost else ahead - len(pending)):
+            try:
+                pending[pool.submit(_call, function, item)] = item
+            except BrokenExecutor:
+                lost.append(item)
+        if not pending:
+            return lost
+        for future in wait(pending, WAIT, FIRST_COMPLETED).done:
+            item = pending.pop(future)
+            try:
+                failed, made = pickle.loads(future.result())
+            except BrokenExecutor:
+                lost.append(item)
+                continue
+            except Exception as error:  # of an executor
+                failed, made = True, (_text(error), "")
+            del future  # as long as it is referenced, Dask repeats a job whose worker is lost
+            yield item, Failure(item, *made) if failed else made
+
+
+def _call(function: Callable[[Item], Any], item: Item) -> bytes:
+    """Make a call in a worker; executors lose errors and results that cannot be pickled."""
+    try:
+        return pickle.dumps((False, function(item)))
+    except (Exception, SystemExit) as error:
+        return pickle.dumps((True, (_text(error), traceback.format_exc())))
+
+
+def _text(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}"
+
+
+def processes(count: int) -> Any:
+    """A pool of fresh interpreters with one thread each."""
+    from joblib.externals.loky import ProcessPoolExecutor
+
+    return ProcessPoolExecutor(
+        count, env=ONE_THREAD, initializer=_end_with_parent, initargs=(os.getpid(),)
+    )
+
+
+def _end_with_parent(parent: int) -> None:
+    """End this worker when its parent ends, however that is; the parent handles Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WAIT)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def check_workers(workers: int | None, *, sure: bool = False) -> int:
+    """The number of processes to start: `workers`, or what cores and memory allow.
+
+    Args:
+        workers: the number asked for.
+        sure: allow more than there are cores and memory for.
+
+    Raises:
+        ParameterError: `workers` is no number of processes, or too large.
+    """
+    from joblib.externals.loky import cpu_count
+
+    cores, free = int(cpu_count()), float(psutil.virtual_memory().available)
+    if LIMIT.exists() and (limit := LIMIT.read_text().strip()).isdigit():
+        free = min(free, float(limit))
+    fitting = max(1, int(free / MEMORY))
+    if workers is None:
+        return min(cores, fitting)
+    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
+        raise ParameterError(f"workers = {workers!r} must be a whole number, 1 or more")
+    if workers > min(cores, fitting) and not sure:
+        raise ParameterError(
+            f"workers = {workers} must be at most {min(cores, fitting)}: {cores} cores, and"
+            f" {free / 1e9:.1f} GB of memory at {MEMORY / 1e9:.2f} GB each"
+        )
+    return workers
