@@ -1,0 +1,697 @@
+"""What the published files come to, frozen: `python tests/golden/freeze.py` writes it anew.
+
+Each function below is one entry of a JSON file beside this one, and computes it from what is
+published; nothing is trained. `test_golden` compares all of them with what the library says.
+"""
+
+import json
+import sys
+from collections.abc import Callable, Iterable
+from functools import cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+import pandas as pd
+from plain_values import array, plain, plain_name, processor, short, table
+
+from nmpcrl.analysis import judgements, other_problems, worlds
+from nmpcrl.analysis.difficulty import raised_cost
+from nmpcrl.analysis.statistics import interquartile_mean
+from nmpcrl.bench import problem_times, sweep
+from nmpcrl.claims import (
+    agent_published,
+    agent_questions,
+    agent_runs,
+    agents,
+    evidence,
+    finding,
+    interventions,
+    own_claims,
+    paper_claims,
+    population,
+    population_published,
+    population_questions,
+    prespecified,
+    publish,
+    published,
+    remedies,
+    remedy_published,
+    remedy_questions,
+    robustness,
+    rule,
+    terminal_questions,
+    thresholds,
+    verification,
+    whole_picture,
+    wider_claims,
+    world,
+    world_published,
+    world_questions,
+    world_runs,
+)
+from nmpcrl.report import baselines, whole_study
+from nmpcrl.report import worlds as world_report
+from nmpcrl.study import design, paper, provenance
+from nmpcrl.study.experiment import PAPER
+from nmpcrl.study.population import JUDGE, LAYOUTS, TUNE
+from nmpcrl.study.population_design import whole_population
+from nmpcrl.study.scenarios import load as scenarios
+
+FOLDER = Path(__file__).parent
+ROLLOUT = 6  # digits of a rollout's cost, which are the same on all machines
+FILES: dict[str, dict[str, Callable[[], Any]]] = {}  # by file, its entries by name
+
+
+def entry(file: str) -> Callable[[Callable[[], Any]], Callable[[], Any]]:
+    """Make a function an entry of a file, under its own name."""
+
+    def add(compute: Callable[[], Any]) -> Callable[[], Any]:
+        FILES.setdefault(file, {})[compute.__name__.replace("_", " ")] = compute
+        return compute
+
+    return add
+
+
+def computed(file: str) -> dict[str, Any]:
+    """All entries of a file, as its JSON has them."""
+    return {name: plain(compute()) for name, compute in FILES[file].items()}
+
+
+def frozen(file: str) -> dict[str, Any]:
+    """The same as it was written."""
+    return json.loads((FOLDER / f"{file}.json").read_text("utf-8"))
+
+
+def write() -> None:
+    """Write all files anew."""
+    for file in FILES:
+        text = json.dumps(computed(file), indent=1, sort_keys=True, ensure_ascii=False)
+        (FOLDER / f"{file}.json").write_text(f"{text}\n", "utf-8")
+
+
+# What is asked of below, loaded once.
+
+study, drawn = published.load, population_published.load
+suite = cache(lambda: remedy_published.load().table)
+trained = cache(lambda: agent_published.load().table)
+changing = cache(lambda: world_published.load().table)
+again = cache(interventions.load)
+problems = cache(lambda: other_problems.read(published.place() / other_problems.FILE))
+every = cache(lambda: evidence.gather("published", variants=True))
+six_paths = cache(lambda: evidence.paths(every()))
+
+
+def by_question(answers: Iterable[Any]) -> dict[str, Any]:
+    """Outcome, counts and numbers of each answer."""
+    names = ("outcome", "counts", "numbers", "beside")
+    return {one.question: {name: getattr(one, name) for name in names} for one in answers}
+
+
+def by_claim(verdicts: Iterable[Any]) -> dict[str, Any]:
+    """Each verdict, and how many layouts drawn anew would say yes."""
+    return {
+        one.claim: plain(one)
+        | {"halves": {f"{half.wrong}, per {half.decay}": half for half in one.halves}}
+        | {"p": [half.p for half in one.halves], "turns": one.turns}
+        | {"anew": rule.anew(one) if one.counts else None}
+        | {"depends": [one.depends_on("layout"), one.depends_on("decay")]}
+        for one in verdicts
+    }
+
+
+# The study in layouts A to F.
+
+
+@entry("verdicts")
+def as_published() -> Any:
+    return by_claim(study().verdicts)
+
+
+@entry("verdicts")
+def judged_from_the_published_runs() -> Any:
+    return by_claim(publish.judge_published(study()))
+
+
+@entry("verdicts")
+def which_fields_differ_from_the_published_ones() -> Any:
+    both = zip(as_published().items(), judged_from_the_published_runs().values(), strict=True)
+    return [name for (name, then), now in both if plain(then) != plain(now)]
+
+
+@entry("verdicts")
+def claims() -> Any:
+    known = {**paper_claims.CLAIMS, **wider_claims.WIDER_CLAIMS, **own_claims.OWN_CLAIMS}
+    names = ("learners", "threshold", "nothing", "linear_to", "unit", "implied")
+    return {
+        name: {field: getattr(one, field, None) for field in names} for name, one in known.items()
+    }
+
+
+@entry("verdicts")
+def thresholds_and_rule() -> Any:
+    return {"numbers": prespecified.NUMBERS, "fixed": prespecified.fixed(study().about)}
+
+
+@entry("verdicts")
+def other_borders() -> Any:
+    main, known = every().main.runs, {}
+    for name, claim in {**paper_claims.BY_RUNS, **own_claims.OWN_CLAIMS}.items():
+        runs = main if name in paper_claims.BY_RUNS else study().table
+        if name not in paper_claims.BY_RUNS:
+            runs = runs[runs.variant.isin([design.MAIN_TABLE, "controls"])]
+        values = claim.measure(runs, six_paths())
+        known[name] = {
+            "values": table(values),
+            "borders": table(claim.at_borders(values, claim.borders)),
+            "steady": claim.steady(values),
+        }
+    return known
+
+
+@entry("verdicts")
+def distances_of_policies() -> Any:
+    return table(paper_claims.policy_distances(every().main.runs, six_paths()))
+
+
+@entry("verdicts")
+def constraints_without_noise() -> Any:
+    kept = paper_claims.kept_without_noise(every().main.runs, PAPER)
+    return kept.groupby(level="learner", sort=False).agg(["sum", "size"])
+
+
+@entry("verdicts")
+def costs_less_than_GES() -> Any:
+    others, main = ("ES", "DES", "RDES", "TDC"), study().main
+    functions = (own_claims.costs_less, own_claims.costs_less_anew)
+    return {name: [one(main, name, "GES") for one in functions] for name in others}
+
+
+@entry("study")
+def robustness_map() -> Any:
+    found = robustness.robustness_map(every().runs, six_paths())
+    return found.set_index(["variant", "claim"])
+
+
+@entry("study")
+def readings_of_DES() -> Any:
+    return baselines.baselines(every().runs, six_paths())
+
+
+@entry("study")
+def failure_modes() -> Any:
+    runs = study().table
+    cells = ["variant", "learner", "wrong", "mechanism", "ending"]
+    return runs.groupby(cells, sort=False).size()
+
+
+@entry("study")
+def runs_that_went_wrong() -> Any:
+    kinds = {"diverged": thresholds.divergence, "unstable": thresholds.instability}
+    return {name: whole_study.went_wrong(one, PAPER) for name, one in kinds.items()}
+
+
+@entry("study")
+def answers_of_thresholds() -> Any:
+    runs = study().table
+    names = ("was_stopped", "worsens", "improves", "solved", "cost_reduction", "late_cost_range")
+    return table(pd.DataFrame({name: getattr(thresholds, name)(runs) for name in names}))
+
+
+@entry("study")
+def the_finding() -> Any:
+    return plain(finding.finding(study()), ROLLOUT)
+
+
+@entry("study")
+def middle_of_each_learner() -> Any:
+    runs = study().main
+    left = runs.final_cost.where(runs.stopped == "finished", np.inf) / runs.initial_cost
+    groups = runs.groupby("learner").groups.items()
+    return {name: interquartile_mean(left[i], list(runs.layout[i])) for name, i in groups}
+
+
+@entry("study")
+def share_of_the_possible() -> Any:
+    gains = {search.layout: found.gain for search, found in study().searches.items()}
+    shares = thresholds.share_of_possible(study().main, gains)
+    return shares.groupby(study().main.learner).median()
+
+
+@entry("study")
+def searches() -> Any:
+    names = ("theta", "made", "initial", "cost", "gain")
+    return {
+        f"{search.layout} {search.seed} {search.budget}": {
+            **{name: getattr(found, name) for name in names},
+            "after 200": found.after(200),
+        }
+        for search, found in study().searches.items()
+    }
+
+
+@entry("study")
+def ratios_of_times() -> Any:
+    pairs = study().timings[["solver", "learner"]].itertuples(index=False, name=None)
+    return {f"{learner}, {solver}": study().ratio(solver, learner) for solver, learner in pairs}
+
+
+@entry("study")
+def batches() -> Any:
+    known = {"six": study().batches, "drawn": [drawn().about, *drawn().about["additions"]]}
+    names = ("date", "epochs", "versions", "hours", "runs")
+    return {
+        name: [{one: batch.get(one) for one in names} for batch in batches]
+        for name, batches in known.items()
+    }
+
+
+# The drawn layouts.
+
+
+@entry("population")
+def shares() -> Any:
+    return drawn().shares().set_index("claim")
+
+
+@entry("population")
+def shares_in_A_to_F() -> Any:
+    main, names = study().main, list(population_questions.EXPECTED)
+    runs = study().table[study().table.variant == design.MAIN_TABLE]
+    assert len(main) == len(runs)
+    return population.shares(population.held(runs, study().paths, names, str)).set_index("claim")
+
+
+@entry("population")
+def where_each_claim_holds() -> Any:
+    return table(population.held(drawn().main, drawn().paths))
+
+
+@entry("population")
+def verdicts_that_stand() -> Any:
+    outcomes = {one.claim: one.outcome for one in study().verdicts}
+    found = drawn().shares()
+    return {one.claim: outcomes[one.claim] == one.outcome for one in found.itertuples()
+            if one.claim in outcomes}  # fmt: skip
+
+
+@entry("population")
+def answers() -> Any:
+    return by_question(drawn().answers())
+
+
+@entry("population")
+def other_answers() -> Any:
+    main, six = study().main, again().query("part == 'six'")
+    return {
+        "cliff": plain(by_question([population.cliff(raised())]), ROLLOUT),
+        "extrapolation": by_question([population.extrapolation(six)]),
+        "early overshoot in A to F": by_question([population.early_overshoot(main)]),
+    }
+
+
+@cache
+def raised() -> pd.Series:
+    """By which share the cost of each layout's best theta rises with theta_c."""
+    share = population_questions.CLIFF_RAISED
+    best = {search.layout: np.array(found.theta) for search, found in study().searches.items()}
+    return pd.Series({name: raised_cost(name, theta, share) for name, theta in best.items()})
+
+
+@entry("population")
+def the_raised_costs() -> Any:
+    return plain(raised(), ROLLOUT)
+
+
+@entry("population")
+def expectations() -> Any:
+    known = {
+        "population": population_questions.QUESTIONS,
+        "remedies": remedy_questions.REMEDY_QUESTIONS,
+        "agents": agent_questions.AGENT_QUESTIONS,
+        "worlds": world_questions.WORLD_QUESTIONS,
+        "terminal costs": terminal_questions.TERMINAL_QUESTIONS,
+    }
+    expected = {
+        name: {one: asked.expected for one, asked in questions.items()}
+        for name, questions in known.items()
+    }
+    return expected | {"shares": population_questions.EXPECTED}
+
+
+@entry("population")
+def predictors() -> Any:
+    parts, layouts = drawn().runs.groupby("part"), drawn().layouts
+    tuned, judged = population.succeeds(parts.get_group("tune")), population.succeeds(drawn().main)
+    return population.predictor_scores(layouts, tuned, judged)
+
+
+@entry("population")
+def successes() -> Any:
+    parts = {"main": drawn().main, **dict(iter(drawn().runs.groupby("part", sort=False)))}
+    learners = ("ES", "GES")
+    return {
+        f"{learner}, {part}": [int(yes.sum()), len(yes), array(yes.to_numpy(bool))]
+        for (part, runs), learner in product(parts.items(), learners)
+        if len(yes := population.succeeds(runs, learner))
+    }
+
+
+@entry("population")
+def at_the_gap() -> Any:
+    ends = population.at_the_gap(drawn().main, drawn().layouts)
+    return {"runs": table(ends), "improve": population.improve_by_gap(ends)}
+
+
+@entry("population")
+def whole_picture_tried() -> Any:
+    tried = drawn().tried
+    columns = ["setting", "layout", "decay", *whole_picture.PICTURE, "whole", "answers"]
+    return {
+        "cells": table(tried),
+        "by setting": tried.groupby(["setting", "whole"], sort=False).size(),
+        "nearest": tried[columns].head(5),
+    }
+
+
+@entry("population")
+def runs_made_again() -> Any:
+    asked = [("true slope", "none"), ("theta held", "none"), ("nudged", "none")]
+    asked += [("true slope", "nudged"), ("theta held", "nudged")]
+    return {
+        f"{part}: {arm}, {than}": interventions.live(runs, arm, than)
+        for part, runs in again().groupby("part", sort=False)
+        for arm, than in asked
+    }
+
+
+@entry("population")
+def which_runs_are_made_again() -> Any:
+    names = list(interventions.runs())
+    return {"first": names[:5], "count": len(names), "all": short(names)}
+
+
+# The comparison of remedies.
+
+
+@entry("remedies")
+def answers_on_remedies() -> Any:
+    return by_question(remedies.answers(suite()))
+
+
+@entry("remedies")
+def advice() -> Any:
+    found = remedies.advice(suite())
+    return {f"{i:02} {one.entry}": one for i, one in enumerate(found, start=1)}
+
+
+@entry("remedies")
+def what_was_expected() -> Any:
+    return remedies.expectations(suite()) | {"greatest": remedies.greatest(suite())}
+
+
+@entry("remedies")
+def rows() -> Any:
+    return {
+        part: {one.entry: one for one in remedies.rows(suite(), part)}
+        for part in remedy_questions.PARTS
+    }
+
+
+@entry("remedies")
+def shares_in_named_layouts() -> Any:
+    there = suite()[suite().part.str.startswith("named")]
+    groups = there.groupby(["part", "entry"], sort=False)
+    return {plain_name(name): remedies.shares(runs) for name, runs in groups}
+
+
+@entry("remedies")
+def best_settings() -> Any:
+    tuned = suite()[suite().part == "tune"].groupby("entry", sort=False)
+    return {entry: remedies.best_setting(runs) for entry, runs in tuned}
+
+
+# SAC and TD3.
+
+
+@entry("agents")
+def answers_on_agents() -> Any:
+    return by_question(agents.answers(trained(), suite()))
+
+
+@entry("agents")
+def answers_without_the_suite() -> Any:
+    return {one.question: one.outcome for one in agents.answers(trained())}
+
+
+@entry("agents")
+def rows_of_the_suite() -> Any:
+    return {one.entry: one for one in agents.rows(trained(), suite())}
+
+
+@entry("agents")
+def costs_of_the_best_search() -> Any:
+    found = (agents.searched(suite(), part) for part in agent_questions.SEARCHED)
+    return dict(zip(agent_questions.SEARCHED, found, strict=True))
+
+
+@entry("agents")
+def courses() -> Any:
+    found = {}
+    asked = [("judge", ()), ("one", ()), ("all", ()), ("all", [*TUNE]), ("all", [*JUDGE])]
+    for (part, among), agent in product(asked, agent_questions.AGENTS):
+        one = agents.course(trained(), part, agent, among)
+        if one:
+            found[f"{agent}, {part}, {len(one.units)}"] = {
+                "episodes": one.episodes,
+                "median": one.median,
+                "interval": one.interval,
+                "matched": one.matched,
+                "shares": array(one.shares),
+                "there": one.there.mean(axis=1),
+            }
+    return found
+
+
+# Worlds that change.
+
+
+@entry("worlds")
+def answers_on_worlds() -> Any:
+    return by_question(world.answers(changing()))
+
+
+@entry("worlds")
+def medians() -> Any:
+    columns = ("cost", "inside", "arrived")
+    return {
+        f"{part}, {column}": world.means(changing(), part, column).median()
+        for part, column in product(world_runs.PARTS, columns)
+    }
+
+
+@entry("worlds")
+def means() -> Any:
+    columns = ("cost", "inside", "arrived")
+    return {
+        f"{part}, {column}": table(world.means(changing(), part, column))
+        for part, column in product(world_runs.PARTS, columns)
+    }
+
+
+@entry("worlds")
+def shares_after_a_change() -> Any:
+    return {part: world.shares(changing(), part).median() for part in world_questions.CHANGES}
+
+
+@entry("worlds")
+def carried() -> Any:
+    return {arm: table(world.carried(changing(), arm)) for arm in ("ES", "CMA-ES")}
+
+
+@entry("worlds")
+def solved_with_a_terminal_cost() -> Any:
+    return world.solved_with(changing()).sum()
+
+
+@entry("worlds")
+def saved_with_a_wrong_model() -> Any:
+    found = world_report.saved(world.means(changing(), "model"))
+    return {f: {how: one.median() for how, one in by.items()} for f, by in found.items()}
+
+
+@entry("worlds")
+def rows_among_moving_obstacles() -> Any:
+    found = world_report.suite_rows(changing())
+    return {plain_name(name): row for name, row in found.items()}
+
+
+@entry("worlds")
+def drawn_scenarios() -> Any:
+    return {"count": len(scenarios()), "all": short(plain(scenarios()))}
+
+
+# Other problems and times.
+
+
+@entry("problems")
+def costs() -> Any:
+    return {
+        arm: {
+            "middle": interquartile_mean(tests, ["all"] * len(tests)),
+            "median": float(np.median(tests)),
+            "ended": int(np.isfinite(tests).sum()),
+            "tests": array(tests),
+        }
+        for arm, tests in problems().tests().items()
+    }
+
+
+@entry("problems")
+def predictions() -> Any:
+    return {name: true for name, (_, true) in problems().predictions().items()}
+
+
+@entry("problems")
+def references() -> Any:
+    return problems().references
+
+
+@entry("problems")
+def spread_of_solvers() -> Any:
+    runs = problems().spreads
+    frame = pd.DataFrame({name: [getattr(one, name) for one in runs] for name in
+                          ("before", "nudged", "after")})  # fmt: skip
+    for solver in runs[0].peers:
+        frame[solver] = [one.peers[solver] for one in runs]
+        frame[f"{solver}, steps"] = [one.made[solver] for one in runs]
+    gaps = np.array([one.gap for one in runs])
+    return {"median": frame.median(), "mean": frame.mean(), "gap": np.median(gaps, axis=0)}
+
+
+@entry("problems")
+def sweep_of_drawn_problems() -> Any:
+    return sweep.read(published.place() / "sweep.json").tally
+
+
+# What is published, as it is loaded.
+
+
+@entry("tables")
+def tables() -> Any:
+    times = problem_times.read(published.place() / problem_times.FILE)
+    known = {
+        "runs": study().table,
+        "runs of the main table": study().main,
+        "timings": study().timings,
+        "runs of chapters": every().runs,
+        "drawn runs": drawn().runs,
+        "drawn layouts": drawn().layouts.reset_index(),
+        "where rollouts stop arriving": drawn().stops.reset_index(),
+        "runs made again": again(),
+        "remedies": suite(),
+        "agents": trained(),
+        "worlds": changing(),
+        "other problems": pd.DataFrame(map(vars, problems().courses)),
+        "spread of solvers": pd.DataFrame([{**vars(one), "peers": [*one.peers.values()],
+                                            "made": [*one.made.values()]}
+                                           for one in problems().spreads]),
+        "times by size": times.sizes,
+        "times beside mpcrl": times.peers,
+        "searches": pd.DataFrame([vars(one) | vars(two) for one, two in study().searches.items()]),
+    }  # fmt: skip
+    return {name: table(frame) for name, frame in known.items()}
+
+
+@entry("tables")
+def arrays() -> Any:
+    runs = study().summaries.values()
+    return {
+        "training costs": short([array(one.episodes["cost"]) for one in runs]),
+        "theta by episode": short(
+            [array(one.episodes["theta"]) for one in runs if "theta" in one.episodes]
+        ),
+        "runs with theta by episode": sum("theta" in one.episodes for one in runs),
+        **{
+            f"{name} of rollouts without noise": short(
+                [array(one.evaluations[name]) for one in runs]
+            )
+            for name in ("episode", "theta", "cost")
+        },
+        "states": short([array(one.states) for one in runs]),
+        "paths of drawn runs": short([array(one) for one in drawn().paths.values()]),
+    }
+
+
+# What names a run: no edit may change a key, or stored runs would be trained again.
+
+
+@cache
+def keys_of_runs() -> dict[Any, tuple[str, str]]:
+    """Keys of each run of the study and of its summary, with the versions that made it."""
+    with mock.patch.object(provenance, "installed", study().about["versions"].__getitem__):
+        return {e: (provenance.key(e), provenance.summary_key(e)) for e in design.whole_study()}
+
+
+@entry("keys")
+def keys() -> Any:
+    parts, wanted = design.whole_study(), dict.fromkeys(verification.sample(study(), 60))
+    first = {part: e for e, part in reversed(parts.items())}
+    wanted |= dict.fromkeys([*design.fresh(), *first.values()])
+    known = keys_of_runs()
+    return {
+        f"{parts[e]}: {e.learner} {e.layout} {e.decay} {e.seed}": [one[:16] for one in known[e]]
+        for e in wanted
+    }
+
+
+@entry("keys")
+def all_keys() -> Any:
+    known, rows = keys_of_runs(), study().rows
+    return {
+        "runs": len(known),
+        "as published": sum(rows[e]["key"] == one for e, (_, one) in known.items() if e in rows),
+        "all, in their order": short([*known.values()]),
+    }
+
+
+@entry("keys")
+def plans() -> Any:
+    known = {"six": design.whole_study(), "drawn": whole_population()}
+    lists = {
+        name: [[plain(provenance.identity(e)), part] for e, part in plan.items()]
+        for name, plan in known.items()
+    }
+    return {name: [len(plan), short(plan)] for name, plan in lists.items()}
+
+
+@entry("keys")
+def seeds() -> Any:
+    named = (*LAYOUTS, *paper.LAYOUTS)
+    where = {part: [*one.places] for part, one in world_runs.PARTS.items()}
+    return {
+        "remedies": short([judgements.seed_of(place, 0) for place in named]),
+        "agents": [agent_runs.seed_of(place, 1) for place in (agent_questions.EVERY, "A", "J001")],
+        "worlds": {part: short([worlds.seed_of(place, 1) for place in places])
+                   for part, places in where.items()},
+    }  # fmt: skip
+
+
+@entry("keys")
+def numbers_of_runs() -> Any:
+    return {
+        "remedies": suite().groupby(["part", "entry"], sort=False).size(),
+        "agents": trained().groupby(["part", "arm"], sort=False).size(),
+        "worlds": changing().groupby(["part", "arm"], sort=False).size(),
+    }
+
+
+@entry("machine")
+def abilities() -> Any:
+    return processor()
+
+
+if __name__ == "__main__":
+    sys.exit(write())

@@ -1,0 +1,116 @@
+"""Values of the library as plain JSON: floats to the last digit, tables and arrays as hashes."""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+SENTENCES = {"statement", "evidence", "would_change", "each", "said", "question", "theorem", "here"}
+CPUINFO = Path("/proc/cpuinfo")
+
+
+def plain(value: Any, digits: int | None = None) -> Any:
+    """A value as JSON can hold it; of a dataclass the fields that are no sentences.
+
+    Args:
+        value: a number, a table, a dataclass, or any nesting of these.
+        digits: to how many significant digits floats are rounded; all of them by default.
+    """
+    if isinstance(value, Enum):
+        return str(value)
+    if value is None or value is pd.NA or isinstance(value, str | bool):
+        return None if value is pd.NA else value
+    if isinstance(value, np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        number = float(value)
+        if digits and math.isfinite(number):
+            number = float(f"{number:.{digits}g}")
+        return number if math.isfinite(number) else str(number)
+    if is_dataclass(value):
+        names = [one.name for one in fields(value) if one.name not in SENTENCES]
+        return {name: plain(getattr(value, name), digits) for name in names}
+    if isinstance(value, pd.DataFrame):
+        return {plain_name(name): plain(row, digits) for name, row in value.iterrows()}
+    if isinstance(value, Mapping | pd.Series):
+        return {plain_name(name): plain(one, digits) for name, one in value.items()}
+    return [plain(one, digits) for one in value]
+
+
+def plain_name(name: Any) -> str:
+    """The name of a row or of an entry; the parts of one with several lie between blanks."""
+    return " ".join(map(str, name)) if isinstance(name, tuple) else str(name)
+
+
+def table(frame: pd.DataFrame) -> dict[str, Any]:
+    """The number of rows and a hash of each column: every cell, in the order of the rows."""
+    return {
+        "rows": len(frame),
+        "columns": {str(name): short([_cell(one) for one in frame[name]]) for name in frame},
+    }
+
+
+def array(values: Any) -> str:
+    """A hash of the bytes of an array, with its shape and type."""
+    known = np.ascontiguousarray(values)
+    return short([known.dtype.str, known.shape, hashlib.sha256(known.tobytes()).hexdigest()])
+
+
+def short(value: Any) -> str:
+    """A hash of what JSON can hold."""
+    return hashlib.sha256(json.dumps(value).encode()).hexdigest()[:16]
+
+
+def _cell(value: Any) -> Any:
+    """A cell of a table: 3 and 3.0 are the same number, and all that is missing is the same."""
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_cell(one) for one in value]
+    if value is None or value is pd.NA:
+        return "nan"
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | float | np.integer | np.floating):
+        return repr(float(value))
+    return str(value)
+
+
+def processor() -> str:
+    """A hash of what the processor can do, on which the last digits of some numbers depend."""
+    told = CPUINFO.read_text().splitlines() if CPUINFO.exists() else []
+    return short(sorted({one for one in told if one.startswith(("flags", "Features"))}))
+
+
+def differing(now: Any, then: Any, tolerance: float = 0.0, where: str = "") -> list[str]:
+    """Where two plain values differ, a line each; floats by more than a relative tolerance."""
+    if isinstance(now, dict) and isinstance(then, dict):
+        names = [*now, *(name for name in then if name not in now)]
+        gone = object()
+        return [
+            line
+            for name in names
+            for line in differing(
+                now.get(name, gone), then.get(name, gone), tolerance, f"{where}/{name}"
+            )
+        ]
+    if isinstance(now, list) and isinstance(then, list) and len(now) == len(then):
+        pairs = enumerate(zip(now, then, strict=True))
+        return [line for i, pair in pairs for line in differing(*pair, tolerance, f"{where}[{i}]")]
+    floats = isinstance(now, float) and isinstance(then, float)
+    if now == then and type(now) is type(then):
+        return []
+    if floats and math.isclose(now, then, rel_tol=tolerance, abs_tol=tolerance):
+        return []
+    return [f"{where}: {_shown(now)} now, {_shown(then)} as frozen"]
+
+
+def _shown(value: Any) -> str:
+    return "nothing" if type(value) is object else repr(value)
