@@ -3,7 +3,7 @@
 `book/published` holds the whole study as it was trained once, and the book speaks of that. Whoever
 asks for other runs, or for runs of his own, gets those; every figure says whose it shows. What a
 reader's machine makes of a part of the published study is a check, and stands by itself: see
-`agreement.repeated`.
+`reproduce.agreement`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

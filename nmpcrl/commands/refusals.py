@@ -15,7 +15,7 @@ SAID = (  # errors whose message is a sentence for the reader, and where they ar
     ("nmpcrl.analysis.summaries", "Failed"),
     ("nmpcrl.analysis.summaries", "OtherSolver"),
     ("nmpcrl.claims.published", "Damaged"),
-    ("nmpcrl.claims.verification", "CannotRelock"),
+    ("nmpcrl.claims.reproduce", "CannotRelock"),
 )
 
 

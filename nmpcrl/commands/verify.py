@@ -1,15 +1,11 @@
 """`nmpcrl verify`: compares the runs of this machine with the published ones."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import click
 
 from nmpcrl.commands.tables import counted
 from nmpcrl.commands.workers import check
-
-if TYPE_CHECKING:
-    from nmpcrl.claims.published import Published
 
 RELOCKED = 60  # runs that are trained afresh before the code is locked anew
 
@@ -29,7 +25,8 @@ def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
       nmpcrl verify --sample 5
     """
     check(workers, sure=yes)
-    from nmpcrl.claims import published
+    from nmpcrl.analysis import summaries
+    from nmpcrl.claims import published, reproduce
 
     known = published.load()
     if sample > len(known.rows):
@@ -37,46 +34,23 @@ def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
             f"{sample} is more than the {len(known.rows):,} published runs.", param_hint="--sample"
         )
     if relock:
-        _relock(known, sample or RELOCKED, workers)
-    else:
-        _compare(known, sample, workers)
-
-
-def _relock(known: "Published", sample: int, workers: int | None) -> None:
-    """Lock the code, if runs that are trained again have the same bits."""
-    from nmpcrl.claims import verification
-
-    done = verification.relock(known, sample, workers=workers)
-    known_bits = {"published": done.published, "stored here": done.stored}
-    parts = [f"{count} as {where}" for where, count in known_bits.items() if count]
-    click.echo(
-        f"{counted(done.published + done.stored, 'run')} trained again gave the same bits,"
-        f" {' and '.join(parts)}: {done.lock} is written"
-    )
-
-
-def _compare(known: "Published", sample: int, workers: int | None) -> None:
-    """Print every contradiction; exit code 1 if there is one."""
-    from nmpcrl.analysis import summaries
-    from nmpcrl.claims import comparison, verification
-
+        done = reproduce.relock(known, sample or RELOCKED, workers=workers)
+        said = f"{counted(done.published + done.stored, 'run')} trained again gave the same bits"
+        click.echo(f"{said}, {done.published} as published, {done.stored} as stored: {done.lock}")
+        return
     stored = {e for e in known.rows if summaries.path_of(e).exists()}
     rest = {e: part for e, part in known.variants.items() if e not in stored}
-    drawn = verification.sample(replace(known, variants=rest), sample) if sample else ()
-    own = [e for e in known.rows if e in {*stored, *drawn}]
-    if not own:
+    wanted = {*stored, *(reproduce.sample(replace(known, variants=rest), sample) if sample else ())}
+    if not wanted:
         raise click.ClickException(
             "no run of the study was trained here; --sample 5 trains five for the comparison"
         )
-    found = summaries.fetch_summaries(own, workers=workers)
-    wrong = comparison.compare(found, known)
-    exact = comparison.comparable(found, known)
-    ways = {"bit for bit": len(exact), "by distribution": len(found) - len(exact)}
+    found = summaries.fetch_summaries((e for e in known.rows if e in wanted), workers=workers)
+    wrong, exact = reproduce.compare(found, known), len(reproduce.comparable(found, known))
+    ways = {"bit for bit": exact, "by distribution": len(found) - exact}
     parts = [f"{count} {way}" for way, count in ways.items() if count]
-    click.echo(
-        f"{counted(len(found), 'run')} compared with the published ones, {' and '.join(parts)}:"
-        f" {counted(len(wrong), 'contradiction')}"
-    )
+    said = f"{counted(len(found), 'run')} compared with the published ones, {' and '.join(parts)}"
+    click.echo(f"{said}: {counted(len(wrong), 'contradiction')}")
     if len(wrong):
         click.echo(wrong.to_string(index=False))
         raise SystemExit(1)

@@ -5,10 +5,10 @@ from typing import Any
 
 import pandas as pd
 
-from nmpcrl.claims.agreement import Repeated
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
 from nmpcrl.claims.prespecified import SINCE, Fixed
 from nmpcrl.claims.published import Published
+from nmpcrl.claims.reproduce import Agreement
 from nmpcrl.claims.robustness import PARTS
 from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.claims.wider_claims import WIDER_THAN
@@ -165,7 +165,7 @@ def _compared(found: Sequence[Verdict], count: int, other: str) -> str:
     return listed(parts)
 
 
-def repeated(found: Repeated) -> str:
+def repeated(found: Agreement) -> str:
     """How the published runs that were trained again came out, in two sentences."""
     if not found.runs:
         return "No published run was trained again here."

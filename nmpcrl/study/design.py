@@ -20,7 +20,7 @@ LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may 
 SEEDS = tuple(range(10))
 VARIED: dict[str, Any] = {"layout": ("A", "D"), "seed": tuple(range(5))}  # one open, one closing
 # What a build trains again: all learners, in the chapters' layout in both readings and with as many
-# seeds as `claims.comparison.FEWEST`, and in every other layout in one reading and with one seed.
+# seeds as `claims.reproduce.FEWEST`, and in every other layout in one reading and with one seed.
 FRESH: tuple[dict[str, Any], ...] = (
     {"layouts": ("A",), "seeds": (0, 1, 2)},
     {"layouts": ("B", "E"), "decays": ("step",), "seeds": (0,)},

@@ -235,7 +235,12 @@ def locked_hash() -> str:
 
 def is_accepted(made: str) -> bool:
     """Whether the sources with this `sources_hash` make the numbers that these here make."""
-    return made in (sources_hash(), locked_hash(), *_earlier())
+    return made in (sources_hash(), *locks())
+
+
+def locks() -> tuple[str, ...]:
+    """The hashes of the lock and of the earlier locks of these epochs."""
+    return (locked_hash(), *_earlier())
 
 
 def _earlier() -> list[str]:

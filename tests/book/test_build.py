@@ -20,6 +20,7 @@ from filelock import FileLock
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from raising import raising
 
+from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
 from nmpcrl.control import browser as alone
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
@@ -340,24 +341,32 @@ def test_what_live_figures_solve_with_is_compiled_ahead_if_it_can_be(known, monk
     assert [one.data.shape for (one,) in problems] == [(paper.HORIZON + 1, 8)] * known
 
 
+CONTRADICTION = (
+    Verdict("C3", "", REPRODUCED, "", "", ratio=0.55, interval=(0.5, 0.6)),
+    Verdict("C3", "", NOT, "", ""),
+)
+
+
 def test_a_verdict_that_contradicts_a_published_one_ends_the_build(monkeypatch):
     """Of times, right after they were measured; what measures no times says nothing."""
     from nmpcrl.bench import summary
-    from nmpcrl.claims import agreement, published
+    from nmpcrl.claims import published, reproduce
 
     monkeypatch.setattr(published, "load", published.Published)
     monkeypatch.setattr(summary, "learners", lambda measured: measured["learners"])
-    monkeypatch.setattr(agreement, "of_times", lambda timings, known: (timings,))
+    monkeypatch.setattr(reproduce, "of_times", lambda timings, known: (timings,))
     train.measure((lambda: None, lambda: {"solves": {}}))
-    with pytest.raises(project.Failure, match="contradict the published ones:\nC3 is so"):
-        train.measure((lambda: {"learners": "C3 is so here"},))
+    with pytest.raises(
+        project.Failure, match=r"ones:\nC3 is reproduced \[0.50, 0.60\] here, and not"
+    ):
+        train.measure((lambda: {"learners": CONTRADICTION},))
 
 
 def test_verdicts_of_runs_are_held_against_the_published_ones_before_a_chapter_runs(monkeypatch):
-    from nmpcrl.claims import agreement
+    from nmpcrl.claims import reproduce
 
-    monkeypatch.setattr(agreement, "of_runs", lambda fresh, known: ("C1 is so here",))
-    with pytest.raises(project.Failure, match="C1 is so here"):
+    monkeypatch.setattr(reproduce, "of_runs", lambda fresh, known: (CONTRADICTION,))
+    with pytest.raises(project.Failure, match="C3 is reproduced"):
         train.train((), ())
 
 

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from nmpcrl.analysis.policy_search import Found, Search
 from nmpcrl.analysis.rows import row, table
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.claims import comparison, published, thetas
-from nmpcrl.claims.comparison import compare
+from nmpcrl.claims import published, thetas
 from nmpcrl.claims.published import FILES, Damaged, Published, load, publish
 from nmpcrl.claims.verdict import PARTLY, REPRODUCED, Verdict
 from nmpcrl.study import Experiment, design, paper, run, sweep
@@ -69,18 +68,6 @@ def known(summaries) -> Published:
 def whole(known, folder):
     """What is published, and the bytes of its files."""
     return known, {name: (folder / name).read_bytes() for name in FILES}
-
-
-@pytest.fixture
-def elsewhere(monkeypatch):
-    """From here on this is another machine."""
-    there = fingerprint() | {"processor": "another"}
-
-    def moved() -> None:
-        for module in (published, comparison):
-            monkeypatch.setattr(module, "fingerprint", lambda: there)
-
-    return moved
 
 
 def changed(one, **rollouts):
@@ -310,12 +297,6 @@ def test_a_column_that_an_older_table_lacks_takes_the_fields_default(known, summ
     assert list(found.rows) == [replace(e, evaluate_every=default) for e in summaries]
 
 
-def test_runs_do_not_contradict_an_older_table(known, summaries, folder, elsewhere):
-    found = without(folder, ["start", "target"])
-    elsewhere()
-    assert compare(summaries, found).empty
-
-
 @pytest.mark.parametrize(("name", "word"), [("runs.csv", "stuck"), ("verdicts.json", "partly")])
 def test_a_word_that_is_not_known_is_refused(known, folder, name, word):
     text = (folder / name).read_text()
@@ -496,18 +477,6 @@ def test_how_a_further_run_went_wrong_is_what_the_whole_study_would_say(known, s
     assert [found[name] for name in expected.index] == expected.tolist()
 
 
-def test_a_run_of_another_machine_is_not_compared_bit_for_bit(known, summaries, elsewhere):
-    more = replace(next(iter(known.rows)), alpha=3e-7)
-    made = {more: summarise(run(more))}
-    published.extend(made, {more: "alpha x 3"})
-    assert comparison.comparable([more, RUNS[0]], load()) == {more, RUNS[0]}
-    elsewhere()
-    assert comparison.comparable([more, RUNS[0]], load()) == set()
-    other = replace(more, alpha=4e-7)
-    published.extend({other: summarise(run(other))}, {other: "alpha x 4"})
-    assert comparison.comparable([more, other, RUNS[0]], load()) == {other}
-
-
 def test_runs_that_cannot_stand_beside_the_others_are_refused_in_a_sentence(
     known, summaries, further
 ):
@@ -516,118 +485,6 @@ def test_runs_that_cannot_stand_beside_the_others_are_refused_in_a_sentence(
     with pytest.raises(published.Unpublishable, match=r"the frozen arm of ES .* is not published"):
         published.extend(further, {FURTHER: "alpha x 2"})
     assert load().rows.keys() == known.rows.keys()
-
-
-def test_what_is_published_does_not_contradict_itself(known, summaries, elsewhere):
-    assert compare(summaries, known).empty
-    elsewhere()
-    assert compare(summaries, known).empty
-
-
-def test_runs_that_are_not_published_contradict_nothing(known, summaries):
-    other = Experiment("frozen", seed=9, episodes=4, steps=6, evaluate_every=2)
-    assert compare({other: summarise(run(other))}, known).empty
-
-
-@pytest.mark.parametrize("where", ["cost", "theta"])
-def test_on_the_same_machine_the_last_bit_counts(known, summaries, where):
-    first = RUNS[0]
-    column = summaries[first].evaluations[where].copy()
-    column[-1] = np.nextafter(column[-1], np.inf)
-    episodes = summaries[first].episodes | {
-        "theta": np.nextafter(summaries[first].episodes["theta"], 9)
-    }
-    wrong = compare(
-        {first: replace(changed(summaries[first], **{where: column}), episodes=episodes)}, known
-    )
-    assert len(wrong) == 1
-    assert (wrong.learner[0], wrong.layout[0], wrong.seed[0]) == ("ES", "A", 0)
-
-
-def test_on_another_machine_the_last_bit_does_not_count(known, summaries, elsewhere):
-    elsewhere()
-    moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in summaries.items()}
-    assert compare(moved, known).empty
-
-
-@pytest.mark.parametrize(
-    ("what", "other"),
-    [("environment", lambda: {"python": "2.7"}), ("summary_key", lambda _: "another")],
-)
-def test_with_other_versions_or_epochs_the_last_bit_does_not_count(
-    known, summaries, monkeypatch, what, other
-):
-    monkeypatch.setattr(comparison, what, other)
-    moved = {e: changed(d, cost=d.evaluations["cost"] * (1 + 1e-9)) for e, d in summaries.items()}
-    assert compare(moved, known).empty
-
-
-def test_the_cost_of_theta_init_must_agree_on_every_machine(known, summaries, elsewhere):
-    elsewhere()
-    first = RUNS[0]
-    cost = summaries[first].evaluations["cost"].copy()
-    cost[0] *= 1 + 1e-4
-    wrong = compare({first: changed(summaries[first], cost=cost)}, known)
-    assert list(wrong.what) == ["initial_cost"]
-
-
-def spread(summaries, costs):
-    """The runs of ES in the main table, with these final costs."""
-    runs = [e for e in RUNS if e.learner == "ES" and LABELS[e] == "main"]
-    found = {}
-    for experiment, cost in zip(runs, costs, strict=True):
-        one = summaries[experiment]
-        start = one.evaluations["cost"][0]
-        found[experiment] = changed(one, cost=np.array([start, *[cost * start] * 2]))
-    return found
-
-
-@pytest.mark.parametrize(
-    ("here", "contradicts"),
-    [
-        ((0.6, 0.7, 0.8, 0.9), False),  # the same
-        ((0.9, 0.6, 0.7, 0.8), False),  # each seed otherwise, all within
-        ((0.4, 1.1, 0.7, 0.8), False),  # a bit outside
-        ((5.0, 0.7, 0.8, 0.9), False),  # one of four far outside
-        ((5.0, 5.0, 5.0, 0.9), True),  # most far outside
-        ((0.1, 0.1, 0.1, 0.1), True),  # all much better
-        ((np.inf,) * 4, True),  # all failed
-    ],
-)
-def test_on_another_machine_most_runs_must_lie_in_the_published_spread(
-    summaries, elsewhere, here, contradicts
-):
-    theirs = spread(summaries, (0.6, 0.7, 0.8, 0.9))
-    publish(summaries | theirs, LABELS, VERDICTS)
-    elsewhere()
-    wrong = compare(spread(summaries, here), load())
-    assert list(wrong.what.unique()) == (["final_cost"] if contradicts else [])
-
-
-@pytest.mark.parametrize(("count", "contradicts"), [(1, False), (2, False), (3, True)])
-def test_one_or_two_runs_of_a_chaotic_learner_contradict_nothing(
-    summaries, elsewhere, count, contradicts
-):
-    publish(summaries | spread(summaries, (0.6, 0.7, 0.8, 0.9)), LABELS, VERDICTS)
-    elsewhere()
-    failed = dict(list(spread(summaries, (np.inf,) * 4).items())[:count])
-    assert bool(len(compare(failed, load()))) == contradicts
-
-
-def test_where_published_runs_failed_failures_are_no_contradiction(summaries, elsewhere):
-    publish(summaries | spread(summaries, (0.6, 0.7, np.inf, np.inf)), LABELS, VERDICTS)
-    elsewhere()
-    assert compare(spread(summaries, (np.inf, np.inf, np.inf, 0.7)), load()).empty
-
-
-def test_a_variant_is_held_against_itself_alone(known, summaries, elsewhere):
-    """Its theta_init costs otherwise than that of the main table."""
-    main, variant = RUNS[0], next(e for e in RUNS if e.horizon == 2)
-    assert row(summaries[main])["initial_cost"] != row(summaries[variant])["initial_cost"]
-    elsewhere()
-    assert compare(summaries, known).empty
-    as_main = replace(summaries[main], experiment=summaries[variant].experiment)
-    assert "initial_cost" in set(compare({variant: as_main}, known).what)
 
 
 def test_the_rows_make_the_same_table_as_the_summaries(known, summaries):

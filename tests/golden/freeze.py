@@ -40,11 +40,11 @@ from nmpcrl.claims import (
     remedies,
     remedy_published,
     remedy_questions,
+    reproduce,
     robustness,
     rule,
     terminal_questions,
     thresholds,
-    verification,
     whole_picture,
     wider_claims,
     world,
@@ -637,7 +637,7 @@ def keys_of_runs() -> dict[Any, tuple[str, str]]:
 
 @entry("keys")
 def keys() -> Any:
-    parts, wanted = design.whole_study(), dict.fromkeys(verification.sample(study(), 60))
+    parts, wanted = design.whole_study(), dict.fromkeys(reproduce.sample(study(), 60))
     first = {part: e for e, part in reversed(parts.items())}
     wanted |= dict.fromkeys([*design.fresh(), *first.values()])
     known = keys_of_runs()

@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims import published
-from nmpcrl.claims.agreement import Repeated
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.prespecified import Commit, Fixed
 from nmpcrl.claims.published import Published
+from nmpcrl.claims.reproduce import Agreement
 from nmpcrl.claims.robustness import COLUMNS
 from nmpcrl.claims.verdict import (
     NOT,
@@ -265,13 +265,13 @@ def test_names_are_listed_as_a_sentence_has_them(names, said):
 
 def test_runs_that_were_trained_again_are_counted_and_judged_beside_the_published_ones():
     there = (verdict("C1", PARTLY), verdict("C2", NOT), verdict("C3", NOT))
-    same = text.repeated(Repeated(6, 4, 1, there, there))
+    same = text.repeated(Agreement(6, 4, 1, there, there))
     assert "Of 6 published runs" in same
     assert "4 have the published numbers in every digit, and 1 more to six digits" in same
     assert same.endswith("layouts and readings for 3 of 3 claims.")
     here = (verdict("C1", PARTLY), verdict("C2", REPRODUCED), verdict("C3", UNDECIDABLE))
-    assert text.repeated(Repeated(6, 4, 1, here, there)).endswith(
+    assert text.repeated(Agreement(6, 4, 1, here, there)).endswith(
         "for 1 of 3 claims, another for 1 (C2: reproduced here, not reproduced there)"
         " and none for 1 (too few runs: C3)."
     )
-    assert text.repeated(Repeated(0, 0, 0, (), ())) == "No published run was trained again here."
+    assert text.repeated(Agreement(0, 0, 0, (), ())) == "No published run was trained again here."

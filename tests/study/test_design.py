@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from nmpcrl.claims.comparison import FEWEST
+from nmpcrl.claims.reproduce import FEWEST
 from nmpcrl.study import Experiment, design, paper
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import MAIN, frozen_arm

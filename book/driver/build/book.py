@@ -12,7 +12,7 @@ Each build has its own place, in the last column, and six steps, each a function
               the machine to itself. A build without `book/published` ends here, too
 2. `mirror`   copy _config.yml, _toc.yml and book/ to PLACE/src, and MathJax from its package
 3. `train`    what of these is not stored, once the solver is compiled; runs that contradict
-              the published ones end the build, and so do verdicts, as `claims.agreement` says.
+              the published ones end the build, and so do verdicts, as `claims.reproduce` says.
               What the live figures solve with is compiled meanwhile
 4. `execute`  the chapters with papermill, the exercises solved, two at a time, into PLACE/executed
 5. `dress`    the pages of the mirror: numbers, references and boxes, as `enrich` says, exercises

@@ -4,9 +4,13 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from driver.project import Failure
+
+if TYPE_CHECKING:
+    from nmpcrl.claims.reproduce import Pairs
+    from nmpcrl.claims.verdict import Verdict
 
 
 def require_published() -> None:
@@ -45,7 +49,7 @@ def compile_for_pages() -> None:
 def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     """Run what is not stored yet; the bars are the store's."""
     from nmpcrl.analysis.summaries import fetch_summaries
-    from nmpcrl.claims import agreement, comparison, published
+    from nmpcrl.claims import published, reproduce
     from nmpcrl.study import Experiment
     from nmpcrl.study.provenance import warn_of_changes
     from nmpcrl.study.setup import compile_ahead
@@ -55,28 +59,38 @@ def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     compile_ahead((*experiments, *summaries) or (Experiment(),))
     fetch_all(experiments, progress=True)
     made, known = fetch_summaries(summaries), published.load()
-    contradictions = comparison.compare(made, known)
+    contradictions = reproduce.compare(made, known)
     if len(contradictions):
         raise Failure(
             "Runs that were trained here contradict the published ones:\n"
             f"{contradictions.to_string(index=False)}"
         )
-    refuse_verdicts(agreement.of_runs(made, known))
+    refuse_verdicts(reproduce.of_runs(made, known))
 
 
 def measure(calls: tuple[Callable[[], Any], ...]) -> None:
     """What is to be done with the machine to itself; times have their verdicts, too."""
     from nmpcrl.bench import summary
-    from nmpcrl.claims import agreement, published
+    from nmpcrl.claims import published, reproduce
 
     for call in calls:
         measured = call()
         if isinstance(measured, dict) and "learners" in measured:
-            refuse_verdicts(agreement.of_times(summary.learners(measured), published.load()))
+            refuse_verdicts(reproduce.of_times(summary.learners(measured), published.load()))
 
 
-def refuse_verdicts(contradictions: tuple[str, ...]) -> None:
+def refuse_verdicts(contradictions: "Pairs") -> None:
     """End the build if a verdict that was found here contradicts the published one."""
     if contradictions:
-        listed = "\n".join(contradictions)
+        listed = "\n".join(
+            f"{here.claim} is {_outcome(here)} here, and {_outcome(there)} as published"
+            for here, there in contradictions
+        )
         raise Failure(f"Verdicts that were found here contradict the published ones:\n{listed}")
+
+
+def _outcome(verdict: "Verdict") -> str:
+    """The words of an outcome with the interval that it rests on."""
+    if verdict.interval is None:
+        return verdict.words
+    return f"{verdict.words} [{verdict.interval[0]:.2f}, {verdict.interval[1]:.2f}]"

@@ -1,0 +1,279 @@
+"""Runs made on this machine against the published ones, and the proof that an edit changes no bit.
+
+Where code, versions and machine are the published ones, a run must be equal to the last bit.
+Elsewhere rounding differs, and learning may amplify the difference. Then the cost of theta_init
+must agree to `EXACT`, and of `FEWEST` or more runs of one learner, layout and reading of the decay
+at least half must lie in the range of the published runs, widened on both sides by its width and by
+`SLACK`. If none of ten published runs failed and each fails with probability p, most of three fail
+in at most 1.2 % of all cases, whatever p is; a single run fails in 3.5 %.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl.analysis import summaries
+from nmpcrl.analysis.rows import FIELDS, THETA, row, table
+from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.claims import rule
+from nmpcrl.claims.own_claims import judge_own
+from nmpcrl.claims.paper_claims import judge_runs, judge_times
+from nmpcrl.claims.published import Published
+from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
+from nmpcrl.claims.wider_claims import judge_wider
+from nmpcrl.study import design, provenance
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.limits import seconds_of
+from nmpcrl.study.setup import compile_ahead
+from nmpcrl.study.storage.executor import execute
+from nmpcrl.study.storage.machine import fingerprint
+
+Row = Mapping[str, Any]
+Pairs = tuple[tuple[Verdict, Verdict], ...]  # found here, published
+GROUP = [name for name in FIELDS if name != "seed"]  # fields that runs of a range have in common
+CELL = ["learner", "layout", "decay"]  # columns that name a group in the table of `compare`
+MEASURES = ("final_cost", "training_cost")  # compared with a range on another machine
+NUMBERS = (*MEASURES, "initial_cost", *THETA)  # compared bit for bit on the same machine
+SLACK = 0.01  # of the cost of theta_init
+FEWEST = 3  # runs of a group: one or two of a chaotic learner may fail by chance
+EXACT = 1e-6  # relative
+
+
+def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.DataFrame:
+    """The numbers of runs made here that contradict published ones, one row each."""
+    rows = {e: row(one) for e, one in fresh.items() if e in published.rows}
+    exact = comparable(rows, published)
+    wrong = [unequal(e, rows[e], published.rows[e]) for e in sorted(exact, key=str)]
+    wrong += _out_of_range([one for e, one in rows.items() if e not in exact], published)
+    names = [*CELL, "seed", "what", "here", "published"]
+    return pd.DataFrame([one for one in wrong if one], columns=names)
+
+
+def comparable(runs: Iterable[Experiment], published: Published) -> set[Experiment]:
+    """The runs that were published with this code, these versions and on this machine."""
+    here = {"machine": fingerprint(), "versions": provenance.environment()}
+    parts = {
+        part
+        for batch in published.batches
+        for part in batch.get("runs", {})
+        if all(batch.get(name) == value for name, value in here.items())
+    }
+    found = {e for e in runs if e in published.rows and published.variants[e] in parts}
+    return {e for e in found if published.rows[e]["key"] == provenance.summary_key(e)}
+
+
+def unequal(e: Experiment, here: Row, there: Row) -> tuple[Any, ...] | None:
+    """The first number that differs between two rows of one run, as a row of `compare`."""
+    for name in NUMBERS:
+        if here[name] != there[name]:
+            return e.learner, e.layout, e.decay, e.seed, name, here[name], str(there[name])
+    return None
+
+
+def _out_of_range(rows: list[dict[str, Any]], published: Published) -> list[tuple[Any, ...]]:
+    """The rows of `compare` by the rule for another machine."""
+    if not rows:
+        return []
+    wrong: list[tuple[Any, ...]] = []
+    known = dict(list(pd.DataFrame(list(published.rows.values())).groupby(GROUP)))
+    for name, group in pd.DataFrame(rows).groupby(GROUP):
+        there, cell = known[name], tuple(group[CELL].iloc[0])
+        start = float(there.initial_cost.iloc[0])
+        for seed, here in zip(group.seed, group.initial_cost, strict=True):
+            if abs(here / start - 1) > EXACT:
+                wrong.append((*cell, seed, "initial_cost", here, str(start)))
+        for measure in MEASURES if len(group) >= FEWEST else ():
+            low, high = _widened(there[measure], SLACK * start)
+            if (~group[measure].between(low, high)).mean() > 0.5:
+                middle = float(group[measure].median())
+                wrong.append((*cell, "all", measure, middle, f"{low:.1f} to {high:.1f}"))
+    return wrong
+
+
+def _widened(values: pd.Series, slack: float) -> tuple[float, float]:
+    """The range of published values; without an upper end where a published run failed."""
+    finite = values[np.isfinite(values)]
+    if finite.empty:
+        return -np.inf, np.inf
+    low, high = float(finite.min()), float(finite.max())
+    width = high - low + slack
+    return low - width, high + width if len(finite) == len(values) else np.inf
+
+
+def contradictions(found: Iterable[Verdict], known: Iterable[Verdict]) -> Pairs:
+    """The pairs of verdicts on one claim that cannot both be right."""
+    there = {verdict.claim: verdict for verdict in known}
+    pairs = [(one, there[one.claim]) for one in found if one.claim in there]
+    return tuple(pair for pair in pairs if _contradict(*pair))
+
+
+def _contradict(one: Verdict, other: Verdict) -> bool:
+    """Whether two decided outcomes differ by more than chance.
+
+    Of two samples from one source, fewer than one pair in a hundred has intervals of 95 % that do
+    not overlap. A verdict without an interval rests on no sample.
+    """
+    if UNDECIDABLE in (one.outcome, other.outcome) or one.outcome == other.outcome:
+        return False
+    if one.interval is None or other.interval is None:
+        return True
+    return one.interval[1] < other.interval[0] or other.interval[1] < one.interval[0]
+
+
+def of_runs(fresh: Mapping[Experiment, RunSummary], published: Published) -> Pairs:
+    """The contradictions between verdicts on runs made here and on published runs.
+
+    Runs are compared with the published main table in the same layouts and readings of the decay,
+    so that a choice of layouts contradicts nothing. Runs with other fields are skipped.
+    """
+    return contradictions(*_verdicts(fresh, published))
+
+
+def of_times(timings: pd.DataFrame, published: Published) -> Pairs:
+    """The contradictions with times taken here; none if another machine took the published ones."""
+    if published.about.get("timings", {}).get("machine") != fingerprint():
+        return ()
+    return contradictions(judge_times(timings), published.verdicts)
+
+
+def _verdicts(
+    fresh: Mapping[Experiment, RunSummary], published: Published
+) -> tuple[tuple[Verdict, ...], tuple[Verdict, ...]]:
+    """The verdicts on runs made here, and on published runs of the same layouts and readings."""
+    named = ("learner", *rule.CELL)
+    mine = {
+        e: one
+        for e, one in fresh.items()
+        if e == Experiment(**{name: getattr(e, name) for name in named})
+    }
+    cells = {(e.layout, e.decay) for e in mine}
+    shared = [
+        part == design.MAIN_TABLE and (e.layout, e.decay) in cells
+        for e, part in published.variants.items()
+    ]
+    if not any(shared):
+        return (), ()
+    here, there = table(mine), published.table[shared]
+    paths = {e: one.states for e, one in mine.items()}
+    return _judge(here, paths), _judge(there, published.paths)
+
+
+def _judge(runs: pd.DataFrame, paths: rule.Paths) -> tuple[Verdict, ...]:
+    return (*judge_runs(runs, paths), *judge_wider(runs, paths), *judge_own(runs))
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Published runs made again on this machine."""
+
+    runs: int
+    equal: int  # with every published number in every digit
+    close: int  # of the others, with every number to `EXACT`
+    here: tuple[Verdict, ...]  # on these runs alone
+    there: tuple[Verdict, ...]  # on the published runs of the same layouts and readings
+
+
+def agreement(fresh: Mapping[Experiment, RunSummary], published: Published) -> Agreement:
+    """How the runs made here agree with the published main table; other runs are skipped."""
+    mine = {e: one for e, one in fresh.items() if published.variants.get(e) == design.MAIN_TABLE}
+    pairs = {e: (row(one), published.rows[e]) for e, one in mine.items()}
+    differing = [pair for e, pair in pairs.items() if unequal(e, *pair)]
+    close = sum(_nearly_equal(*pair) for pair in differing)
+    here, there = _verdicts(mine, published)
+    return Agreement(len(mine), len(mine) - len(differing), close, here, there)
+
+
+def _nearly_equal(here: Row, there: Row) -> bool:
+    mine, theirs = ([float(one[name]) for name in NUMBERS] for one in (here, there))
+    return bool(np.allclose(mine, theirs, rtol=EXACT, atol=EXACT))
+
+
+class CannotRelock(RuntimeError):
+    """The lock stays as it is; the message has the reason."""
+
+
+class Relocked(NamedTuple):
+    """The proof on which a new lock rests."""
+
+    lock: Path
+    published: int  # runs with the bits of published ones
+    stored: int  # runs with the bits of those that locked code stored here
+
+
+def sample(known: Published, count: int) -> tuple[Experiment, ...]:
+    """Published runs, spread over the parts of the study and in each part over its learners."""
+    parts: dict[str, dict[str, list[Experiment]]] = {}
+    for experiment, part in known.variants.items():
+        parts.setdefault(part, {}).setdefault(experiment.learner, []).append(experiment)
+    ordered = _interleaved([_interleaved(learners.values()) for learners in parts.values()])
+    if count >= len(parts):
+        return tuple(ordered[:count])
+    return tuple(ordered[i * len(parts) // count] for i in range(count))
+
+
+def _interleaved(groups: Iterable[Iterable[Experiment]]) -> list[Experiment]:
+    """The first of each group, the second of each, and so on."""
+    return [e for turn in zip_longest(*groups) for e in turn if e is not None]
+
+
+def relock(known: Published, count: int, *, workers: int | None = None) -> Relocked:
+    """Train `count` runs afresh, and write the lock if all have the bits that locked code made.
+
+    A fresh run is compared with the published run, if such a machine made it, else with the run
+    that is stored here.
+
+    Raises:
+        CannotRelock: a bit has changed, a run failed, or a run has nothing to be compared with.
+    """
+    drawn = sample(known, count)
+    exact = comparable(drawn, known)
+    before: dict[Experiment, Row] = {e: known.rows[e] for e in exact}
+    before |= {e: row(one) for e in drawn if e not in exact and (one := _stored_by_lock(e))}
+    if len(before) < len(drawn):
+        raise CannotRelock(
+            f"only {len(before)} of {len(drawn)} runs can be compared with runs that locked code"
+            f" made on such a machine: with that code, `nmpcrl verify --sample {count}` makes them"
+        )
+    fresh = _trained_afresh(drawn, workers)
+    wrong = [found for e in drawn if (found := unequal(e, row(fresh[e]), before[e]))]
+    if wrong:
+        learner, layout, decay, seed, what, now, then = wrong[0]
+        raise CannotRelock(
+            f"{len(wrong)} of {len(drawn)} runs have other bits, first {learner} in layout"
+            f" {layout}, decay per {decay}, seed {seed}: {what} is {now!r} and was {then}; if that"
+            " is intended, raise the epoch of the room in nmpcrl/study/provenance.py"
+        )
+    for experiment, made in fresh.items():  # the next edit is compared with these
+        summaries.keep(experiment, made)
+    return Relocked(provenance.relock(), len(exact), len(drawn) - len(exact))
+
+
+def _stored_by_lock(e: Experiment) -> RunSummary | None:
+    """The stored summary, if locked code made it on such a machine with such versions."""
+    one, here = summaries.read(e), (fingerprint(), provenance.environment())
+    if one is None or one.facts.get("sources") not in provenance.locks():
+        return None
+    return one if (one.facts.get("machine"), one.facts.get("versions")) == here else None
+
+
+def _trained_afresh(
+    drawn: tuple[Experiment, ...], workers: int | None
+) -> dict[Experiment, RunSummary]:
+    fresh: dict[Experiment, RunSummary] = {}
+    compile_ahead(drawn)
+    ordered = sorted(drawn, key=seconds_of, reverse=True)
+    jobs = {e: partial(summaries.make, e, provenance.signature(), afresh=True) for e in ordered}
+
+    def keep(experiment: Experiment, made: RunSummary) -> str:
+        fresh[experiment] = made
+        return ""
+
+    for experiment, error in execute(jobs, keep, workers=workers).items():
+        raise CannotRelock(f"{experiment} failed with {type(error).__name__}: {error}") from error
+    return fresh

@@ -1,0 +1,299 @@
+"""Runs made here against published ones: bits, ranges, verdicts, and the proof for a new lock."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nmpcrl.analysis import summaries
+from nmpcrl.analysis.rows import cost_ratios, row
+from nmpcrl.claims import published, reproduce
+from nmpcrl.claims.paper_claims import judge_times
+from nmpcrl.claims.published import Published
+from nmpcrl.claims.reproduce import (
+    CannotRelock,
+    agreement,
+    comparable,
+    compare,
+    contradictions,
+    of_runs,
+    of_times,
+    relock,
+    sample,
+)
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
+from nmpcrl.study import Experiment, design, provenance, sweep
+from nmpcrl.study.storage.executor import THREADS
+from nmpcrl.study.storage.machine import fingerprint
+
+HERE = {"machine": fingerprint(), "versions": provenance.environment()}
+ELSEWHERE = HERE | {"machine": fingerprint() | {"processor": "another"}}
+
+
+def published_of(found, made=HERE) -> Published:
+    """Summaries as if they had been published."""
+    rows = {e: row(one) | {"key": provenance.summary_key(e)} for e, one in found.items()}
+    ratios = cost_ratios(rows)
+    rows = {e: one | {"cost_ratio": ratios[e]} for e, one in rows.items()}
+    about = made | {"runs": {design.MAIN_TABLE: len(rows)}}
+    return Published(found, dict.fromkeys(rows, design.MAIN_TABLE), rows, about=about)
+
+
+@pytest.fixture
+def study(made_up):
+    """A small main table; a function of the final costs of four runs of ES over the first cost."""
+
+    def make(*costs):
+        ends = {Experiment(seed=k): {"end": cost} for k, cost in enumerate(costs)}
+        return dict(made_up(lambda e: ends.get(e, {}), layouts=("A",)).summaries)
+
+    return make
+
+
+def scaled(one, factor, which=slice(None)):
+    cost = one.evaluations["cost"].copy()
+    cost[which] *= factor
+    return replace(one, evaluations=one.evaluations | {"cost": cost})
+
+
+def moved(one):
+    theta = one.episodes["theta"] + np.spacing(1.0)
+    return replace(one, episodes=one.episodes | {"theta": theta})
+
+
+@pytest.mark.parametrize("edit", [lambda one: scaled(one, 1 + 1e-15, -1), moved])
+def test_on_the_same_machine_the_last_bit_counts(study, edit):
+    found, first = study(), Experiment(seed=2)
+    known = published_of(found)
+    assert compare(found, known).empty
+    wrong = compare(found | {first: edit(found[first])}, known)
+    assert wrong[["learner", "layout", "decay", "seed"]].values.tolist() == [["ES", "A", "step", 2]]
+
+
+@pytest.mark.parametrize("other", ["machine", "versions", "key"])
+def test_elsewhere_the_last_bit_does_not_count(study, other):
+    found = study()
+    known = published_of(found, HERE | ({} if other == "key" else {other: {"python": "2.7"}}))
+    if other == "key":
+        known = replace(known, rows={e: one | {"key": "0"} for e, one in known.rows.items()})
+    assert compare({e: scaled(one, 1 + 1e-9) for e, one in found.items()}, known).empty
+
+
+def test_elsewhere_the_cost_of_theta_init_must_agree(study):
+    found, first = study(), Experiment()
+    edited = {first: scaled(found[first], 1 + 1e-4, 0)}
+    assert compare(edited, published_of(found, ELSEWHERE)).what.tolist() == ["initial_cost"]
+
+
+FAILED = (np.inf,) * 4
+
+
+@pytest.mark.parametrize(
+    ("there", "here", "count", "contradicts"),
+    [
+        ((0.6, 0.7, 0.8, 0.9), (0.9, 0.6, 0.7, 0.8), 4, False),  # other seeds, the same range
+        ((0.6, 0.7, 0.8, 0.9), (0.4, 1.1, 0.7, 0.8), 4, False),  # within the widened range
+        ((0.6, 0.7, 0.8, 0.9), (5.0, 0.7, 0.8, 0.9), 4, False),  # one of four far outside
+        ((0.6, 0.7, 0.8, 0.9), (5.0, 5.0, 5.0, 0.9), 4, True),
+        ((0.6, 0.7, 0.8, 0.9), (0.1, 0.1, 0.1, 0.1), 4, True),
+        ((0.6, 0.7, 0.8, 0.9), FAILED, 3, True),
+        ((0.6, 0.7, 0.8, 0.9), FAILED, 2, False),  # too few runs
+        ((0.6, 0.7, np.inf, np.inf), FAILED, 4, False),  # published runs failed, too
+        (FAILED, (0.6, 0.7, 0.8, 0.9), 4, False),
+    ],
+)
+def test_elsewhere_most_runs_must_lie_in_the_published_range(
+    study, there, here, count, contradicts
+):
+    made, mine = study(*here), [Experiment(seed=k) for k in range(count)]
+    wrong = compare({e: made[e] for e in mine}, published_of(study(*there), ELSEWHERE))
+    assert wrong.what.tolist() == ["final_cost"] * contradicts
+
+
+def test_runs_are_compared_with_runs_of_the_same_fields_alone(study):
+    found, other = study(), Experiment(horizon=5)
+    assert compare({other: found[Experiment()]}, published_of(found)).empty
+    variant = scaled(replace(found[Experiment()], experiment=asdict(other)), 2.0)
+    known = published_of(found | {other: variant}, ELSEWHERE)
+    assert compare({other: variant}, known).empty
+    as_main = replace(found[Experiment()], experiment=asdict(other))
+    assert "initial_cost" in set(compare({other: as_main}, known).what)
+
+
+def test_a_batch_is_comparable_where_this_machine_made_it(study):
+    known = published_of(study(), ELSEWHERE)
+    more, *rest = known.rows
+    known = replace(known, variants=dict(known.variants) | {more: "alpha x 3"})
+    added = replace(known, about={**known.about, "additions": [HERE | {"runs": {"alpha x 3": 1}}]})
+    assert comparable([more, *rest], known) == set()
+    assert comparable([more, *rest, Experiment(seed=99)], added) == {more}
+
+
+def verdict(outcome: Outcome, interval: tuple[float, float] | None = None) -> Verdict:
+    share = None if interval is None else sum(interval) / 2
+    return Verdict("C1", "It works.", outcome, "", "", share, interval)
+
+
+@pytest.mark.parametrize(
+    ("here", "there", "contradict"),
+    [
+        (verdict(REPRODUCED, (0.8, 1.0)), verdict(NOT, (0.0, 0.2)), True),
+        (verdict(REPRODUCED, (0.8, 1.0)), verdict(PARTLY, (0.3, 0.7)), True),
+        (verdict(REPRODUCED, (0.8, 1.0)), verdict(PARTLY, (0.3, 0.81)), False),
+        (verdict(PARTLY, (0.1, 0.2)), verdict(PARTLY, (0.6, 0.7)), False),
+        (verdict(UNDECIDABLE, (0.9, 1.0)), verdict(NOT, (0.0, 0.2)), False),
+        (verdict(REPRODUCED), verdict(NOT), True),
+        (verdict(NOT), verdict(NOT), False),
+        (verdict(UNDECIDABLE), verdict(NOT), False),
+        (replace(verdict(REPRODUCED), claim="C9"), verdict(NOT), False),
+    ],
+)
+def test_two_decided_verdicts_contradict_each_other_beyond_chance_alone(here, there, contradict):
+    assert contradictions([here], [there]) == ((here, there),) * contradict
+    assert contradictions([there], [here]) == ((there, here),) * contradict
+
+
+def timings(ratio: float, waited: float = 0.0) -> pd.DataFrame:
+    rows = [
+        {"solver": "ipopt", "learner": name, "ratio": value, "waited": waited}
+        | {"ratio_low": value - 0.01, "ratio_high": value + 0.01}
+        for name, value in {"ES": 1.0, "RDES": ratio, "GES": 1.0}.items()
+    ]
+    return pd.DataFrame(rows)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "waited", "made", "contradicted"),
+    [
+        (0.5, 0.0, HERE, ["C3"]),
+        (0.7, 0.0, HERE, []),
+        (0.5, 0.9, HERE, []),  # a busy machine
+        (0.6, 0.3, HERE, []),  # its interval reaches across a border
+        (0.5, 0.0, ELSEWHERE, []),
+    ],
+)
+def test_times_contradict_published_ones_of_this_machine(ratio, waited, made, contradicted):
+    known = Published(verdicts=judge_times(timings(0.65)), about={"timings": made})
+    found = of_times(timings(ratio, waited), known)
+    assert [here.claim for here, _ in found] == contradicted
+
+
+def diverges(experiment):
+    """C1 is reproduced: DES is stopped and RDES is not."""
+    return {"reached": 40, "training": np.inf} if experiment.learner == "DES" else {}
+
+
+def test_verdicts_on_runs_are_compared_in_the_same_layouts_and_readings(made_up):
+    known, found = published_of(made_up().summaries), made_up(diverges).summaries
+    pairs = of_runs(found, known)
+    assert [here.claim for here, _ in pairs] == ["C1", "W9"]
+    assert [(here.outcome, there.outcome) for here, there in pairs[:1]] == [(REPRODUCED, NOT)]
+    assert of_runs(made_up(diverges, layouts=("B",)).summaries, known) == ()
+    assert of_runs(made_up(diverges, episodes=50).summaries, known) == ()
+    assert of_runs({replace(e, horizon=5): one for e, one in found.items()}, known) == ()
+
+
+@pytest.mark.slow
+def test_runs_do_not_contradict_themselves_nor_a_part_the_whole(made_up):
+    whole = made_up(lambda e: diverges(e) if e.layout == "A" else {}).summaries
+    part = {e: one for e, one in whole.items() if e.layout == "A"}
+    assert of_runs(whole, published_of(whole)) == of_runs(part, published_of(whole)) == ()
+
+
+def test_every_decided_claim_on_runs_is_compared(made_up, monkeypatch):
+    monkeypatch.setattr(reproduce, "contradictions", lambda found, known: tuple(found))
+    found = of_runs(made_up().summaries, published_of(made_up().summaries))
+    decided = [one.claim for one in found if one.outcome != UNDECIDABLE]
+    assert decided == ["C1", "C2", "C5", "C6", "C7", "C9", "W7", "W9", "B1"]
+
+
+def test_published_runs_made_again_are_counted_by_how_equal_they_are(study):
+    found = study()
+    first, second, third, *_ = (e for e in found if e.learner != "frozen")
+    known = published_of(
+        found | {first: scaled(found[first], 1 + 1e-9, -1), second: scaled(found[second], 2.0)}
+    )
+    made = agreement(found, replace(known, variants=dict(known.variants) | {third: "N = 5"}))
+    assert (made.runs, made.equal, made.close) == (len(found) - 1, len(found) - 3, 1)
+    assert [one.claim for one in made.here] == [one.claim for one in made.there]
+    assert agreement({}, Published()) == reproduce.Agreement(0, 0, 0, (), ())
+
+
+SHORT = {"episodes": 2, "steps": 3, "evaluate_every": 1}
+MAIN = sweep(learner=("ES", "GES"), seed=(0, 1, 2), **SHORT)
+OTHER = sweep(learner="ES", horizon=5, seed=(0, 1), **SHORT)
+PARTS = dict.fromkeys(MAIN, "main") | dict.fromkeys(OTHER, "N = 5")
+KNOWN = Published(variants=PARTS)  # published by another machine
+
+
+def test_a_sample_is_spread_over_parts_and_learners():
+    assert sample(KNOWN, 2) == (MAIN[0], OTHER[0])
+    four = sample(KNOWN, 4)
+    assert {PARTS[e] for e in four[:2]} == {PARTS[e] for e in four[2:]} == {"main", "N = 5"}
+    assert {e.learner for e in four if PARTS[e] == "main"} == {"ES", "GES"}
+    assert set(sample(KNOWN, 99)) == set(PARTS)
+    real = published.load()
+    drawn = sample(real, 60)
+    assert len(set(drawn)) == 60
+    assert {real.variants[e] for e in drawn} == set(real.variants.values())
+
+
+@pytest.fixture
+def lock(tmp_path, monkeypatch):
+    """Runs and a lock of this test; the lock is of the code as it is."""
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    for name in THREADS:
+        monkeypatch.setenv(name, "1")
+    monkeypatch.setattr(provenance, "LOCK", tmp_path / "sources.lock.json")
+
+    def execute(jobs, keep, **_):  # in this process, which is patched
+        for name, job in jobs.items():
+            keep(name, job())
+        return {}
+
+    monkeypatch.setattr(reproduce, "execute", execute)
+    return provenance.relock()
+
+
+def edit(monkeypatch, times=1.0, code="edited"):
+    """From here on the code is other code, whose runs have costs times a factor."""
+    real = summaries.summarise
+    monkeypatch.setattr(provenance, "sources", lambda: {"learning/updates.py": code})
+    monkeypatch.setattr(provenance, "sources_hash", lambda: provenance.hash_of([code]))
+    monkeypatch.setattr(summaries, "summarise", lambda records: scaled(real(records), times))
+
+
+def train_here():
+    with ThreadPoolExecutor(1) as executor:
+        summaries.fetch_summaries(sample(KNOWN, 4), executor=executor, progress=False)
+
+
+def test_the_lock_is_written_where_no_bit_has_changed(lock, monkeypatch):
+    train_here()
+    edit(monkeypatch)
+    assert relock(KNOWN, 4)[1:] == (0, 4)
+    assert json.loads(lock.read_text())["sources"] == {"learning/updates.py": "edited"}
+    edit(monkeypatch, code="edited again")
+    assert relock(KNOWN, 4)[1:] == (0, 4)  # runs of the first relock are compared with
+
+
+@pytest.mark.parametrize(
+    ("stored", "times", "refusal"),
+    [
+        (True, 1 + 1e-15, "4 of 4 runs have other bits, first ES .*final_cost"),
+        (False, 1.0, "only 0 of 4 runs .* `nmpcrl verify --sample 4`"),
+    ],
+)
+def test_otherwise_the_lock_stays(lock, monkeypatch, stored, times, refusal):
+    before = lock.read_text()
+    if stored:
+        train_here()
+    edit(monkeypatch, times)
+    if not stored:
+        train_here()  # by code that is not locked
+    with pytest.raises(CannotRelock, match=refusal):
+        relock(KNOWN, 4)
+    assert lock.read_text() == before
