@@ -27,7 +27,7 @@ from nmpcrl.control import SolverError
 from nmpcrl.learning.rollout import Rollout
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
-from nmpcrl.study.parameters import Whole, refused
+from nmpcrl.study.parameters import refused, whole
 from nmpcrl.study.population import JUDGE
 from nmpcrl.study.scenarios import load
 from nmpcrl.study.storage.executor import execute
@@ -151,10 +151,10 @@ def judge(
         ParameterError: an argument is not what it may be.
         NoEntry: there is no such entry, or it failed, or returned what is neither.
     """
-    budget = Whole(1, MOST_BUDGET).check("budget", budget)
-    seeds = Whole(1, MOST_SEEDS).check("seeds", seeds)
+    budget = whole(1, MOST_BUDGET).check("budget", budget)
+    seeds = whole(1, MOST_SEEDS).check("seeds", seeds)
     if layouts is not None:
-        layouts = Whole(1, len(table.places)).check("layouts", layouts)
+        layouts = whole(1, len(table.places)).check("layouts", layouts)
     entry_of(name)
     chosen = dict(islice(table.places.items(), layouts))
     jobs = {

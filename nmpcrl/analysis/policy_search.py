@@ -20,7 +20,7 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper, store
-from nmpcrl.study.parameters import LARGEST_SEED, Allowed, OneOf, Whole
+from nmpcrl.study.parameters import LARGEST_SEED, Allowed, one_of, whole
 from nmpcrl.study.provenance import epochs, versions
 from nmpcrl.study.storage import place
 from nmpcrl.study.storage.atomic import write_json
@@ -34,9 +34,9 @@ SPREAD = 0.3  # of the first rollouts, in units of `SCALE`
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
 ALLOWED: Mapping[str, Allowed] = {  # by field of `Search`
-    "layout": OneOf(paper.LAYOUTS),
-    "seed": Whole(0, LARGEST_SEED - 1),  # one more is CMA-ES's
-    "budget": Whole(LEAST, MOST),
+    "layout": one_of(paper.LAYOUTS),
+    "seed": whole(0, LARGEST_SEED - 1),  # one more is CMA-ES's
+    "budget": whole(LEAST, MOST),
 }
 FAILED = 1e6  # stands for the cost of a rollout on which a solve failed
 

@@ -16,7 +16,7 @@ from nmpcrl.analysis.policy_search import LOWER, SCALE, UPPER
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import FARTHEST
-from nmpcrl.study.parameters import Whole, refused
+from nmpcrl.study.parameters import refused, whole
 from nmpcrl.study.population import TUNE
 from nmpcrl.study.robot import centres_of, task_of
 
@@ -47,7 +47,7 @@ class TuneEnv(gymnasium.Env[Vector, Vector]):
         if render_mode is not None:
             raise refused("render_mode", render_mode, "None: there is nothing to see")
         self.render_mode = None
-        self._rollouts = Whole(2, MOST_ROLLOUTS).check("rollouts", rollouts)
+        self._rollouts = whole(2, MOST_ROLLOUTS).check("rollouts", rollouts)
         self._fixed = None if layout is None else centres_of(layout)
         walls = np.full(2 * len(self._fixed or next(iter(TUNE.values()))), FARTHEST)
         self.observation_space = Box(

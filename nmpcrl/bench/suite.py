@@ -20,7 +20,7 @@ from nmpcrl.bench.processes import PROCESSES, at_once, first_calls, time_learner
 from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
 from nmpcrl.study import limits, paper, provenance, store
-from nmpcrl.study.parameters import OneOf
+from nmpcrl.study.parameters import one_of
 from nmpcrl.study.storage import place
 from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.machine import machine
@@ -164,7 +164,7 @@ def check(length: object) -> None:
     Raises:
         ParameterError: there is none of this name.
     """
-    OneOf(LENGTHS).check("length", length)
+    one_of(LENGTHS).check("length", length)
 
 
 def stored() -> Bench | None:

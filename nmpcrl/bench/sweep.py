@@ -17,13 +17,13 @@ from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
 from nmpcrl.study import paper, sealed, store
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import need_numba
-from nmpcrl.study.parameters import Whole
+from nmpcrl.study.parameters import whole
 from nmpcrl.study.setup import compile_ahead
 from nmpcrl.study.storage.executor import execute
 from nmpcrl.study.storage.place import check_folder
 
 SEED = 2025
-PROBLEMS = Whole(1, 10**9)  # that a sweep may have
+PROBLEMS = whole(1, 10**9)  # that a sweep may have
 OF_A_LAYOUT = 400  # problems: a layout is transcribed anew
 COMPARED = 4  # every so many problems are given to Ipopt, too, which takes most of the time
 OBSTACLES = 4

@@ -22,7 +22,7 @@ from nmpcrl.claims.published import failure_modes_of, load
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design, paper
 from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
-from nmpcrl.study.parameters import OneOf, Truth
+from nmpcrl.study.parameters import TRUTH, one_of
 from nmpcrl.study.records import Column, Stopped
 from nmpcrl.study.setup import controller_of
 from nmpcrl.study.store import Runs
@@ -99,7 +99,7 @@ def needed(
     Raises:
         ParameterError: a value is not what it may be.
     """
-    OneOf(SOURCES).check("study", source)
+    one_of(SOURCES).check("study", source)
     asked, known = _asked(learners, layouts, seeds, episodes), load().summaries
     return tuple(e for e in asked if source == "fresh" or e not in known)
 
@@ -114,7 +114,7 @@ def repeatable(
     Raises:
         ParameterError: `repeat` is neither true nor false, or a value is not what it may be.
     """
-    again = set(design.fresh()) if Truth().check("repeat", repeat) else set()
+    again = set(design.fresh()) if TRUTH.check("repeat", repeat) else set()
     known = load().summaries
     return tuple(e for e in _asked(**asked) if e in again and e in known)  # type: ignore[arg-type]
 

@@ -9,12 +9,12 @@ from typing import Any
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.limits import estimate
-from nmpcrl.study.parameters import OneOf, ParameterError, Several, shown
+from nmpcrl.study.parameters import ParameterError, one_of, several, shown
 from nmpcrl.study.sweeps import AXES, FIELDS
 
 INJECTED = "# Parameters\n"  # so begins the cell in which papermill sets what it is given
 OF_PAPERMILL = "PAPERMILL_"  # so begin the names that it sets on its own account
-NAMED = Several(OneOf(tuple(paper.LAYOUTS)), "layout")  # of which a study is published
+NAMED = several(one_of(paper.LAYOUTS), "layout")  # of which a study is published
 # Step sizes with which a chapter has something to show: with larger ones a run ends at once.
 MOST = {"alpha": 1e-5, "beta": 1e-4}  # 100 and 10,000 times the paper's
 

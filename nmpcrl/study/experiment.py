@@ -1,110 +1,105 @@
 """An `Experiment` is a frozen value that names one run."""
 
-from dataclasses import Field, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
 from nmpcrl.control import Task, solvers
 from nmpcrl.control.nmpc import ABSURD
-from nmpcrl.study import paper
-from nmpcrl.study.geometry import Layout, Pose, short_name
-from nmpcrl.study.learners import DECAYS, LEARNERS, NETWORKS
+from nmpcrl.study import geometry, paper
+from nmpcrl.study.learners import DECAYS, LEARNERS, NETWORKS, readers
 from nmpcrl.study.parameters import (
     LARGEST_SEED,
+    TRUTH,
     Allowed,
-    Number,
-    Numbers,
-    OneOf,
     ParameterError,
-    Truth,
-    Whole,
+    number,
+    numbers,
+    one_of,
+    positive,
+    whole,
 )
 
 PAPER = ("ES", "DES", "RDES", "GES")  # the paper's learners
 MAIN = (*PAPER, "TDC", "frozen")  # of the main table
 
-# Nothing sensible lies above these.
 MOST_EPISODES = 100_000  # 333 times the paper's: exploration has long ended
 MOST_STEPS = 10_000  # 77 times the paper's; the robot arrives within 92
 MOST_STAGES = 500  # of a plan: four times an episode; gamma^500 is 2e-7
 
-WITHIN = Pose(paper.LOWER, paper.UPPER)  # the box
-STEP_SIZE = Number.above_zero(ABSURD)  # with more, theta leaves the numbers in one step
+POSE = geometry.pose(paper.LOWER, paper.UPPER)
+STEP_SIZE = positive(ABSURD)  # with a larger one theta leaves the numbers in one step
+THETA = numbers(
+    [number(-ABSURD, ABSURD)] * len(paper.THETA_INIT),
+    f"{len(paper.THETA_INIT)} numbers of size at most {ABSURD:g}",
+)
 
 
-def option(default: Any, allowed: Allowed, about: str, *, optional: bool = False) -> Any:
-    """A field: its default, what it may be, and a line of help.
-
-    An optional one is read by the learners whose entry in `LEARNERS` names it. The others ignore
-    it, and it is not part of their keys.
-    """
-    metadata = {"allowed": allowed, "help": about, "optional": optional}
-    return field(default=default, metadata=metadata)
+def option(default: Any, allowed: Allowed, about: str) -> Any:
+    """A field: its default, the values that are allowed, and a line of help."""
+    return field(default=default, metadata={"allowed": allowed, "help": about})
 
 
 @dataclass(frozen=True)
 class Experiment:
     """One run; the defaults are the paper's.
 
+    A field that `LEARNERS` names in `reads` is part of the keys of those learners' runs alone.
+
     Raises:
-        ParameterError: a field is not what it may be.
+        ParameterError: a field has a value that is not allowed.
     """
 
-    learner: str = option("ES", OneOf(LEARNERS), "What learns.")
-    seed: int = option(0, Whole(0, LARGEST_SEED), "Of the noise and of the network.")
-    episodes: int = option(paper.EPISODES, Whole(1, MOST_EPISODES), "Of training.")
-    layout: str | tuple[tuple[float, float], ...] = option(  # centres are kept as text
-        "A", Layout(paper.LAYOUTS), "Of the obstacles."
+    learner: str = option("ES", one_of(LEARNERS), "Name of the learner.")
+    seed: int = option(0, whole(0, LARGEST_SEED), "Seed of the noise and of the network.")
+    episodes: int = option(paper.EPISODES, whole(1, MOST_EPISODES), "Episodes of training.")
+    layout: str | tuple[tuple[float, float], ...] = option(  # centres are stored as text
+        "A", geometry.layout(paper.LAYOUTS), "Layout of the obstacles."
     )
-    decay: str = option("step", OneOf(DECAYS), "What k of Eq. (5) counts.")  # departure C
+    decay: str = option("step", one_of(DECAYS), "What k of Eq. (5) counts.")  # departure C
     decay_rate: float = option(
-        paper.DECAY_RATE, Number.above_zero(1), "c_epsilon, by which exploration decays."
+        paper.DECAY_RATE, positive(1), "c_epsilon, by which exploration decays."
     )
-    alpha: float = option(paper.ALPHA, STEP_SIZE, "Step size of theta.", optional=True)
-    beta: float = option(paper.BETA, STEP_SIZE, "Step size of w.", optional=True)
-    zeta: float = option(paper.ZETA, STEP_SIZE, "Learning rate of the network.", optional=True)
+    alpha: float = option(paper.ALPHA, STEP_SIZE, "Step size of theta.")
+    beta: float = option(paper.BETA, STEP_SIZE, "Step size of w.")
+    zeta: float = option(paper.ZETA, STEP_SIZE, "Learning rate of the network.")
     gated: bool = option(  # False: Algorithm 1 # departure G
-        True, Truth(), "Whether theta waits for the network's first fit.", optional=True
+        True, TRUTH, "Whether theta waits for the network's first fit."
     )
-    clipped: bool = option(
-        True, Truth(), "Whether noise is kept in the action space."
-    )  # departure E
+    clipped: bool = option(  # departure E
+        True, TRUTH, "Whether noisy actions are clipped to the action space."
+    )
     constrained: bool = option(  # departure F
-        False,
-        Truth(),
-        "Whether Q(s, a) is learned, with u_0 = a fixed, and not V(s).",
-        optional=True,
+        False, TRUTH, "Whether Q(s, a) is learned, with u_0 = a fixed, and not V(s)."
     )
     network: str = option(  # departure H
-        "plain", OneOf(NETWORKS), "What the paper leaves open of the network.", optional=True
+        "plain", one_of(NETWORKS), "Reading of what the paper leaves open of the network."
     )
-    box: str = option("hard", OneOf(paper.BOXES), "The bounds of the state.")  # departures A and M
-    ties_active: bool = option(  # the other side of the kink # departure L
-        False, Truth(), "Whether a state on an obstacle's boundary is in it.", optional=True
+    box: str = option(  # departures A and M
+        "hard", one_of(paper.BOXES), "Bounds of the state."
     )
-    curvature: bool = option(True, Truth(), "Whether TDC subtracts h.", optional=True)
-    projected: bool = option(
-        True, Truth(), "Whether theta is projected into [0, 10].", optional=True
+    ties_active: bool = option(  # departure L
+        False, TRUTH, "Whether a state on an obstacle's boundary is in the obstacle."
     )
-    beta_tdc: float = option(paper.BETA_TDC, STEP_SIZE, "Step size of w in TDC.", optional=True)
+    curvature: bool = option(True, TRUTH, "Whether TDC subtracts h.")
+    projected: bool = option(True, TRUTH, "Whether TDC projects theta into [0, 10].")
+    beta_tdc: float = option(paper.BETA_TDC, STEP_SIZE, "Step size of w in TDC.")
     theta: tuple[float, ...] = option(
-        paper.THETA_INIT,
-        Numbers(len(paper.THETA_INIT)),
-        "The controller's parameters at the start.",
+        paper.THETA_INIT, THETA, "Parameters of the controller at the start."
     )
-    steps: int = option(paper.STEPS, Whole(1, MOST_STEPS), "Of an episode.")
-    start: tuple[float, ...] = option(paper.START, WITHIN, "Where an episode begins.")
-    target: tuple[float, ...] = option(paper.TARGET, WITHIN, "Where the robot is to go.")
-    horizon: int = option(paper.HORIZON, Whole(1, MOST_STAGES), "N, the inputs of a plan.")
-    solver: str = option("riccati", OneOf(solvers.SOLVERS), "What solves Eq. (2).")
+    steps: int = option(paper.STEPS, whole(1, MOST_STEPS), "Steps of an episode.")
+    start: tuple[float, ...] = option(paper.START, POSE, "Pose where an episode begins.")
+    target: tuple[float, ...] = option(paper.TARGET, POSE, "Pose that the robot is to reach.")
+    horizon: int = option(paper.HORIZON, whole(1, MOST_STAGES), "N, the inputs of a plan.")
+    solver: str = option("riccati", one_of(solvers.SOLVERS), "Solver of Eq. (2).")
     tolerance: float = option(
         solvers.TOLERANCE,
-        Number.within(solvers.LEAST_TOLERANCE, solvers.LARGEST_TOLERANCE),
-        "Of the solver.",
+        number(solvers.LEAST_TOLERANCE, solvers.LARGEST_TOLERANCE),
+        "Tolerance of the solver.",
     )
     evaluate_every: int = option(
-        10, Whole(1, MOST_EPISODES), "Episodes between rollouts without noise."
+        10, whole(1, MOST_EPISODES), "Episodes between rollouts without noise."
     )
 
     def __post_init__(self) -> None:
@@ -123,7 +118,7 @@ class Experiment:
 
     @property
     def task(self) -> Task:
-        """Where the robot starts, where it is to go, and what it avoids."""
+        """The start, the target and the obstacles."""
         return paper.task(self.layout, box=self.box, start=self.start, target=self.target)
 
     @property
@@ -134,18 +129,19 @@ class Experiment:
     @property
     def canonical(self) -> "Experiment":
         """The same run, with the default in every field that its learner does not read."""
-        unread: dict[str, Any] = {one.name: one.default for one in fields(self) if self._skips(one)}
-        said = {name: default for name, default in unread.items() if getattr(self, name) != default}
-        return replace(self, **said) if said else self
-
-    def _skips(self, one: "Field[Any]") -> bool:
-        return one.metadata["optional"] and one.name not in LEARNERS[self.learner].reads
+        changed: dict[str, Any] = {
+            one.name: one.default
+            for one in fields(self)
+            if getattr(self, one.name) != one.default
+            and self.learner not in (readers(one.name) or LEARNERS)
+        }
+        return replace(self, **changed) if changed else self
 
     def __str__(self) -> str:
-        place = f"layout {short_name(self.layout)}"
+        place = f"layout {geometry.short_name(self.layout)}"
         return f"{self.learner} in {place}, decay per {self.decay}, seed {self.seed}"
 
 
 def frozen_arm(experiment: Experiment) -> Experiment:
-    """The control arm of a run: the same noise and the same controller, and theta never moves."""
+    """The baseline of a run: the same noise and controller, and a theta that never moves."""
     return replace(experiment, learner="frozen", constrained=False).canonical

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,45 +26,32 @@ from nmpcrl.learning.training import count_episodes, count_steps
 from nmpcrl.study import paper
 
 SMALL_BUFFER = 10 * paper.STEPS  # examples
-AVERAGING = 0.005  # the part of the way that a slow copy goes a step: Fujimoto et al. (2018)
-LEAST_SCALE = 1e-3  # that an input of the normalised network is divided by
+AVERAGING = 0.005  # rate of the averaged copy: Fujimoto et al. (2018)
+LEAST_SCALE = 1e-3  # of an input of the normalised network
+
+Settings = Any  # an `Experiment`
 
 DECAYS = {"step": count_steps, "episode": count_episodes}  # departure C
 
 
-class Settings(Protocol):
-    """The fields of an `Experiment` that its learner may read."""
-
-    alpha: float
-    beta: float
-    zeta: float
-    gated: bool
-    network: str
-    curvature: bool
-    projected: bool
-    beta_tdc: float
-    theta: tuple[float, ...]
-    steps: int
-
-
 class Generators(NamedTuple):
-    """One generator a purpose, so that all learners of a seed meet the same noise."""
+    """A generator for each purpose, so that all learners of a seed meet the same noise."""
 
     noise: np.random.Generator
     network: np.random.Generator
-    directions: np.random.Generator  # of a control that draws them
+    directions: np.random.Generator  # of the control with random directions
 
 
 Factory = Callable[[Settings, Persistent, Generators], Learner]
 
 
 class Network(NamedTuple):
-    """A way to read what the paper leaves open of the network.  # departures H and I"""
+    """A reading of what the paper leaves open of the network.  # departures H and I"""
 
     options: Mapping[str, Any] = MappingProxyType({})  # of `QNetwork`
     fits: int = 1  # mini-batches a step
-    normalised: bool = False  # whether inputs and target are divided by `scales`
-    target: Callable[[Settings], Mapping[str, Any]] | None = None  # gives options of `Target`
+    normalised: bool = False  # whether inputs and target are scaled
+    target: Callable[[Settings], Mapping[str, Any]] | None = None  # options of `Target`
     late: bool = False  # whether the value is predicted before the step's fit
     greedy: bool = False  # whether the next action is the network's minimiser, and not u_1
 
@@ -119,10 +106,10 @@ def _network_learner(
 
 
 def _scales(controller: Persistent, theta: Vector, *, with_theta: bool) -> tuple[Vector, float]:
-    """What the inputs and the target of the normalised network are divided by.
+    """The scales of the normalised network's inputs and of its target.
 
-    A state by the box's half width, or pi where it has none; an action by its bound; theta by
-    theta_init; the value by that of theta_init at the start.
+    A state is divided by the box's half width, or by pi where it has none; an action by its bound;
+    theta by theta_init; the value by the value of theta_init at the start.
     """
     nmpc = controller.nmpc
     half = (nmpc.task.upper - nmpc.task.lower) / 2
@@ -133,7 +120,7 @@ def _scales(controller: Persistent, theta: Vector, *, with_theta: bool) -> tuple
 
 
 def _tdc(settings: Settings, controller: Persistent, _: Generators) -> Learner:
-    """Exact TDC, with each part that it adds to GES or without."""
+    """Exact TDC; curvature and projection can be left out."""
     return gradient_tdc(
         controller,
         settings.alpha,
@@ -143,27 +130,28 @@ def _tdc(settings: Settings, controller: Persistent, _: Generators) -> Learner:
     )
 
 
-MOVING = ("alpha", "ties_active")  # fields that learners read whose theta moves
-VALUING = (*MOVING, "constrained")  # that may value u_0 = a or not
-IMITATING = (*VALUING, "zeta", "gated", "network")  # that hold a network
+# Fields read by learners that move theta, by those that solve for V(s) or Q(s, a), and by those
+# with a network.
+MOVING = ("alpha", "ties_active")
+VALUING = (*MOVING, "constrained")
+IMITATING = (*VALUING, "zeta", "gated", "network")
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A learner as experiments name it.
+    """A learner that experiments can name.
 
-    A field of `Experiment` that not all learners read is read, and is part of a run's key, only
-    where `reads` has it; a factory that reads another is refused.
+    A field of `Experiment` that only some learners read is part of the keys of their runs alone.
     """
 
     make: Factory
-    reads: tuple[str, ...] = VALUING  # fields that not all learners read
-    network: bool = False  # whether it holds one: torch then is part of its keys
+    reads: tuple[str, ...] = VALUING  # fields that only some learners read
+    network: bool = False  # whether a network learns: torch is part of the keys then
     solves: int = 2  # a step, without the one for Q(s, a)
     step_size: Callable[[Settings], float] = lambda e: e.alpha  # of theta
-    moves: bool = True  # whether theta does
-    valued: bool = False  # whether Q(s, a) itself is always learned, with u_0 = a fixed
-    curved: bool = False  # whether it asks for the Hessian of the value
+    moves: bool = True  # whether theta moves
+    valued: bool = False  # whether Q(s, a) is always learned, with u_0 = a fixed
+    curved: bool = False  # whether the Hessian of the value is used
 
 
 def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:
@@ -172,7 +160,7 @@ def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:
     return Entry(factory, IMITATING, network=True, solves=1)
 
 
-LEARNERS: dict[str, Entry] = {  # the only list of learners: a name that is not in it is refused
+LEARNERS: dict[str, Entry] = {
     "ES": Entry(lambda e, nmpc, _: expected_sarsa(nmpc, e.alpha)),
     "DES": _imitating(deep_expected_sarsa, with_theta=False),
     "RDES": _imitating(regularized_deep_expected_sarsa, with_theta=True),
@@ -185,7 +173,7 @@ LEARNERS: dict[str, Entry] = {  # the only list of learners: a name that is not 
         lambda _, nmpc, __: frozen(nmpc),
         reads=(),
         solves=1,
-        step_size=lambda _: paper.ALPHA,  # that theta would have
+        step_size=lambda _: paper.ALPHA,  # of the ES that the run is compared with
         moves=False,
     ),
     "matched": Entry(lambda e, nmpc, _: step_matched(nmpc, e.alpha, e.beta), (*VALUING, "beta")),
@@ -194,5 +182,5 @@ LEARNERS: dict[str, Entry] = {  # the only list of learners: a name that is not 
 
 
 def readers(name: str) -> tuple[str, ...]:
-    """The learners that read a field of `Experiment` that not all do."""
+    """The learners that read a field of `Experiment`; none for a field that all learners read."""
     return tuple(learner for learner, entry in LEARNERS.items() if name in entry.reads)

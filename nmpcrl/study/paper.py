@@ -8,8 +8,9 @@ import numpy as np
 
 from nmpcrl.control import Nmpc, Obstacle, Task, differential_drive
 from nmpcrl.control.solvers import Solver
-from nmpcrl.study.geometry import Centres, Layout
-from nmpcrl.study.parameters import OneOf
+from nmpcrl.study import geometry
+from nmpcrl.study.geometry import Centres
+from nmpcrl.study.parameters import one_of
 
 __all__ = ["LAYOUTS", "centres_of", "controller", "nmpc", "task", "task_among"]
 
@@ -51,8 +52,8 @@ LAYOUTS: dict[str, Centres] = {  # of the four obstacles [m]; the paper shows no
 
 
 def centres_of(layout: str | Centres) -> Centres:
-    """Where the obstacles of a layout stand [m]: of a name in `LAYOUTS`, or of centres."""
-    return Layout(LAYOUTS).centres(layout)
+    """The centres of a layout's obstacles [m]; the layout is a name in `LAYOUTS`, or centres."""
+    return geometry.centres_of(layout, LAYOUTS)
 
 
 def task(
@@ -65,7 +66,7 @@ def task(
     """The robot's task among the obstacles of a layout, in one of `BOXES`."""
     return task_among(
         centres_of(layout),
-        printed_box=OneOf(BOXES).check("box", box) == "printed",
+        printed_box=one_of(BOXES).check("box", box) == "printed",
         soft_box=box == "soft",
         start=start,
         target=target,

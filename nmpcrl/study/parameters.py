@@ -1,218 +1,156 @@
-"""What a parameter may be: each kind says so in words, and refuses all else in one sentence."""
+"""The values that parameters may have: described in words, and checked."""
 
 import re
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from math import inf, nextafter
 from numbers import Integral, Real
 from reprlib import Repr
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.study.storage.refusal import ParameterError as ParameterError
 from nmpcrl.study.storage.refusal import Refusal as Refusal
 
-LARGEST_SEED = 2**31 - 1  # what every generator takes, whichever library's
-MOST_VALUES = 10_000  # of an axis
+LARGEST_SEED = 2**31 - 1  # that the generators of all libraries take
+MOST_VALUES = 10_000  # of a list
 POWER = re.compile(r"([+-]?\d*)(\.\d*)?[eE]([+-]?)(\d+)", re.ASCII)
 LONGEST = 100  # characters of a value in a message
 
 
-class Allowed(Protocol):
-    """What a parameter may be."""
+class Unfit(ValueError):
+    """The reason for a refusal: the end of the sentence "NAME = VALUE ..."."""
 
-    @property
-    def text(self) -> str:
-        """In words, as they stand after "must be"."""
 
-    @property
-    def choices(self) -> tuple[str, ...] | None:
-        """All that it may be, if these are words."""
+@dataclass(frozen=True)
+class Allowed:
+    """The values that a parameter may have."""
+
+    text: str  # the values in words, as they follow "must be"
+    read: Callable[[Any], Any]  # converts a value; a ValueError or TypeError refuses it
+    choices: tuple[str, ...] | None = None  # all values, if they are words
+    ends: tuple[float, float] | None = None  # the least and the largest, if they are numbers
 
     def check(self, name: str, value: Any) -> Any:
-        """The value in its own type: an int for NumPy's, a tuple for a list.
+        """Convert a value to a type of Python's own: an int for NumPy's, a tuple for a list.
 
         Raises:
-            ParameterError: the parameter `name` may not be this.
+            ParameterError: the parameter `name` may not have this value.
         """
-
-
-@dataclass(frozen=True)
-class OneOf:
-    """One of some words."""
-
-    words: Collection[str]
-
-    @property
-    def choices(self) -> tuple[str, ...]:
-        """See `Allowed`."""
-        return tuple(self.words)
-
-    @property
-    def text(self) -> str:
-        """See `Allowed`."""
-        return f"one of {', '.join(self.words)}"
-
-    def check(self, name: str, value: Any) -> str:
-        """See `Allowed`."""
-        if not isinstance(value, str) or value not in self.words:
-            raise refused(name, value, self.text)
-        return str(value)
-
-
-@dataclass(frozen=True)
-class Whole:
-    """A whole number from `least` to `most`."""
-
-    least: int
-    most: int
-    choices: None = None
-
-    @property
-    def text(self) -> str:
-        """See `Allowed`."""
-        return f"a whole number from {self.least} to {self.most}"
-
-    def check(self, name: str, value: Any) -> int:
-        """See `Allowed`."""
-        whole = isinstance(value, Integral) and not isinstance(value, bool)
-        if not whole or not self.least <= value <= self.most:
-            raise refused(name, value, self.text)
-        return int(value)
-
-
-@dataclass(frozen=True)
-class Number:
-    """A number from `least` to `most`."""
-
-    least: float
-    most: float
-    text: str
-    choices: None = None
-
-    @classmethod
-    def within(cls, least: float, most: float) -> "Number":
-        """A number in [least, most]."""
-        return cls(least, most, f"a number in [{least:g}, {most:g}]")
-
-    @classmethod
-    def above_zero(cls, most: float) -> "Number":
-        """A number in (0, most]."""
-        return cls(nextafter(0, inf), most, f"a number in (0, {most:g}]")
-
-    def check(self, name: str, value: Any) -> float:
-        """See `Allowed`."""
-        refuse_text(name, value)
-        real = isinstance(value, Real) and not isinstance(value, bool)
-        if not real or not self.least <= value <= self.most:  # which nan is not
-            raise refused(name, value, self.text)
-        return float(value)
-
-
-SENSIBLE = Number.within(-ABSURD, ABSURD)
-
-
-@dataclass(frozen=True)
-class Truth:
-    """True or false."""
-
-    text: str = "true or false"
-    choices: None = None
-
-    def check(self, name: str, value: Any) -> bool:
-        """See `Allowed`."""
-        if not isinstance(value, bool | np.bool_):
-            raise refused(name, value, self.text)
-        return bool(value)
-
-
-@dataclass(frozen=True)
-class Numbers:
-    """So many numbers that a solver can be given."""
-
-    size: int
-    choices: None = None
-
-    @property
-    def text(self) -> str:
-        """See `Allowed`."""
-        return f"{self.size} numbers of size at most {ABSURD:g}"
-
-    def check(self, name: str, value: Any) -> tuple[float, ...]:
-        """See `Allowed`."""
-        if not is_list(value) or len(value) != self.size:
-            raise refused(name, value, self.text)
-        for one in value:
-            refuse_text(name, one)
         try:
-            return tuple(SENSIBLE.check(name, one) for one in value)
-        except ParameterError:
+            return self.read(value)
+        except ParameterError:  # about one value of a list
+            raise
+        except Unfit as error:
+            raise ParameterError(f"{name} = {shown(value)} {error}") from None
+        except (TypeError, ValueError):
             raise refused(name, value, self.text) from None
 
 
-@dataclass(frozen=True)
-class Several:
-    """A list of what `each` may be, without repetition: the values of an axis."""
+def one_of(words: Collection[str]) -> Allowed:
+    """One of some words."""
 
-    each: Allowed
-    name: str  # of one value; the parameter's is its plural
-    choices: None = None
+    def read(value: Any) -> str:
+        _need(isinstance(value, str) and value in words)
+        return str(value)
 
-    @property
-    def text(self) -> str:
-        """See `Allowed`."""
-        return f"a list in which each {self.name} is {self.each.text}"
+    return Allowed(f"one of {', '.join(words)}", read, tuple(words))
 
-    def check(self, name: str, value: Any) -> tuple[Any, ...]:
-        """See `Allowed`."""
+
+def whole(least: int, most: int) -> Allowed:
+    """A whole number from `least` to `most`."""
+
+    def read(value: Any) -> int:
+        _need(isinstance(value, Integral) and not isinstance(value, bool))
+        _need(least <= value <= most)
+        return int(value)
+
+    return Allowed(f"a whole number from {least} to {most}", read, ends=(least, most))
+
+
+def number(least: float, most: float, text: str = "") -> Allowed:
+    """A number in [least, most]."""
+
+    def read(value: Any) -> float:
+        found = POWER.fullmatch(value.strip()) if isinstance(value, str) else None
+        if found:  # YAML 1.1 wants a point, and a sign of the power
+            digits, part, sign, power = found.groups(default="")
+            written = f"{digits or 0}.{part.strip('.') or 0}e{sign or '+'}{power}"
+            raise Unfit(f"arrived as text; write {written}")
+        _need(isinstance(value, Real) and not isinstance(value, bool))
+        _need(least <= value <= most)  # which nan is not
+        return float(value)
+
+    return Allowed(text or f"a number in [{least:g}, {most:g}]", read, ends=(least, most))
+
+
+def positive(most: float) -> Allowed:
+    """A number in (0, most]."""
+    return number(nextafter(0, inf), most, f"a number in (0, {most:g}]")
+
+
+def numbers(each: Sequence[Allowed], text: str) -> Allowed:
+    """A list of numbers, one for each of `each`."""
+
+    def read(value: Any) -> tuple[float, ...]:
+        _need(is_list(value) and len(value) == len(each))
+        return tuple(allowed.read(one) for allowed, one in zip(each, value, strict=True))
+
+    return Allowed(text, read)
+
+
+def several(each: Allowed, name: str) -> Allowed:
+    """A list of different values of the parameter `name`; the list is called by its plural."""
+
+    def read(value: Any) -> tuple[Any, ...]:
         if isinstance(value, str) and value.strip().startswith("["):
-            raise ParameterError(
-                f"{name} = {shown(value)} arrived as text, not as a list;"
-                f" write -y '{{{name}: {shortened(value.strip())}}}'"
-            )
+            line = shortened(value.strip())
+            raise Unfit(f"arrived as text, not as a list; write -y '{{{name}s: {line}}}'")
         if not is_list(value):
             single = isinstance(value, str | int | float)
-            raise refused(name, value, f"a list{f', such as [{shown(value)}]' if single else ''}")
-        if not 0 < len(value) <= MOST_VALUES:
-            many = f"{MOST_VALUES} {name} at most, not {len(value)}"
-            must = many if len(value) else f"at least one {self.name}"
-            raise ParameterError(f"{name} = {shown(value)} must name {must}")
-        values = tuple(self.each.check(self.name, one) for one in value)
+            raise Unfit(f"must be a list{f', such as [{shown(value)}]' if single else ''}")
+        if not len(value):
+            raise Unfit(f"must name at least one {name}")
+        if len(value) > MOST_VALUES:
+            raise Unfit(f"must name {MOST_VALUES} {name}s at most, not {len(value)}")
+        values = tuple(each.check(name, one) for one in value)
         twice = {one for one, count in Counter(values).items() if count > 1}
         if twice:
-            raise refused(name, value, f"a list that names {shown(min(twice))} once")
+            raise Unfit(f"must be a list that names {shown(min(twice))} once")
         return values
+
+    return Allowed(f"a list in which each {name} is {each.text}", read)
+
+
+def _truth(value: Any) -> bool:
+    _need(isinstance(value, bool | np.bool_))
+    return bool(value)
+
+
+TRUTH = Allowed("true or false", _truth)
+
+
+def _need(holds: bool) -> None:
+    """Refuse a value for which this does not hold."""
+    if not holds:
+        raise ValueError
 
 
 def is_list(value: Any) -> bool:
-    """Whether it holds values in a row."""
+    """Whether a value is a list, a tuple, a range or a vector."""
     rows = isinstance(value, np.ndarray) and value.ndim == 1
     return rows or isinstance(value, list | tuple | range)
 
 
-def refuse_text(name: str, value: Any) -> None:
-    """Refuse a number that YAML 1.1 takes for text, for want of a point or of its power's sign.
-
-    Raises:
-        ParameterError: it is one.
-    """
-    found = POWER.fullmatch(value.strip()) if isinstance(value, str) else None
-    if found:
-        whole, part, sign, power = found.groups(default="")
-        number = f"{whole or 0}.{part.strip('.') or 0}e{sign or '+'}{power}"
-        raise ParameterError(f"{name} = {shown(value)} arrived as text; write {number}")
-
-
 def refused(name: str, value: Any, text: str) -> ParameterError:
-    """The refusal of a value: what it `must be` is the `text`."""
+    """The refusal of a value that must be something else, which `text` says."""
     return ParameterError(f"{name} = {shown(value)} must be {text}")
 
 
 class _Short(Repr):
-    """As `repr`, on one line, however large the value is."""
+    """`repr` on one line, however large the value is."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -220,7 +158,7 @@ class _Short(Repr):
         self.maxstring = self.maxother = LONGEST
 
     def repr_int(self, x: int, level: int) -> str:
-        """Python refuses to print the largest."""
+        """An integer; Python refuses to print the largest."""
         return repr(x) if abs(x) < 10**40 else f"an integer of {x.bit_length()} bits"
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.parameters import Whole
+from nmpcrl.study.parameters import whole
 from nmpcrl.study.storage.archive import (
     Column,
     DamagedRecords,
@@ -267,7 +267,7 @@ def _sizes(named: dict[str, Any]) -> Sizes:
     """Those of an experiment, or of a trial, which states how many states and inputs it has."""
     if "states" in named:
         states, inputs, *others = (
-            Whole(1, MOST).check(name, named[name])
+            whole(1, MOST).check(name, named[name])
             for name in ("states", "inputs", "episodes", "steps", "evaluate_every")
         )
         return Sizes(states, inputs, len(named["theta"]), *others)

@@ -16,10 +16,10 @@ from gymnasium.spaces import Box
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Plant, Solution, Task, differential_drive
 from nmpcrl.learning.rollout import Persistent
-from nmpcrl.study import paper
-from nmpcrl.study.geometry import FARTHEST, MOST_OBSTACLES, Centres, Layout
+from nmpcrl.study import geometry, paper
+from nmpcrl.study.geometry import CENTRES, FARTHEST, Centres
 from nmpcrl.study.motions import Motion, centres
-from nmpcrl.study.parameters import ParameterError, Whole, refused
+from nmpcrl.study.parameters import ParameterError, refused, whole
 from nmpcrl.study.population import TUNE
 from nmpcrl.study.world import charge
 
@@ -36,10 +36,9 @@ def centres_of(layout: Any) -> Centres:
         ParameterError: it is neither one of `NAMED` nor centres of obstacles.
     """
     try:
-        return Layout(NAMED).centres(layout)
+        return geometry.centres_of(layout, NAMED)
     except ParameterError:
-        where = f"1 to {MOST_OBSTACLES} centres x,y within {FARTHEST:g} m of 0"
-        raise refused("layout", layout, f"one of A to F and T01 to T60, or {where}") from None
+        raise refused("layout", layout, f"one of A to F and T01 to T60, or {CENTRES}") from None
 
 
 @lru_cache(maxsize=256)
@@ -88,7 +87,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         if render_mode not in (None, *modes):
             raise refused("render_mode", render_mode, f"None or one of {', '.join(modes)}")
         self.render_mode, self._draw, self.plant = render_mode, draw, robot()
-        self._steps = Whole(1, MOST_STEPS).check("steps", steps)
+        self._steps = whole(1, MOST_STEPS).check("steps", steps)
         self._fixed = None if layout is None else centres_of(layout)
         self._count = len(self._fixed or next(iter(TUNE.values())))
         lower, upper = self._reach()

@@ -1,9 +1,9 @@
-"""From what names a run to what `train` takes: controller, learner, first weights and noise."""
+"""The arguments of `train` for an experiment or a trial: controller, learner, weights, noise."""
 
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields
-from typing import Any, cast
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -15,16 +15,15 @@ from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Exploration
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.learners import DECAYS, LEARNERS, Generators, Settings
-from nmpcrl.study.parameters import ParameterError
+from nmpcrl.study.learners import DECAYS, LEARNERS, Generators
 from nmpcrl.study.trial import Trial
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """All that a run needs."""
+    """Everything that a run needs."""
 
-    stated: dict[str, Any]  # what its records say that it is
+    stated: dict[str, Any]  # the run's fields, as its records have them
     controller: Persistent
     learner: Learner
     weights: Weights
@@ -33,22 +32,22 @@ class Job:
     evaluate_every: int
     options: dict[str, Any]  # of `train` alone
     environment: dict[str, Any] = field(default_factory=dict)  # of `train` and `evaluate`
-    rollouts: int = 1  # that judge theta
-    judged: int | np.random.SeedSequence = 0  # the seed of each evaluation
+    rollouts: int = 1  # of each evaluation
+    judged: int | np.random.SeedSequence = 0  # seed of each evaluation
 
     @property
     def episodes(self) -> int:
-        """Of training."""
+        """Episodes of training."""
         return len(self.explore.scale)
 
     @property
     def steps(self) -> int:
-        """Of an episode, at most."""
+        """Steps of an episode, at most."""
         return len(self.explore.scale[0])
 
 
 def job_of(named: Experiment | Trial) -> Job:
-    """What is to be done to carry out a run."""
+    """The job of a run."""
     if isinstance(named, Trial):
         return _job_of_trial(named)
     experiment = named.canonical
@@ -61,7 +60,7 @@ def job_of(named: Experiment | Trial) -> Job:
 
 
 def _job_of_trial(trial: Trial) -> Job:
-    """The noise of a seed is that of an `Experiment` of this seed."""
+    """The job of a trial; its noise is that of an `Experiment` with the same seed."""
     trial.refuse_change()
     noise, learner, world, judged = np.random.SeedSequence(trial.seed).spawn(4)
     theta, controller = np.array(trial.theta), Persistent(trial.nmpc)
@@ -102,7 +101,7 @@ def controller_of(experiment: Experiment) -> Persistent:
 
 
 def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
-    """Compile what the runs will call, so that their processes find it done."""
+    """Compile the functions of some runs, so that their processes find them compiled."""
     named = tuple(named)
     _compile_trials(one for one in named if isinstance(one, Trial))
     kinds = {
@@ -121,7 +120,7 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
 
 
 def _compile_trials(trials: Iterable[Trial]) -> None:
-    """Solve once with each controller and in each way that a trial does."""
+    """Solve once with each controller of some trials, with and without a fixed action."""
     for trial in {(one.nmpc.key, one.constrained): one for one in trials}.values():
         around = environment(trial.nmpc, trial.plant, trial.start)
         state, theta = around.start(np.random.default_rng(trial.seed)), np.array(trial.theta)
@@ -134,11 +133,7 @@ def _compile_trials(trials: Iterable[Trial]) -> None:
 
 
 def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, Weights, Exploration]:
-    """The learner, its first weights and its noise: all that `train` needs besides `controller`.
-
-    Raises:
-        ParameterError: the learner holds or reads what its entry in `LEARNERS` does not say.
-    """
+    """The learner, its first weights and its noise: all that `train` needs besides `controller`."""
     children = np.random.SeedSequence(experiment.seed).spawn(3)
     generators = Generators(*map(np.random.default_rng, children))
     explore = Exploration.draw(
@@ -150,38 +145,10 @@ def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, We
     )
     theta = np.array(experiment.theta)
     weights = Weights(theta, np.full(theta.size, paper.W_INIT))
-    entry = LEARNERS[experiment.learner]
-    learner = entry.make(_as_read(experiment), controller, generators)
-    if hasattr(learner.bootstrap, "network") and not entry.network:
-        raise ParameterError(
-            f"learner = {experiment.learner!r} holds a network: its entry in LEARNERS needs"
-            " network=True, so that its runs are named by the version of torch, too"
-        )
+    learner = LEARNERS[experiment.learner].make(experiment, controller, generators)
     return learner, weights, explore
 
 
 def step_size(experiment: Experiment) -> float:
-    """The step size of theta that a run's learner has, which its recorded alpha ||phi||^2 uses."""
-    return LEARNERS[experiment.learner].step_size(_as_read(experiment))
-
-
-class _AsRead:
-    """An experiment that refuses the fields that its learner's entry does not name."""
-
-    def __init__(self, experiment: Experiment) -> None:
-        optional = {one.name for one in fields(experiment) if one.metadata["optional"]}
-        self._experiment = experiment
-        self._refused = optional - set(LEARNERS[experiment.learner].reads)
-
-    def __getattr__(self, name: str) -> Any:
-        if name in self._refused:
-            raise ParameterError(
-                f"learner = {self._experiment.learner!r} reads {name}: its entry in LEARNERS needs"
-                f" {name!r} in `reads`, so that {name} is part of the names of its runs"
-            )
-        return getattr(self._experiment, name)
-
-
-def _as_read(experiment: Experiment) -> Settings:
-    """The experiment as its learner may read it."""
-    return cast(Settings, _AsRead(experiment))
+    """The step size of theta, by which the recorded alpha ||phi||^2 is computed."""
+    return LEARNERS[experiment.learner].step_size(experiment)

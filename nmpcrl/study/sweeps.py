@@ -10,12 +10,12 @@ from nmpcrl.study import paper
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.geometry import Centres, are_centres
 from nmpcrl.study.learners import DECAYS
-from nmpcrl.study.parameters import Allowed, ParameterError, Several, is_list, shown
+from nmpcrl.study.parameters import Allowed, ParameterError, is_list, several, shown
 
 VECTORS = ("theta", "start", "target")  # fields of which a list is one value
 MOST_RUNS = 10_000  # of a sweep: more than five times the whole study
 FIELDS: dict[str, Allowed] = {field.name: field.metadata["allowed"] for field in fields(Experiment)}
-AXES: dict[str, Allowed] = {f"{name}s": Several(one, name) for name, one in FIELDS.items()}
+AXES: dict[str, Allowed] = {f"{name}s": several(one, name) for name, one in FIELDS.items()}
 
 
 def sweep(**axes: Any) -> tuple[Experiment, ...]:

@@ -17,7 +17,7 @@ from nmpcrl.control import Nmpc
 from nmpcrl.control.content import NoContent, content
 from nmpcrl.learning import Learner
 from nmpcrl.learning.rollout import Persistent
-from nmpcrl.study.parameters import LARGEST_SEED, ParameterError, Whole
+from nmpcrl.study.parameters import LARGEST_SEED, ParameterError, whole
 
 AT_LEAST_ONE = ("episodes", "steps", "evaluate_every", "rollouts")
 ABOUT = ("learner", "seed", *AT_LEAST_ONE, "theta")  # fields that its records state
@@ -54,9 +54,9 @@ class Trial:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "theta", tuple(map(float, self._first_theta())))
-        Whole(0, LARGEST_SEED).check("seed", self.seed)
+        whole(0, LARGEST_SEED).check("seed", self.seed)
         for name in AT_LEAST_ONE:
-            Whole(1, MOST).check(name, getattr(self, name))
+            whole(1, MOST).check(name, getattr(self, name))
         if not callable(self.make):
             raise ParameterError(f"make = {self.make!r} must be a function of nmpc: a learner is"
                                  " made anew for each run")  # fmt: skip

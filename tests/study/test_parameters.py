@@ -1,5 +1,6 @@
-"""What a parameter may be: said in words, checked, and refused in one sentence."""
+"""Values of parameters: converted to Python's own types, or refused in one short sentence."""
 
+import math
 import re
 
 import numpy as np
@@ -8,26 +9,33 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from nmpcrl.control.solvers.charge import DISCS
+from nmpcrl.study import ParameterError, geometry, paper
+from nmpcrl.study.geometry import MOST_OBSTACLES, are_centres, centres_of, short_name
 from nmpcrl.study.parameters import (
     LONGEST,
-    Number,
-    Numbers,
-    OneOf,
-    ParameterError,
-    Several,
-    Truth,
-    Whole,
+    TRUTH,
+    number,
+    numbers,
+    one_of,
+    positive,
+    several,
     shown,
+    whole,
 )
 
-KINDS = {
-    "word": OneOf(("A", "B")),
-    "whole": Whole(1, 300),
-    "number": Number.above_zero(1e6),
-    "range": Number.within(-1, 1),
-    "truth": Truth(),
-    "numbers": Numbers(2),
-    "list": Several(Whole(0, 9), "it"),
+LAYOUT = geometry.layout(paper.LAYOUTS)
+POSE = geometry.pose(paper.LOWER, paper.UPPER)
+ALLOWED = {
+    "word": one_of(("A", "B")),
+    "whole": whole(1, 300),
+    "positive": positive(1e6),
+    "range": number(-1, 1),
+    "truth": TRUTH,
+    "numbers": numbers([number(-1e6, 1e6)] * 2, "2 numbers"),
+    "list": several(whole(0, 9), "it"),
+    "layout": LAYOUT,
+    "pose": POSE,
 }
 ANYTHING = st.recursive(
     st.one_of(
@@ -39,7 +47,6 @@ ANYTHING = st.recursive(
         st.complex_numbers(),
         st.text(max_size=5),
         st.binary(max_size=5),
-        st.dates(),
         st.decimals(),
         st.sampled_from([np.int8(3), np.uint64(2**63), np.float32(0.5), np.nan, np.True_]),
         st.sampled_from([np.array(3), np.ones((3, 3)), np.array(["a"]), np.array([None, 1])]),
@@ -50,18 +57,17 @@ ANYTHING = st.recursive(
 )
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ALLOWED)
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(value=ANYTHING)
-def test_whatever_is_given_is_taken_or_refused_in_one_short_sentence(kind, value):
-    allowed = KINDS[kind]
+def test_any_value_is_converted_or_refused_in_one_short_sentence(kind, value):
+    allowed = ALLOWED[kind]
     try:
         taken = allowed.check("it", value)
     except ParameterError as error:
         said = str(error)
-        if kind != "list":
-            assert said == f"it = {shown(value)} must be {allowed.text}"
         assert said.startswith("it = ")
+        assert allowed.text in said or kind == "list"
         assert "\n" not in said
         assert len(said) < 2 * LONGEST + 100
     else:
@@ -75,84 +81,62 @@ def test_whatever_is_given_is_taken_or_refused_in_one_short_sentence(kind, value
         ("word", np.str_("A"), "A"),
         ("whole", np.int64(3), 3),
         ("whole", np.uint8(3), 3),
-        ("number", np.float32(0.5), 0.5),
-        ("number", np.int16(2), 2.0),
-        ("number", 3, 3.0),
+        ("positive", np.float32(0.5), 0.5),
+        ("positive", np.int16(2), 2.0),
+        ("positive", 3, 3.0),
         ("truth", np.False_, False),
         ("numbers", np.ones(2), (1.0, 1.0)),
-        ("numbers", [1, np.float64(2)], (1.0, 2.0)),
         ("numbers", range(2), (0.0, 1.0)),
         ("list", np.arange(3), (0, 1, 2)),
-        ("list", range(3), (0, 1, 2)),
+        ("layout", "0.5 2.2,3.0 0.5", "0.5,2.2 3,0.5"),
+        ("layout", [[-0.0, 1]], "0,1"),
+        ("layout", paper.LAYOUTS["C"], "C"),
+        ("pose", [-3, 9, -math.tau], (-3.0, 9.0, -math.tau)),
     ],
 )
-def test_numbers_of_numpy_become_pythons_own(kind, given, taken):
-    found = KINDS[kind].check("it", given)
+def test_a_value_becomes_one_of_pythons_own_types(kind, given, taken):
+    found = ALLOWED[kind].check("it", given)
     assert found == taken
     assert type(found) is type(taken)
 
 
-@pytest.mark.parametrize(
-    ("kind", "text", "choices"),
-    [
-        ("word", "one of A, B", ("A", "B")),
-        ("whole", "a whole number from 1 to 300", None),
-        ("number", "a number in (0, 1e+06]", None),
-        ("range", "a number in [-1, 1]", None),
-        ("truth", "true or false", None),
-        ("numbers", "2 numbers of size at most 1e+06", None),
-        ("list", "a list in which each it is a whole number from 0 to 9", None),
-    ],
-)
-def test_what_is_allowed_is_said_in_words(kind, text, choices):
-    assert KINDS[kind].text == text
-    assert KINDS[kind].choices == choices
+def test_a_pose_has_no_negative_zero():  # it would be another key
+    assert math.copysign(1, POSE.check("start", [-0.0, 0, 0])[0]) == 1
 
 
 @pytest.mark.parametrize(
-    ("kind", "given"),
-    [
-        ("numbers", ["1", "2"]),
-        ("numbers", "12"),
-        ("numbers", {1: 2, 3: 4}),
-        ("numbers", [True, False]),
-        ("numbers", [[1], [2]]),
-        ("numbers", [10**400, 0]),
-        ("number", "0.5"),
-        ("number", 10**400),
-        ("number", np.nan),
-        ("number", np.True_),
-        ("whole", "3"),
-        ("whole", 3.0),
-        ("whole", np.float64(3)),
-        ("whole", np.True_),
-        ("whole", 2**20000),
-        ("truth", 1),
-        ("truth", "true"),
-        ("word", ["A"]),
-        ("word", None),
-    ],
-    ids=shown,
+    ("kind", "values"),
+    {
+        "word": [["A"], None, "C"],
+        "whole": ["3", 3.0, np.float64(3), np.True_, 2**20000, 0, 301],
+        "positive": ["0.5", 0, 10**400, np.nan, np.True_, 1e6 + 1],
+        "range": [1.01, -1.01],
+        "truth": [1, "true"],
+        "numbers": [["1", "2"], "12", {1: 2, 3: 4}, [True, False], [[1], [2]], [10**400, 0], [1]],
+        "layout": [[], [(1, 2)] * 17, "", "1,2 " * 17, "1,2 3", (0, 1), [(0, 0, 0)], [(0, 101)]],
+        "pose": [[-3.001, 0, 0], [0, 0, math.inf], [0, 0], None],
+    }.items(),
 )
-def test_texts_truths_and_lists_are_no_numbers(kind, given):
-    with pytest.raises(ParameterError, match=r"^it = .* must be "):
-        KINDS[kind].check("it", given)
+def test_a_refusal_names_the_value_and_what_is_allowed(kind, values):
+    for value in values:
+        with pytest.raises(ParameterError) as caught:
+            ALLOWED[kind].check("it", value)
+        assert str(caught.value) == f"it = {shown(value)} must be {ALLOWED[kind].text}"
 
 
 @pytest.mark.parametrize(
     ("given", "write"),
     [("1e-7", "1.0e-7"), ("-2E5", "-2.0e+5"), (".5e3", "0.5e+3"), ("1.5e5", "1.5e+5")],
 )
-def test_a_number_that_yaml_takes_for_text_is_written_as_one(given, write):
+def test_a_number_that_yaml_reads_as_text_is_refused_with_what_to_write(given, write):
     assert isinstance(yaml.safe_load(given), str)
     assert yaml.safe_load(write) == float(given)
+    each = number(-1e6, 1e6)
     for kind, value in (
-        (Number.within(-1e6, 1e6), given), (Numbers(1), [given]),
-        (Several(Number.within(-1e6, 1e6), "it"), [given]),
+        (each, given), (numbers([each], "1 number"), [given]), (several(each, "it"), [given]),
     ):  # fmt: skip
-        with pytest.raises(ParameterError, match=re.escape(f"'{given}' arrived as text; ")) as at:
+        with pytest.raises(ParameterError, match=re.escape(f"write {write}")):
             kind.check("it", value)
-        assert str(at.value).endswith(f"write {write}")
 
 
 @pytest.mark.parametrize(
@@ -171,9 +155,9 @@ def test_a_number_that_yaml_takes_for_text_is_written_as_one(given, write):
     ],
     ids=shown,
 )
-def test_a_list_that_is_none_is_refused_in_one_sentence(given, said):
+def test_a_list_is_refused_for_a_reason_of_its_own(given, said):
     with pytest.raises(ParameterError) as caught:
-        Several(Whole(0, 100), "seed").check("seeds", given)
+        several(whole(0, 100), "seed").check("seeds", given)
     assert str(caught.value) == said
 
 
@@ -185,6 +169,55 @@ def test_a_list_that_is_none_is_refused_in_one_sentence(given, said):
 def test_a_value_is_shown_on_one_short_line(value):
     assert len(shown(value)) <= LONGEST
     assert "\n" not in shown(value)
+
+
+CENTRES = st.lists(
+    st.tuples(st.floats(-100, 100), st.floats(-100, 100)), min_size=1, max_size=MOST_OBSTACLES
+)
+
+
+@given(CENTRES, st.sampled_from([",", " ", "  ", ", "]))
+def test_a_layout_is_one_word_that_gives_its_centres_back_to_the_last_bit(centres, between):
+    word = LAYOUT.check("layout", centres)
+    assert list(centres_of(word, paper.LAYOUTS)) == centres
+    for same in (word, np.array(centres), word.replace(" ", between)):
+        assert LAYOUT.check("layout", same) == word
+
+
+def test_the_browser_has_room_for_every_layout():
+    assert MOST_OBSTACLES == DISCS
+
+
+def test_a_short_name_is_the_layouts_own_or_fits_a_file():
+    assert short_name("A") == "A"
+    word = LAYOUT.check("layout", [(0.1 * i, 1 / 3) for i in range(16)])
+    assert len(short_name(word)) == len("drawn-123456")
+    assert short_name(word) != short_name(word.replace("0.1,", "0.2,"))
+
+
+@pytest.mark.parametrize(
+    ("value", "are"),
+    [
+        ([(0, 1)], True),
+        (np.zeros((2, 2)), True),
+        (["A", "B"], False),
+        ([[(0, 1)], [(1, 2)]], False),
+        (["A", [(0, 1)]], False),
+        ([], False),
+        ("A", False),
+        (3, False),
+    ],
+)
+def test_the_centres_of_one_layout_differ_from_several_layouts(value, are):
+    assert are_centres(value) == are
+
+
+def test_the_task_of_a_named_layout_has_its_centres():
+    np.testing.assert_array_equal(
+        paper.task(paper.LAYOUTS["B"]).discs, paper.task_among(paper.centres_of("B")).discs
+    )
+    moved = paper.task("B", start=(0, 0, 0), target=(1, 2, 3))
+    np.testing.assert_array_equal((moved.start, moved.target), ((0, 0, 0), (1, 2, 3)))
 
 
 def test_a_notebook_shows_the_sentence_and_no_traceback():

@@ -1,120 +1,50 @@
-"""From names to learners and networks: one registry each, which refuses what it does not know."""
+"""Learners and networks by name: each reads what its entry says, and makes what its name says."""
 
-from contextlib import contextmanager
 from dataclasses import fields, replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
-from nmpcrl.learning import expected_sarsa
 from nmpcrl.learning.rollout import Persistent
-from nmpcrl.study import Experiment, ParameterError, paper, run, setup
-from nmpcrl.study.learners import LEARNERS, NETWORKS, Entry
+from nmpcrl.study import Experiment, ParameterError, paper, run
+from nmpcrl.study.learners import LEARNERS, NETWORKS, Generators, readers
 from nmpcrl.study.setup import controller_of, prepare, step_size
 
-
-@contextmanager
-def without(registry, name):
-    """Take a name out of a registry for a while; it comes back at its old place."""
-    whole = dict(registry)
-    del registry[name]
-    try:
-        yield
-    finally:
-        registry.clear()
-        registry.update(whole)
+CONTROLLER = Persistent(paper.nmpc())
+ALL = {one.name for one in fields(Experiment)}
+OPTIONAL = {name for name in ALL if readers(name)}
 
 
-@pytest.mark.parametrize("name", LEARNERS)
-def test_every_learner_calls_itself_by_its_name_in_the_registry(name):
-    wanted = Experiment(name, episodes=1)
-    learner, _, _ = prepare(wanted, controller_of(wanted))
-    assert learner.name == name
+class Recorder:
+    """An experiment that records the fields that are read."""
 
+    def __init__(self, experiment):
+        self.experiment, self.read = experiment, set()
 
-def test_a_learner_without_a_factory_is_refused_and_never_frozen():
-    wanted = Experiment("matched", episodes=1)
-    with without(LEARNERS, "matched"):
-        with pytest.raises(KeyError, match="matched"):
-            prepare(wanted, controller_of(wanted))
-        with pytest.raises(ParameterError, match="learner = 'matched' must be one of"):
-            Experiment("matched")
-
-
-def test_a_network_that_is_not_in_the_registry_is_refused_and_never_plain():
-    wanted = Experiment("DES", network="four fits", episodes=1)
-    with without(NETWORKS, "four fits"):
-        with pytest.raises(KeyError, match="four fits"):
-            prepare(wanted, controller_of(wanted))
-        with pytest.raises(ParameterError, match="network = 'four fits' must be one of"):
-            Experiment("DES", network="four fits")
-
-
-@pytest.mark.parametrize(("network", "fits"), [("plain", 1), ("four fits", 4), ("tanh", 1)])
-def test_the_registry_says_how_often_a_network_is_fitted(network, fits):
-    wanted = Experiment("RDES", network=network, episodes=1)
-    learner, _, _ = prepare(wanted, controller_of(wanted))
-    assert learner.bootstrap.fits == fits
-
-
-class Unsolvable(Nmpc):
-    def __init__(self):
-        super().__init__(differential_drive(), paper.task())
-
-    def solve(self, state, theta, warm_start=None, action=None):
-        raise SolverError("no optimum", state, theta)
-
-
-@pytest.mark.parametrize("learner", ["DES", "RDES"])
-def test_only_a_normalised_network_asks_for_a_solve_before_training(learner):
-    unsolvable = Persistent(Unsolvable())
-    for network in NETWORKS:
-        wanted = Experiment(learner, network=network, episodes=1)
-        if network == "normalised":
-            with pytest.raises(SolverError):
-                prepare(wanted, unsolvable)
-        else:
-            prepare(wanted, unsolvable)
-
-
-def test_the_purposes_of_a_seed_draw_from_generators_of_their_own(monkeypatch):
-    seen = []
-    learner = SimpleNamespace(bootstrap=None)
-    entry = Entry(lambda _, __, rngs: (seen.append(rngs), learner)[1])
-    monkeypatch.setitem(LEARNERS, "ES", entry)
-    wanted = Experiment(episodes=1)
-    prepare(wanted, controller_of(wanted))
-    (rngs,) = seen
-    children = np.random.SeedSequence(wanted.seed).spawn(3)
-    assert rngs.network.normal() == np.random.default_rng(children[1]).normal()
-    assert rngs.directions.normal() == np.random.default_rng(children[2]).normal()
-    assert setup.Generators._fields == ("noise", "network", "directions")
-
-
-@pytest.mark.parametrize("field", ["beta", "zeta", "network"])
-def test_a_learner_that_reads_what_its_entry_does_not_name_is_refused(monkeypatch, field):
-    entry = Entry(lambda e, nmpc, _: expected_sarsa(nmpc, float(bool(getattr(e, field)))))
-    monkeypatch.setitem(LEARNERS, "new", entry)
-    wanted = replace(Experiment(episodes=1), learner="ES")
-    object.__setattr__(wanted, "learner", "new")
-    message = f"learner = 'new' reads {field}: its entry in LEARNERS needs '{field}' in `reads`"
-    with pytest.raises(ParameterError, match=message):
-        prepare(wanted, controller_of(wanted))
-
-
-def test_a_learner_that_holds_a_network_without_saying_so_is_refused(monkeypatch):
-    monkeypatch.setitem(LEARNERS, "DES", replace(LEARNERS["DES"], network=False))
-    wanted = Experiment("DES", episodes=1)
-    with pytest.raises(ParameterError, match="holds a network: its entry in LEARNERS needs"):
-        prepare(wanted, controller_of(wanted))
+    def __getattr__(self, name):
+        self.read.add(name)
+        return getattr(self.experiment, name)
 
 
 @pytest.mark.parametrize("name", LEARNERS)
-def test_an_entry_names_fields_that_not_all_learners_read(name):
-    optional = {one.name for one in fields(Experiment) if one.metadata["optional"]}
-    assert set(LEARNERS[name].reads) <= optional
+def test_a_learner_is_what_its_entry_says_and_reads_only_what_its_entry_names(name):
+    """A field that is read and not named would be missing from the keys of the runs."""
+    entry, read = LEARNERS[name], set()
+    for network in NETWORKS if entry.network else ("plain",):
+        experiment = Recorder(Experiment(name, network=network, alpha=3e-7))
+        learner = entry.make(
+            experiment, CONTROLLER, Generators(*map(np.random.default_rng, range(3)))
+        )
+        assert learner.name == name
+        assert hasattr(learner.bootstrap, "network") == entry.network
+        if entry.network:
+            assert learner.bootstrap.fits == NETWORKS[network].fits
+        assert entry.step_size(experiment) == (3e-7 if entry.moves else paper.ALPHA)
+        read |= experiment.read & OPTIONAL
+    wherever = {"constrained", "ties_active"}  # read by the experiment and its controller
+    assert read <= set(entry.reads) <= read | wherever
+    assert step_size(Experiment(name)) == paper.ALPHA
 
 
 @pytest.mark.parametrize("name", LEARNERS)
@@ -125,7 +55,53 @@ def test_an_entry_says_how_many_solves_a_step_makes_and_whether_theta_moves(name
     assert (steps["theta"][-1] != steps["theta"][0]).any() == LEARNERS[name].moves
 
 
-@pytest.mark.parametrize("name", LEARNERS)
-def test_the_step_size_of_every_learner_of_the_book_is_alpha(name):
-    moves = LEARNERS[name].moves
-    assert step_size(Experiment(name, alpha=3e-7).canonical) == (3e-7 if moves else paper.ALPHA)
+@pytest.mark.parametrize(
+    ("registry", "fields"),
+    [(LEARNERS, {"learner": "matched"}), (NETWORKS, {"learner": "DES", "network": "four fits"})],
+)
+def test_an_unknown_name_is_refused_and_nothing_takes_its_place(registry, fields, monkeypatch):
+    wanted, (field, name) = Experiment(**fields, episodes=1), list(fields.items())[-1]
+    monkeypatch.delitem(registry, name)
+    with pytest.raises(KeyError, match=name):
+        prepare(wanted, CONTROLLER)
+    with pytest.raises(ParameterError, match=f"{field} = '{name}' must be one of"):
+        Experiment(**fields)
+
+
+class Unsolvable(Nmpc):
+    def __init__(self):
+        super().__init__(differential_drive(), paper.task())
+
+    def solve(self, state, theta, warm_start=None, action=None):
+        raise SolverError("no optimum", state, theta)
+
+
+def test_only_a_normalised_network_solves_before_training():
+    unsolvable = Persistent(Unsolvable())
+    for network in NETWORKS:
+        wanted = Experiment("RDES", network=network, episodes=1)
+        if network == "normalised":
+            with pytest.raises(SolverError):
+                prepare(wanted, unsolvable)
+        else:
+            prepare(wanted, unsolvable)
+
+
+def test_each_purpose_of_a_seed_has_a_generator_of_its_own(monkeypatch):
+    seen = []
+    entry = replace(LEARNERS["ES"], make=lambda *given: seen.append(given[-1]))
+    monkeypatch.setitem(LEARNERS, "ES", entry)
+    wanted = Experiment(episodes=1, seed=5)
+    prepare(wanted, controller_of(wanted))
+    children = np.random.SeedSequence(5).spawn(3)
+    for used, child in list(zip(seen[0], children, strict=True))[1:]:  # the noise was drawn
+        assert used.normal() == np.random.default_rng(child).normal()
+    assert Generators._fields == ("noise", "network", "directions")
+
+
+@pytest.mark.parametrize("varied", [{"learner": list(LEARNERS)}, {"decay": ["step", "episode"]}])
+def test_the_noise_of_a_seed_is_the_same_for_all_learners_and_readings(varied):
+    ((name, values),) = varied.items()
+    runs = [prepare(Experiment(**{name: one}, seed=3), CONTROLLER)[2] for one in values]
+    for explore in runs:
+        np.testing.assert_array_equal(explore.noise, runs[0].noise)

@@ -129,11 +129,12 @@ def setting(name: str) -> dict[str, Any]:
     """What a page needs to know of a field of `Experiment`: its default, and what it may be."""
     one = next(one for one in fields(Experiment) if one.name == name)
     allowed = one.metadata["allowed"]
-    read_by = readers(name) if one.metadata["optional"] else LEARNERS
+    read_by = readers(name) or LEARNERS
     found = {"name": name, "default": one.default, "help": one.metadata["help"]}
     found["read_by"] = [learner for learner in LEARNERS if learner in read_by]
     if allowed.choices:
         choices = LEARNERS if name == "learner" else allowed.choices
         return found | {"choices": list(choices), "text": allowed.text}
-    most = MOST.get(name, allowed.most)
-    return found | {"least": allowed.least, "most": most, "whole": isinstance(one.default, int)}
+    least, most = allowed.ends
+    whole = isinstance(one.default, int)
+    return found | {"least": least, "most": MOST.get(name, most), "whole": whole}
