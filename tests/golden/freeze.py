@@ -607,7 +607,7 @@ def tables() -> Any:
 
 @entry("tables")
 def arrays() -> Any:
-    runs = study().summaries.values()
+    runs = [study().summaries[e] for e in study().rows]
     return {
         "training costs": short([array(one.episodes["cost"]) for one in runs]),
         "theta by episode": short(
