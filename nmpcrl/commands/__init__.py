@@ -12,6 +12,7 @@ from nmpcrl.commands.compare import compare
 from nmpcrl.commands.completion import completion
 from nmpcrl.commands.evaluate import evaluate
 from nmpcrl.commands.grade import grade
+from nmpcrl.commands.investigate import investigate
 from nmpcrl.commands.refusals import Commands
 from nmpcrl.commands.remedies import remedies
 from nmpcrl.commands.runs import runs
@@ -21,7 +22,6 @@ from nmpcrl.commands.suite import suite
 from nmpcrl.commands.train import train
 from nmpcrl.commands.verify import verify
 from nmpcrl.commands.wasm import wasm
-from nmpcrl.commands.world import world
 
 __all__ = ["main"]
 
@@ -52,7 +52,7 @@ for command in (
     bench,
     suite,
     remedies,
-    world,
+    investigate,
     agents,
     grade,
     wasm,

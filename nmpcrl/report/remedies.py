@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Mapping
 from html import escape
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, rate
-from nmpcrl.claims.population import Answer
-from nmpcrl.claims.population_questions import WORDS, Question
+from nmpcrl.claims.investigation import Answer
+from nmpcrl.claims.population_questions import WORDS
 from nmpcrl.claims.remedies import Advice, RemedyRow, rows, shares, solved
 from nmpcrl.claims.remedy_questions import (
     ADVICE,
@@ -204,7 +205,7 @@ def expectation_items(expected: Mapping[str, bool]) -> str:
 
 def answer_items(
     answers: Iterable[Answer],
-    questions: Mapping[str, Question] = REMEDY_QUESTIONS,
+    questions: Mapping[str, Any] = REMEDY_QUESTIONS,
     *,
     expected: bool = False,
 ) -> str:
@@ -217,19 +218,22 @@ def answer_items(
             another.
     """
     return "\n".join(
-        _item(one, asked, f" *Asked of: {asked.asked_of}.*" * expected)
-        + _otherwise(one, asked) * expected
+        _item(one, asked, _asked_of(asked) * expected) + _otherwise(one, asked) * expected
         for one, asked in ((one, questions[one.question]) for one in answers)
     )
 
 
-def _otherwise(answer: Answer, asked: Question) -> str:
+def _asked_of(asked: Any) -> str:
+    return f" *Asked of: {asked.asked_of}.*" if hasattr(asked, "asked_of") else f" ({asked.name})"
+
+
+def _otherwise(answer: Answer, asked: Any) -> str:
     """Which outcome was expected, if another one."""
     other = asked.expected != answer.outcome
     return f" Expected: {WORDS.get(asked.expected, asked.expected)}." if other else ""
 
 
-def _item(answer: Answer, asked: Question, of_what: str) -> str:
+def _item(answer: Answer, asked: Any, of_what: str) -> str:
     """The pilot and the question; the outcome, what decided it, and what stands beside that."""
     pilot = f"The pilot: “{asked.pilot}” " if asked.pilot else ""
     said = [f"{yes} of {of} {name}{_bounds(yes, of)}" for name, (yes, of) in answer.counts.items()]

@@ -9,13 +9,12 @@ from nmpcrl import Vector
 from nmpcrl.analysis import leaderboard
 from nmpcrl.analysis.encounters import Encounters
 from nmpcrl.analysis.leaderboard import Judged, Row
-from nmpcrl.claims.population import Answer
+from nmpcrl.claims.investigation import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.claims.world import QUESTIONS
-from nmpcrl.claims.world_questions import ORACLES, PARTS, VIEWS, WITHOUT, WORLD_QUESTIONS
 from nmpcrl.report.cited import cited
 from nmpcrl.report.remedies import answer_items, entry_named
 from nmpcrl.report.tables import html_table
+from nmpcrl.studies.worlds import ORACLES, PARTS, VIEWS, WITHOUT, WORLD_QUESTIONS, WORLDS
 from nmpcrl.study import paper
 from nmpcrl.study.motions import Motion, centres
 from nmpcrl.study.world import CLEARANCE
@@ -32,7 +31,7 @@ def saved(costs: pd.DataFrame) -> Saved:
     """By fault and policy, the share of theta_init's cost that is saved in each layout.
 
     Args:
-        costs: of `claims.world.means`, of the part "model".
+        costs: of `worlds.means`, of the part "model".
     """
     found = {
         fault: {
@@ -52,7 +51,8 @@ def by_policy(found: Saved) -> dict[str, dict[str, pd.Series]]:
 
 def decided(answers: Iterable[Answer]) -> dict[str, str]:
     """How many of `WORLD_QUESTIONS` are answered how."""
-    outcomes = [one.outcome for one in answers if one.question in WORLD_QUESTIONS]
+    asked = {one.name for one in WORLD_QUESTIONS}
+    outcomes = [one.outcome for one in answers if one.question in asked]
     return {
         "asked": str(len(outcomes)),
         "confirmed": str(outcomes.count(REPRODUCED)),
@@ -82,14 +82,14 @@ def nearest(one: Encounters, motions: Sequence[Motion]) -> Vector:
 def answered(answers: Iterable[Answer]) -> str:
     """The questions that published runs answer, one item each, in Markdown."""
     there = [one for one in answers if one.outcome != UNDECIDABLE]
-    return answer_items(there, QUESTIONS, expected=True)
+    return answer_items(there, {one.name: one for one in WORLDS.questions}, expected=True)
 
 
 def suite_rows(table: pd.DataFrame) -> dict[tuple[str, str], Row]:
     """By view and policy the row that the suite makes of published runs among moving obstacles.
 
     Args:
-        table: with `world_runs.COLUMNS`.
+        table: of `studies.worlds`.
     """
     there = table[table.part == "moving"]
     found = {}
@@ -98,13 +98,13 @@ def suite_rows(table: pd.DataFrame) -> dict[tuple[str, str], Row]:
         for policy, entry in ENTRY.items():
             judged: dict[str, list[Judged]] = {}
             for one in there[there.arm == f"{view} {policy}"].itertuples():
-                begun = PARTS["moving"].budget if policy != "init" else 0
+                begun = PARTS["moving"].episodes if policy != "init" else 0
                 judged.setdefault(one.place, []).append(
                     Judged(initial[one.place], one.cost, one.arrived, begun, one.seconds,
                            inside=one.inside)
                 )  # fmt: skip
             if judged:
-                found[view, policy] = leaderboard.row(entry, PARTS["moving"].budget, judged)
+                found[view, policy] = leaderboard.row(entry, PARTS["moving"].episodes, judged)
     return found
 
 
@@ -112,7 +112,7 @@ def suite_table(table: pd.DataFrame) -> str:
     """`suite_rows` in HTML, those of the suite's own robot first."""
     found = suite_rows(table)
     header = ("Entry", "Plans with", "Solved", "Gain", "Never inside")
-    caption = f"Among obstacles that move, with {PARTS['moving'].budget} episodes a scenario."
+    caption = f"Among obstacles that move, with {PARTS['moving'].episodes} episodes a scenario."
     rows = (
         (entry_named(found[view, policy].entry), sees, *_shares(view, found[view, policy]))
         for view, sees in SEES.items()

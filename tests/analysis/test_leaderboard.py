@@ -18,9 +18,8 @@ from nmpcrl.analysis.leaderboard import (
     row,
     scenario_seed,
 )
-from nmpcrl.claims import world_published
 from nmpcrl.learning import evaluate
-from nmpcrl.study import ParameterError, paper
+from nmpcrl.study import ParameterError, paper, published
 from nmpcrl.study.population import JUDGE
 from nmpcrl.study.robot import NmpcPolicy
 
@@ -204,7 +203,7 @@ def among_moving(name, place="M03", budget=50, k=0):
                                                ("CMA-ES", "CMA-ES")])  # fmt: skip
 @pytest.mark.parametrize("place", ["M03", "M04"])
 def test_a_search_among_moving_obstacles_ends_where_the_published_one_did(entry, policy, place):
-    table = world_published.load().table
+    table = published.read("worlds")
     chosen = (table.part == "moving") & (table.arm == f"extrapolated {policy}")
     known = table[chosen & (table.place == place) & (table.k == 0)].iloc[0]
     found = among_moving(entry, place)

@@ -9,8 +9,6 @@ from nmpcrl.claims import (
     agent_questions,
     population_questions,
     remedy_questions,
-    terminal_questions,
-    world_questions,
 )
 
 # a file; its questions; how many there are, and how many have a pilot; what is published of them
@@ -18,8 +16,6 @@ FIXED = [
     (agent_questions, "AGENT_QUESTIONS", (17, 0), ("agents.json",)),
     (population_questions, "QUESTIONS", (10, 7), ("population.csv",)),
     (remedy_questions, "REMEDY_QUESTIONS", (10, 6), ("suite.json",)),
-    (terminal_questions, "TERMINAL_QUESTIONS", (3, 0), ("worlds.json", '"terminal"')),
-    (world_questions, "WORLD_QUESTIONS", (25, 6), ("worlds.json",)),
 ]
 each_file = pytest.mark.parametrize(("file", "name", "counts", "runs"), FIXED)
 

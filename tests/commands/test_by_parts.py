@@ -10,7 +10,6 @@ pytestmark = pytest.mark.usefixtures("trains_here")
     [
         (("agents",), "tune: 0 of 24 runs", "all: 0 of 4 runs"),
         (("remedies", "--entry", "ES"), "tune: 0 of 60 runs", "judge 50: 0 of 240 runs"),
-        (("world",), "moving: 0 of 1,440 runs", "carry: 0 of 241 runs"),
     ],
 )
 def test_a_dry_run_counts_the_runs_and_says_what_they_take(command, words, first, other):
@@ -26,7 +25,6 @@ def test_a_dry_run_counts_the_runs_and_says_what_they_take(command, words, first
     [
         (("agents", "--part", "best"), "no part 'best'; there are tune, judge, one, all"),
         (("remedies", "--part", "all"), "no part 'all'; there are best, tune, judge 50"),
-        (("world", "--part", "all"), "no part 'all'; there are moving, model, once"),
         (("remedies", "--entry", "SAC"), "no entry 'SAC'"),
     ],
 )
@@ -45,7 +43,7 @@ def test_nothing_is_judged_before_it_is_tuned(command, words, entry):
     assert_refused(command(*words), f"{entry} is not tuned yet")
 
 
-@pytest.mark.parametrize("name", ["agents", "remedies", "world"])
+@pytest.mark.parametrize("name", ["agents", "remedies"])
 def test_what_is_not_published_is_not_judged(command, name):
     assert_refused(command(name, "--judge"), f"nmpcrl {name} --publish")
 

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from plain_values import array, plain, plain_name, processor, short, table
 
-from nmpcrl.analysis import judgements, other_problems, worlds
+from nmpcrl.analysis import judgements, other_problems
 from nmpcrl.analysis.difficulty import raised_cost
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.bench import problem_times, sweep
@@ -43,17 +43,13 @@ from nmpcrl.claims import (
     reproduce,
     robustness,
     rule,
-    terminal_questions,
     thresholds,
     whole_picture,
     wider_claims,
-    world,
-    world_published,
-    world_questions,
-    world_runs,
 )
 from nmpcrl.report import baselines, whole_study
 from nmpcrl.report import worlds as world_report
+from nmpcrl.studies import worlds
 from nmpcrl.study import design, paper, provenance
 from nmpcrl.study.experiment import PAPER
 from nmpcrl.study.population import JUDGE, LAYOUTS, TUNE
@@ -97,7 +93,7 @@ def write() -> None:
 study, drawn = published.load, population_published.load
 suite = cache(lambda: remedy_published.load().table)
 trained = cache(lambda: agent_published.load().table)
-changing = cache(lambda: world_published.load().table)
+changing = cache(lambda: worlds.WORLDS.table())
 again = cache(interventions.load)
 problems = cache(lambda: other_problems.read(published.place() / other_problems.FILE))
 every = cache(lambda: evidence.gather("published", variants=True))
@@ -331,8 +327,8 @@ def expectations() -> Any:
         "population": population_questions.QUESTIONS,
         "remedies": remedy_questions.REMEDY_QUESTIONS,
         "agents": agent_questions.AGENT_QUESTIONS,
-        "worlds": world_questions.WORLD_QUESTIONS,
-        "terminal costs": terminal_questions.TERMINAL_QUESTIONS,
+        "worlds": {one.name: one for one in worlds.WORLD_QUESTIONS},
+        "terminal costs": {one.name: one for one in worlds.TERMINAL_QUESTIONS},
     }
     expected = {
         name: {one: asked.expected for one, asked in questions.items()}
@@ -480,15 +476,15 @@ def courses() -> Any:
 
 @entry("worlds")
 def answers_on_worlds() -> Any:
-    return by_question(world.answers(changing()))
+    return by_question(worlds.WORLDS.answers(changing()).values())
 
 
 @entry("worlds")
 def medians() -> Any:
     columns = ("cost", "inside", "arrived")
     return {
-        f"{part}, {column}": world.means(changing(), part, column).median()
-        for part, column in product(world_runs.PARTS, columns)
+        f"{part}, {column}": worlds.means(changing(), part, column).median()
+        for part, column in product(worlds.PARTS, columns)
     }
 
 
@@ -496,29 +492,29 @@ def medians() -> Any:
 def means() -> Any:
     columns = ("cost", "inside", "arrived")
     return {
-        f"{part}, {column}": table(world.means(changing(), part, column))
-        for part, column in product(world_runs.PARTS, columns)
+        f"{part}, {column}": table(worlds.means(changing(), part, column))
+        for part, column in product(worlds.PARTS, columns)
     }
 
 
 @entry("worlds")
 def shares_after_a_change() -> Any:
-    return {part: world.shares(changing(), part).median() for part in world_questions.CHANGES}
+    return {part: worlds.shares(changing(), part).median() for part in worlds.CHANGES}
 
 
 @entry("worlds")
 def carried() -> Any:
-    return {arm: table(world.carried(changing(), arm)) for arm in ("ES", "CMA-ES")}
+    return {arm: table(worlds.carried(changing(), arm)) for arm in ("ES", "CMA-ES")}
 
 
 @entry("worlds")
 def solved_with_a_terminal_cost() -> Any:
-    return world.solved_with(changing()).sum()
+    return worlds.solved_with(changing()).sum()
 
 
 @entry("worlds")
 def saved_with_a_wrong_model() -> Any:
-    found = world_report.saved(world.means(changing(), "model"))
+    found = world_report.saved(worlds.means(changing(), "model"))
     return {f: {how: one.median() for how, one in by.items()} for f, by in found.items()}
 
 
@@ -670,11 +666,11 @@ def plans() -> Any:
 @entry("keys")
 def seeds() -> Any:
     named = (*LAYOUTS, *paper.LAYOUTS)
-    where = {part: [*one.places] for part, one in world_runs.PARTS.items()}
+    where = {part: [*one.places] for part, one in worlds.PARTS.items()}
     return {
         "remedies": short([judgements.seed_of(place, 0) for place in named]),
         "agents": [agent_runs.seed_of(place, 1) for place in (agent_questions.EVERY, "A", "J001")],
-        "worlds": {part: short([worlds.seed_of(place, 1) for place in places])
+        "worlds": {part: short([worlds.WORLDS.seed(place, 1) for place in places])
                    for part, places in where.items()},
     }  # fmt: skip
 

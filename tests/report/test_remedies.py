@@ -23,7 +23,6 @@ from nmpcrl.claims.remedy_questions import (
     SETTINGS,
 )
 from nmpcrl.claims.verdict import NOT, REPRODUCED
-from nmpcrl.claims.world_questions import WORLD_QUESTIONS
 from nmpcrl.report import remedies
 from nmpcrl.report.remedies import (
     COLOURS,
@@ -32,8 +31,11 @@ from nmpcrl.report.remedies import (
     in_short,
     rule,
 )
+from nmpcrl.studies.worlds import WORLDS
 
 SHORT, LONG = ADVISED
+
+WORLD = {one.name: one for one in WORLDS.questions}
 
 
 def row(entry, part=SHORT, gain=(0.8, 0.7, 0.9), name=None):
@@ -165,16 +167,15 @@ def test_an_answer_stands_beside_its_pilot():
 def test_what_decides_comes_before_what_stands_beside_it():
     numbers = {"correlation": 0.35, "low": 0.02, "high": 0.6}
     one = Answer("crowding", REPRODUCED, numbers=numbers, beside={"scenarios with any": (21, 40)})
-    said = answer_items([one], WORLD_QUESTIONS, expected=True)
+    said = answer_items([one], WORLD, expected=True)
     assert "Confirmed: the correlation is 0.35 [0.02, 0.60]; 21 of 40 scenarios with any." in said
-    assert WORLD_QUESTIONS["crowding"].asked_of in said
 
 
 def test_two_questions_with_the_same_words_are_told_apart():
-    charts = [Answer(name, NOT) for name in WORLD_QUESTIONS if name.startswith("a chart")]
-    cost, error = answer_items(charts, WORLD_QUESTIONS, expected=True).splitlines()
+    charts = [Answer(name, NOT) for name in WORLD if name.startswith("a chart")]
+    cost, error = answer_items(charts, WORLD, expected=True).splitlines()
     assert "chart on the cost" in cost
-    assert "|delta|" in error
+    assert "chart on the TD error" in error
 
 
 def test_an_answer_that_was_not_expected_says_which_one_was():

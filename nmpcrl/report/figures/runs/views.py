@@ -9,7 +9,6 @@ from matplotlib.patches import Circle
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.encounters import Encounters
-from nmpcrl.claims.world_questions import VIEWS
 from nmpcrl.report.figures.axes import below
 from nmpcrl.report.figures.sheet import Drawn, sheet
 from nmpcrl.report.figures.style import (
@@ -24,6 +23,7 @@ from nmpcrl.report.figures.style import (
     page,
 )
 from nmpcrl.report.worlds import nearest
+from nmpcrl.studies.worlds import VIEWS
 from nmpcrl.study import paper
 from nmpcrl.study.motions import PERIOD, Motion, centres
 from nmpcrl.study.world import CLEARANCE, TASK

@@ -11,8 +11,6 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator, PercentFormatter
 
 from nmpcrl import Matrix
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
-from nmpcrl.analysis.worlds import EVERY
-from nmpcrl.claims.world_questions import VIEWS
 from nmpcrl.report.figures.axes import below, over_episodes
 from nmpcrl.report.figures.style import (
     INK,
@@ -27,6 +25,8 @@ from nmpcrl.report.figures.style import (
     subplots,
 )
 from nmpcrl.report.worlds import signed
+from nmpcrl.studies.worlds import VIEWS
+from nmpcrl.studies.worlds_run import EVERY
 
 POLICIES = {  # by arm
     "init": r"$\theta_\mathrm{init}$", "ES": "ES", "grid": r"grid over $\theta_c$",
@@ -63,7 +63,7 @@ def policies(costs: pd.DataFrame, met: pd.DataFrame) -> Figure:
     """What each policy costs under each view, and in how many scenarios the robot gets inside.
 
     Args:
-        costs: of `claims.world.means`, a row a scenario and a column an arm.
+        costs: of `worlds.means`, a row a scenario and a column an arm.
         met: the share of the seeds in which the robot gets into an obstacle, in the same form.
     """
     figure, (left, right) = subplots(1, 2, ROW * len(POLICIES) + 1.5, sharey=True, tall=5.0)

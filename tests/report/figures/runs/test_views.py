@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.encounters import Counted, Encounters
-from nmpcrl.claims.world_questions import VIEWS
 from nmpcrl.report.figures.moving import PLAY, SECONDS
 from nmpcrl.report.figures.runs import views as figures
 from nmpcrl.report.figures.sheet import NARROW, WIDE
+from nmpcrl.studies.worlds import VIEWS
 from nmpcrl.study import paper
 from nmpcrl.study.motions import Straight, centres
 

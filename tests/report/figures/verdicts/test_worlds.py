@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from nmpcrl.claims.world_questions import VIEWS
 from nmpcrl.report.figures.verdicts import worlds as figures
+from nmpcrl.studies.worlds import VIEWS
 
 SCENARIOS = [f"M{i:02}" for i in range(1, 21)]
 COSTS = {"init": 100.0, "ES": 98.0, "grid": 92.0, "CMA-ES": 90.0}

@@ -4,10 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.claims.population_questions import WORDS
+from nmpcrl.claims.investigation import WORDS
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.claims.world import QUESTIONS, after, answers, back, changes, noticing
-from nmpcrl.claims.world_runs import COLUMNS, PARTS
+from nmpcrl.studies.worlds import PARTS, REMEDY, WORLDS, after, back, changes, noticing
+
+COLUMNS = [*WORLDS.table().columns]
 
 
 def rows(part, arm, **values):
@@ -18,18 +19,18 @@ def rows(part, arm, **values):
     return [
         {"part": part, "arm": arm, "place": place, "k": k}
         | {name: one(places.index(place)) if callable(one) else one for name, one in known.items()}
-        for place, k in PARTS[part].runs("remedy" if arm.startswith("remedy") else arm)
+        for place, k in PARTS[part].order(arm)
     ]
 
 
 def answered(*some):
-    table = pd.DataFrame([one for each in some for one in each], columns=[*COLUMNS])
-    return {one.question: one for one in answers(table)}
+    table = pd.DataFrame([one for each in some for one in each], columns=COLUMNS)
+    return WORLDS.answers(table)
 
 
 def test_of_nothing_no_question_can_be_decided():
     found = answered()
-    assert [*found] == [*QUESTIONS]
+    assert [*found] == [one.name for one in WORLDS.questions]
     assert {one.outcome for one in found.values()} == {UNDECIDABLE}
     assert {one.outcome for one in found.values()}.isdisjoint(WORDS)
 
@@ -89,7 +90,7 @@ def test_a_changing_world_is_judged_beside_replanning():
             for part in ("once", "every 50", "random")]  # fmt: skip
     found = answered(
         *told, rows("every 50", "ES never plain", series=higher),
-        rows("once", "remedy grid", cost=0.8),
+        rows("once", f"remedy {REMEDY}", cost=0.8),
         rows("every 50", "ES cost plain", series=higher, events=[54, 104, 154, 204, 254]),
     )  # fmt: skip
     assert found["learning pays in a changing world"].outcome == REPRODUCED

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from nmpcrl.analysis import shifts
-from nmpcrl.analysis.shifts import FOR, LIMIT, RAISED, WINDOW, Chart, Recent, changing, schedule
 from nmpcrl.learning import Diverged, Exploration
 from nmpcrl.learning.training import Step
+from nmpcrl.studies import shifts
+from nmpcrl.studies.shifts import FOR, LIMIT, RAISED, WINDOW, Chart, Recent, changing, schedule
 from nmpcrl.study import paper
 
 TWO = (paper.LAYOUTS["A"], paper.LAYOUTS["D"])

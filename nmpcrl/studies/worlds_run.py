@@ -1,35 +1,22 @@
-"""What is run in worlds that move, change, or are not the model, and how it is kept.
+"""Runs in worlds that move or change, with a wrong model, or with a richer terminal cost.
 
-`run` carries out one `Wanted`, whose entry is "PART: ARM". The arms of the parts are
-
-- moving: a predictor and a policy, "frozen ES", in a scenario;
-- model: a fault and a policy, "drift ES+model", in a layout;
-- once, every 50, random: learner, what is known and the reaction, "RDES told recent"; or
-  "remedy ENTRY", the entry begun anew after the change; in a sequence of layouts, S01 and so on;
-- carry: an entry, whose theta of a layout is judged in all of `JUDGE`;
-- gradient: the deviation of the measured state, in a layout;
-- terminal: a terminal cost of `study.world.TERMINALS`, learned by ES in a layout.
-
-A policy is "init", "grid" over theta_c, "CMA-ES", "ES", and where the model can be learned
-"ES+model", "oracle" and "oracle+ES".
+Each function takes the setting of an arm, a place, a number of episodes and a seed, and returns a
+row of `worlds.py`. A policy is "init", "grid" (over theta_c), "CMA-ES" or "ES"; and where the model
+can be learned "ES+model", "oracle" or "oracle+ES".
 """
 
-import time
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.analysis import judgements
 from nmpcrl.analysis.direct_search import cma_es, grid
 from nmpcrl.analysis.encounters import judged
 from nmpcrl.analysis.entries import entry_with
 from nmpcrl.analysis.interaction import Robot
-from nmpcrl.analysis.kept import Kept, Wanted
-from nmpcrl.analysis.leaderboard import judge_once, scenario_seed
-from nmpcrl.analysis.shifts import RATES, Recent, changing, schedule
+from nmpcrl.analysis.leaderboard import judge_once
+from nmpcrl.claims.investigation import Condition, Row
 from nmpcrl.learning import (
     Diverged,
     Exploration,
@@ -43,6 +30,7 @@ from nmpcrl.learning import (
 )
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import absurd
+from nmpcrl.studies.shifts import Recent, changing, schedule
 from nmpcrl.study import paper
 from nmpcrl.study.faults import FAULTS, Fault
 from nmpcrl.study.motions import PREDICTORS, still
@@ -50,34 +38,33 @@ from nmpcrl.study.population import JUDGE
 from nmpcrl.study.scenarios import load
 from nmpcrl.study.world import World, controller, oracle
 
-EPOCH = 1  # raised by hand where an edit of this changes a number
 EVERY = 5  # episodes between two rollouts of a changing world
 DRAWS = 5  # rollouts that judge theta where the body draws
 THETA = np.array(paper.THETA_INIT)
 
 
-@dataclass(frozen=True)
-class Ran:
-    """What one run came to; what its part does not have is left as it is."""
+def row(
+    cost: float,
+    inside: int = 0,
+    collisions: int = 0,
+    arrived: bool = False,
+    series: Sequence[float] = (),
+    events: Sequence[int] = (),
+) -> Row:
+    """A row; columns that a part does not measure have these values.
 
-    cost: float = np.nan  # of the last theta; of `gradient` the cosine
-    inside: int = 0  # states in an obstacle
-    collisions: int = 0
-    arrived: bool = False
-    series: list[float] = field(default_factory=list)  # costs: every `EVERY` episodes, or by layout
-    events: list[int] = field(default_factory=list)  # episodes at whose end a chart fired
-    seconds: float = 0.0  # of processor time
-
-
-def run(one: Wanted) -> Ran:
-    """Carry out one."""
-    part, _, arm = one.entry.partition(": ")
-    began = time.process_time()
-    ran = JOBS[part](arm, one)
-    return replace(ran, seconds=time.process_time() - began)
-
-
-seed_of = scenario_seed  # of any place, by its name
+    Args:
+        cost: of the last theta; of `gradient` the cosine.
+        inside: states in an obstacle.
+        collisions: times that the robot enters one.
+        arrived: whether the robot is at the target at the end.
+        series: costs, every `EVERY` episodes or by layout; or theta.
+        events: episodes at whose end a chart fired.
+    """
+    return {
+        "cost": float(cost), "inside": int(inside), "collisions": int(collisions),
+        "arrived": bool(arrived), "series": [*series], "events": [*events],
+    }  # fmt: skip
 
 
 def explored(episodes: int, seed: int) -> Exploration:
@@ -114,69 +101,70 @@ def found(policy: str, nmpc: Persistent, world: World, episodes: int, seed: int)
     return start if policy == "init" else learned(nmpc, world, start, episodes, seed)
 
 
-def moving(arm: str, one: Wanted) -> Ran:
-    """A policy among obstacles that move."""
-    view, policy = arm.split()
-    motions = load()[one.layout]
+def moving(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row:
+    """A view and a policy among obstacles that move."""
+    view, policy = setting
+    motions = load()[place]
     nmpc, world = controller(len(motions)), World(motions, PREDICTORS[view])
-    made = judged(nmpc, found(policy, nmpc, world, one.budget, one.seed), world)
-    return Ran(made.cost, *made.counted, made.arrived)
+    made = judged(nmpc, found(policy, nmpc, world, episodes, seed), world)
+    return row(made.cost, *made.counted, made.arrived)
 
 
-def model(arm: str, one: Wanted) -> Ran:
-    """A policy in a body that is not the model; mean cost where the body draws."""
-    name, policy = arm.split()
-    fault: Fault = FAULTS[name]
+def model(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row:
+    """A policy in a body with a fault; the mean cost where the body draws."""
+    fault, policy = FAULTS[setting[0]], setting[1]
     nmpc = controller(learned_model=policy not in ("init", "grid", "ES"))
-    world = World(still(JUDGE[one.layout]), fault=fault)
+    world = World(still(JUDGE[place]), fault=fault)
     if policy.startswith("oracle"):
         theta = oracle(fault)
         if policy == "oracle+ES":
-            theta = learned(nmpc, world, theta, one.budget, one.seed)
+            theta = learned(nmpc, world, theta, episodes, seed)
     else:
-        theta = found(policy, nmpc, world, one.budget, one.seed)
+        theta = found(policy, nmpc, world, episodes, seed)
     draws = DRAWS if fault.slip or any(fault.noise) else 1
-    made = [judged(nmpc, theta, world, seed) for seed in range(draws)]
-    return Ran(
+    made = [judged(nmpc, theta, world, draw) for draw in range(draws)]
+    return row(
         float(np.mean([each.cost for each in made])),
         sum(each.counted.inside for each in made),
         sum(each.counted.collisions for each in made),
         all(each.arrived for each in made),
-        series=theta.tolist(),
+        theta.tolist(),
     )
 
 
 def sequence(rate: str, place: str, episodes: int) -> tuple[list[str], list[int]]:
-    """The layouts of a sequence, and the number of that of each episode."""
+    """The layouts of a sequence, and the index of the layout of each episode."""
     rng = np.random.default_rng([25, int(place[1:])])
     names = [str(name) for name in rng.permutation([*JUDGE])]
     order = schedule(rate, episodes, rng)
     return names[: order[-1] + 1], order
 
 
-def shifting(arm: str, one: Wanted) -> Ran:
+def begun_anew(rate: str, entry: str, place: str, episodes: int, seed: int) -> Row:
+    """An entry of the suite in the last layout of a sequence, with the episodes that are left."""
+    names, order = sequence(rate, place, episodes)
+    alone = judge_once(entry, JUDGE[names[-1]], episodes - order.index(order[-1]), seed)
+    return row(alone.cost / alone.initial, arrived=alone.arrived)
+
+
+def shifting(rate: str, setting: tuple[str, str, str], place: str, episodes: int, seed: int) -> Row:
     """A learner where the layout changes; costs are shares of theta_init's in the same layout."""
-    rate = one.entry.partition(": ")[0]
-    names, order = sequence(rate, one.layout, one.budget)
+    kind, knows, reaction = setting
+    names, order = sequence(rate, place, episodes)
     layouts, nmpc = [JUDGE[name] for name in names], controller()
-    if arm.startswith("remedy "):
-        entry, left = arm.partition(" ")[2], one.budget - order.index(order[-1])
-        alone = judge_once(entry, layouts[-1], left, one.seed)
-        return Ran(alone.cost / alone.initial, arrived=alone.arrived)
-    kind, knows, reaction = arm.split()
     initial = [judged(nmpc, THETA, World(still(each))).cost for each in layouts]
-    make = _maker(kind, nmpc, one.seed, recent=reaction == "recent")
+    make = _maker(kind, nmpc, seed, recent=reaction == "recent")
     reacts = {"knows": knows, "reaction": "plain" if reaction == "recent" else reaction}
     series, events, arrived = [], [], False
-    explore = explored(one.budget, one.seed)
+    explore = explored(episodes, seed)
     for e, each in enumerate(changing(nmpc, layouts, order, make, explore, **reacts)):
         events += [e] if each.alarm else []
-        if e % EVERY == EVERY - 1 or e == one.budget - 1:
+        if e % EVERY == EVERY - 1 or e == episodes - 1:
             world = World(still(layouts[each.layout]), seen=still(layouts[each.seen]))
             made = judged(nmpc, each.theta, world)
             series.append(made.cost / initial[each.layout])
             arrived = made.arrived
-    return Ran(series[-1], arrived=arrived, series=series, events=events)
+    return row(series[-1], arrived=arrived, series=series, events=events)
 
 
 def _maker(kind: str, nmpc: Persistent, seed: int, *, recent: bool) -> Callable[[float], Learner]:
@@ -198,64 +186,49 @@ def _maker(kind: str, nmpc: Persistent, seed: int, *, recent: bool) -> Callable[
     return lambda factor: learner(nmpc, network, factor * paper.ALPHA)
 
 
-def carry(arm: str, one: Wanted) -> Ran:
-    """The costs of one layout's theta in all of `JUDGE`, by the paper's own controller."""
-    theta = entry_with(arm)(Robot(JUDGE[one.layout], one.budget, one.seed))
+def carry(entry: str, place: str, episodes: int, seed: int) -> Row:
+    """The costs of the theta of one layout in all of `JUDGE`, by the paper's own controller."""
+    theta = entry_with(entry)(Robot(JUDGE[place], episodes, seed))
     assert not callable(theta)  # no policy is carried
     costs = [evaluate(paper.nmpc(each), theta, paper.STEPS).cost for each in JUDGE.values()]
-    return Ran(costs[[*JUDGE].index(one.layout)], series=costs)
+    return row(costs[[*JUDGE].index(place)], series=costs)
 
 
-def gradient(arm: str, one: Wanted) -> Ran:
+def gradient(deviation: float, place: str, episodes: int, seed: int) -> Row:
     """The cosine of the summed steps of ES at theta_init with noise in the state and without."""
     sums = []
-    for deviation in (0.0, float(arm)):
-        world = World(still(JUDGE[one.layout]), fault=Fault(noise=(deviation,) * 3))
+    for each in (0.0, deviation):
+        world = World(still(JUDGE[place]), fault=Fault(noise=(each,) * 3))
         nmpc, summed = controller(), np.zeros(THETA.size)
         weights = Weights(THETA, np.zeros(THETA.size))
         # the published draws: those of `explored`, since [seed, 0] is the stream of seed
-        how: dict[str, Any] = {"rng": np.random.default_rng(one.seed), **world.environment}
-        explore = explored(one.budget, one.seed)
+        how: dict[str, Any] = {"rng": np.random.default_rng(seed), **world.environment}
+        explore = explored(episodes, seed)
         for step in train(expected_sarsa(nmpc, 0.0), nmpc, weights, explore, **how):
             if step.update and step.solution and step.update.delta is not None:
                 summed += step.update.delta * step.solution.features
         sums.append(summed)
     exact, noisy = sums
     lengths = np.linalg.norm(exact), np.linalg.norm(noisy)
-    return Ran(float(exact @ noisy / np.prod(lengths)), series=[float(lengths[1] / lengths[0])])
+    return row(exact @ noisy / np.prod(lengths), series=[float(lengths[1] / lengths[0])])
 
 
-def terminal(arm: str, one: Wanted) -> Ran:
+def terminal(kind: str, place: str, episodes: int, seed: int) -> Row:
     """ES with a terminal cost, in the paper's world; costs are shares of theta_init's."""
-    nmpc, world = controller(terminal=arm), World(still(JUDGE[one.layout]))
+    nmpc, world = controller(terminal=kind), World(still(JUDGE[place]))
     start = nmpc.nmpc.problem.theta  # type: ignore[union-attr]
-    theta = learned(nmpc, world, start, one.budget, one.seed)
+    theta = learned(nmpc, world, start, episodes, seed)
     initial, made = (judged(nmpc, each, world) for each in (start, theta))
-    return Ran(made.cost / initial.cost, *made.counted, made.arrived, series=theta.tolist())
+    return row(made.cost / initial.cost, *made.counted, made.arrived, theta.tolist())
 
 
-JOBS: dict[str, Callable[[str, Wanted], Ran]] = {
-    "moving": moving, "model": model, "carry": carry, "gradient": gradient, "terminal": terminal,
-    **dict.fromkeys(RATES, shifting),
-}  # fmt: skip
-
-
-def depends_on() -> dict[str, Any]:
-    """All that the numbers depend on, beside what is wanted."""
-    return {**judgements.depends_on(), "worlds": EPOCH}
-
-
-def compile_ahead(missing: Iterable[Wanted]) -> None:
-    """Compile what the runs call, so that no processor time of that is counted."""
-    kinds: dict[tuple[int, bool, str], None] = {}  # each once: a controller takes a while to make
-    for one in missing:
-        part, _, arm = one.entry.partition(": ")
-        size = len(load()[one.layout]) if part == "moving" else 4
-        kinds[size, "ES+" in arm or "oracle" in arm, arm if part == "terminal" else ""] = None
-    for size, learned_model, richer in kinds:
-        kind = {"terminal": richer} if richer else {}
-        nmpc = controller(size, learned_model=learned_model, **kind)
+def compile_ahead(missing: Iterable[tuple[Condition, Any]]) -> None:
+    """Compile what the runs call, so that no row counts the time of it."""
+    kinds: dict[tuple[int, bool, str], None] = {}
+    for one, setting in missing:
+        size = len(load()[one.place]) if one.part == "moving" else 4
+        richer = one.part == "model" and setting[1] not in ("init", "grid", "ES")
+        kinds[size, richer, setting if one.part == "terminal" else ""] = None
+    for size, learned_model, kind in kinds:
+        nmpc = controller(size, learned_model=learned_model, **({"terminal": kind} if kind else {}))
         nmpc.solve(np.array(paper.START), nmpc.nmpc.problem.theta)  # type: ignore[union-attr]
-
-
-KEPT: Kept[Ran] = Kept("worlds", Ran, lambda: depends_on())

@@ -1,0 +1,364 @@
+"""An investigation: arms in places make rows of one table, and the table answers questions.
+
+    parts (arms x places x seeds) -> conditions -> run -> rows -> questions -> answers
+
+Rows are stored one by one in `runs/NAME.jsonl`, so that an interruption loses only the rows in
+progress. Complete arms are published as `NAME.csv`. `nmpcrl investigate` runs, resumes, publishes
+and judges; `nmpcrl.studies` has the investigations of the book, and a reader's own is one file.
+"""
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import cloudpickle
+import numpy as np
+import pandas as pd
+from filelock import FileLock
+
+from nmpcrl.claims.published import made_here
+from nmpcrl.claims.rule import read
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
+from nmpcrl.study import published
+from nmpcrl.study.jobs import parallel
+from nmpcrl.study.provenance import (
+    EPOCHS,
+    hash_of,
+    installed,
+    is_accepted,
+    sources_hash,
+    versions,
+)
+from nmpcrl.study.published import Unpublishable
+from nmpcrl.study.storage.place import folder
+from nmpcrl.study.storage.refusal import Refusal
+
+WORDS = {REPRODUCED: "confirmed", PARTLY: "confirmed in part", NOT: "contradicted"}
+
+Row: TypeAlias = dict[str, Any]
+Arms: TypeAlias = Mapping[str, Any]  # the setting of each arm, by its name
+Run: TypeAlias = Callable[[Any, str, int, int], Row]  # (setting, place, episodes, seed)
+
+
+class NoInvestigation(Refusal):
+    """A file does not define an investigation."""
+
+
+class Condition(NamedTuple):
+    """The name of a row: an arm in a place, with the k-th seed of that place."""
+
+    part: str
+    arm: str
+    place: str
+    k: int
+
+
+NAMES = list(Condition._fields)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Every arm in every place with every seed.
+
+    Arms may depend on earlier rows (a setting that was tuned); they are then a function of the
+    table of these, and may raise a `Refusal` while it is incomplete.
+    """
+
+    run: Run
+    arms: Arms | Callable[[pd.DataFrame], Arms]
+    places: Sequence[str]
+    episodes: int
+    seeds: int = 1
+    deterministic: Collection[str] = ()  # arms that draw nothing: one seed
+    first: Mapping[str, int] = field(default_factory=dict)  # arms of the first places only
+    seconds: float = 0.03  # of processor time an episode, as long as no row of the arm is known
+
+    def settings(self, table: pd.DataFrame) -> Arms:
+        """The setting of each arm, given the rows of earlier parts."""
+        return self.arms(table) if callable(self.arms) else self.arms
+
+    def order(self, arm: str) -> list[tuple[str, int]]:
+        """Place and k of each row of an arm."""
+        places = self.places[: self.first.get(arm)]
+        seeds = 1 if arm in self.deterministic else self.seeds
+        return [(place, k) for place in places for k in range(seeds)]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The answer to a question."""
+
+    outcome: Outcome
+    counts: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # yes, asked; by unit
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    beside: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # decide nothing
+    said: str = ""  # the outcome in words, where `WORDS` would mislead
+    question: str = ""  # its name
+
+    @property
+    def words(self) -> str:
+        """The outcome as a page prints it."""
+        return self.said or WORDS.get(self.outcome, str(self.outcome))
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question, with the answer that was expected before any row was made."""
+
+    name: str
+    question: str  # in words
+    expected: Outcome
+    answer: Callable[[pd.DataFrame], Answer]
+    pilot: str = ""  # the sentence of an earlier, smaller experiment
+
+
+@dataclass(frozen=True, kw_only=True)
+class Investigation:
+    """Parts, run in order, and the questions that their rows answer."""
+
+    name: str
+    parts: Mapping[str, Part]
+    questions: Sequence[Question]
+    seed: Callable[[str, int], int]  # of a place and k
+    registered: str = ""  # the commit that fixed parts and questions, before the first row
+    epoch: int = 1  # raised by hand where an edit changes a number
+    libraries: Sequence[str] = ()  # whose versions matter, beside those of every run
+    digits: int | None = None  # to which published numbers are rounded
+    prepare: Callable[[Iterable[tuple[Condition, Any]]], None] | None = None  # compiles ahead
+    where: Path | None = None  # of the published table; by default the project's folder
+
+    def key(self, one: Condition) -> str:
+        """A hash of all that a row depends on."""
+        episodes = self.parts[one.part].episodes
+        made_with = {**versions(), **{name: installed(name) for name in self.libraries}}
+        return hash_of([self.name, self.epoch, EPOCHS, made_with, episodes, *one])
+
+    def table(self) -> pd.DataFrame:
+        """The published rows.
+
+        Raises:
+            Damaged: they are missing, or are not those that were written.
+        """
+        return published.read(self.name, self.where)
+
+    def known(self) -> pd.DataFrame:
+        """The published rows, then the rows stored here that are not published."""
+        there = [published.about(self.name, self.where) and self.table(), self.log().table()]
+        tables = [one for one in there if len(one)]
+        if not tables:
+            return pd.DataFrame(columns=NAMES)
+        return pd.concat(tables, ignore_index=True).drop_duplicates(NAMES, ignore_index=True)
+
+    def log(self) -> "RowLog":
+        """The rows that were made here."""
+        return RowLog(folder() / f"{self.name}.jsonl")
+
+    def conditions(self, part: str) -> dict[Condition, Any]:
+        """The setting of each row of a part.
+
+        Raises:
+            Refusal: an arm depends on rows that are not known.
+        """
+        one = self.parts[part]
+        return {
+            Condition(part, arm, *at): setting
+            for arm, setting in one.settings(self.known()).items()
+            for at in one.order(arm)
+        }
+
+    def missing(self, part: str) -> dict[Condition, Any]:
+        """The conditions of a part without a row in `log`."""
+        rows = self.log().rows
+        return {one: it for one, it in self.conditions(part).items() if self.key(one) not in rows}
+
+    def complete(self, parts: Iterable[str] = (), workers: int | None = None) -> pd.DataFrame:
+        """Make every missing row, part by part.
+
+        Args:
+            parts: by default all.
+            workers: processes; by default one per core.
+
+        Returns:
+            The table of the rows that were made here.
+        """
+        log, chosen = self.log(), [*parts] or [*self.parts]
+        for part in filter(chosen.__contains__, self.parts):
+            missing = self.missing(part)
+            if missing and self.prepare:
+                self.prepare(missing.items())
+            made = parallel(partial(_timed, self), [*missing.items()], workers, part)
+            for (one, _), row in made:
+                log.append(self.key(one), one._asdict() | row)
+        return log.table()
+
+    def make(self, one: Condition, setting: Any) -> Row:
+        """Run one condition."""
+        part = self.parts[one.part]
+        return part.run(setting, one.place, part.episodes, self.seed(one.place, one.k))
+
+    def price(self, part: str) -> float:
+        """Seconds of processor time that the missing rows of a part take."""
+        known, one = self.known(), self.parts[part]
+        known = known[known.part == part]
+        means = known.groupby("arm").seconds.mean() if len(known) else {}
+        asked = (each.arm for each in self.missing(part))
+        return float(sum(means.get(arm, one.seconds * one.episodes) for arm in asked))
+
+    def answers(self, table: pd.DataFrame) -> dict[str, Answer]:
+        """The answers to all questions, by name."""
+        return {one.name: replace(one.answer(table), question=one.name) for one in self.questions}
+
+    def publish(self) -> Path:
+        """Add the complete arms that were made here to the published table.
+
+        Raises:
+            Unpublishable: an arm is published already with other numbers, or none is complete and
+                new.
+        """
+        there = self.table() if published.about(self.name, self.where) else pd.DataFrame()
+        made, new = self.log().table(), []
+        for (part, arm), rows in made.groupby(["part", "arm"], sort=False) if len(made) else ():
+            block = self._block(part, arm, rows)
+            old = there[(there.part == part) & (there.arm == arm)] if len(there) else there
+            if block is None:
+                continue
+            if not len(old):
+                new.append(block)
+            elif not _same(old, block):
+                raise Unpublishable(f"{arm} of the part {part!r} is published with other numbers")
+        if not new:
+            raise Unpublishable(f"no arm of {self.name} is complete and new")
+        added = pd.concat(new)
+        batch = made_here() | {"rows": added.groupby("part", sort=False).size().to_dict()}
+        return published.write(
+            self.name,
+            pd.concat([there, added], ignore_index=True),
+            batch=batch,
+            registered=self.registered,
+            where=self.where,
+        )
+
+    def _block(self, part: str, arm: str, rows: pd.DataFrame) -> pd.DataFrame | None:
+        """The rows of an arm in order, rounded; None while some are missing."""
+        by, order = rows.set_index(["place", "k"], drop=False), self.parts[part].order(arm)
+        if {*by.index} < {*order}:
+            return None
+        return by.loc[order].reset_index(drop=True).map(partial(rounded, digits=self.digits))
+
+
+def _timed(investigation: Investigation, job: tuple[Condition, Any]) -> Row:
+    """A row with the seconds of processor time that it took."""
+    began = time.process_time()
+    row = investigation.make(*job)
+    return row | {"seconds": time.process_time() - began}
+
+
+def _same(first: pd.DataFrame, second: pd.DataFrame) -> bool:
+    """Whether two blocks have the same numbers, the time that they took apart."""
+    one, other = (block.drop(columns="seconds").reset_index(drop=True) for block in (first, second))
+    return bool(one.equals(other[one.columns]))
+
+
+def rounded(value: Any, digits: int | None) -> Any:
+    """Floats with so many significant digits, in lists as well."""
+    if isinstance(value, list):
+        return [rounded(one, digits) for one in value]
+    if digits and isinstance(value, float) and np.isfinite(value):
+        return float(f"{value:.{digits}g}")
+    return value
+
+
+def of_file(path: Path) -> Investigation:
+    """The investigation that a Python file defines; published beside it, in `published`.
+
+    Its `registered` is the commit of the file, if Git knows the file as it is.
+
+    Raises:
+        NoInvestigation: there is no such file, it fails, or defines none or several.
+    """
+    spec = spec_from_file_location(path.stem, path)
+    if not path.is_file() or spec is None or spec.loader is None:
+        raise NoInvestigation(f"{path} is no Python file")
+    module = sys.modules[path.stem] = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise NoInvestigation(f"{path} fails: {type(error).__name__}: {error}") from error
+    cloudpickle.register_pickle_by_value(module)  # workers cannot import it
+    found = [one for one in vars(module).values() if isinstance(one, Investigation)]
+    if len(found) != 1:
+        raise NoInvestigation(f"{path} must define one Investigation, and defines {len(found)}")
+    where = found[0].where or path.parent / "published"
+    return replace(found[0], where=where, registered=found[0].registered or _commit(path))
+
+
+def _commit(path: Path) -> str:
+    """The last commit of a file; empty if the file is not committed as it is."""
+
+    def git(*arguments: str) -> str:
+        asked = ["git", "-C", str(path.parent), *arguments, "--", path.name]
+        return subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip()
+
+    return "" if git("status", "--porcelain") else git("log", "-1", "--format=%H")
+
+
+class RowLog:
+    """Rows by key in a file of JSON lines; an incomplete line is ignored, and its row made again.
+
+    Rows of sources that are neither these nor the locked ones are ignored, too.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.rows = path, dict[str, Row]()
+        for line in path.read_text("utf-8").splitlines() if path.exists() else ():
+            with suppress(ValueError):
+                key, sources, row = json.loads(line)
+                if is_accepted(sources):
+                    self.rows[key] = row
+
+    def append(self, key: str, row: Row) -> None:
+        """Store a row."""
+        self.rows[key] = row
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        line = json.dumps([key, sources_hash(), row])
+        with FileLock(f"{self.path}.lock"), self.path.open("a", encoding="utf-8") as file:
+            file.write(f"\n{line}")  # begins a line, whatever was cut off before
+
+    def table(self) -> pd.DataFrame:
+        """All rows."""
+        return pd.DataFrame([*self.rows.values()])
+
+
+def share(
+    yes: pd.Series, unit: str = "layouts", numbers: Mapping[str, float] | None = None
+) -> Answer:
+    """The answer of a share of yes, by `rule.read`."""
+    count = int(yes.sum()), len(yes)
+    return Answer(read(*count), {unit: count}, numbers or {})
+
+
+def means(table: pd.DataFrame, part: str, column: str = "cost") -> pd.DataFrame:
+    """The mean over seeds, a row a place and a column an arm; nan where nothing is known."""
+    there = table[table.part == part]
+    found = there.assign(value=there[column].astype(float))
+    return found.groupby(["place", "arm"], sort=False).value.mean().unstack("arm")
+
+
+def lower(
+    part: str, first: str, second: str, unit: str = "layouts", column: str = "cost"
+) -> Callable[[pd.DataFrame], Answer]:
+    """Asked of each place: is the first arm below the second?"""
+
+    def answer(table: pd.DataFrame) -> Answer:
+        both = means(table, part, column).reindex(columns=[first, second]).dropna()
+        return share(both[first] < both[second], unit)
+
+    return answer

@@ -1,0 +1,99 @@
+"""`nmpcrl investigate`: make, publish and judge the rows of an investigation."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from nmpcrl.claims.investigation import Investigation
+
+BOOK = {  # the investigations of the book: module and name of each
+    "worlds": ("worlds", "WORLDS"),
+}
+
+
+@click.command()
+@click.argument("name", metavar="NAME|FILE.py")
+@click.option("--part", "parts", multiple=True, help="Only this part; by default all.")
+@click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes; default: cores.")
+@click.option("--dry-run", is_flag=True, help="Only report what is missing, and its price.")
+@click.option("--publish", is_flag=True, help="Add complete arms to the published table.")
+@click.option("--judge", is_flag=True, help="Only print the answers of the published table.")
+def investigate(
+    name: str, parts: tuple[str, ...], workers: int | None, dry_run: bool, publish: bool,
+    judge: bool,
+) -> None:  # fmt: skip
+    """Make the missing rows of an investigation, and answer its questions.
+
+    NAME is one of the book's (worlds), or a Python file that defines one
+    Investigation. Each row is stored as soon as it is made, so a run can be
+    interrupted and started again.
+
+    \b
+    Example:
+      nmpcrl investigate worlds --dry-run
+      nmpcrl investigate worlds --part moving
+      nmpcrl investigate my_study.py --publish
+    """
+    one = load(name)
+    for unknown in (part for part in parts if part not in one.parts):
+        known = ", ".join(one.parts)
+        raise click.ClickException(f"part = {unknown!r} must be one of {known}")
+    if dry_run:
+        report(one, parts or tuple(one.parts))
+        return
+    if not judge:
+        made = one.complete(parts, workers)
+        if publish:
+            click.echo(f"{one.publish()}: published")
+    say(one, made if not (judge or publish) else one.table())
+
+
+def load(name: str) -> "Investigation":
+    """An investigation by its name in `BOOK`, or of a file.
+
+    Raises:
+        ClickException: there is none, or a file defines none or several.
+    """
+    from importlib import import_module
+
+    from nmpcrl.claims.investigation import of_file
+
+    if name in BOOK:
+        module, constant = BOOK[name]
+        found: Investigation = getattr(import_module(f"nmpcrl.studies.{module}"), constant)
+        return found
+    if not name.endswith(".py"):
+        raise click.ClickException(f"{name!r} must be one of {', '.join(BOOK)}, or a .py file")
+    return of_file(Path(name))
+
+
+def report(one: "Investigation", parts: tuple[str, ...]) -> None:
+    """How many rows of each part are stored, and what the others take."""
+    from nmpcrl.study.storage.refusal import Refusal
+
+    for part in parts:
+        try:
+            every, missing, price = one.conditions(part), one.missing(part), one.price(part)
+        except Refusal as error:
+            click.echo(f"{part}: {error}")
+            continue
+        took = f"; the others take about {price / 60:.1f} minutes of one core" if missing else ""
+        click.echo(f"{part}: {len(every) - len(missing)} of {len(every)} rows are stored{took}")
+
+
+def say(one: "Investigation", table: "pd.DataFrame") -> None:
+    """The answer to each question, and the expected one where it differs."""
+    from nmpcrl.claims.investigation import WORDS
+
+    answers = one.answers(table)
+    for question in one.questions:
+        answer = answers[question.name]
+        counts = {**answer.counts, **answer.beside}
+        said = ", ".join(f"{yes} of {of} {unit}" for unit, (yes, of) in counts.items())
+        click.echo(f"{question.name}: {answer.words} ({said})")
+        if question.expected != answer.outcome:
+            click.echo(f"  expected: {WORDS.get(question.expected, question.expected)}")

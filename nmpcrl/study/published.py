@@ -1,0 +1,189 @@
+"""The published data in `book/published`: tables, arrays, and one manifest that describes them.
+
+A table is `NAME.csv`; what does not fit in one is `NAME.npz`. `manifest.json` has for each name the
+hashes of its files, the commit that registered questions and settings before the first row, and
+the batches in which rows were made: date, machine, versions, epochs, and what was added.
+
+Files are read as they were written, floats to the last digit. A cell with a list is JSON; a text
+column has no missing cells.
+"""
+
+import io
+import json
+import os
+from collections.abc import Mapping
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from filelock import FileLock
+
+import nmpcrl
+from nmpcrl.study.provenance import hash_of
+from nmpcrl.study.storage.atomic import write_json, write_whole
+from nmpcrl.study.storage.refusal import Refusal
+
+MANIFEST = "manifest.json"
+SEAL = "hash of all the rest"
+CHECKOUT = "`git checkout -- book/published` restores it"
+ELSEWHERE = (
+    "it comes with the project's repository and not with an installed package: set"
+    " NMPCRL_PUBLISHED to its folder book/published"
+)
+
+Arrays = dict[str, npt.NDArray[Any]]
+
+
+class Damaged(Refusal):
+    """A published file is missing, or is not the file that was written."""
+
+
+class Unpublishable(Refusal):
+    """Rows cannot be added to a published table."""
+
+
+def folder() -> Path:
+    """The folder of the published data: the project's, or the environment's NMPCRL_PUBLISHED."""
+    beside = Path(nmpcrl.__file__).parent.parent / "book" / "published"
+    return Path(os.environ.get("NMPCRL_PUBLISHED") or beside)
+
+
+def read(name: str, where: Path | None = None) -> pd.DataFrame:
+    """A published table.
+
+    Raises:
+        Damaged: a file is missing, or is not the file that was written.
+    """
+    return _table(where or folder(), name).copy()
+
+
+def arrays(name: str, where: Path | None = None) -> Arrays:
+    """The published arrays of a name.
+
+    Raises:
+        Damaged: a file is missing, or is not the file that was written.
+    """
+    return dict(_arrays(where or folder(), name))
+
+
+def about(name: str, where: Path | None = None) -> dict[str, Any]:
+    """What the manifest says of a name; nothing where nothing is published.
+
+    Raises:
+        Damaged: the manifest is not the file that was written.
+    """
+    return dict(_manifest(where or folder()).get(name, {}))
+
+
+def write(
+    name: str,
+    table: pd.DataFrame,
+    arrays: Mapping[str, npt.NDArray[Any]] | None = None,
+    *,
+    batch: Mapping[str, Any],
+    registered: str = "",
+    where: Path | None = None,
+) -> Path:
+    """Write a table, and its arrays if there are any, and note them in the manifest.
+
+    Args:
+        name: of the files, without a suffix.
+        table: all rows, those of earlier batches included.
+        arrays: all arrays.
+        batch: what was added now, and where, when and with what: `provenance.made_here()`.
+        registered: the commit that fixed what would be made, before anything was.
+        where: the folder, by default the project's.
+
+    Returns:
+        The path of the table.
+    """
+    place = where or folder()
+    place.mkdir(parents=True, exist_ok=True)
+    with FileLock(place / ".lock"):
+        known = _manifest(place)
+        content = {f"{name}.csv": _csv(table)}
+        write_whole(place / f"{name}.csv", lambda file: file.write(content[f"{name}.csv"]))
+        if arrays:
+            path = place / f"{name}.npz"
+            write_whole(path, lambda file: np.savez_compressed(file, **dict(arrays)))  # type: ignore[arg-type]
+            content[path.name] = path.read_bytes()
+        files = {file: sha256(found).hexdigest() for file, found in content.items()}
+        earlier = known.get(name, {})
+        batches = [*earlier.get("batches", ()), dict(batch)]
+        entry = {**earlier, "files": files, "registered": registered, "batches": batches}
+        write_manifest(place, {**known, name: entry})
+    return place / f"{name}.csv"
+
+
+def write_manifest(place: Path, entries: Mapping[str, Any]) -> None:
+    """Write the manifest of a folder, and forget what was read there."""
+    write_json(place / MANIFEST, {**entries, SEAL: hash_of(entries)}, indent=1)
+    for each in (_manifest, _table, _arrays):
+        each.cache_clear()
+
+
+@cache
+def _manifest(place: Path) -> dict[str, Any]:
+    path = place / MANIFEST
+    if not path.exists():
+        return {}
+    try:
+        entries: dict[str, Any] = json.loads(path.read_text("utf-8"))
+        if entries.pop(SEAL) != hash_of(entries):
+            raise ValueError("it is not the file that was written")
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        raise Damaged(f"{path} is damaged ({error}); {_restore()}") from error
+    return entries
+
+
+def _content(place: Path, name: str, suffix: str) -> bytes:
+    """The bytes of a published file, if they are those that were written."""
+    path = place / f"{name}{suffix}"
+    known = _manifest(place).get(name, {}).get("files", {})
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        why = "nothing is published under this name" if path.name not in known else error.strerror
+        raise Damaged(f"{path} cannot be read ({why}); {_restore()}") from error
+    if sha256(content).hexdigest() != known.get(path.name):
+        raise Damaged(f"{path} is not the file that was published; {_restore()}")
+    return content
+
+
+@cache
+def _table(place: Path, name: str) -> pd.DataFrame:
+    return _of_csv(_content(place, name, ".csv"))
+
+
+@cache
+def _arrays(place: Path, name: str) -> Arrays:
+    with np.load(io.BytesIO(_content(place, name, ".npz")), allow_pickle=False) as file:
+        return {key: file[key] for key in file.files}
+
+
+def _csv(table: pd.DataFrame) -> bytes:
+    """A table as text, with lists as JSON."""
+    plain = table.copy()
+    for column in (name for name, kind in plain.dtypes.items() if kind.kind == "O"):
+        plain[column] = [json.dumps(one) if isinstance(one, list) else one for one in plain[column]]
+    return bytes(plain.to_csv(index=False), "utf-8")
+
+
+def _of_csv(content: bytes) -> pd.DataFrame:
+    """The table that `_csv` was given."""
+    table = pd.read_csv(io.BytesIO(content))
+    for column in table.select_dtypes("str"):
+        texts = table[column].fillna("")
+        lists = len(texts) > 0 and texts.str.startswith("[").all()
+        table[column] = [json.loads(one) for one in texts] if lists else texts
+    return table
+
+
+def _restore() -> str:
+    """How to get the published data back, in a checkout of the project and elsewhere."""
+    checkout = (Path(nmpcrl.__file__).parents[1] / ".git").exists()
+    return CHECKOUT if checkout else ELSEWHERE

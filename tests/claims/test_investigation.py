@@ -1,0 +1,147 @@
+"""An investigation makes each row once, loses none, and publishes what is complete."""
+
+import json
+
+import pandas as pd
+import pytest
+
+from nmpcrl.claims.investigation import (
+    Answer,
+    Investigation,
+    Part,
+    Question,
+    lower,
+    means,
+)
+from nmpcrl.claims.verdict import NOT, REPRODUCED, UNDECIDABLE
+from nmpcrl.study import published
+from nmpcrl.study.published import Damaged, Unpublishable
+from nmpcrl.study.storage.refusal import Refusal
+
+CALLS = []
+
+
+def run(setting, place, episodes, seed):
+    CALLS.append((setting, place, seed))
+    return {"cost": setting + seed / 3 + len(place), "series": [1.0, float("inf")], "arrived": True}
+
+
+def best(table):
+    if table[table.part == "tune"].empty:
+        raise Refusal("the arm depends on the part 'tune'")
+    return {"best": table[table.part == "tune"].groupby("arm").cost.mean().min()}
+
+
+PARTS = {
+    "tune": Part(run, {"low": 1.0, "high": 2.0}, ("a", "b"), 10, seeds=2, deterministic=("low",)),
+    "judge": Part(run, best, tuple("abcdefghij"), 10, first={"best": 3}),
+}
+QUESTIONS = (Question("low is low", "Is it?", NOT, lower("tune", "low", "high")),)
+
+
+def toy(**changes):
+    fields = {"name": "toy", "parts": PARTS, "questions": QUESTIONS, "digits": 3}
+    return Investigation(**fields | {"seed": lambda place, k: 10 * ord(place) + k} | changes)
+
+
+@pytest.fixture(autouse=True)
+def folders(tmp_path, monkeypatch, trains_here):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "published"))
+    CALLS.clear()
+    return tmp_path
+
+
+def test_every_row_is_made_once_with_the_same_seeds_for_all_arms():
+    table = toy().complete(workers=1)
+    assert table.groupby("part", sort=False).size().to_dict() == {"tune": 6, "judge": 3}
+    again = toy().complete(workers=1)
+    pd.testing.assert_frame_equal(again, table)
+    low, high = (table[table.arm == arm].query("k == 0") for arm in ("low", "high"))
+    assert (high.cost.to_numpy() - low.cost.to_numpy() == 1).all()
+
+
+def test_an_arm_that_depends_on_earlier_rows_waits_for_them():
+    with pytest.raises(Refusal, match="depends on the part 'tune'"):
+        toy().complete(["judge"], workers=1)
+    toy().complete(["tune"], workers=1)
+    assert len(toy().conditions("judge")) == 3
+
+
+def test_what_changes_a_number_changes_the_key_and_nothing_else_does():
+    one = next(iter(toy().conditions("tune")))
+    longer = {"tune": Part(run, {"low": 1.0}, "ab", 11)}
+    assert toy().key(one) == toy(questions=()).key(one)
+    others = (toy(name="other"), toy(epoch=2), toy(parts=longer), toy(libraries=("cma",)))
+    assert len({toy().key(one), *(each.key(one) for each in others)}) == 5
+
+
+def test_a_line_that_was_cut_off_is_made_again_and_all_others_stay():
+    toy().complete(["tune"], workers=1)
+    path = toy().log().path
+    path.write_text(path.read_text()[:-9])
+    assert len(toy().missing("tune")) == 1
+    table = toy().complete(["tune"], workers=1)
+    assert len(table) == 6
+
+
+def test_rows_of_other_sources_are_made_again():
+    toy().complete(["tune"], workers=1)
+    path = toy().log().path
+    lines = [json.loads(line) for line in path.read_text().splitlines() if line]
+    path.write_text("\n".join(json.dumps([key, "other", row]) for key, _, row in lines))
+    assert len(toy().missing("tune")) == 6
+
+
+def test_complete_arms_are_published_rounded_and_read_as_they_were_written(folders):
+    toy().complete(["tune"], workers=1)
+    toy().publish()
+    table = toy().table()
+    assert [*table.arm] == ["low"] * 2 + ["high"] * 4
+    assert table.cost[0] == float(f"{1 + 970 / 3 + 1:.3g}")
+    assert table.series[0] == [1.0, float("inf")]
+    toy().complete(workers=1)
+    toy(registered="abc").publish()
+    pd.testing.assert_frame_equal(toy().table()[:6], table)
+    about = published.about("toy")
+    assert [one["rows"] for one in about["batches"]] == [{"tune": 6}, {"judge": 3}]
+    assert about["registered"] == "abc"
+
+
+def test_what_is_published_is_neither_changed_nor_published_twice_nor_in_part():
+    toy().complete(["tune"], workers=1)
+    toy().publish()
+    with pytest.raises(Unpublishable, match="no arm of toy is complete and new"):
+        toy().publish()
+    path = toy().log().path
+    path.write_text(path.read_text().replace('"cost": ', '"cost": 9'))
+    with pytest.raises(Unpublishable, match="low of the part 'tune' is published with other"):
+        toy().publish()
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz"])
+def test_every_changed_byte_is_noticed_before_a_number_is_shown(folders, suffix):
+    table = pd.DataFrame({"a": [1.5, float("inf")], "b": [[1], []], "c": ["", "x"]})
+    published.write("data", table, {"x": table.a.to_numpy()}, batch={})
+    pd.testing.assert_frame_equal(published.read("data"), table)
+    for path in (published.folder() / f"data{suffix}", published.folder() / "manifest.json"):
+        content = path.read_bytes()
+        for i in range(0, len(content), 1 + len(content) // 60):
+            path.write_bytes(content[:i] + bytes([content[i] ^ 1]) + content[i + 1 :])
+            for cached in (published._manifest, published._table, published._arrays):
+                cached.cache_clear()
+            with pytest.raises(Damaged):
+                published.read("data"), published.arrays("data")
+        path.write_bytes(content)
+
+
+def test_answers_come_with_their_question_and_places_without_a_row_are_skipped():
+    toy().complete(["tune"], workers=1)
+    answer = toy().answers(toy().log().table())["low is low"]
+    assert answer == Answer(UNDECIDABLE, {"layouts": (2, 2)}, question="low is low")
+    rows = [
+        ("p", arm, f"{i}", 0, i + (arm == "b")) for arm in "ab" for i in range(10 + (arm == "a"))
+    ]
+    table = pd.DataFrame(rows, columns=["part", "arm", "place", "k", "cost"])
+    assert lower("p", "a", "b")(table) == Answer(REPRODUCED, {"layouts": (10, 10)})
+    assert means(table, "p").b.isna().sum() == 1

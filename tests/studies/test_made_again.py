@@ -1,0 +1,21 @@
+"""Drawn rows of each published investigation, made afresh, are the published ones."""
+
+import numpy as np
+import pytest
+from registered import INVESTIGATIONS
+
+from nmpcrl.claims.investigation import Condition, rounded
+
+DRAWN = 5
+
+
+@pytest.mark.weekly
+@pytest.mark.parametrize("investigation", INVESTIGATIONS, ids=lambda one: one.name)
+def test_drawn_rows_made_afresh_are_the_published_ones(investigation):
+    table = investigation.table()
+    order = np.random.default_rng(0).permutation(len(table))[:DRAWN]
+    for row in table.iloc[order].to_dict("records"):
+        one = Condition(*(row.pop(name) for name in Condition._fields))
+        made = investigation.make(one, investigation.conditions(one.part)[one])
+        del row["seconds"]
+        assert {name: rounded(made[name], investigation.digits) for name in row} == row

@@ -1,0 +1,67 @@
+"""Parts, thresholds and questions are those that were committed before the first row was made."""
+
+import pytest
+from fixed_questions import git
+from registered import INVESTIGATIONS, module
+
+from nmpcrl.studies import worlds
+from nmpcrl.study import published
+
+# today's module; its investigation; commit, module and name of questions that were registered
+REGISTERED = [
+    (worlds, worlds.WORLDS, "cff09a0", "nmpcrl.claims.world_questions", "WORLD_QUESTIONS"),
+    (worlds, worlds.WORLDS, "ff05118", "nmpcrl.claims.terminal_questions", "TERMINAL_QUESTIONS"),
+]
+each = pytest.mark.parametrize(
+    ("today", "investigation", "commit", "name", "questions"), REGISTERED
+)
+
+
+@each
+def test_questions_and_expectations_are_those_registered(
+    today, investigation, commit, name, questions
+):
+    then = getattr(module(commit, name), questions)
+    now = {one.name: one for one in investigation.questions if one.name in then}
+    assert [*now] == [*then]
+    for one in now.values():
+        old = then[one.name]
+        assert (one.question, one.expected, one.pilot) == (old.question, old.expected, old.pilot)
+
+
+@each
+def test_thresholds_are_those_registered(today, investigation, commit, name, questions):
+    then = module(commit, name)
+    plain = {
+        one: value
+        for one, value in vars(then).items()
+        if one.isupper() and isinstance(value, int | float | tuple) and hasattr(today, one)
+    }
+    assert {one: getattr(today, one) for one in plain} == plain
+
+
+def test_parts_are_those_registered():
+    then = module("cff09a0", "nmpcrl.claims.world_questions").PARTS
+    then |= {"terminal": module("ff05118", "nmpcrl.claims.terminal_questions").TERMINAL}
+    assert [*then] == [*worlds.PARTS]
+    for name, old in then.items():
+        now = worlds.PARTS[name]
+        arms = {"remedy" if arm.startswith("remedy") else arm: arm for arm in now.arms}
+        assert (now.episodes, now.places, [*arms]) == (old.budget, old.places, [*old.arms])
+        assert all(now.order(arms[one]) == [*old.runs(one)] for one in old.arms)
+
+
+@each
+def test_they_are_older_than_the_rows(today, investigation, commit, name, questions):
+    first = published.about(investigation.name)["first"]
+    part = "terminal" if questions == "TERMINAL_QUESTIONS" else "all"
+    assert git("rev-parse", commit) in git("rev-list", f"{first[part]}^").split()
+
+
+def test_every_investigation_is_published_with_the_columns_of_its_conditions():
+    for investigation in INVESTIGATIONS:
+        table = investigation.table()
+        assert not table.duplicated(["part", "arm", "place", "k"]).any()
+        for (part, arm), rows in table.groupby(["part", "arm"], sort=False):
+            order = investigation.parts[part].order(arm)
+            assert [*zip(rows.place, rows.k, strict=True)] == order
