@@ -13,7 +13,7 @@ from nmpcrl.control.solution import short
 
 FASTEST = 10.0  # what one step of a model may multiply a small deviation by
 FARTHEST = 1e9  # no plan goes through such a state
-UNSTABLE = "an unstable model takes a shorter horizon, or solver='fatrop'"
+UNSTABLE = "an unstable model takes a shorter horizon"
 SUBSTEPS = f"dynamics too fast for their period take more substeps, of rk4 or the plant; {UNSTABLE}"
 ORDERS = {  # what is not finite -> what to write instead
     "": "keep it finite, as ca.log(ca.fmax(x, 1e-6)) does",

@@ -86,7 +86,7 @@ class Nmpc(Described):
                 )
             self.horizon, self.gamma = plant.horizon, plant.gamma
             self.n, self.m, self._theta_size = plant.states, plant.inputs, plant.names.size
-            self._far = FARTHEST * max(1.0, *plant.sizes[0])
+            self.farthest = FARTHEST * max(1.0, *plant.sizes[0])  # number in a state
             self.largest = max(ABSURD, 1e3 * float(np.abs(plant.theta).max()))  # number in theta
         else:
             if task is None:
@@ -101,10 +101,10 @@ class Nmpc(Described):
             self.n, self.m, self._theta_size = plant.n, plant.m, 2 * plant.n + plant.m + 1
             self.largest = ABSURD
             box = np.abs([task.lower, task.upper])
-            self._far = max(FAR, 100 * box[np.isfinite(box)].max(initial=0))
+            self.farthest = max(FAR, 100 * box[np.isfinite(box)].max(initial=0))
         self.lower, self.upper = plant.lower, plant.upper
         bounds = np.abs([plant.lower, plant.upper])
-        self._strong = max(self._far, bounds[np.isfinite(bounds)].max(initial=0))
+        self._strong = max(self.farthest, bounds[np.isfinite(bounds)].max(initial=0))
         self.ties_active = ties_active
 
     def solve(
@@ -131,7 +131,7 @@ class Nmpc(Described):
             SolverError: no optimum was found; carries the status, the state and theta.
         """
         began = time.perf_counter()
-        state = _checked("state", state, self.n, self._far)
+        state = _checked("state", state, self.n, self.farthest)
         theta = _checked("theta", theta, self._theta_size, self.largest)
         known = None
         if self.problem is not None:
@@ -152,9 +152,10 @@ class Nmpc(Described):
             return variant.solve(state, theta, warm_start, *given, began=began, data=known)
         except SolverError as error:
             why = variant.diagnosis.why(state, theta, known)
-            if not why:
+            said = "; ".join(filter(None, (error.status, why, self._otherwise(why))))
+            if said == error.status:
                 raise
-            raise type(error)(f"{error.status}; {why}", state, theta) from error
+            raise type(error)(said, state, theta) from error
 
     def value_hessian(self, solution: Solution) -> Matrix:
         """The second derivative of `solution.value` in theta, shape (d, d): see `Sensitivity`.
@@ -180,6 +181,7 @@ class Nmpc(Described):
         In microseconds an input by riccati. At a bound or row that is just reached, where the
         policy has a kink, it lies between the derivatives of the two sides; where more is reached
         than the inputs can follow, it is that of the side to which theta grows: see `Sensitivity`.
+        There riccati's derivatives of a task, unlike those of a `Problem`, belong to neither side.
 
         Raises:
             DerivativeError: a `SolverError`: the optimum moves in a direction without curvature.
@@ -266,6 +268,14 @@ class Nmpc(Described):
             )
             self._solves = instead
         return self._solves.prepare(ocp)
+
+    def _otherwise(self, why: str) -> str:
+        """What else to try where a solve failed, for that reason."""
+        if self._solves.name == Riccati.name:  # which asked fatrop itself, if it is a problem
+            task = self.problem is None and not self.task.soft_box
+            return f"or try solver={Fatrop.name!r}" if why and task else ""
+        known = self.problem is not None or why
+        return f"try solver={Riccati.name!r}, which begins in more ways" if known else ""
 
     def _variant(self, solution: Solution) -> Variant:
         return self._fixed if solution.ocp.fixed_action.size else self._free

@@ -8,6 +8,7 @@ import pytest
 
 from nmpcrl.control import Nmpc, Problem, Riccati, SolverError, Status, rk4
 from nmpcrl.control.solvers.codes import End
+from nmpcrl.control.solvers.starts import Regulator
 
 PERIOD = 0.1  # s
 
@@ -17,7 +18,7 @@ def swing(x, u, gravity):
     return ca.vertcat(x[1], gravity * ca.sin(x[0]) + u[0])
 
 
-def pendulum(horizon: int) -> Problem:
+def pendulum(horizon: int, bound: float = 5.0) -> Problem:
     return Problem(
         states=2,
         inputs=1,
@@ -26,8 +27,8 @@ def pendulum(horizon: int) -> Problem:
         model=lambda x, u, th: rk4(lambda x, u: swing(x, u, th["gravity"]), x, u, PERIOD),
         stage=lambda x, u, th: x[0] ** 2 + 0.1 * x[1] ** 2 + th["price"] * u[0] ** 2,
         terminal=lambda x, th: 50 * x[0] ** 2 + 5 * x[1] ** 2,
-        lower=-5.0,
-        upper=5.0,
+        lower=-bound,
+        upper=bound,
     )
 
 
@@ -116,6 +117,26 @@ def test_a_cost_that_is_flat_at_rest_and_steep_elsewhere_is_scaled(size):
     for state in (-1.5, 0.3, 1.9):
         value = Nmpc(unit).solve([state], unit.theta).value
         assert nmpc.solve([state], problem.theta).value == pytest.approx(size * value, rel=1e-6)
+
+
+@pytest.mark.parametrize("solver", ["fatrop", "ipopt"])
+@pytest.mark.parametrize("state", [(0.42, 1.73), (-0.31, -0.28), (0.6, 1.7), (-0.8, -1.9)])
+def test_a_pendulum_that_is_short_is_solved_from_a_plan_held_by_feedback(solver, state):
+    problem = pendulum(40, bound=30.0)
+    nmpc, short = Nmpc(problem, solver=solver), problem.vector(gravity=98.1)
+    found = nmpc.solve(state, short)
+    assert found.restarts == {"ipopt": 1, "fatrop": 2}[solver]  # fatrop asks Ipopt from rest first
+    for one in (found, nmpc.solve(state, short, action=found.action)):
+        assert nmpc.kkt_residual(one, relative=True) < 1e-6
+
+
+@pytest.mark.parametrize("solver", ["fatrop", "ipopt"])
+def test_the_error_of_a_solve_says_who_failed_and_who_may_not(solver, monkeypatch):
+    problem = pendulum(40, bound=30.0)
+    monkeypatch.setattr(Regulator, "inputs", lambda *_: None)
+    with pytest.raises(SolverError, match=f"^{solver} .*; try solver='riccati'") as caught:
+        Nmpc(problem, solver=solver).solve((0.42, 1.73), problem.vector(gravity=98.1))
+    assert "solver='fatrop'" not in str(caught.value)
 
 
 @pytest.mark.usefixtures("interpreted")

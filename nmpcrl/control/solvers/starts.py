@@ -55,7 +55,7 @@ class Regulator:
 
         Nor are there any where a number is not finite.
         """
-        slopes = self._stage(state, self._still, theta, data[0])[1].full()[:, : state.size]
+        slopes = self.slopes(state, theta, data)
         growth = np.abs(np.linalg.matrix_power(slopes, self._problem.horizon)).max()
         if growth <= GROWS:
             return None
@@ -68,6 +68,18 @@ class Regulator:
                 inputs[0] = action[0]
             x = self._step(x, inputs[i], theta, data[i]).full().ravel()
         return inputs if np.isfinite(inputs).all() else None
+
+    def slopes(self, state: Vector, theta: Vector, data: Matrix) -> Matrix:
+        """The model's derivative in the state at rest, shape (n, n)."""
+        of_state_and_input: Matrix = self._stage(state, self._still, theta, data[0])[1].full()
+        return of_state_and_input[:, : state.size]
+
+    def states(self, state: Vector, inputs: Matrix, theta: Vector, data: Matrix) -> Matrix:
+        """Where inputs lead from a state, shape (N + 1, n)."""
+        found = [state]
+        for u, d in zip(inputs, data, strict=False):
+            found.append(self._step(found[-1], u, theta, d).full().ravel())
+        return np.array(found)
 
     def _gains(self, state: Vector, theta: Vector, data: Matrix) -> list[tuple[Vector, Matrix]]:
         """k and K of every stage, from the last to the first and turned around."""
