@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from nmpcrl import Vector
 from nmpcrl.control.plant import Plant
-from nmpcrl.control.problem import Problem
+from nmpcrl.control.problem import SMALL, Problem
 from nmpcrl.control.task import Task, overlap
 
 Indices = NDArray[np.int_]
@@ -92,6 +92,11 @@ class Ocp(ABC):
         return np.ones(self.lower.size), np.ones(self.equality.size)
 
     @property
+    def cost_size(self) -> float:
+        """The unit of the objective, and with it of the multipliers."""
+        return 1.0
+
+    @property
     def bound_prices(self) -> Vector:
         """What a unit beyond each bound on z costs, the most that its multiplier can be."""
         return np.full(self.lower.size, np.inf)
@@ -163,6 +168,12 @@ class ProblemOcp(Ocp):
         z, g = np.ones(self.lower.size), np.ones(self.equality.size)
         z[self.slacks] = g[self.obstacles] = self.problem.typical_row_sizes
         return z, g
+
+    @property
+    def cost_size(self) -> float:
+        """`Problem.cost_scale` where that is small."""
+        size = self.problem.cost_scale
+        return size if size < SMALL else 1.0
 
     def settled(self, p: Vector) -> tuple[Any, Vector, Any]:
         """Those without u; all where u_0 is fixed. One that does not hold there is at -1."""

@@ -178,7 +178,7 @@ class Problem(Described):
     @cached_property
     def cost_scale(self) -> float:
         """What riccati divides the objective by, half of the largest curvature or a slope."""
-        curvature, slope = self._bends
+        curvature, slope = _bends(self, self.gamma**self.horizon)
         found = max(np.abs(curvature).max() / 2, np.abs(slope).max())
         return float(found) if 0 < found < np.inf else 1.0
 
@@ -216,16 +216,6 @@ class Problem(Described):
         bounds = {"lower": kept(self.lower / inputs), "upper": kept(self.upper / inputs)}
         vars(other).update(_function=function, sizes=_ones(self), **bounds)
         return other
-
-    @cached_property
-    def _bends(self) -> tuple[Matrix, Matrix]:
-        """Hessian and gradient in (x, u) of a stage's cost and the last, around 0."""
-        e = self.expressions
-        z, costs = ca.vertcat(e.x, e.u), e.stage + self.gamma**self.horizon * e.terminal
-        both = ca.Function("bends", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
-        still = np.clip(np.zeros(self.inputs), self.lower, self.upper)
-        curvature, slope = both(np.zeros(self.states), still, self.theta, self.data[0])
-        return curvature.full(), slope.full()
 
     def split(self, theta: Vector) -> dict[str, Any]:
         """A vector in the order of theta, or of its gradient, by name."""
@@ -323,13 +313,26 @@ def discount(gamma: Any) -> float:
     return float(gamma)
 
 
+def _bends(problem: Problem, share: float) -> tuple[Matrix, Matrix]:
+    """Hessian and gradient in (x, u) of a stage's cost and a share of the last, around 0."""
+    e = problem.expressions
+    z, costs = ca.vertcat(e.x, e.u), e.stage + share * e.terminal
+    both = ca.Function("bends", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
+    still = np.clip(np.zeros(problem.inputs), problem.lower, problem.upper)
+    curvature, slope = both(np.zeros(problem.states), still, problem.theta, problem.data[0])
+    return curvature.full(), slope.full()
+
+
 def _ones(problem: Problem) -> tuple[Vector, Vector]:
     return kept(np.ones(problem.states)), kept(np.ones(problem.inputs))
 
 
 def _sizes(scale: Any, problem: Problem) -> tuple[Vector, Vector]:
-    """In which units states and inputs are solved: powers of 2, so that nothing is rounded."""
-    bends = np.diag(problem._bends[0])
+    """In which units states and inputs are solved: powers of 2, so that nothing is rounded.
+
+    Neither horizon nor gamma changes them, and with them what is compiled.
+    """
+    bends = np.diag(_bends(problem, 1.0)[0])
     usual = np.where((bends > 0) & (bends < np.inf), np.maximum(bends, LEAST) ** -0.5, 1.0)
     states, inputs = usual[: problem.states], usual[problem.states :]
     if scale is None and ((states > SMALL) & (states < LARGE)).all():

@@ -80,7 +80,7 @@ class Sensitivity:
     def _moved(
         self, z: Vector, p: Vector, lam: Vector, nu: Vector
     ) -> tuple[Matrix, Matrix, Matrix]:
-        """L_theta theta, (L_z theta, A_theta), and K^-1 times the latter."""
+        """L_theta theta, (L_z theta, A_theta) and K^-1 times the latter, both for L of size 1."""
         ocp = self._ocp
         g, l_zz, l_zt, l_tt, g_z, g_t = (b.full() for b in self._second_derivatives(z, p, lam))
         row, bound = self._active(z, g.ravel(), lam, nu)
@@ -93,18 +93,19 @@ class Sensitivity:
             lam[row] = multipliers[: row.sum()]
             _, l_zz, l_zt, l_tt, _, _ = (b.full() for b in self._second_derivatives(z, p, lam))
             active, active_t = active[held], active_t[held]
-        kkt = np.block([[l_zz, active.T], [active, np.zeros((len(active), len(active)))]])
-        right = np.vstack([l_zt, active_t])
-        return l_tt, right, _solved(kkt, right)
+        size = ocp.cost_size
+        kkt = np.block([[l_zz / size, active.T], [active, np.zeros((len(active), len(active)))]])
+        right = np.vstack([l_zt / size, active_t])
+        return l_tt, size * right, _solved(kkt, right)
 
     def _active(self, z: Vector, g: Vector, lam: Vector, nu: Vector) -> tuple[Flags, Flags]:
         """Which constraints and which bounds hold as equalities, each in its own unit."""
-        ocp, (of_z, of_g) = self._ocp, self._ocp.sizes
-        row: Flags = ocp.equality | (lam * of_g > np.abs(g) / of_g)
+        ocp, (of_z, of_g), size = self._ocp, self._ocp.sizes, self._ocp.cost_size
+        row: Flags = ocp.equality | (lam * of_g / size > np.abs(g) / of_g)
         bound: Flags = np.full(z.size, False)
         for multiplier, distance in ((-nu, np.abs(z - ocp.lower)), (nu, np.abs(ocp.upper - z))):
             left = ocp.bound_prices - multiplier
-            bound |= np.minimum(multiplier, left) * of_z > distance / of_z
+            bound |= np.minimum(multiplier, left) * of_z / size > distance / of_z
         return row, bound
 
     def is_minimum(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> bool:
@@ -143,7 +144,8 @@ class Sensitivity:
         z, lower, upper = z / of_z, ocp.lower / of_z, ocp.upper / of_z
         nu, prices, slope = nu * of_z, ocp.bound_prices * of_z, slope * of_z
         g, lam = g / of_g, lam * of_g
-        inequality, largest = ~ocp.equality, max(1.0, np.abs(lam).max(), np.abs(nu).max())
+        inequality = ~ocp.equality
+        largest = max(ocp.cost_size, np.abs(lam).max(), np.abs(nu).max())
         slope = (slope + nu) / largest
         if relative:
             lam, nu, size = lam / largest, nu / largest, max(1.0, np.abs(z).max())

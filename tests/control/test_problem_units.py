@@ -1,12 +1,14 @@
 """No plan depends on its units: pascals, micrometres and kelvins are solved as numbers near 1."""
 
 import pickle
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from nmpcrl.control import Fatrop, Ipopt, Nmpc, Problem, Riccati, Soft, SolverError
+from nmpcrl.control.solvers import problem_stages
 
 pytestmark = pytest.mark.usefixtures("interpreted")
 
@@ -97,7 +99,7 @@ def test_derivatives_in_other_units_are_finite_differences(unit):
 def test_sizes_may_be_said_and_are_found_where_they_are_extreme():
     np.testing.assert_array_equal(tank(1.0).sizes[0], [1, 1])
     np.testing.assert_array_equal(tank(300.0).sizes[0], [1, 1])  # kelvins are solved as they are
-    np.testing.assert_array_equal(tank(1e-6).sizes[0], [2.0**-21, 2.0**-21])
+    np.testing.assert_array_equal(tank(1e-6).sizes[0], [2.0**-22, 2.0**-22])
     np.testing.assert_array_equal(tank(1.0, scale=[2.0**-10, 1024]).sizes[0], [2.0**-10, 1024])
     plain, scaled = (Nmpc(tank(1.0, **said)) for said in ({}, {"scale": [3.0, 0.2]}))
     one, other = (nmpc.solve(STATE, nmpc.problem.theta) for nmpc in (plain, scaled))
@@ -182,3 +184,54 @@ def test_rows_of_any_unit_are_solved_alike(solver, unit):
     for one, other in zip(solved(1.0), solved(unit), strict=True):
         for expected, found in zip(one, other, strict=True):
             np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4)
+
+
+@pytest.fixture(scope="module", params=SOLVERS, ids=lambda one: one.name)
+def charged(request):
+    """A cart that reaches its bounds and a row, and the same of costs in any unit."""
+
+    def controller(unit):
+        problem = Problem(
+            states=2, inputs=1, horizon=60, theta={"q": np.ones(2), "r": 0.3, "wind": 0.1},
+            model=lambda x, u, th, d: ca.vertcat(
+                x[0] + 0.1 * x[1], x[1] + 0.1 * u + 0.01 * th["wind"]
+            ),
+            stage=lambda x, u, th, d: d["unit"] * (
+                ca.sumsqr(th["q"] * (x - 1)) + th["r"] * ca.sumsqr(u)
+            ),
+            terminal=lambda x, th, d: d["unit"] * 10 * ca.sumsqr(x - 1),
+            soft=[Soft(lambda x, u, th, d: x[1] - 0.6, weight=5.0 * unit)],
+            lower=-1.0, upper=1.0, data={"unit": unit},
+        )  # fmt: skip
+        return Nmpc(problem, solver=request.param)
+
+    return controller
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e-6, 1e-3, 1e6])
+@pytest.mark.parametrize("state", [(0.0, 0.0), (0.9, 0.2)])
+def test_derivatives_do_not_depend_on_the_unit_of_the_cost(charged, unit, state):
+    (one, plan), (nmpc, found) = (
+        (each, each.solve(state, each.problem.theta)) for each in (charged(1.0), charged(unit))
+    )
+    size = np.abs(one.value_hessian(plan)).max()
+    for asked, share in ((one, 1.0), (nmpc, 1 / unit)):
+        at = plan if asked is one else found
+        many = [asked.value_hessian_times(at, k) for k in np.eye(4)]
+        for bends in (asked.value_hessian(at), many):
+            np.testing.assert_allclose(
+                share * np.array(bends), one.value_hessian(plan), atol=1e-3 * size
+            )
+    np.testing.assert_allclose(
+        nmpc.policy_jacobian(found), one.policy_jacobian(plan), rtol=1e-3, atol=1e-5
+    )
+    off = replace(found, point=1.01 * found.point)
+    assert nmpc.kkt_residual(found, relative=True) < 1e-6 < nmpc.kkt_residual(off, relative=True)
+
+
+def test_another_horizon_or_discount_takes_no_other_code():
+    first, *others = (
+        problem_stages.write(tank(1e-6, horizon=horizon, gamma=gamma).solved)
+        for horizon, gamma in ((8, 0.95), (40, 0.95), (40, 0.5), (1, 1.0))
+    )
+    assert others == 3 * [first]
