@@ -138,7 +138,23 @@ def begun(start: Any, states: int | None) -> Callable[[np.random.Generator], Vec
     return lambda _: state.copy()
 
 
-def state_of(said: str, given: Any, states: int | None) -> Vector:
+def ran_away(state: Vector, nmpc: Nmpc | None, *, end: bool = False) -> str:
+    """Why no plan can begin in a state that the plant led to; "" if one can.
+
+    A state in which an episode ends has to be finite only.
+    """
+    largest = np.inf if nmpc is None or end else nmpc.farthest
+    if sum(map(abs, state.tolist())) < largest:  # false for nan, and faster than NumPy
+        return ""
+    if np.isfinite(state).all() and (np.abs(state) <= largest).all():
+        return ""
+    return (
+        f"no plan can begin in state {short(state)}, to which the plant ran away: its numbers must"
+        f" be finite and of size at most {largest:g}"
+    )
+
+
+def state_of(said: str, given: Any, states: int | None, *, finite: bool = True) -> Vector:
     """A copy of a state that the user gave, shape (n,); of any size where `states` is None.
 
     Raises:
@@ -146,7 +162,7 @@ def state_of(said: str, given: Any, states: int | None) -> Vector:
     """
     with suppress(TypeError, ValueError):
         state = np.array(given, float).reshape(-1)
-        if state.size == (states or state.size) and np.isfinite(state).all():
+        if state.size == (states or state.size) and not (finite and not np.isfinite(state).all()):
             return state
     raise ValueError(f"{said} {given}; a state is {states or 'a vector of'} finite numbers")
 
@@ -210,7 +226,7 @@ def checked(plant: StepFunction, states: int | None) -> Callable[..., Step]:
     """A plant of the user, whose results are looked at.
 
     Raises:
-        ValueError: when it is called: a next state of another size, or that is not finite.
+        ValueError: when it is called: a next state of another size, or of what are no numbers.
     """
 
     def step(state: Vector, action: Vector, rng: np.random.Generator) -> Step:
@@ -220,6 +236,6 @@ def checked(plant: StepFunction, states: int | None) -> Callable[..., Step]:
             paid, ended = np.array(cost, float).item(), bool(end)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{PLANT}: {error}") from error
-        return state_of("plant returned", later, states), paid, ended, any(cut)
+        return state_of("plant returned", later, states, finite=False), paid, ended, any(cut)
 
     return step

@@ -6,7 +6,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc
-from nmpcrl.learning.environment import environment
+from nmpcrl.learning.environment import environment, state_of
 
 if TYPE_CHECKING:
     from gymnasium import Env
@@ -54,7 +54,8 @@ def as_gymnasium(
 
         def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
             given = np.array(action, float).reshape(nmpc.m)
-            self.state, cost, end, cut = around.step(self.state, given, self.np_random)
+            later, cost, end, cut = around.step(self.state, given, self.np_random)
+            self.state = state_of("plant returned", later, nmpc.n)
             self.time += 1
             return self.state.copy(), -cost, end, cut or self.time == steps, {}
 

@@ -9,7 +9,14 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc, Plant, Problem, Solution, SolverError
 from nmpcrl.control.solution import NoStartLeft
-from nmpcrl.learning.environment import Data, GymnasiumEnv, StepFunction, environment, forecasts
+from nmpcrl.learning.environment import (
+    Data,
+    GymnasiumEnv,
+    StepFunction,
+    environment,
+    forecasts,
+    ran_away,
+)
 
 
 @dataclass(frozen=True)
@@ -69,14 +76,14 @@ class Persistent:
 class Rollout:
     """The closed loop from the start without noise."""
 
-    states: Matrix  # s_0, ..., s_K; fewer where a solve failed, shape (<= K + 1, n)
+    states: Matrix  # s_0, ..., s_K; fewer where it ended or failed, shape (<= K + 1, n)
     actions: Matrix  # shape (<= K + 1, m)
     costs: Vector  # RL stage costs, shape (<= K + 1,)
-    failure: str = field(default="")  # what the solver said, if it failed
+    failure: str = field(default="")  # what the solver said, if it failed, or where the plant went
 
     @property
     def cost(self) -> float:
-        """Sum of the RL stage cost, t = 0, ..., K; infinite where a solve failed."""
+        """Sum of the RL stage cost, t = 0, ..., K; infinite where the rollout failed."""
         return np.inf if self.failure else float(self.costs.sum())
 
 
@@ -111,7 +118,8 @@ def evaluate(
 ) -> Rollout:
     """Follow the policy of theta, Eq. (4), from the start and without noise.
 
-    A failed solve ends the rollout, which then says so and costs infinitely much.
+    A failed solve, or a plant that runs away to where no plan can begin, ends the rollout, which
+    then says so and costs infinitely much.
 
     Args:
         controller: acts: an `Nmpc`, or an object with `solve(state, theta, plan before)`, whose
@@ -139,7 +147,8 @@ def evaluate(
         actions.append(np.array(plan.action, float))
         state, cost, end, cut = around.step(state, actions[-1], rng)
         costs.append(cost)
-        if end or cut:
+        failure = ran_away(state, nmpc, end=end)
+        if failure or end or cut:
             break
     inputs = nmpc.m if nmpc else actions[0].size if actions else 0
     return Rollout(

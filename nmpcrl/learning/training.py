@@ -20,6 +20,7 @@ from nmpcrl.learning.environment import (
     StepFunction,
     environment,
     forecasts,
+    ran_away,
 )
 from nmpcrl.learning.learners import Learner, Update, Weights
 from nmpcrl.learning.rollout import nmpc_of, persistent, stream
@@ -36,7 +37,7 @@ class Diverged(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step of learning; `update` and `solution` are None where a solve failed."""
+    """One step of learning; `update` is None where it failed, and `solution` may be."""
 
     episode: int
     time: int  # t of Algorithm 1
@@ -47,7 +48,7 @@ class Step:
     plan: Solution | None = None  # whose first input is the policy of Eq. (4)
     solution: Solution | None = None  # whose value is learned; the plan, unless that is Q(s, a)
     update: Update | None = None
-    failure: str = ""  # what the solver said, if it failed
+    failure: str = ""  # what the solver said, if it failed, or where the plant went
     end: bool = False  # whether the plant ended the episode
     last: bool = False  # whether it is the last step of its episode, for whatever reason
 
@@ -125,7 +126,8 @@ def train(
 ) -> Iterator[Step]:
     """Algorithm 1: as many episodes, and at most as many steps, as `explore` has noise for.
 
-    A solve that fails ends the episode, and learning goes on from the next one: see `Persistent`.
+    A solve that fails ends the episode, and so does a plant that runs away to where no plan can
+    begin; learning goes on from the next episode: see `Persistent`.
     A step holds its solutions, 7 KB for the robot: of a long run, keep what you need of each.
 
     Args:
@@ -222,6 +224,11 @@ class _Trainer:
             action = self.explore(plan.action, episode, t)
             action = nmpc.clip(action) if self.clipped else action  # departure E
             next_state, cost, end, cut = self.environment.step(state, action, rng)
+            gone = ran_away(next_state, nmpc, end=end)
+            if gone:
+                weights = self.learner.interrupted(weights)
+                yield Step(episode, t, state, weights, action, cost, plan, failure=gone, last=True)
+                return
             last = end or cut or t == final
             later = ahead(t + 1) if ahead and not end else None
             solution = None

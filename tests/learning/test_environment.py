@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import Ipopt, Nmpc, Plant, Problem, differential_drive
+from nmpcrl.control.solution import short
 from nmpcrl.learning import (
+    Diverged,
     Exploration,
     Weights,
     evaluate,
@@ -120,12 +122,44 @@ def test_a_problem_says_that_it_only_plans(tank, missing):
         (lambda state, action, rng: state, r"returns \(next state, cost, end\)"),
         (5, "plant is called as .* not a callable"),
         (lambda state, action, rng: ([1, 2], 0, False), "a state is 1 finite numbers"),
-        (lambda state, action, rng: (np.nan * state, 0, False), "plant returned .nan."),
     ],
 )
 def test_what_is_no_plant_is_refused(tank, plant, message):
     with pytest.raises(ValueError, match=message):
         evaluate(tank, tank.problem.theta, 5, plant=plant, start=[0.0])
+
+
+@pytest.mark.parametrize(
+    ("later", "end", "ran"),  # of one step, what follows 0.1, and whether the plant ran away
+    [(np.nan, False, True), (np.nan, True, True), (-np.inf, False, True), (2e9, False, True),
+     (2e9, True, False), (1e9, False, False)],
+)  # fmt: skip
+def test_a_plant_that_runs_away_is_a_failed_solve(tank, later, end, ran):
+    def running(state, action, rng):
+        return np.array([later]), 0.5, end
+
+    how, theta = {"plant": running, "start": [0.1]}, tank.problem.theta
+    rollout = evaluate(tank, theta, 1, **how)
+    assert (rollout.states, rollout.costs) == ([[0.1]], [0.5])
+    assert (rollout.cost, bool(rollout.failure)) == ((np.inf, True) if ran else (0.5, False))
+    if not ran:
+        return
+    assert "ran away" in rollout.failure
+    assert f"[{short(later)}]" in rollout.failure
+    for learner in (expected_sarsa(tank, 1e-3), q_learning(tank, 1e-3)):
+        steps = list(train(learner, tank, Weights(theta, 0 * theta), noise(2, 3, 1), **how))
+        assert [(s.episode, s.time, s.cost, s.last, s.failure) for s in steps] == [
+            (k, 0, 0.5, True, rollout.failure) for k in range(2)
+        ]
+        with pytest.raises(Diverged, match=r"10 episodes in a row .* ran away"):
+            list(train(learner, tank, Weights(theta, 0 * theta), noise(10, 3, 1), **how))
+
+
+def test_a_plant_of_a_task_may_run_away_as_well(robot):
+    fast = Plant(lambda s, a: s * (s + 3), ("x", "y", "psi"), ("v", "w"), robot.lower, robot.upper)
+    rollout = evaluate(robot, THETA, 9, plant=fast)
+    assert "ran away" in rollout.failure
+    assert 0 < len(rollout.states) == len(rollout.costs) < 9
 
 
 @pytest.mark.parametrize("broken", ["plant", "start", "data"])

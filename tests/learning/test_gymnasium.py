@@ -135,6 +135,13 @@ def test_an_environment_of_another_kind_is_refused(car, make, message):
         evaluate(car, car.problem.theta, 5, plant=make())
 
 
+def test_a_plant_that_runs_away_is_an_error_of_the_environment(car):
+    env = as_gymnasium(car, plant=lambda x, u, rng: (np.nan * x, 0.0, False), start=[0.0, 0.0])
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"plant returned .nan nan.; a state is 2 finite numbers"):
+        env.step(np.zeros(1))
+
+
 def test_an_environment_has_a_start_of_its_own(car):
     with pytest.raises(ValueError, match="draws its own start: leave start= out"):
         evaluate(car, car.problem.theta, 5, plant=Slow(), start=[0.0, 0.0])
