@@ -19,9 +19,9 @@ from nmpcrl.bench.paired import Ratio, pooled
 from nmpcrl.bench.problem_sizes import Sizes
 from nmpcrl.bench.solves import Columns, transposed
 from nmpcrl.study import paper
+from nmpcrl.study.design import sweep
 from nmpcrl.study.storage.executor import THREADS
 from nmpcrl.study.store import fetch_all
-from nmpcrl.study.sweeps import sweep
 
 PROCESSES = 7  # leave Student's interval 2.4 standard errors wide on each side; 21 would leave 2.1
 REPETITIONS = 10  # of a measurement that is published: of so many, nine intervals should hold

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.kept import Kept, Wanted
-from nmpcrl.claims.published import Damaged, Unpublishable, made_here, place
+from nmpcrl.claims.published import Damaged, Unpublishable, place
 from nmpcrl.study import sealed
+from nmpcrl.study.provenance import made_here
 from nmpcrl.study.storage.atomic import write_json
 
 

@@ -24,7 +24,6 @@ import numpy as np
 import pandas as pd
 from filelock import FileLock
 
-from nmpcrl.claims.published import made_here
 from nmpcrl.claims.rule import read
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.study import published
@@ -34,6 +33,7 @@ from nmpcrl.study.provenance import (
     hash_of,
     installed,
     is_accepted,
+    made_here,
     sources_hash,
     versions,
 )

@@ -24,12 +24,13 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import published, whole_picture
 from nmpcrl.claims.population import Answer, answers, held, shares
 from nmpcrl.claims.population_questions import RAISED_TO, SAME_CLOSING
-from nmpcrl.claims.published import Damaged, Unpublishable, effort, made_here, place, sums
+from nmpcrl.claims.published import Damaged, Unpublishable, effort, place, sums
 from nmpcrl.claims.rule import Paths
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.population import LAYOUTS
 from nmpcrl.study.population_design import COMPARED, HORIZONS, name_of, whole_population
+from nmpcrl.study.provenance import made_here
 from nmpcrl.study.records import Column
 from nmpcrl.study.sealed import seal_of
 from nmpcrl.study.storage.atomic import write_json

@@ -14,7 +14,6 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
-from datetime import UTC, datetime
 from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -45,11 +44,10 @@ from nmpcrl.claims.verdict import Halves, Outcome, Verdict
 from nmpcrl.study import design
 from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.parameters import Refusal, shortened
-from nmpcrl.study.provenance import EPOCHS, environment, summary_key
+from nmpcrl.study.provenance import made_here, summary_key
 from nmpcrl.study.records import Column
 from nmpcrl.study.sealed import seal_of
 from nmpcrl.study.storage.atomic import write_json
-from nmpcrl.study.storage.machine import fingerprint
 
 FILES = (
     *("runs.csv", "curves.npz", thetas.FILE, "searches.json", "verdicts.json", "timings.csv"),
@@ -233,16 +231,6 @@ def extend(summaries: Mapping[Experiment, RunSummary], variants: Mapping[Experim
     about = {**found.about, "runs": found.about["runs"] | addition["runs"]}
     _seal(folder, about | {"additions": [*found.about.get("additions", []), addition]})
     return folder
-
-
-def made_here() -> dict[str, Any]:
-    """When runs were made, by which code and libraries, and on which machine."""
-    return {
-        "date": datetime.now(UTC).date().isoformat(),
-        "epochs": EPOCHS,
-        "versions": environment(),
-        "machine": fingerprint(),
-    }
 
 
 def effort(runs: pd.DataFrame, part: str) -> dict[str, Any]:

@@ -29,9 +29,9 @@ from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.claims.wider_claims import judge_wider
 from nmpcrl.study import design, provenance
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.jobs import parallel
 from nmpcrl.study.limits import seconds_of
 from nmpcrl.study.setup import compile_ahead
-from nmpcrl.study.storage.executor import execute
 from nmpcrl.study.storage.machine import fingerprint
 
 Row = Mapping[str, Any]
@@ -229,7 +229,8 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
     that is stored here.
 
     Raises:
-        CannotRelock: a bit has changed, a run failed, or a run has nothing to be compared with.
+        CannotRelock: a bit has changed, or a run has nothing to be compared with.
+        Failed: a run failed.
     """
     drawn = sample(known, count)
     exact = comparable(drawn, known)
@@ -240,7 +241,10 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
             f"only {len(before)} of {len(drawn)} runs can be compared with runs that locked code"
             f" made on such a machine: with that code, `nmpcrl verify --sample {count}` makes them"
         )
-    fresh = _trained_afresh(drawn, workers)
+    compile_ahead(drawn)
+    ordered = sorted(drawn, key=seconds_of, reverse=True)
+    train = partial(summaries.make, expected=provenance.signature(), afresh=True)
+    fresh = dict(parallel(train, ordered, workers, "runs"))
     wrong = [found for e in drawn if (found := unequal(e, row(fresh[e]), before[e]))]
     if wrong:
         learner, layout, decay, seed, what, now, then = wrong[0]
@@ -260,20 +264,3 @@ def _stored_by_lock(e: Experiment) -> RunSummary | None:
     if one is None or one.facts.get("sources") not in provenance.locks():
         return None
     return one if (one.facts.get("machine"), one.facts.get("versions")) == here else None
-
-
-def _trained_afresh(
-    drawn: tuple[Experiment, ...], workers: int | None
-) -> dict[Experiment, RunSummary]:
-    fresh: dict[Experiment, RunSummary] = {}
-    compile_ahead(drawn)
-    ordered = sorted(drawn, key=seconds_of, reverse=True)
-    jobs = {e: partial(summaries.make, e, provenance.signature(), afresh=True) for e in ordered}
-
-    def keep(experiment: Experiment, made: RunSummary) -> str:
-        fresh[experiment] = made
-        return ""
-
-    for experiment, error in execute(jobs, keep, workers=workers).items():
-        raise CannotRelock(f"{experiment} failed with {type(error).__name__}: {error}") from error
-    return fresh

@@ -10,6 +10,7 @@ SAID = (  # errors whose message is a sentence for the reader, and where they ar
     ("nmpcrl.study.storage.refusal", "Refusal"),
     ("nmpcrl.study.records", "DamagedRecords"),
     ("nmpcrl.study.storage.place", "StoreError"),
+    ("nmpcrl.study.jobs", "Failed"),
     ("nmpcrl.study.cluster", "NoCluster"),
     ("nmpcrl.bench.sweep", "DamagedSweep"),
     ("nmpcrl.analysis.summaries", "Failed"),

@@ -52,7 +52,7 @@ def study(
     """
     from nmpcrl.analysis import summaries
     from nmpcrl.study import cluster
-    from nmpcrl.study.limits import estimate
+    from nmpcrl.study.limits import seconds_of
     from nmpcrl.study.storage.place import refuse_file
 
     if judge:
@@ -63,7 +63,7 @@ def study(
     _check(workers, scheduler, security, publish=publish, sure=yes)
     missing = [e for e in chosen if not summaries.is_stored(e)]
     stored = f"{len(chosen) - len(missing)} of {counted(len(chosen), 'run')}"
-    left = f"; the others take about {duration(estimate(missing).seconds)} of one core"
+    left = f"; the others take about {duration(sum(map(seconds_of, missing)))} of one core"
     click.echo(f"{stored} are stored in {summaries.folder()}{left * bool(missing)}")
     if dry_run:
         return

@@ -25,7 +25,7 @@ def train(yes: bool, **fields: Any) -> None:
     from nmpcrl.commands.progress import fetched
     from nmpcrl.report.run import verdict
     from nmpcrl.study import Experiment
-    from nmpcrl.study.limits import estimate, need_numba
+    from nmpcrl.study.limits import afford, need_numba
     from nmpcrl.study.storage.place import harmless
     from nmpcrl.study.store import check_folder, path_of, size_of
 
@@ -34,7 +34,7 @@ def train(yes: bool, **fields: Any) -> None:
     if not path.is_file():
         if experiment.box == "soft":
             need_numba("only riccati, which it compiles, keeps to a soft box")
-        estimate([experiment]).refuse(sure=yes or None, lift="--yes")
+        afford([experiment], sure=yes or None, lift="--yes")
         check_folder(size_of(experiment))
     records = fetched(experiment)
     if not path.is_file():  # the store has said why

@@ -1,12 +1,12 @@
 """What is run, and where it is kept: the paper's numbers, layouts, experiments and records."""
 
 from nmpcrl.study import paper
+from nmpcrl.study.design import paper_runs, sweep
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.parameters import ParameterError
 from nmpcrl.study.records import DamagedRecords, Records
 from nmpcrl.study.run import run
 from nmpcrl.study.store import Runs, StoreError, fetch, fetch_all, stored
-from nmpcrl.study.sweeps import paper_runs, sweep
 from nmpcrl.study.trial import Trial
 
 __all__ = [

@@ -1,26 +1,24 @@
-"""What a chapter is given: its parameters, checked before anything else is done with them."""
+"""The parameters of a chapter, checked in its second cell."""
 
 import ast
 import sys
-from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.limits import estimate
+from nmpcrl.study.design import AXES, FIELDS
+from nmpcrl.study.limits import afford as afford
 from nmpcrl.study.parameters import ParameterError, one_of, several, shown
-from nmpcrl.study.sweeps import AXES, FIELDS
 
-INJECTED = "# Parameters\n"  # so begins the cell in which papermill sets what it is given
-OF_PAPERMILL = "PAPERMILL_"  # so begin the names that it sets on its own account
-NAMED = several(one_of(paper.LAYOUTS), "layout")  # of which a study is published
+INJECTED = "# Parameters\n"  # first line of the cell that papermill adds
+OF_PAPERMILL = "PAPERMILL_"  # prefix of papermill's own names
+ALLOWED = FIELDS | AXES | {"layouts": several(one_of(paper.LAYOUTS), "layout")}
 # Step sizes with which a chapter has something to show: with larger ones a run ends at once.
 MOST = {"alpha": 1e-5, "beta": 1e-4}  # 100 and 10,000 times the paper's
 
 
 def check(**declared: Any) -> None:
-    """Refuse a value that is not what it may be, and a name that the chapter does not declare.
+    """Refuse a value that is not allowed, and a name that the chapter does not declare.
 
     `check(seeds=seeds, layout=layout)` stands in the second cell. A parameter that is a field of
     `Experiment`, or the plural of one, is checked here, and any other one where it is used.
@@ -36,11 +34,10 @@ def check(**declared: Any) -> None:
             f"this chapter has no parameter {name!r}{meant}; it has {', '.join(declared) or 'none'}"
         )
     for name, value in declared.items():
-        allowed = (FIELDS | AXES | {"layouts": NAMED}).get(name)
-        if allowed:
-            allowed.check(name, value)
+        if name in ALLOWED:
+            ALLOWED[name].check(name, value)
         if name == "layout":
-            _placed(value)
+            _refuse_place(value)
         if name in MOST and value > MOST[name]:
             raise ParameterError(
                 f"{name} = {value:g} must be at most {MOST[name]:g} in a chapter: with larger ones"
@@ -48,37 +45,26 @@ def check(**declared: Any) -> None:
             )
 
 
-def afford(experiments: Iterable[Experiment]) -> None:
-    """Refuse runs that take too long or too much memory, as `Estimate.refuse` does.
-
-    Raises:
-        ParameterError: in one sentence, which says how to train them nevertheless.
-    """
-    estimate(experiments).refuse()
-
-
-def _placed(layout: Any) -> None:
-    """Refuse an obstacle on the robot's start or target, or where the robot never comes."""
-    task = paper.task(layout)
+def _refuse_place(layout: Any) -> None:
+    """Refuse an obstacle on the robot's start or target, or outside the robot's box."""
+    task, given = paper.task(layout), f"layout = {shown(layout)} has an obstacle"
     for end, place in (("start", task.start), ("target", task.target)):
         if task.overlap(place).max() > 0:
             raise ParameterError(
-                f"layout = {shown(layout)} has an obstacle on the robot's {end},"
-                f" ({place[0]:g}, {place[1]:g}): each centre must be"
+                f"{given} on the robot's {end}, ({place[0]:g}, {place[1]:g}): each centre must be"
                 f" {max(task.discs[2]) / 2:g} m or more away from it in a chapter"
             )
     (left, bottom, _), (right, top, _) = task.lower, task.upper
     for x, y in paper.centres_of(layout):
         if not (left <= x <= right and bottom <= y <= top):
             raise ParameterError(
-                f"layout = {shown(layout)} has an obstacle where the robot never comes,"
-                f" ({x:g}, {y:g}): each centre must be in its box,"
-                f" [{left:g}, {right:g}] x [{bottom:g}, {top:g}], in a chapter"
+                f"{given} where the robot never comes, ({x:g}, {y:g}): each centre must be in its"
+                f" box, [{left:g}, {right:g}] x [{bottom:g}, {top:g}], in a chapter"
             )
 
 
 def _injected() -> set[str]:
-    """The names that papermill set in this session; none where there is no notebook."""
+    """The names that papermill set in this session; none outside a notebook."""
     ipython = sys.modules.get("IPython")
     shell = ipython.get_ipython() if ipython else None
     cells = shell.history_manager.input_hist_raw if shell else []

@@ -1,20 +1,105 @@
-"""The design of the study: which runs decide the claims, and what each part is called.
+"""Sets of runs: grids of field values, a chapter's runs, and the parts of the main study.
 
 The main table varies what the paper leaves open and no single value can be chosen for: layout,
-reading of the exploration decay, and seed. The variants change one other thing at a time.
+reading of the exploration decay, and seed. A variant changes one other thing.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import chain
+from dataclasses import dataclass, field, fields, replace
+from itertools import chain, product
+from math import prod
 from types import MappingProxyType
 from typing import Any
 
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import MAIN, PAPER, Experiment, frozen_arm
+from nmpcrl.study.geometry import Centres, are_centres
 from nmpcrl.study.learners import DECAYS, LEARNERS
-from nmpcrl.study.replicas import perturbed
-from nmpcrl.study.sweeps import sweep
+from nmpcrl.study.parameters import Allowed, ParameterError, is_list, several, shown
+
+VECTORS = ("theta", "start", "target")  # fields of which a list is one value
+MOST_RUNS = 10_000  # of a sweep: more than five times the whole study
+FIELDS: dict[str, Allowed] = {one.name: one.metadata["allowed"] for one in fields(Experiment)}
+AXES: dict[str, Allowed] = {f"{name}s": several(one, name) for name, one in FIELDS.items()}
+
+
+def sweep(**axes: Any) -> tuple[Experiment, ...]:
+    """Every combination of field values; a list or tuple is an axis, anything else is fixed.
+
+    `sweep(learner=("ES", "GES"), seed=[0, 1], episodes=20)` names four runs. A list of
+    numbers is one `theta`, `start` or `target`; a list of pairs is one `layout`, by its centres.
+
+    Raises:
+        ParameterError: a value is not allowed, an axis is empty, repeats a value or names no field,
+            or there are too many runs.
+    """
+    choices = {name: _values(name, given) for name, given in axes.items()}
+    count = prod(map(len, choices.values()))
+    if count > MOST_RUNS:
+        longest = max(choices, key=lambda name: len(choices[name]))
+        raise ParameterError(
+            f"{longest}s = {shown(axes[longest])} and the other axes make {count:,} runs;"
+            f" {MOST_RUNS:,} are allowed"
+        )
+    return tuple(
+        Experiment(**dict(zip(choices, combination, strict=True)))
+        for combination in product(*choices.values())
+    )
+
+
+def _values(name: str, given: Any) -> tuple[Any, ...]:
+    """The values of an axis, or the one value of a fixed field."""
+    if name not in FIELDS:
+        raise ParameterError(f"{name!r} is not a parameter; there are {', '.join(FIELDS)}")
+    text = isinstance(given, str) and given.strip().startswith("[")
+    one = name in VECTORS or (name == "layout" and are_centres(given))
+    if (text or is_list(given)) and not one:
+        values: tuple[Any, ...] = AXES[f"{name}s"].check(f"{name}s", given)
+        return values
+    return (FIELDS[name].check(name, given),)
+
+
+def paper_runs(
+    episodes: int = paper.EPISODES,
+    seeds: Sequence[int] = (0, 1),
+    layout: str | Centres = "A",
+    **others: Any,
+) -> tuple[Experiment, ...]:
+    """The runs of a chapter: the paper's learners, both readings of the decay, some seeds.
+
+    Args:
+        episodes: length of a run.
+        seeds: one run of each learner and reading for each.
+        layout: of the obstacles.
+        others: further fields of `Experiment`, as `sweep` takes them.
+    """
+    grid = {"learner": (*PAPER, "frozen"), "decay": tuple(DECAYS), "seed": seeds}
+    return sweep(**grid, episodes=episodes, layout=layout, **others)
+
+
+Pair = tuple[Experiment, Experiment]
+PERTURBATION = 1e-12  # added to theta_x at the start
+OTHER_SOLVER = "ipopt"
+SOLVER_EPISODES = 20  # of a run with the other solver, which takes a minute
+
+
+def perturbed(experiment: Experiment) -> Experiment:
+    """The replica of a run: theta_x of theta_init is moved by `PERTURBATION`."""
+    first, *rest = experiment.theta
+    return replace(experiment, theta=(first + PERTURBATION, *rest))
+
+
+def perturbed_pairs(**fields: Any) -> tuple[Pair, ...]:
+    """Every learner's run and its perturbed replica; `fields` as `paper_runs` takes them."""
+    moving = [e for e in paper_runs(**fields) if LEARNERS[e.learner].moves]
+    return tuple((e, perturbed(e)) for e in moving)
+
+
+def solver_pair(experiment: Experiment) -> Pair:
+    """The same short run with the default solver and with the paper's."""
+    short = replace(experiment, episodes=min(experiment.episodes, SOLVER_EPISODES))
+    return short, replace(short, solver=OTHER_SOLVER)
+
 
 LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too
 SEEDS = tuple(range(10))
@@ -28,7 +113,7 @@ FRESH: tuple[dict[str, Any], ...] = (
 )
 MAIN_TABLE = "main"
 IMITATING = tuple(name for name in PAPER if LEARNERS[name].network)
-BASELINES = {  # what the paper leaves open of DES, on every layout and in both readings
+BASELINES = {  # readings of DES, in every layout and in both readings of the decay
     "lagged": "a copy of the network, refreshed once an episode, predicts",
     "averaged": "a copy that follows the network slowly predicts",
     "greedy": "the next action is the network's minimiser",
@@ -38,10 +123,10 @@ BASELINES = {  # what the paper leaves open of DES, on every layout and in both 
 
 @dataclass(frozen=True)
 class Variant:
-    """One thing read otherwise, all else as in the main table."""
+    """One field with another value; the others are those of the main table."""
 
-    departure: str  # its letter in `DEPARTURES`, or "" where the paper is followed elsewhere
-    changed: str  # in words
+    departure: str  # its letter in `DEPARTURES`; "" where the main table follows the paper
+    changed: str  # the difference in words
     fields: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     learners: tuple[str, ...] = PAPER
 
@@ -93,33 +178,30 @@ def main_table(
     return sweep(learner=learners, layout=layouts, decay=decays, seed=seeds, episodes=episodes)
 
 
-def fresh(episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:
-    """The part of the main table that `make book` trains on the reader's machine."""
-    parts = (main_table(**part, episodes=episodes) for part in FRESH)
-    return tuple(dict.fromkeys(chain.from_iterable(parts)))
+def fresh() -> tuple[Experiment, ...]:
+    """The runs of the main table that `make book` trains on the reader's machine."""
+    return tuple(dict.fromkeys(chain.from_iterable(main_table(**part) for part in FRESH)))
 
 
-def controls(episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:
-    """Learners that only some cells need: matched steps, random directions, and Q-learning."""
-    return sweep(
-        learner=("matched", "random", "QL"), decay=tuple(DECAYS), episodes=episodes, **VARIED
-    )
+def controls() -> tuple[Experiment, ...]:
+    """The runs of learners that only some questions need: matched, random and Q-learning."""
+    return sweep(learner=("matched", "random", "QL"), decay=tuple(DECAYS), **VARIED)
 
 
-def variant(name: str, episodes: int = paper.EPISODES) -> tuple[Experiment, ...]:
+def variant(name: str) -> tuple[Experiment, ...]:
     """The runs of one variant, with the frozen arms that they are compared with."""
     one = VARIANTS[name]
-    runs = sweep(learner=one.learners, episodes=episodes, **VARIED | dict(one.fields))
+    runs = sweep(learner=one.learners, **VARIED | dict(one.fields))
     return (*runs, *dict.fromkeys(map(frozen_arm, runs)))
 
 
-def whole_study(episodes: int = paper.EPISODES) -> dict[Experiment, str]:
-    """Every run of the study with the part that it belongs to, the main table first.
+def whole_study() -> dict[Experiment, str]:
+    """Every run of the study with the name of its part, the main table first.
 
-    A run that two parts share is named after the first.
+    A run that two parts share has the name of the first.
     """
-    parts = {MAIN_TABLE: main_table(episodes=episodes), "controls": controls(episodes)}
-    parts |= {name: variant(name, episodes) for name in VARIANTS}
+    parts = {MAIN_TABLE: main_table(), "controls": controls()}
+    parts |= {name: variant(name) for name in VARIANTS}
     named: dict[Experiment, str] = {}
     for name, runs in parts.items():
         for experiment in runs:

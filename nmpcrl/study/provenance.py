@@ -1,20 +1,20 @@
-"""What the numbers of a stored run depend on, and how a stored run of old code is noticed.
+"""What the numbers of a stored run depend on, and how a run of other code is noticed.
 
-A run's *key* is a hash of what names its numbers:
+A run's *key* is a hash of
 
-- the fields of its experiment that its learner reads and that differ from `ORIGINAL`, in resolved
-  form: the centres of the obstacles and not the letter of the layout;
-- the versions of the libraries that touch its numbers;
+- the fields of its experiment that its learner reads and that differ from `ORIGINAL`, resolved: the
+  centres of the obstacles in place of the letter of the layout;
+- the versions of the libraries that bear on its numbers;
 - the epoch of each room whose code does, a number in `EPOCHS` that is raised by hand.
 
-So a new field, layout or metric, a moved or a renamed file leaves every key as it is. Source code
-has no part in a key. Instead, `sources.lock.json` holds a hash of every file that bears on numbers.
-Where one differs from the lock, a test fails and every command that reads a run warns, until
-either the epoch of its room is raised, so that all runs are trained anew, or
-`nmpcrl verify --relock` has shown with fresh runs that no bit has changed.
+A new field, layout or metric changes no key, and neither does a file that is moved or renamed. Code
+has no part in a key. Instead `sources.lock.json` has a hash of every file of `FILES`. Where a file
+differs from the lock, a test fails and every command that reads a run warns, until either the epoch
+of its room is raised, so that all runs are trained anew, or `nmpcrl verify --relock` has shown with
+fresh runs that no bit has changed.
 
-A stored run says which sources made it. It is read if these are today's, the lock's, or those of an
-earlier lock of the same epochs; what was trained in the midst of an edit is trained again after it.
+A stored run names the sources that made it. It is read if these are the present ones, those of the
+lock, or those of an earlier lock of the same epochs. A run of an edit in between is trained again.
 """
 
 import ast
@@ -26,7 +26,8 @@ import platform
 import sys
 import threading
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -35,7 +36,6 @@ from typing import Any, TypedDict
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import LEARNERS
-from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.machine import Fingerprint, fingerprint
 from nmpcrl.study.trial import Trial
 
@@ -44,7 +44,7 @@ EPOCHS = {"control": 1, "learning": 1, "study": 1, "analysis": 1}
 RUN_ROOMS = ("control", "learning", "study")  # whose code bears on a run
 SUMMARY_ROOMS = (*RUN_ROOMS, "analysis")  # and on its summary
 
-LIBRARIES = ("casadi", "numba", "numpy")  # of every run; torch besides, where a network learns
+LIBRARIES = ("casadi", "numba", "numpy")  # of every run; also torch, where a network learns
 
 # A field is left out of the key where it has this value, which it had when it became a field. New
 # fields are added with the value that all runs before them had; an entry never changes, even if the
@@ -78,50 +78,47 @@ ORIGINAL: dict[str, Any] = {
     "evaluate_every": 10,
 }
 
-WARNED = "NMPCRL_WARNED"  # set in the environment once the warning has been given
+FILES = (  # whose code bears on the numbers of runs, summaries and searches
+    *("control/**/*.py", "learning/**/*.py"),
+    *(f"study/{name}.py" for name in ("experiment", "geometry", "learners", "paper", "parameters")),
+    *(f"study/{name}.py" for name in ("records", "run", "setup", "trial")),
+    *(
+        f"analysis/{name}.py"
+        for name in ("imitation", "metrics", "policy_search", "rows", "summary")
+    ),
+)
+OTHER_HOSTS = (  # not among them: compiled for browsers and hosts where no stored run is made
+    *("control/browser.py", "control/codegen/browser/", "learning/browser.py"),
+    *("control/solvers/charge.py", "control/solvers/entries.py", "learning/rules.py"),
+)
 ROOT = Path(__file__).parent.parent
 LOCK = Path(__file__).with_name("sources.lock.json")
-WHOLE_ROOMS = ("control", "learning")  # every file of which counts, but
-ELSEWHERE = (  # those that are compiled for other hosts, where no stored run is made
-    "control/browser.py",
-    "control/codegen/browser/",
-    "control/solvers/charge.py",
-    "control/solvers/entries.py",
-    "learning/browser.py",
-    "learning/rules.py",
-)
-ENTRIES = (
-    "study/run.py",
-    "analysis/summary.py",
-    "analysis/rows.py",
-)  # which count with all that they import
-ALONE = ("analysis/policy_search.py",)  # which count without
-UNCOUNTED = ("__future__", "collections.abc", "typing")  # modules that no number comes from
+WARNED = "NMPCRL_WARNED"  # set in the environment once the warning has been given
 PARSING = threading.Lock()  # Python 3.11 fails where two threads parse at once
 
 
 class Provenance(TypedDict):
     """Where a run was made, and what its numbers depend on."""
 
-    versions: dict[str, str]  # as `environment` has them
+    versions: dict[str, str]  # of `environment`
     machine: Fingerprint
     key: str
     sources: str  # `sources_hash`
 
 
 def before() -> dict[str, Any]:
-    """The fields of an experiment but the layout, with what all runs had before each was one."""
+    """The fields of an experiment but the layout, with the values of runs before each was added."""
     return {name: value for name, value in ORIGINAL.items() if name != "obstacles"}
 
 
 def key(experiment: Experiment | Trial) -> str:
     """A hash of all that the run's numbers depend on."""
-    return hash_of([identity(experiment), versions(experiment), _epochs(RUN_ROOMS)])
+    return hash_of([identity(experiment), versions(experiment), epochs(RUN_ROOMS)])
 
 
 def summary_key(experiment: Experiment) -> str:
     """A hash of all that the numbers of the run's summary depend on."""
-    return hash_of([identity(experiment), versions(experiment), _epochs(SUMMARY_ROOMS)])
+    return hash_of([identity(experiment), versions(experiment), epochs()])
 
 
 def identity(experiment: Experiment | Trial) -> dict[str, Any]:
@@ -139,9 +136,9 @@ def resolved(experiment: Experiment) -> dict[str, Any]:
 
 
 def versions(experiment: Experiment | Trial | None = None) -> dict[str, str]:
-    """The versions of the libraries that touch the numbers of a run, or of any run.
+    """The versions of the libraries that bear on a run, or on any run.
 
-    What a build adds after "+" is left out: it is the same code.
+    A build's suffix after "+" is left out: the code is the same.
     """
     learns = not isinstance(experiment, Experiment) or LEARNERS[experiment.learner].network
     names = (*LIBRARIES, "torch") if learns else LIBRARIES
@@ -149,13 +146,13 @@ def versions(experiment: Experiment | Trial | None = None) -> dict[str, str]:
 
 
 def environment() -> dict[str, str]:
-    """All that must be the same, beside key and machine, for the same bits."""
+    """The versions that must be equal, beside key and machine, for the same bits."""
     libraries = {name: installed(name) for name in (*LIBRARIES, "torch")}
     return {"python": platform.python_version(), **libraries}
 
 
 def provenance(experiment: Experiment | Trial) -> Provenance:
-    """That of a run that is made here and now."""
+    """Versions, machine, key and source hash, stored with a run."""
     return {
         "versions": environment(),
         "machine": fingerprint(),
@@ -164,27 +161,33 @@ def provenance(experiment: Experiment | Trial) -> Provenance:
     }
 
 
+def made_here() -> dict[str, Any]:
+    """Date, epochs, versions and machine, published with runs."""
+    return {
+        "date": datetime.now(UTC).date().isoformat(),
+        "epochs": EPOCHS,
+        "versions": environment(),
+        "machine": fingerprint(),
+    }
+
+
 def signature() -> str:
-    """The same for all who would make the same numbers of the same experiments."""
+    """Equal in all processes that make the same numbers of the same experiments."""
     return hash_of([versions(), EPOCHS, sources_hash()])
 
 
-def epochs() -> dict[str, int]:
-    """Those of the rooms that bear on summaries, and on what is searched for."""
-    return _epochs(SUMMARY_ROOMS)
+def epochs(rooms: Iterable[str] = SUMMARY_ROOMS) -> dict[str, int]:
+    """The epochs of rooms; by default of those that bear on summaries and searches."""
+    return {room: EPOCHS[room] for room in rooms}
 
 
 @cache
 def installed(library: str) -> str:
-    """The version of a library; "absent" if it is not there."""
+    """The version of a library, or "absent"."""
     try:
         return version(library)
     except PackageNotFoundError:  # only numba may be missing: fatrop then solves
         return "absent"
-
-
-def _epochs(rooms: Iterable[str]) -> dict[str, int]:
-    return {room: EPOCHS[room] for room in rooms}
 
 
 def hash_of(depends: Any) -> str:
@@ -193,28 +196,20 @@ def hash_of(depends: Any) -> str:
 
 
 def sources(root: Path = ROOT) -> dict[str, str]:
-    """A hash of the code of each file that bears on the numbers of runs and summaries, by path."""
+    """A hash of the code of each file of `FILES` by path; a file without code is left out."""
+    found = {path.relative_to(root).as_posix(): path for one in FILES for path in root.glob(one)}
     with PARSING:
-        paths = {path for room in WHOLE_ROOMS for path in _counted(root, room)}
-        paths |= _reached(root, [root / entry for entry in ENTRIES])
-        paths |= {root / entry for entry in ALONE}
-        codes = {path: code(path.read_text("utf-8")) for path in sorted(paths)}
+        codes = {name: code(path.read_text("utf-8")) for name, path in sorted(found.items())}
     return {
-        path.relative_to(root).as_posix(): hashlib.sha256(text.encode()).hexdigest()
-        for path, text in codes.items()
-        if text
+        name: hashlib.sha256(text.encode()).hexdigest()
+        for name, text in codes.items()
+        if text and not name.startswith(OTHER_HOSTS)
     }
-
-
-def _counted(root: Path, room: str) -> list[Path]:
-    """The files of a room that bear on numbers."""
-    paths = (root / room).rglob("*.py")
-    return [path for path in paths if not path.relative_to(root).as_posix().startswith(ELSEWHERE)]
 
 
 @cache
 def sources_hash() -> str:
-    """One hash of all `sources`, wherever they lie."""
+    """One hash of all `sources`, wherever the files are."""
     return hash_of(sorted(sources().values()))
 
 
@@ -224,58 +219,52 @@ def room_hash(room: str) -> str:
 
 
 def locked() -> dict[str, str]:
-    """`sources` as the lock has them."""
-    return dict(json.loads(LOCK.read_text("utf-8"))["sources"])
+    """The `sources` of the lock."""
+    return dict(_lock()["sources"])
 
 
 def locked_hash() -> str:
-    """`sources_hash` as it was when the lock was written."""
+    """The `sources_hash` of the lock."""
     return hash_of(sorted(locked().values()))
-
-
-def is_accepted(made: str) -> bool:
-    """Whether the sources with this `sources_hash` make the numbers that these here make."""
-    return made in (sources_hash(), *locks())
 
 
 def locks() -> tuple[str, ...]:
     """The hashes of the lock and of the earlier locks of these epochs."""
-    return (locked_hash(), *_earlier())
+    lock = _lock()
+    return (locked_hash(), *(lock["earlier"] if lock["epochs"] == EPOCHS else ()))
 
 
-def _earlier() -> list[str]:
-    """The hashes of the earlier locks of these epochs."""
-    lock = json.loads(LOCK.read_text("utf-8"))
-    return list(lock.get("earlier", ())) if lock["epochs"] == EPOCHS else []
+def is_accepted(made: str) -> bool:
+    """Whether the sources with this `sources_hash` make the same numbers as the present ones."""
+    return made in (sources_hash(), *locks())
 
 
 def changed(now: Mapping[str, str], lock: Mapping[str, str]) -> list[str]:
-    """The files whose code is not what the lock has, moved and renamed ones left out."""
+    """The files whose code is in one of two `sources` alone; a moved file is not among them."""
     new, old = Counter(now.values()), Counter(lock.values())
-    other = {path for path, found in now.items() if new[found] > old[found]}
-    gone = {path for path, found in lock.items() if old[found] > new[found]}
-    return sorted(other | gone)
+    added = {path for path, found in now.items() if new[found] > old[found]}
+    return sorted(added | {path for path, found in lock.items() if old[found] > new[found]})
 
 
 def relock() -> Path:
-    """Write the lock anew; the one before is among the earlier ones, unless an epoch was raised."""
-    lock = json.loads(LOCK.read_text("utf-8")) if LOCK.exists() else {}
-    same = lock.get("epochs") == EPOCHS
-    earlier = list(dict.fromkeys([*_earlier(), locked_hash()])) if same else []
-    write_json(LOCK, {"epochs": EPOCHS, "earlier": earlier, "sources": sources()}, indent=1)
+    """Write the lock; the one before becomes an earlier one, unless an epoch was raised."""
+    same = LOCK.exists() and _lock()["epochs"] == EPOCHS
+    earlier = list(dict.fromkeys([*locks()[1:], locked_hash()])) if same else []
+    lock = {"epochs": EPOCHS, "earlier": earlier, "sources": sources()}
+    LOCK.write_text(json.dumps(lock, indent=1) + "\n", "utf-8")
     return LOCK
+
+
+def _lock() -> dict[str, Any]:
+    return dict(json.loads(LOCK.read_text("utf-8")))
 
 
 @cache
 def warn_of_changes() -> None:
-    """Say once, on standard error, that stored runs may be of other code than this.
-
-    Processes that are started after that keep quiet: a chapter that the driver executes, a worker.
-    """
+    """Warn that stored runs may be of other code; once, also for the processes started after it."""
     if os.environ.get(WARNED):
         return
-    files = changed(sources(), locked())
-    if files:
+    if files := changed(sources(), locked()):
         os.environ[WARNED] = "1"
         print(
             f"{', '.join(files)}: changed since the stored runs were trained;"
@@ -286,98 +275,52 @@ def warn_of_changes() -> None:
 
 
 def code(text: str) -> str:
-    """A module's syntax tree as text, without comments, docstrings and functions' types.
+    """A module's syntax tree as text, without comments, docstrings and types of functions.
 
-    Of its imports it has what can change a number: of what is used in it, the name of the module
-    that it comes from and its own. Of modules of ours that is the last part alone, so that they can
-    be moved. Empty if nothing but imports is in it, which rename nothing of ours. The same text on
-    every version of Python that we know.
+    An import counts if it renames or is used; of a module of this package the last name counts, so
+    that a file can be moved. The text is the same on every version of Python.
     """
     tree = ast.parse(text)
-    renamed, used = _imports(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             node.returns = None
         elif isinstance(node, ast.arg):
             node.annotation = None
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
-            documented = ast.get_docstring(node) is not None
-            node.body = [one for one in node.body[documented:] if not _is_bookkeeping(one)]
-    body = list(map(_shape, tree.body))
-    return "\n".join([*renamed, *(used if body else ()), *body])
+    return "\n".join([*sorted(_imports(tree)), *map(_shape, filter(_counts, tree.body))])
 
 
-def _imports(tree: ast.AST) -> tuple[list[str], list[str]]:
-    """What a module imports: ours under another name; and all that it uses, with where it is."""
-    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    renamed, used = set(), set()
+def _imports(tree: ast.AST) -> set[str]:
+    """The imported names that are used or renamed, each with the module that it comes from."""
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    found = set()
     for node in ast.walk(tree):
-        if not isinstance(node, ast.Import | ast.ImportFrom):
-            continue
-        module = (node.module or "") if isinstance(node, ast.ImportFrom) else ""
-        own = module.split(".")[0] == "nmpcrl"
-        for one in node.names:
-            bound = one.asname or one.name.partition(".")[0]
-            if own and bound != one.name:
-                renamed.add(f"import {one.name} as {bound}")
-            if bound in names and module not in UNCOUNTED:
-                place = module.rpartition(".")[2] if own else module
-                used.add(f"from {place} import {one.name} as {bound}")
-    return sorted(renamed), sorted(used)
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            module = getattr(node, "module", None) or ""
+            place = module.rpartition(".")[2] if module.startswith("nmpcrl.") else module
+            for one in node.names:
+                name = one.asname or one.name.partition(".")[0]
+                if name in used or one.asname not in (None, one.name):
+                    found.add(f"from {place} import {one.name} as {name}")
+    return found
 
 
-def _is_bookkeeping(node: ast.stmt) -> bool:
-    """Whether a statement is an import, or names what a package exports."""
-    exports = isinstance(node, ast.Assign) and any(
-        isinstance(target, ast.Name) and target.id == "__all__" for target in node.targets
-    )
-    return exports or isinstance(node, ast.Import | ast.ImportFrom)
+def _counts(node: Any) -> bool:
+    """Whether a statement is more than an import, a docstring or the list of exports."""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return False
+    exports = isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__"
+    return not exports and not isinstance(node, ast.Import | ast.ImportFrom)
 
 
 def _shape(node: Any) -> str:
-    """`ast.dump`, whose text is not the same on every version of Python."""
+    """`ast.dump`, but the same text on every version of Python."""
     if isinstance(node, list):
-        return f"[{', '.join(map(_shape, node))}]"
+        return f"[{', '.join(_shape(one) for one in node if _counts(one))}]"
     if not isinstance(node, ast.AST):
         return repr(node)
-    kept = (
+    fields = (
         f"{name}={_shape(value)}"
         for name, value in ast.iter_fields(node)
         if name not in ("ctx", "kind", "type_comment", "type_params") and value not in (None, [])
     )
-    return f"{type(node).__name__}({', '.join(kept)})"
-
-
-def _reached(root: Path, entries: Iterable[Path]) -> set[Path]:
-    """The files of the package that some files import, directly or through others."""
-    found: set[Path] = set()
-    left = list(entries)
-    while left:
-        path = left.pop()
-        if path not in found:
-            found.add(path)
-            left += _imported(root, path)
-    return found
-
-
-def _imported(root: Path, path: Path) -> Iterator[Path]:
-    """The files that a file imports; what a package passes on is followed to where it is made."""
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "nmpcrl":
-            for alias in node.names:
-                yield from _defined(root, str(node.module), alias.name)
-
-
-def _defined(root: Path, module: str, name: str) -> Iterator[Path]:
-    """Where `from module import name` is defined."""
-    place = root.joinpath(*module.split(".")[1:])
-    if place.with_suffix(".py").is_file():
-        yield place.with_suffix(".py")
-    elif (place / f"{name}.py").is_file():
-        yield place / f"{name}.py"
-    elif (place / "__init__.py").is_file():
-        for node in ast.parse((place / "__init__.py").read_text("utf-8")).body:
-            if isinstance(node, ast.ImportFrom):
-                for alias in node.names:
-                    if (alias.asname or alias.name) == name and node.module != module:
-                        yield from _defined(root, str(node.module), alias.name)
+    return f"{type(node).__name__}({', '.join(fields)})"

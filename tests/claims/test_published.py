@@ -19,7 +19,7 @@ from nmpcrl.claims.published import FILES, Damaged, Published, load, publish
 from nmpcrl.claims.verdict import PARTLY, REPRODUCED, Verdict
 from nmpcrl.study import Experiment, design, paper, run, sweep
 from nmpcrl.study.experiment import frozen_arm
-from nmpcrl.study.provenance import EPOCHS, environment
+from nmpcrl.study.provenance import EPOCHS, environment, made_here
 from nmpcrl.study.provenance import summary_key as run_key
 from nmpcrl.study.storage.machine import fingerprint
 
@@ -160,7 +160,7 @@ def test_searches_are_published_as_they_were_found(summaries):
     searches = {Search("B", budget=40): Found((0.1, 0.2), 31, (1, 7), (1 / 3, 0.1))}
     publish(summaries, LABELS, VERDICTS, searches=searches)
     assert load().searches == searches
-    assert load().about["searches"]["machine"] == published.made_here()["machine"]
+    assert load().about["searches"]["machine"] == made_here()["machine"]
 
 
 def test_the_summaries_are_read_bit_for_bit_and_in_order(known, summaries):

@@ -20,8 +20,8 @@ from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, design, limits, paper, sweep
+from nmpcrl.study.design import FIELDS
 from nmpcrl.study.learners import LEARNERS
-from nmpcrl.study.sweeps import FIELDS
 
 WHOLE = len(design.whole_study())
 SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}

@@ -1,20 +1,23 @@
-"""The study as a list of runs: what varies, and what each run is compared with."""
+"""Sets of runs: sweeps, replicas, and the study with what each run is compared with."""
 
 from collections import Counter
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 
+import numpy as np
 import pytest
 
+from nmpcrl.analysis.summary import RunSummary, separation, summarise
 from nmpcrl.claims.reproduce import FEWEST
-from nmpcrl.study import Experiment, design, paper
+from nmpcrl.report.figures.runs import perturbed as figure
+from nmpcrl.study import Experiment, ParameterError, design, paper, paper_runs, run, sweep
 from nmpcrl.study.departures import DEPARTURES
-from nmpcrl.study.experiment import MAIN, frozen_arm
+from nmpcrl.study.experiment import MAIN, PAPER, frozen_arm
 from nmpcrl.study.learners import DECAYS
 
-
-@pytest.fixture(scope="module")
-def main_table() -> set[Experiment]:
-    return set(design.main_table())
+TABLE = set(design.main_table())
+STUDY = design.whole_study()
+MAIN_AXES = {"decay", "layout"}  # which the main table varies itself
+DRAWN = ((0.5, 2.2), (3.0, 0.5))
 
 
 def differing(one: Experiment, other: Experiment) -> set[str]:
@@ -22,85 +25,142 @@ def differing(one: Experiment, other: Experiment) -> set[str]:
     return {name for name in first if first[name] != second[name]}
 
 
-def test_the_main_table_has_every_learner_layout_reading_and_seed():
-    runs = design.main_table()
-    assert len(runs) == len(set(runs)) == len(MAIN) * 6 * 2 * 10
-    assert {e.episodes for e in runs} == {paper.EPISODES}
-    default = Experiment()
-    assert all(differing(e, default) <= {"learner", "layout", "decay", "seed"} for e in runs)
+def test_a_sweep_is_every_combination_in_order():
+    found = sweep(learner=("ES", "GES"), seed=[0, 1], episodes=20)
+    assert [(e.learner, e.seed) for e in found] == [("ES", 0), ("ES", 1), ("GES", 0), ("GES", 1)]
+    assert {e.episodes for e in found} == {20}
+
+
+@pytest.mark.parametrize("one", [DRAWN, np.array(DRAWN), "0.5,2.2 3,0.5"])
+def test_a_vector_and_a_layout_are_one_value_of_a_sweep(one):
+    assert {e.layout for e in sweep(layout=one, seed=[0, 1])} == {"0.5,2.2 3,0.5"}
+    assert [e.layout for e in sweep(layout=["A", DRAWN])] == ["A", "0.5,2.2 3,0.5"]
+    (only,) = sweep(start=[0, 1, 2], target=(1.0, 1.0, 0.0), theta=[2.0] * 9)
+    assert (only.start, only.target, only.theta) == ((0, 1, 2), (1, 1, 0), (2.0,) * 9)
+
+
+@pytest.mark.parametrize(
+    ("axes", "said"),
+    [
+        (
+            {"seed": range(9_999), "learner": ("ES", "GES")},
+            "seeds = range(0, 9999) and the other axes make 19,998 runs; 10,000 are allowed",
+        ),
+        ({"seed": (3, 3)}, "seeds = (3, 3) must be a list that names 3 once"),
+        ({"layout": ["A", "A"]}, "layouts = ['A', 'A'] must be a list that names 'A' once"),
+        ({"seed": [range(10**9)]}, "seed = range(0, 1000000000) must be a whole number"),
+        ({"seed": range(10**12)}, "must name 10000 seeds at most, not 1000000000000"),
+        ({"seed": ()}, "seeds = () must name at least one seed"),
+        ({"seed": "[3]"}, "seeds = '[3]' arrived as text, not as a list; write -y '{seeds: [3]}'"),
+        ({"theta": "[2.0]"}, "theta = '[2.0]' must be 9 numbers"),
+        ({"episode": 3}, f"'episode' is not a parameter; there are {', '.join(design.FIELDS)}"),
+    ],
+)
+def test_a_sweep_refuses_axes(axes, said):
+    with pytest.raises(ParameterError) as caught:
+        sweep(**axes)
+    assert said in str(caught.value)
+
+
+def test_a_chapter_has_five_learners_two_decays_and_its_seeds():
+    runs = paper_runs(episodes=7, seeds=[4, 5])
+    cells = Counter((e.learner, e.decay, e.seed, e.episodes, e.layout) for e in runs)
+    assert cells == Counter((n, d, s, 7, "A") for n in (*PAPER, "frozen") for d in DECAYS
+                            for s in (4, 5))  # fmt: skip
+
+
+def test_a_replica_differs_in_the_twelfth_digit_of_theta_x():
+    experiment = Experiment()
+    moved = np.array(design.perturbed(experiment).theta) - experiment.theta
+    assert moved[0] == pytest.approx(design.PERTURBATION, rel=1e-3)
+    assert not moved[1:].any()
+    assert differing(experiment, design.perturbed(experiment)) == {"theta"}
+    found = design.perturbed_pairs(episodes=2, seeds=[3], layout="A")
+    assert Counter((e.learner, e.decay) for e, _ in found) == Counter(
+        (name, decay) for name in PAPER for decay in DECAYS
+    )
+    for episodes, expected in ((300, design.SOLVER_EPISODES), (4, 4)):
+        one, other = design.solver_pair(Experiment(episodes=episodes))
+        assert (one.solver, other.solver) == ("riccati", "ipopt")
+        assert one.episodes == other.episodes == expected
+
+
+def test_separation_is_the_largest_difference_over_the_episodes_that_both_reached():
+    one, other = (
+        RunSummary({}, {"theta": np.array(rows)}, {}, np.empty((0, 0)), np.empty((0, 0)), {})
+        for rows in ([[1, 2], [3, 4], [5, 6]], [[1, 2], [2.5, 4.25], [np.nan, np.nan]])
+    )
+    np.testing.assert_array_equal(separation(one, other), [0, 0.5])
+
+
+@pytest.mark.slow
+def test_a_run_learns_the_same_with_our_solver_as_with_ipopt():
+    """Until rounding separates them; two episodes of a learner that settles are far from it."""
+    one, other = (summarise(run(e)) for e in design.solver_pair(Experiment(episodes=2)))
+    assert separation(one, other).max() < 1e-6
+
+
+@pytest.mark.parametrize(("end", "title"), [(1e-13, "none end further apart"), (1e-2, "of DES")])
+def test_the_figure_of_replicas_says_whose_difference_grew(end, title):
+    apart = {Experiment("DES", steps=5, episodes=2): np.geomspace(1e-12, end, 10)}
+    drawn = figure.replicas(apart, np.full(10, 1e-10), design.PERTURBATION)
+    assert title in drawn.get_suptitle()
 
 
 def test_the_study_begins_with_the_main_table_and_names_every_run_once():
-    study = design.whole_study()
-    names = list(study.values())
-    main = len(design.main_table())
-    assert set(names[:main]) == {design.MAIN_TABLE}
-    assert design.MAIN_TABLE not in names[main:]
-    assert set(names) == {design.MAIN_TABLE, "controls", *design.VARIANTS}
+    assert len(TABLE) == len(design.main_table()) == len(MAIN) * 6 * 2 * 10
+    default, axes = Experiment(), {"learner", "layout", "decay", "seed"}
+    assert all(differing(e, default) <= axes for e in TABLE)
+    names = list(STUDY.values())
+    assert set(names[: len(TABLE)]) == {design.MAIN_TABLE}
+    assert set(names[len(TABLE) :]) == {"controls", *design.VARIANTS}
+    assert {frozen_arm(e) for e in STUDY} <= set(STUDY)
 
 
-def test_what_is_trained_afresh_meets_every_layout_and_both_readings_with_every_learner():
+def test_fresh_runs_meet_every_layout_and_both_readings_with_every_learner():
     """So that the learners of a cell can be compared, and a check of ranges has enough seeds."""
     fresh = set(design.fresh())
-    assert fresh < set(design.main_table())
+    assert fresh < TABLE
     cells = Counter((e.layout, e.decay, e.seed) for e in fresh)
     assert set(cells.values()) == {len(MAIN)}
     assert {layout for layout, _, _ in cells} == set(design.LAYOUTS)
     seeds = Counter((layout, decay) for layout, decay, _ in cells)
-    assert [seeds["A", decay] for decay in design.DECAYS] == [FEWEST, FEWEST]
+    assert [seeds["A", decay] for decay in DECAYS] == [FEWEST, FEWEST]
     elsewhere = Counter(decay for layout, decay in seeds if layout != "A")
     assert sorted(elsewhere.values()) == [2, 3]
 
 
-def test_every_run_of_the_study_has_its_frozen_arm_in_the_study():
-    study = design.whole_study()
-    assert {frozen_arm(e) for e in study} <= set(study)
-
-
-MAIN_AXES = {"decay", "layout"}  # which the main table varies itself
-
-
-def base_of(experiment: Experiment, name: str) -> Experiment:
-    """The run of the main table that a run of variant `name` is compared with."""
-    default = Experiment()
-    changed = {
-        key: getattr(default, key) for key in design.VARIANTS[name].fields if key not in MAIN_AXES
-    }
-    return replace(experiment, **changed)
-
-
 @pytest.mark.parametrize("name", design.VARIANTS)
-def test_a_variant_changes_one_thing(name, main_table):
-    variant = design.VARIANTS[name]
+def test_a_variant_changes_one_thing(name):
+    variant, default = design.VARIANTS[name], Experiment()
+    changed = set(variant.fields) - MAIN_AXES
     for experiment in design.variant(name):
         if experiment.learner != "frozen":
-            base = base_of(experiment, name)
-            assert differing(experiment, base) == set(variant.fields) - MAIN_AXES
-            assert base in main_table
+            base = replace(experiment, **{key: getattr(default, key) for key in changed})
+            assert differing(experiment, base) == changed
+            assert base in TABLE
 
 
 @pytest.mark.parametrize("name", design.BASELINES)
-def test_what_is_open_of_des_is_run_on_every_layout_in_both_readings(name, main_table):
+def test_readings_of_des_are_run_in_every_layout_in_both_readings_of_the_decay(name):
     runs = design.variant(name)
-    learning = [one for one in runs if one.learner != "frozen"]
-    axes = Counter((one.layout, one.decay) for one in learning)
-    assert axes == Counter({(layout, decay): 5 for layout in "ABCDEF" for decay in DECAYS})
-    assert {(one.learner, one.network) for one in learning} == {("DES", name)}
-    assert set(runs) - set(learning) < main_table
-    study = design.whole_study()
-    assert {study[one] for one in learning} == {name}
-    assert {study[one] for one in set(runs) - set(learning)} == {design.MAIN_TABLE}
+    learning = {one for one in runs if one.learner != "frozen"}
+    cells = Counter((one.learner, one.network, one.layout, one.decay) for one in learning)
+    assert cells == Counter({("DES", name, layout, d): 5 for layout in "ABCDEF" for d in DECAYS})
+    assert {STUDY[one] for one in learning} == {name}
+    assert set(runs) - learning < TABLE
 
 
-def test_variants_name_departures_that_there_are_and_no_two_are_the_same():
-    letters = {variant.departure for variant in design.VARIANTS.values()} - {""}
-    assert letters <= set(DEPARTURES)
-    fields = Counter(str(sorted(dict(v.fields).items())) for v in design.VARIANTS.values())
-    assert max(fields.values()) == 1
+def test_variants_name_known_departures_and_no_two_are_the_same():
+    assert {one.departure for one in design.VARIANTS.values()} - {""} <= set(DEPARTURES)
+    named = Counter(str(sorted(dict(v.fields).items())) for v in design.VARIANTS.values())
+    assert max(named.values()) == 1
 
 
 def test_a_frozen_arm_meets_the_same_noise_and_ignores_what_only_learning_uses():
-    run = Experiment("GES", seed=3, layout="D", decay="episode", beta=1.0, alpha=2.0, horizon=5)
-    arm = frozen_arm(run)
-    assert differing(run, arm) == {"learner", "alpha", "beta"}
+    one = Experiment("GES", seed=3, layout="D", decay="episode", beta=1.0, alpha=2.0, horizon=5)
+    arm = frozen_arm(one)
+    assert differing(one, arm) == {"learner", "alpha", "beta"}
     assert frozen_arm(arm) == arm
+    assert arm.episodes == paper.EPISODES
+    assert {field.name for field in fields(Experiment)} == set(design.FIELDS)

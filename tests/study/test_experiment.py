@@ -7,18 +7,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.control.codegen import jit
-from nmpcrl.learning.rollout import Persistent
-from nmpcrl.study import Experiment, ParameterError, paper, paper_runs, run, sweep
-from nmpcrl.study.experiment import PAPER, frozen_arm
-from nmpcrl.study.learners import DECAYS, LEARNERS
+from nmpcrl.study import Experiment, ParameterError, paper, run
+from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.provenance import key
 from nmpcrl.study.records import Records, StepStatus
-from nmpcrl.study.setup import prepare
 
 RUN = import_module("nmpcrl.study.run")  # the module; its name in the package is the function
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
@@ -38,74 +34,39 @@ def message_of(make, *arguments, **fields):
 
 REFUSED = [
     ("episodes", 0, "must be a whole number from 1 to 100000"),
-    ("episodes", -3, "must be a whole number from 1 to 100000"),
     ("episodes", 20.0, "must be a whole number from 1 to 100000"),
-    ("episodes", "20", "must be a whole number from 1 to 100000"),
-    ("episodes", True, "must be a whole number from 1 to 100000"),
-    ("episodes", None, "must be a whole number from 1 to 100000"),
     ("steps", 0, "must be a whole number from 1 to 10000"),
     ("horizon", 0, "must be a whole number from 1 to 500"),
     ("evaluate_every", 0, "must be a whole number from 1 to 100000"),
     ("seed", -1, "must be a whole number from 0 to 2147483647"),
-    ("seed", 1.5, "must be a whole number from 0 to 2147483647"),
-    ("seed", False, "must be a whole number from 0 to 2147483647"),
-    ("seed", 10**30, "must be a whole number from 0 to 2147483647"),
     ("episodes", 100_000_000, "must be a whole number from 1 to 100000"),
-    ("steps", 10**9, "must be a whole number from 1 to 10000"),
-    ("horizon", 10**12, "must be a whole number from 1 to 500"),
-    ("evaluate_every", np.nan, "must be a whole number from 1 to 100000"),
-    ("layout", ("A",), "must be one of A"),
     ("layout", None, "must be one of A"),
     ("layout", "Z", "must be one of A"),
-    ("layout", 1, "must be one of A"),
-    ("layout", [], "or 1 to 16 centres x,y within 100 m of 0"),
     ("layout", ((0, 0, 0),), "or 1 to 16 centres x,y within 100 m of 0"),
-    ("layout", ((0, 101),), "or 1 to 16 centres x,y within 100 m of 0"),
-    ("layout", ((0, np.nan),), "or 1 to 16 centres x,y within 100 m of 0"),
-    ("layout", (("0", "1"),), "or 1 to 16 centres x,y within 100 m of 0"),
-    ("layout", (0, 1), "or 1 to 16 centres x,y within 100 m of 0"),
     ("layout", "0,1 2", "or 1 to 16 centres x,y within 100 m of 0"),
     ("start", (9.1, 0, 0), "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
-    ("start", (0, 0), "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
-    ("start", "0,0,0", "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
     ("target", (0, -3.5, 0), "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
     ("target", (0, 0, 6.3), "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
-    ("target", None, "must be 3 numbers: x in [-3, 9], y in [-3, 9] and a heading in"),
     ("learner", "SARSA", f"must be one of {', '.join(LEARNERS)}"),
-    ("learner", "es", f"must be one of {', '.join(LEARNERS)}"),
     ("decay", "year", "must be one of step, episode"),
     ("network", "deep", "must be one of plain, normalised, tanh, small buffer, four fits"),
     ("box", "open", "must be one of hard, soft, printed"),
     ("clipped", 0, "must be true or false"),
     ("constrained", "yes", "must be true or false"),
-    ("ties_active", None, "must be true or false"),
-    ("curvature", 1.0, "must be true or false"),
     ("projected", "off", "must be true or false"),
     ("beta_tdc", 0.0, "must be a number in (0, 1e+06]"),
     ("tolerance", 0.1, "must be a number in [1e-12, 0.01]"),
     ("tolerance", 1e-13, "must be a number in [1e-12, 0.01]"),
     ("solver", "acados", "must be one of riccati, fatrop, ipopt"),
     ("alpha", -1e-7, "must be a number in (0, 1e+06]"),
-    ("alpha", 0, "must be a number in (0, 1e+06]"),
-    ("alpha", np.nan, "must be a number in (0, 1e+06]"),
-    ("alpha", np.inf, "must be a number in (0, 1e+06]"),
     ("alpha", "1e-7", "arrived as text; write 1.0e-7"),
-    ("alpha", True, "must be a number in (0, 1e+06]"),
     ("beta", -1.0, "must be a number in (0, 1e+06]"),
     ("zeta", 0.0, "must be a number in (0, 1e+06]"),
     ("decay_rate", 0.0, "must be a number in (0, 1]"),
     ("decay_rate", 1.01, "must be a number in (0, 1]"),
     ("gated", 1, "must be true or false"),
-    ("gated", "no", "must be true or false"),
-    ("alpha", 10**30, "must be a number in (0, 1e+06]"),
     ("theta", (1.0,) * 8, "must be 9 numbers"),
-    ("theta", ("1",) * 9, "must be 9 numbers"),
-    ("theta", (True,) * 9, "must be 9 numbers"),
-    ("theta", [[1.0]] * 9, "must be 9 numbers"),
-    ("theta", (1.0,) * 8 + (np.nan,), "must be 9 numbers"),
     ("theta", (1.0,) * 8 + (1e7,), "of size at most 1e+06"),
-    ("theta", 1.0, "must be 9 numbers"),
-    ("theta", "default", "must be 9 numbers"),
     ("theta", "123456789", "must be 9 numbers"),
 ]
 
@@ -115,16 +76,6 @@ def test_a_field_that_is_not_what_it_may_be_is_refused_in_one_sentence(name, giv
     message = message_of(Experiment, **{name: given})
     assert message.startswith(f"{name} = {given!r} ")
     assert allowed in message
-
-
-@pytest.mark.parametrize(
-    ("name", "given", "allowed"), [row for row in REFUSED if not isinstance(row[1], tuple | list)]
-)
-def test_a_sweep_refuses_the_same_fixed_or_on_an_axis(name, given, allowed):
-    for value in (given, [given]):
-        message = message_of(sweep, **{name: value})
-        assert name in message
-        assert allowed in message
 
 
 def test_every_field_says_what_it_is_and_what_it_may_be():
@@ -145,31 +96,6 @@ def test_numbers_of_numpy_name_the_same_run():
     assert type(same.seed) is int
 
 
-def test_whatever_a_field_is_given_it_is_taken_or_refused_by_name():
-    taken, refusals = [], []
-
-    @settings(max_examples=60)
-    @given(
-        name=st.sampled_from([field.name for field in dataclasses.fields(Experiment)]),
-        value=st.one_of(
-            st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.binary()
-        ),
-    )
-    def ask(name, value):
-        try:
-            taken.append(Experiment(**{name: value}))
-        except ParameterError as error:
-            refusals.append((name, str(error)))
-            return
-        assert getattr(taken[-1], name) == value
-        assert hash(taken[-1]) == hash(Experiment(**{name: value}))
-
-    ask()
-    assert all(said.startswith(f"{name} = ") for name, said in refusals)
-    assert taken
-    assert refusals
-
-
 def test_a_start_outside_the_printed_box_is_refused_in_that_box_alone():
     assert Experiment(start=(5.0, 0.0, 0.0)).task.start[0] == 5
     message = message_of(Experiment, start=(5.0, 0.0, 0.0), box="printed")
@@ -179,74 +105,6 @@ def test_a_start_outside_the_printed_box_is_refused_in_that_box_alone():
 @pytest.mark.parametrize("valued", [{"constrained": True}, {"learner": "QL"}])
 def test_actions_out_of_bounds_cannot_be_valued(valued):
     assert message_of(Experiment, clipped=False, **valued).startswith("clipped = False ")
-
-
-def test_a_list_that_arrived_as_text_shows_how_to_write_it():
-    message = message_of(sweep, seed="[3]", episodes=20)
-    assert message.startswith("seeds = '[3]' ")
-    assert "-y '{seeds: [3]}'" in message
-
-
-@pytest.mark.parametrize("empty", [[], ()])
-def test_an_axis_without_values_is_refused(empty):
-    assert message_of(sweep, seed=empty) == f"seeds = {empty!r} must name at least one seed"
-
-
-@pytest.mark.parametrize(
-    ("axes", "said"),
-    [
-        (
-            {"seed": range(9_999), "learner": ("ES", "GES")},
-            "seeds = range(0, 9999) and the other axes make 19,998 runs; 10,000 are allowed",
-        ),
-        ({"seed": (3, 3)}, "seeds = (3, 3) must be a list that names 3 once"),
-        ({"layout": ["A", "A"]}, "layouts = ['A', 'A'] must be a list that names 'A' once"),
-        ({"seed": [range(10**9)]}, "seed = range(0, 1000000000) must be a whole number"),
-        ({"seed": range(10**12)}, "must name 10000 seeds at most, not 1000000000000"),
-    ],
-)
-def test_too_many_runs_and_runs_twice_are_refused(axes, said):
-    assert said in message_of(sweep, **axes)
-
-
-def test_an_unknown_parameter_is_refused_with_those_there_are():
-    message = message_of(sweep, episode=3)
-    assert message.startswith("'episode' is not a parameter")
-    for field in dataclasses.fields(Experiment):
-        assert field.name in message
-
-
-def test_a_sweep_is_every_combination_in_order():
-    experiments = sweep(learner=("ES", "GES"), seed=[0, 1], episodes=20)
-    assert [(e.learner, e.seed) for e in experiments] == [
-        ("ES", 0),
-        ("ES", 1),
-        ("GES", 0),
-        ("GES", 1),
-    ]
-    assert {e.episodes for e in experiments} == {20}
-
-
-def test_theta_is_one_value_of_a_sweep_not_an_axis():
-    (only,) = sweep(theta=[2.0] * 9)
-    assert only.theta == (2.0,) * 9
-    assert message_of(sweep, theta="[2.0]").startswith("theta = '[2.0]' must be 9 numbers")
-
-
-@pytest.mark.parametrize("one", [DRAWN, np.array(DRAWN), "0.5,2.2 3,0.5"])
-def test_a_layout_by_its_centres_is_one_value_of_a_sweep(one):
-    assert {e.layout for e in sweep(layout=one, seed=[0, 1])} == {"0.5,2.2 3,0.5"}
-    assert [e.layout for e in sweep(layout=["A", DRAWN])] == ["A", "0.5,2.2 3,0.5"]
-    (only,) = sweep(start=[0, 1, 2], target=(1.0, 1.0, 0.0))
-    assert (only.start, only.target) == ((0, 1, 2), (1, 1, 0))
-
-
-def test_the_study_of_a_chapter_is_five_learners_two_decays_and_the_seeds():
-    experiments = paper_runs(episodes=7, seeds=[4, 5])
-    assert len(experiments) == len(set(experiments)) == 5 * 2 * 2
-    assert {e.learner for e in experiments} == {*PAPER, "frozen"}
-    assert {e.decay for e in experiments} == set(DECAYS)
-    assert {(e.seed, e.episodes, e.layout) for e in experiments} == {(4, 7, "A"), (5, 7, "A")}
 
 
 def test_the_centres_of_a_named_layout_are_that_layout():
@@ -285,13 +143,10 @@ def test_an_experiment_is_a_value():
     assert Experiment(alpha=1) == Experiment(alpha=1.0)
     assert Experiment(theta=list(paper.THETA_INIT)) == Experiment()
     assert len({Experiment(), Experiment(seed=1), Experiment()}) == 2
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        Experiment().seed = 2
-
-
-def test_the_defaults_are_table_one():
     e = Experiment()
-    assert (e.episodes, e.steps, e.horizon) == (300, 130, 10)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        e.seed = 2
+    assert (e.episodes, e.steps, e.horizon) == (300, 130, 10)  # Table I
     assert (e.alpha, e.beta, e.zeta) == (1e-7, 1e-8, 1e-2)
     assert e.theta == (1, 1, 0.05, 0.05, 0.05, 1, 1, 0.1, 0.001)
 
@@ -312,34 +167,12 @@ def same(one, other):
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
-def test_the_same_experiment_gives_the_same_bits(runs, learner):
-    assert same(run(Experiment(learner=learner, **SHORT)), runs[learner])
-
-
-@pytest.mark.parametrize("learner", ["ES", "RDES"])
-def test_another_seed_gives_other_bits(runs, learner):
-    other = run(Experiment(learner=learner, seed=1, **SHORT))
-    assert not same(other, runs[learner])
-    assert not np.array_equal(other.steps["theta"][-1], runs[learner].steps["theta"][-1])
-
-
-def test_all_learners_of_a_seed_meet_the_same_noise():
-    controller = Persistent(paper.nmpc())
-    first, *others = (prepare(Experiment(learner=n, seed=3), controller)[2] for n in LEARNERS)
-    for explore in others:
-        np.testing.assert_array_equal(explore.noise, first.noise)
-
-
-def test_the_noise_does_not_depend_on_the_decay():
-    controller = Persistent(paper.nmpc())
-    one, other = (prepare(Experiment(decay=d, seed=3), controller)[2].noise for d in DECAYS)
-    np.testing.assert_array_equal(one, other)
-
-
-def test_the_first_action_is_the_same_for_all_learners(runs):
-    actions = [records.steps["action"][0] for records in runs.values()]
-    for action in actions:
-        np.testing.assert_array_equal(action, actions[0])
+def test_a_run_repeats_to_the_last_bit_and_another_seed_gives_another(runs, learner):
+    assert same(run(Experiment(learner, **SHORT)), runs[learner])
+    assert not same(run(Experiment(learner, seed=1, **SHORT)), runs[learner])
+    np.testing.assert_array_equal(  # the noise is the same, and theta has not moved
+        runs[learner].steps["action"][0], runs["ES"].steps["action"][0]
+    )
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
@@ -353,28 +186,24 @@ def test_every_step_has_a_row_and_every_column_every_row(runs, learner):
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
-def test_the_columns_satisfy_the_definition_of_the_td_error(runs, learner):
+def test_the_columns_satisfy_the_papers_equations(runs, learner):
     s = runs[learner].steps
     delta = s["cost"] + 0.97 * s["next_value"] - s["value"]
     np.testing.assert_allclose(s["delta"], delta, rtol=1e-12)
     np.testing.assert_allclose(s["alpha_phi2"], 1e-7 * (s["features"] ** 2).sum(axis=1))
-
-
-@pytest.mark.parametrize("learner", ["ES", "DES", "RDES"])
-def test_the_columns_satisfy_the_semi_gradient(runs, learner):
-    s = runs[learner].steps
     before = np.vstack([paper.THETA_INIT, s["theta"][:-1]])
-    moved = np.nan_to_num(1e-7 * s["delta"])[:, None] * s["features"]
-    np.testing.assert_allclose(s["theta"], before + moved, rtol=1e-13)
-    assert (s["w"] == 1e-4).all()
-
-
-def test_the_columns_satisfy_gradient_tds_second_equation(runs):
-    s = runs["GES"].steps
-    before = np.vstack([np.full(9, 1e-4), s["w"][:-1]])
-    overlap = (s["features"] * before).sum(axis=1)
-    moved = 1e-8 * (s["delta"] - overlap)[:, None] * s["features"]
-    np.testing.assert_allclose(s["w"], before + moved, rtol=1e-12)
+    if learner in ("ES", "DES", "RDES"):  # the semi-gradient
+        moved = np.nan_to_num(1e-7 * s["delta"])[:, None] * s["features"]
+        np.testing.assert_allclose(s["theta"], before + moved, rtol=1e-13)
+        assert (s["w"] == 1e-4).all()
+    if learner == "GES":  # gradient TD's second equation
+        before = np.vstack([np.full(9, 1e-4), s["w"][:-1]])
+        overlap = (s["features"] * before).sum(axis=1)
+        moved = 1e-8 * (s["delta"] - overlap)[:, None] * s["features"]
+        np.testing.assert_allclose(s["w"], before + moved, rtol=1e-12)
+    if learner == "frozen":
+        assert np.isnan(s["delta"]).all()
+        assert (s["theta"] == paper.THETA_INIT).all()
 
 
 @pytest.mark.parametrize("learner", ["DES", "RDES"])
@@ -394,12 +223,6 @@ def test_read_literally_they_move_from_the_first_step():
     assert np.isnan(s["loss"]).all()
     assert (s["delta"] < 0).mean() > 0.9
     assert s["theta"][-1, 0] < 0.7
-
-
-def test_frozen_has_no_td_error_and_no_step(runs):
-    s = runs["frozen"].steps
-    assert (s["theta"] == paper.THETA_INIT).all()
-    assert np.isnan(s["delta"]).all()
 
 
 def test_evaluations_come_first_every_so_often_and_last():
@@ -504,18 +327,12 @@ def test_a_run_that_fails_ten_times_in_a_row_says_why_it_stopped(monkeypatch):
     assert (records.evaluations["cost"] == np.inf).all()
 
 
-def test_a_run_whose_theta_explodes_says_why_it_stopped():
-    records = run(Experiment(learner="ES", episodes=2, steps=6, alpha=1e5))
-    assert records.facts["stopped"].startswith("diverged: theta ")
-    assert "left the numbers" in records.facts["stopped"]
-    assert len(records.steps["time"]) < 12
-
-
-@pytest.mark.parametrize("steps", [1, 2, 3])
-def test_a_theta_that_explodes_in_an_episodes_last_step_is_not_evaluated(steps):
+@pytest.mark.parametrize("steps", [1, 2, 3, 6])
+def test_a_theta_that_explodes_ends_the_run_and_is_not_evaluated(steps):
     records = run(Experiment(learner="ES", episodes=4, steps=steps, alpha=1e5, evaluate_every=1))
     assert records.facts["stopped"].startswith("diverged: theta ")
     assert "left the numbers" in records.facts["stopped"]
+    assert len(records.steps["time"]) < 4 * steps
     assert (np.abs(records.evaluations["theta"]) <= 1e6).all()
 
 

@@ -1,7 +1,8 @@
-"""Keys that survive a move, a lock that tells when code has changed, and what a key depends on."""
+"""Keys, the hash of a file's code, the files in the lock, and the machine."""
 
 import json
-import shutil
+import subprocess
+import sys
 from dataclasses import fields, replace
 
 import pytest
@@ -9,117 +10,108 @@ import pytest
 from nmpcrl.study import Experiment, paper, provenance
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.learners import LEARNERS
-from nmpcrl.study.provenance import ORIGINAL, changed, identity, key, sources, summary_key
+from nmpcrl.study.provenance import ORIGINAL, changed, code, identity, key, sources, summary_key
 from nmpcrl.study.storage import machine
 
+MODULE = '''"""A module."""
 
-@pytest.fixture(scope="module")
-def unedited() -> dict[str, str]:
-    """The sources as they are."""
-    return sources()
+from collections.abc import Callable
 
+import numpy as np
 
-@pytest.fixture(scope="module")
-def copy(tmp_path_factory):
-    """The package in another folder."""
-    target = tmp_path_factory.mktemp("copy") / "nmpcrl"
-    ignored = shutil.ignore_patterns("*.pyc", "__pycache__")
-    return shutil.copytree(provenance.ROOT, target, ignore=ignored)
+from nmpcrl.study.paper import ALPHA as RATE
+from nmpcrl.study.records import final_cost
+
+__all__ = ["Rule", "step"]
 
 
-@pytest.fixture
-def edited(copy):
-    """The sources of the copy after edits, as `sources` has them; then it is as it was."""
-    kept = {}
+class Rule:
+    """A rule."""
 
-    def undo():
-        for place, text in kept.items():
-            if text is None:
-                (copy / place).unlink()
-            else:
-                (copy / place).write_text(text)
-        kept.clear()
-
-    def edit(*edits, moved_to=""):
-        for place, before, after in edits:
-            if place not in kept:
-                kept[place] = (copy / place).read_text()
-            text = (copy / place).read_text()
-            assert before in text
-            (copy / place).write_text(text.replace(before, after, 1))
-            if moved_to:
-                (copy / moved_to).parent.mkdir(exist_ok=True)
-                (copy / place).rename(copy / moved_to)
-                kept[moved_to] = None
-        return sources(copy)
-
-    edit.undo = undo
-    yield edit
-    undo()
+    rate: float = RATE  # of learning
 
 
+def step(theta: float, by: Callable[[float], float]) -> float:
+    """A step."""
+    return np.abs(theta) - Rule.rate * by(final_cost(theta))
+'''
 NUMBERS = [
-    ("learning/updates.py", "cost + gamma * q_next - q", "cost + gamma * q_next - 2 * q"),
-    ("learning/training.py", "PATIENCE = 10", "PATIENCE = 11"),
-    ("control/solvers/kernel.py", "ARMIJO = 1e-4", "ARMIJO = 1e-1"),
-    ("control/solvers/nlpsol.py", "MAX_ITERATIONS = 300", "MAX_ITERATIONS = 200"),
-    ("study/paper.py", "ALPHA = 1e-7", "ALPHA = 1e-6"),
-    ("study/setup.py", "spawn(3)", "spawn(4)"),
-    ("study/run.py", "evaluate_every == 0", "evaluate_every == 1"),
-    ("analysis/metrics.py", "LATE = 20", "LATE = 21"),
-    ("analysis/metrics.py", "TOUCH = 1e-6", "TOUCH = 1e-5"),
-    ("analysis/imitation.py", "FITS = 4000", "FITS = 4001"),
-    ("analysis/policy_search.py", "SPREAD = 0.3", "SPREAD = 0.4"),
-    (
-        "learning/learners.py",
-        "    semi_gradient_step,\n",
-        "    auxiliary_step as semi_gradient_step,\n",
-    ),
-    ("learning/updates.py", "import numpy as np", "import jax.numpy as np"),
-    (
-        "learning/training.py",
-        "from nmpcrl.control.nmpc import ABSURD",
-        "from nmpcrl.control.solvers.rows import ABSURD",
-    ),
+    ("= RATE", "= 2 * RATE"),
+    ("np.abs(theta)", "theta"),
+    ("Rule.rate * by", "by"),
+    ("import ALPHA", "import BETA"),
+    ("import final_cost", "import initial_cost as final_cost"),
+    ("import numpy as np", "import jax.numpy as np"),
+    ("nmpcrl.study.records", "nmpcrl.analysis.metrics"),
+    ("rate: float", "rate: int"),
 ]
 NO_NUMBERS = [
-    ("learning/updates.py", '"""The update rules', '"""All update rules'),
-    ("learning/updates.py", '"""TD error', '"""The TD error'),
-    ("learning/updates.py", "\n\n\ndef td_error", "\n\n\n# A comment.\n\n\ndef td_error"),
-    ("learning/updates.py", "import numpy as np", "import math\n\nimport numpy as np"),
-    ("learning/updates.py", "q_next: float) -> float", "q_next: object) -> object"),
-    ("learning/__init__.py", '"td_error",', '"td_error", "another",'),
-    ("control/ocp.py", "# z\n", "# the variables\n"),
-    ("study/storage/executor.py", "ATTEMPTS = 3", "ATTEMPTS = 4"),
-    ("study/departures.py", "A slip of the index.", "A slip of an index."),
-    ("claims/rule.py", "MAJORITY = 0.5", "MAJORITY = 0.6"),
+    ("A module", "Some module"),
+    ("A step.", "One step.\n\n    With a second paragraph.\n    "),
+    ("  # of learning", ""),
+    ("\n\n\ndef", "\n\n\n# A comment.\n\n\ndef"),
+    ("by: Callable[[float], float]", "by: Callable[..., float]"),
+    (") -> float:", ") -> object:"),
+    ("import Callable", "import Callable, Mapping"),
+    ("import numpy as np", "import math\n\nimport numpy as np"),
+    ('["Rule", "step"]', '["step"]'),
+    ("nmpcrl.study.records", "nmpcrl.study.below.records"),
 ]
 
 
-def test_an_edit_of_what_bears_on_numbers_is_noticed(edited, unedited):
-    once = {edit[0]: edit for edit in NUMBERS}  # one edit of each file, and then the others
-    for edits in (once.values(), [edit for edit in NUMBERS if edit not in once.values()]):
-        assert changed(edited(*edits), unedited) == sorted(edit[0] for edit in edits)
-        edited.undo()
+@pytest.mark.parametrize(("before", "after"), [*NUMBERS, *NO_NUMBERS])
+def test_an_edit_is_noticed_where_it_can_change_a_number(before, after):
+    assert before in MODULE
+    edited = MODULE.replace(before, after, 1)
+    assert (code(edited) != code(MODULE)) == ((before, after) in NUMBERS)
 
 
-def test_such_an_edit_is_noticed_in_a_file_that_was_moved_into_a_subfolder(edited, unedited):
-    for place, *edit in (NUMBERS[1], NUMBERS[2]):
-        room, _, name = place.partition("/")
-        moved_to = f"{room}/below/{name.rpartition('/')[2]}"
-        now = edited((place, *edit), moved_to=moved_to)
-        assert changed(now, unedited) == sorted([place, moved_to])
-        edited.undo()
+def test_a_package_that_passes_a_name_on_as_another_counts_and_one_that_does_not_is_empty():
+    assert code('"""A package."""\n\nfrom nmpcrl.study.run import run\n\n__all__ = ["run"]\n') == ""
+    assert code("from nmpcrl.study.run import run as train\n")
 
 
-def test_edits_of_what_bears_on_no_number_are_not(edited, unedited):
-    assert changed(edited(*NO_NUMBERS), unedited) == []
+def test_a_moved_file_is_not_changed_and_an_edited_one_is():
+    before = {"a.py": "1", "b.py": "2", "c.py": "2"}
+    assert changed({"a.py": "1", "b.py": "2", "d/c.py": "2"}, before) == []
+    assert changed({"a.py": "3", "b.py": "2", "c.py": "2"}, before) == ["a.py"]
+    assert changed({"d/a.py": "3", "b.py": "2", "c.py": "2"}, before) == ["a.py", "d/a.py"]
+    assert changed({"a.py": "1", "b.py": "2"}, before) == ["b.py", "c.py"]
 
 
-def test_a_moved_and_a_renamed_file_change_nothing(edited, unedited):
-    now = edited(("learning/updates.py", "", ""), moved_to="learning/below/rules.py")
-    assert "learning/below/rules.py" in now
-    assert changed(now, unedited) == []
+WITHOUT_NUMBERS = {  # files that a run imports and that store, lock, describe or start processes
+    *("study/jobs.py", "study/provenance.py", "study/store.py", "study/design.py"),
+}
+IMPORTS = """
+import sys
+from pathlib import Path
+import nmpcrl
+from nmpcrl.analysis.policy_search import Search, search
+from nmpcrl.analysis.rows import row
+from nmpcrl.analysis.summary import summarise
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.run import run
+
+for learner in ("ES", "RDES", "GES"):
+    row(summarise(run(Experiment(learner, episodes=1, steps=5, evaluate_every=1))))
+search(Search(budget=40))
+for module in list(sys.modules.values()):
+    if module.__name__.startswith("nmpcrl."):
+        print(Path(module.__file__).relative_to(Path(nmpcrl.__file__).parent).as_posix())
+"""
+
+
+def test_every_file_that_a_run_its_summary_and_a_search_import_is_in_the_lock():
+    """If a new file bears on no number: add it to `WITHOUT_NUMBERS`, else to `FILES`."""
+    made = subprocess.run(
+        [sys.executable, "-c", IMPORTS], capture_output=True, text=True, check=True
+    )
+    imported = {name for name in made.stdout.split() if code((provenance.ROOT / name).read_text())}
+    listed = set(sources())
+    assert {one for one in imported - listed - WITHOUT_NUMBERS if "/storage/" not in one} == set()
+    assert {one for one in listed - imported if one.startswith(("study", "analysis"))} == set()
+    assert all(any(provenance.ROOT.glob(one)) for one in provenance.FILES)
+    assert all((provenance.ROOT / one).exists() for one in provenance.OTHER_HOSTS)
 
 
 def test_the_code_is_what_the_lock_has():
@@ -128,12 +120,37 @@ def test_the_code_is_what_the_lock_has():
     assert json.loads(provenance.LOCK.read_text())["epochs"] == provenance.EPOCHS
 
 
-def test_who_reads_stored_runs_is_warned_of_other_code(monkeypatch, capsys):
+@pytest.mark.parametrize("begins", ["07237effb4b1545a", "44134a116cb64ab0"])
+def test_runs_of_the_first_edition_are_read(begins):
+    """The last two source hashes of that edition."""
+    (made,) = (one for one in provenance.locks() if one.startswith(begins))
+    assert provenance.is_accepted(made)
+
+
+def test_an_earlier_lock_is_accepted_until_an_epoch_is_raised(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "LOCK", tmp_path / "lock.json")
+    provenance.relock()
+    made = provenance.locked_hash()
+    for edit in ("first", "second"):
+        monkeypatch.setattr(provenance, "sources", lambda edit=edit: {"run.py": edit})
+        monkeypatch.setattr(
+            provenance, "sources_hash", lambda edit=edit: provenance.hash_of([edit])
+        )
+        assert provenance.is_accepted(made)
+        provenance.relock()
+    assert provenance.is_accepted(made)
+    assert not provenance.is_accepted(provenance.hash_of(["third"]))
+    monkeypatch.setitem(provenance.EPOCHS, "study", 2)
+    provenance.relock()
+    assert not provenance.is_accepted(made)
+
+
+def test_a_warning_names_the_changed_files_once(monkeypatch, capsys):
     lock = {**sources(), "learning/updates.py": "another"}
     monkeypatch.setattr(provenance, "locked", lambda: lock)
     monkeypatch.setenv(provenance.WARNED, "")
-    provenance.warn_of_changes.__wrapped__()
-    provenance.warn_of_changes.__wrapped__()
+    for _ in range(2):
+        provenance.warn_of_changes.__wrapped__()
     said = capsys.readouterr().err
     assert said.startswith("learning/updates.py: changed since the stored runs were trained")
     assert said.count("\n") == 1
@@ -253,13 +270,10 @@ def test_what_a_build_adds_to_a_version_does_not_count(monkeypatch):
     assert key(Experiment("RDES")) == before
 
 
-def test_what_changes_last_digits_is_part_of_the_machine(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
+def test_the_machine_is_known_by_what_changes_last_digits(monkeypatch):
     for name in machine.SETTINGS:
         monkeypatch.delenv(name, raising=False)
     common = machine.fingerprint()
     assert "settings" not in common
     monkeypatch.setenv("ATEN_CPU_CAPABILITY", "default")
     assert machine.fingerprint() == common | {"settings": {"ATEN_CPU_CAPABILITY": "default"}}
-    (tmp_path / ".numba_config.yaml").write_text("disable_jit: 1")
-    assert ".numba_config.yaml" in machine.fingerprint()["settings"]

@@ -1,4 +1,4 @@
-"""What is known of this machine: enough to tell whether the same code must give the same bits."""
+"""This machine, and what of it changes the last digits of numbers."""
 
 import os
 import platform
@@ -12,23 +12,14 @@ import psutil
 CPUINFO = Path("/proc/cpuinfo")
 BOOT = Path("/proc/sys/kernel/random/boot_id")  # another after each start of the machine
 NAMESPACE = Path("/proc/self/ns/pid")  # another in each container
-SETTINGS = (  # environment variables by which the same code gives other last digits
-    "NUMBA_DISABLE_JIT",
-    "NUMBA_OPT",
-    "NUMBA_CPU_NAME",
-    "NUMBA_CPU_FEATURES",
-    "NUMBA_LOOP_VECTORIZE",
-    "NUMBA_SLP_VECTORIZE",
-    "OPENBLAS_CORETYPE",
-    "ATEN_CPU_CAPABILITY",
-    "MKL_CBWR",
-    "GLIBC_TUNABLES",
+SETTINGS = (  # environment variables that choose other machine code
+    *("NUMBA_DISABLE_JIT", "NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"),
+    *("OPENBLAS_CORETYPE", "ATEN_CPU_CAPABILITY", "MKL_CBWR", "GLIBC_TUNABLES"),
 )
-CONFIGURED = Path(".numba_config.yaml")  # in the working folder, where numba looks for it
 
 
 class Machine(TypedDict):
-    """What a reader has to know of it."""
+    """A machine as a page names it."""
 
     processor: str
     architecture: str
@@ -37,17 +28,18 @@ class Machine(TypedDict):
 
 
 class Fingerprint(Machine):
-    """All of it on which last digits depend."""
+    """What must be equal, beside code and versions, for the same bits."""
 
-    library: str  # of C
-    abilities: str  # a hash of what its processor can do
-    settings: NotRequired[dict[str, str]]  # what `SETTINGS` and numba's file say, if anything
+    library: str  # of C: sines and cosines
+    abilities: str  # a hash of the processor's instruction sets, for which code is compiled
+    settings: NotRequired[dict[str, str]]  # those of `SETTINGS` that are set
 
 
 def machine() -> Machine:
-    """This one, in short."""
+    """This machine, in short."""
+    names = [line.partition(":")[2].strip() for line in _cpuinfo() if line.startswith("model name")]
     return {
-        "processor": _processor(),
+        "processor": names[0] if names else platform.processor() or "unknown",
         "architecture": platform.machine(),
         "cores": os.cpu_count(),
         "system": platform.system(),
@@ -55,27 +47,23 @@ def machine() -> Machine:
 
 
 def fingerprint() -> Fingerprint:
-    """`machine`, with the abilities of its processor, its C library, and what `SETTINGS` say.
-
-    Machine code is made for the first, and processors of one name may differ in them; sines and
-    cosines come from the second.
-    """
-    settings = {name: os.environ[name] for name in SETTINGS if os.environ.get(name)}
-    if CONFIGURED.is_file():
-        settings[CONFIGURED.name] = sha256(CONFIGURED.read_bytes()).hexdigest()[:16]
-    known = _fingerprint().copy()
-    if settings:
+    """This machine, as it is compared with the machine of stored and published runs."""
+    lines = ("flags", "Features", "cpu family", "model\t")
+    found = sorted({line for line in _cpuinfo() if line.startswith(lines)})
+    abilities = sha256("\n".join(found).encode()).hexdigest()[:16]
+    known = cast(
+        Fingerprint,
+        {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities},
+    )
+    if settings := {name: os.environ[name] for name in SETTINGS if os.environ.get(name)}:
         known["settings"] = settings
     return known
 
 
 @cache
-def _fingerprint() -> Fingerprint:
-    kept = ("flags", "Features", "cpu family", "model\t")
-    told = sorted({line for line in _cpuinfo() if line.startswith(kept)})
-    abilities = sha256("\n".join(told).encode()).hexdigest()[:16]
-    found = {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities}
-    return cast(Fingerprint, found)
+def _cpuinfo() -> tuple[str, ...]:
+    """The lines in which Linux describes the processor; none on other systems."""
+    return tuple(CPUINFO.read_text().splitlines()) if CPUINFO.exists() else ()
 
 
 @cache
@@ -95,16 +83,3 @@ def _told_by(path: Path) -> str:
         return str(path.readlink()) if path.is_symlink() else path.read_text()
     except OSError:
         return ""
-
-
-def _processor() -> str:
-    """The processor's name, where the system tells it."""
-    names = [line.partition(":")[2] for line in _cpuinfo() if line.startswith("model name")]
-    return names[0].strip() if names else platform.processor() or "unknown"
-
-
-def _cpuinfo() -> list[str]:
-    try:
-        return CPUINFO.read_text().splitlines()
-    except OSError:
-        return []

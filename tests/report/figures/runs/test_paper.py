@@ -6,8 +6,8 @@ from matplotlib.colors import to_hex
 
 from nmpcrl.report.figures.runs import paper as draw
 from nmpcrl.study import Records, Runs, paper
+from nmpcrl.study.design import paper_runs
 from nmpcrl.study.records import Stopped
-from nmpcrl.study.sweeps import paper_runs
 
 EPISODES, STEPS = 4, 5
 FIGURES = (draw.figure_1, draw.figure_2, draw.figure_3, draw.figure_4)

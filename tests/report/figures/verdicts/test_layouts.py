@@ -1,6 +1,6 @@
 """Layouts and robustness analysis: titles follow from the runs, and nothing is left undrawn."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pandas as pd
@@ -56,7 +56,8 @@ def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
     parts = dict.fromkeys(
         design.main_table(LEARNERS, ("A", "D"), SEEDS, episodes), design.MAIN_TABLE
     )
-    parts |= {e: VARIANT for e in design.variant(VARIANT, episodes) if e not in parts}
+    varied = (replace(e, episodes=episodes) for e in design.variant(VARIANT))
+    parts |= {e: VARIANT for e in varied if e not in parts}
     summaries = {}
     for experiment, part in parts.items():
         learned = experiment.learner != "frozen"
