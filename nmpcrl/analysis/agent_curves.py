@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.analysis import judgements
-from nmpcrl.analysis.agents import Agent
-from nmpcrl.analysis.entries import entry_with
-from nmpcrl.analysis.interaction import Policy, Robot
+from nmpcrl.analysis.agents import agent
 from nmpcrl.analysis.kept import Kept
-from nmpcrl.analysis.leaderboard import followed
+from nmpcrl.analysis.suite import Policy, Robot, followed
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED
@@ -59,13 +57,11 @@ def curve(
         NoAgents: stable-baselines3 is not installed.
     """
     began = time.process_time()
-    agent = entry_with(entry)
-    assert isinstance(agent, Agent)
     robots = [Robot(centres, 1 + len(checkpoints), seed) for centres in judged_in.values()]
     initial = [robot.cost(np.array(paper.THETA_INIT)) for robot in robots]
     costs, arrived, at = [], [], None
     layouts = [*trained_in.values()]
-    for at in agent.trained(RobotEnv(layouts[0]), layouts, checkpoints, seed):
+    for at in agent(entry).trained(RobotEnv(layouts[0]), layouts, checkpoints, seed):
         judged = [_judged(robot, at.policy) for robot in robots]
         costs.append([cost for cost, _ in judged])
         arrived.append("".join(THERE if there else AWAY for _, there in judged))

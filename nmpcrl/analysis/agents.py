@@ -2,7 +2,7 @@
 
 They are told where the robot is, where its target and where the obstacles' centres are, and after
 each step what it cost. They have no model: neither of the robot nor of the cost nor of how large an
-obstacle is. In the suite they are entries, `SAC` or with something set `SAC[reward=0.1]`.
+obstacle is. `SAC` and `TD3` are entries of the suite.
 """
 
 import importlib
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from nmpcrl import Vector
-from nmpcrl.analysis.interaction import Policy, Robot
+from nmpcrl.analysis.suite import Entry, Policy, Robot, entry
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.storage.refusal import Refusal
@@ -53,17 +53,7 @@ class Agent:
     """An agent as an entry: it is trained as long as the budget goes, and returns its policy."""
 
     name: str  # of `AGENTS`
-    setting: tuple[tuple[str, float], ...] = ()  # what differs from `defaults`
-
-    @property
-    def defaults(self) -> Mapping[str, float]:
-        """What can be set."""
-        return {**SETTING, "reward": REWARD[self.name]}
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """What is set."""
-        return {**self.defaults, **dict(self.setting)}
+    values: Mapping[str, float]  # of its settings
 
     def __call__(self, robot: Robot) -> Policy:
         """Its policy without noise.
@@ -106,6 +96,23 @@ class Agent:
             with drawing.own():
                 model.learn(left, reset_num_timesteps=not scaled.episodes)
             yield Checkpoint(scaled.episodes, scaled.steps, policy)
+
+
+SAC, TD3 = (
+    Entry(
+        name,
+        lambda robot, name=name, **values: Agent(name, values)(robot),
+        {**SETTING, "reward": REWARD[name]},
+    )
+    for name in AGENTS
+)
+ENTRIES = {"SAC": SAC, "TD3": TD3}
+
+
+def agent(name: str) -> Agent:
+    """An agent by its name, such as "SAC[reward=0.1]"."""
+    one = entry(name, ENTRIES)
+    return Agent(one.name, one.settings)
 
 
 def seen(observation: Vector) -> Vector:

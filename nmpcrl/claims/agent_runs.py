@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nmpcrl.analysis import judgements, kept
+from nmpcrl.analysis import kept
 from nmpcrl.analysis.agent_curves import KEPT, Curve, curve
-from nmpcrl.analysis.agents import Agent, require
-from nmpcrl.analysis.entries import called, entry_with
+from nmpcrl.analysis.agents import ENTRIES, require
+from nmpcrl.analysis.agents import agent as agent_named
 from nmpcrl.analysis.kept import Wanted
-from nmpcrl.analysis.leaderboard import HELD_OUT
+from nmpcrl.analysis.suite import HELD_OUT, LAYOUTS, entry
+from nmpcrl.analysis.suite import seed_of as seed_in
 from nmpcrl.claims import agent_published
 from nmpcrl.claims.agent_published import order
 from nmpcrl.claims.agent_questions import AGENTS, EVERY, LONG, PARTS, SETTINGS, SPARING
@@ -37,7 +38,7 @@ class NotTuned(Refusal):
 
 def trained_in(place: str) -> dict[str, Centres]:
     """The layouts of a place."""
-    return dict(TUNE) if place == EVERY else {place: judgements.LAYOUTS[place]}
+    return dict(TUNE) if place == EVERY else {place: LAYOUTS[place]}
 
 
 def judged_in(place: str) -> dict[str, Centres]:
@@ -47,12 +48,12 @@ def judged_in(place: str) -> dict[str, Centres]:
 
 def seed_of(place: str, k: int) -> int:
     """The seed number k of a place; of a layout it is that of the suite."""
-    return 6 * HELD_OUT + k if place == EVERY else judgements.seed_of(place, k)
+    return 6 * HELD_OUT + k if place == EVERY else seed_in(place, k)
 
 
 def settings(agent: str) -> tuple[str, ...]:
     """The names that an agent has in its tuning, that of the one it ships with first."""
-    return tuple(called(agent, setting) for setting in SETTINGS[agent])
+    return tuple(str(ENTRIES[agent].with_settings(**one)) for one in SETTINGS[agent])
 
 
 def chosen(agent: str) -> str:
@@ -85,10 +86,9 @@ def _published(names: Iterable[str]) -> dict[str, list[float]]:
 
 def sparing(name: str) -> str:
     """An agent with its setting, but at most `SPARING` gradient steps a step."""
-    made = entry_with(name)
-    assert isinstance(made, Agent)
-    gradient = min(made.values["gradient"], SPARING)
-    return called(made.name, {**made.values, "gradient": gradient})
+    made = entry(name, ENTRIES)
+    gradient = min(made.settings["gradient"], SPARING)
+    return str(made.with_settings(gradient=gradient))
 
 
 def wanted(part: str) -> tuple[Wanted, ...]:
@@ -162,8 +162,7 @@ def price(runs: Iterable[Wanted], measured: Mapping[Wanted, Curve]) -> float:
 
 def _seconds(one: Wanted) -> float:
     part, _, name = one.entry.partition(": ")
-    made = entry_with(name)
-    assert isinstance(made, Agent)
+    made = agent_named(name)
     gradient = made.values["gradient"] * paper.STEPS
     judged = len(judged_in(one.layout)) * len(PARTS[part].checkpoints) * ROLLOUT
     return one.budget * (gradient * SECONDS[made.name] + ELSE) + judged

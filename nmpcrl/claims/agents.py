@@ -12,7 +12,7 @@ import pandas as pd
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.agent_curves import THERE
-from nmpcrl.analysis.leaderboard import TOLERANCE
+from nmpcrl.analysis.suite import TOLERANCE
 from nmpcrl.claims import remedies
 from nmpcrl.claims.agent_questions import (
     AGENT_QUESTIONS,

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nmpcrl.analysis.leaderboard import TOLERANCE
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
+from nmpcrl.analysis.suite import TOLERANCE
 from nmpcrl.claims.population import Answer, by_share
 from nmpcrl.claims.remedy_questions import (
     ADVISED,

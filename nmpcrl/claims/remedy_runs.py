@@ -10,10 +10,10 @@ from typing import Any
 import pandas as pd
 
 from nmpcrl.analysis import kept
-from nmpcrl.analysis.entries import called
-from nmpcrl.analysis.judgements import judge_all, seed_of, stored
+from nmpcrl.analysis.judgements import judge_all, stored
 from nmpcrl.analysis.kept import Wanted
-from nmpcrl.analysis.leaderboard import Judged
+from nmpcrl.analysis.suite import ENTRIES, Judgement, seed_of
+from nmpcrl.analysis.suite import entry as entry_named
 from nmpcrl.claims.remedies import COLUMNS, best_setting
 from nmpcrl.claims.remedy_questions import PARTS, SETTINGS, YARDSTICK, YARDSTICK_SEED
 from nmpcrl.study.storage.refusal import Refusal
@@ -36,7 +36,7 @@ def yardsticks(parts: Iterable[str] = tuple(PARTS)) -> dict[str, Wanted]:
 
 def settings(entry: str) -> tuple[str, ...]:
     """The names that an entry has in its tuning, that of the one it ships with first."""
-    return tuple(called(entry, setting) for setting in SETTINGS[entry])
+    return tuple(str(ENTRIES[entry].with_settings(**one)) for one in SETTINGS[entry])
 
 
 def tuning(entry: str) -> tuple[Wanted, ...]:
@@ -154,7 +154,7 @@ def table(part: str, entry: str, runs: Iterable[Wanted]) -> pd.DataFrame:
     return pd.DataFrame(found, columns=[*COLUMNS])
 
 
-def _row(part: str, entry: str, one: Wanted, judged: Judged, best: float) -> dict[str, Any]:
+def _row(part: str, entry: str, one: Wanted, judged: Judgement, best: float) -> dict[str, Any]:
     return {
         "part": part, "entry": entry, "name": one.entry, "layout": one.layout,
         "k": one.seed - seed_of(one.layout, 0),
@@ -164,7 +164,7 @@ def _row(part: str, entry: str, one: Wanted, judged: Judged, best: float) -> dic
     }  # fmt: skip
 
 
-def price(runs: Iterable[Wanted], measured: Mapping[Wanted, Judged]) -> float:
+def price(runs: Iterable[Wanted], measured: Mapping[Wanted, Judgement]) -> float:
     """Seconds of processor time that some runs take, by those that are known of the same entry."""
     return kept.price(
         runs,
@@ -175,4 +175,4 @@ def price(runs: Iterable[Wanted], measured: Mapping[Wanted, Judged]) -> float:
 
 
 def _ships(one: Wanted) -> str:
-    return one.entry.partition("[")[0]
+    return entry_named(one.entry).name

@@ -1,38 +1,24 @@
 """`nmpcrl suite`: one row for any learner, tuner or policy."""
 
-from typing import TYPE_CHECKING
-
 import click
 
 from nmpcrl.commands.tables import columns
 from nmpcrl.commands.workers import check
 
-if TYPE_CHECKING:
-    from nmpcrl.analysis.leaderboard import Row
-
-HEAD = ("entry", "layouts", "solved", "gain", "episodes", "CPU time")
-MOVING_HEAD = (HEAD[0], "scenarios", *HEAD[2:], "never inside")
+HEAD: tuple[str, ...] = ("entry", "layouts", "solved", "gain", "episodes", "CPU time")
 
 
 @click.command()
-@click.option("--policy", metavar="ENTRY", help="MODULE:FACTORY, or what ships, such as ES.")
+@click.option("--policy", metavar="ENTRY", help="MODULE:FACTORY, or a shipped entry, such as ES.")
 @click.option("--moving", is_flag=True, help="The 40 scenarios in which obstacles move.")
 @click.option("--budget", type=int, default=300, show_default=True, help="Episodes a layout.")
 @click.option("--layouts", metavar="N", type=int, help="Only the first N of the 120, or 40.")
 @click.option("--seeds", metavar="N", type=int, default=2, show_default=True, help="A layout.")
 @click.option("--workers", metavar="N", type=int, help="Processes; by default one per core.")
-@click.option("--list", "listed", is_flag=True, help="Only list what ships.")
+@click.option("--list", "listed", is_flag=True, help="Only list the shipped entries.")
 @click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
-def suite(
-    policy: str | None,
-    moving: bool,
-    budget: int,
-    layouts: int | None,
-    seeds: int,
-    workers: int | None,
-    listed: bool,
-    yes: bool,
-) -> None:
+def suite(policy: str | None, moving: bool, workers: int | None, listed: bool, yes: bool,
+          **asked: int | None) -> None:  # fmt: skip
     """Judge an entry on 120 layouts or among moving obstacles.
 
     An entry is a learner, a tuner or a policy, and was tuned on neither. FACTORY
@@ -46,30 +32,29 @@ def suite(
       nmpcrl suite --policy CMA-ES --budget 50 --moving
       nmpcrl suite --policy my_tuner:factory --layouts 10
     """
-    from nmpcrl.analysis import leaderboard
-    from nmpcrl.analysis.entries import ENTRIES
+    from nmpcrl.analysis.suite import ENTRIES, judge_all, leaderboard
 
     if listed:
-        for name in ENTRIES:
-            click.echo(name)
+        click.echo("\n".join(ENTRIES))
         return
     if policy is None:
-        raise click.ClickException("--policy says what is judged: MODULE:FACTORY, or what ships")
+        raise click.ClickException("--policy names an entry: MODULE:FACTORY, or a shipped one")
     check(workers, sure=yes)
-    table = leaderboard.MOVING if moving else leaderboard.STILL
-    row = leaderboard.judge(
-        policy, table, budget=budget, layouts=layouts, seeds=seeds, workers=workers
+    judged = judge_all(policy, moving=moving, workers=workers, **asked)  # type: ignore[arg-type]
+    (row,) = leaderboard(judged).itertuples()
+    shares = ("disqualified",) * 2 if row.over else (f"{row.solved:.0%}", f"{row.gain:.1%}")
+    cells: tuple[str, ...] = (
+        row.entry,
+        f"{row.places}",
+        *shares,
+        f"{row.episodes}",
+        f"{row.seconds:.0f} s",
     )
-    lines = [MOVING_HEAD, (*cells(row), f"{row.clear:.0%}")] if moving else [HEAD, cells(row)]
+    lines = [HEAD, cells]
+    if moving:
+        lines = [(HEAD[0], "scenarios", *HEAD[2:], "never inside"), (*cells, f"{row.clear:.0%}")]
     for line in columns(lines, right=frozenset((1, 4, 5))):
         click.echo(line)
-    if row.disqualified:
-        raise click.ClickException(f"{row.entry} is disqualified: {row.disqualified}")
-
-
-def cells(row: "Row") -> tuple[str, ...]:
-    """The words of a row."""
-    said = f"{row.solved:.0%}", f"{row.gain:.1%}"
-    if row.disqualified:
-        said = "disqualified", "disqualified"
-    return (row.entry, str(row.layouts), *said, str(row.episodes), f"{row.seconds:.0f} s")
+    if row.over:
+        said = f"it began more than {asked['budget']} episodes in {row.over}"
+        raise click.ClickException(f"{row.entry} is disqualified: {said}")

@@ -1,14 +1,14 @@
 """Worlds that move, change, or are not the model, as a chapter shows them."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.analysis import leaderboard
 from nmpcrl.analysis.encounters import Encounters
-from nmpcrl.analysis.leaderboard import Judged, Row
+from nmpcrl.analysis.suite import leaderboard
 from nmpcrl.claims.investigation import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report.cited import cited
@@ -85,8 +85,8 @@ def answered(answers: Iterable[Answer]) -> str:
     return answer_items(there, {one.name: one for one in WORLDS.questions}, expected=True)
 
 
-def suite_rows(table: pd.DataFrame) -> dict[tuple[str, str], Row]:
-    """By view and policy the row that the suite makes of published runs among moving obstacles.
+def suite_rows(table: pd.DataFrame) -> dict[tuple[str, str], Any]:
+    """By view and policy the suite's row of published runs among moving obstacles.
 
     Args:
         table: of `studies.worlds`.
@@ -96,15 +96,13 @@ def suite_rows(table: pd.DataFrame) -> dict[tuple[str, str], Row]:
     for view in VIEWS:
         initial = there[there.arm == f"{view} init"].set_index("place").cost
         for policy, entry in ENTRY.items():
-            judged: dict[str, list[Judged]] = {}
-            for one in there[there.arm == f"{view} {policy}"].itertuples():
-                begun = PARTS["moving"].episodes if policy != "init" else 0
-                judged.setdefault(one.place, []).append(
-                    Judged(initial[one.place], one.cost, one.arrived, begun, one.seconds,
-                           inside=one.inside)
-                )  # fmt: skip
-            if judged:
-                found[view, policy] = leaderboard.row(entry, PARTS["moving"].episodes, judged)
+            own = there[there.arm == f"{view} {policy}"]
+            begun = PARTS["moving"].episodes if policy != "init" else 0
+            judged = own.assign(
+                entry=entry, initial=own.place.map(initial), episodes=begun, over=False
+            )
+            if len(judged):
+                (found[view, policy],) = leaderboard(judged).itertuples()
     return found
 
 
@@ -122,8 +120,7 @@ def suite_table(table: pd.DataFrame) -> str:
     return html_table(caption, header, rows, headed=True)
 
 
-def _shares(view: str, row: Row) -> list[str]:
-    assert row.clear is not None
+def _shares(view: str, row: Any) -> list[str]:
     shares = {"solved": row.solved, "gain": row.gain, "never inside": row.clear}
     return [
         cited(f"{one:.1%}" if name == "gain" else f"{one:.0%}", one,

@@ -19,7 +19,7 @@ import pandas as pd
 from scipy.stats import rankdata
 
 from nmpcrl.analysis.encounters import crowding
-from nmpcrl.analysis.leaderboard import scenario_seed
+from nmpcrl.analysis.suite import scenario_seed
 from nmpcrl.claims import investigation
 from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, lower, share
 from nmpcrl.claims.rule import read

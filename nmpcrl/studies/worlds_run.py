@@ -13,9 +13,7 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.analysis.direct_search import cma_es, grid
 from nmpcrl.analysis.encounters import judged
-from nmpcrl.analysis.entries import entry_with
-from nmpcrl.analysis.interaction import Robot
-from nmpcrl.analysis.leaderboard import judge_once
+from nmpcrl.analysis.suite import Robot, entry, judge
 from nmpcrl.claims.investigation import Condition, Row
 from nmpcrl.learning import (
     Diverged,
@@ -140,10 +138,10 @@ def sequence(rate: str, place: str, episodes: int) -> tuple[list[str], list[int]
     return names[: order[-1] + 1], order
 
 
-def begun_anew(rate: str, entry: str, place: str, episodes: int, seed: int) -> Row:
+def begun_anew(rate: str, name: str, place: str, episodes: int, seed: int) -> Row:
     """An entry of the suite in the last layout of a sequence, with the episodes that are left."""
     names, order = sequence(rate, place, episodes)
-    alone = judge_once(entry, JUDGE[names[-1]], episodes - order.index(order[-1]), seed)
+    alone = judge(entry(name), names[-1], seed, episodes - order.index(order[-1]))
     return row(alone.cost / alone.initial, arrived=alone.arrived)
 
 
@@ -186,9 +184,9 @@ def _maker(kind: str, nmpc: Persistent, seed: int, *, recent: bool) -> Callable[
     return lambda factor: learner(nmpc, network, factor * paper.ALPHA)
 
 
-def carry(entry: str, place: str, episodes: int, seed: int) -> Row:
+def carry(name: str, place: str, episodes: int, seed: int) -> Row:
     """The costs of the theta of one layout in all of `JUDGE`, by the paper's own controller."""
-    theta = entry_with(entry)(Robot(JUDGE[place], episodes, seed))
+    theta = entry(name)(Robot(JUDGE[place], episodes, seed))
     assert not callable(theta)  # no policy is carried
     costs = [evaluate(paper.nmpc(each), theta, paper.STEPS).cost for each in JUDGE.values()]
     return row(costs[[*JUDGE].index(place)], series=costs)

@@ -5,8 +5,8 @@ import importlib.util
 import pytest
 
 from nmpcrl.analysis.agent_curves import curve
-from nmpcrl.analysis.interaction import Robot
-from nmpcrl.analysis.leaderboard import judge_once
+from nmpcrl.analysis.agents import ENTRIES
+from nmpcrl.analysis.suite import Robot, entry, judge
 from nmpcrl.study import paper
 from nmpcrl.study.population import TUNE
 
@@ -26,7 +26,7 @@ def small(monkeypatch):
 @pytest.mark.slow
 def test_the_last_checkpoint_is_what_the_suite_says_of_the_entry():
     found = curve(QUICK, A, A, [1, 2], seed=3)
-    judged = judge_once(QUICK, A["A"], 2, 3)
+    judged = judge(entry(QUICK, ENTRIES), "A", 3, 2)
     assert found.costs[-1] == [judged.cost]
     assert found.costs[0] != found.costs[-1]
     assert found.initial == [judged.initial]

@@ -6,11 +6,9 @@ import sys
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.agents import AGENTS, Agent, NoAgents, seen
-from nmpcrl.analysis.entries import ENTRIES, NoSetting, entry_with
-from nmpcrl.analysis.interaction import Robot
-from nmpcrl.analysis.leaderboard import followed, judge_once
-from nmpcrl.study import paper
+from nmpcrl.analysis.agents import AGENTS, ENTRIES, NoAgents, agent, seen
+from nmpcrl.analysis.suite import Robot, followed, judge
+from nmpcrl.study import ParameterError, paper
 from nmpcrl.study.population import TUNE
 from nmpcrl.study.robot import RobotEnv
 
@@ -28,7 +26,7 @@ def small(monkeypatch):
 
 
 def quick(name):
-    return Agent(name, (("gradient", 0.1), ("width", 8)))
+    return agent(f"{name}[gradient=0.1,width=8]")
 
 
 @needs_agents
@@ -57,9 +55,8 @@ def test_episodes_and_steps_are_counted_and_none_is_begun_in_vain():
 
 
 @needs_agents
-def test_an_agent_is_an_entry_whose_policy_is_judged_by_the_cost_of_all_others(monkeypatch):
-    monkeypatch.setitem(ENTRIES, "TD3", quick("TD3"))
-    judged = judge_once("TD3", LAYOUT, 2, 7)
+def test_an_agent_is_an_entry_whose_policy_is_judged_by_the_cost_of_all_others():
+    judged = judge(quick("TD3"), LAYOUT, 7, 2)
     assert judged.episodes == 2
     assert not judged.over
     rollout = followed(Robot(LAYOUT, 1, 7), quick("TD3")(Robot(LAYOUT, 2, 7)))
@@ -92,20 +89,20 @@ def test_what_is_seen_is_turned_with_the_robot_and_says_where_target_and_centres
 
 @needs_agents
 def test_a_share_of_the_turn_rates_bounds_what_is_applied():
-    policy = Agent("TD3", (("turn", 0.25), ("gradient", 0.1)))(Robot(LAYOUT, 2, seed=0))
+    policy = agent("TD3[turn=0.25,gradient=0.1]")(Robot(LAYOUT, 2, seed=0))
     actions = np.array([policy(START + 100 * np.eye(11)[i]) for i in range(11)])
     assert (abs(actions) <= [0.6, np.pi / 8]).all()
 
 
 def test_a_setting_is_refused_that_there_is_not():
-    assert dict(entry_with("SAC[width=32]").setting) == {"width": 32}
-    with pytest.raises(NoSetting, match="width must be a whole number above 0"):
-        entry_with("SAC[width=32.5]")
-    with pytest.raises(NoSetting, match="can be set only reward, turn, gradient, width"):
-        entry_with("SAC[alpha=1]")
+    assert agent("SAC[width=32]").values == {**ENTRIES["SAC"].defaults, "width": 32}
+    with pytest.raises(ParameterError, match=r"width = 32\.5 must be a whole number above 0"):
+        agent("SAC[width=32.5]")
+    with pytest.raises(ParameterError, match="must be one of reward, turn, gradient, width"):
+        agent("SAC[alpha=1]")
 
 
 def test_without_the_extra_one_sentence_says_what_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
     with pytest.raises(NoAgents, match=r"SAC needs stable-baselines3: .* nmpcrl\[agents\]"):
-        Agent("SAC")(Robot(LAYOUT, 1, seed=0))
+        agent("SAC")(Robot(LAYOUT, 1, seed=0))

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis import judgements
-from nmpcrl.analysis.judgements import KEPT, LAYOUTS, judge_all, seed_of, stored
+from nmpcrl.analysis.judgements import KEPT, judge_all, stored
 from nmpcrl.analysis.kept import Wanted
-from nmpcrl.analysis.leaderboard import HELD_OUT, MOST_SEEDS, Judged, judge_once
-from nmpcrl.study.population import JUDGE
+from nmpcrl.analysis.suite import Judgement, entry, judge, seed_of
 
 ONE, OTHER = (Wanted("frozen", 1, name, seed_of(name, 0)) for name in ("J001", "T01"))
-JUDGED = Judged(initial=4000.0, cost=3000.0, arrived=True, episodes=5, seconds=1.0)
+JUDGED = Judgement(initial=4000.0, cost=3000.0, arrived=True, episodes=5, seconds=1.0)
 
 
 @pytest.fixture(autouse=True)
@@ -37,7 +36,7 @@ def counted(monkeypatch):
 def test_what_is_kept_is_what_was_judged():
     found = judge_all([ONE, OTHER], progress=False)
     assert stored([ONE, OTHER]) == found
-    assert found[ONE].cost == judge_once("frozen", LAYOUTS["J001"], 1, ONE.seed).cost
+    assert found[ONE].cost == judge(entry("frozen"), "J001", ONE.seed, 1).cost
 
 
 def test_nothing_is_judged_twice(counted):
@@ -59,7 +58,7 @@ def test_what_was_interrupted_goes_on(counted, monkeypatch):
 
 
 def test_a_failed_solve_is_kept_as_infinite(counted, monkeypatch):
-    failed = Judged(initial=4000.0, cost=np.inf, arrived=False, episodes=5, seconds=1.0)
+    failed = Judgement(initial=4000.0, cost=np.inf, arrived=False, episodes=5, seconds=1.0)
     monkeypatch.setattr(judgements, "judge_named", lambda one: failed)
     judge_all([ONE], progress=False)
     assert stored([ONE])[ONE].cost == np.inf
@@ -96,13 +95,3 @@ def test_settings_and_budgets_have_files_of_their_own():
     others = [ONE._replace(entry="ES"), ONE._replace(entry="ES[alpha=3e-07]"), ONE]
     paths = {KEPT.path_of(one) for one in (*others, ONE._replace(budget=2))}
     assert len(paths) == 4
-
-
-def test_seeds_are_held_out_and_those_of_the_suite_and_no_two_layouts_share_one():
-    seeds = [seed_of(name, k) for name in LAYOUTS for k in (0, 9)]
-    assert len({*seeds}) == len(seeds)
-    assert min(seeds) >= HELD_OUT
-    names = [*JUDGE]
-    assert seed_of(names[3], 1) == HELD_OUT + 3 * MOST_SEEDS + 1
-    with pytest.raises(KeyError):
-        seed_of("nowhere", 0)

@@ -185,7 +185,9 @@ def test_fields_have_their_types_and_the_comments_beside_them():
     assert "features (Vector): phi, the value's gradient in theta, shape (2n + m + 1,)" in list(
         reference._fields(Solution)
     )
-    assert "seed (int): Seed of the noise and of the network." in list(reference._fields(Experiment))
+    assert "seed (int): Seed of the noise and of the network." in list(
+        reference._fields(Experiment)
+    )
 
 
 def test_a_constructor_shows_defaults_that_can_be_read():

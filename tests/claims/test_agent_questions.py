@@ -1,7 +1,6 @@
 """What is asked of SAC and TD3 is complete."""
 
 from nmpcrl.analysis import agents
-from nmpcrl.analysis.entries import called
 from nmpcrl.claims import remedy_questions
 from nmpcrl.claims.agent_questions import AGENTS, EVERY, LONG, PARTS, SEARCH, SEARCHED, SETTINGS
 from nmpcrl.study import paper
@@ -11,7 +10,7 @@ from nmpcrl.study.population import JUDGE, TUNE
 def test_each_agent_has_as_many_settings_as_a_remedy_the_one_it_ships_with_first():
     assert AGENTS == agents.AGENTS
     for agent in AGENTS:
-        names = [called(agent, setting) for setting in SETTINGS[agent]]
+        names = [str(agents.ENTRIES[agent].with_settings(**setting)) for setting in SETTINGS[agent]]
         assert names[0] == agent
         assert len({*names}) == remedy_questions.RUNS_OF_TUNING
 

@@ -4,7 +4,7 @@ import pytest
 
 from nmpcrl.analysis import judgements
 from nmpcrl.analysis.judgements import KEPT, stored
-from nmpcrl.analysis.leaderboard import Judged
+from nmpcrl.analysis.suite import Judgement
 from nmpcrl.claims import remedy_runs
 from nmpcrl.claims.remedy_questions import PARTS, SETTINGS, YARDSTICK
 from nmpcrl.claims.remedy_runs import (
@@ -31,7 +31,7 @@ def quick(tmp_path, monkeypatch, trains_here):
         cost = {YARDSTICK: 3000.0}.get(one.budget, 3500.0)
         if one.entry == settings("ES")[1]:
             cost = 3200.0
-        return Judged(4000.0, cost, True, min(one.budget, 50), seconds=2.0)
+        return Judgement(4000.0, cost, True, min(one.budget, 50), seconds=2.0)
 
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
     monkeypatch.setattr(judgements, "judge_named", judge)

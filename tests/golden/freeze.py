@@ -17,9 +17,10 @@ import numpy as np
 import pandas as pd
 from plain_values import array, plain, plain_name, processor, short, table
 
-from nmpcrl.analysis import judgements, other_problems
+from nmpcrl.analysis import other_problems
 from nmpcrl.analysis.difficulty import raised_cost
 from nmpcrl.analysis.statistics import interquartile_mean
+from nmpcrl.analysis.suite import seed_of
 from nmpcrl.bench import problem_times, sweep
 from nmpcrl.claims import (
     agent_published,
@@ -521,7 +522,12 @@ def saved_with_a_wrong_model() -> Any:
 @entry("worlds")
 def rows_among_moving_obstacles() -> Any:
     found = world_report.suite_rows(changing())
-    return {plain_name(name): row for name, row in found.items()}
+    renamed = {"places": "layouts", "over": "disqualified"}
+    return {
+        plain_name(name): {renamed.get(key, key): value for key, value in row._asdict().items()
+                           if key != "Index"}
+        for name, row in found.items()
+    }  # fmt: skip
 
 
 @entry("worlds")
@@ -668,7 +674,7 @@ def seeds() -> Any:
     named = (*LAYOUTS, *paper.LAYOUTS)
     where = {part: [*one.places] for part, one in worlds.PARTS.items()}
     return {
-        "remedies": short([judgements.seed_of(place, 0) for place in named]),
+        "remedies": short([seed_of(place, 0) for place in named]),
         "agents": [agent_runs.seed_of(place, 1) for place in (agent_questions.EVERY, "A", "J001")],
         "worlds": {part: short([worlds.WORLDS.seed(place, 1) for place in places])
                    for part, places in where.items()},

@@ -57,7 +57,7 @@ def test_the_suites_table_has_a_row_of_each_view_and_policy_that_is_published():
     found = worlds.suite_rows(table)
     assert [*found] == [("extrapolated", "init"), ("extrapolated", "ES")]
     row = found["extrapolated", "ES"]
-    assert (row.entry, row.layouts, row.solved.value, row.clear.value) == ("ES", 2, 1.0, 0.0)
+    assert (row.entry, row.places, row.solved.value, row.clear.value) == ("ES", 2, 1.0, 0.0)
     assert row.gain.value == pytest.approx(0.1)
     assert found["extrapolated", "init"].clear.value == 1.0
     assert worlds.suite_table(table).count("<tr>") == 3

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from nmpcrl.analysis.leaderboard import Judged
+from nmpcrl.analysis.suite import Judgement
 from nmpcrl.claims.remedies import Advice
 from nmpcrl.claims.remedy_questions import ADVISED, FIRST, NEVER, PARTS, SECOND
 from nmpcrl.report.figures.style import (
@@ -53,7 +53,7 @@ def gains(advice: Sequence[Advice]) -> Figure:
 
 
 @page
-def by_budget(budgets: Sequence[int], returned: Mapping[str, Sequence[Judged]]) -> Figure:
+def by_budget(budgets: Sequence[int], returned: Mapping[str, Sequence[Judgement]]) -> Figure:
     """One line an entry: the cost of what it returns, in parts of theta_init's, over the budget.
 
     Args:
@@ -82,7 +82,7 @@ def by_budget(budgets: Sequence[int], returned: Mapping[str, Sequence[Judged]]) 
     return headed(figure, _cheapest(budgets, returned))
 
 
-def _cheapest(budgets: Sequence[int], returned: Mapping[str, Sequence[Judged]]) -> str:
+def _cheapest(budgets: Sequence[int], returned: Mapping[str, Sequence[Judgement]]) -> str:
     """Who costs least with the whole budget, in a title."""
     last = {name: each[-1] for name, each in returned.items()}
     best = min(last, key=lambda name: last[name].cost)

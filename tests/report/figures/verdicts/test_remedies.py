@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from nmpcrl.analysis.leaderboard import Judged
 from nmpcrl.analysis.statistics import Estimate
+from nmpcrl.analysis.suite import Judgement
 from nmpcrl.claims.remedies import Advice, RemedyRow
 from nmpcrl.claims.remedy_questions import ADVISED, FIRST, NEVER, SECOND
 from nmpcrl.report.figures.verdicts.remedies import DEAREST, by_budget, gains
@@ -35,8 +35,8 @@ def test_the_title_says_what_to_try_and_an_arrow_marks_what_is_beyond_the_panel(
 
 def test_what_did_not_arrive_is_crossed_and_what_costs_too_much_stands_at_the_edge():
     made = [
-        Judged(100.0, 95.0, arrived=True, episodes=5, seconds=0.1),
-        Judged(100.0, 150.0, arrived=False, episodes=10, seconds=0.2),
+        Judgement(100.0, 95.0, arrived=True, episodes=5, seconds=0.1),
+        Judgement(100.0, 150.0, arrived=False, episodes=10, seconds=0.2),
     ]
     figure = by_budget([5, 10], {"ES": made, "grid": [made[0], made[0]]})
     assert figure.get_suptitle() == "With 10 episodes grid costs least: 95% of the start's cost"

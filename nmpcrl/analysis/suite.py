@@ -1,0 +1,582 @@
+"""The suite: any learner, tuner or policy, judged where it was not tuned, within a budget.
+
+An entry gets a `Robot` in one place, spends at most the budget of episodes, and returns theta or a
+policy, which a rollout without noise judges. A place is a layout of the obstacles or a scenario in
+which they move; it is *solved* if under every seed the robot ends at the target and the rollout
+costs no more than under theta_init. Intervals are over places.
+
+    >>> judge(entry("CMA-ES[spread=0.1]"), "J001", seed_of("J001", 0), 50).cost  # doctest: +SKIP
+"""
+
+import importlib
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.analysis.direct_search import NEARBY, PERTURBED, SEARCHES, STEP
+from nmpcrl.analysis.encounters import count
+from nmpcrl.analysis.policy_search import LOWER, SCALE, SPREAD, UPPER
+from nmpcrl.analysis.statistics import interquartile_mean, rate
+from nmpcrl.control import SolverError, Task
+from nmpcrl.learning import Diverged, Exploration, Learner, Step, Weights, policy_gradient, train
+from nmpcrl.learning.gauss_newton import TrustRegion, closed_loop, lstd_q_within
+from nmpcrl.learning.remedies import (
+    REGULARISATION,
+    averaged,
+    directed,
+    guarded,
+    judged_theta,
+    normalised_ges,
+    tdrc,
+    undo,
+)
+from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
+from nmpcrl.learning.training import absurd
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.geometry import Centres
+from nmpcrl.study.jobs import Failed, parallel
+from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.motions import centres, extrapolated
+from nmpcrl.study.parameters import refused, shortened, whole
+from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.scenarios import Scenario, load
+from nmpcrl.study.setup import prepare
+from nmpcrl.study.storage.refusal import Refusal
+from nmpcrl.study.world import TASK, World, controller
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+EPISODES, SEEDS = 300, 2  # a place and seed; a place
+MOST_EPISODES, MOST_SEEDS = 10_000, 100
+HELD_OUT = 1_000_000  # the first seed; the study's are below 100
+TOLERANCE = 1e-9  # of a cost that must not exceed another
+EPOCH = 1  # raised by hand where an edit of the suite or its entries changes a number
+LAYOUTS: Mapping[str, Centres] = {**JUDGE, **TUNE, **paper.LAYOUTS}
+THETA = np.array(paper.THETA_INIT)
+BOUNDS = (LOWER, UPPER)  # of theta where a step may be long
+
+Policy = Callable[[Vector], Vector]  # observation of `nmpcrl/Robot-v0` -> action
+Change = Callable[..., Learner]  # (learner, robot, **settings)
+
+
+class OverBudget(Refusal):
+    """An episode was begun beyond the budget."""
+
+
+class NoEntry(Refusal):
+    """An entry cannot be imported, or raised an error."""
+
+
+# The robot that an entry is given.
+
+
+class Robot:
+    """The robot in one place, with a budget of episodes.
+
+    An episode counts from its first step, whether it trains, confirms or tunes: by `train`, by
+    `rollout` and `cost`, or by a reset of `env`. Among obstacles that move the controller plans
+    with the velocity of each obstacle seen since the step before, and `task` has no obstacle.
+    """
+
+    def __init__(self, place: str | Centres, budget: int, seed: int) -> None:
+        """Place the robot.
+
+        Args:
+            place: name of a layout or of a scenario (J001, T01, A, M01), or centres [m].
+            budget: episodes that may be begun.
+            seed: of all that an entry draws.
+        """
+        self.motions: Scenario = load().get(place, ()) if isinstance(place, str) else ()
+        self.budget, self.seed, self.begun = budget, seed, 0
+        self.rng = np.random.default_rng(seed)
+        if self.motions:
+            first = centres(self.motions, 0)[0].tolist()
+            self.centres: Centres = tuple((x, y) for x, y in first)
+            self.task: Task = TASK
+            self.controller: Persistent = controller(len(self.motions))
+        else:
+            self.centres = LAYOUTS[place] if isinstance(place, str) else place
+            self.task = paper.task_among(self.centres)
+            self.controller = Persistent(paper.controller(self.task))
+
+    @property
+    def left(self) -> int:
+        """Episodes that may still be begun."""
+        return max(self.budget - self.begun, 0)
+
+    def train(
+        self,
+        learner: Learner,
+        weights: Weights,
+        explore: Exploration,
+        *,
+        constrained: bool = False,
+    ) -> Iterator[Step]:
+        """`learning.train` in this place.
+
+        Raises:
+            OverBudget: an episode is begun beyond the budget.
+            Diverged: as `learning.train`.
+        """
+        return train(
+            learner, self.controller, weights, explore, constrained=constrained, **self._world()
+        )
+
+    def rollout(self, theta: Vector) -> Rollout:
+        """`learning.evaluate`: an episode without noise under the policy of theta.
+
+        Raises:
+            OverBudget: it is beyond the budget.
+        """
+        return evaluate(self.controller, theta, paper.STEPS, **self._world())
+
+    def cost(self, theta: Vector) -> float:
+        """The summed cost of `rollout`; infinite where a solve failed."""
+        return self.rollout(theta).cost
+
+    def env(self) -> Any:
+        """`nmpcrl/Robot-v0` in this place; every reset counts as an episode."""
+        from nmpcrl.study.robot import RobotEnv  # Gymnasium, which few entries need
+
+        robot = self
+
+        class Counted(RobotEnv):
+            """The environment; a reset beyond the budget raises OverBudget."""
+
+            def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+                robot._begin()
+                return super().reset(seed=seed, options={"layout": robot.centres})
+
+        return Counted(self.centres, motions=self.motions)
+
+    def _world(self) -> dict[str, Any]:
+        """The environment of one call of `train` or `evaluate`."""
+        if not self.motions:
+            return {"start": self._begin}
+        world = World(self.motions, extrapolated)
+
+        def begin(rng: np.random.Generator) -> Vector:
+            self._begin()
+            return world.begin(rng)
+
+        return {**world.environment, "start": begin}
+
+    def _begin(self, _: Any = None) -> Vector:
+        """Count an episode and return its first state."""
+        self.begun += 1
+        if self.begun > self.budget:
+            raise OverBudget(f"episode {self.begun} was begun with a budget of {self.budget}")
+        return self.task.start
+
+
+# Entries.
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """A learner, tuner or policy with its settings; called with a `Robot` it returns what it found.
+
+    >>> str(ENTRIES["CMA-ES"].with_settings(spread=0.1))
+    'CMA-ES[spread=0.1]'
+    """
+
+    name: str
+    run: Callable[..., Any]  # (robot, **settings) -> theta or `Policy`
+    defaults: Mapping[str, float] = field(default_factory=dict)
+    changed: Mapping[str, float] = field(default_factory=dict)  # settings that differ from these
+
+    def with_settings(self, **settings: float) -> "Entry":
+        """The entry with other settings.
+
+        Raises:
+            ParameterError: there is no such setting, or its value is not above 0.
+        """
+        for key, value in settings.items():
+            if key not in self.defaults:
+                known = f"one of {', '.join(self.defaults)}" if self.defaults else "absent"
+                raise refused("setting", key, f"{known} for entry {self.name!r}")
+            whole = isinstance(self.defaults[key], int)
+            if not 0 < value < np.inf or (whole and value != int(value)):
+                raise refused(key, value, f"a {'whole' if whole else 'finite'} number above 0")
+        both = {**self.defaults, **self.changed, **settings}
+        other = {key: both[key] for key, value in self.defaults.items() if both[key] != value}
+        return replace(self, changed=other)
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """All settings by name."""
+        return {**self.defaults, **self.changed}
+
+    def __call__(self, robot: Robot) -> Any:
+        """Theta, or a policy; spends at most the robot's budget."""
+        return self.run(robot, **self.settings)
+
+    def __str__(self) -> str:
+        """The name in published tables, such as "ES[alpha=3e-07]"."""
+        changed = ",".join(f"{key}={value:g}" for key, value in self.changed.items())
+        return f"{self.name}[{changed}]" if changed else self.name
+
+
+def learned(
+    robot: Robot, *, learner: str = "ES", change: Change | None = None, **settings: float
+) -> Vector:
+    """Train a learner of the study, changed or not, as long as the budget lasts.
+
+    Args:
+        robot: where.
+        learner: its name in the study.
+        change: (learner, robot, **settings) -> the learner that is trained.
+        settings: alpha, to which beta of GES and TDC keeps its ratio; `every`, the episodes
+            between two rollouts that confirm and count; others for `change`.
+
+    Returns:
+        The last theta with which a solver can be called.
+    """
+    every = int(settings.get("every", 0))
+    episodes = (robot.budget - 1) * every // (every + 1) if every else robot.budget
+    factor = settings.get("alpha", paper.ALPHA) / paper.ALPHA
+    experiment = Experiment(
+        learner=learner,
+        seed=robot.seed,
+        episodes=max(episodes, 1),
+        layout=robot.centres,
+        alpha=factor * paper.ALPHA,
+        beta=factor * paper.BETA,
+        beta_tdc=factor * paper.BETA_TDC,
+    )
+    made, weights, explore = prepare(experiment, robot.controller)
+    made = change(made, robot, **settings) if change else made
+    if not episodes:
+        return weights.theta
+    try:
+        for step in robot.train(made, weights, explore, constrained=experiment.values_actions):
+            weights = weights if absurd(step.weights) else step.weights
+    except Diverged:
+        pass
+    return judged_theta(weights)
+
+
+def trust_region(radius: float) -> TrustRegion:
+    """The trust region of every entry that takes Gauss-Newton steps; the radius is in `SCALE`s."""
+    return TrustRegion(radius, SCALE)
+
+
+def lstd_q(_: Learner, robot: Robot, radius: float, **__: float) -> Learner:
+    """Gauss-Newton steps on the TD error."""
+    return lstd_q_within(robot.controller, trust_region(radius), bounds=BOUNDS)
+
+
+def gn_j(_: Learner, robot: Robot, radius: float, **__: float) -> Learner:
+    """Gauss-Newton steps on the cost of the closed loop."""
+    return closed_loop(robot.controller, trust_region(radius), BOUNDS)
+
+
+def undone(change: Change) -> Change:
+    """`change`, and steps after which a confirming rollout costs more are undone."""
+    return lambda learner, robot, every, **settings: undo(
+        change(learner, robot, **settings), robot.cost, int(every)
+    )
+
+
+def searched(robot: Robot, *, search: str, **settings: float) -> Vector:
+    """The theta whose rollout cost least in a direct search from theta_init."""
+    return SEARCHES[search](robot.cost, THETA, robot.budget, robot.seed, **settings)
+
+
+ALPHA, RADIUS, EVERY = {"alpha": paper.ALPHA}, {"radius": 0.3}, {"every": 1}
+CHANGES: Mapping[str, tuple[str, Change, dict[str, float]]] = {  # learner, change and settings
+    "TDRC": (
+        "ES",
+        lambda _, robot, **settings: tdrc(robot.controller, **settings),
+        {**ALPHA, "regularisation": REGULARISATION},
+    ),
+    "GES-3": (
+        "ES",
+        lambda _, robot, **settings: normalised_ges(robot.controller, **settings),
+        {**ALPHA, "ratio": 3.0},
+    ),
+    "guarded-ES": ("ES", lambda learner, _, alpha: guarded(learner, alpha), ALPHA),
+    "guarded-RDES": ("RDES", lambda learner, _, alpha: guarded(learner, alpha), ALPHA),
+    "control-RDES": (
+        "RDES", lambda learner, _, alpha: directed(guarded(learner, alpha), alpha), ALPHA,
+    ),
+    "averaged-ES": (
+        "ES",
+        lambda learner, robot, **_: averaged(learner, skip=robot.budget * paper.STEPS // 2),
+        ALPHA,
+    ),
+    "undone-ES": ("ES", undone(lambda learner, *_, **__: learner), ALPHA | EVERY),
+    "undone-LSTD-Q": ("ES", undone(lstd_q), RADIUS | EVERY),
+    "GN-J": ("ES", gn_j, RADIUS),
+    "undone-GN-J": ("ES", undone(gn_j), RADIUS | EVERY),
+    "DPG": (
+        "ES",
+        lambda _, robot, radius: policy_gradient(
+            robot.controller, optimiser=trust_region(radius), bounds=BOUNDS
+        ),
+        RADIUS,
+    ),
+}  # fmt: skip
+SEARCHED: Mapping[str, dict[str, float]] = {
+    "SPSA": {"step": STEP, "perturbed": PERTURBED}, "CMA-ES": {"spread": SPREAD},
+    "Bayes": {"nearby": NEARBY},
+}  # fmt: skip
+ENTRIES: Mapping[str, Entry] = {
+    one.name: one
+    for one in (
+        Entry("frozen", lambda _: THETA.copy()),
+        Entry("grid", partial(searched, search="grid")),
+        *(Entry(name, partial(learned, learner=name), ALPHA)
+          for name in ("ES", "GES", "TDC", "RDES", "DES")),
+        *(Entry(name, partial(learned, learner=learner, change=change), settings)
+          for name, (learner, change, settings) in CHANGES.items()),
+        *(Entry(name, partial(searched, search=name), settings)
+          for name, settings in SEARCHED.items()),
+    )
+}  # fmt: skip
+
+
+def entry(name: str, known: Mapping[str, Entry] = ENTRIES) -> Entry:
+    """An entry by its name: "ES", "CMA-ES[spread=0.1]", or "my_module:factory".
+
+    A factory is a function of a `Robot`; the working directory is searched for its module, too.
+
+    Raises:
+        ParameterError: there is no such entry or setting.
+        NoEntry: the module cannot be imported.
+    """
+    base, bracket, inner = name.partition("[")
+    if base in known:
+        pairs = [one.split("=") for one in inner.removesuffix("]").split(",")] if bracket else []
+        try:
+            settings = {key.strip(): float(value) for key, value in pairs}
+        except ValueError:
+            raise refused("entry", name, "of the form ES[alpha=3e-7]") from None
+        return known[base].with_settings(**settings)
+    module, _, attribute = name.partition(":")
+    if not module or not attribute:
+        raise refused("entry", name, f"MODULE:FACTORY or one of {', '.join(known)}")
+    sys.path.insert(0, here := str(Path.cwd()))
+    try:
+        factory = getattr(importlib.import_module(module), attribute)
+    except (Exception, SystemExit) as error:  # whatever the module raises
+        raise NoEntry(f"entry = {name!r} cannot be imported: {_short(error)}") from error
+    finally:
+        sys.path.remove(here)
+    if not callable(factory):
+        raise refused("entry", name, f"the name of a function of a Robot, not of {factory!r}")
+    return Entry(name, factory)
+
+
+# Judging.
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """An entry in one place with one seed."""
+
+    initial: float  # cost under theta_init
+    cost: float  # infinite where a solve failed
+    arrived: bool
+    episodes: int  # begun
+    seconds: float  # of processor time
+    over: bool = False  # whether more episodes were begun than the budget
+    inside: int = 0  # states in an obstacle that moves
+
+
+def gain(judged: Any) -> Any:
+    """Share of theta_init's cost that is saved, of a `Judgement` or of a table of them."""
+    return 1 - judged.cost / judged.initial
+
+
+def solved(judged: Any) -> Any:
+    """Whether the robot ends at the target and costs no more than under theta_init; as `gain`."""
+    return judged.arrived & (judged.cost <= judged.initial * (1 + TOLERANCE))
+
+
+def judge(one: Entry | Callable[[Robot], Any], place: str | Centres, seed: int,
+          episodes: int) -> Judgement:  # fmt: skip
+    """Give an entry its robot, and judge what it returns by a rollout without noise.
+
+    Args:
+        one: the entry.
+        place: as in `Robot`.
+        seed: of all that is drawn.
+        episodes: the budget.
+
+    Raises:
+        ParameterError: the entry returns neither theta nor a policy.
+    """
+    robot, judging = Robot(place, episodes, seed), Robot(place, 2, seed)
+    initial, seconds, began = judging.cost(THETA), 0.0, time.process_time()
+    try:
+        found = one(robot)
+        seconds = time.process_time() - began
+        rollout = _rollout(judging, found)
+    except OverBudget as error:
+        rollout = _failed(error)
+    arrived = not rollout.failure and judging.task.distance(rollout.states[-1]) <= ARRIVED
+    inside = count(rollout.states, robot.motions).inside if robot.motions else 0
+    return Judgement(
+        initial, rollout.cost, bool(arrived), min(robot.begun, episodes), seconds,
+        robot.begun > episodes, inside,
+    )  # fmt: skip
+
+
+def seed_of(place: str, k: int) -> int:
+    """The k-th seed of a place; no two places share one.
+
+    Raises:
+        KeyError: there is no such place.
+    """
+    for further, names in enumerate((JUDGE, TUNE, paper.LAYOUTS)):
+        if place in names:
+            return HELD_OUT * (1 + further) + MOST_SEEDS * [*names].index(place) + k
+    if place in load():
+        return scenario_seed(place, k)
+    raise KeyError(place)
+
+
+def scenario_seed(place: str, k: int) -> int:
+    """The k-th seed of a place of the worlds that change, scenario, sequence or layout."""
+    return 5 * HELD_OUT + 1000 * (100 * ord(place[0]) + int(place[1:])) + k
+
+
+def judge_all(
+    name: str,
+    *,
+    moving: bool = False,
+    budget: int = EPISODES,
+    layouts: int | None = None,
+    seeds: int = SEEDS,
+    workers: int | None = None,
+    progress: bool = True,
+) -> "pd.DataFrame":
+    """Judge an entry in every place of the suite with every seed; one row a judgement.
+
+    Args:
+        name: as `entry` takes it.
+        moving: whether in the scenarios in which obstacles move, not in the layouts of `JUDGE`.
+        budget: episodes in each place with each seed.
+        layouts: the first so many places; all if absent.
+        seeds: a place.
+        workers: processes; as many as there are cores if absent.
+        progress: whether to show a bar.
+
+    Returns:
+        Columns entry, place, k and those of `Judgement`: the same twice but for `seconds`.
+
+    Raises:
+        ParameterError: an argument is not what it may be.
+        NoEntry: the entry cannot be imported, or raised an error.
+    """
+    import pandas as pd
+
+    places = load() if moving else JUDGE
+    budget = whole(1, MOST_EPISODES).check("budget", budget)
+    seeds = whole(1, MOST_SEEDS).check("seeds", seeds)
+    if layouts is not None:
+        layouts = whole(1, len(places)).check("layouts", layouts)
+    entry(name)
+    jobs = [(place, k) for place in islice(places, layouts) for k in range(seeds)]
+    try:
+        found = dict(parallel(partial(_judge, name, budget), jobs, workers, name * progress))
+    except Failed as error:
+        (place, _), why, _ = error.failures[0]
+        raise NoEntry(f"entry = {name!r} failed in {place}: {shortened(why)}") from None
+    return pd.DataFrame(
+        [{"entry": name, "place": job[0], "k": job[1], **asdict(found[job])} for job in jobs]
+    )
+
+
+def leaderboard(judged: "pd.DataFrame") -> "pd.DataFrame":
+    """One row an entry.
+
+    Args:
+        judged: columns entry, place and those of `Judgement`.
+
+    Returns:
+        Columns entry, places, solved (share of the places), gain (interquartile mean over places
+        of the mean over seeds), episodes (most in any place), seconds (in all), clear (share of
+        the places in which no state is in a moving obstacle) and over (the first place in which
+        the budget was exceeded, or ""); shares are `Estimate`s.
+    """
+    import pandas as pd
+
+    rows = []
+    for name, of_entry in judged.groupby("entry", sort=False):
+        places = [each for _, each in of_entry.groupby("place", sort=False)]
+        gains = np.array([np.mean(gain(each).to_numpy()) for each in places])
+        rows.append(
+            {
+                "entry": name,
+                "places": len(places),
+                "solved": rate(sum(bool(solved(each).all()) for each in places), len(places)),
+                "gain": interquartile_mean(gains, ["places"] * len(places)),
+                "episodes": int(of_entry.episodes.max()),
+                "seconds": sum(of_entry.seconds),
+                "clear": rate(sum(not each.inside.any() for each in places), len(places)),
+                "over": next(iter(of_entry.place[of_entry.over.astype(bool)]), ""),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def followed(robot: Robot, policy: Policy) -> Rollout:
+    """An episode of a policy in `nmpcrl/Robot-v0`."""
+    env = robot.env()
+    observation, _ = env.reset()
+    actions, costs = [], []
+    over = False
+    while not over:
+        try:
+            action = np.array(policy(observation.copy()), float)
+        except SolverError as error:
+            return _failed(error)
+        observation, reward, _, over, _ = env.step(action)
+        actions.append(action)
+        costs.append(-reward)
+    return Rollout(np.array(env.states[:-1]), np.array(actions), np.array(costs))
+
+
+def _judge(name: str, episodes: int, job: tuple[str, int]) -> Judgement:
+    """`judge` in a worker, which imports the entry by its name."""
+    return judge(entry(name), job[0], seed_of(*job), episodes)
+
+
+def _rollout(robot: Robot, found: Any) -> Rollout:
+    """An episode without noise under theta or a policy.
+
+    Raises:
+        ParameterError: it is neither.
+    """
+    if callable(found):
+        return followed(robot, found)
+    try:
+        theta = np.array(found, float)
+    except (TypeError, ValueError):
+        theta = np.array([np.nan])
+    if theta.shape != THETA.shape or not np.isfinite(theta).all():
+        raise refused("what the entry returned", found, f"{THETA.size} finite numbers or a policy")
+    try:
+        return robot.rollout(theta)
+    except ValueError as error:  # too large for a solver
+        return _failed(error)
+
+
+def _failed(error: Exception) -> Rollout:
+    nothing: Vector = np.zeros((0, 3))
+    return Rollout(nothing, nothing[:, :2], nothing[:, 0], failure=str(error) or "failed")
+
+
+def _short(error: BaseException) -> str:
+    return shortened(f"{type(error).__name__}: {error}")

@@ -1,0 +1,337 @@
+"""The suite: every episode counts, an entry is what its name says, and judgements repeat."""
+
+import importlib.util
+from contextlib import suppress
+from dataclasses import asdict, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nmpcrl.analysis.suite import (
+    ENTRIES,
+    HELD_OUT,
+    LAYOUTS,
+    MOST_SEEDS,
+    Judgement,
+    NoEntry,
+    OverBudget,
+    Robot,
+    entry,
+    gain,
+    judge,
+    judge_all,
+    leaderboard,
+    learned,
+    seed_of,
+    solved,
+)
+from nmpcrl.claims import remedy_published
+from nmpcrl.learning import Exploration, Weights, evaluate, expected_sarsa, train
+from nmpcrl.study import Experiment, ParameterError, paper, published, run
+from nmpcrl.study.population import JUDGE
+from nmpcrl.study.robot import NmpcPolicy
+from nmpcrl.study.scenarios import load
+
+LAYOUT, THETA = paper.LAYOUTS["A"], np.array(paper.THETA_INIT)
+QUICK = ("frozen", "TDRC", "GES-3", "guarded-ES", "averaged-ES", "undone-LSTD-Q")
+GOOD = Judgement(initial=4000.0, cost=3000.0, arrived=True, episodes=5, seconds=1.0)
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Episodes of six steps."""
+    monkeypatch.setattr(paper, "STEPS", 6)
+    defaults = Experiment.__init__.__defaults__
+    shortened = tuple(6 if one == 130 else one for one in defaults)
+    monkeypatch.setattr(Experiment.__init__, "__defaults__", shortened)
+
+
+@pytest.fixture
+def module(tmp_path, monkeypatch):
+    """A module in the working directory, with some text."""
+
+    def write(text):
+        (tmp_path / "of_my_own.py").write_text(text)
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.delitem(__import__("sys").modules, "of_my_own", raising=False)
+
+    return write
+
+
+# The robot.
+
+
+def test_a_robot_trains_and_rolls_out_as_the_library_does_and_begins_no_episode_too_many():
+    robot = Robot("B", 5, 0)
+    noise = Exploration.draw(np.random.default_rng(0), (3, 3, 2))
+    learner, start = expected_sarsa(robot.controller, paper.ALPHA), Weights(THETA, np.zeros(9))
+    known = [*train(learner, robot.controller, start, noise)]
+    training = robot.train(learner, start, noise)
+    assert robot.begun == 0  # until its first step
+    found = [next(training) for _ in range(7)]
+    for one, other in zip(found, known[:7], strict=True):
+        np.testing.assert_array_equal(one.weights.theta, other.weights.theta)
+    assert robot.begun == 3  # the last of which was left early
+    assert robot.cost(THETA) == evaluate(robot.controller, THETA, paper.STEPS).cost
+    _, info = robot.env().reset(options={"layout": "A"})
+    assert info["layout"] == paper.LAYOUTS["B"]
+    assert robot.left == 0
+    for more in (lambda: robot.cost(THETA), lambda: robot.env().reset(),
+                 lambda: next(robot.train(learner, start, noise))):  # fmt: skip
+        with pytest.raises(OverBudget, match=r"episode \d was begun with a budget of 5"):
+            more()
+
+
+def test_among_moving_obstacles_the_environment_is_that_of_a_rollout():
+    robot = Robot("M04", 2, 0)
+    rollout, env = robot.rollout(THETA), robot.env()
+    observation, _ = env.reset()
+    steps = zip(rollout.states, rollout.actions, rollout.costs, strict=True)
+    for t, (state, action, cost) in enumerate(steps):
+        expected = [one(np.array([0.2 * t]))[0] for one in robot.motions]
+        np.testing.assert_allclose(observation, np.r_[state, np.ravel(expected)], atol=1e-12)
+        observation, reward, _, over, _ = env.step(action)
+        assert -reward == cost
+    assert over
+    with pytest.raises(OverBudget):
+        robot.cost(THETA)
+
+
+# Entries.
+
+
+@pytest.mark.usefixtures("short")
+@pytest.mark.parametrize("name", ENTRIES)
+def test_an_entry_spends_its_budget_and_no_more_and_a_setting_makes_a_difference(name):
+    if name == "Bayes" and not importlib.util.find_spec("optuna"):
+        pytest.skip("needs the extra nmpcrl[search]")
+    one, budget = ENTRIES[name], 7
+    others = {key: 2 if isinstance(value, int) else 0.3 * value
+              for key, value in one.defaults.items()}  # fmt: skip
+    kinds = [one, one, *(one.with_settings(**{key: value}) for key, value in others.items())]
+    found = []
+    for each in kinds:
+        robot = Robot(LAYOUT, budget, seed=7)
+        found.append(each(robot))
+        assert robot.begun <= budget
+        assert robot.begun == budget or "undone" in name or name == "frozen"
+        assert np.isfinite(found[-1]).all()
+    np.testing.assert_array_equal(found[0], found[1])
+    if "DES" not in name and name != "undone-ES":  # too few examples here; every step undone
+        assert all((other != found[0]).any() for other in found[2:]), kinds
+    least = Robot(LAYOUT, 1, seed=0)
+    assert one(least).shape == (9,)
+    assert least.begun <= 1
+
+
+@pytest.mark.usefixtures("short")
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("GES", {}),
+        ("QL", {}),
+        ("GES", {"alpha": 3e-7, "beta": 3 * paper.BETA}),
+    ],
+)
+def test_an_entry_is_the_run_of_the_study_and_beta_keeps_its_ratio(name, options):
+    experiment = Experiment(learner=name, episodes=2, seed=3, layout=LAYOUT, **options)
+    options.pop("beta", None)
+    found = learned(Robot(LAYOUT, 2, seed=3), learner=name, **options)
+    np.testing.assert_allclose(found, run(experiment).steps["theta"][-1], rtol=1e-12)
+
+
+def test_an_entry_with_undo_is_no_worse_than_theta_init():
+    robot, judging = Robot(LAYOUT, 7, seed=0), Robot(LAYOUT, 2, seed=0)
+    found = ENTRIES["undone-GN-J"](robot)
+    assert robot.begun == 7  # theta_init's rollout, and three episodes with one each
+    assert judging.cost(found) <= judging.cost(THETA)
+
+
+@pytest.mark.parametrize(
+    ("base", "settings", "name"),
+    [
+        ("ES", {"alpha": 3e-7}, "ES[alpha=3e-07]"),
+        ("ES", {"alpha": paper.ALPHA}, "ES"),
+        ("TDRC", {"regularisation": 1e6, "alpha": 3e-7}, "TDRC[alpha=3e-07,regularisation=1e+06]"),
+        ("SPSA", {"step": 0.3, "perturbed": 0.05}, "SPSA[step=0.3]"),
+        ("undone-LSTD-Q", {"radius": 0.1, "every": 5}, "undone-LSTD-Q[radius=0.1,every=5]"),
+    ],
+)
+def test_the_name_of_an_entry_has_its_settings_and_gives_it_back(base, settings, name):
+    assert str(ENTRIES[base].with_settings(**settings)) == name
+    assert entry(name).settings | settings == entry(name).settings
+    assert (entry(name).name, str(entry(name))) == (base, name)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("grid[step=1]", "setting = 'step' must be absent for entry 'grid'"),
+        ("ES[radius=1]", "setting = 'radius' must be one of alpha for entry 'ES'"),
+        ("ES[alpha]", "must be of the form ES"),
+        ("ES[alpha=-1]", "alpha = -1.0 must be a finite number above 0"),
+        ("undone-ES[every=1.5]", "every = 1.5 must be a whole number above 0"),
+        ("nonsense", "entry = 'nonsense' must be MODULE:FACTORY or one of frozen, grid"),
+        (":factory", "must be MODULE:FACTORY"),
+        ("no_such_module:factory", "cannot be imported: ModuleNotFoundError: No module named"),
+        ("of_my_own:other", "cannot be imported: AttributeError: module 'of_my_own' has no attr"),
+        ("of_my_own:number", "must be the name of a function of a Robot, not of 3"),
+    ],
+)
+def test_what_is_no_entry_is_refused_in_a_sentence(module, name, message):
+    module("number = 3")
+    with pytest.raises((ParameterError, NoEntry), match=message):
+        judge_all(name, progress=False)
+
+
+@pytest.mark.usefixtures("trains_here")
+def test_a_module_or_an_entry_that_fails_says_why_and_where(module):
+    module("raise RuntimeError('not today')")
+    with pytest.raises(NoEntry, match="cannot be imported: RuntimeError: not today"):
+        entry("of_my_own:factory")
+    module("def factory(robot): raise KeyError('x')")
+    with pytest.raises(NoEntry, match="'of_my_own:factory' failed in J001: KeyError: 'x'"):
+        judge_all("of_my_own:factory", layouts=1, seeds=1, progress=False)
+
+
+# Judging.
+
+
+def test_theta_and_a_policy_are_judged_alike_by_the_cost_of_a_rollout():
+    found = judge(lambda robot: THETA, "J001", 1, 3)
+    assert solved(found)
+    assert (gain(found), found.episodes) == (0, 0)
+    assert found.cost == evaluate(paper.nmpc(JUDGE["J001"]), THETA, paper.STEPS).cost
+    assert judge(lambda robot: NmpcPolicy(), "J001", 1, 3).cost == found.cost
+    still = judge(lambda robot: lambda observation: np.zeros(2), "J001", 1, 3)
+    assert not still.arrived
+    assert gain(still) < 0
+    beyond = judge(lambda robot: np.full(9, 1e9), "J001", 1, 3)
+    assert beyond.cost == np.inf
+    assert not solved(beyond)
+
+
+def spend(robot, more=0):
+    """Begin as many episodes as the budget has, or more, and hide the refusal."""
+    for _ in range(robot.budget + more):
+        with suppress(OverBudget):
+            robot.cost(THETA)
+    return THETA
+
+
+def late(robot):
+    """Begin episodes while the policy is judged."""
+    env, policy = robot.env(), NmpcPolicy()
+
+    def act(observation):
+        env.reset()
+        return policy(observation)
+
+    return act
+
+
+@pytest.mark.parametrize(
+    ("factory", "over"), [(spend, False), (lambda robot: spend(robot, 1), True), (late, True)]
+)
+def test_one_episode_too_many_is_seen_even_if_it_is_hidden_or_late(factory, over):
+    found = judge(factory, "J001", 1, 3)
+    assert (found.over, found.episodes) == (over, 3)
+
+
+@pytest.mark.parametrize("answer", [None, 3, np.zeros(8), np.full(9, np.nan), "theta"])
+def test_what_is_neither_theta_nor_a_policy_is_refused(answer):
+    with pytest.raises(ParameterError, match=r"what the entry returned = .* must be 9 finite num"):
+        judge(lambda robot: answer, "J001", 1, 3)
+
+
+@pytest.mark.parametrize(
+    "nonsense", [{"budget": 0}, {"layouts": 121}, {"layouts": 0}, {"seeds": 0}]
+)
+def test_a_number_that_makes_no_sense_is_refused(nonsense):
+    (name,) = nonsense
+    with pytest.raises(ParameterError, match=f"{name} = "):
+        judge_all("ES", **nonsense)
+
+
+@pytest.mark.usefixtures("trains_here")
+def test_two_calls_give_the_same_judgements_but_for_their_time():
+    first, again = (
+        judge_all("CMA-ES", budget=3, layouts=2, progress=False).drop(columns="seconds")
+        for _ in range(2)
+    )
+    pd.testing.assert_frame_equal(first, again, check_exact=True)
+    assert first.episodes.tolist() == [3] * 4
+    assert not first.over.any()
+
+
+@pytest.mark.parametrize(
+    "base", [pytest.param(one, marks=() if one in QUICK else pytest.mark.slow) for one in ENTRIES]
+)
+def test_an_entry_ends_where_the_published_one_did(base):
+    table = remedy_published.load().table
+    known = table[(table.part == "judge 50") & (table.entry == base)].iloc[0]
+    found = judge(entry(known["name"]), known.layout, seed_of(known.layout, known.k), 50)
+    assert found.cost == pytest.approx(known.cost, rel=1e-4)
+    assert (found.episodes, found.arrived) == (known.episodes, known.arrived)
+
+
+@pytest.mark.parametrize(("name", "policy"), [("frozen", "init"), ("grid", "grid"),
+                                              ("CMA-ES", "CMA-ES")])  # fmt: skip
+@pytest.mark.parametrize("place", ["M03", "M04"])
+def test_a_search_among_moving_obstacles_ends_where_the_published_one_did(name, policy, place):
+    table = published.read("worlds")
+    chosen = (table.part == "moving") & (table.arm == f"extrapolated {policy}")
+    known = table[chosen & (table.place == place) & (table.k == 0)].iloc[0]
+    found = judge(entry(name), place, seed_of(place, 0), 50)
+    assert found.cost == pytest.approx(known.cost, rel=1e-4)
+    assert (found.inside, found.arrived) == (known.inside, known.arrived)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ES", "DES", "RDES", "TDRC", "undone-LSTD-Q", "DPG", "SPSA"])
+def test_learners_and_tuners_are_judged_among_moving_obstacles_too(name):
+    found = judge(entry(name), "M03", 0, 3)
+    assert 0 < found.cost < np.inf
+    assert 0 < found.episodes <= 3
+
+
+def test_what_needs_the_papers_own_task_says_so_among_moving_obstacles():
+    with pytest.raises(ValueError, match="GN-J differentiates a task's cost and its plant"):
+        judge(entry("GN-J"), "M03", 0, 3)
+
+
+def test_seeds_are_held_out_and_no_two_places_share_one():
+    seeds = [seed_of(name, k) for name in (*LAYOUTS, *load()) for k in (0, 9)]
+    assert len({*seeds}) == len(seeds)
+    assert min(seeds) >= HELD_OUT
+    assert seed_of("J004", 1) == HELD_OUT + 3 * MOST_SEEDS + 1
+    with pytest.raises(KeyError):
+        seed_of("nowhere", 0)
+
+
+# The leaderboard.
+
+
+def row(judged):
+    """The row of judgements by place."""
+    rows = [{"entry": "x", "place": place, **asdict(one)} for place in judged
+            for one in judged[place]]  # fmt: skip
+    (found,) = leaderboard(pd.DataFrame(rows)).itertuples()
+    return found
+
+
+def test_a_place_is_solved_under_every_seed_and_weighs_the_same_however_many_it_has():
+    missed, poor = replace(GOOD, arrived=False), replace(GOOD, cost=4000.0)
+    found = row({"J001": [GOOD, GOOD], "J002": [GOOD, missed], "J003": [missed, missed]})
+    assert found.solved.value == pytest.approx(1 / 3)
+    assert found.gain.value == pytest.approx(0.25)
+    assert row({"J001": [poor] * 9, "J002": [GOOD]}).gain.value == pytest.approx(0.125)
+    assert [solved(replace(GOOD, cost=GOOD.initial + more)) for more in (0, 1)] == [True, False]
+
+
+def test_a_row_says_where_the_budget_was_exceeded_and_where_no_obstacle_was_entered():
+    over, inside = replace(GOOD, over=True), replace(GOOD, inside=3)
+    assert row({"J001": [GOOD], "J002": [over]}).over == "J002"
+    found = row({"M01": [GOOD, inside], "M02": [GOOD, GOOD]})
+    assert (found.clear.value, found.over, found.seconds) == (0.5, "", 4.0)
