@@ -156,56 +156,37 @@ def test_a_warning_names_the_changed_files_once(monkeypatch, capsys):
     assert said.count("\n") == 1
 
 
-def test_every_field_and_nothing_else_has_an_original_value():
-    names = {field.name for field in fields(Experiment)}
-    assert set(ORIGINAL) == names - {"layout"} | {"obstacles"}
-
-
-def test_the_papers_run_of_es_is_named_by_versions_and_epochs_alone():
+def test_a_key_depends_on_the_fields_that_differ_from_their_original_values():
+    assert {*ORIGINAL} == {field.name for field in fields(Experiment)} - {"layout"} | {"obstacles"}
     assert identity(Experiment()) == {}
+    for name, value in {
+        "seed": 1,
+        "alpha": 2e-7,
+        "steps": 4,
+        "theta": (0.9,) * 9,
+        "learner": "DES",
+        "solver": "ipopt",
+    }.items():
+        assert identity(Experiment(**{name: value})) == {name: value}
+        assert key(Experiment(**{name: value})) != key(Experiment())
+    assert identity(Experiment(layout="B")) == {"obstacles": paper.LAYOUTS["B"]}
+    assert key(Experiment()) != summary_key(Experiment())
 
 
 @pytest.mark.parametrize(
-    ("other", "names"),
+    ("one", "begins"),
     [
-        ({"seed": 1}, {"seed": 1}),
-        ({"alpha": 2e-7}, {"alpha": 2e-7}),
-        ({"steps": 4}, {"steps": 4}),
-        ({"theta": (0.9,) * 9}, {"theta": (0.9,) * 9}),
-        ({"layout": "B"}, {"obstacles": paper.LAYOUTS["B"]}),
-        ({"learner": "DES", "gated": False}, {"learner": "DES", "gated": False}),
-        ({"solver": "ipopt"}, {"solver": "ipopt"}),
+        (Experiment(), "9e79cb1f74"),
+        (Experiment("RDES", layout="B", seed=7, decay="episode", gated=False), "da885a4823"),
+        (Experiment("GES", layout="0.5,2.2 3,0.5", beta=2e-8, box="soft"), "3f1e689524"),
+        (Experiment("TDC", beta_tdc=1e-7, horizon=20, solver="fatrop"), "1a87ffe9e9"),
     ],
 )
-def test_a_key_depends_on_what_differs_from_the_original(other, names):
-    assert identity(Experiment(**other)) == names
-    assert key(Experiment(**other)) != key(Experiment())
-
-
-@pytest.mark.parametrize(
-    ("fields", "begins"),
-    [
-        ({}, "9e79cb1f74"),
-        (
-            {"learner": "RDES", "layout": "B", "seed": 7, "decay": "episode", "gated": False},
-            "da885a4823",
-        ),
-        (
-            {"learner": "GES", "layout": "0.5,2.2 3,0.5", "beta": 2e-8, "box": "soft"},
-            "3f1e689524",
-        ),
-        ({"learner": "TDC", "beta_tdc": 1e-7, "horizon": 20, "solver": "fatrop"}, "1a87ffe9e9"),
-    ],
-)
-def test_stored_runs_keep_their_keys(monkeypatch, fields, begins):
-    """Those of the first epoch and of libraries that are all of version 1."""
+def test_stored_runs_keep_their_keys(monkeypatch, one, begins):
+    """The keys in the first epoch, with libraries that are all of version 1."""
     monkeypatch.setattr(provenance, "installed", lambda _: "1")
     monkeypatch.setattr(provenance, "EPOCHS", dict.fromkeys(provenance.EPOCHS, 1))
-    assert key(Experiment(**fields))[:10] == begins
-
-
-def test_a_run_and_its_summary_have_keys_of_their_own():
-    assert key(Experiment()) != summary_key(Experiment())
+    assert key(one)[:10] == begins
 
 
 def test_the_key_does_not_depend_on_how_a_value_was_written():
@@ -231,7 +212,7 @@ def test_the_centres_of_a_layout_count_and_not_its_letter(monkeypatch):
         ("frozen", {"alpha": 1.0, "beta": 1.0, "ties_active": True, "constrained": True}),
     ],
 )
-def test_what_a_learner_does_not_read_has_no_part_in_the_key(learner, unread):
+def test_fields_that_a_learner_does_not_read_have_no_part_in_the_key(learner, unread):
     one = Experiment(learner=learner)
     for name, value in unread.items():
         other = replace(one, **{name: value})
@@ -240,13 +221,13 @@ def test_what_a_learner_does_not_read_has_no_part_in_the_key(learner, unread):
 
 
 @pytest.mark.parametrize("learner", LEARNERS)
-def test_the_frozen_arm_keeps_all_that_is_not_learned(learner):
+def test_the_frozen_arm_has_every_field_that_no_learner_reads(learner):
     one = Experiment(learner=learner, layout="C", seed=3, horizon=5, box="soft", alpha=3e-7)
     assert frozen_arm(one) == Experiment("frozen", layout="C", seed=3, horizon=5, box="soft")
 
 
 @pytest.mark.parametrize("room", provenance.EPOCHS)
-def test_an_epoch_that_is_raised_makes_other_runs(monkeypatch, room):
+def test_a_raised_epoch_makes_other_runs(monkeypatch, room):
     before = key(Experiment()), summary_key(Experiment())
     monkeypatch.setitem(provenance.EPOCHS, room, provenance.EPOCHS[room] + 1)
     after = key(Experiment()), summary_key(Experiment())
@@ -255,19 +236,16 @@ def test_an_epoch_that_is_raised_makes_other_runs(monkeypatch, room):
 
 
 @pytest.mark.parametrize("library", ["casadi", "numba", "numpy", "torch"])
-@pytest.mark.parametrize("learner", ["ES", "RDES"])
-def test_a_version_counts_where_the_library_touches_the_numbers(monkeypatch, library, learner):
-    before, version = key(Experiment(learner)), provenance.installed
-    other = {library: "0.0.1"}
-    monkeypatch.setattr(provenance, "installed", lambda name: other.get(name) or version(name))
-    assert (key(Experiment(learner)) != before) == (library != "torch" or learner == "RDES")
-
-
-def test_what_a_build_adds_to_a_version_does_not_count(monkeypatch):
-    monkeypatch.setattr(provenance, "installed", lambda name: "1.2")
-    before = key(Experiment("RDES"))
-    monkeypatch.setattr(provenance, "installed", lambda name: "1.2+cpu")
-    assert key(Experiment("RDES")) == before
+def test_a_version_counts_where_the_library_bears_on_the_numbers(monkeypatch, library):
+    for learner in ("ES", "RDES"):
+        with monkeypatch.context() as patch:
+            keys = {}
+            for number in ("1.2", "1.2+cpu", "1.3"):
+                other = {library: number}
+                patch.setattr(provenance, "installed", lambda name, n=other: n.get(name, "1"))
+                keys[number] = key(Experiment(learner))
+        assert keys["1.2"] == keys["1.2+cpu"]
+        assert (keys["1.2"] != keys["1.3"]) == (library != "torch" or learner == "RDES")
 
 
 def test_the_machine_is_known_by_what_changes_last_digits(monkeypatch):
