@@ -31,6 +31,7 @@ from nmpcrl.study.setup import compile_ahead
 from nmpcrl.study.storage import place
 from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.executor import execute
+from nmpcrl.study.storage.refusal import Refusal
 from nmpcrl.study.storage.reservation import reservations
 from nmpcrl.study.store import Runs
 
@@ -38,11 +39,11 @@ FOLDER = "summaries"  # among the runs
 EPISODE, EVALUATION, STEP, REST = 280, 140, 40, 10_000  # bytes that a summary's file takes at most
 
 
-class Failed(RuntimeError):
+class Failed(Refusal):
     """Some runs of a study could not be made; the others are stored."""
 
 
-class OtherSolver(RuntimeError):
+class OtherSolver(Refusal):
     """A run was solved by another solver than its experiment names, and so is none of that."""
 
 

@@ -21,6 +21,7 @@ from nmpcrl.study.parameters import whole
 from nmpcrl.study.setup import compile_ahead
 from nmpcrl.study.storage.executor import execute
 from nmpcrl.study.storage.place import check_folder
+from nmpcrl.study.storage.refusal import Refusal
 
 SEED = 2025
 PROBLEMS = whole(1, 10**9)  # that a sweep may have
@@ -34,7 +35,7 @@ KEPT = 1e-6  # [m]; a plan that leaves the box by more has no KKT conditions wit
 SAME = 1e-6  # relative difference of two values that are the same minimum's
 
 
-class DamagedSweep(ValueError):
+class DamagedSweep(Refusal):
     """A file is not a sweep's table."""
 
 

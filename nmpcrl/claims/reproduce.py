@@ -33,6 +33,7 @@ from nmpcrl.study.jobs import parallel
 from nmpcrl.study.limits import seconds_of
 from nmpcrl.study.setup import compile_ahead
 from nmpcrl.study.storage.machine import fingerprint
+from nmpcrl.study.storage.refusal import Refusal
 
 Row = Mapping[str, Any]
 Pairs = tuple[tuple[Verdict, Verdict], ...]  # found here, published
@@ -194,7 +195,7 @@ def _nearly_equal(here: Row, there: Row) -> bool:
     return bool(np.allclose(mine, theirs, rtol=EXACT, atol=EXACT))
 
 
-class CannotRelock(RuntimeError):
+class CannotRelock(Refusal):
     """The lock stays as it is; the message has the reason."""
 
 

@@ -7,10 +7,6 @@ import click
 from nmpcrl import __version__
 from nmpcrl.commands.agents import agents
 from nmpcrl.commands.bench import bench
-from nmpcrl.commands.clean import clean
-from nmpcrl.commands.compare import compare
-from nmpcrl.commands.completion import completion
-from nmpcrl.commands.evaluate import evaluate
 from nmpcrl.commands.grade import grade
 from nmpcrl.commands.investigate import investigate
 from nmpcrl.commands.refusals import Commands
@@ -44,9 +40,6 @@ for command in (
     train,
     runs,
     show,
-    evaluate,
-    compare,
-    clean,
     study,
     verify,
     bench,
@@ -56,6 +49,5 @@ for command in (
     agents,
     grade,
     wasm,
-    completion,
 ):
     main.add_command(command)

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from nmpcrl.commands.places import refuse_unwritable
+from nmpcrl.commands.options import refuse_unwritable
 from nmpcrl.commands.tables import counted, duration
 from nmpcrl.commands.workers import check
 

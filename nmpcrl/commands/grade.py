@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from nmpcrl.commands.places import NewFile, Place
-from nmpcrl.commands.tables import columns, counted
+from nmpcrl.commands.options import FOLDER, NewFile
+from nmpcrl.commands.tables import columns
 
 if TYPE_CHECKING:
     from nmpcrl.course.grading import Mark
@@ -19,7 +19,6 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 FIELDS = ("student", "notebook", "exercise", "points", "of", "why")
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet computes begins so
 HEADER = ("student", "notebook", "points", "of", "by hand")
-FOLDER = Place(exists=True, file_okay=False)
 NO_SANDBOX = (
     "The notebooks ran with your rights: limits and a temporary folder are no sandbox."
     " See nmpcrl grade --help."
@@ -37,7 +36,7 @@ def number(name: str, least: int, default: int, text: str) -> Callable[[Command]
 @click.option("--out", type=NewFile(), required=True, help="A CSV file, one row an exercise.")
 @click.option(
     "--edition",
-    type=Place(file_okay=False),
+    type=click.Path(file_okay=False, path_type=Path),
     default=Path("_build/course/grader"),
     show_default=True,
     help="What `make course` writes for graders.",
@@ -103,7 +102,7 @@ def grade(
             file.flush()
             click.echo(harmless(f"{notebook}: {got} of {of}"), err=True)
     click.echo("\n".join(columns([HEADER, *rows], frozenset({2, 3, 4}))))
-    click.echo(f"\n{counted(len(rows), 'notebook')} in {out}")
+    click.echo(f"\n{len(rows)} notebooks in {out}")
     click.echo(NO_SANDBOX)
 
 

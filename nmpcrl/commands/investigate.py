@@ -26,7 +26,7 @@ def investigate(
     name: str, parts: tuple[str, ...], workers: int | None, dry_run: bool, publish: bool,
     judge: bool,
 ) -> None:  # fmt: skip
-    """Make the missing rows of an investigation, and answer its questions.
+    """Make and judge the rows of an investigation.
 
     NAME is one of the book's (worlds), or a Python file that defines one
     Investigation. Each row is stored as soon as it is made, so a run can be

@@ -1,59 +1,53 @@
-"""What a command cannot do ends in one sentence, and never in a traceback."""
+"""A group of commands whose known errors end in one sentence, without a traceback."""
 
 import errno
-import sys
 from typing import Any
 
 import click
 
-SAID = (  # errors whose message is a sentence for the reader, and where they are defined
-    ("nmpcrl.study.storage.refusal", "Refusal"),
-    ("nmpcrl.study.records", "DamagedRecords"),
-    ("nmpcrl.study.storage.place", "StoreError"),
-    ("nmpcrl.study.jobs", "Failed"),
-    ("nmpcrl.study.cluster", "NoCluster"),
-    ("nmpcrl.bench.sweep", "DamagedSweep"),
-    ("nmpcrl.analysis.summaries", "Failed"),
-    ("nmpcrl.analysis.summaries", "OtherSolver"),
-    ("nmpcrl.claims.published", "Damaged"),
-    ("nmpcrl.claims.reproduce", "CannotRelock"),
-)
+INSTEAD = {  # of commands that earlier versions had
+    "clean": "delete files in the folder of the runs yourself",
+    "compare": "read two runs with `nmpcrl.study.fetch` and compare their tables",
+    "completion": "click writes the script: `_NMPCRL_COMPLETE=bash_source nmpcrl`",
+    "evaluate": "use `nmpcrl show`",
+    "world": "use `nmpcrl investigate worlds`",
+}
 
 
 class Commands(click.Group):
-    """A group of commands, in the order in which they were added."""
+    """Commands in the order in which they were added."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Not sorted by name: the first is what a reader needs first."""
+        """The names, the first a reader needs first."""
         return list(self.commands)
 
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command; a name of `INSTEAD` is refused with what to use instead."""
+        if cmd_name in INSTEAD:
+            ctx.fail(f"there is no {cmd_name!r} any more: {INSTEAD[cmd_name]}.")
+        return super().get_command(ctx, cmd_name)
+
     def invoke(self, ctx: click.Context) -> Any:
-        """Call a command; an error that is known becomes its sentence and exit code 1."""
+        """Call the command; a known error becomes its sentence and exit code 1."""
         try:
             return super().invoke(ctx)
+        except (click.ClickException, click.exceptions.Exit, click.Abort):
+            raise
         except Exception as error:
-            said = error.message if isinstance(error, click.ClickException) else sentence(error)
-            if said is None:
-                raise
-            from nmpcrl.study.storage.place import harmless
-
-            if isinstance(error, click.ClickException):
-                vars(error)["message"] = harmless(said)  # which click declares final
-                raise
-            raise click.ClickException(harmless(said)) from None
+            if message := sentence(error):
+                raise click.ClickException(message) from None
+            raise
 
 
-def sentence(error: Exception) -> str | None:
-    """What an error says to the reader; nothing of one that is a mistake of ours.
+def sentence(error: Exception) -> str:
+    """The message for the user; empty if the error is a mistake of the library."""
+    from nmpcrl.study.storage.refusal import Refusal
 
-    A module that was never imported raised nothing, so none is imported for this.
-    """
-    known = [getattr(sys.modules.get(module), name, ()) for module, name in SAID]
-    if isinstance(error, tuple(one for one in known if one)):
+    if isinstance(error, Refusal):
         return str(error)
     if isinstance(error, OSError) and error.errno != errno.EPIPE:
         reason = error.strerror or str(error) or type(error).__name__
         return f"{error.filename}: {reason}" if error.filename else reason
     if isinstance(error, MemoryError):
-        return str(error) or "this machine does not have enough memory for this"
-    return None
+        return str(error) or "this machine has too little memory"
+    return ""

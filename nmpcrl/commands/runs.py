@@ -1,171 +1,105 @@
-"""`nmpcrl runs`: what is stored, as a table or as JSON."""
+"""`nmpcrl runs`: the stored runs, as a table or as JSON."""
 
 import json
-from dataclasses import dataclass, fields
-from math import isfinite
+from fnmatch import fnmatchcase
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from nmpcrl.commands.fields import Conditions
-from nmpcrl.commands.names import OTHER_CODE, say_of_trials
-from nmpcrl.commands.tables import columns, counted, duration, size
-
 if TYPE_CHECKING:
-    from nmpcrl.study.records import Facts
+    from nmpcrl.study.records import About
 
-SHOWN = ("learner", "layout", "decay", "seed", "episodes")  # fields in the table
-MEASURED = ("run", "cost", "minutes", "size", "stopped")  # what else runs can be sorted by
-NUMBERS = frozenset((4, 5, 6, 7, 8))  # columns of the table
-
-
-@dataclass(frozen=True)
-class Row:
-    """A stored run, without its tables of numbers."""
-
-    path: Path
-    fields: dict[str, Any]
-    facts: "Facts"
-    bytes: int
-
-    def value(self, column: str) -> Any:
-        """What runs are sorted by."""
-        measured = {
-            "run": self.path.stem,
-            "cost": self.facts["final_cost"],
-            "minutes": self.facts["seconds"] / 60,
-            "size": self.bytes,
-            "stopped": self.facts["stopped"],
-        }
-        return measured[column] if column in measured else self.fields.get(column)
-
-    def words(self) -> list[str]:
-        """The line of the table."""
-        from nmpcrl.study.geometry import short_name
-
-        return [
-            self.path.stem,
-            *(short_name(str(self.fields[name])) for name in SHOWN),
-            f"{self.facts['final_cost']:.1f}",
-            f"{self.facts['seconds'] / 60:.1f}",
-            size(self.bytes),
-            shorten(self.facts["stopped"], 60, placeholder=" ..."),
-        ]
-
-    def json(self) -> dict[str, Any]:
-        """The object of `--json`."""
-        return {
-            "run": self.path.stem,
-            "path": str(self.path),
-            "bytes": self.bytes,
-            "experiment": self.fields,
-            "facts": self.facts,
-        }
-
-
-@click.command(cls=Conditions)
-@click.option(
-    "--sort",
-    metavar="COLUMN",
-    default="run",
-    show_default=True,
-    help=f"Any field, or one of {', '.join(MEASURED)}.",
+COLUMNS = (
+    *("run", "learner", "layout", "decay", "seed", "episodes"),
+    *("cost", "minutes", "kB", "stopped"),
 )
+LISTED = 5  # names in a refusal
+
+
+@click.command()
+@click.argument("name", default="")
+@click.option("--sort", type=click.Choice(COLUMNS), default="run", show_default=True)
 @click.option("--reverse", is_flag=True, help="Largest first.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
-def runs(sort: str, reverse: bool, as_json: bool, **conditions: Any) -> None:
-    """List the stored runs, or only those that the options select.
+def runs(name: str, sort: str, reverse: bool, as_json: bool) -> None:
+    """List the stored runs, or those whose names begin with NAME.
 
-    An option that is given twice selects runs with either value.
+    NAME may have the wildcards *, ? and [...]. The column cost has the noise-free
+    cost, which is the mean of the last three rollouts.
 
-    With --json, each run is an object with its name `run`, its `path`, its size
-    in `bytes`, the fields of its `experiment`, and its `facts`: how it stopped
-    (`stopped`), its noise-free cost `final_cost`, which is the mean of the last
-    three rollouts, `seconds`, the `solver`, and where it was trained. A
-    number that is not finite is null. Runs of a `Trial` of your own are only counted.
+    With --json, each run is an object with its name `run`, its `path`, the fields
+    of its `experiment`, and its `facts`: how it stopped (`stopped`), `final_cost`,
+    `seconds`, the `solver`, and where it was trained. A number that is not finite
+    is null. Runs of a `Trial` are not listed.
 
     \b
     Example:
-      nmpcrl runs --learner GES --layout A --sort cost
+      nmpcrl runs GES-A --sort cost
+      nmpcrl runs "*-episode-seed0" --json
     """
-    wanted = _wanted(conditions)
-    _refuse_unknown(sort)
     from nmpcrl.study.provenance import is_accepted, locked_hash, warn_of_changes
     from nmpcrl.study.store import folder, stored
 
-    rows = [
-        Row(path, fields, facts, path.stat().st_size)
-        for path, (fields, facts) in stored().items()
-        if all(_plain(fields.get(name)) in values for name, values in wanted.items())
-    ]
-    rows.sort(key=lambda row: _order(row.value(sort)), reverse=reverse)
+    found = [(path, about) for path, about in stored().items() if begins(path, name)]
+    rows = sorted((_row(*one) for one in found), key=lambda row: row[sort], reverse=reverse)
     if as_json:
-        click.echo(json.dumps(_finite([row.json() for row in rows]), indent=1))
+        places = {path.stem: (path, about) for path, about in found}
+        text = json.dumps([_object(*places[row["run"]]) for row in rows])
+        click.echo(json.dumps(json.loads(text, parse_constant=lambda _: None), indent=1))
     elif rows:
-        _print(rows, folder())
-    elif wanted:
-        click.echo(f"No run in {folder()} matches; `nmpcrl runs` lists all.")
+        import pandas as pd
+
+        click.echo(pd.DataFrame(rows).to_string(index=False, float_format="{:.1f}".format))
     else:
-        click.echo(f"No run is stored in {folder()}; `nmpcrl train` trains one.")
-    others = [row for row in rows if not is_accepted(row.facts.get("sources", locked_hash()))]
+        click.echo(f"no run {name!r} is stored in {folder()}; `nmpcrl train` trains one")
+    others = sum(not is_accepted(one.facts.get("sources", locked_hash())) for _, one in found)
     if others:
-        count = counted(len(others), "run")
-        click.echo(f"{count} of {OTHER_CODE}; the first is {others[0].path.stem}", err=True)
+        click.echo(f"{others} of them are of other code, whose numbers may differ", err=True)
     warn_of_changes()
-    say_of_trials("`nmpcrl.study.fetch` reads them, and they are not listed")
 
 
-def _wanted(conditions: dict[str, Any]) -> dict[str, tuple[Any, ...]]:
-    """The values that each field may have; what no experiment may have is refused."""
+def begins(path: Path, name: str) -> bool:
+    """Whether the name of a file begins with a name, which may have wildcards."""
+    return fnmatchcase(path.stem, f"{name}*")
+
+
+def stored_run(name: str) -> Path:
+    """The file of a stored run: a path, a name, or the beginning of one run's name alone.
+
+    Raises:
+        click.ClickException: there are none or several such runs.
+    """
+    from nmpcrl.study.store import folder
+
+    if name.endswith(".npz") and Path(name).is_file():
+        return Path(name)
+    known = sorted(folder().glob("*.npz"))
+    found = [path for path in known if path.stem == name]
+    found = found or [path for path in known if begins(path, name)]
+    if len(found) == 1:
+        return found[0]
+    names = [path.stem for path in found or known]
+    listed = ", ".join(names[:LISTED]) + ", ..." * (len(names) > LISTED)
+    begin = f"{len(found)} runs begin" if found else "no run begins"
+    raise click.ClickException(f"in {folder()} {begin} with {name!r}; stored: {listed or 'none'}")
+
+
+def _row(path: Path, about: "About") -> dict[str, Any]:
+    """A line of the table."""
     from nmpcrl.study import Experiment
+    from nmpcrl.study.geometry import short_name
 
-    given = {
-        name: value if isinstance(value, tuple) else (value,)
-        for name, value in conditions.items()
-        if value is not None and value != ()
-    }
-    return {
-        name: tuple(_plain(getattr(Experiment(**{name: value}), name)) for value in values)
-        for name, values in given.items()
-    }
-
-
-def _refuse_unknown(column: str) -> None:
-    from nmpcrl.study import Experiment
-
-    known = [*MEASURED, *(one.name for one in fields(Experiment))]
-    if column not in known:
-        raise click.ClickException(f"sort = {column!r} must be one of {', '.join(known)}")
+    fields, facts = about
+    e = Experiment(**fields)
+    values = (e.learner, short_name(e.layout), e.decay, e.seed, e.episodes)
+    cost, minutes = facts["final_cost"], facts["seconds"] / 60
+    stopped = shorten(facts["stopped"], 60, placeholder=" ...")
+    measured = (cost, minutes, path.stat().st_size / 1000, stopped)
+    return dict(zip(COLUMNS, (path.stem, *values, *measured), strict=True))
 
 
-def _print(rows: list[Row], place: Path) -> None:
-    """Print the table and its totals."""
-    head = ["run", *SHOWN, "final cost", "minutes", "size", "stopped"]
-    for line in columns([head, *(row.words() for row in rows)], NUMBERS):
-        click.echo(line)
-    whole, seconds = sum(row.bytes for row in rows), sum(row.facts["seconds"] for row in rows)
-    count = counted(len(rows), "run")
-    click.echo(f"{count}, {size(whole)}, {duration(seconds)} of one core, in {place}")
-
-
-def _plain(value: Any) -> Any:
-    """A value as JSON returns it, so that two can be compared."""
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _order(value: Any) -> tuple[int, Any]:
-    """Numbers by size, and what is not known last."""
-    if value is None or value != value:
-        return 1, 0
-    return 0, tuple(value) if isinstance(value, list) else value
-
-
-def _finite(value: Any) -> Any:
-    """The same in what JSON has: it knows no infinity."""
-    if isinstance(value, dict):
-        return {name: _finite(one) for name, one in value.items()}
-    if isinstance(value, list):
-        return [_finite(one) for one in value]
-    return None if isinstance(value, float) and not isfinite(value) else value
+def _object(path: Path, about: "About") -> dict[str, Any]:
+    """An element of the JSON."""
+    return {"run": path.stem, "path": str(path), **about._asdict()}

@@ -1,81 +1,53 @@
 """`nmpcrl show`: one page of pictures of a run."""
 
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from nmpcrl.commands.names import RunName, file_of, records_of
-from nmpcrl.commands.places import NewFile
-
-if TYPE_CHECKING:
-    from nmpcrl.study import Records
-
-FORMATS = ("svg", "png")
+from nmpcrl.commands.options import NewFile
+from nmpcrl.commands.runs import stored_run
 
 
 @click.command()
-@click.argument("run", type=RunName())
-@click.option("--out", metavar="PATH", type=NewFile(), help="By default next to the run.")
-@click.option(
-    "--format", "kind", type=click.Choice(FORMATS), help="By default as PATH ends, or svg."
-)
-@click.option("--frozen", is_flag=True, help="Train the frozen arm if it is not stored.")
-def show(run: str, out: Path | None, kind: str | None, frozen: bool) -> None:
-    """Draw one page of pictures of RUN, and print its path.
+@click.argument("run")
+@click.option("--out", metavar="PATH", type=NewFile(), help="PATH.svg or PATH.png; by default SVG.")
+def show(run: str, out: Path | None) -> None:
+    """Draw RUN on one page.
 
-    They show the noise-free trajectory, theta, the cost with and without noise,
-    and alpha ||phi||^2, which is above 2 where a step overshoots. The costs of the
-    frozen arm, whose theta never moves, are drawn as well if it is stored.
+    RUN is a name that `nmpcrl runs` lists, or its beginning. The noise-free cost of
+    RUN and the path of the page are printed. The page has the noise-free
+    trajectory, theta, the cost with and without noise, and alpha ||phi||^2, which
+    is above 2 where a step overshoots. The costs of the same run with a frozen
+    theta are drawn as well if it is stored.
 
     \b
     Example:
       nmpcrl show GES-A-step-seed0 --out ges.png
     """
-    path = file_of(run)
-    out, kind = _place(path, out, kind)
+    path = stored_run(run)
+    out = out or path.with_suffix(".svg")
+    kind = out.suffix.lower().removeprefix(".")
+    if kind not in ("svg", "png"):
+        raise click.BadParameter(f"{str(out)!r} must end in .svg or .png.", param_hint="--out")
     from nmpcrl.report.figures.runs.run import run_page, write
-    from nmpcrl.study.storage.atomic import write_whole
-    from nmpcrl.study.storage.place import harmless
-
-    records = records_of(path)
-    figure = run_page(records, _frozen_arm(records, train=frozen))
-    write_whole(out, lambda file: write(figure, file, kind))
-    click.echo(harmless(str(out)))
-
-
-def _place(run: Path, out: Path | None, kind: str | None) -> tuple[Path, str]:
-    """Where the page goes and in which format; one follows from the other."""
-    if out is None:
-        kind = kind or FORMATS[0]
-        return run.with_suffix(f".{kind}"), kind
-    ending = out.suffix.lower().removeprefix(".")
-    kind = kind or ending
-    if kind not in FORMATS or ending not in (kind, ""):
-        raise click.ClickException(
-            f"the name of the file, {str(out)!r}, must end in .svg or .png and agree with --format"
-        )
-    return out, kind
-
-
-def _frozen_arm(records: "Records", *, train: bool) -> "Records | None":
-    """The frozen arm of a run, if it has one and that is stored or to be trained."""
-    from nmpcrl.commands.progress import fetched
-    from nmpcrl.study import Experiment
+    from nmpcrl.report.run import verdict
+    from nmpcrl.study import DamagedRecords, Experiment, Records
     from nmpcrl.study.experiment import frozen_arm
-    from nmpcrl.study.records import DamagedRecords
-    from nmpcrl.study.storage.place import say
+    from nmpcrl.study.provenance import is_accepted, locked_hash, warn_of_changes
+    from nmpcrl.study.storage.atomic import write_whole
     from nmpcrl.study.store import read
 
-    if records.experiment["learner"] == "frozen":
-        return None
-    arm = frozen_arm(Experiment(**records.experiment))
-    if train:
-        return fetched(arm)
-    try:
-        return read(arm)
-    except FileNotFoundError:
-        return None
-    except DamagedRecords as error:
-        say(f"{error}; it is not drawn")
-        return None
+    records = Records.load(path)
+    if "layout" not in records.experiment:
+        raise click.ClickException(f"{path} is a run of a Trial, which only `fetch(trial)` reads")
+    if not is_accepted(records.facts.get("sources", locked_hash())):
+        click.echo(f"{path} is of other code, whose numbers may differ", err=True)
+    warn_of_changes()
+    frozen = None
+    if records.experiment["learner"] != "frozen":
+        with suppress(FileNotFoundError, DamagedRecords):
+            frozen = read(frozen_arm(Experiment(**records.experiment)))
+    figure = run_page(records, frozen)
+    write_whole(out, lambda file: write(figure, file, kind))
+    click.echo(f"{verdict(records)}\n{out}")

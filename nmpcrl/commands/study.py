@@ -1,19 +1,12 @@
-"""`nmpcrl study`: all runs of the book, or parts of them."""
+"""`nmpcrl study`: trains all runs of the book, or parts of them."""
 
-from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from nmpcrl.commands.places import NewFile, refuse_unwritable
-from nmpcrl.commands.tables import counted, duration
+from nmpcrl.commands.options import NewFile, refuse_unwritable
 from nmpcrl.commands.workers import check
-
-if TYPE_CHECKING:
-    from nmpcrl.analysis.summary import RunSummary
-    from nmpcrl.study import Experiment
 
 
 @click.command()
@@ -41,9 +34,10 @@ def study(
 ) -> None:
     """Train the runs of the study that are not stored.
 
-    Finished runs are stored, so it can be interrupted and started again. With --publish and --part,
-    the runs of these parts are published beside those that are there. With --population, the
-    parts are judge, tune, "N = 20", "N = 40", "judge imitating", "alpha x 3" and "judge again".
+    Finished runs are stored, so the study can be interrupted and started again.
+    With --publish and --part, the runs of these parts are published beside the
+    published ones. The parts of --population are judge, tune, "N = 20", "N = 40",
+    "judge imitating", "alpha x 3" and "judge again".
 
     \b
     Example:
@@ -51,7 +45,7 @@ def study(
       nmpcrl study --population --part judge --dry-run
     """
     from nmpcrl.analysis import summaries
-    from nmpcrl.study import cluster
+    from nmpcrl.study import cluster, design, population_design
     from nmpcrl.study.limits import seconds_of
     from nmpcrl.study.storage.place import refuse_file
 
@@ -59,21 +53,39 @@ def study(
         _judge_population() if population else _judge()
         return
     refuse_file()
-    chosen = _chosen(parts, population)
-    _check(workers, scheduler, security, publish=publish, sure=yes)
-    missing = [e for e in chosen if not summaries.is_stored(e)]
-    stored = f"{len(chosen) - len(missing)} of {counted(len(chosen), 'run')}"
-    left = f"; the others take about {duration(sum(map(seconds_of, missing)))} of one core"
-    click.echo(f"{stored} are stored in {summaries.folder()}{left * bool(missing)}")
+    every = population_design.whole_population() if population else design.whole_study()
+    if unknown := sorted(set(parts) - set(every.values())):
+        known = ", ".join(dict.fromkeys(every.values()))
+        raise click.ClickException(f"there is no part {unknown[0]!r}; the parts are {known}")
+    wanted = {e: part for e, part in every.items() if not parts or part in parts}
+    check(workers, sure=yes)
+    if scheduler is not None:
+        cluster.check(scheduler, security=security)
+    elif security is not None:
+        raise click.ClickException("--security needs --scheduler")
+    if publish:
+        from nmpcrl.claims import published
+
+        refuse_unwritable(published.place())
+    missing = [e for e in wanted if not summaries.is_stored(e)]
+    stored = f"{len(wanted) - len(missing):,} of {len(wanted):,} runs are stored"
+    hours = sum(map(seconds_of, missing)) / 3600
+    click.echo(f"{stored} in {summaries.folder()}; the others take about {hours:.1f} h of one core")
     if dry_run:
         return
     there = cluster.executor(scheduler, security=security) if scheduler else nullcontext()
     with there as executor:
         found = summaries.fetch_summaries(
-            chosen, executor=executor, workers=workers, strict=publish
+            wanted, executor=executor, workers=workers, strict=publish
         )
     if table:
-        _write(table, found, chosen)
+        import pandas as pd
+
+        from nmpcrl.analysis.rows import tidy
+
+        frames = [tidy([one]).assign(variant=wanted[e]) for e, one in found.items()]
+        pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
+        click.echo(f"{table}: written")
     if publish and population:
         from nmpcrl.claims import population_published
 
@@ -83,15 +95,15 @@ def study(
     elif publish:
         from nmpcrl.claims.publish import publish_parts, publish_study
 
-        place = publish_parts(found, chosen) if parts else publish_study(found, chosen)
+        place = (publish_parts if parts else publish_study)(found, wanted)
         click.echo(f"{place}: published")
         _judge()
-    if len(found) < len(chosen):
-        raise SystemExit(1)  # what failed has been said
+    if len(found) < len(wanted):
+        raise SystemExit(1)  # the reasons are printed
 
 
 def _judge() -> None:
-    """Judge what is published, and say each verdict."""
+    """Judge what is published, and print each verdict."""
     from nmpcrl.claims.publish import rejudge
 
     for verdict in rejudge():
@@ -99,7 +111,7 @@ def _judge() -> None:
 
 
 def _judge_population() -> None:
-    """Say in which share of the layouts each claim holds, and each question's answer."""
+    """Print in which share of the layouts each claim holds, and each question's answer."""
     from nmpcrl.claims import population_published
 
     found = population_published.load()
@@ -111,50 +123,3 @@ def _judge_population() -> None:
         every = {**answer.counts, **answer.beside}
         counts = ", ".join(f"{name} {yes} of {of}" for name, (yes, of) in every.items())
         click.echo(f"{answer.question}: {answer.words}" + (f" ({counts})" if counts else ""))
-
-
-def _check(
-    workers: int | None,
-    scheduler: str | None,
-    security: str | None,
-    *,
-    publish: bool,
-    sure: bool,
-) -> None:
-    """Refuse, before any work, what would fail after it."""
-    from nmpcrl.study import cluster
-
-    check(workers, sure=sure)
-    if scheduler is not None:
-        cluster.check(scheduler, security=security)
-    elif security is not None:
-        raise click.ClickException("--security needs --scheduler")
-    if publish:
-        from nmpcrl.claims import published
-
-        refuse_unwritable(published.place())
-
-
-def _chosen(parts: tuple[str, ...], population: bool) -> "dict[Experiment, str]":
-    """The runs of some parts of the study, or of the population's, with the part of each."""
-    from nmpcrl.study import design, population_design
-
-    whole = population_design.whole_population() if population else design.whole_study()
-    unknown = set(parts) - set(whole.values())
-    if unknown:
-        known = ", ".join(dict.fromkeys(whole.values()))
-        raise click.ClickException(f"there is no part {min(unknown)!r}; the parts are {known}")
-    return {e: name for e, name in whole.items() if not parts or name in parts}
-
-
-def _write(
-    table: Path, found: "Mapping[Experiment, RunSummary]", parts: "Mapping[Experiment, str]"
-) -> None:
-    """One row an episode, as CSV."""
-    import pandas as pd
-
-    from nmpcrl.analysis.rows import tidy
-
-    frames = [tidy([one]).assign(variant=parts[e]) for e, one in found.items()]
-    pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
-    click.echo(f"{table}: {table.stat().st_size / 1e6:.0f} MB")

@@ -1,18 +1,54 @@
-"""`nmpcrl train`: one run, any field of it."""
+"""`nmpcrl train`: one run; each field of an experiment is an option."""
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import Field, fields
+from functools import cache
+from typing import Any
 
 import click
 
-from nmpcrl.commands.fields import Settings
 
-if TYPE_CHECKING:
+class Train(click.Command):
+    """A command with an option a field of `Experiment`, which only this command imports."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """The options of the fields, and then the command's own."""
+        return [*_options(), *super().get_params(ctx)]
+
+
+@cache
+def _options() -> tuple[click.Option, ...]:
     from nmpcrl.study import Experiment
 
+    return tuple(map(_option, fields(Experiment)))
 
-@click.command(cls=Settings)
+
+def _option(one: "Field[Any]") -> click.Option:
+    """The option that sets a field: `--beta-tdc X`, or `--gated/--no-gated`."""
+    name, kind, text = one.name.replace("_", "-"), type(one.default), one.metadata["help"]
+    switch = kind is bool
+    return click.Option(
+        [one.name, f"--{name}/--no-{name}" if switch else f"--{name}"],
+        type=vector if kind is tuple else kind,
+        default=one.default,
+        show_default=True,
+        help=text if switch else f"{text.rstrip('.')}: {one.metadata['allowed'].text}.",
+        metavar={str: "NAME", tuple: "NUMBERS", int: "N", float: "X"}.get(kind),
+    )
+
+
+def vector(value: Any) -> tuple[float, ...]:
+    """Numbers between commas or blanks; the experiment checks how many."""
+    if isinstance(value, tuple):
+        return value
+    try:
+        return tuple(map(float, value.replace(",", " ").split()))
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is not a list of numbers such as 1,1,0.05.") from None
+
+
+@click.command(cls=Train)
 @click.option("--yes", "-y", is_flag=True, help="Train even if it takes more than a day.")
-def train(yes: bool, **fields: Any) -> None:
+def train(yes: bool, **values: Any) -> None:
     """Train one run and store it, or read it if it is stored.
 
     Each field of an experiment is an option; the defaults are the paper's.
@@ -22,35 +58,29 @@ def train(yes: bool, **fields: Any) -> None:
       nmpcrl train --learner RDES --layout B --episodes 50 --no-gated
       nmpcrl train --layout "0.5,2.2 3,0.5" --target 8,4,1.57
     """
-    from nmpcrl.commands.progress import fetched
-    from nmpcrl.report.run import verdict
-    from nmpcrl.study import Experiment
-    from nmpcrl.study.limits import afford, need_numba
-    from nmpcrl.study.storage.place import harmless
-    from nmpcrl.study.store import check_folder, path_of, size_of
+    from tqdm import tqdm
 
-    experiment = Experiment(**fields)
+    from nmpcrl.report.run import verdict
+    from nmpcrl.study import Experiment, fetch
+    from nmpcrl.study.limits import afford, need_numba
+    from nmpcrl.study.store import path_of
+
+    experiment = Experiment(**values)
     path = path_of(experiment)
-    if not path.is_file():
+    stored = path.is_file()
+    if not stored:
         if experiment.box == "soft":
             need_numba("only riccati, which it compiles, keeps to a soft box")
         afford([experiment], sure=yes or None, lift="--yes")
-        check_folder(size_of(experiment))
-    records = fetched(experiment)
-    if not path.is_file():  # the store has said why
-        click.echo(harmless(f"{experiment}: {records.facts['stopped']}"))
-        click.echo(harmless(verdict(records)))
+    name = experiment.learner
+    with tqdm(total=experiment.episodes, unit="ep", desc=name, disable=stored) as bar:
+
+        def on_episode(done: int, cost: float) -> None:
+            bar.set_postfix_str(f"cost {cost:.0f}", refresh=False)
+            bar.update(done - bar.n)
+
+        records = fetch(experiment, on_episode=on_episode)
+    click.echo(f"{experiment}: {records.facts['stopped']}\n{verdict(records)}")
+    if not path.is_file():  # the store has printed the reason
         raise SystemExit(1)
-    click.echo(harmless(f"{path}: {records.facts['stopped']}"))
-    click.echo(harmless(verdict(records)))
-    click.echo(f"Next: nmpcrl show {path.stem}")
-    click.echo(f"      nmpcrl compare {path.stem} {_other(experiment)}")
-
-
-def _other(experiment: "Experiment") -> str:
-    """The frozen arm of this run if it is stored; otherwise a placeholder for a name."""
-    from nmpcrl.study.experiment import frozen_arm
-    from nmpcrl.study.store import path_of
-
-    arm = path_of(frozen_arm(experiment))
-    return arm.stem if arm.is_file() and arm != path_of(experiment) else "RUN"
+    click.echo(f"{path}\nNext: nmpcrl show {path.stem}")

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from nmpcrl.commands.places import NewFile
+from nmpcrl.commands.options import NewFile
 
 ROBOT = "nmpcrl.control:differential_drive"
 

@@ -1,11 +1,10 @@
-"""One run in words: what `nmpcrl train`, `evaluate`, `compare` and the titles of pictures say."""
+"""One run in words, for `nmpcrl train`, `nmpcrl show` and the titles of figures."""
 
 import numpy as np
 
 from nmpcrl import Matrix
 from nmpcrl.analysis import metrics
-from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.records import LAST, Records, StepStatus, Stopped
+from nmpcrl.study.records import LAST, Records, Stopped
 
 SAME = f"{0:.1%}"  # how a change is shown that is less than half of the last digit
 
@@ -21,27 +20,6 @@ def verdict(records: Records) -> str:
         return f"{end}, within 0.1% of the {before:.1f} of theta_init"
     word = "less" if after <= before else "more"
     return f"{end}, {change} {word} than the {before:.1f} of theta_init"
-
-
-def figures(records: Records) -> dict[str, str]:
-    """What the last rollout without noise shows besides its cost, ready to print."""
-    task = Experiment(**records.experiment).task
-    states, actions = metrics.final_rollout(records)
-    overlap = task.overlap(states).max(axis=-1)
-    theta = ", ".join(f"{value:.4g}" for value in records.evaluations["theta"][-1])
-    failed = records.steps["status"] == StepStatus.FAILED
-    return {
-        "steps": f"{np.isfinite(states[:, 0]).sum()} of {len(states)}",
-        "distance to the target at the end": f"{task.distance(states[-1]):.3f}",
-        "largest overlap Xi (above 0: inside)": f"{np.nanmax(overlap):.4f}",
-        "states inside an obstacle": f"{metrics.obstacle_violations(states, task).size}",
-        "largest speed and turn rate": " and ".join(
-            f"{value:.3f}" for value in np.nanmax(np.abs(actions), axis=0)
-        ),
-        "steps of training with a failed solve": f"{failed.sum()}",
-        "steps with alpha ||phi||^2 above 2": f"{metrics.overshooting(records):.2%}",
-        "theta": theta,
-    }
 
 
 def finding(records: Records) -> str:

@@ -15,13 +15,14 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from nmpcrl.study.provenance import signature
+from nmpcrl.study.storage.refusal import Refusal
 
 ANSWER = 10.0  # [s] within which a scheduler that is there has answered
 SECURITY = ("tls-ca-file", "tls-client-cert", "tls-client-key")  # what a security file names
 ADDRESSES = "HOST:PORT, tcp://HOST:PORT or tls://HOST:PORT"
 
 
-class NoCluster(RuntimeError):
+class NoCluster(Refusal):
     """There is no cluster that could be used; the message says why."""
 
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TypeVar
 import psutil
 from tqdm import tqdm
 
-from nmpcrl.study.storage.refusal import ParameterError
+from nmpcrl.study.storage.refusal import ParameterError, Refusal
 
 ATTEMPTS = 3  # how often a job is begun whose process is killed
 AHEAD = 128  # jobs given to an executor of the caller's at a time
@@ -42,7 +42,7 @@ class Failure(NamedTuple):
     traceback: str = ""
 
 
-class Failed(RuntimeError):
+class Failed(Refusal):
     """Some jobs failed; the results of all others were yielded. The message names the first."""
 
     def __init__(self, failures: Sequence[Failure], jobs: int) -> None:

@@ -1,296 +1,191 @@
-"""`nmpcrl runs`, and runs by the beginning of their names."""
+"""`nmpcrl train`, `runs` and `show`, used one after the other."""
 
 import json
-import shutil
-from functools import partial
+import os
+import shlex
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
 
-import numpy as np
 import pytest
-from click import ClickException
-from click.testing import CliRunner
 
-from nmpcrl.commands import main
-from nmpcrl.commands.names import file_of
-from nmpcrl.commands.tables import columns, counted, duration, size
-from nmpcrl.learning import expected_sarsa
-from nmpcrl.study import Experiment, Trial, fetch, fetch_all, paper, run, store, sweep
-from nmpcrl.study.records import Records
+from nmpcrl.report.run import verdict
+from nmpcrl.study import Experiment, Records, fetch, paper, store, sweep
+from nmpcrl.study.experiment import frozen_arm
 
-TRAIN = "train --episodes 2 --steps 5 --evaluate-every 1"
-DRAWN = ((0.5, 2.2), (3.0, 0.5))
-SHORT = {"episodes": 2, "steps": 5, "evaluate_every": 1}
-STORED = sweep(learner=("ES", "GES", "frozen"), seed=(0, 1), **SHORT) + sweep(
-    layout=DRAWN, target=(6, 6, 0), **SHORT
-)
-
-
-@pytest.fixture(scope="module")
-def command(tmp_path_factory):
-    """The command on a folder with seven runs, which no test here changes."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    folder = tmp_path_factory.mktemp("runs")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("NMPCRL_RUNS", str(folder))
-        with ThreadPoolExecutor(1) as one:
-            fetch_all(STORED, executor=one, progress=False)
-        yield lambda *words: CliRunner().invoke(main, words)
+SHORT = {"episodes": 2, "steps": 4, "evaluate_every": 1}
+WORDS = ["--episodes", "2", "--steps", "4", "--evaluate-every", "1"]
+OTHERS = {  # another value than the default, as one types it
+    "learner": ("RDES", "RDES"),
+    "layout": ("B", "B"),
+    "start": ("0,1,2", (0.0, 1.0, 2.0)),
+    "target": ("0 -1 2", (0.0, -1.0, 2.0)),
+    "decay": ("episode", "episode"),
+    "network": ("tanh", "tanh"),
+    "box": ("soft", "soft"),
+    "solver": ("fatrop", "fatrop"),
+    "theta": ("1,1,0.05,0.05,0.05,1,1,0.1,0.002", (*paper.THETA_INIT[:-1], 0.002)),
+    "decay_rate": ("0.5", 0.5),
+    "tolerance": ("1e-7", 1e-7),
+}
 
 
-def listed(command, *words) -> list[str]:
-    """The names in the table."""
-    lines = command("runs", *words).stdout.splitlines()
-    return [line.split()[0] for line in lines[1:-1]]
+@pytest.fixture
+def asked(monkeypatch):
+    """The experiments that would be trained; none is."""
+    asked = []
+
+    def fetch(experiment, **_):
+        asked.append(experiment)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("nmpcrl.study.fetch", fetch)
+    return asked
 
 
-def names(**fields) -> set[str]:
-    return {
-        store.path_of(e).stem
-        for e in STORED
-        if all(getattr(e, name) == value for name, value in fields.items())
-    }
+def words_of(field) -> tuple[list[str], object]:
+    """An option that sets a field, and the value that it then has."""
+    name = field.name.replace("_", "-")
+    if isinstance(field.default, bool):
+        return [f"--no-{name}" if field.default else f"--{name}"], not field.default
+    if field.name in OTHERS:
+        word, value = OTHERS[field.name]
+    else:
+        value = 2 * field.default + 2
+        word = str(value)
+    return [f"--{name}", word], value
 
 
-@pytest.mark.parametrize(
-    ("words", "fields"),
-    [
-        ((), {}),
-        (("--learner", "GES"), {"learner": "GES"}),
-        (("--learner", "ES", "--seed", "1"), {"learner": "ES", "seed": 1}),
-        (("--clipped", "--seed", "0"), {"seed": 0}),
-        (("--layout", "0.5,2.2 3,0.5"), {"layout": "0.5,2.2 3,0.5"}),
-        (("--target", "6,6,0"), {"target": (6, 6, 0)}),
-        (("--layout", "A", "--layout", "0.5 2.2 3 0.5"), {}),
-        (("--theta", "1,1,0.05,0.05,0.05,1,1,0.1,0.001", "--seed", "0"), {"seed": 0}),
-    ],
-)
-def test_options_pick_runs_by_any_field(command, words, fields):
-    assert set(listed(command, *words)) == names(**fields)
-
-
-def test_an_option_given_twice_picks_runs_of_either_value(command):
-    found = listed(command, "--learner", "ES", "--learner", "frozen")
-    assert set(found) == names(learner="ES") | names(learner="frozen")
-
-
-def test_where_nothing_is_picked_it_says_so(command):
-    said = command("runs", "--layout", "F")
-    assert said.exit_code == 0
-    assert said.output.startswith("No run in ")
-
-
-@pytest.mark.parametrize("column", ["cost", "size", "seed", "layout", "run", "theta", "target"])
-def test_any_column_and_any_field_sorts(command, column):
-    measured = {
-        "cost": lambda row: row["facts"]["final_cost"],
-        "size": lambda row: row["bytes"],
-        "run": lambda row: row["run"],
-    }
-    value = measured.get(column, lambda row: row["experiment"].get(column))
-    for reverse in ((), ("--reverse",)):
-        rows = json.loads(command("runs", "--sort", column, *reverse, "--json").stdout)
-        values = [value(row) for row in rows]
-        assert values == sorted(values, reverse=bool(reverse))
-        assert len(rows) == len(STORED)
+@pytest.mark.parametrize("field", fields(Experiment), ids=lambda field: field.name)
+def test_every_field_of_an_experiment_is_an_option_with_its_help(command, asked, field):
+    words, value = words_of(field)
+    command("train", *words)
+    assert asked == [Experiment(**{field.name: value})]
+    text = " ".join(command("train", "--help").output.split()).replace("- ", "-")
+    assert " ".join(field.metadata["help"].removesuffix(".").split()) in text
+    if not isinstance(field.default, bool):
+        assert field.metadata["allowed"].text in text
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("line", "wanted"),
     [
-        (("--sort", "costs"), "sort = 'costs' must be one of run, cost, minutes, size, stopped"),
-        (("--learner", "SARSA"), "learner = 'SARSA' must be one of ES"),
-        (("--seed", "-1"), "seed = -1 must be a whole number"),
+        ("", {}),
+        ("--theta 1,1,.05,.05,.05,1,1,.1,.002", {"theta": OTHERS["theta"][1]}),
+        (
+            "--layout '.5,2.2 -3,.5' --start -1,0,1",
+            {"layout": ((0.5, 2.2), (-3, 0.5)), "start": (-1, 0, 1)},
+        ),
+        ("--episodes 10000 --horizon 500 --yes", {"episodes": 10_000, "horizon": 500}),
     ],
 )
-def test_what_no_run_can_be_is_refused(command, words, said):
-    refused = command("runs", *words)
-    assert refused.exit_code == 1
-    assert refused.output.startswith(f"Error: {said}")
+def test_options_name_a_run(command, asked, line, wanted):
+    command("train", *shlex.split(line))
+    assert asked == [Experiment(**wanted)]
 
 
-def test_the_table_ends_with_what_it_adds_up_to(command):
-    last = command("runs").stdout.splitlines()[-1]
-    whole = sum(store.path_of(e).stat().st_size for e in STORED)
-    assert last.startswith(f"{len(STORED)} runs, {size(whole)}, ")
+def test_a_run_is_trained_once_listed_and_drawn(command, tmp_path, monkeypatch):
+    one = Experiment("GES", **SHORT)
+    done = command("train", "--learner", "GES", *WORDS)
+    assert done.exit_code == 0, done.output
+    path = store.path_of(one)
+    assert f"{path}\nNext: nmpcrl show {path.stem}\n" in done.stdout
+    monkeypatch.setattr("nmpcrl.study.store.run", lambda *_, **__: pytest.fail("trained again"))
+    again = command("train", "--learner", "GES", *WORDS)
+    assert again.stdout == done.stdout
+    head, line = command("runs").stdout.splitlines()
+    assert head.split()[:6] == ["run", "learner", "layout", "decay", "seed", "episodes"]
+    assert line.split()[:6] == [path.stem, "GES", "A", "step", "0", "2"]
+    for name in ("GES-A", path.stem, str(path)):
+        shown = command("show", name)
+        assert shown.exit_code == 0, shown.output
+        assert shown.stdout == f"{verdict(fetch(one))}\n{path.with_suffix('.svg')}\n"
+    page = path.with_suffix(".svg").read_bytes()
+    assert page.startswith(b"<?xml")
+    assert command("show", "GES", "--out", str(tmp_path / "a.PNG")).exit_code == 0
+    assert (tmp_path / "a.PNG").read_bytes().startswith(b"\x89PNG\r")
 
 
-def test_json_has_what_the_help_says_and_no_infinity(command, tmp_path, monkeypatch):
-    (row,) = json.loads(command("runs", "--learner", "GES", "--seed", "0", "--json").stdout)
-    assert set(row) == {"run", "path", "bytes", "experiment", "facts"}
-    assert Experiment(**row["experiment"]) in STORED
+def test_the_frozen_run_is_drawn_if_it_is_stored_and_is_what_its_name_says(command):
+    one = Experiment(**SHORT)
+    fetch(one)
+    alone = page(command)
+    fetch(Experiment("GES", **SHORT)).save(store.path_of(frozen_arm(one)))
+    assert page(command) == alone
+    store.path_of(frozen_arm(one)).unlink()
+    fetch(frozen_arm(one))
+    assert page(command) != alone
+
+
+def page(command) -> bytes:
+    return Path(command("show", "ES-").stdout.splitlines()[-1]).read_bytes()
+
+
+@pytest.fixture
+def stored(command):
+    """Four runs, of which one has an infinite cost and one was made by other code."""
+    wanted = sweep(seed=(0, 1), layout=("A", "B"), **SHORT)
+    records = fetch(wanted[0])
+    for one, cost in zip(wanted, (9.0, 8.0, 7.0, float("inf")), strict=True):
+        facts = records.facts | {"final_cost": cost, "key": store.key(one)}
+        facts |= {"sources": "other"} if cost == 7 else {}
+        named = records.experiment | {"seed": one.seed, "layout": one.layout}
+        Records(named, records.steps, records.evaluations, facts).save(store.path_of(one))
+    return [store.path_of(one).stem for one in wanted]
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("", [0, 2, 1, 3]),
+        ("ES-A", [0, 2]),
+        ("*-seed1", [2, 3]),
+        ("--sort cost", [2, 1, 0, 3]),
+        ("--sort layout --reverse", [3, 1, 2, 0]),
+        ("GES", []),
+    ],
+)
+def test_runs_are_picked_by_name_and_sorted_by_a_column(command, stored, line, found):
+    rows = json.loads(command("runs", "--json", *line.split()).stdout, parse_constant=pytest.fail)
+    if "layout" not in line:
+        assert [row["run"] for row in rows] == [stored[k] for k in found]
+    assert {row["run"] for row in rows} == {stored[k] for k in found}
+    table = command("runs", *line.split()).stdout.splitlines()[1:]
+    assert [one.split()[0] for one in table] == [row["run"] for row in rows]
+
+
+def test_json_has_what_the_help_says(command, stored):
+    ended = command("runs", "ES-B-step-seed1", "--json")
+    (row,) = json.loads(ended.stdout)
+    assert set(row) == {"run", "path", "experiment", "facts"}
+    assert Experiment(**row["experiment"]) == Experiment(seed=1, layout="B", **SHORT)
     assert {"stopped", "final_cost", "seconds", "solver"} <= set(row["facts"])
-    records = Records.load(store.path_of(STORED[0]))
-    records.facts["final_cost"] = float("inf")
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
-    records.save(store.path_of(STORED[0]))
-    text = command("runs", "--json").stdout
-    assert json.loads(text, parse_constant=pytest.fail)[0]["facts"]["final_cost"] is None
+    assert row["facts"]["final_cost"] is None
 
 
-def test_nothing_stored_is_an_empty_list_for_programs(command, tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
-    assert json.loads(command("runs", "--json").stdout) == []
+def test_a_run_of_other_code_is_shown_and_that_is_said(command, stored):
+    for line in ("runs", "show ES-A-step-seed1"):
+        ended = command(*line.split())
+        assert ended.exit_code == 0, ended.output
+        assert "of other code" in ended.stderr
+    assert "of other code" not in command("show", "ES-A-step-seed0").stderr
 
 
-def test_the_beginning_of_a_name_is_enough_where_no_other_begins_so(command):
-    whole = command("evaluate", store.path_of(STORED[2]).stem)
-    assert whole.exit_code == 0, whole.output
-    assert command("evaluate", "GES-A-step-seed0").stdout == whole.stdout
-    assert command("evaluate", str(store.path_of(STORED[2]))).stdout == whole.stdout
+def test_a_run_that_could_not_be_stored_is_reported_and_fails(command, monkeypatch):
+    from nmpcrl.study import run
 
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("GES", "'GES' is the beginning of several runs: GES-A-step-seed0-2ep-"),
-        ("GSE-A-step-seed0", "there is no run 'GSE-A-step-seed0' in "),
-        ("nothing.npz", "there is no run 'nothing.npz' in "),
-        ("", "'' is the beginning of several runs: ES-A-step-seed0-2ep-"),
-        ("\udcff", r"there is no run '\udcff' in "),
-    ],
-)
-def test_a_name_that_is_none_or_several_lists_those_that_come_close(command, name, said):
-    for words in (("evaluate", name), ("show", name), ("compare", name, name)):
-        refused = command(*words)
-        assert refused.exit_code == 1
-        assert refused.output.startswith(f"Error: {said}")
-        assert "GES-A-step-seed0-2ep-" in refused.output
-        assert len(refused.output.splitlines()) == 1
-
-
-def test_the_shell_completes_commands_options_learners_and_runs(command, monkeypatch):
-    def completed(*words: str) -> list[str]:
-        monkeypatch.setenv("COMP_WORDS", " ".join(["nmpcrl", *words]))
-        monkeypatch.setenv("COMP_CWORD", str(len(words)))
-        asked = CliRunner().invoke(
-            main, prog_name="nmpcrl", env={"_NMPCRL_COMPLETE": "bash_complete"}, complete_var=None
-        )
-        return [line.partition(",")[2] for line in asked.stdout.splitlines()]
-
-    assert completed("comp") == ["compare", "completion"]
-    assert "--evaluate-every" in completed("train", "--eval")
-    assert completed("train", "--learner", "G") == ["GES"]
-    assert completed("runs", "--layout", "B") == ["B"]
-    assert set(completed("show", "GES-")) == names(learner="GES")
-    assert set(completed("compare", "ES", "fro")) == names(learner="frozen")
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_completion_script_is_the_shells_own(command, shell):
-    script = command("completion", shell)
-    assert script.exit_code == 0
-    assert f"_NMPCRL_COMPLETE={shell}_complete" in script.stdout
-    assert command("completion", "tcsh").exit_code == 2
-
-
-def test_text_in_columns():
-    assert columns([["a", "1"], ["bcd", "20"]], frozenset({1})) == ["a     1", "bcd  20"]
-
-
-@pytest.mark.parametrize(
-    ("count", "text"),
-    [(0, "0 B"), (999, "999 B"), (1000, "1.0 kB"), (8.1e6, "8.1 MB"), (2e13, "20000.0 GB")],
-)
-def test_sizes_as_people_write_them(count, text):
-    assert size(count) == text
-
-
-@pytest.mark.parametrize(("seconds", "text"), [(3, "3 s"), (120, "2.0 min"), (7200, "2.0 h")])
-def test_durations_as_people_write_them(seconds, text):
-    assert duration(seconds) == text
-
-
-def test_a_cost_that_is_not_known_sorts_last():
-    from nmpcrl.commands.runs import _order
-
-    assert sorted([np.nan, 2.0, None, 1.0], key=_order)[:2] == [1.0, 2.0]
-
-
-@pytest.mark.parametrize(
-    ("count", "words"), [(0, "0 runs"), (1, "1 run"), (2, "2 runs"), (1760, "1,760 runs")]
-)
-def test_one_is_singular(count, words):
-    assert counted(count, "run") == words
-
-
-def test_a_shorter_run_does_not_make_the_name_of_the_papers_ambiguous(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
-    whole, short = (store.path_of(Experiment("GES", episodes=n)) for n in (300, 2))
-    for path in (short, short.with_stem(short.stem.replace("2ep", "20ep"))):
-        path.touch()
-    with pytest.raises(ClickException, match="is the beginning of several runs"):
-        file_of("GES-A-step-seed0")
-    whole.touch()
-    assert file_of("GES-A-step-seed0") == whole
-    assert file_of(short.stem) == short
-    with pytest.raises(ClickException, match="is the beginning of several runs"):
-        file_of("GES-A")
+    monkeypatch.setattr("nmpcrl.study.fetch", lambda one, **_: run(one))
+    done = command("train", *WORDS)
+    assert done.exit_code == 1
+    assert "noise-free cost" in done.stdout
+    assert "Next" not in done.stdout
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [("evaluate",), ("show",), ("compare", "ES-A-step-seed0")])
-def test_a_run_under_the_name_of_another_is_refused(words, tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
-    right, wrong = (Experiment(name, **SHORT) for name in ("ES", "GES"))
-    fetch_all([right], progress=False)
-    shutil.copy(store.path_of(right), store.path_of(wrong))
-    (tmp_path / "below").mkdir()
-    for name in ("GES-A-step-seed0", str(tmp_path / "below/.." / store.path_of(wrong).name)):
-        refused = CliRunner().invoke(main, [*words, name])
-        assert refused.exit_code == 1
-        assert f"holds another run, {store.path_of(right).stem}" in refused.output
-
-
-def test_what_does_not_say_which_code_made_it_is_no_run_of_the_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    path = store.path_of(Experiment(**SHORT))
-    path.parent.mkdir()
-    run(Experiment(**SHORT)).save(path)
-    said = CliRunner().invoke(main, ["evaluate", path.stem]).output
-    assert "does not say which code made it" in said
-    elsewhere = path.rename(tmp_path / "mine.npz")
-    assert CliRunner().invoke(main, ["evaluate", str(elsewhere)]).exit_code == 0
-
-
-@pytest.mark.parametrize("words", ["runs", "evaluate ES", "show ES", "compare ES ES"])
-def test_a_run_of_other_code_is_read_and_that_is_said(words, tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
-    records = fetch(Experiment(**SHORT))
-    assert CliRunner().invoke(main, words.split()).stderr == ""
-    records.facts["sources"] = "another"
-    records.save(store.path_of(Experiment(**SHORT)))
-    done = CliRunner().invoke(main, words.split())
-    assert done.exit_code == 0
-    assert "code that is neither this nor locked" in done.stderr
-
-
-def test_nothing_in_a_file_is_a_command_to_the_terminal(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
-    records = fetch_all([Experiment(**SHORT)], progress=False)[Experiment(**SHORT)]
-    records.facts["stopped"] = "diverged: \x1b[31mred\x1b]0;title\x07"
-    records.save(store.path_of(Experiment(**SHORT)))
-    (tmp_path / "none\x1b[31m\x07.npz").write_text("damaged")
-    asked = ("runs", TRAIN, "evaluate ES", "compare ES ES", "clean", "evaluate non", "show nobody")
-    for words in map(str.split, asked):
-        said = CliRunner().invoke(main, words).output
-        assert "\x1b" not in said
-        assert "\x07" not in said
-
-
-def test_runs_of_ones_own_are_counted_kept_and_not_drawn_in_a_sentence(command):
-    make = partial(expected_sarsa, alpha=paper.ALPHA)
-    trial = Trial("mine", make, paper.nmpc(), paper.THETA_INIT, episodes=1, steps=3)
-    fetch(trial)
-    place = store.path_of(trial)
-    try:
-        for words, consequence in ((["runs"], "not listed"), (["clean"], "they are kept")):
-            said = command(*words).stderr
-            assert f"1 trial of your own in {place.parent}: " in said
-            assert consequence in said
-        for name in (place.stem, str(place)):
-            done = command("show", name)
-            assert done.exit_code == 1
-            assert "is a run of a Trial" in done.stderr
-    finally:
-        shutil.rmtree(place.parent)
-    assert command("runs").stderr == ""
+def test_no_window_system_that_is_set_elsewhere_matters(tmp_path):
+    environment = os.environ | {"NMPCRL_RUNS": str(tmp_path), "MPLBACKEND": "nonsense"}
+    for words in (["train", *WORDS], ["show", "ES"]):
+        command = [sys.executable, "-m", "nmpcrl", *words]
+        subprocess.run(command, check=True, env=environment, capture_output=True)
+    assert list(tmp_path.glob("*.svg"))

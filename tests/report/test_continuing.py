@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nmpcrl.commands import main
-from nmpcrl.commands.fields import joined
 from nmpcrl.report.continuing import TEMPLATES, changed, code, command
 from nmpcrl.study import Experiment, Records, run
 from nmpcrl.study.learners import NETWORKS
@@ -91,7 +90,7 @@ def test_the_code_names_the_run_whatever_its_fields_are(experiment):
 @given(experiments)
 def test_the_options_name_the_run_whatever_its_fields_are(experiment):
     _, name, *words = shlex.split(command(experiment).replace("\\\n", ""))
-    with main.commands[name].make_context(name, joined(words)) as context:
+    with main.commands[name].make_context(name, words) as context:
         given = {one.name: context.params[one.name] for one in fields(Experiment)}
     assert Experiment(**given) == experiment.canonical
 

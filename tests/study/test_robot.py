@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-import nmpcrl.gym
-from nmpcrl.analysis.policy_search import LOWER, SCALE
-from nmpcrl.analysis.tune_env import CHANGE, WORST, TuneEnv
 from nmpcrl.learning import Persistent, evaluate
 from nmpcrl.study import ParameterError, paper
 from nmpcrl.study.population import JUDGE, TUNE
 from nmpcrl.study.robot import NmpcPolicy, RobotEnv
 
+ROBOT = "nmpcrl.gym:nmpcrl/Robot-v0"
 THETA = np.array(paper.THETA_INIT)
 FORWARD = np.array([0.6, 0.0])
 in_its_units = pytest.mark.filterwarnings("ignore:.*For Box action spaces:UserWarning")
@@ -34,21 +32,15 @@ def follow(env, policy, **options):
 
 
 @in_its_units
-@pytest.mark.parametrize(
-    ("name", "layout"),
-    [
-        *((nmpcrl.gym.ROBOT, layout) for layout in (None, "E", "T07", "0.5,2.2 3,0.5")),
-        (nmpcrl.gym.TUNE, None),
-    ],
-)
-def test_gymnasiums_own_check_passes(name, layout):
-    env = gymnasium.make(name, layout=layout)
+@pytest.mark.parametrize("layout", [None, "E", "T07", "0.5,2.2 3,0.5"])
+def test_gymnasiums_own_check_passes(layout):
+    env = gymnasium.make(ROBOT, layout=layout)
     check_env(env.unwrapped, skip_render_check=True)
 
 
 @in_its_units
 def test_the_frames_pass_gymnasiums_check():
-    check_env(gymnasium.make("nmpcrl/Robot-v0", render_mode="rgb_array", steps=3).unwrapped)
+    check_env(gymnasium.make(ROBOT, render_mode="rgb_array", steps=3).unwrapped)
 
 
 def test_a_module_before_the_name_is_enough():
@@ -59,7 +51,7 @@ def test_a_module_before_the_name_is_enough():
 
 @pytest.mark.parametrize("layout", ["A", "E"])
 def test_the_nmpc_as_a_policy_makes_the_rollout_by_which_theta_is_judged(layout):
-    states, rewards, end = follow(gymnasium.make("nmpcrl/Robot-v0", layout=layout), NmpcPolicy())
+    states, rewards, end = follow(gymnasium.make(ROBOT, layout=layout), NmpcPolicy())
     judged = evaluate(Persistent(paper.nmpc(layout)), THETA, paper.STEPS)
     np.testing.assert_array_equal(states[:, :3], judged.states)
     np.testing.assert_array_equal(-rewards, judged.costs)
@@ -127,8 +119,6 @@ def test_a_step_before_a_reset_and_after_the_end_is_refused():
         (lambda: RobotEnv(steps=0), "steps = 0 must be"),
         (lambda: RobotEnv(render_mode="human"), "render_mode = 'human' must be None or one of rgb"),
         (lambda: RobotEnv().reset(options={"layout": "1,1"}), "layout = '1,1' must be one of 4 ob"),
-        (lambda: TuneEnv(rollouts=1), "rollouts = 1 must be"),
-        (lambda: TuneEnv("A", render_mode="rgb_array"), "render_mode = 'rgb_array' must be None"),
     ],
 )
 def test_what_makes_no_sense_is_refused_in_a_sentence(call, message):
@@ -145,7 +135,7 @@ def test_what_is_no_action_is_refused(action):
 
 
 def test_a_frame_shows_the_robot_where_it_is():
-    env = gymnasium.make("nmpcrl/Robot-v0", layout="A", render_mode="rgb_array")
+    env = gymnasium.make(ROBOT, layout="A", render_mode="rgb_array")
     env.reset()
     first = env.render()
     for _ in range(10):
@@ -154,37 +144,3 @@ def test_a_frame_shows_the_robot_where_it_is():
     assert first.shape == later.shape == (640, 640, 3)
     assert first.dtype == np.uint8
     assert not np.array_equal(first, later)
-
-
-def test_tuning_nothing_costs_what_theta_init_does():
-    env = TuneEnv("A", rollouts=3)
-    seen, info = env.reset()
-    cost = evaluate(Persistent(paper.nmpc("A")), THETA, paper.STEPS).cost
-    assert info["cost"] == cost
-    ends = [env.step(np.zeros(9)) for _ in range(2)]
-    assert [one[1] for one in ends] == [-1.0, -1.0]
-    assert [one[3] for one in ends] == [False, True]
-    assert [one[4]["rollouts"] for one in ends] == [2, 3]
-    np.testing.assert_array_equal(ends[0][0], seen)
-    with pytest.raises(gymnasium.error.ResetNeeded):
-        env.step(np.zeros(9))
-
-
-def test_an_action_of_tuning_moves_theta_within_its_box():
-    env = TuneEnv("A")
-    env.reset()
-    *_, info = env.step(np.r_[np.full(8, 0.5), 9.0])
-    np.testing.assert_allclose(info["theta"] - THETA, CHANGE * SCALE * np.r_[np.full(8, 0.5), 1.0])
-    for _ in range(12):
-        *_, info = env.step(-np.ones(9))
-    np.testing.assert_allclose(info["theta"][:2], LOWER[:2], atol=1e-12)
-
-
-def test_a_failed_rollout_of_tuning_counts_the_worst(monkeypatch):
-    env = TuneEnv("A")
-    env.reset()
-    monkeypatch.setattr(env, "_rollout", lambda: np.inf)
-    seen, reward, *_ = env.step(np.zeros(9))
-    assert reward == -WORST
-    assert seen[-1] == WORST
-    assert env.observation_space.contains(seen)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from nmpcrl.study.storage.atomic import write_whole
+from nmpcrl.study.storage.refusal import Refusal
 
 Column = NDArray[Any]
 Tables = dict[str, dict[str, Column]]  # columns by name, by the name of their table
@@ -33,7 +34,7 @@ class Form(NamedTuple):
 Forms = Mapping[str, Form]  # by the name of the table
 
 
-class DamagedRecords(ValueError):
+class DamagedRecords(Refusal):
     """A file is not a whole run, or not the run that was asked for; the message says why."""
 
 

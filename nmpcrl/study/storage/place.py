@@ -13,12 +13,13 @@ from pathlib import Path
 
 from nmpcrl.study.storage.archive import DamagedRecords
 from nmpcrl.study.storage.atomic import sweep, try_to_write
+from nmpcrl.study.storage.refusal import Refusal
 
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]")
 UNREADABLE = (errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE)  # the file may yet be whole
 
 
-class StoreError(RuntimeError):
+class StoreError(Refusal):
     """Runs cannot be kept where they should be, or not be read; the message says what to do."""
 
 

@@ -1,0 +1,151 @@
+"""What a command cannot do ends in one sentence, before any work and without a traceback."""
+
+import errno
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from raising import raising
+
+from nmpcrl.analysis import summaries
+from nmpcrl.claims.published import Damaged
+from nmpcrl.commands import main
+from nmpcrl.commands.refusals import INSTEAD, sentence
+from nmpcrl.study import Experiment, fetch, limits, store
+
+TRAIN, STUDY = "train --episodes 1 --steps 4 ", "study "
+REFUSALS = [  # what is typed, and what the refusal names
+    ("nonsense", "No such command 'nonsense'"),
+    *((name, instead) for name, instead in INSTEAD.items()),
+    (TRAIN + "--learner SARSA", "learner = 'SARSA' must be one of ES, DES"),
+    (TRAIN + "--episodes 0", "episodes = 0 must be a whole number from 1 to 100000"),
+    (TRAIN + "--layout Z", "layout = 'Z' must be one of A, B"),
+    (TRAIN + "--layout '1,2 3'", "layout = '1,2 3' must be one of A, B"),
+    (TRAIN + "--alpha -1", "alpha = -1.0 must be a number in (0, 1e+06]"),
+    (TRAIN + "--alpha nan", "alpha = nan must be a number in (0, 1e+06]"),
+    (TRAIN + "--seed x", "'x' is not a valid int"),
+    (TRAIN + "--theta 1,2", "theta = (1.0, 2.0) must be 9 numbers"),
+    (TRAIN + "--theta 1,x", "'1,x' is not a list of numbers"),
+    (TRAIN + "--start 1,2", "start = (1.0, 2.0) must be 3 numbers: x in [-3, 9]"),
+    (TRAIN + "--no-clipped --constrained", "clipped = False leaves actions"),
+    ("train --episodes 10000 --horizon 500 --solver ipopt", "and more with --yes"),
+    ("runs --sort costs", "'costs' is not one of 'run'"),
+    ("show nobody", "no run begins with 'nobody'; stored: ES-A-step-seed0-2ep-"),
+    ("show ES", "2 runs begin with 'ES'; stored: ES-A-step-seed0-2ep-"),
+    ("show nothing.npz", "no run begins with 'nothing.npz'"),
+    ("show \udcff", "no run begins with"),
+    ("show damaged", "damaged.npz is damaged, or not a run"),
+    ("show GES --out a.pdf", "'a.pdf' must end in .svg or .png"),
+    ("show GES --out nowhere/a.svg", "'nowhere/a.svg' cannot be written"),
+    ("show GES --out .", "'.' is a directory"),
+    ("show GES --out ''", "'' cannot be written"),
+    (STUDY + "--part mian", "there is no part 'mian'; the parts are main, controls"),
+    (STUDY + "--table /dev/null/x.csv", "'/dev/null/x.csv' cannot be written"),
+    (STUDY + "--workers 0", "workers = 0 must be a whole number, 1 or more"),
+    (STUDY + "--workers 999", "; --yes starts them nevertheless"),
+    (STUDY + "--scheduler foo", "the scheduler's address 'foo' must be HOST:PORT"),
+    (STUDY + "--security x.toml", "--security needs --scheduler"),
+    ("verify", "nothing is published in "),
+    ("verify --sample x", "'x' is not a valid integer"),
+    ("wasm --plant robot", "as MODULE:NAME would"),
+    ("wasm --plant nowhere_at_all:robot", "No module named"),
+    ("wasm --plant nmpcrl.control:nothing", "nothing"),
+    ("wasm --plant nmpcrl.study:paper", "is no Plant"),
+    ("wasm --task nmpcrl.control:differential_drive", "is no Task"),
+    ("wasm --problem nmpcrl.control:differential_drive", "is no Problem"),
+    ("wasm --problem a:b --task c:d", "a Problem has no Plant and no Task beside it"),
+    ("wasm --out /nowhere/at/all.wasm", "cannot be written"),
+    ("bench --sweep x", "'x' is not a valid int"),
+    ("grade nowhere --out a.csv", "'nowhere' does not exist"),
+    ("grade . --out a.csv --workers 0", "0 is not in the range x>=1"),
+]
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory) -> Path:
+    """A folder of three short runs and a damaged file."""
+    folder = tmp_path_factory.mktemp("runs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("NMPCRL_RUNS", str(folder))
+        for learner, seed in (("ES", 0), ("ES", 1), ("GES", 0)):
+            fetch(Experiment(learner, seed, episodes=2, steps=4))
+    (folder / "damaged.npz").write_text("not a run")
+    return folder
+
+
+@pytest.mark.parametrize(("line", "said"), REFUSALS, ids=[line for line, _ in REFUSALS])
+def test_a_refusal_names_the_value_and_what_is_allowed(
+    command, runs, tmp_path, monkeypatch, line, said
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NMPCRL_RUNS", str(runs))
+    for work in ("nmpcrl.study.fetch", "nmpcrl.analysis.summaries.fetch_summaries"):
+        monkeypatch.setattr(work, raising(AssertionError("work has begun")))
+    monkeypatch.setattr("nmpcrl.learning.browser.module", raising(AssertionError("work has begun")))
+    before = sorted(runs.iterdir())
+    assert said in refused(command(*shlex.split(line)))
+    assert sorted(runs.iterdir()) == before
+    assert not list(tmp_path.iterdir())
+
+
+def refused(ended) -> str:
+    """The one sentence of a command that was refused."""
+    assert ended.exit_code in (1, 2), ended.output
+    assert isinstance(ended.exception, SystemExit), ended.exception
+    (said,) = [one for one in ended.stderr.splitlines() if one.startswith("Error: ")]
+    return said
+
+
+def test_a_removed_command_is_not_listed(command):
+    assert not set(INSTEAD) & set(main.commands)
+
+
+@pytest.mark.parametrize("line", ["study --dry-run", "train --episodes 1", "show x", "runs"])
+def test_a_file_in_the_place_of_the_folder_of_runs(command, tmp_path, line):
+    (tmp_path / "runs").write_text("")
+    assert str(tmp_path / "runs") in refused(command(*line.split()))
+
+
+def test_a_place_that_cannot_be_published_to(command, monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "file/published"))
+    monkeypatch.setattr(summaries, "fetch_summaries", raising(AssertionError("work has begun")))
+    assert f"{tmp_path / 'file/published'} cannot be made" in refused(command("study", "--publish"))
+
+
+@pytest.mark.parametrize(
+    "line", ["bench --again --short", "bench --sweep 20", "wasm", "train --box soft --episodes 1"]
+)
+def test_what_needs_machine_code_says_so_at_once_without_numba(
+    command, monkeypatch, tmp_path, line
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(limits, "environment", lambda: {"numba": "absent"})
+    assert "numba is not installed, and " in refused(command(*line.split()))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_of_a_trial_is_not_drawn(command, runs, tmp_path):
+    from nmpcrl.study import Records
+
+    records = Records.load(next(runs.glob("GES*")))
+    sizes = {"states": 3, "inputs": 2, "theta": [0.0] * 9}
+    about = {"episodes": 2, "steps": 4, "evaluate_every": 10} | sizes
+    Records(about, records.steps, records.evaluations, records.facts).save(tmp_path / "own.npz")
+    assert "is a run of a Trial" in refused(command("show", str(tmp_path / "own.npz")))
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (Damaged("one sentence"), "one sentence"),
+        (store.StoreError("one sentence"), "one sentence"),
+        (OSError(errno.ENOSPC, "No space left on device", "x"), "x: No space left on device"),
+        (MemoryError(), "this machine has too little memory"),
+        (BrokenPipeError(errno.EPIPE, "Broken pipe"), ""),
+        (np.linalg.LinAlgError("singular"), ""),
+    ],
+)
+def test_a_known_error_is_a_sentence_and_a_mistake_of_the_library_a_traceback(error, said):
+    assert sentence(error) == said

@@ -1,0 +1,180 @@
+"""`nmpcrl study`, `verify` and `bench`, on a study of six short runs."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pandas as pd
+import pytest
+from raising import raising
+
+from nmpcrl.analysis import summaries
+from nmpcrl.analysis.policy_search import LEAST, Search
+from nmpcrl.claims import publish, published, rule
+from nmpcrl.claims.verdict import Verdict
+from nmpcrl.study import design, sweep
+
+SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
+STUDY = {
+    **dict.fromkeys(sweep(learner=("ES", "frozen"), seed=(0, 1), **SHORT), "main"),
+    **dict.fromkeys(sweep(learner=("ES", "frozen"), horizon=5, **SHORT), "N = 5"),
+}
+WHOLE = len(design.whole_study())
+
+
+@pytest.fixture
+def small(monkeypatch, measured):
+    """A study of six short runs and short searches, without verdicts and measured times."""
+    times = pd.DataFrame(measured["learners"])
+    monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
+    monkeypatch.setattr(publish, "Search", partial(Search, budget=LEAST))
+    monkeypatch.setattr(publish, "rejudge", lambda: ())
+    monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: times)
+
+
+@pytest.fixture
+def trained(command, small, trains_here):
+    """The small study, trained in this process."""
+    with ThreadPoolExecutor(1) as one:
+        return summaries.fetch_summaries(STUDY, executor=one, progress=False)
+
+
+@pytest.fixture
+def published_here(command, trained):
+    """The small study, published."""
+    assert command("study", "--publish").exit_code == 0
+    return trained
+
+
+def test_a_dry_run_says_how_much_is_to_be_done_and_does_nothing(command, tmp_path):
+    said = command("study", "--dry-run").output
+    assert f"0 of {WHOLE:,} runs are stored" in said
+    assert 1 < float(said.split("take about ")[1].split(" h of")[0]) < 24
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.slow
+def test_study_trains_what_is_missing(command, small):
+    asked = command("study", "--workers", "2")
+    assert asked.exit_code == 0, asked.output
+    assert all(map(summaries.is_stored, STUDY))
+    assert "6 of 6 runs are stored" in command("study", "--dry-run").output
+
+
+def test_study_trains_a_part_of_itself(command, small, trains_here):
+    asked = command("study", "--part", "N = 5", "--workers", "1")
+    assert asked.exit_code == 0, asked.output
+    assert {STUDY[e] for e in STUDY if summaries.is_stored(e)} == {"N = 5"}
+
+
+def test_a_run_that_fails_is_reported_and_the_others_are_stored(command, trained, monkeypatch):
+    next(summaries.path_of(e) for e in STUDY if e.learner == "ES" and e.seed == 1).unlink()
+    monkeypatch.setattr(summaries, "run", raising(ArithmeticError("a mistake")))
+    ended = command("study")
+    assert ended.exit_code == 1
+    assert "1 of 6 runs failed" in ended.output
+    assert "ArithmeticError: a mistake" in ended.output
+
+
+def test_the_table_of_episodes_tells_every_run_from_every_other(command, trained, tmp_path):
+    asked = command("study", "--table", str(tmp_path / "episodes.csv.gz"))
+    assert asked.exit_code == 0, asked.output
+    frame = pd.read_csv(tmp_path / "episodes.csv.gz")
+    assert len(frame) == len(STUDY) * SHORT["episodes"]
+    names = ["variant", "learner", "layout", "decay", "seed"]
+    assert not frame.duplicated([*names, "episode"]).any()
+    runs = frame.set_index(names)
+    for e, one in trained.items():
+        mine = runs.loc[(STUDY[e], e.learner, e.layout, e.decay, e.seed)]
+        np.testing.assert_allclose(mine.cost, one.episodes["cost"], rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_what_is_published_verifies_the_runs_it_was_made_of(command, published_here):
+    assert list(published.load().rows) == list(STUDY)
+    assert list(published.load().searches) == [Search(a, budget=LEAST) for a in design.LAYOUTS]
+    verified = command("verify")
+    assert verified.exit_code == 0, verified.output
+    assert "6 bit for bit: 0 contradictions" in verified.output
+
+
+def test_verify_names_what_contradicts_and_fails(command, published_here):
+    wrong = next(e for e in STUDY if e.learner == "ES")
+    one = published_here[wrong]
+    cost = one.evaluations["cost"].copy()
+    cost[-1] += 1e-9
+    replace(one, evaluations=one.evaluations | {"cost": cost}).save(summaries.path_of(wrong))
+    verified = command("verify")
+    assert verified.exit_code == 1
+    assert ": 1 contradiction\n" in verified.output
+    assert "final_cost" in verified.output
+
+
+@pytest.mark.parametrize("share", [0.5, 0.99])
+def test_verify_makes_a_damaged_summary_again(command, published_here, share):
+    path = summaries.path_of(next(iter(STUDY)))
+    content = bytearray(path.read_bytes())
+    for place in range(400):  # more than what lies between the columns, which nobody reads
+        content[int(share * len(content)) - place] ^= 0xFF
+    path.write_bytes(bytes(content))
+    verified = command("verify")
+    assert verified.exit_code == 0, verified.output
+    assert "is damaged" in verified.output
+    assert "6 bit for bit: 0 contradictions" in verified.output
+
+
+@pytest.mark.parametrize("stored", [0, 1, 5])
+def test_verify_trains_as_many_runs_as_are_asked_for_besides_the_stored_ones(
+    command, published_here, stored
+):
+    for experiment in list(STUDY)[stored:]:
+        summaries.path_of(experiment).unlink()
+    if not stored:
+        assert "--sample 5 trains five for the comparison" in command("verify").output
+    verified = command("verify", "--sample", "2")
+    assert verified.exit_code == 0, verified.output
+    now = min(stored + 2, len(STUDY))
+    assert f"{now} bit for bit: " in verified.output
+    assert sum(map(summaries.is_stored, STUDY)) == now
+
+
+def test_verify_refuses_damaged_publications_and_too_large_samples(
+    command, published_here, tmp_path
+):
+    assert "7 is more than the 6 published runs" in command("verify", "--sample", "7").stderr
+    (tmp_path / "published/curves.npz").write_bytes(b"")
+    published._load.cache_clear()
+    refused = command("verify")
+    assert refused.exit_code == 1
+    assert "is damaged" in refused.output
+
+
+def test_a_study_without_numba_is_refused(command, published_here, monkeypatch):
+    summaries.path_of(next(iter(STUDY))).unlink()
+    monkeypatch.setattr(summaries, "environment", lambda: {"numba": "absent"})
+    refused = command("study")
+    assert refused.exit_code == 1
+    assert "Error: numba is not installed, and without it riccati" in refused.output
+
+
+@pytest.mark.parametrize(("outcome", "code"), [(rule.PARTLY, 0), (rule.UNDECIDABLE, 1)])
+def test_bench_publishes_the_verdicts_on_time_only_where_they_are_decided(
+    command, monkeypatch, outcome, code
+):
+    judged = Verdict("C3", "half the time", outcome, "0.65 [0.62, 0.68]", "")
+    monkeypatch.setattr(publish, "publish_timing", lambda: (judged,))
+    done = command("bench", "--publish")
+    assert done.exit_code == code
+    assert f"C3: {outcome}. 0.65" in done.output
+    assert ("nothing is published" in done.output) == bool(code)
+
+
+def test_bench_sweeps_over_as_many_problems_as_asked_for(command, monkeypatch):
+    from nmpcrl.bench import sweep
+
+    asked = []
+    monkeypatch.setattr(sweep, "sweep", lambda problems: asked.append(problems) or "a table")
+    for words in (("--sweep",), ("--sweep", "20")):
+        assert command("bench", *words).output == f"a table\n{sweep.path()}: stored\n"
+    assert asked == [100_000, 20]
