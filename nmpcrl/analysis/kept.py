@@ -15,7 +15,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from filelock import FileLock
 
-from nmpcrl.study.provenance import hash_of, is_accepted, locked_hash, sources_hash
+from nmpcrl.study.provenance import hash_of, is_accepted, sources_hash
 from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.executor import execute
 from nmpcrl.study.storage.place import check_folder, folder, keep, say
@@ -135,7 +135,7 @@ class Kept(Generic[Result]):
         """What a file holds; nothing if it is not there, or damaged, which is said."""
         try:
             found = json.loads(path.read_text("utf-8"))
-            if not is_accepted(found.get("sources", locked_hash())):
+            if not is_accepted(found.get("sources")):
                 say(f"{path} is of code that is neither this nor locked, and is judged again")
                 return {}
             return {

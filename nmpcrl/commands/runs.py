@@ -39,7 +39,7 @@ def runs(name: str, sort: str, reverse: bool, as_json: bool) -> None:
       nmpcrl runs GES-A --sort cost
       nmpcrl runs "*-episode-seed0" --json
     """
-    from nmpcrl.study.provenance import is_accepted, locked_hash, warn_of_changes
+    from nmpcrl.study.provenance import is_accepted, warn_of_changes
     from nmpcrl.study.store import folder, stored
 
     found = [(path, about) for path, about in stored().items() if begins(path, name)]
@@ -54,7 +54,7 @@ def runs(name: str, sort: str, reverse: bool, as_json: bool) -> None:
         click.echo(pd.DataFrame(rows).to_string(index=False, float_format="{:.1f}".format))
     else:
         click.echo(f"no run {name!r} is stored in {folder()}; `nmpcrl train` trains one")
-    others = sum(not is_accepted(one.facts.get("sources", locked_hash())) for _, one in found)
+    others = sum(not is_accepted(one.facts.get("sources")) for _, one in found)
     if others:
         click.echo(f"{others} of them are of other code, whose numbers may differ", err=True)
     warn_of_changes()

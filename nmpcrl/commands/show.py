@@ -34,14 +34,14 @@ def show(run: str, out: Path | None) -> None:
     from nmpcrl.report.run import verdict
     from nmpcrl.study import DamagedRecords, Experiment, Records
     from nmpcrl.study.experiment import frozen_arm
-    from nmpcrl.study.provenance import is_accepted, locked_hash, warn_of_changes
+    from nmpcrl.study.provenance import is_accepted, warn_of_changes
     from nmpcrl.study.storage.atomic import write_whole
     from nmpcrl.study.store import read
 
     records = Records.load(path)
     if "layout" not in records.experiment:
         raise click.ClickException(f"{path} is a run of a Trial, which only `fetch(trial)` reads")
-    if not is_accepted(records.facts.get("sources", locked_hash())):
+    if not is_accepted(records.facts.get("sources")):
         click.echo(f"{path} is of other code, whose numbers may differ", err=True)
     warn_of_changes()
     frozen = None

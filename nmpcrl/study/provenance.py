@@ -234,9 +234,12 @@ def locks() -> tuple[str, ...]:
     return (locked_hash(), *(lock["earlier"] if lock["epochs"] == EPOCHS else ()))
 
 
-def is_accepted(made: str) -> bool:
-    """Whether the sources with this `sources_hash` make the same numbers as the present ones."""
-    return made in (sources_hash(), *locks())
+def is_accepted(made: str | None) -> bool:
+    """Whether the sources with this `sources_hash` make the same numbers as the present ones.
+
+    A run that was never stored names no sources, and is accepted.
+    """
+    return made in (None, sources_hash(), *locks())
 
 
 def changed(now: Mapping[str, str], lock: Mapping[str, str]) -> list[str]:
