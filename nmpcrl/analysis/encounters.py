@@ -10,8 +10,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
-from nmpcrl.study.motions import Motion, centres
-from nmpcrl.study.world import CLEARANCE, TASK, World, inside
+from nmpcrl.study.moving import CLEARANCE, TASK, Motion, World, centres, inside
 
 GRID = 0.1  # [m], of the points at which crowding is counted
 

@@ -41,16 +41,14 @@ from nmpcrl.learning.remedies import (
 from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
 from nmpcrl.learning.training import absurd
 from nmpcrl.study import Experiment, paper
+from nmpcrl.study.drawn import JUDGE, SCENARIOS, TUNE, Scenario
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.jobs import Failed, parallel
 from nmpcrl.study.layouts import ARRIVED
-from nmpcrl.study.motions import centres, extrapolated
+from nmpcrl.study.moving import TASK, World, centres, controller, extrapolated
 from nmpcrl.study.parameters import refused, shortened, whole
-from nmpcrl.study.population import JUDGE, TUNE
-from nmpcrl.study.scenarios import Scenario, load
 from nmpcrl.study.setup import prepare
 from nmpcrl.study.storage.refusal import Refusal
-from nmpcrl.study.world import TASK, World, controller
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,7 +93,7 @@ class Robot:
             budget: episodes that may be begun.
             seed: of all that an entry draws.
         """
-        self.motions: Scenario = load().get(place, ()) if isinstance(place, str) else ()
+        self.motions: Scenario = SCENARIOS.get(place, ()) if isinstance(place, str) else ()
         self.budget, self.seed, self.begun = budget, seed, 0
         self.rng = np.random.default_rng(seed)
         if self.motions:
@@ -441,7 +439,7 @@ def seed_of(place: str, k: int) -> int:
     for further, names in enumerate((JUDGE, TUNE, paper.LAYOUTS)):
         if place in names:
             return HELD_OUT * (1 + further) + MOST_SEEDS * [*names].index(place) + k
-    if place in load():
+    if place in SCENARIOS:
         return scenario_seed(place, k)
     raise KeyError(place)
 
@@ -481,7 +479,7 @@ def judge_all(
     """
     import pandas as pd
 
-    places = load() if moving else JUDGE
+    places = SCENARIOS if moving else JUDGE
     budget = whole(1, MOST_EPISODES).check("budget", budget)
     seeds = whole(1, MOST_SEEDS).check("seeds", seeds)
     if layouts is not None:

@@ -22,8 +22,8 @@ from nmpcrl.claims.agent_published import order
 from nmpcrl.claims.agent_questions import AGENTS, EVERY, LONG, PARTS, SETTINGS, SPARING
 from nmpcrl.claims.extendable import whole_arms
 from nmpcrl.study import paper
+from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.geometry import Centres
-from nmpcrl.study.population import JUDGE, TUNE
 from nmpcrl.study.storage.refusal import Refusal
 
 TUNING = "tune"  # the part that comes before the others

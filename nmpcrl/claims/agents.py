@@ -24,7 +24,7 @@ from nmpcrl.claims.agent_questions import (
 )
 from nmpcrl.claims.agent_runs import judged_in
 from nmpcrl.claims.population import Answer, by_share
-from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.drawn import JUDGE, TUNE
 
 RESAMPLES = 2000  # of the bootstrap over layouts or seeds
 

@@ -27,8 +27,8 @@ from nmpcrl.claims.population_questions import RAISED_TO, SAME_CLOSING
 from nmpcrl.claims.published import Damaged, Unpublishable, effort, place, sums
 from nmpcrl.claims.rule import Paths
 from nmpcrl.study import paper
+from nmpcrl.study.drawn import LAYOUTS
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.population import LAYOUTS
 from nmpcrl.study.population_design import COMPARED, HORIZONS, name_of, whole_population
 from nmpcrl.study.provenance import made_here
 from nmpcrl.study.records import Column

@@ -15,7 +15,7 @@ from nmpcrl.report.cited import Count, cited
 from nmpcrl.report.remedies import entry_named, share_shown
 from nmpcrl.report.tables import html_table
 from nmpcrl.report.text import listed, number
-from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.drawn import JUDGE, TUNE
 
 BUDGET = PARTS["judge"].budget
 SHORT = SEARCHED[0].split()[1]  # episodes of the search

@@ -16,8 +16,7 @@ from nmpcrl.report.remedies import answer_items, entry_named
 from nmpcrl.report.tables import html_table
 from nmpcrl.studies.worlds import ORACLES, PARTS, VIEWS, WITHOUT, WORLD_QUESTIONS, WORLDS
 from nmpcrl.study import paper
-from nmpcrl.study.motions import Motion, centres
-from nmpcrl.study.world import CLEARANCE
+from nmpcrl.study.moving import CLEARANCE, Motion, centres
 
 OWN = ("oracle", "ES", "ES+model", "grid")  # policies of a wrong model that are compared
 ENTRY = {"init": "frozen", "ES": "ES", "grid": "grid", "CMA-ES": "CMA-ES"}  # by policy

@@ -20,8 +20,7 @@ from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import absurd
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
-from nmpcrl.study.motions import still
-from nmpcrl.study.world import World
+from nmpcrl.study.moving import World, still
 
 WINDOW = 20  # episodes that a chart looks back to
 LIMIT = 4.0  # standard deviations at which it fires

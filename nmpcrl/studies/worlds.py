@@ -26,9 +26,8 @@ from nmpcrl.claims.rule import read
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
 from nmpcrl.studies import worlds_run as runs
 from nmpcrl.studies.worlds_run import EVERY, sequence
-from nmpcrl.study.population import JUDGE
+from nmpcrl.study.drawn import JUDGE, SCENARIOS
 from nmpcrl.study.population_design import COMPARED
-from nmpcrl.study.scenarios import load
 
 BACK = 0.02  # of theta_init's cost: a share that exceeds the one before a change by less is back
 SOON = 50  # episodes: "back" within so many is soon
@@ -78,7 +77,7 @@ PARTS = {
     "moving": Part(
         runs.moving,
         grid(VIEWS, ["init", "grid", "CMA-ES", "ES"]),
-        tuple(load()),
+        tuple(SCENARIOS),
         50,
         seeds=5,
         deterministic=tuple(grid(VIEWS, ["init", "grid"])),
@@ -139,10 +138,10 @@ def _safer(table: pd.DataFrame) -> Answer:
 
 def _crowded(table: pd.DataFrame) -> Answer:
     """The rank correlation of crowding and states inside an obstacle, with its interval."""
-    inside, scenarios = means(table, "moving", "inside")["extrapolated init"].dropna(), load()
+    inside = means(table, "moving", "inside")["extrapolated init"].dropna()
     if len(inside) < 10:
         return Answer(UNDECIDABLE, {"scenarios": (0, len(inside))})
-    pairs = np.c_[[crowding(scenarios[str(name)]) for name in inside.index], inside]
+    pairs = np.c_[[crowding(SCENARIOS[str(name)]) for name in inside.index], inside]
     rng = np.random.default_rng(0)
     drawn = [pairs[rng.integers(len(pairs), size=len(pairs))] for _ in range(RESAMPLES)]
     low, high = np.nanquantile([_correlation(one) for one in drawn], [0.025, 0.975])

@@ -29,12 +29,11 @@ from nmpcrl.learning import (
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import absurd
 from nmpcrl.studies.shifts import Recent, changing, schedule
+from nmpcrl.studies.worlds_problems import controller, oracle
 from nmpcrl.study import paper
+from nmpcrl.study.drawn import JUDGE, SCENARIOS
 from nmpcrl.study.faults import FAULTS, Fault
-from nmpcrl.study.motions import PREDICTORS, still
-from nmpcrl.study.population import JUDGE
-from nmpcrl.study.scenarios import load
-from nmpcrl.study.world import World, controller, oracle
+from nmpcrl.study.moving import PREDICTORS, World, still
 
 EVERY = 5  # episodes between two rollouts of a changing world
 DRAWS = 5  # rollouts that judge theta where the body draws
@@ -102,7 +101,7 @@ def found(policy: str, nmpc: Persistent, world: World, episodes: int, seed: int)
 def moving(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row:
     """A view and a policy among obstacles that move."""
     view, policy = setting
-    motions = load()[place]
+    motions = SCENARIOS[place]
     nmpc, world = controller(len(motions)), World(motions, PREDICTORS[view])
     made = judged(nmpc, found(policy, nmpc, world, episodes, seed), world)
     return row(made.cost, *made.counted, made.arrived)
@@ -224,7 +223,7 @@ def compile_ahead(missing: Iterable[tuple[Condition, Any]]) -> None:
     """Compile what the runs call, so that no row counts the time of it."""
     kinds: dict[tuple[int, bool, str], None] = {}
     for one, setting in missing:
-        size = len(load()[one.place]) if one.part == "moving" else 4
+        size = len(SCENARIOS[one.place]) if one.part == "moving" else 4
         richer = one.part == "model" and setting[1] not in ("init", "grid", "ES")
         kinds[size, richer, setting if one.part == "terminal" else ""] = None
     for size, learned_model, kind in kinds:

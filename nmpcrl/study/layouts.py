@@ -1,8 +1,4 @@
-"""Which layouts of the obstacles a study may use, decided before anything is trained.
-
-`screen` applies the criteria to a layout, `sampler` draws layouts, and `drawn` returns the named
-ones: A is the first that we tried; the others are the first that a seeded sampler drew and the
-screening accepted, so that none was selected for what is learned in it.
+"""The criteria for layouts of obstacles, decided before anything was trained.
 
 A layout may be used if
 
@@ -11,10 +7,12 @@ A layout may be used if
 3. without noise, the controller with theta_init is at the target after K = 129 steps.
 
 It is called *closing* if a gap that this first rollout goes through is closed at theta_c = 0.35,
-where learning may be heading (departure N), and *open* otherwise.
+where learning may be heading (departure N), and *open* otherwise. A is the first layout that was
+tried; the others are the first that a seeded sampler drew and `screen` accepted
+(`nmpcrl.studies.drawing`), so that none was selected for what is learned in it.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -24,20 +22,14 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control import Task
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
+from nmpcrl.study.geometry import Centres
 
 ARRIVED = 0.5  # distance to the target, over all states, at which a rollout has arrived
-SEED = 0  # of the sampler that drew the named layouts
-AREA = ((-1.5, 7.5), (-1.5, 5.0))  # of the drawn centres, x and y [m]
-APART = 2.2  # least distance of two drawn centres [m]: no disc touches another
-GRID = 0.1  # drawn centres are multiples of it [m]
-NAMED = {"open": 3, "closing": 3}  # how many layouts of each kind are named, A included
-
-Centres = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
 class Screening:
-    """How a layout meets the criteria."""
+    """The criteria that a layout meets."""
 
     blocked: bool  # 1: the straight line
     clear: bool  # 2: start and target
@@ -70,11 +62,11 @@ def screen(centres: Centres) -> Screening:
 
 
 def gaps(task: Task, path: Matrix, theta_c: float) -> dict[tuple[int, int], float]:
-    """How wide the gaps are that a path goes through, once theta_c widens the obstacles [m].
+    """The widths of the gaps that a path goes through, once theta_c widens the obstacles [m].
 
     A gap lies between two obstacles if the path crosses the line between their centres, and
-    between an obstacle and a wall if it crosses the shortest line between them. Not above 0, it is
-    closed to plans that keep Eq. (2f).
+    between an obstacle and a wall if it crosses the shortest line between them. A gap of width 0 or
+    less is closed to plans that satisfy Eq. (2f).
 
     Args:
         task: obstacles and walls.
@@ -98,36 +90,6 @@ def gaps(task: Task, path: Matrix, theta_c: float) -> dict[tuple[int, int], floa
             if np.isfinite(limit) and _crosses(path, centre, foot):
                 widths[i, -number] = abs(limit - centre[axis]) - keep_out
     return widths
-
-
-def sampler(seed: int = SEED) -> Iterator[Centres]:
-    """Layouts of four obstacles, without end; the centres are apart, on a grid, and that is all."""
-    rng = np.random.default_rng(seed)
-    (left, right), (bottom, top) = AREA
-    while True:
-        drawn = rng.uniform((left, bottom), (right, top), (4, 2))
-        centres = np.round(np.round(drawn / GRID) * GRID, 6)
-        pairs = combinations(centres, 2)
-        if all(np.linalg.norm(one - other) >= APART for one, other in pairs):
-            yield tuple((float(x), float(y)) for x, y in sorted(centres.tolist()))
-
-
-def drawn() -> dict[str, Centres]:
-    """The named layouts after A: the first that `sampler` draws, until there are `NAMED` of a kind.
-
-    `paper.LAYOUTS` begins with them; a test draws them again.
-    """
-    wanted = dict(NAMED)
-    wanted[screen(paper.LAYOUTS["A"]).kind] -= 1
-    found: dict[str, Centres] = {}
-    for centres in sampler():
-        screening = screen(centres)
-        if screening.passed and wanted[screening.kind]:
-            wanted[screening.kind] -= 1
-            found[chr(ord("B") + len(found))] = centres
-        if not any(wanted.values()):
-            return found
-    raise AssertionError("the sampler does not end")
 
 
 def _keep_out(task: Task, theta_c: float) -> float:

@@ -9,11 +9,11 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any
 
-from nmpcrl.study import paper, population
+from nmpcrl.study import paper
+from nmpcrl.study.drawn import JUDGE, LAYOUTS, TUNE
 from nmpcrl.study.experiment import PAPER, Experiment
-from nmpcrl.study.layouts import Centres
+from nmpcrl.study.geometry import Centres
 from nmpcrl.study.learners import DECAYS
-from nmpcrl.study.population import LAYOUTS
 
 SEEDS = 2  # of each layout
 SOLVING_TWICE = ("ES", "GES")  # the learners for predictors and horizons: the cheap ones
@@ -88,7 +88,7 @@ def arms(episodes: int = paper.EPISODES) -> dict[str, tuple[Experiment, ...]]:
     what predictors are fitted to. The others change one thing in the layouts that are `COMPARED`,
     with one seed, and the step size in the paper's reading only, to save time.
     """
-    judged, tuned = [*population.JUDGE], [*population.TUNE]
+    judged, tuned = [*JUDGE], [*TUNE]
     learning = ("frozen", *SOLVING_TWICE)
     length: dict[str, Any] = {"episodes": episodes}
     one: dict[str, Any] = {"places": (0,), **length}

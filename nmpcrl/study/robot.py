@@ -17,11 +17,10 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control import Plant, Solution, Task, differential_drive
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import geometry, paper
+from nmpcrl.study.drawn import TUNE
 from nmpcrl.study.geometry import CENTRES, FARTHEST, Centres
-from nmpcrl.study.motions import Motion, centres
+from nmpcrl.study.moving import Motion, centres, charge
 from nmpcrl.study.parameters import ParameterError, refused, whole
-from nmpcrl.study.population import TUNE
-from nmpcrl.study.world import charge
 
 NAMED = paper.LAYOUTS | TUNE  # what a layout may be called; those to judge on have no name here
 MOST_STEPS = 10_000  # of an episode

@@ -8,7 +8,7 @@ from nmpcrl.analysis.agent_curves import curve
 from nmpcrl.analysis.agents import ENTRIES
 from nmpcrl.analysis.suite import Robot, entry, judge
 from nmpcrl.study import paper
-from nmpcrl.study.population import TUNE
+from nmpcrl.study.drawn import TUNE
 
 pytestmark = pytest.mark.skipif(
     not importlib.util.find_spec("stable_baselines3"), reason="needs the extra nmpcrl[agents]"

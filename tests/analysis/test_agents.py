@@ -9,7 +9,7 @@ import pytest
 from nmpcrl.analysis.agents import AGENTS, ENTRIES, NoAgents, agent, seen
 from nmpcrl.analysis.suite import Robot, followed, judge
 from nmpcrl.study import ParameterError, paper
-from nmpcrl.study.population import TUNE
+from nmpcrl.study.drawn import TUNE
 from nmpcrl.study.robot import RobotEnv
 
 needs_agents = pytest.mark.skipif(

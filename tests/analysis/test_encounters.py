@@ -6,8 +6,7 @@ import pytest
 from nmpcrl.analysis.encounters import Counted, count, crowding, judged
 from nmpcrl.study import paper
 from nmpcrl.study.faults import FAULTS
-from nmpcrl.study.motions import Straight, still
-from nmpcrl.study.world import World, controller
+from nmpcrl.study.moving import Straight, World, controller, still
 
 THETA = np.array(paper.THETA_INIT)
 

@@ -29,9 +29,8 @@ from nmpcrl.analysis.suite import (
 from nmpcrl.claims import remedy_published
 from nmpcrl.learning import Exploration, Weights, evaluate, expected_sarsa, train
 from nmpcrl.study import Experiment, ParameterError, paper, published, run
-from nmpcrl.study.population import JUDGE
+from nmpcrl.study.drawn import JUDGE, SCENARIOS
 from nmpcrl.study.robot import NmpcPolicy
-from nmpcrl.study.scenarios import load
 
 LAYOUT, THETA = paper.LAYOUTS["A"], np.array(paper.THETA_INIT)
 QUICK = ("frozen", "TDRC", "GES-3", "guarded-ES", "averaged-ES", "undone-LSTD-Q")
@@ -302,7 +301,7 @@ def test_what_needs_the_papers_own_task_says_so_among_moving_obstacles():
 
 
 def test_seeds_are_held_out_and_no_two_places_share_one():
-    seeds = [seed_of(name, k) for name in (*LAYOUTS, *load()) for k in (0, 9)]
+    seeds = [seed_of(name, k) for name in (*LAYOUTS, *SCENARIOS) for k in (0, 9)]
     assert len({*seeds}) == len(seeds)
     assert min(seeds) >= HELD_OUT
     assert seed_of("J004", 1) == HELD_OUT + 3 * MOST_SEEDS + 1

@@ -5,8 +5,8 @@ import pytest
 
 from nmpcrl.analysis.encounters import judged
 from nmpcrl.report.live.moving_obstacles import BEGIN, SCENE
-from nmpcrl.study import paper, world
-from nmpcrl.study.motions import PERIOD, PREDICTORS, Straight
+from nmpcrl.study import moving, paper
+from nmpcrl.study.moving import PERIOD, PREDICTORS, Straight
 
 FIGURE = "moving"
 TIME, MARGIN = "Time", "theta c, tightens the obstacle constraint"
@@ -28,8 +28,8 @@ def assert_equal_to_python(shown: dict) -> None:
     given = shown["given"]
     motions = [Straight((x, y), (vx, vy)) for x, y, vx, vy in given["movers"]]
     for view, robot in shown["found"].items():
-        around = world.World(motions, PREDICTORS[view])
-        found = judged(world.controller(4), np.array(given["theta"]), around)
+        around = moving.World(motions, PREDICTORS[view])
+        found = judged(moving.controller(4), np.array(given["theta"]), around)
         assert not robot["failed"]
         assert robot["costs"][-1] == pytest.approx(found.cost, rel=1e-6)
         assert robot["inside"][-1] == found.counted.inside

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from nmpcrl.analysis.suite import Robot, gain, judge, solved
-from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.drawn import JUDGE, TUNE
 
 PAGE = (Path(__file__).resolve().parents[2] / "book/the_suite.md").read_text()
 

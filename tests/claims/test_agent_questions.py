@@ -4,7 +4,7 @@ from nmpcrl.analysis import agents
 from nmpcrl.claims import remedy_questions
 from nmpcrl.claims.agent_questions import AGENTS, EVERY, LONG, PARTS, SEARCH, SEARCHED, SETTINGS
 from nmpcrl.study import paper
-from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.drawn import JUDGE, TUNE
 
 
 def test_each_agent_has_as_many_settings_as_a_remedy_the_one_it_ships_with_first():

@@ -22,7 +22,7 @@ from nmpcrl.claims.agent_runs import (
     wanted,
     whole,
 )
-from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.drawn import JUDGE, TUNE
 
 BEST = 2  # which setting costs least here
 

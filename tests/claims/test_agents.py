@@ -11,7 +11,7 @@ from nmpcrl.claims.agent_runs import judged_in
 from nmpcrl.claims.agents import answers, course, rows
 from nmpcrl.claims.published import Damaged, Unpublishable
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.drawn import JUDGE, TUNE
 
 
 def runs(part, agent, share, there="a", seen=None):

@@ -12,8 +12,8 @@ from nmpcrl.claims.population_questions import EXPECTED, QUESTIONS
 from nmpcrl.claims.rule import Observations
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.claims.wider_claims import WIDER_CLAIMS
+from nmpcrl.study.drawn import JUDGE, LAYOUTS, TUNE
 from nmpcrl.study.experiment import MAIN, Experiment
-from nmpcrl.study.population import JUDGE, LAYOUTS, TUNE
 from nmpcrl.study.population_design import COMPARED, seeds
 
 NAMES = [*JUDGE][:20]

@@ -7,7 +7,7 @@ import pytest
 from nmpcrl.analysis.difficulty import MEASURES
 from nmpcrl.claims import population_published as published
 from nmpcrl.claims.published import Damaged, Unpublishable
-from nmpcrl.study.population import JUDGE, LAYOUTS
+from nmpcrl.study.drawn import JUDGE, LAYOUTS
 from nmpcrl.study.population_design import COMPARED, HORIZONS, seeds, whole_population
 
 NAME = "J001"

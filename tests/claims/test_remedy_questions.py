@@ -12,7 +12,7 @@ from nmpcrl.claims.remedy_questions import (
     RUNS_OF_TUNING,
     SETTINGS,
 )
-from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.drawn import JUDGE, TUNE
 
 
 def test_every_entry_ships_and_begins_its_tuning_as_it_ships():

@@ -9,7 +9,7 @@ from driver.project import ROOT
 from nmpcrl.analysis.difficulty import MEASURES
 from nmpcrl.claims import population_published
 from nmpcrl.claims.published import place
-from nmpcrl.study.population import JUDGE, LAYOUTS
+from nmpcrl.study.drawn import JUDGE, LAYOUTS
 from nmpcrl.study.population_design import COMPARED, seeds, whole_population
 
 

@@ -52,10 +52,9 @@ from nmpcrl.report import baselines, whole_study
 from nmpcrl.report import worlds as world_report
 from nmpcrl.studies import worlds
 from nmpcrl.study import design, paper, provenance
+from nmpcrl.study.drawn import JUDGE, LAYOUTS, SCENARIOS, TUNE
 from nmpcrl.study.experiment import PAPER
-from nmpcrl.study.population import JUDGE, LAYOUTS, TUNE
 from nmpcrl.study.population_design import whole_population
-from nmpcrl.study.scenarios import load as scenarios
 
 FOLDER = Path(__file__).parent
 ROLLOUT = 6  # digits of a rollout's cost, which are the same on all machines
@@ -532,7 +531,7 @@ def rows_among_moving_obstacles() -> Any:
 
 @entry("worlds")
 def drawn_scenarios() -> Any:
-    return {"count": len(scenarios()), "all": short(plain(scenarios()))}
+    return {"count": len(SCENARIOS), "all": short(plain(SCENARIOS))}
 
 
 # Other problems and times.

@@ -10,7 +10,7 @@ from nmpcrl.claims.agent_questions import AGENTS, PARTS
 from nmpcrl.claims.agent_runs import judged_in
 from nmpcrl.claims.remedies import COLUMNS as COMPARED
 from nmpcrl.report.agents import finding, in_short, longer_table, panels, row_table, waiting
-from nmpcrl.study.population import JUDGE
+from nmpcrl.study.drawn import JUDGE
 
 NOTHING = pd.DataFrame(columns=[*COLUMNS])
 SHARES = {"SAC": 1.2, "TD3": 0.97}  # of theta_init's cost, at the end

@@ -9,8 +9,8 @@ from nmpcrl.claims.population import shares
 from nmpcrl.claims.population_published import PopulationRuns
 from nmpcrl.claims.whole_picture import PICTURE
 from nmpcrl.report.drawn import in_short, share_table, whole_or_nearest
+from nmpcrl.study.drawn import JUDGE
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.population import JUDGE
 
 HELD = ["claim", "layout", "yes", "of", "holds", "weaker"]
 

@@ -12,8 +12,8 @@ from nmpcrl.learning import browser
 from nmpcrl.report import live
 from nmpcrl.report.live import frame, moving_obstacles
 from nmpcrl.report.live.moving_obstacles import SCENE
-from nmpcrl.study import paper, world
-from nmpcrl.study.motions import PREDICTORS, Straight, centres
+from nmpcrl.study import moving, paper
+from nmpcrl.study.moving import PREDICTORS, Straight, centres
 
 THETA = np.array(paper.THETA_INIT)
 ON_THE_START = (Straight((-1.5, 1.4), (0.1, 0.1)), *SCENE[1:])
@@ -37,8 +37,11 @@ def test_its_files_are_those_of_a_figure_that_solves_and_a_second_module(shown):
 
 def test_it_is_given_the_studys_episode_and_clearance(data):
     assert (data["start"], data["theta"]) == (list(paper.START), list(paper.THETA_INIT))
-    assert (data["steps"], len(data["movers"])) == (paper.STEPS, world.problem().data.shape[1] // 2)
-    assert {clearance for *_, clearance in data["problem"]["discs"]} == {world.CLEARANCE}
+    assert (data["steps"], len(data["movers"])) == (
+        paper.STEPS,
+        moving.problem().data.shape[1] // 2,
+    )
+    assert {clearance for *_, clearance in data["problem"]["discs"]} == {moving.CLEARANCE}
     assert set(data["looks"]) < set(PREDICTORS)
     movers = np.array(data["movers"])
     seventh = movers[:, :2] + 7 * data["period"] * movers[:, 2:]
@@ -51,7 +54,7 @@ def test_the_scene_shows_what_the_chapter_says():
     for c in (THETA[8], 0.301):
         theta = np.array([*THETA[:8], c])
         for view in moving_obstacles.LOOKS:
-            found = judged(world.controller(4), theta, world.World(SCENE, PREDICTORS[view]))
+            found = judged(moving.controller(4), theta, moving.World(SCENE, PREDICTORS[view]))
             assert found.arrived
             seen[view, c > 0.3] = found
     assert seen["frozen", False].counted.inside > 20
@@ -65,7 +68,7 @@ def test_the_scene_shows_what_the_chapter_says():
 def modules() -> tuple[Controller, ProblemController]:
     nmpc = paper.controller(paper.task_among(one.centre for one in SCENE))
     there = Controller(Module(browser.module(nmpc.plant, nmpc.task)), nmpc)
-    return there, ProblemController(Module(alone.module(world.problem())))
+    return there, ProblemController(Module(alone.module(moving.problem())))
 
 
 @pytest.mark.slow
@@ -81,10 +84,10 @@ def test_the_modules_drive_as_python_does(modules, view, motions):
             plan = planner.begin(state, THETA, data)
         else:
             plan = planner.solve(state, THETA, plan, data=data)
-        discs = np.column_stack([centres(motions, [t])[0], [world.CLEARANCE] * len(motions)])
+        discs = np.column_stack([centres(motions, [t])[0], [moving.CLEARANCE] * len(motions)])
         states.append(state)
         cost += there.cost(state, plan["action"], discs)
         state = there.step(state, plan["action"])
-    found = judged(world.controller(4), THETA, world.World(motions, PREDICTORS[view]))
+    found = judged(moving.controller(4), THETA, moving.World(motions, PREDICTORS[view]))
     assert cost == pytest.approx(found.cost, rel=1e-6)
     assert count(np.array(states), motions) == found.counted

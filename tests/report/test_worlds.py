@@ -10,7 +10,7 @@ from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report import worlds
 from nmpcrl.studies.worlds import ORACLES, WORLD_QUESTIONS
 from nmpcrl.study import paper
-from nmpcrl.study.motions import still
+from nmpcrl.study.moving import still
 
 
 def test_what_is_saved_is_a_share_of_the_same_layout_and_there_is_no_oracle_of_a_lag():

@@ -6,14 +6,13 @@ import pytest
 from nmpcrl.analysis.encounters import judged
 from nmpcrl.studies import worlds_run
 from nmpcrl.studies.worlds import PARTS, WORLDS
+from nmpcrl.studies.worlds_problems import controller
 from nmpcrl.studies.worlds_run import EVERY, begun_anew, sequence
 from nmpcrl.study import paper
-from nmpcrl.study.motions import frozen, still
-from nmpcrl.study.population import JUDGE
-from nmpcrl.study.scenarios import load
-from nmpcrl.study.world import World, controller
+from nmpcrl.study.drawn import JUDGE, SCENARIOS
+from nmpcrl.study.moving import World, frozen, still
 
-FOUR = next(name for name, one in load().items() if len(one) == 4)  # compiled for most tests
+FOUR = next(name for name, one in SCENARIOS.items() if len(one) == 4)  # compiled for most tests
 
 
 def ran(part, arm, place="J001", episodes=2, k=0):
@@ -22,7 +21,7 @@ def ran(part, arm, place="J001", episodes=2, k=0):
 
 
 def test_no_two_places_share_a_seed():
-    places = [*JUDGE, *load(), *(f"S{i:02}" for i in range(1, 11))]
+    places = [*JUDGE, *SCENARIOS, *(f"S{i:02}" for i in range(1, 11))]
     seeds = [WORLDS.seed(place, k) for place in places for k in (0, 4)]
     assert len({*seeds}) == len(seeds)
 
@@ -44,7 +43,7 @@ def test_the_same_run_has_the_same_numbers_and_another_seed_others(part, arm, pl
 
 def test_a_frozen_view_fares_as_its_world_says():
     row = ran("moving", "frozen init", FOUR)
-    made = judged(controller(4), np.array(paper.THETA_INIT), World(load()[FOUR], frozen))
+    made = judged(controller(4), np.array(paper.THETA_INIT), World(SCENARIOS[FOUR], frozen))
     assert (row["cost"], row["inside"], row["collisions"]) == (made.cost, *made.counted)
 
 

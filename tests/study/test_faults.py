@@ -4,9 +4,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from nmpcrl.studies.worlds_problems import oracle, problem
 from nmpcrl.study.faults import BASE, FAULTS, NONE, Fault, robot, wheels
 from nmpcrl.study.parameters import ParameterError
-from nmpcrl.study.world import oracle, problem
 
 STATE, ACTION = np.array([1.0, 2.0, 0.0]), np.array([0.5, 0.0])
 RNG = np.random.default_rng

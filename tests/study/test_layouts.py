@@ -1,12 +1,10 @@
-"""Layouts: each criterion of the screening, the sampler, and the named ones."""
-
-from itertools import combinations, islice
+"""Layouts: each criterion of the screening, and the widths of gaps."""
 
 import numpy as np
 import pytest
 
-from nmpcrl.study import design, layouts, paper
-from nmpcrl.study.layouts import gaps, sampler, screen
+from nmpcrl.study import paper
+from nmpcrl.study.layouts import gaps, screen
 
 AWAY = ((0.0, 7.5), (3.0, 7.5), (5.5, 7.5), (8.0, 7.5))  # all at the upper wall
 
@@ -76,29 +74,3 @@ def test_a_layout_closes_where_the_gap_of_the_first_rollout_does_at_theta_c_of_t
     towards = np.array(second) - [x, y]
     nearer = np.array(second) - 0.15 * towards / np.linalg.norm(towards)
     assert screen(((x, y), tuple(nearer), *others)).kind == "closing"
-
-
-def test_the_sampler_repeats_itself_and_keeps_its_promises():
-    some = list(islice(sampler(3), 50))
-    assert some == list(islice(sampler(3), 50))
-    assert some != list(islice(sampler(4), 50))
-    (left, right), (bottom, top) = layouts.AREA
-    for centres in some:
-        assert len(centres) == 4
-        for one, other in combinations(np.array(centres), 2):
-            assert np.linalg.norm(one - other) >= layouts.APART
-        x, y = np.transpose(centres)
-        assert left <= x.min()
-        assert x.max() <= right
-        assert bottom <= y.min()
-        assert y.max() <= top
-        assert np.allclose(np.round(centres, 1), centres, atol=1e-9)
-
-
-def test_the_layouts_of_the_study_are_the_first_that_were_drawn_and_pass():
-    named = {name: paper.LAYOUTS[name] for name in design.LAYOUTS}
-    kinds = [screen(centres).kind for centres in named.values()]
-    first = named.pop("A")
-    assert screen(first).passed
-    assert layouts.drawn() == named
-    assert {kind: kinds.count(kind) for kind in set(kinds)} == layouts.NAMED

@@ -3,10 +3,10 @@
 import pytest
 
 from nmpcrl.study import population_design as design
+from nmpcrl.study.drawn import JUDGE, LAYOUTS
 from nmpcrl.study.experiment import MAIN, frozen_arm
 from nmpcrl.study.layouts import screen
 from nmpcrl.study.limits import seconds_of
-from nmpcrl.study.population import JUDGE, LAYOUTS
 
 
 def test_no_two_layouts_share_a_seed():

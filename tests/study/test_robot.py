@@ -10,7 +10,7 @@ from gymnasium.utils.env_checker import check_env
 
 from nmpcrl.learning import Persistent, evaluate
 from nmpcrl.study import ParameterError, paper
-from nmpcrl.study.population import JUDGE, TUNE
+from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.robot import NmpcPolicy, RobotEnv
 
 ROBOT = "nmpcrl.gym:nmpcrl/Robot-v0"

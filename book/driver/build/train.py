@@ -37,13 +37,13 @@ def compile_for_pages() -> None:
     from nmpcrl.control import browser as alone
     from nmpcrl.control.codegen.source import CannotCompile
     from nmpcrl.learning import browser
-    from nmpcrl.study import Experiment, world
+    from nmpcrl.study import Experiment, moving
     from nmpcrl.study.setup import controller_of
 
     nmpc = controller_of(Experiment()).nmpc
     with suppress(CannotCompile):
         browser.module(nmpc.plant, nmpc.task)
-        alone.module(world.problem())
+        alone.module(moving.problem())
 
 
 def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:

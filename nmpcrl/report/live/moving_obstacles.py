@@ -8,8 +8,8 @@ from IPython.display import HTML
 from nmpcrl import Vector
 from nmpcrl.report.live import frame
 from nmpcrl.report.live.problem import begin
-from nmpcrl.study import paper, world
-from nmpcrl.study.motions import PERIOD, Straight
+from nmpcrl.study import paper
+from nmpcrl.study.moving import PERIOD, Straight, problem
 
 SCRIPTS = frame.scripts_of(
     "moving", *frame.MAP, "sliders.js", "charts.js", "player.js", "problem.js"
@@ -46,5 +46,4 @@ def moving(theta: Vector | None = None) -> HTML:
             "looks": LOOKS,
         }
 
-    problem = world.problem(len(SCENE))
-    return frame.solving("moving", nmpc, data, SCRIPTS, STYLES, problem)
+    return frame.solving("moving", nmpc, data, SCRIPTS, STYLES, problem(len(SCENE)))

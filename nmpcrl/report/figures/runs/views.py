@@ -25,8 +25,7 @@ from nmpcrl.report.figures.style import (
 from nmpcrl.report.worlds import nearest
 from nmpcrl.studies.worlds import VIEWS
 from nmpcrl.study import paper
-from nmpcrl.study.motions import PERIOD, Motion, centres
-from nmpcrl.study.world import CLEARANCE, TASK
+from nmpcrl.study.moving import CLEARANCE, PERIOD, TASK, Motion, centres
 
 PANELS = (("known", "extrapolated", "frozen"), ("near",) * 3)
 AROUND = 0.6  # of the map, beyond start and target [m]

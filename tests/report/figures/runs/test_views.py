@@ -12,7 +12,7 @@ from nmpcrl.report.figures.runs import views as figures
 from nmpcrl.report.figures.sheet import NARROW, WIDE
 from nmpcrl.studies.worlds import VIEWS
 from nmpcrl.study import paper
-from nmpcrl.study.motions import Straight, centres
+from nmpcrl.study.moving import Straight, centres
 
 SVG = "{http://www.w3.org/2000/svg}"
 MOTIONS = (Straight((3.0, 3.0), (0.0, -0.1)), Straight((5.0, 1.0), (0.1, 0.0)))

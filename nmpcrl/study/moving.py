@@ -1,0 +1,270 @@
+"""The robot's task among obstacles that move, as a `Problem`, and the world in which it is done.
+
+A motion is a function of the time in seconds, defined before the start, too. A predictor gives the
+centres of the obstacles at a plan's stages, from what is known at its first.
+
+    min   sum_i gamma^i (||theta_x (x_i - s_ref)||^2 + ||theta_u u_i||^2 + omega' sigma_i) + ...
+    s.t.  Xi(x_i, o_i) + theta_c <= sigma_i
+
+This is Eq. (2) with centres o_i that are data of each stage, and a soft box. In the paper's layouts
+it has the value of the paper's controller to seven digits.
+
+**The theory.** V_theta(s) becomes V_theta(s, t): the state of the Markov chain includes the time,
+or the motions' phase. Bootstrapped by a second solve with the data of t + 1, the TD error is that
+of the larger chain; with a network of (s, a) alone it is not. A predictor that errs makes every
+value one of another chain, so that the TD error has no zero at the true value. Within an episode
+that ends, there is no stationary law of the states to converge under, and "converges" means over
+episodes.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from math import sqrt
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.control import Nmpc, Problem
+from nmpcrl.control.nmpc import HORIZON
+from nmpcrl.control.problem import Soft
+from nmpcrl.control.task import Task, overlap
+from nmpcrl.learning.rollout import Persistent
+from nmpcrl.study import paper
+from nmpcrl.study.faults import NONE, Body, Fault, robot
+
+TARGET, LOWER, UPPER = map(np.array, (paper.TARGET, paper.LOWER, paper.UPPER))
+TASK: Task = paper.task_among(())  # its numbers are those of the charge
+CLEARANCE = 2.5  # d_rob + d_obs [m]
+PERIOD = 0.2  # [s] of a step
+Point = tuple[float, float]
+Motion = Callable[[Vector], Vector]  # times [s], shape (k,) -> centres [m], shape (k, 2)
+Predictor = Callable[[Sequence[Motion], int, int], Vector]
+
+
+@dataclass(frozen=True)
+class Straight:
+    """Motion at constant velocity; standing still at velocity 0."""
+
+    centre: Point  # at the start [m]
+    velocity: Point = (0.0, 0.0)  # [m/s]
+
+    def __call__(self, seconds: Vector) -> Vector:
+        """The centre at some times."""
+        return np.asarray(self.centre, float) + np.multiply.outer(seconds, self.velocity)
+
+
+@dataclass(frozen=True)
+class Sinusoidal:
+    """Oscillation: centre + reach sin(2 pi t / period + phase)."""
+
+    centre: Point  # of the motion [m]
+    reach: Point  # from the centre to a turning point [m]
+    period: float  # [s]
+    phase: float = 0.0  # at the start [rad]
+
+    def __call__(self, seconds: Vector) -> Vector:
+        """The centre at some times."""
+        swing = np.sin(2 * np.pi * np.asarray(seconds) / self.period + self.phase)
+        return np.asarray(self.centre, float) + np.multiply.outer(swing, self.reach)
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """Motion to and fro on the graph of a polynomial p over an axis, as in DynaBARN.
+
+    centre + along s + across p(s), |s| <= 1, where s runs at constant speed and turns at the ends.
+    Source: Nair et al. (2022), from the description.
+    """
+
+    centre: Point  # [m]
+    along: Point  # half of the axis [m]; p is across it, in units of its length
+    coefficients: tuple[float, ...]  # of p, the constant first
+    speed: float  # on the axis [m/s]
+    phase: float = 0.0  # s at the start, on the way up
+
+    def __call__(self, seconds: Vector) -> Vector:
+        """The centre at some times."""
+        way = np.asarray(seconds) * self.speed / np.hypot(*self.along) + self.phase
+        s = 1 - np.abs((way + 1) % 4 - 2)  # up to 1, down to -1, and up again
+        height = np.polynomial.polynomial.polyval(s, self.coefficients)
+        across = (-self.along[1], self.along[0])
+        turned = np.multiply.outer(s, self.along) + np.multiply.outer(height, across)
+        moved: Vector = np.asarray(self.centre, float) + turned
+        return moved
+
+
+KINDS: dict[str, Callable[..., Motion]] = {
+    "straight": Straight, "sinusoidal": Sinusoidal, "polynomial": Polynomial,
+}  # fmt: skip
+
+
+def centres(motions: Sequence[Motion], times: ArrayLike) -> Vector:
+    """The centres of the obstacles at some steps of an episode, shape (k, M, 2)."""
+    seconds = PERIOD * np.atleast_1d(np.asarray(times, float))
+    return np.stack([motion(seconds) for motion in motions], axis=1)
+
+
+def still(layout: Sequence[Point]) -> tuple[Motion, ...]:
+    """The obstacles of a layout, standing still."""
+    return tuple(Straight((float(x), float(y))) for x, y in layout)
+
+
+def known(motions: Sequence[Motion], t: int, horizon: int = HORIZON) -> Vector:
+    """The motion itself, shape (N + 1, M, 2)."""
+    return centres(motions, np.arange(t, t + horizon + 1))
+
+
+def extrapolated(motions: Sequence[Motion], t: int, horizon: int = HORIZON) -> Vector:
+    """The velocity since the last step continued: exact where it is constant."""
+    before, now = centres(motions, [t - 1, t])
+    ahead: Vector = now + np.multiply.outer(np.arange(horizon + 1), now - before)
+    return ahead
+
+
+def frozen(motions: Sequence[Motion], t: int, horizon: int = HORIZON) -> Vector:
+    """The present centres, at all stages."""
+    return np.repeat(centres(motions, [t]), horizon + 1, axis=0)
+
+
+PREDICTORS: dict[str, Predictor] = {
+    "known": known, "extrapolated": extrapolated, "frozen": frozen,
+}  # fmt: skip
+
+
+def square(terms: Any, size: int) -> Any:
+    """The squared norm of `size` expressions."""
+    return sum(terms[i] ** 2 for i in range(size))
+
+
+def transition(x: Any, u: Any, *_: Any) -> Any:
+    """The robot's model."""
+    return robot().transition(x, u)
+
+
+def diagonal(x: Any, th: Any, *_: Any) -> Any:
+    """The paper's terminal cost."""
+    away = x - TARGET
+    return square([th["f"][i] * away[i] for i in range(3)], 3)
+
+
+def problem(
+    obstacles: int = 4,
+    *,
+    model: Callable[..., Any] = transition,
+    terminal: Callable[..., Any] = diagonal,
+    further: Mapping[str, Any] = MappingProxyType({}),
+) -> Problem:
+    """Eq. (2) among obstacles whose centres are data.
+
+    Args:
+        obstacles: M.
+        model: (x, u, theta, data) -> next x.
+        terminal: (x, theta, data) -> cost.
+        further: parameters of these two, behind the paper's in theta.
+    """
+    first = np.array(paper.THETA_INIT)
+    theta: dict[str, Any] = {"x": first[:3], "u": first[3:5], "f": first[5:8], "c": first[8]}
+
+    def stage(x: Any, u: Any, th: Any, _: Any) -> Any:
+        return square(th["x"] * (x - TARGET), 3) + square(th["u"] * u, 2)
+
+    def discs(x: Any, _: Any, th: Any, d: Any) -> Any:
+        at = d["centres"]
+        return [overlap(x[0], x[1], at[j, 0], at[j, 1], CLEARANCE) + th["c"]
+                for j in range(obstacles)]  # fmt: skip
+
+    def walls(x: Any, _: Any, __: Any, ___: Any) -> Any:
+        return [side for i in (0, 1) for side in (x[i] - UPPER[i], LOWER[i] - x[i])]
+
+    return Problem(
+        states=3, inputs=2, horizon=paper.HORIZON, gamma=paper.GAMMA, theta=theta | dict(further),
+        model=model, stage=stage, terminal=terminal,
+        soft=[Soft(discs, paper.SLACK_WEIGHT), Soft(walls, paper.SLACK_WEIGHT, slice(1, None))],
+        lower=robot().lower, upper=robot().upper, data={"centres": np.zeros((obstacles, 2))},
+    )  # fmt: skip
+
+
+@cache
+def controller(obstacles: int = 4) -> Persistent:
+    """The NMPC of `problem`, compiled once."""
+    return Persistent(Nmpc(problem(obstacles)))
+
+
+def charge(state: Vector, action: Vector, at: Matrix) -> float:
+    """Eq. (20) among obstacles at some centres, shape (M, 2), to the last bit of `stage_cost`."""
+    away, weights = (state - TARGET).tolist(), TASK.weights.tolist()
+    cost: float = sum(w * (a * a) for w, a in zip(weights, away, strict=True))
+    if sqrt(sum(a * a for a in away)) < TASK.near:
+        return cost + sqrt(sum(a * a for a in action.tolist()))
+    x, y = state[:2].tolist()
+    entered = sum(
+        max(0.0, overlap(x, y, cx, cy, CLEARANCE) + TASK.margin) for cx, cy in at.tolist()
+    )
+    return float(cost + TASK.penalty * entered)
+
+
+def inside(states: Matrix, motions: Sequence[Motion]) -> NDArray[np.bool_]:
+    """Whether the robot is in each obstacle at each step, Xi > 0, shape (K + 1, M)."""
+    at = centres(motions, np.arange(len(states)))
+    away = states[:, None, :2] - at
+    found: NDArray[np.bool_] = (away**2).sum(axis=2) < (CLEARANCE / 2) ** 2
+    return found
+
+
+class World:
+    """An environment with a clock: the plant, the start and the data of `train` and `evaluate`.
+
+    A world serves one run at a time: `begin` sets the clock to 0 and draws the episode's body.
+    """
+
+    def __init__(
+        self,
+        motions: Sequence[Motion],
+        predict: Predictor = known,
+        *,
+        fault: Fault = NONE,
+        seen: Sequence[Motion] | None = None,
+    ) -> None:
+        """Set the obstacles, their predictor and the body.
+
+        Args:
+            motions: of the obstacles.
+            predict: the controller's predictor, one of `PREDICTORS`.
+            fault: the difference of the body from the model.
+            seen: the obstacles that the controller predicts; `motions` if absent.
+        """
+        self.motions, self.predict, self.fault = tuple(motions), predict, fault
+        self.seen = self.motions if seen is None else tuple(seen)
+        self.states: list[Vector] = []  # of the episode so far, without noise
+        self._body = Body(NONE, np.eye(2))
+        self._at = centres(self.motions, np.arange(paper.STEPS + 1))
+        self._predicted: dict[int, Matrix] = {}
+
+    @property
+    def environment(self) -> dict[str, Any]:
+        """Keyword arguments of `train` and `evaluate`."""
+        return {"plant": self.step, "start": self.begin, "data": self.data}
+
+    def begin(self, rng: np.random.Generator) -> Vector:
+        """The measured start."""
+        self._body, self.states = self.fault.draw(rng), [np.array(paper.START)]
+        return self._body.measure(self.states[0], rng)
+
+    def step(
+        self, _: Vector, action: Vector, rng: np.random.Generator
+    ) -> tuple[Vector, float, bool]:
+        """The next state, measured, and the charge of the true one."""
+        state = self.states[-1]
+        at = self._at[len(self.states) - 1]
+        self.states.append(self._body.step(state, action))
+        return self._body.measure(self.states[-1], rng), charge(state, action, at), False
+
+    def data(self, t: int) -> dict[str, Matrix]:
+        """The predicted centres at the stages of a plan that begins at t."""
+        if t not in self._predicted:
+            self._predicted[t] = self.predict(self.seen, t, paper.HORIZON)
+        return {"centres": self._predicted[t]}
