@@ -54,9 +54,9 @@ class Spread:
 
 def spread(seed: int) -> Spread:
     """Run a seed in every way."""
-    from nmpcrl.study.problems import gros_zanon_csnlp as peer  # takes seconds to import
+    from nmpcrl.study.problems import peers  # takes seconds to import
 
-    runs = {solver: peer.run(solver, seed, STEPS) for solver in PEERS}
+    runs = {solver: peers.run(solver, seed, STEPS) for solver in PEERS}
     e = max((one.disturbances for one in runs.values()), key=len)
     theta = gz.problem().theta
     nudge = NUDGE * np.random.default_rng(seed).normal(size=theta.size)

@@ -16,8 +16,8 @@ from nmpcrl.learning import Exploration, Weights, q_learning, train
 from nmpcrl.learning.environment import StepFunction
 from nmpcrl.study import paper
 from nmpcrl.study.problems import gros_zanon as gz
-from nmpcrl.study.problems import gros_zanon_csnlp as peer
-from nmpcrl.study.problems import lqr, lqr_csnlp
+from nmpcrl.study.problems import lqr
+from nmpcrl.study.problems import peers as csnlp
 
 SOLVES = 60  # of each, after some that do not count
 FIRST = 5
@@ -56,16 +56,16 @@ class Pair:
 def gros_zanon(solver: str = "riccati") -> Peers:
     """The example of Gros and Zanon."""
     problem, rate = gz.problem(), 1e-4
-    agent = peer.agent(peer.mpc(TIGHT), problem, GradientDescent(rate))
+    agent = csnlp.agent(csnlp.gros_zanon_plan(TIGHT), problem, GradientDescent(rate))
     ours = (Nmpc(problem, solver=solver), problem.theta, gz.START, gz.plant)
-    return Peers("Gros and Zanon", *ours, agent, peer.World, rate)
+    return Peers("Gros and Zanon", *ours, agent, csnlp.World, rate)
 
 
 def linear(solver: str = "riccati") -> Peers:
     """The linear plant with a quadratic cost, whose truth is known."""
     problem, rate = lqr.problem(), 3e-5
-    agent = peer.agent(lqr_csnlp.mpc(TIGHT), problem, GradientDescent(rate))
-    world = partial(peer.World, plant=lqr.plant, start=lqr.START, most=np.inf)
+    agent = csnlp.agent(csnlp.lqr_plan(TIGHT), problem, GradientDescent(rate))
+    world = partial(csnlp.World, plant=lqr.plant, start=lqr.START, most=np.inf)
     ours = (Nmpc(problem, solver=solver), problem.theta, lqr.START, lqr.plant)
     return Peers("linear-quadratic", *ours, agent, world, rate)
 
@@ -94,7 +94,7 @@ def side_by_side(peers: Peers) -> Pair:
     """V of the states of one closed loop, each solved by both in turns, from their last plans."""
     rng, state, theta = np.random.default_rng(0), peers.start, peers.theta
     plan, spent = peers.nmpc.solve(state, theta), []
-    with peer.silent():
+    with csnlp.silent():
         for _ in range(FIRST + SOLVES):
             plan, ours = timed(partial(peers.nmpc.solve, state, theta, plan))
             _, theirs = timed(partial(peers.agent.state_value, state, True))
@@ -110,7 +110,7 @@ def learning(peers: Peers) -> Pair:
     for the next value, and ours plans anew.
     """
     spent = []
-    with peer.silent():
+    with csnlp.silent():
         for episode in range(1 + EPISODES):
             _, ours = timed(partial(list, _steps(peers, episode)))
             world = peers.world(EPISODE)

@@ -9,7 +9,7 @@ from csnlp.wrappers import NlpSensitivity
 
 from nmpcrl.control import Nmpc, Riccati, Solution
 from nmpcrl.study.problems import gros_zanon as gz
-from nmpcrl.study.problems import gros_zanon_csnlp as peer
+from nmpcrl.study.problems import peers
 
 PROBLEM = gz.problem()
 CLEAR = 1e-4  # from a change of the active rows
@@ -36,15 +36,15 @@ def strict(solution: Solution) -> bool:
 
 @cache
 def agent():
-    with peer.silent():
-        return peer.agent(peer.mpc("ipopt, exact"))
+    with peers.silent():
+        return peers.agent(peers.gros_zanon_plan("ipopt, exact"))
 
 
 @cache
 def slopes(kind: str):
     """Functions of csnlp's solution: the gradient of the value, and the policy's."""
     nlp = getattr(agent(), kind).nlp
-    theta = ca.vvcat([nlp.parameters[name] for name in peer.starts(gz.problem())])
+    theta = ca.vvcat([nlp.parameters[name] for name in peers.starts(gz.problem())])
     of = NlpSensitivity(nlp, theta)
     u0 = getattr(agent(), kind).first_actions["u"]
     kkt, of_theta = of.jacobian("K-y"), of.jacobian("K-p")
@@ -58,9 +58,9 @@ def slopes(kind: str):
 def theirs(kind: str, state, theta, action=None):
     """Value, gradient in the order of theta, and a function for the policy's slope, of csnlp."""
     by_name = PROBLEM.split(theta)
-    values = {name: np.asarray(by_name[name], float) for name in peer.starts(gz.problem())}
+    values = {name: np.asarray(by_name[name], float) for name in peers.starts(gz.problem())}
     agent().learnable_parameters.update_values(values)
-    with peer.silent():
+    with peers.silent():
         if kind == "V":
             _, found = agent().state_value(state, True)
         else:
@@ -80,7 +80,7 @@ def theirs(kind: str, state, theta, action=None):
 def by_columns(rows):
     """Rows in csnlp's order of theta, matrices column by column, in ours."""
     result, at = [], 0
-    for value in peer.starts(gz.problem()).values():
+    for value in peers.starts(gz.problem()).values():
         part = rows[:, at : at + value.size]
         at += value.size
         order = np.arange(value.size).reshape(value.shape, order="F").ravel()

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, Riccati
-from nmpcrl.study.problems import gros_zanon_csnlp as peer
-from nmpcrl.study.problems import lqr, lqr_csnlp
+from nmpcrl.study.problems import lqr, peers
 
 STATE = np.array([0.7, -1.1])
 
@@ -57,20 +56,20 @@ def test_the_worth_of_a_gain_is_what_it_costs():
 
 
 def test_value_and_action_are_csnlps(nmpc):
-    agent = peer.agent(lqr_csnlp.mpc("ipopt, 1e-10"), lqr.problem())
+    agent = peers.agent(peers.lqr_plan("ipopt, 1e-10"), lqr.problem())
     for state in np.random.default_rng(3).normal(size=(5, 2)):
         solution = nmpc.solve(state, lqr.problem().theta)
-        with peer.silent():
+        with peers.silent():
             action, theirs = agent.state_value(state, True)
         assert float(theirs.f) == pytest.approx(solution.value, rel=1e-7)
         assert float(action) == pytest.approx(solution.action[0], rel=1e-5, abs=1e-7)
 
 
 def test_the_agent_of_the_peer_meets_our_plant():
-    world = peer.World(3, plant=lqr.plant, start=lqr.START, most=np.inf)
-    with peer.silent():
-        peer.agent(lqr_csnlp.mpc("ipopt, 1e-10"), lqr.problem()).train(world, episodes=1, seed=0)
-    first, action, later = world.passed[0]
+    world = peers.World(3, plant=lqr.plant, start=lqr.START, most=np.inf)
+    with peers.silent():
+        peers.agent(peers.lqr_plan("ipopt, 1e-10"), lqr.problem()).train(world, episodes=1, seed=0)
+    first, action, later = world.transitions[0]
     expected, cost, _ = lqr.plant(first, action, None)
     np.testing.assert_array_equal(later, expected)
     assert (len(world.costs), world.costs[0]) == (3, cost)

@@ -1,7 +1,7 @@
-"""`gros_zanon` as csnlp and mpcrl have it (F. Airaldi): a peer, and an oracle that shares no code.
+"""`gros_zanon` and `lqr` as csnlp and mpcrl have them (F. Airaldi): peers that share no code.
 
-The plan, the plant and the agent are set up as in mpcrl's example of Q-learning: a step of Newton
-for each transition with the outer product of Q's gradient for a Hessian, and no exploration.
+Plan, plant and agent of `gros_zanon` are those of mpcrl's example of Q-learning: a step of Newton
+for each transition, with the outer product of Q's gradient for a Hessian, and no exploration.
 """
 
 import warnings
@@ -23,6 +23,7 @@ from nmpcrl import Vector
 from nmpcrl.control import Problem
 from nmpcrl.learning.environment import StepFunction
 from nmpcrl.study.problems import gros_zanon as gz
+from nmpcrl.study.problems import lqr
 
 RATE = 0.05  # of mpcrl's example
 IPOPT = {"print_level": 0, "sb": "yes", "max_iter": 500}
@@ -46,7 +47,7 @@ class Run:
 
 
 def run(solver: str, seed: int, steps: int) -> Run:
-    """Train mpcrl's agent for an episode.
+    """Train mpcrl's agent for an episode of `gros_zanon`.
 
     Args:
         solver: a name in `SOLVERS`.
@@ -56,10 +57,14 @@ def run(solver: str, seed: int, steps: int) -> Run:
     world, failure = World(steps), ""
     with silent():
         try:
-            agent(mpc(solver)).train(world, episodes=1, seed=seed)
+            agent(gros_zanon_plan(solver)).train(world, episodes=1, seed=seed)
         except MpcSolverError as error:
             failure = str(error)
-    return Run(np.array(world.costs), np.array(list(map(_disturbance, world.passed))), failure)
+    disturbances = [
+        float(later[0] - (gz.TRUE_A @ state + gz.TRUE_B @ action)[0])
+        for state, action, later in world.transitions
+    ]
+    return Run(np.array(world.costs), np.array(disturbances), failure)
 
 
 def agent(
@@ -68,19 +73,15 @@ def agent(
     """Q-learning after each transition.
 
     Args:
-        controller: as `mpc` writes it.
-        problem: ours, whose theta and gamma it takes; that of Gros and Zanon if absent.
+        controller: a plan in csnlp.
+        problem: our form of it, with theta and gamma; `gros_zanon` if absent.
         optimiser: one of mpcrl's; a step of Newton if absent.
     """
     problem = problem or gz.problem()
+    learnable = [LearnableParameter(name, one.shape, one) for name, one in starts(problem).items()]
     return LstdQLearningAgent(
         mpc=controller,
-        learnable_parameters=LearnableParametersDict(
-            [
-                LearnableParameter(name, value.shape, value)
-                for name, value in starts(problem).items()
-            ]
-        ),
+        learnable_parameters=LearnableParametersDict(learnable),
         discount_factor=problem.gamma,
         update_strategy=1,
         optimizer=optimiser or NewtonMethod(RATE),
@@ -90,26 +91,13 @@ def agent(
 
 
 def starts(problem: Problem) -> dict[str, Any]:
-    """theta as it begins, by name, each an array."""
+    """The first theta, by name, each parameter an array."""
     return {name: np.asarray(one, float) for name, one in problem.split(problem.theta).items()}
 
 
-def symbols(plan: Mpc, problem: Problem) -> dict[str, Any]:
-    """theta as parameters of csnlp, by name."""
-    return {
-        name: plan.parameter(name, value.shape if value.ndim == 2 else (value.size, 1))
-        for name, value in starts(problem).items()
-    }
-
-
-def mpc(solver: str) -> Mpc:
-    """The plan in csnlp, by multiple shooting.
-
-    Args:
-        solver: a name in `SOLVERS`.
-    """
-    plan = Mpc(Nlp("SX"), gz.HORIZON)
-    th = symbols(plan, gz.problem())
+def gros_zanon_plan(solver: str) -> Mpc:
+    """The plan of `gros_zanon` by multiple shooting, with one of `SOLVERS`."""
+    plan, th = _begin(gz.problem())
     x, _ = plan.state("x", 2, bound_initial=False)
     u, _ = plan.action("u", 1, lb=-1, ub=1)
     slack, _, _ = plan.variable("s", (2, gz.HORIZON), lb=0)
@@ -121,34 +109,56 @@ def mpc(solver: str) -> Mpc:
         z, v, s = x[:, i], u[:, i], slack[:, i]
         stage = 0.5 * (z.T @ z + 0.5 * v**2 + gz.PENALTY * (s[0] + s[1]))
         objective += gz.GAMMA**i * stage + th["f"][:2].T @ z + th["f"][2] * v
+    return _end(plan, objective, solver)
+
+
+def lqr_plan(solver: str) -> Mpc:
+    """The plan of `lqr` by multiple shooting, with one of `SOLVERS`."""
+    plan, th = _begin(lqr.problem())
+    x, _ = plan.state("x", 2, bound_initial=False)
+    u, _ = plan.action("u", 1)
+    plan.set_affine_dynamics(th["A"], th["B"])
+    objective = th["V0"] + lqr.GAMMA**lqr.HORIZON * (x[:, -1].T @ th["P"] @ x[:, -1])
+    for i in range(lqr.HORIZON):
+        stage = x[:, i].T @ th["Q"] @ x[:, i] + u[:, i].T @ th["R"] @ u[:, i]
+        objective += lqr.GAMMA**i * stage
+    return _end(plan, objective, solver)
+
+
+def _begin(problem: Problem) -> tuple[Mpc, dict[str, Any]]:
+    """An empty plan, and theta as its parameters by name."""
+    plan = Mpc(Nlp("SX"), problem.horizon)
+    return plan, {
+        name: plan.parameter(name, one.shape if one.ndim == 2 else (one.size, 1))
+        for name, one in starts(problem).items()
+    }
+
+
+def _end(plan: Mpc, objective: Any, solver: str) -> Mpc:
+    """The plan with its objective and its solver."""
     plan.minimize(objective)
-    give_solver(plan, solver)
-    return plan
-
-
-def give_solver(plan: Mpc, solver: str) -> None:
-    """Let a solver in `SOLVERS` solve it."""
     name, options = SOLVERS[solver]
     common = {"expand": True, "print_time": False, "bound_consistency": True, "calc_lam_p": False}
     plan.init_solver(common | options, solver=name, type="nlp")
+    return plan
 
 
 class World(gymnasium.Env):
-    """A plant as a Gymnasium environment that remembers its costs and transitions."""
+    """A plant as a Gymnasium environment that records its costs and transitions."""
 
     def __init__(
         self, steps: int, plant: StepFunction = gz.plant, start: Vector = gz.START, most: float = 1
     ) -> None:
         self.action_space = gymnasium.spaces.Box(-most, most, (1,), dtype=float)
         self.costs: list[float] = []
-        self.passed: list[tuple[Vector, Vector, Vector]] = []  # state, action, next state
+        self.transitions: list[tuple[Vector, Vector, Vector]] = []  # state, action, next state
         self._steps, self._plant, self._start = steps, plant, start
 
     def reset(
         self, *, seed: int | None = None, options: Any = None
     ) -> tuple[Vector, dict[str, Any]]:
         """Back to the start."""
-        super().reset(seed=seed, options=options)
+        super().reset(seed=seed)
         self._state = self._start
         return self._state, {}
 
@@ -157,14 +167,8 @@ class World(gymnasium.Env):
         state, action = self._state, np.asarray(action, float).ravel()
         self._state, cost, end = self._plant(state, action, self.np_random)
         self.costs.append(cost)
-        self.passed.append((state, action, self._state))
+        self.transitions.append((state, action, self._state))
         return self._state, cost, end, len(self.costs) >= self._steps, {}
-
-
-def _disturbance(passed: tuple[Vector, Vector, Vector]) -> float:
-    """e of a transition."""
-    state, action, later = passed
-    return float(later[0] - (gz.TRUE_A @ state + gz.TRUE_B @ action)[0])
 
 
 @contextmanager
