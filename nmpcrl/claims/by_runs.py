@@ -1,78 +1,85 @@
-"""Claims that runs decide: each run, or pair of runs, has a number, and a border ends the yes.
+"""Claims that runs decide: each run, or pair of runs, has a number, and yes ends at a border.
 
-Three questions are asked of numbers, a class each. The number of a run that is missing, or of which
-it is not known, is nan, and so is the answer missing.
+Three classes ask three questions of the numbers. The number of a missing run, or an unknown number,
+is nan, and then the answer is missing, too.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis.statistics import rate
-from nmpcrl.claims.halves import halves
 from nmpcrl.claims.rule import Claim, Observations, Paths, arms, read, settle
-from nmpcrl.claims.verdict import Verdict
+from nmpcrl.claims.verdict import Halves, Verdict
 
 # One row a cell of layout, decay and seed, one column an arm; nan is unknown.
 Values: TypeAlias = pd.DataFrame
-Measure: TypeAlias = Callable[[pd.DataFrame, Paths], Values]
+Number: TypeAlias = Callable[[pd.DataFrame], pd.Series]  # of each of one learner's runs
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunClaim(Claim):
-    """A claim that runs decide."""
+    """A claim that runs decide, by `number` of each learner's runs, or by `values` of all runs."""
 
-    measure: Measure  # the numbers behind it: runs and paths to values
+    number: Number | None = None
+    values: Callable[[pd.DataFrame, Paths], Values] | None = None
+    among: tuple[str, ...] = ()  # the learners whose cells are covered; by default `learners`
     threshold: float  # where yes ends
-    evidence: Callable[[pd.DataFrame, Paths], str]  # what the numbers are, in sentences
-    besides: Measure | None = None  # counts that have to be 0; the weaker question forgives them
-    each: Callable[[pd.DataFrame, Paths], str] | None = None  # and for each learner
-    unit: str = "pairs"  # what is asked, in the plural
-    nothing: float = 0.0  # the number of a run in which nothing is to be seen
-    short: str = ""  # statement for the head of a column
-    label: str = ""  # of the axis on which the numbers are drawn
-    linear_to: float = 0.0  # up to this size they are drawn on a linear axis, above on a log one
-    borders: Vector = field(default_factory=lambda: np.empty(0))  # at which it is decided once more
+    besides: Number | None = None  # counts that must be 0; the weaker question omits them
+    numbers: Callable[[pd.DataFrame, Paths, tuple[str, ...]], Mapping[str, Any]] | None = None
+    unit: str = "pairs"  # of answers, in the plural
+    nothing: float = 0.0  # the number of a run without the effect
+    short: str = ""  # the statement in the head of a column
+    label: str = ""  # of the axis with the numbers
+    linear_to: float = 0.0  # the axis is linear up to this size, and logarithmic above
+    borders: Vector = field(default_factory=lambda: np.empty(0))  # others, for `at_borders`
 
     @abstractmethod
     def yes(self, values: Values, border: float) -> pd.Series:
-        """The answers that these numbers give with a border: True, False or missing."""
+        """The answers to these numbers at a border: True, False or missing."""
+
+    def measure(self, runs: pd.DataFrame, paths: Paths) -> Values:
+        """The numbers that the claim asks about."""
+        if self.values:
+            return self.values(runs, paths)
+        assert self.number
+        return self._of_each(self.number, runs)
 
     def answers(self, values: Values, border: float | None = None) -> pd.Series:
-        """The answers that are known, with another border than the claim's if one is given."""
+        """The known answers, at the claim's own border or at another one."""
         return self.yes(values, self.threshold if border is None else border).dropna().astype(bool)
 
     def judge(self, observed: Observations) -> Verdict:
-        """The verdict, by the rule of `rule`."""
-        found = (observed.runs, observed.paths)
-        verdict = self.settled(observed, self.evidence(*found))
-        return replace(verdict, each=self.each(*found) if self.each else "")
+        """The verdict, by the rule of `rule`, with further numbers."""
+        verdict, names = self.settled(observed), self.learners
+        if not self.numbers:
+            return verdict
+        return replace(verdict, numbers=self.numbers(observed.runs, observed.paths, names))
 
-    def settled(self, observed: Observations, evidence: str = "") -> Verdict:
-        """The verdict with its counts, without what else `judge` says of it, which takes longer."""
+    def settled(self, observed: Observations) -> Verdict:
+        """The verdict with its counts, without the further numbers, which take longer."""
         answers, weaker = self.asked(observed)
-        return settle(self, answers, evidence, weaker=weaker, unit=self.unit)
+        return settle(self, answers, weaker=weaker, unit=self.unit)
 
     def asked(self, observed: Observations) -> tuple[pd.Series, pd.Series]:
-        """The answers to the claim's question, and to the weaker one, if it has one: else twice."""
-        found = (observed.runs, observed.paths)
-        answers = self.yes(self.measure(*found), self.threshold)
+        """The answers to the claim's question, and to its weaker one (else the same)."""
+        answers = self.yes(self.measure(observed.runs, observed.paths), self.threshold)
         if not self.besides:
             return answers, answers
-        counts = _long(self.besides(*found))
+        counts = _long(self._of_each(self.besides, observed.runs))
         return answers & _known(counts == 0, counts), answers
 
     def at_borders(self, values: Values, borders: Iterable[float]) -> pd.DataFrame:
-        """What would become of the claim at other borders than its own, which stays where it is.
+        """The outcome at other borders than the claim's own.
 
         Returns:
             Columns border, share (of yes), low and high (its interval) and outcome, by `rule.read`
-            for the answers that are known; no row where none is.
+            for the known answers; no row without answers.
         """
         rows = []
         for border in borders:
@@ -85,15 +92,19 @@ class RunClaim(Claim):
         return pd.DataFrame(rows, columns=[*names, "outcome"]).astype(dict.fromkeys(names, float))
 
     def steady(self, values: Values) -> bool:
-        """Whether the verdict stays with a border half and twice as far from nothing."""
-        far = self.threshold - self.nothing
-        around = self.nothing + far * np.array([0.5, 1.0, 2.0])
+        """Whether the outcome is the same with a border half and twice as far from `nothing`."""
+        around = self.nothing + (self.threshold - self.nothing) * np.array([0.5, 1.0, 2.0])
         result: bool = self.at_borders(values, around).outcome.nunique() <= 1
         return result
 
+    def _of_each(self, number: Number, runs: pd.DataFrame) -> Values:
+        found = arms(runs, *self.learners, among=self.among)
+        named = zip(self.learners, found, strict=True)
+        return pd.DataFrame({name: number(arm).astype(float) for name, arm in named})
+
 
 class AtMost(RunClaim):
-    """Asked of each number: is it at most the border?"""
+    """Is each number at most the border?"""
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """See `RunClaim.yes`."""
@@ -102,7 +113,7 @@ class AtMost(RunClaim):
 
 
 class AtLeast(RunClaim):
-    """Asked of each number: is it at least the border?"""
+    """Is each number at least the border?"""
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """See `RunClaim.yes`."""
@@ -112,18 +123,17 @@ class AtLeast(RunClaim):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contrast(RunClaim):
-    """Asked of each pair of numbers: is the first above the border, and the second not?"""
+    """Is the first number of each pair above the border, and the second not?"""
 
-    wrong: str  # what a run above the border did
-    worst: str  # and one whose number is infinite
+    wrong: str  # of a run above the border: "diverged"
+    worst: str  # of a run whose number is infinite
 
     def judge(self, observed: Observations) -> Verdict:
-        """See `RunClaim.judge`; both halves of the claim are counted, too."""
-        first, second = self.learners
+        """See `RunClaim.judge`; each half of the claim is counted, too."""
         borders = {self.wrong: self.threshold, self.worst: np.finfo(float).max}
         values = self.measure(observed.runs, observed.paths)
-        found = halves((first, second), values, borders)
-        return replace(super().judge(observed), halves=found)
+        first, second = self.learners
+        return replace(super().judge(observed), halves=halves((first, second), values, borders))
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """See `RunClaim.yes`."""
@@ -131,18 +141,27 @@ class Contrast(RunClaim):
         return _known((first > border) & (second <= border), first.where(second.notna()))
 
 
-def beside(
-    runs: pd.DataFrame,
-    learners: tuple[str, ...],
-    number: Callable[[pd.DataFrame], pd.Series],
-    *,
-    among: tuple[str, ...] = (),
-) -> Values:
-    """A number of each learner's runs, side by side; `among` as `arms` takes it."""
-    found = arms(runs, *learners, among=among)
-    return pd.DataFrame(
-        {name: number(arm).astype(float) for name, arm in zip(learners, found, strict=True)}
-    )
+def halves(
+    learners: tuple[str, str], values: Values, borders: Mapping[str, float]
+) -> tuple[Halves, ...]:
+    """Both halves of a contrast in each reading of the decay.
+
+    Args:
+        learners: by the claim the first goes wrong, and the second does not.
+        values: a number of each run, a column a learner.
+        borders: by the way to go wrong, the number above which a run does; the claim's own first.
+    """
+    known = values.dropna()
+    readings = known.index.get_level_values("decay")
+    found = []
+    for wrong, border in borders.items():
+        for decay in readings.unique():
+            bad = known[readings == decay] > border
+            first, second = (bad[name].astype(bool) for name in learners)
+            counts = int(first.sum()), int(second.sum())
+            against, apart = int((second & ~first).sum()), int((first != second).sum())
+            found.append(Halves(learners, wrong, str(decay), len(bad), counts, against, apart))
+    return tuple(found)
 
 
 def _long(values: Values) -> pd.Series:
@@ -151,5 +170,5 @@ def _long(values: Values) -> pd.Series:
 
 
 def _known(holds: pd.Series, numbers: pd.Series) -> pd.Series:
-    """Answers that are missing where a number is not known."""
+    """Answers that are missing where a number is unknown."""
     return holds.astype("boolean").where(numbers.notna())

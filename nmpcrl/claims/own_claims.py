@@ -1,11 +1,10 @@
-"""What we add to the paper: learners that it does not have, compared with those that it has.
+"""Our own claims: learners that the paper does not have, compared with the paper's.
 
-Decided as the paper's claims are, by `thresholds` and the rule of `rule`, and
-fixed with them before they were put to the study. A claim is judged wherever its learner was run.
+`thresholds` and the rule of `rule` decide them, and all was fixed together, before any claim was
+tested on the study. A claim is judged in the cells in which its learner was run.
 """
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, probability_of_improvement
 from nmpcrl.claims.by_runs import AtMost, RunClaim, Values
-from nmpcrl.claims.rule import Observations, Paths, arms, drawn_anew, median, shown
+from nmpcrl.claims.rule import Observations, Paths, arms, drawn_anew, median
 from nmpcrl.claims.thresholds import BETTER, SAME_COST, cost_difference, cost_reduction
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Verdict
 from nmpcrl.study.experiment import PAPER
@@ -26,16 +25,21 @@ def compared(
     """The fields of a claim that compares the final noise-free costs of two learners.
 
     Args:
-        learners: the cost of the first minus that of the second is judged, in shares of
+        learners: the numbers are the cost of the first minus that of the second, in shares of
             theta_init's.
-        size: what is judged of the difference.
+        size: applied to the difference.
     """
     first, second = learners
+
+    def values(runs: pd.DataFrame, _: Paths) -> Values:
+        difference = size(cost_difference(*_pairs(learners, runs)))
+        return difference.astype(float).to_frame(f"{first} and {second}")
+
     return {
         "learners": learners,
         "measured": "final noise-free costs, in shares of theta_init's",
-        "measure": partial(_difference, learners, size),
-        "evidence": partial(_evidence, learners),
+        "values": values,
+        "numbers": _numbers,
         "label": f"noise-free cost, {first} - {second}",
         "words": {
             REPRODUCED: "confirmed",
@@ -45,41 +49,23 @@ def compared(
     }
 
 
-def _difference(
-    learners: tuple[str, str],
-    size: Callable[[pd.Series], pd.Series],
-    runs: pd.DataFrame,
-    _: Paths,
-) -> Values:
-    difference = size(cost_difference(*_pairs(learners, runs)))
-    return difference.astype(float).to_frame(f"{learners[0]} and {learners[1]}")
-
-
-def _evidence(learners: tuple[str, str], runs: pd.DataFrame, _: Paths) -> str:
-    """Probability of improvement and median reductions, of the pairs that are whole."""
-    first, second = _pairs(learners, runs)
-    whole = (first.stopped.notna() & second.stopped.notna()).to_numpy(bool)
-    if not whole.any():
-        return f"{learners[0]} and {learners[1]} were not run together."
-    one, other = first[whole], second[whole]
-    better = _costs_less(one, other)
-    medians = [shown(median(cost_reduction(arm)), "+.1%") for arm in (one, other)]
-    return (
-        f"A run of {learners[0]} costs less than one of {learners[1]} with probability"
-        f" {better:.2f}; the noise-free cost was reduced by {medians[0]} and {medians[1]}"
-        " (medians)."
-    )
+def _numbers(runs: pd.DataFrame, _: Paths, learners: tuple[str, ...]) -> dict[str, Any]:
+    """Probability of improvement and median reductions, of complete pairs; empty without any."""
+    first, second = _complete(*_pairs(learners, runs))
+    if first.empty:
+        return {}
+    medians = [median(cost_reduction(arm)) for arm in (first, second)]
+    return {"better": _costs_less(first, second), "first": medians[0], "second": medians[1]}
 
 
 def costs_less(runs: pd.DataFrame, first: str, second: str) -> Estimate:
     """Probability that a run of the first learner costs less than one of the second in its layout.
 
-    Every pair counts alike: one that got stuck loses, by however much, no more than once. Runs
-    without a counterpart do not count; without any pair the estimate is nan.
+    Every pair counts alike: a run that got stuck loses once, by however much. Runs without a
+    counterpart do not count; without any pair the estimate is nan.
     """
-    one, other = arms(runs, first, second)
-    whole = (one.stopped.notna() & other.stopped.notna()).to_numpy(bool)
-    return _costs_less(one[whole], other[whole]) if whole.any() else Estimate(*[np.nan] * 3)
+    one, other = _complete(*arms(runs, first, second))
+    return Estimate(*[np.nan] * 3) if one.empty else _costs_less(one, other)
 
 
 def costs_less_anew(runs: pd.DataFrame, first: str, second: str) -> Estimate:
@@ -94,9 +80,15 @@ def _costs_less(first: pd.DataFrame, second: pd.DataFrame) -> Estimate:
     return probability_of_improvement(one, other, layouts)
 
 
-def _pairs(learners: tuple[str, str], runs: pd.DataFrame) -> tuple[pd.DataFrame, ...]:
-    """The runs of both, where the one that the paper does not have was run."""
+def _pairs(learners: tuple[str, ...], runs: pd.DataFrame) -> tuple[pd.DataFrame, ...]:
+    """The runs of both learners in the cells of the one that is not the paper's."""
     return arms(runs, *learners, among=tuple(name for name in learners if name not in PAPER))
+
+
+def _complete(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The pairs without a missing run."""
+    known = (first.stopped.notna() & second.stopped.notna()).to_numpy(bool)
+    return first[known], second[known]
 
 
 OWN_CLAIMS: dict[str, RunClaim] = {
@@ -151,5 +143,5 @@ OWN_CLAIMS: dict[str, RunClaim] = {
 
 
 def judge_own(runs: pd.DataFrame) -> tuple[Verdict, ...]:
-    """The verdicts on all of them, in order; `runs` as `paper_claims.judge` takes them."""
+    """The verdicts on our own claims, in order; `runs` as for `paper_claims.judge`."""
     return tuple(claim.judge(Observations(runs)) for claim in OWN_CLAIMS.values())

@@ -1,23 +1,21 @@
-"""The paper's claims, one object each: a question, numbers, a border and the sentences about them.
+"""The paper's claims, one object each: a question, the numbers that answer it, and a border.
 
-Where a border lies is said in `thresholds`, and how the answers of many runs become a verdict in
-`rule`.
+The borders are in `thresholds`, and the rule by which answers become a verdict is in `rule`.
 """
 
-from collections.abc import Iterable
-from functools import partial
-from typing import Any
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
-from nmpcrl import Vector
 from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.rows import THETA, experiment_of
 from nmpcrl.analysis.summary import SIZES
 from nmpcrl.claims.assumptions import TheoremClaim
-from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values, beside
-from nmpcrl.claims.rule import CELL, Assumption, Claim, Observations, Paths, arms, median, shown
+from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values
+from nmpcrl.claims.rule import CELL, Claim, Observations, Paths, arms, median
 from nmpcrl.claims.thresholds import (
     BETTER,
     DIVERGED,
@@ -39,7 +37,7 @@ from nmpcrl.claims.thresholds import (
     was_stopped,
 )
 from nmpcrl.claims.timing import TimeClaim
-from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
+from nmpcrl.claims.verdict import NOT, REPRODUCED, Assumption, Verdict
 from nmpcrl.study.experiment import PAPER
 from nmpcrl.study.layouts import ARRIVED
 
@@ -52,241 +50,128 @@ TIMED: dict[str, Any] = {
 }
 UP_TO = 60  # borders at which a claim is decided once more
 
-
-# C1, from Fig. 1
-
-
-def _cost_ratios(runs: pd.DataFrame, _: Paths) -> Values:
-    return beside(runs, ("DES", "RDES"), training_cost_ratio)
+Learners: TypeAlias = tuple[str, ...]
+Numbers: TypeAlias = dict[str, Any]
 
 
-def _c1_evidence(runs: pd.DataFrame, _: Paths) -> str:
-    des, rdes = arms(runs, "DES", "RDES")
-    ratio = [shown(median(arm.cost_ratio), ".2f") for arm in (des, rdes)]
-    return (
-        f"{_of(divergence(des))} runs of DES and {_of(divergence(rdes))} of RDES diverged; their"
-        f" training cost ended at {ratio[0]} and {ratio[1]} times the frozen arm's (medians; an"
-        " episode that a failed solve cut short counts as ∞)."
-    )
+def _contrasted(
+    wrong: Callable[[pd.DataFrame], pd.Series], column: str
+) -> Callable[[pd.DataFrame, Paths, Learners], Numbers]:
+    """How many runs of each learner went wrong, and the median of a column."""
 
+    def numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
+        found = dict(zip(learners, arms(runs, *learners), strict=True))
+        return {f"{name}_wrong": _count(wrong(arm)) for name, arm in found.items()} | {
+            f"{name}_median": median(arm[column]) for name, arm in found.items()
+        }
 
-# C2, from Fig. 2
-
-
-def _late_cost_ranges(runs: pd.DataFrame, _: Paths) -> Values:
-    return beside(runs, ("ES", "GES"), late_cost_range)
-
-
-def _c2_evidence(runs: pd.DataFrame, _: Paths) -> str:
-    es, ges = arms(runs, "ES", "GES")
-    ranges = [shown(median(arm.late_cost_range), ".1%") for arm in (es, ges)]
-    return (
-        f"{_of(instability(es))} runs of ES and {_of(instability(ges))} of GES were unstable; in"
-        f" the second half the noise-free cost ranged over {ranges[0]} and {ranges[1]} (medians)."
-    )
-
-
-# C5, from Figs. 3 and 4 and the conclusion
+    return numbers
 
 
 def policy_distances(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
-    """How far the policies of RDES and GES are apart, a row a cell.
+    """The distance between the policies of RDES and GES, a row a cell.
 
     Returns:
         Columns path [m] (nan where a rollout failed) and cost (in shares of theta_init's), failed
         (whether RDES's did: two that failed have the same cost and are not the same), and known
-        (whether both runs and both paths are there).
+        (whether both runs and both paths are known).
     """
     rdes, ges = arms(runs, "RDES", "GES")
-    wanted = runs[runs.learner.isin(("RDES", "GES"))].to_dict("records")
+    asked = runs[runs.learner.isin(("RDES", "GES"))].to_dict("records")
     found = {
         (row["learner"], *(row[name] for name in CELL)): paths.get(experiment_of(row))
-        for row in wanted
+        for row in asked
     }
     pairs = [(found.get(("RDES", *cell)), found.get(("GES", *cell))) for cell in rdes.index]
-    there = np.array([one is not None and other is not None for one, other in pairs], bool)
+    both = np.array([one is not None and other is not None for one, other in pairs], bool)
     return pd.DataFrame(
         {
             "path": pd.Series([path_distance(*pair) for pair in pairs], rdes.index, dtype=float),
             "cost": cost_difference(rdes, ges).abs(),
             "failed": np.isinf(rdes.final_cost),
-            "known": there & rdes.stopped.notna() & ges.stopped.notna(),
+            "known": both & rdes.stopped.notna() & ges.stopped.notna(),
         }
     )
 
 
 def _policy_distance(runs: pd.DataFrame, paths: Paths) -> Values:
-    """The distance in path or in cost, whichever is more, in units of what counts as the same."""
+    """The distance in path or in cost, the larger one, in units of what counts as the same."""
     apart = policy_distances(runs, paths)
     worse = np.maximum(apart.path / SAME_PATH, apart.cost / SAME_COST).fillna(np.inf)
     return worse.mask(apart.failed, np.inf).where(apart.known).to_frame("RDES and GES")
 
 
-def _c5_evidence(runs: pd.DataFrame, paths: Paths) -> str:
-    apart, thetas = policy_distances(runs, paths), arms(runs, "RDES", "GES")
-    return (
-        f"The trajectories come to be {shown(median(apart.path), '.2f')} m apart, the noise-free"
-        f" costs differ by {shown(median(apart.cost), '.1%')} and the components of theta by up to"
-        f" {shown(median(_theta_distances(*thetas)), '.0%')} (medians)."
-    )
-
-
-def _theta_distances(first: pd.DataFrame, second: pd.DataFrame) -> Vector:
-    """Largest relative difference between the components of two final thetas, one a pair."""
-    one, other = (arm[[*THETA]].to_numpy(float) for arm in (first, second))
+def _c5_numbers(runs: pd.DataFrame, paths: Paths, learners: Learners) -> Numbers:
+    """Median distances; of theta, the largest relative difference between two components."""
+    apart = policy_distances(runs, paths)
+    one, other = (arm[[*THETA]].to_numpy(float) for arm in arms(runs, *learners))
     relative = np.abs(one - other) / np.maximum(np.abs(one), np.abs(other))
-    result: Vector = np.max(relative, axis=1, initial=0)
-    return result
+    theta = np.max(relative, axis=1, initial=0)
+    return {"path": median(apart.path), "cost": median(apart.cost), "theta": median(theta)}
 
 
-# C6, from Section III-A
-
-
-def _relative_error(runs: pd.DataFrame, _: Paths) -> Values:
+def _relative_error(rdes: pd.DataFrame) -> pd.Series:
     """Held-out error of the network that has theta as an input over that of the one without."""
-    return beside(
-        runs, ("RDES",), lambda arm: arm.imitation_with / arm.imitation_without, among=PAPER
-    )
+    return rdes.imitation_with / rdes.imitation_without
 
 
-def _c6_evidence(runs: pd.DataFrame, _: Paths) -> str:
-    (rdes,) = arms(runs, "RDES", among=PAPER)
-    return (
-        f"On held-out pairs the error is {shown(median(rdes.imitation_with), '.1f')} with theta and"
-        f" {shown(median(rdes.imitation_without), '.1f')} without (medians of the root mean square,"
-        " in units of cost)."
-    )
+def _c6_numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
+    (rdes,) = arms(runs, *learners, among=PAPER)
+    return {"told": median(rdes.imitation_with), "alone": median(rdes.imitation_without)}
 
 
-# C7, from Section III-A and the conclusion
-
-
-def constraints_held(learners: tuple[str, ...]) -> dict[str, Any]:
-    """The fields of a claim that the constraints hold with some learners."""
-    return {
-        "learners": learners,
-        "measure": partial(_largest_overlap, learners),
-        "besides": partial(_states_inside, learners),
-        "evidence": partial(_c7_evidence, learners),
-        "each": partial(_c7_each, learners),
-    }
-
-
-def _largest_overlap(learners: tuple[str, ...], runs: pd.DataFrame, _: Paths) -> Values:
+def _largest_overlap(arm: pd.DataFrame) -> pd.Series:
     """Largest Xi without noise, 0 if none was above; infinite for an input out of bounds."""
-    return beside(
-        runs,
-        learners,
-        lambda arm: arm.eval_worst_overlap.clip(lower=0).mask(arm.inputs > 0, np.inf),
-    )
+    return arm.eval_worst_overlap.clip(lower=0).mask(arm.inputs > 0, np.inf)
 
 
-def _states_inside(learners: tuple[str, ...], runs: pd.DataFrame, _: Paths) -> Values:
-    """How many states in training lay in an obstacle."""
-    return beside(runs, learners, lambda arm: _inside(arm, "inside").sum(axis=1, skipna=False))
-
-
-def _c7_evidence(learners: tuple[str, ...], runs: pd.DataFrame, paths: Paths) -> str:
-    every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
-    training, judged = (_inside(every, name) for name in ("inside", "eval_inside"))
-    worst = [shown(every[c].max(), ".3f") for c in ("worst_overlap", "eval_worst_overlap")]
-    kept = BY_RUNS["C7"].answers(_largest_overlap(learners, runs, paths))
-    by_learner = judged.sum(axis=1).groupby(level="learner", sort=False).sum()
-    listed = ", ".join(f"{name} {states:.0f}" for name, states in by_learner.items())
-    return (
-        f"{every.inputs.sum():.0f} actions left their bounds. Of {every.steps_done.sum():.0f}"
-        f" states in training, {_sized(training)} lay in an obstacle by a small, a medium and a"
-        f" large Xi (up to 0.01, up to 0.1, and above; the largest is {worst[0]}), and of those"
-        f" without noise {_sized(judged)} (the largest is {worst[1]}; by learner: {listed})."
-        f" {every.outside.sum():.0f} states in training lay outside the box. Without noise,"
-        f" {_of(kept)} runs kept the constraints."
-    )
-
-
-def _c7_each(learners: tuple[str, ...], runs: pd.DataFrame, paths: Paths) -> str:
-    kept = BY_RUNS["C7"].answers(_largest_overlap(learners, runs, paths))
-    every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
-    states = _inside(every, "eval_inside").sum(axis=1).groupby(level="learner", sort=False).sum()
-    inside = ", ".join(f"{count:.0f} of {name}" for name, count in states.items())
-    return (
-        f"Without noise, the constraints held in {_by_learner(kept)}; states in an obstacle:"
-        f" {inside}."
-    )
-
-
-def kept_without_noise(runs: pd.DataFrame, learners: tuple[str, ...]) -> pd.DataFrame:
-    """The runs that C7's weaker question is put to, or that of the wider claim, by learner.
-
-    Args:
-        runs: of `rows.table`.
-        learners: of whom the claim speaks.
-
-    Returns:
-        Columns kept (whether its rollouts without noise kept the constraints) and stopped (whether
-        training had to be stopped: then only the rollouts up to there are asked).
-    """
-    every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
-    kept = BY_RUNS["C7"].answers(_largest_overlap(learners, runs, {})).dropna().astype(bool)
-    stopped = was_stopped(every).reorder_levels(kept.index.names)
-    return pd.DataFrame({"kept": kept, "stopped": stopped.reindex(kept.index)})
-
-
-def _by_learner(answers: pd.Series) -> str:
-    """In how many runs of each learner the answer is yes."""
-    groups = answers.groupby(level="learner", sort=False)
-    return ", ".join(f"{_of(group)} runs of {name}" for name, group in groups) or "no run"
-
-
-def _inside(runs: pd.DataFrame, name: str) -> pd.DataFrame:
+def _inside(runs: pd.DataFrame, name: str = "inside") -> pd.DataFrame:
     """How many states lay in an obstacle, one column a size."""
     return runs[[f"{name}_{size}" for size in SIZES]]
 
 
-def _sized(inside: pd.DataFrame) -> str:
-    first, second, third = (f"{count:.0f}" for count in inside.sum())
-    return f"{first}, {second} and {third}"
+def _c7_numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
+    """Violations of the constraints, in training and without noise (`eval_`)."""
+    every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
+    training, judged = _inside(every), _inside(every, "eval_inside")
+    by_learner = judged.sum(axis=1).groupby(level="learner", sort=False).sum()
+    largest = every[["worst_overlap", "eval_worst_overlap"]].max()
+    sums = every[["inputs", "steps_done", "outside"]].sum(), training.sum(), judged.sum()
+    numbers: Numbers = pd.concat([largest, *sums]).to_dict()
+    return numbers | {"eval_inside": by_learner.to_dict()}
 
 
-# C9, what the paper takes for granted
+def kept_without_noise(runs: pd.DataFrame, learners: Learners) -> pd.DataFrame:
+    """The answers of each run to the weaker question of C7, or of W7.
+
+    Args:
+        runs: of `rows.table`.
+        learners: of the claim.
+
+    Returns:
+        Columns kept (whether its rollouts without noise kept the constraints) and stopped (whether
+        training was stopped: then only the rollouts before are asked).
+    """
+    every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
+    c7 = replace(BY_RUNS["C7"], learners=learners)
+    kept = c7.answers(c7.measure(runs, {}))
+    stopped = was_stopped(every).reorder_levels(kept.index.names)
+    return pd.DataFrame({"kept": kept, "stopped": stopped.reindex(kept.index)})
 
 
-def cost_reduced(learners: tuple[str, ...]) -> dict[str, Any]:
-    """The fields of a claim that some learners reduce the cost."""
+def _c9_numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
+    every = zip(PAPER, arms(runs, *PAPER), strict=True)
+    claimed = pd.concat(arms(runs, *learners))
     return {
-        "learners": learners,
-        "measure": partial(_cost_reductions, learners),
-        "evidence": partial(_c9_evidence, learners),
-        "each": partial(_c9_each, learners),
+        "medians": {name: median(cost_reduction(arm)) for name, arm in every},
+        "failed": int(np.isinf(claimed.final_cost).sum()),
+        "stuck": int((claimed.distance > ARRIVED).sum()),
     }
 
 
-def _cost_reductions(learners: tuple[str, ...], runs: pd.DataFrame, _: Paths) -> Values:
-    return beside(runs, learners, cost_reduction)
-
-
-def _c9_evidence(learners: tuple[str, ...], runs: pd.DataFrame, _: Paths) -> str:
-    every = dict(zip(PAPER, arms(runs, *PAPER), strict=True))
-    medians = {name: shown(median(cost_reduction(arm)), "+.1%") for name, arm in every.items()}
-    claimed = pd.concat(arms(runs, *learners))
-    failed = int(np.isinf(claimed.final_cost).sum())
-    stuck = int((claimed.distance > ARRIVED).sum())
-    listed = ", ".join(f"{name} {value}" for name, value in medians.items())
-    named = f"{', '.join(learners[:-1])} and {learners[-1]}"
-    return (
-        f"Median reduction of the noise-free cost: {listed}. Of the last rollouts of {named},"
-        f" {stuck} end more than {ARRIVED} away from the target, and in {failed} runs one of the"
-        " last three failed or training was stopped; they count."
-    )
-
-
-def _c9_each(learners: tuple[str, ...], runs: pd.DataFrame, paths: Paths) -> str:
-    better = BY_RUNS["C9"].answers(_cost_reductions(learners, runs, paths))
-    return f"It holds in {_by_learner(better)}."
-
-
-def _of(holds: pd.Series) -> str:
+def _count(holds: pd.Series) -> tuple[int, int]:
     known = holds.dropna()
-    return f"{int(known.sum())} of {len(known)}"
+    return int(known.sum()), len(known)
 
 
 CLAIMS: dict[str, Claim] = {
@@ -305,11 +190,11 @@ CLAIMS: dict[str, Claim] = {
             would_change="Other layouts and the untold details of the network; Algorithm 1 read"
             " literally (departure G).",
             learners=("DES", "RDES"),
-            measure=_cost_ratios,
+            number=training_cost_ratio,
             threshold=DIVERGED,
             wrong="diverged",
             worst="had to be stopped",
-            evidence=_c1_evidence,
+            numbers=_contrasted(divergence, "cost_ratio"),
             nothing=1.0,
             label="training cost / frozen arm's",
             borders=np.geomspace(1.02, 15, UP_TO),
@@ -327,11 +212,11 @@ CLAIMS: dict[str, Claim] = {
             would_change="A larger step size: alpha ||phi||^2 decides where a semi-gradient step"
             " overshoots.",
             learners=("ES", "GES"),
-            measure=_late_cost_ranges,
+            number=late_cost_range,
             threshold=UNSTABLE,
             wrong="was unstable",
             worst="diverged",
-            evidence=_c2_evidence,
+            numbers=_contrasted(instability, "late_cost_range"),
             label="range of noise-free cost",
             borders=np.geomspace(0.005, 1.5, UP_TO),
         ),
@@ -378,9 +263,9 @@ CLAIMS: dict[str, Claim] = {
             border=f"at most {SAME_PATH} m and at most {SAME_COST:.0%}",
             would_change="A looser meaning of 'same', and longer training.",
             learners=("RDES", "GES"),
-            measure=_policy_distance,
+            values=_policy_distance,
             threshold=1.0,
-            evidence=_c5_evidence,
+            numbers=_c5_numbers,
             label="apart / what counts as the same",
             borders=np.geomspace(0.1, 30, UP_TO),
         ),
@@ -399,9 +284,10 @@ CLAIMS: dict[str, Claim] = {
             would_change="How far theta moves: where it hardly does, the network gains nothing from"
             " it.",
             learners=("RDES",),
-            measure=_relative_error,
+            number=_relative_error,
+            among=PAPER,
             threshold=MORE_ACCURATE,
-            evidence=_c6_evidence,
+            numbers=_c6_numbers,
             unit="runs",
             nothing=1.0,
             label="error with θ / without",
@@ -425,7 +311,10 @@ CLAIMS: dict[str, Claim] = {
             label="largest Ξ without noise",
             linear_to=TOUCH,
             borders=np.geomspace(1e-8, 1.0, UP_TO),
-            **constraints_held(("RDES",)),
+            learners=("RDES",),
+            number=_largest_overlap,
+            besides=lambda arm: _inside(arm).sum(axis=1, skipna=False),
+            numbers=_c7_numbers,
         ),
         TheoremClaim(
             name="C8",
@@ -464,7 +353,9 @@ CLAIMS: dict[str, Claim] = {
             label="fall of noise-free cost",
             linear_to=0.1,
             borders=np.linspace(-0.05, 0.15, UP_TO),
-            **cost_reduced(("RDES", "GES")),
+            learners=("RDES", "GES"),
+            number=cost_reduction,
+            numbers=_c9_numbers,
         ),
     )
 }

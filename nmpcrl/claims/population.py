@@ -16,7 +16,7 @@ from nmpcrl.analysis.predictors import Logistic, auc, brier, fit, over_layouts
 from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.claims.by_runs import RunClaim
 from nmpcrl.claims.own_claims import OWN_CLAIMS
-from nmpcrl.claims.paper_claims import BY_RUNS, cost_reduced
+from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.population_questions import (
     CLIFF_COST,
     CLOSES_BEFORE,
@@ -69,7 +69,7 @@ def asked() -> dict[str, RunClaim]:
     known = {**BY_RUNS, **WIDER_CLAIMS, **OWN_CLAIMS}
     alone = {name: name.partition(" ")[0] for name in EXPECTED if name not in known}
     by_itself = {
-        name: replace(BY_RUNS["C9"], name=name, **cost_reduced((learner,)))
+        name: replace(BY_RUNS["C9"], name=name, learners=(learner,))
         for name, learner in alone.items()
     }
     return {name: (known | by_itself)[name] for name in EXPECTED}

@@ -4,7 +4,6 @@
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
 - `thetas.npz`: theta after every episode, of the runs that a reader can follow (see `thetas`);
-- `verdicts.json`: what became of each claim;
 - `searches.json`: the best theta that `analysis.policy_search` finds in each layout;
 - `timings.csv`: of `time_learners`, on which the verdicts on time rest;
 - `about.json`: code, libraries and machine, and when the thresholds were fixed.
@@ -12,8 +11,8 @@
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
 from functools import cache, cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -30,7 +29,8 @@ from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, cost_ratios, experiment
 from nmpcrl.analysis.summary import Outline, RunSummary
 from nmpcrl.bench.learners import ratio
 from nmpcrl.bench.paired import Ratio
-from nmpcrl.claims import thetas
+from nmpcrl.claims import assumptions, thetas
+from nmpcrl.claims.assumptions import Measured
 from nmpcrl.claims.failure_modes import (
     WELL,
     Ending,
@@ -40,7 +40,11 @@ from nmpcrl.claims.failure_modes import (
     failure_modes,
     went_wrong,
 )
-from nmpcrl.claims.verdict import Halves, Outcome, Verdict
+from nmpcrl.claims.own_claims import OWN_CLAIMS
+from nmpcrl.claims.paper_claims import CLAIMS
+from nmpcrl.claims.rule import Claim, Observations
+from nmpcrl.claims.verdict import Verdict
+from nmpcrl.claims.wider_claims import WIDER_CLAIMS, WIDER_THAN
 from nmpcrl.study import design
 from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.parameters import Refusal, shortened
@@ -50,7 +54,7 @@ from nmpcrl.study.sealed import seal_of
 from nmpcrl.study.storage.atomic import write_json
 
 FILES = (
-    *("runs.csv", "curves.npz", thetas.FILE, "searches.json", "verdicts.json", "timings.csv"),
+    *("runs.csv", "curves.npz", thetas.FILE, "searches.json", "timings.csv"),
     "about.json",
 )
 # Columns of `failure_modes`, and what may be in them; the frozen arms have none.
@@ -63,6 +67,17 @@ FAILURE_MODE = [*WORDS, "episode"]
 # Columns of `runs.csv`; those that are younger than it are missing, and a metric is then not known.
 COLUMNS = (*FIELDS, *OUTCOME, "variant", "key", *FAILURE_MODE)
 
+
+WIDER = {old: new for new, old in WIDER_THAN.items()}
+EVERY: dict[str, Claim] = {  # in the order of the verdicts
+    **{
+        one: {**CLAIMS, **WIDER_CLAIMS}[one]
+        for claim in CLAIMS
+        for one in (claim, *filter(None, [WIDER.get(claim)]))
+    },
+    **OWN_CLAIMS,
+}
+AUDITED = Experiment("GES")  # the run in which the assumptions of C8 are measured
 
 CHECKOUT = "`git checkout -- book/published` restores what came with the project,"
 ELSEWHERE = (
@@ -82,7 +97,6 @@ class Published:
     summaries: Mapping[Experiment, Outline] = field(default_factory=dict)  # single precision
     variants: Mapping[Experiment, str] = field(default_factory=dict)  # the part each belongs to
     rows: Mapping[Experiment, dict[str, Any]] = field(default_factory=dict)  # of `runs.csv`
-    verdicts: tuple[Verdict, ...] = ()
     timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
     about: Mapping[str, Any] = field(default_factory=dict)
     searches: Mapping[Search, Found] = field(default_factory=dict)
@@ -114,13 +128,26 @@ class Published:
         """
         return (self.about, *self.about.get("additions", ())) if self.rows else ()
 
-    def verdict(self, claim: str) -> Verdict:
-        """What became of a claim.
+    @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """On the paper's claims, each followed by the one that is wider, and on our own."""
+        return tuple(map(self.verdict, EVERY)) if self.rows else ()
 
-        Raises:
-            KeyError: no verdict on it is published.
-        """
-        return {one.claim: one for one in self.verdicts}[claim]
+    @cache  # noqa: B019 - there is one for a process
+    def verdict(self, claim: str) -> Verdict:
+        """The verdict on a claim, from what is published alone."""
+        return EVERY[claim].judge(self._added if claim in OWN_CLAIMS else self._main)
+
+    @cached_property
+    def _main(self) -> Observations:
+        """Judged for all claims but our own."""
+        runs, audited = self.table, self.about.get("audit")
+        made = assumptions.audit(AUDITED, Measured(**audited)) if audited else ()
+        return Observations(runs[runs.variant == design.MAIN_TABLE], self.paths, self.timings, made)
+
+    @cached_property
+    def _added(self) -> Observations:
+        return Observations(self.table[self.table.variant.isin(thetas.FOLLOWED)])
 
     def ratio(self, solver: str, learner: str) -> Ratio:
         """Time of a learner's step over that of one of ES, as `bench.learners.ratio` has it."""
@@ -142,18 +169,18 @@ def _restore() -> str:
 def publish(
     summaries: Mapping[Experiment, RunSummary],
     variants: Mapping[Experiment, str],
-    verdicts: Sequence[Verdict] = (),
     timings: pd.DataFrame | None = None,
     searches: Mapping[Search, Found] = MappingProxyType({}),
+    audit: Measured | None = None,
 ) -> Path:
     """Write all files anew; the same content gives the same bytes, but for the date.
 
     Args:
         summaries: the runs.
         variants: the part of the study that each belongs to.
-        verdicts: on the claims, if they are judged already.
         timings: of `time_learners`, if there were any taken.
         searches: for the best theta.
+        audit: of `AUDITED`.
 
     Returns:
         Where they are.
@@ -168,19 +195,15 @@ def publish(
     np.savez_compressed(folder / "curves.npz", **curves)
     thetas.save(folder, summaries, variants)
     write_json(folder / "searches.json", policy_search.as_lists(searches))
-    _write(folder, verdicts, pd.DataFrame() if timings is None else timings)
+    (pd.DataFrame() if timings is None else timings).to_csv(folder / "timings.csv", index=False)
     made = _timed(timings) | ({"searches": made_here()} if searches else {})
+    made |= {"audit": asdict(audit)} if audit else {}
     _seal(folder, made_here() | made | effort(runs, "variant") | _fixed(folder))
     return folder
 
 
-def republish(verdicts: Iterable[Verdict], timings: pd.DataFrame | None = None) -> Path:
-    """Put these in the place of the published verdicts on the same claims; the runs stay.
-
-    Args:
-        verdicts: where a claim has no published verdict, its own comes after the others; if they
-            are on all that have one, they are published in their order.
-        timings: of `time_learners`, in the place of the published ones, if they were taken anew.
+def republish(timings: pd.DataFrame) -> Path:
+    """Publish times of `time_learners` that were measured just now; all else stays.
 
     Returns:
         Where they are.
@@ -189,10 +212,7 @@ def republish(verdicts: Iterable[Verdict], timings: pd.DataFrame | None = None) 
         Damaged: what is published is not what `publish` wrote.
     """
     found, folder = load(), place()
-    new = {verdict.claim: verdict for verdict in verdicts}
-    known = {verdict.claim: verdict for verdict in found.verdicts}
-    kept = new if known.keys() <= new.keys() else known | new
-    _write(folder, kept.values(), found.timings if timings is None else timings)
+    timings.to_csv(folder / "timings.csv", index=False)
     _seal(folder, {**found.about, **_timed(timings)})
     return folder
 
@@ -332,12 +352,10 @@ def _read(folder: Path) -> Published:
     if {len(rows)} != {len(column) for column in curves.values()}:
         raise ValueError("runs.csv and curves.npz are not of the same runs")
     followed = thetas.load(folder)
-    verdicts = json.loads((folder / "verdicts.json").read_text("utf-8"))
     return Published(
         {e: _outline_of(one, curves, i, followed) for i, (e, one) in enumerate(rows.items())},
         {e: one["variant"] for e, one in rows.items()},
         rows,
-        tuple(_verdict(one) for one in verdicts),
         _timings(folder / "timings.csv"),
         about,
         policy_search.from_lists(json.loads((folder / "searches.json").read_text("utf-8"))),
@@ -406,37 +424,6 @@ def _timed(timings: pd.DataFrame | None) -> dict[str, Any]:
     return {} if timings is None else {"timings": made_here()}
 
 
-def _write(folder: Path, verdicts: Iterable[Verdict], timings: pd.DataFrame) -> None:
-    """The files that need no run."""
-    write_json(folder / "verdicts.json", [asdict(verdict) for verdict in verdicts], indent=1)
-    timings.to_csv(folder / "timings.csv", index=False)
-
-
 def _timings(path: Path) -> pd.DataFrame:
     """As they were written; no rows where no time was taken."""
     return pd.read_csv(path) if path.read_text("utf-8").strip() else pd.DataFrame()
-
-
-def _verdict(stored: dict[str, Any]) -> Verdict:
-    """A verdict as JSON has it, with its tuples again."""
-    interval = stored["interval"] and tuple(stored["interval"])
-    counts = {name: tuple(pair) for name, pair in stored["counts"].items()}
-    parts: dict[str, Any] = {
-        name: {part: Outcome(outcome) for part, outcome in stored[name].items()}
-        for name in ("by_layout", "by_decay")
-    }
-    parts |= {"outcome": Outcome(stored["outcome"]), "interval": interval, "counts": counts}
-    parts["halves"] = tuple(_halves(one) for one in stored["halves"])
-    return Verdict(**_own(Verdict, stored) | parts)
-
-
-def _halves(stored: dict[str, Any]) -> Halves:
-    parts: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value for name, value in stored.items()
-    }
-    return Halves(**_own(Halves, parts))
-
-
-def _own(kind: type, stored: dict[str, Any]) -> dict[str, Any]:
-    """What is stored of the fields that there are; older files also have what is computed now."""
-    return {one.name: stored[one.name] for one in fields(kind) if one.name in stored}

@@ -140,7 +140,7 @@ def of_times(timings: pd.DataFrame, published: Published) -> Pairs:
     """The contradictions with times taken here; none if another machine took the published ones."""
     if published.about.get("timings", {}).get("machine") != fingerprint():
         return ()
-    return contradictions(judge_times(timings), published.verdicts)
+    return contradictions(judge_times(timings), judge_times(published.timings))
 
 
 def _verdicts(

@@ -1,26 +1,26 @@
-"""How a claim is put to many runs, and how their answers become a verdict.
+"""How the answers of many runs become a verdict.
 
-A claim is put to each run, or to each pair of runs with the same layout, decay and seed, as a
-question with the answer yes or no. The share of yes is then read by one rule. It was fixed before
-any claim was put to the study, and is not to be moved after:
+A claim asks each run, or each pair of runs with the same layout, decay and seed, one question with
+the answer yes or no. One rule reads the share of yes. It was fixed before any claim was tested on
+the study, and stays as it is:
 
 - reproduced: the interval of the share lies above `MAJORITY`, and the share is at least
   `NEARLY_ALL`;
 - not reproduced: the interval lies below `MAJORITY`, and the share is at most `NEARLY_NONE`;
-- not decidable: so few runs were asked that even one answer from all of them would leave the
-  interval about `MAJORITY`, or the answers that are missing would decide;
+- not decidable: the runs are so few that even one answer from all of them would leave `MAJORITY`
+  inside the interval, or the missing answers would decide;
 - partly reproduced: all else, so that it depends on layout, decay or seed whether the claim holds.
 
 - a claim with a weaker question, which a yes to the first implies, is partly reproduced where it
   would not be reproduced and the weaker question is not "not reproduced" (C7 and W7).
 
-The interval alone would not do: of 1000 runs, 55 % are surely more than half, and surely not what
-"DES diverges" says. Nor would the share alone: two of two runs are all there are. The interval is
-Wilson's, over all layouts too: it is for other seeds in the same layouts, where it is not too
-narrow (see `statistics.rate`). What other layouts would say is another question: see `drawn_anew`.
+The interval alone is not enough: of 1000 runs, 55 % are surely more than half, and surely not what
+"DES diverges" says. Nor is the share alone: two of two runs are all runs. The interval is Wilson's,
+over all layouts too: it is for other seeds in the same layouts, where it is not too narrow (see
+`statistics.rate`). For other layouts see `drawn_anew`.
 
-What is missing (a run that was not made, or is shorter than the paper's, or has no frozen arm to be
-compared with) is excluded; if it could change the verdict, the claim is undecidable.
+A missing answer (a run that was not made, is shorter than the paper's, or has no frozen arm for
+comparison) is excluded; if it could change the verdict, the claim is undecidable.
 """
 
 from abc import ABC, abstractmethod
@@ -34,7 +34,15 @@ import pandas as pd
 
 from nmpcrl.analysis.predictors import over_layouts
 from nmpcrl.analysis.statistics import Estimate, rate
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
+from nmpcrl.claims.verdict import (
+    NOT,
+    PARTLY,
+    REPRODUCED,
+    UNDECIDABLE,
+    Assumption,
+    Outcome,
+    Verdict,
+)
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column, Stopped
@@ -44,25 +52,14 @@ NEARLY_ALL = 0.9
 NEARLY_NONE = 0.1
 FEWEST_LAYOUTS = 5  # of an interval for layouts drawn anew
 
-CELL = ["layout", "decay", "seed"]  # what two runs share that are compared
-NAMED = {"decay": ("reading", " of the decay")}  # a level that a sentence calls otherwise
+CELL = ["layout", "decay", "seed"]  # equal in two runs that are compared
 
 Paths: TypeAlias = Mapping[Experiment, Column]  # the states of each run's last rollout
 
 
 @dataclass(frozen=True, eq=False)
-class Assumption:
-    """One assumption of the theorems behind C8, beside what is run."""
-
-    theorem: str  # what is assumed
-    here: str  # what the paper does, with a measurement where one is possible
-    holds: bool
-    by: tuple[str, ...] = ()  # the theorems that assume it, as `assumptions.THEOREMS` names them
-
-
-@dataclass(frozen=True, eq=False)
 class Observations:
-    """All that a claim may be judged by; each takes what it asks for."""
+    """The data that claims are judged by; each claim takes a part."""
 
     runs: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `rows.table`
     paths: Paths = field(default_factory=dict)
@@ -72,57 +69,62 @@ class Observations:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Claim(ABC):
-    """What the paper says, or we do, and how it is decided: fixed before it was put to a run."""
+    """A statement of the paper, or of this book, and how it is decided."""
 
     name: str  # "C1"
     statement: str
-    question: str  # what is asked
-    measured: str  # the numbers that answer it, in words
-    border: str  # and where yes ends, in words
+    question: str
+    measured: str  # the numbers that answer the question, in words
+    border: str  # where yes ends, in words
     test: str = "share of yes, with its interval"
-    would_change: str  # where another verdict is to be expected
+    would_change: str  # where another verdict is expected
     learners: tuple[str, ...] = ()  # whose runs answer, in the order of the question
-    quotation: str = ""  # the sentences of the paper that it rests on, in Markdown
+    quotation: str = ""  # the paper's sentences behind it, in Markdown
     implied: bool = False  # whether the paper takes it for granted, and nowhere says it
-    words: Mapping[Outcome, str] = field(default_factory=dict)  # for outcomes, where not their own
+    words: Mapping[Outcome, str] = field(default_factory=dict)  # for outcomes with words of its own
 
     @abstractmethod
     def judge(self, observed: Observations) -> Verdict:
-        """The verdict on what was observed."""
+        """The verdict on these observations."""
 
-    def verdict(self, outcome: Outcome, evidence: str, **numbers: Any) -> Verdict:
+    def verdict(self, outcome: Outcome, **numbers: Any) -> Verdict:
         """A verdict on this claim; `numbers` are further fields of `Verdict`."""
-        texts = (self.name, self.statement, outcome, evidence, self.would_change)
-        return Verdict(*texts, said=self.words.get(outcome, ""), **numbers)
+        said = self.words.get(outcome, "")
+        return Verdict(self.name, self.statement, outcome, self.would_change, said=said, **numbers)
 
 
 @dataclass(frozen=True)
 class Answers:
-    """How many runs say yes, no, and nothing."""
+    """How many runs say yes and no, and how many answers are missing."""
 
     yes: int
     no: int
     missing: int = 0
 
     @property
+    def known(self) -> tuple[int, int]:
+        """Yes, and all answers."""
+        return self.yes, self.yes + self.no
+
+    @property
     def outcome(self) -> Outcome:
-        """The rule at the top, whatever the missing ones would say."""
+        """The outcome by the rule; undecidable if missing answers could change it."""
         asked = self.yes + self.no + self.missing
         least, most = read(self.yes, asked), read(self.yes + self.missing, asked)
         return least if least == most else UNDECIDABLE
 
     @property
     def share(self) -> Estimate | None:
-        """Share of yes among the answers; its interval also covers what the missing may say."""
-        answered, asked = self.yes + self.no, self.yes + self.no + self.missing
+        """Share of yes among the answers; its interval covers all values of the missing ones."""
+        yes, answered = self.known
         if not answered:
             return None
-        low, high = rate(self.yes, asked).low, rate(self.yes + self.missing, asked).high
-        return Estimate(self.yes / answered, low, high)
+        asked = answered + self.missing
+        return Estimate(yes / answered, rate(yes, asked).low, rate(yes + self.missing, asked).high)
 
 
 def read(yes: int, of: int) -> Outcome:
-    """The rule at the top, for `yes` of `of` answers of which none is missing."""
+    """The outcome by the rule for `yes` of `of` answers, with none missing."""
     if not of or rate(of, of).low <= MAJORITY:
         return UNDECIDABLE
     share = rate(yes, of)
@@ -133,12 +135,19 @@ def read(yes: int, of: int) -> Outcome:
     return PARTLY
 
 
+def forgiving(strict: Outcome, weaker: Outcome) -> Outcome:
+    """The outcome of a claim whose weaker question has an outcome of its own."""
+    if strict != NOT:
+        return strict
+    return weaker if weaker in (NOT, UNDECIDABLE) else PARTLY
+
+
 def counted(answers: pd.Series, level: str = "") -> dict[str, Answers]:
-    """How runs answer for each value of a level, in the order in which they come, or as "all".
+    """The answers by value of a level of their index, in order of appearance, or as "all".
 
     Args:
         answers: True, False or missing.
-        level: of their index; without one all are counted together.
+        level: of the index; without one all are counted together.
     """
     known = answers.astype("boolean")
     missing, yes = known.isna().to_numpy(), known.to_numpy(bool, na_value=False)
@@ -146,74 +155,69 @@ def counted(answers: pd.Series, level: str = "") -> dict[str, Answers]:
         place, names = pd.factorize(answers.index.get_level_values(level))
     else:
         place, names = np.zeros(len(answers), int), pd.Index(["all"])
-    found = [np.bincount(place[where], minlength=len(names)) for where in (yes, missing)]
-    of = np.bincount(place, minlength=len(names))
+    by_name = np.arange(len(names))[:, None] == place
     return {
-        name: Answers(int(yeses), int(all_of - yeses - unknown), int(unknown))
-        for name, all_of, yeses, unknown in zip(names, of, *found, strict=True)
+        name: Answers(
+            int((yes & here).sum()),
+            int((~yes & ~missing & here).sum()),
+            int((missing & here).sum()),
+        )
+        for name, here in zip(names, by_name, strict=True)
     }
 
 
 def settle(
     claim: Claim,
     answers: pd.Series,
-    evidence: str,
     *,
     weaker: pd.Series | None = None,
     unit: str = "pairs",
+    **numbers: Any,
 ) -> Verdict:
     """The verdict on a claim, overall, in each layout and in each reading of the decay.
 
     Args:
-        claim: what was asked.
-        answers: True, False or missing, indexed by layout, decay, seed and whatever else.
-        evidence: what the numbers are, in sentences.
-        weaker: answers to a weaker question, which a yes to the first implies. Where that one is
-            not refuted, the claim is partly reproduced.
-        unit: what was asked, in the plural.
+        claim: the claim.
+        answers: True, False or missing, indexed by layout, decay, seed or by other levels.
+        weaker: answers to a weaker question, which a yes to the first implies.
+        unit: the things that answered, in the plural.
+        numbers: further fields of `Verdict`.
     """
-
-    levels = [level for level in ("layout", "decay") if level in answers.index.names]
-    found = {level: counted(answers, level) for level in ("", *levels)}
-    forgiven = answers if weaker is None else weaker[answers.index]
-    lenient = {level: counted(forgiven, level) for level in found}
-
+    names = [str(name) for name in answers.index.names]
+    levels = ["", *(level for level in ("layout", "decay", "learner") if level in names)]
+    lenient = answers if weaker is None else weaker
+    strict, weak = ({level: counted(one, level) for level in levels} for one in (answers, lenient))
     outcomes = {
-        level: {
-            name: forgiving(one.outcome, lenient[level][name].outcome)
-            for name, one in parts.items()
-        }
-        for level, parts in found.items()
+        level: {name: forgiving(one.outcome, weak[level][name].outcome) for name, one in of.items()}
+        for level, of in strict.items()
     }
-    whole = found[""]["all"]
+    by_learner = strict.pop("learner", {}) and weak["learner"]
+    share = strict[""]["all"].share
     return claim.verdict(
         outcomes[""]["all"],
-        f"{evidence} {_held(whole, unit)} {scope(answers)}",
-        share=whole.share.value if whole.share else None,
-        interval=(whole.share.low, whole.share.high) if whole.share else None,
+        share=share.value if share else None,
+        interval=(share.low, share.high) if share else None,
         by_layout=outcomes.get("layout", {}),
         by_decay=outcomes.get("decay", {}),
-        counts={
-            name: (one.yes, one.yes + one.no)
-            for parts in found.values()
-            for name, one in parts.items()
+        counts={name: one.known for of in strict.values() for name, one in of.items()},
+        by_learner={name: one.known for name, one in by_learner.items() if one.known[1]},
+        missing=strict[""]["all"].missing,
+        unit=unit,
+        levels={
+            name: answers.index.unique(name).size
+            for name in (CELL if {*CELL} <= {*names} else names)
+            if name != "learner"
         },
+        **numbers,
     )
-
-
-def forgiving(strict: Outcome, weaker: Outcome) -> Outcome:
-    """What is refuted is partly reproduced where the weaker question is not refuted."""
-    if strict != NOT:
-        return strict
-    return weaker if weaker in (NOT, UNDECIDABLE) else PARTLY
 
 
 def drawn_anew(values: Iterable[float]) -> Estimate:
     """The mean of one value a layout, with the interval of 95 % for layouts drawn anew.
 
-    The bootstrap draws layouts. Where all layouts say 0, or all 1, it would be sure of what it saw,
-    and the interval is Wilson's of as many layouts. Below `FEWEST_LAYOUTS` the bounds are nan. Six
-    layouts are few for a bootstrap: the interval is, if anything, too narrow.
+    The bootstrap draws layouts. Where all values are 0, or all 1, it would have no width, and the
+    interval is Wilson's of as many layouts. Below `FEWEST_LAYOUTS` the bounds are nan. Six layouts
+    are few for a bootstrap: the interval is, if anything, too narrow.
     """
     known = np.array([*values], float)
     value = float(known.mean()) if known.size else np.nan
@@ -235,13 +239,13 @@ def arms(
 ) -> tuple[pd.DataFrame, ...]:
     """The runs of each learner, in the same order of layout, decay and seed.
 
-    A run that is missing, or shorter than the paper's, is a row of nan. One that had to be stopped
-    left no policy, so its final cost is infinite, whatever the last rollout cost.
+    A run that is missing, or shorter than the paper's, is a row of nan. One that was stopped left
+    no policy, so its final cost is infinite, whatever the last rollout cost.
 
     Args:
         runs: of `rows.table`, all of one setting.
-        learners: whose runs are wanted.
-        among: the learners in whose cells they are wanted; by default themselves.
+        learners: whose runs are returned.
+        among: the learners whose cells are covered; by default `learners`.
 
     Raises:
         ValueError: a learner has two runs in one cell, so that the runs are of several settings.
@@ -252,43 +256,17 @@ def arms(
 
 
 def _arm(runs: pd.DataFrame, learner: str) -> pd.DataFrame:
-    whole = runs[(runs.learner == learner) & (runs.episodes >= paper.EPISODES)].set_index(CELL)
-    twice = whole.index[whole.index.duplicated()]
+    full = runs[(runs.learner == learner) & (runs.episodes >= paper.EPISODES)].set_index(CELL)
+    twice = full.index[full.index.duplicated()]
     if len(twice):
         cell = ", ".join(f"{n} {value}" for n, value in zip(CELL, twice[0], strict=True))
         raise ValueError(
             f"{learner} has several runs in {cell}: judge the runs of one setting at a time"
         )
-    return whole.assign(
-        final_cost=whole.final_cost.where(whole.stopped == Stopped.FINISHED, np.inf)
-    )
-
-
-def scope(answers: pd.Series) -> str:
-    """What the answers cover: layouts, readings and seeds, or what another study has for levels."""
-    levels = [name for name in answers.index.names if name != "learner"]
-    counts = [
-        (answers.index.unique(name).size, *NAMED.get(name, (str(name), "")))
-        for name in (CELL if {*CELL} <= {*levels} else levels)
-    ]
-    parts = [f"{n} {name}{'' if n == 1 else 's'}{rest}" for n, name, rest in counts]
-    return f"({', '.join(parts)}.)"
-
-
-def _held(answers: Answers, unit: str) -> str:
-    missing = f"; {answers.missing} {unit} are missing" if answers.missing else ""
-    if answers.share is None:
-        return f"No {unit} are there to be asked{missing}."
-    asked = answers.yes + answers.no
-    return f"It holds in {answers.yes} of {asked} {unit}: {answers.share:.0%}{missing}."
-
-
-def shown(value: float, form: str) -> str:
-    """A number as a sentence shows it; the cost of what could not be finished is infinite."""
-    return f"{value:{form}}" if np.isfinite(value) else str(value).replace("inf", "∞")
+    return full.assign(final_cost=full.final_cost.where(full.stopped == Stopped.FINISHED, np.inf))
 
 
 def median(values: Iterable[float]) -> float:
-    """Of those that are known; nan where none is."""
+    """The median of the known values; nan without any."""
     known = np.array([value for value in values if not np.isnan(value)])
     return float(np.median(known)) if known.size else np.nan

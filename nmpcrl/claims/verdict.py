@@ -1,13 +1,15 @@
-"""What became of a claim, as data; the sentences about it are made in `report`."""
+"""The outcome of a claim and the numbers behind it, as data; `report.verdicts` writes sentences."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 from nmpcrl.analysis.statistics import paired_p, rate
 
 
 class Outcome(StrEnum):
-    """What becomes of a claim."""
+    """The outcome of a claim or of a question."""
 
     REPRODUCED = "reproduced"
     PARTLY = "partly reproduced"
@@ -19,19 +21,33 @@ REPRODUCED, PARTLY, NOT, UNDECIDABLE = Outcome
 
 
 def differ(first: Outcome, second: Outcome) -> bool:
-    """Whether both are decided, and differently."""
+    """Whether both outcomes are decided, and differ."""
     return UNDECIDABLE not in (first, second) and first != second
+
+
+@dataclass(frozen=True, eq=False)
+class Assumption:
+    """One assumption of the theorems behind C8, beside the algorithm that is run."""
+
+    theorem: str  # the assumption
+    here: str  # the paper's algorithm, with a measurement where one is possible
+    holds: bool
+    by: tuple[str, ...] = ()  # the theorems that make it, by their names in `assumptions.THEOREMS`
 
 
 @dataclass(frozen=True)
 class Halves:
-    """In how many runs each of two learners went wrong, in one reading of the decay."""
+    """How many runs of two learners went wrong, in one reading of the decay.
 
-    learners: tuple[str, str]  # the claim says that the first goes wrong, and the second does not
+    One share of pairs cannot tell which half of "DES diverges and RDES does not" fails. Only pairs
+    in which one of the two went wrong, and the other did not, tell the learners apart.
+    """
+
+    learners: tuple[str, str]  # by the claim the first goes wrong, and the second does not
     wrong: str  # how: "diverged"
     decay: str
-    pairs: int  # of which both answers are known
-    counts: tuple[int, int]  # of the first and of the second
+    pairs: int  # with two known answers
+    counts: tuple[int, int]  # runs of the first and of the second that went wrong
     against: int  # pairs in which only the second went wrong
     apart: int  # pairs in which only one of them did
 
@@ -42,37 +58,41 @@ class Halves:
 
     @property
     def p(self) -> float:
-        """How likely pairs split as far by chance if both go wrong as often, by McNemar's test."""
+        """The probability of so uneven a split if both go wrong as often (McNemar's test)."""
         return paired_p(self.as_claimed, self.against)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of one claim."""
+    """The verdict on one claim."""
 
     claim: str  # "C1"
-    statement: str  # what the paper says
+    statement: str
     outcome: Outcome
-    evidence: str  # the numbers
-    would_change: str  # where another verdict is to be expected
-    share: float | None = None  # of the answers, how many are yes; None where no run is asked
+    would_change: str = ""  # where another verdict is expected
+    share: float | None = None  # of yes; None for a claim that asks no runs
     interval: tuple[float, float] | None = None  # of the share, whatever the missing say; or ratio
-    by_layout: dict[str, Outcome] = field(default_factory=dict)  # the outcome in each
-    by_decay: dict[str, Outcome] = field(default_factory=dict)  # and in each reading of the decay
-    counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes of answers: "all", "A"
-    ratio: float | None = None  # of times, where the claim is about time
-    each: str = ""  # what a claim on several learners comes to for each of them
-    halves: tuple[Halves, ...] = ()  # of a claim that joins two statements; see `claims.halves`
-    said: str = ""  # the outcome in the claim's own words, where it has any
+    by_layout: dict[str, Outcome] = field(default_factory=dict)
+    by_decay: dict[str, Outcome] = field(default_factory=dict)
+    counts: dict[str, tuple[int, int]] = field(default_factory=dict)  # yes, answers: "all", "A"
+    by_learner: dict[str, tuple[int, int]] = field(default_factory=dict)  # of the weaker question
+    missing: int = 0  # answers
+    unit: str = "pairs"  # of answers
+    levels: dict[str, int] = field(default_factory=dict)  # how many layouts, seeds and so on
+    ratio: float | None = None  # of times, for a claim about time
+    halves: tuple[Halves, ...] = ()  # of a claim that joins two statements
+    numbers: Mapping[str, Any] = field(default_factory=dict)  # further ones, by name
+    assumptions: tuple[Assumption, ...] = ()  # of a claim that rests on a theorem
+    said: str = ""  # the outcome in the claim's own words, if it has any
 
     @property
     def words(self) -> str:
-        """The outcome as a page says it."""
+        """The outcome as a page shows it."""
         return self.said or str(self.outcome)
 
     @property
     def own_halves(self) -> tuple[Halves, ...]:
-        """The halves by the claim's own measure, in each reading."""
+        """The halves by the claim's own measure, in each reading of the decay."""
         return tuple(one for one in self.halves if one.wrong == self.halves[0].wrong)
 
     @property
@@ -81,16 +101,12 @@ class Verdict:
 
         "Most" is sure (`rate` above one half) in the one; in the other more go against the claim.
         """
-        there = [one for one in self.own_halves if one.apart]
-        sure = any(rate(one.as_claimed, one.apart).low > 0.5 for one in there)
-        return sure and any(one.against > one.as_claimed for one in there)
+        split = [one for one in self.own_halves if one.apart]
+        sure = any(rate(one.as_claimed, one.apart).low > 0.5 for one in split)
+        return sure and any(one.against > one.as_claimed for one in split)
 
     def differs_by(self, field: str) -> bool:
-        """Whether not all layouts, or readings of the decay, have the same decided outcome.
-
-        Args:
-            field: "layout" or "decay".
-        """
+        """Whether the decided outcomes differ between the values of "layout" or of "decay"."""
         outcomes = {"layout": self.by_layout, "decay": self.by_decay}[field]
         return len({*outcomes.values()} - {UNDECIDABLE}) > 1
 

@@ -1,7 +1,6 @@
-"""Wider questions than the paper's: its claims on two or fewer learners, asked of all four.
+"""Wider questions than the paper's: C7 and C9, which name some of its learners, asked of all four.
 
-C7 and C9 speak of some of the paper's learners. What becomes of the same statement with all of them
-is another question, with a name of its own; measure, threshold and rule are those of the claim.
+Measure, threshold and rule are the claim's; the name is another.
 """
 
 from dataclasses import replace
@@ -9,7 +8,7 @@ from dataclasses import replace
 import pandas as pd
 
 from nmpcrl.claims.by_runs import RunClaim
-from nmpcrl.claims.paper_claims import BY_RUNS, constraints_held, cost_reduced
+from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.rule import Observations, Paths
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.study.experiment import PAPER
@@ -20,7 +19,7 @@ WIDER_CLAIMS: dict[str, RunClaim] = {
         name="W7",
         statement="With all four learners, input and obstacle constraints hold throughout.",
         quotation="",
-        **constraints_held(PAPER),
+        learners=PAPER,
     ),
     "W9": replace(
         BY_RUNS["C9"],
@@ -31,13 +30,13 @@ WIDER_CLAIMS: dict[str, RunClaim] = {
         short="all four\nbeat $\\theta_\\mathrm{init}$",
         quotation="",
         implied=False,
-        **cost_reduced(PAPER),
+        learners=PAPER,
     ),
 }
-WIDER_THAN = {"W7": "C7", "W9": "C9"}  # the claim that each widens
+WIDER_THAN = {"W7": "C7", "W9": "C9"}
 
 
 def judge_wider(runs: pd.DataFrame, paths: Paths) -> tuple[Verdict, ...]:
-    """The verdicts on all of them, in order; arguments as `paper_claims.judge_runs` takes them."""
+    """The verdicts on the wider claims, in order; arguments as for `paper_claims.judge_runs`."""
     observed = Observations(runs, paths)
     return tuple(claim.judge(observed) for claim in WIDER_CLAIMS.values())

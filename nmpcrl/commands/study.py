@@ -17,8 +17,8 @@ from nmpcrl.commands.workers import check
 @click.option("--security", metavar="FILE", help="Certificates for a scheduler at tls://.")
 @click.option("--dry-run", is_flag=True, help="Only report what is missing.")
 @click.option("--table", metavar="PATH", type=NewFile(), help="Write a CSV row per episode.")
-@click.option("--publish", is_flag=True, help="Judge the runs and write book/published.")
-@click.option("--judge", is_flag=True, help="Only judge again what is published.")
+@click.option("--publish", is_flag=True, help="Write the runs to book/published.")
+@click.option("--judge", is_flag=True, help="Only show the verdicts on the published study.")
 @click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
 def study(
     parts: tuple[str, ...],
@@ -103,10 +103,10 @@ def study(
 
 
 def _judge() -> None:
-    """Judge what is published, and print each verdict."""
-    from nmpcrl.claims.publish import rejudge
+    """The verdicts on the published study, a line each."""
+    from nmpcrl.claims import published
 
-    for verdict in rejudge():
+    for verdict in published.load().verdicts:
         click.echo(f"{verdict.claim} {verdict.words}")
 
 

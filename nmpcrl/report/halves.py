@@ -9,6 +9,7 @@ from nmpcrl.claims.paper_claims import BY_RUNS, kept_without_noise
 from nmpcrl.claims.verdict import Halves, Verdict
 from nmpcrl.claims.wider_claims import WIDER_CLAIMS
 from nmpcrl.report.text import listed
+from nmpcrl.report.verdicts import by_learner
 
 
 def items(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
@@ -28,7 +29,7 @@ def items(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
 def apart(verdict: Verdict) -> str:
     """What a claim comes to for each learner that it is about, in sentences; "" for one learner."""
     groups = groupby(verdict.halves, key=lambda one: one.wrong)
-    return verdict.each or " ".join(_counted(list(group)) for _, group in groups)
+    return by_learner(verdict) or " ".join(_counted(list(group)) for _, group in groups)
 
 
 def own(verdict: Verdict) -> str:

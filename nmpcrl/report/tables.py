@@ -14,13 +14,22 @@ from nmpcrl.bench.targets import Target
 from nmpcrl.claims.assumptions import THEOREMS
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
 from nmpcrl.claims.published import Published
-from nmpcrl.claims.rule import Assumption, Claim, anew
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
+from nmpcrl.claims.rule import Claim, anew
+from nmpcrl.claims.verdict import (
+    NOT,
+    PARTLY,
+    REPRODUCED,
+    UNDECIDABLE,
+    Assumption,
+    Outcome,
+    Verdict,
+)
 from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.report.cited import Cited, cited
 from nmpcrl.report.halves import own
 from nmpcrl.report.text import SURE, audit_place, departure_link, listed
 from nmpcrl.report.timing import ratios_at_paper_speed, to_es
+from nmpcrl.report.verdicts import evidence as sentences
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import Experiment
 
@@ -186,7 +195,7 @@ def evidence(verdicts: Iterable[Verdict]) -> str:
     """One item a claim, in Markdown: verdict, evidence, and where it would change."""
     return "\n\n".join(
         f"- **{v.claim}: {v.statement}**\n\n"
-        f"  {_labelled(v)} {v.evidence}{_anew(v)}\n\n"
+        f"  {_labelled(v)} {sentences(v)}{_anew(v)}\n\n"
         f"  *Where it would change.* {_linked(v.would_change)}"
         for v in verdicts
     )
@@ -321,8 +330,8 @@ def _rests_on(verdict: Verdict) -> str:
         return f"a step takes {verdict.ratio:.2f} of the time of a step of ES"
     if "all" in verdict.counts:
         yes, of = verdict.counts["all"]
-        unit = BY_RUNS[verdict.claim].unit
-        return f"held in {yes} of {of} {'pairs of runs' if unit == 'pairs' else unit}"
+        unit = "pairs of runs" if verdict.unit == "pairs" else verdict.unit
+        return f"held in {yes} of {of} {unit}"
     return "what the cited theorems assume; no run is needed"
 
 

@@ -93,7 +93,7 @@ def number(count: int) -> str:
 def legend(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
     """What the numbers of a table of verdicts mean; `runs` are those that were judged."""
     asked_twice = ""
-    if any(v.claim == "C7" and v.each for v in verdicts):
+    if any(v.claim == "C7" and v.by_learner for v in verdicts):
         asked = kept_without_noise(runs, BY_RUNS["C7"].learners)
         stopped = (asked.kept & asked.stopped).sum()
         asked_twice = (

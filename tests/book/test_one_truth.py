@@ -14,6 +14,7 @@ from nmpcrl.report import halves
 from nmpcrl.report.prose import filled
 from nmpcrl.report.tables import BADGES, WORDS
 from nmpcrl.report.timing import of_steps
+from nmpcrl.report.verdicts import evidence
 
 PAGES = project.pages()
 each_page = pytest.mark.parametrize("page", PAGES)
@@ -107,7 +108,7 @@ def badly_counted(text: str, known: dict[str, Verdict]) -> list[str]:
     if len(names) != 1:
         return []
     verdict = known[names.pop()]
-    said = f"{verdict.evidence} {halves.apart(verdict)}"
+    said = f"{evidence(verdict)} {halves.apart(verdict)}"
     every = {str(of) for _, of in verdict.counts.values()}
     counts = [found[0] for found in COUNT.finditer(text) if found[1] in every]
     return [f"{verdict.claim} {count}" for count in counts if count not in said]

@@ -131,7 +131,7 @@ def test_published_verdicts_on_time_are_what_their_intervals_say():
     assert len(known) == len(BY_TIME)
     for verdict in known:
         claim, ratio = BY_TIME[verdict.claim], Ratio(verdict.ratio, *verdict.interval, waited=0.0)
-        assert verdict.outcome == decide(ratio, claim.claimed, claim.near)[0] != UNDECIDABLE
+        assert verdict.outcome == decide(ratio, claim.claimed, claim.near) != UNDECIDABLE
 
 
 def test_times_are_ratios_first_and_those_of_the_published_measurement():

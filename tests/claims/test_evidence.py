@@ -26,7 +26,7 @@ def known():
     """ES and its frozen arm, both readings of the decay, published."""
     runs = main_table(["ES", "frozen"], ["A"], [0], 2)
     summaries = fetch_summaries(runs, progress=False)
-    published.publish(summaries, dict.fromkeys(runs, "main"), ())
+    published.publish(summaries, dict.fromkeys(runs, "main"))
     return summaries
 
 

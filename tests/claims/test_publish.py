@@ -1,12 +1,11 @@
-"""Verdicts are published anew from what is published, and those on time unless it was too busy."""
+"""Times are published if they decide, and parts beside the whole study."""
 
 import pandas as pd
 import pytest
 
 from nmpcrl.claims import publish, published
-from nmpcrl.claims.assumptions import THEOREMS
-from nmpcrl.claims.rule import Assumption
 from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.study import Experiment
 
 
@@ -23,43 +22,23 @@ def timings(width: float) -> pd.DataFrame:
 @pytest.mark.parametrize(
     ("width", "outcomes"), [(0.02, [PARTLY, REPRODUCED]), (0.07, [UNDECIDABLE, REPRODUCED])]
 )
-def test_verdicts_on_time_are_published_if_all_are_decided(monkeypatch, width, outcomes):
-    kept = []
-    taken = timings(width)
+def test_times_are_published_if_they_decide_all_claims_about_time(monkeypatch, width, outcomes):
+    written, taken = [], timings(width)
     monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: taken)
-    monkeypatch.setattr(publish.published, "republish", lambda *both: kept.append(both))
+    monkeypatch.setattr(publish.published, "republish", written.append)
     judged = publish.publish_timing()
-    assert [verdict.claim for verdict in judged] == ["C3", "C4"]
     assert [verdict.outcome for verdict in judged] == outcomes
-    assert kept == ([(judged, taken)] if UNDECIDABLE not in outcomes else [])
-
-
-def test_what_is_published_gives_its_verdicts_again_without_a_run():
-    found = published.load()
-    assert publish.judge_published(found) == found.verdicts
-
-
-def test_verdicts_are_published_in_the_place_of_those_that_were_there(monkeypatch):
-    kept, study = [], {publish.AUDITED: "records"}
-    monkeypatch.setattr(publish, "fetch_all", lambda *_, **__: study)
-    monkeypatch.setattr(publish, "dropped_curvature", lambda records: f"of {records}")
-    held = Assumption("a finite MDP", "it is not", holds=False, by=THEOREMS)
-    monkeypatch.setattr(publish, "audit", lambda *given: (held,) * (given == (study, "of records")))
-    monkeypatch.setattr(publish.published, "republish", kept.append)
-    judged = publish.rejudge()
-    assert kept == [judged]
-    (c8,) = [one for one in judged if one.claim == "C8"]
-    assert "a finite MDP" in c8.evidence
-
-
-def test_each_wider_verdict_follows_the_one_it_widens():
-    claims = [one.claim for one in publish.judge_published(published.load())]
-    assert claims[claims.index("C7") + 1] == "W7"
-    assert claims[claims.index("C9") + 1] == "W9"
-    assert claims[-1].startswith("B")
+    assert len(written) == (UNDECIDABLE not in outcomes)
 
 
 def test_the_main_table_and_the_controls_are_published_as_a_whole_only():
-    one = Experiment()
     with pytest.raises(published.Unpublishable, match="with the whole study only"):
-        publish.publish_parts({one: None}, {one: "main"})
+        publish.publish_parts({Experiment(): None}, {Experiment(): "main"})
+
+
+def test_each_wider_verdict_follows_the_one_it_widens_and_ours_are_last():
+    claims = [one.claim for one in published.load().verdicts]
+    for wider, narrow in WIDER_THAN.items():
+        assert claims[claims.index(narrow) + 1] == wider
+    assert [one[0] for one in claims[-4:]] == ["B"] * 4
+    assert published.Published().verdicts == ()

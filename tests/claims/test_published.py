@@ -16,7 +16,6 @@ from nmpcrl.analysis.rows import row, table
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.claims import published, thetas
 from nmpcrl.claims.published import FILES, Damaged, Published, load, publish
-from nmpcrl.claims.verdict import PARTLY, REPRODUCED, Verdict
 from nmpcrl.study import Experiment, design, paper, run, sweep
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.provenance import EPOCHS, environment, made_here
@@ -28,21 +27,6 @@ RUNS = (
     *sweep(learner=("ES", "frozen"), seed=(0, 1), episodes=4, steps=6, evaluate_every=2, horizon=2),
 )
 LABELS = {e: "main" if e.horizon == paper.HORIZON else "N = 2" for e in RUNS}
-VERDICTS = (
-    Verdict("C1", "It converges.", PARTLY, "It holds in 3 of 4 pairs.", "With another c_epsilon."),
-    Verdict(
-        "C2",
-        "It is fast.",
-        REPRODUCED,
-        "4 of 4 pairs: 100 %.",
-        "",
-        1.0,
-        (0.51, 1.0),
-        {"A": REPRODUCED},
-        {"step": REPRODUCED},
-        {"all": (4, 4), "A": (4, 4)},
-    ),
-)
 
 
 @pytest.fixture(autouse=True)
@@ -60,7 +44,7 @@ def summaries():
 
 @pytest.fixture
 def known(summaries) -> Published:
-    publish(summaries, LABELS, VERDICTS)
+    publish(summaries, LABELS)
     return load()
 
 
@@ -132,7 +116,7 @@ def test_the_bytes_of_any_numbers_are_read_bit_for_bit():
 
 
 def test_a_study_without_such_parts_has_an_empty_file(summaries):
-    publish(summaries, dict.fromkeys(summaries, "N = 2"), VERDICTS)
+    publish(summaries, dict.fromkeys(summaries, "N = 2"))
     assert not any("theta" in one.episodes for one in load().summaries.values())
 
 
@@ -151,14 +135,14 @@ def test_where_no_folder_is_named_the_projects_own_is_read(monkeypatch):
     assert published.place().parts[-2:] == ("book", "published")
 
 
-def test_what_is_published_is_in_seven_files(known, folder):
+def test_what_is_published_is_in_six_files(known, folder):
     assert {path.name for path in folder.iterdir()} == set(FILES)
-    assert len(FILES) == 7
+    assert len(FILES) == 6
 
 
 def test_searches_are_published_as_they_were_found(summaries):
     searches = {Search("B", budget=40): Found((0.1, 0.2), 31, (1, 7), (1 / 3, 0.1))}
-    publish(summaries, LABELS, VERDICTS, searches=searches)
+    publish(summaries, LABELS, searches=searches)
     assert load().searches == searches
     assert load().about["searches"]["machine"] == made_here()["machine"]
 
@@ -192,7 +176,7 @@ def test_runs_that_failed_are_read_as_they_were(summaries):
     states[2:] = np.nan
     facts = summaries[first].facts | {"stopped": 'diverged: ", | "'}
     diverged = replace(changed(summaries[first], cost=cost), states=states, facts=facts)
-    publish({first: diverged} | {e: summaries[e] for e in others}, LABELS, VERDICTS)
+    publish({first: diverged} | {e: summaries[e] for e in others}, LABELS)
     found = load()
     assert found.rows[first]["final_cost"] == np.inf
     assert found.rows[first]["stopped"] == 'diverged: ", | "'
@@ -202,7 +186,7 @@ def test_runs_that_failed_are_read_as_they_were(summaries):
 
 def test_runs_of_other_lengths_are_not_padded(summaries):
     longer = Experiment("frozen", episodes=7, steps=9, evaluate_every=1)
-    publish(summaries | {longer: summarise(run(longer))}, LABELS | {longer: "longer"}, VERDICTS)
+    publish(summaries | {longer: summarise(run(longer))}, LABELS | {longer: "longer"})
     found = load().summaries
     assert found[longer].episodes["cost"].shape == (7,)
     assert found[longer].evaluations["cost"].shape == (8,)
@@ -210,10 +194,6 @@ def test_runs_of_other_lengths_are_not_padded(summaries):
     assert found[RUNS[0]].episodes["cost"].shape == (4,)
     assert found[RUNS[0]].evaluations["cost"].shape == (3,)
     assert found[RUNS[0]].states.shape == (6, 3)
-
-
-def test_verdicts_are_read_as_they_were(known):
-    assert known.verdicts == VERDICTS
 
 
 def test_what_is_published_says_what_made_it(known):
@@ -227,7 +207,7 @@ def test_what_is_published_says_what_made_it(known):
 def test_the_same_content_gives_the_same_bytes(known, summaries, folder):
     before = {name: (folder / name).read_bytes() for name in FILES}
     shutil.rmtree(folder)
-    publish(summaries, LABELS, VERDICTS)
+    publish(summaries, LABELS)
     again = {name: (folder / name).read_bytes() for name in FILES}
     about, about_again = (json.loads(files.pop("about.json")) for files in (before, again))
     assert again == before
@@ -238,7 +218,7 @@ def test_the_same_content_gives_the_same_bytes(known, summaries, folder):
 
 def test_what_is_published_anew_takes_the_place_of_what_was_read(known, summaries):
     fewer = [RUNS[0], frozen_arm(RUNS[0])]
-    publish({e: summaries[e] for e in fewer}, LABELS, VERDICTS)
+    publish({e: summaries[e] for e in fewer}, LABELS)
     assert list(load().summaries) == fewer
 
 
@@ -246,7 +226,7 @@ def test_when_the_thresholds_were_fixed_is_said_again_by_what_is_published_anew(
     known, summaries, folder
 ):
     published._seal(folder, {**known.about, "fixed": "then"})
-    publish(summaries, LABELS, VERDICTS)
+    publish(summaries, LABELS)
     assert load().about["fixed"] == "then"
 
 
@@ -268,7 +248,7 @@ def test_the_whole_study_takes_20_megabytes_at_most(summaries, folder):
     followed = sum(variant in thetas.FOLLOWED for variant in design.whole_study().values())
     share = followed / len(design.whole_study())
     labels = {e: "main" if i < share * n else "N = 5" for i, e in enumerate(noise)}
-    publish(noise, labels, VERDICTS)
+    publish(noise, labels)
     each = sum(path.stat().st_size for path in folder.iterdir()) / n
     assert each * len(design.whole_study()) < 20e6
 
@@ -297,7 +277,7 @@ def test_a_column_that_an_older_table_lacks_takes_the_fields_default(known, summ
     assert list(found.rows) == [replace(e, evaluate_every=default) for e in summaries]
 
 
-@pytest.mark.parametrize(("name", "word"), [("runs.csv", "stuck"), ("verdicts.json", "partly")])
+@pytest.mark.parametrize(("name", "word"), [("runs.csv", "stuck")])
 def test_a_word_that_is_not_known_is_refused(known, folder, name, word):
     text = (folder / name).read_text()
     (folder / name).write_text(text.replace(word, "hardly"))
@@ -406,31 +386,16 @@ def parts(found: Published) -> dict:
         "summaries": summaries,
         "rows": rows,
         "variants": {repr(e): part for e, part in found.variants.items()},
-        "verdicts": found.verdicts,
         "about": dict(found.about),
     }
 
 
-def test_single_verdicts_are_published_anew_and_all_else_stays(known, folder):
+def test_times_are_published_anew_and_all_else_stays(known, folder):
     before = [(folder / name).read_bytes() for name in ("runs.csv", "curves.npz")]
-    measured = replace(VERDICTS[1], outcome=PARTLY, share=None, interval=(1.1, 1.2), ratio=1.15)
-    published.republish([measured])
-    found = load()
-    assert found.verdicts == (VERDICTS[0], measured)
+    published.republish(pd.DataFrame({"solver": ["ipopt"], "learner": ["ES"]}))
+    assert load().timings.to_dict("list") == {"solver": ["ipopt"], "learner": ["ES"]}
+    assert load().about["timings"]["machine"] == fingerprint()
     assert before == [(folder / name).read_bytes() for name in ("runs.csv", "curves.npz")]
-    sums = {"files", "seal"}
-    kept = {name: value for name, value in known.about.items() if name not in sums}
-    assert {name: value for name, value in found.about.items() if name not in sums} == kept
-
-
-def test_a_verdict_on_a_new_claim_comes_after_the_others_and_all_of_them_in_their_own_order(known):
-    new = replace(VERDICTS[1], claim="B9")
-    published.republish([new])
-    assert load().verdicts == (*VERDICTS, new)
-    published.republish([new, *VERDICTS])
-    assert load().verdicts == (new, *VERDICTS)
-    published.republish([VERDICTS[0], new, VERDICTS[1]])
-    assert load().verdicts == (VERDICTS[0], new, VERDICTS[1])
 
 
 FURTHER = Experiment("ES", seed=7, episodes=6, steps=6, evaluate_every=2, alpha=2e-7)
@@ -458,7 +423,6 @@ def test_further_runs_are_published_beside_the_others_which_keep_every_byte(know
     assert found.rows[more]["final_cost"] == row(made)["final_cost"]
     assert found.rows[more]["ending"]
     np.testing.assert_allclose(found.summaries[more].states, made.states, atol=1e-6)
-    assert found.verdicts == known.verdicts
     assert found.about["runs"]["alpha x 3"] == 1
     (addition,) = found.about["additions"]
     assert addition["machine"] == fingerprint()

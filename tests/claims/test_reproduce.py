@@ -11,7 +11,6 @@ import pytest
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.rows import cost_ratios, row
 from nmpcrl.claims import published, reproduce
-from nmpcrl.claims.paper_claims import judge_times
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.reproduce import (
     CannotRelock,
@@ -134,7 +133,7 @@ def test_a_batch_is_comparable_where_this_machine_made_it(study):
 
 def verdict(outcome: Outcome, interval: tuple[float, float] | None = None) -> Verdict:
     share = None if interval is None else sum(interval) / 2
-    return Verdict("C1", "It works.", outcome, "", "", share, interval)
+    return Verdict("C1", "It works.", outcome, "", share, interval)
 
 
 @pytest.mark.parametrize(
@@ -176,7 +175,7 @@ def timings(ratio: float, waited: float = 0.0) -> pd.DataFrame:
     ],
 )
 def test_times_contradict_published_ones_of_this_machine(ratio, waited, made, contradicted):
-    known = Published(verdicts=judge_times(timings(0.65)), about={"timings": made})
+    known = Published(timings=timings(0.65), about={"timings": made})
     found = of_times(timings(ratio, waited), known)
     assert [here.claim for here, _ in found] == contradicted
 

@@ -24,7 +24,7 @@ BAD = (
 )
 LONG = (  # replaced by a refusal
     *((summaries, "fetch_summaries"), (cluster, "executor"), (executor, "processes")),
-    *((publish, "publish_timing"), (publish, "rejudge"), (reproduce, "relock")),
+    *((publish, "publish_timing"), (reproduce, "relock")),
     *((other_problems, "make"), (problem_times, "make"), (suite, "measure")),
     *((suite, "read_or_measure"), (sweep, "sweep"), (live, "measure")),
 )

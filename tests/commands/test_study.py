@@ -11,6 +11,7 @@ from raising import raising
 
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.policy_search import LEAST, Search
+from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.study import design, sweep
@@ -29,7 +30,6 @@ def small(monkeypatch, measured):
     times = pd.DataFrame(measured["learners"])
     monkeypatch.setattr(design, "whole_study", lambda: dict(STUDY))
     monkeypatch.setattr(publish, "Search", partial(Search, budget=LEAST))
-    monkeypatch.setattr(publish, "rejudge", lambda: ())
     monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: times)
 
 
@@ -162,11 +162,12 @@ def test_a_study_without_numba_is_refused(command, published_here, monkeypatch):
 def test_bench_publishes_the_verdicts_on_time_only_where_they_are_decided(
     command, monkeypatch, outcome, code
 ):
-    judged = Verdict("C3", "half the time", outcome, "0.65 [0.62, 0.68]", "")
+    ratio = Ratio(0.65, 0.62, 0.68, 0.1)
+    judged = Verdict("C3", "half the time", outcome, numbers={"ipopt": ratio})
     monkeypatch.setattr(publish, "publish_timing", lambda: (judged,))
     done = command("bench", "--publish")
     assert done.exit_code == code
-    assert f"C3: {outcome}. 0.65" in done.output
+    assert "0.65 [0.62, 0.68] with ipopt" in done.output
     assert ("nothing is published" in done.output) == bool(code)
 
 

@@ -36,7 +36,6 @@ from nmpcrl.claims import (
     population_published,
     population_questions,
     prespecified,
-    publish,
     published,
     remedies,
     remedy_published,
@@ -124,17 +123,6 @@ def by_claim(verdicts: Iterable[Any]) -> dict[str, Any]:
 @entry("verdicts")
 def as_published() -> Any:
     return by_claim(study().verdicts)
-
-
-@entry("verdicts")
-def judged_from_the_published_runs() -> Any:
-    return by_claim(publish.judge_published(study()))
-
-
-@entry("verdicts")
-def which_fields_differ_from_the_published_ones() -> Any:
-    both = zip(as_published().items(), judged_from_the_published_runs().values(), strict=True)
-    return [name for (name, then), now in both if plain(then) != plain(now)]
 
 
 @entry("verdicts")

@@ -50,7 +50,7 @@ def test_a_letter_asks_only_what_a_verdict_depends_on_and_says_which():
 
 
 def test_a_letter_says_of_each_claim_which_answers_may_change_it():
-    verdicts = [Verdict(name, "It does.", NOT, "", "Longer runs.") for name in ("C1", "C3")]
+    verdicts = [Verdict(name, "It does.", NOT, "Longer runs.") for name in ("C1", "C3")]
     first, second = by_claim(verdicts, {"B": ("C1",), "C": ("C1",), "L": ("C5",)}).splitlines()
     assert first.startswith("- **C1.** It does. *Here: not reproduced.* The answers to 1 and 2 may")
     assert "No verdict on it changed" in second

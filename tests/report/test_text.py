@@ -46,7 +46,6 @@ def verdict(claim: str, outcome: str, layouts: str = "", decays: str = "") -> Ve
         claim,
         "It is so.",
         outcome,
-        "evidence",
         "elsewhere",
         by_layout={name: read[letter] for name, letter in zip("ABCDEF", layouts, strict=False)},
         by_decay={
@@ -117,7 +116,7 @@ def test_the_answer_is_what_the_decided_claims_say(outcomes, head):
 
 
 def test_the_legend_says_what_c7s_percentage_leaves_out_where_c7_is_shown(some_stopped):
-    c7 = replace(verdict("C7", PARTLY), each="Without noise, it held in 3 of 4 runs of ES.")
+    c7 = replace(verdict("C7", PARTLY), by_learner={"RDES": (2, 4)})
     said = text.legend([c7], some_stopped)
     assert said.endswith(
         " Without noise, 2 of 4 runs kept them, 2 of which had to be stopped in training."

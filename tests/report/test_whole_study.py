@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from nmpcrl.claims.halves import halves
+from nmpcrl.claims.by_runs import halves
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.thresholds import divergence, instability
 from nmpcrl.report.whole_study import EVERY, main_table, went_wrong

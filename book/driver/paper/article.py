@@ -39,6 +39,7 @@ from nmpcrl.claims.published import Published
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.report import drawn, halves, tables, text
 from nmpcrl.report import finding as said
+from nmpcrl.report import verdicts as sentences
 from nmpcrl.report.figures.verdicts import claims as verdicts
 from nmpcrl.report.figures.verdicts import failure_modes
 from nmpcrl.report.open_questions import QUESTIONS
@@ -164,7 +165,8 @@ def _tables(given: Source) -> dict[str, Any]:
 
 def _evidence(one: Verdict) -> list[str]:
     """Claim, verdict, evidence, and where another verdict is to be expected."""
-    evidence = markup.text(f"{one.evidence} {halves.own(one) or one.each}".strip())
+    beside = halves.own(one) or sentences.by_learner(one)
+    evidence = markup.text(f"{sentences.evidence(one)} {beside}".strip())
     return [one.claim, one.words, evidence, markup.text(one.would_change)]
 
 

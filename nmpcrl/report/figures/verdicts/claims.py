@@ -22,8 +22,7 @@ from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import paper_claims, thresholds
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.rule import Assumption
-from nmpcrl.claims.verdict import Verdict
+from nmpcrl.claims.verdict import Assumption, Verdict
 from nmpcrl.report.figures.axes import below, jitter, label_panel, logarithmic
 from nmpcrl.report.figures.panels import part, shares, strips
 from nmpcrl.report.figures.style import (

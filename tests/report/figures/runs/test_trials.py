@@ -43,7 +43,7 @@ def test_the_infinite_cost_of_a_lost_run_is_not_drawn():
 def test_the_title_counts_the_parts_that_say_yes(second, said):
     def verdict(outcome, share):
         interval = (max(0, share - 0.1), min(1, share + 0.1))
-        return Verdict("P", "", outcome, "", "", share=share, interval=interval)
+        return Verdict("P", "", outcome, share=share, interval=interval)
 
     figure = trials.shares({0.1: verdict(REPRODUCED, 1.0), 4: verdict(second, 0.05)}, "ratio")
     assert title(figure) == f"Taken by themselves, {said} are a yes"

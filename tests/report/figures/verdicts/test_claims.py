@@ -11,8 +11,8 @@ from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.claims import thresholds
 from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import CLAIMS
-from nmpcrl.claims.rule import Assumption, Observations
-from nmpcrl.claims.verdict import Verdict
+from nmpcrl.claims.rule import Observations
+from nmpcrl.claims.verdict import Assumption, Verdict
 from nmpcrl.report.figures.verdicts import claims as figures
 from nmpcrl.study import Experiment
 from nmpcrl.study.records import Records

@@ -1,0 +1,561 @@
+"""Every claim can have each outcome, and each border is respected exactly."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from quiet_rows import START_COST, quiet_row
+
+from nmpcrl.analysis.gradient_td import Curvature
+from nmpcrl.analysis.metrics import TOUCH
+from nmpcrl.analysis.rows import experiment_of, row, table
+from nmpcrl.analysis.summary import summarise
+from nmpcrl.bench.paired import IDLE, Ratio
+from nmpcrl.claims import own_claims, paper_claims, thresholds
+from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS, Measured, audit, measured
+from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, halves
+from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
+from nmpcrl.claims.rule import Observations, arms
+from nmpcrl.claims.timing import WAITED, decide
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Assumption, Verdict
+from nmpcrl.claims.wider_claims import WIDER_CLAIMS, WIDER_THAN
+from nmpcrl.study import Experiment, Records, Runs, paper, run
+from nmpcrl.study.experiment import LEARNERS, PAPER
+
+SEEDS, SOME = range(5), range(2)
+EVERY = {**CLAIMS, **WIDER_CLAIMS, **own_claims.OWN_CLAIMS}
+BAD, SWAYING = {"cost_ratio": 1.6}, {"late_cost_range": 0.06}
+LOST = {"final_cost": 500.0, "stopped": "diverged: theta"}
+FAILED = {"final_cost": np.inf}
+
+Changes = Callable[[Experiment], dict[str, Any]]
+
+
+def study(
+    changes: Changes = lambda _: {}, *, learners=LEARNERS, layouts=("A",), **fields
+) -> pd.DataFrame:
+    """Runs with both readings and five seeds, quiet but for `changes`."""
+    named = [
+        Experiment(learner, seed=seed, layout=layout, decay=decay, **fields)
+        for learner, layout, decay, seed in product(learners, layouts, ("step", "episode"), SEEDS)
+    ]
+    return pd.DataFrame([quiet_row(one, **changes(one)) for one in named])
+
+
+def of(learner: str, seeds=SEEDS, **columns: Any) -> Changes:
+    """Changes to the runs of one learner with these seeds, in both readings."""
+    return lambda e: columns if learner in (e.learner, "all") and e.seed in seeds else {}
+
+
+def both(*changes: Changes) -> Changes:
+    return lambda e: {name: value for one in changes for name, value in one(e).items()}
+
+
+def paths(runs: pd.DataFrame, apart: float = 0.0, seeds=SEEDS) -> dict[Experiment, np.ndarray]:
+    """Rollouts that stand still, those of RDES with some seeds at a distance [m]."""
+    named = [experiment_of(one) for one in runs.to_dict("records")]
+    away = {e: apart if e.learner == "RDES" and e.seed in seeds else 0.0 for e in named}
+    return {e: np.zeros((3, 3)) + [away[e], 0, 0] for e in named}
+
+
+def timings(rdes=0.5, ges=1.0, width=0.0, waited=0.0, solvers=("fatrop", "ipopt")) -> pd.DataFrame:
+    """Ratios of the times of a step, with intervals as wide on either side."""
+    ratios = {"ES": 1.0, "RDES": rdes, "GES": ges}
+    return pd.DataFrame(
+        [
+            {"solver": solver, "learner": learner, "waited": waited}
+            | {"ratio": ratio, "ratio_low": ratio - width, "ratio_high": ratio + width}
+            for solver in solvers
+            for learner, ratio in ratios.items()
+        ]
+    )
+
+
+def verdict_on(name: str, *observed: Any, **others: Any) -> Verdict:
+    """One verdict; the arguments are those of `Observations`."""
+    return EVERY[name].judge(Observations(*observed, **others))
+
+
+def outcomes(runs: pd.DataFrame, rollouts=None) -> dict[str, str]:
+    observed = Observations(runs, paths(runs) if rollouts is None else rollouts)
+    asked = {**BY_RUNS, **own_claims.OWN_CLAIMS}
+    return {name: claim.judge(observed).outcome for name, claim in asked.items()}
+
+
+# Outcomes, at the borders and at either side
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "outcome"),
+    [
+        (SEEDS, (), REPRODUCED),
+        (SOME, (), PARTLY),
+        (SEEDS, SOME, PARTLY),
+        ((), (), NOT),
+        (SEEDS, SEEDS, NOT),
+        ((), SEEDS, NOT),
+    ],
+)
+@pytest.mark.parametrize(("name", "why"), [("C1", BAD), ("C2", SWAYING), ("C2", BAD)])
+def test_a_contrast_asks_in_how_many_pairs_only_the_first_went_wrong(
+    name, why, first, second, outcome
+):
+    one, other = EVERY[name].learners
+    verdict = verdict_on(name, study(both(of(one, first, **why), of(other, second, **why))))
+    assert (verdict.claim, verdict.outcome) == (name, outcome)
+    assert verdict.counts["all"] == (2 * len({*first} - {*second}), 10)
+    assert [half.counts for half in verdict.own_halves] == [(len(first), len(second))] * 2
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "apart", "outcome"),
+    [
+        ("C5", {}, 0.0, REPRODUCED),
+        ("C5", {"theta_0": 2.0}, 0.0, REPRODUCED),  # theta is compared, and not judged
+        ("C5", {"final_cost": START_COST * (1 - thresholds.SAME_COST)}, 0.25, REPRODUCED),
+        ("C5", {}, thresholds.SAME_PATH + 1e-9, NOT),
+        ("C5", {"final_cost": START_COST * (1 - thresholds.SAME_COST) - 1e-9}, 0.0, NOT),
+        ("C5", FAILED, np.nan, NOT),
+        ("C5", LOST, 0.0, NOT),
+        ("C6", {"imitation_with": thresholds.MORE_ACCURATE}, 0.0, REPRODUCED),
+        ("C6", {"imitation_with": np.nextafter(thresholds.MORE_ACCURATE, 1)}, 0.0, NOT),
+        ("C6", {"imitation_with": np.nan}, 0.0, UNDECIDABLE),
+        ("C7", {}, 0.0, REPRODUCED),
+        ("C7", {"inside_small": 1}, 0.0, PARTLY),  # in training only
+        ("C7", {"eval_inside_small": 1, "eval_worst_overlap": 0.005}, 0.0, NOT),
+        ("C7", {"eval_worst_overlap": TOUCH}, 0.0, REPRODUCED),
+        ("C7", {"inputs": 1}, 0.0, NOT),
+        ("C7", {"outside": 1}, 0.0, REPRODUCED),  # the box is another constraint
+        ("C9", {"final_cost": START_COST * (1 - thresholds.BETTER)}, 0.0, REPRODUCED),
+        ("C9", {"final_cost": START_COST * (1 - thresholds.BETTER) + 1e-9}, 0.0, NOT),
+        ("C9", FAILED, 0.0, NOT),
+        ("C9", LOST, 0.0, NOT),
+        ("B1", {"final_cost": START_COST * (1 + thresholds.SAME_COST)}, 0.0, REPRODUCED),
+        ("B1", {"final_cost": START_COST * (1 + thresholds.SAME_COST) + 1e-9}, 0.0, NOT),
+        ("B1", LOST, 0.0, NOT),
+        ("B2", {"final_cost": START_COST * (1 - thresholds.BETTER)}, 0.0, REPRODUCED),
+        ("B2", {"final_cost": START_COST * (1 - thresholds.BETTER) + 1e-9}, 0.0, NOT),
+        ("B3", {"final_cost": START_COST * (1 + thresholds.SAME_COST)}, 0.0, REPRODUCED),
+        ("B3", {"final_cost": START_COST * (1 + thresholds.SAME_COST) + 1e-9}, 0.0, NOT),
+        ("B3", {"final_cost": START_COST * (1 - thresholds.SAME_COST) - 1e-9}, 0.0, NOT),
+        ("B4", {"final_cost": START_COST * (1 + thresholds.SAME_COST)}, 0.0, REPRODUCED),
+        ("B4", {"final_cost": START_COST * (1 + thresholds.SAME_COST) + 1e-9}, 0.0, NOT),
+    ],
+)
+def test_each_border_belongs_to_yes(name, changes, apart, outcome):
+    changed = EVERY[name].learners if name == "C9" else EVERY[name].learners[:1]
+    runs = study(both(*(of(learner, **changes) for learner in changed)))
+    verdict = verdict_on(name, runs, paths(runs, apart))
+    assert (verdict.claim, verdict.outcome) == (name, outcome)
+    assert verdict.counts["all"][1] == 10 * len(changed) * (outcome != UNDECIDABLE)
+    if outcome == NOT and name not in ("B2", "C9"):  # there, a quiet run is no yes
+        some = study(both(*(of(learner, SOME, **changes) for learner in changed)))
+        assert verdict_on(name, some, paths(some, apart, SOME)).outcome == PARTLY
+
+
+def test_two_that_failed_are_not_the_same_policy_and_cost_the_same():
+    runs = study(of("all", **FAILED))
+    found = outcomes(runs, {e: np.full((3, 3), np.nan) for e in paths(runs)})
+    assert found["C5"] == found["B2"] == NOT
+    assert found["B1"] == found["B3"] == found["B4"] == REPRODUCED
+
+
+def test_robots_are_as_far_apart_as_they_ever_come_whatever_their_headings():
+    one, other = np.zeros((2, 4, 3))
+    other[2], other[3] = (3.0, 4.0, 0.0), (0.0, 0.0, 9.0)
+    assert thresholds.path_distance(one, other) == 5
+
+
+@pytest.mark.parametrize("learner", sorted(LEARNERS))
+def test_the_wider_claim_asks_all_four_learners_what_the_paper_says_of_some(learner):
+    runs = study(of(learner, eval_inside_large=9, eval_worst_overlap=0.5, inputs=9))
+    assert (verdict_on("C7", runs).outcome == REPRODUCED) == (learner != "RDES")
+    assert (verdict_on("W7", runs).outcome == REPRODUCED) == (learner not in PAPER)
+    assert verdict_on("W7", runs).by_learner == {one: (10 * (one != learner), 10) for one in PAPER}
+    for name, one in WIDER_CLAIMS.items():
+        assert {*EVERY[WIDER_THAN[name]].learners} < {*one.learners} == {*PAPER}
+        assert not one.quotation
+        assert not one.implied
+
+
+# Which learners answer
+
+
+ASKED = {**BY_RUNS, **own_claims.OWN_CLAIMS}
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_the_learners_of_a_claim_decide_it_and_no_others(name):
+    runs = study(lambda e: BAD if e.learner in ("DES", "ES", "matched", "QL") else {})
+    asked, rollouts = ASKED[name].learners, paths(runs)
+    of_all = verdict_on(name, runs, rollouts)
+    alone = verdict_on(name, runs[runs.learner.isin(asked)], rollouts)
+    assert (alone.outcome, alone.counts) == (of_all.outcome, of_all.counts)
+    for learner in asked:
+        some = runs[runs.learner != learner]
+        assert verdict_on(name, some, rollouts).outcome == UNDECIDABLE
+        cut = pd.concat([some, runs[(runs.learner == learner) & (runs.seed > 0)]])
+        asked_once = 20 if name == "C9" else 10  # of C9 each run, of the others each cell
+        assert verdict_on(name, cut, rollouts).counts["all"][1] == asked_once - 2
+
+
+@pytest.mark.parametrize(
+    ("runs", "open_"),
+    [
+        (study(episodes=paper.EPISODES - 1), {*ASKED}),
+        (study(of("all", cost_ratio=np.nan)), {"C1", "C2"}),  # no frozen arm
+        (study(learners=("frozen",)), {*ASKED}),
+        (study(learners=PAPER), {*own_claims.OWN_CLAIMS}),
+    ],
+)
+def test_short_runs_and_missing_ones_decide_nothing(runs, open_):
+    assert {name for name, outcome in outcomes(runs).items() if outcome == UNDECIDABLE} == open_
+
+
+def test_a_missing_path_is_a_missing_answer_and_two_settings_are_refused():
+    assert outcomes(study(), {})["C5"] == UNDECIDABLE
+    with pytest.raises(ValueError, match="DES has several runs in layout A"):
+        verdict_on("C1", pd.concat([study(), study(alpha=3e-7)]))
+
+
+def test_layouts_are_judged_one_by_one_and_only_where_the_learner_was_run():
+    worse = both(lambda e: BAD if e.learner == "DES" and e.layout == "B" else {})
+    runs = study(worse, layouts=("A", "B"))
+    assert verdict_on("C1", runs).by_layout == {"A": NOT, "B": REPRODUCED}
+    some = runs[(runs.learner != "random") | (runs.layout == "B")]
+    assert verdict_on("B2", some).by_layout == {"B": NOT}
+
+
+# The numbers of a verdict
+
+
+def test_a_verdict_has_the_numbers_behind_it():
+    sizes = {"inside_small": 7, "inside_medium": 2, "inside_large": 1, "eval_inside_large": 3}
+    runs = study(both(of("RDES", **sizes, inputs=4, outside=6), of("DES", SOME, **BAD)))
+    c7, c1 = verdict_on("C7", runs).numbers, verdict_on("C1", runs).numbers
+    assert (c7["inputs"], c7["outside"], c7["steps_done"]) == (40, 60, 390_000)
+    assert [c7[f"inside_{size}"] for size in ("small", "medium", "large")] == [70, 20, 10]
+    assert (c7["eval_inside"], c7["eval_inside_large"]) == ({"RDES": 30}, 30)
+    assert (c1["DES_wrong"], c1["RDES_wrong"]) == ((4, 10), (0, 10))
+    assert (c1["DES_median"], c1["RDES_median"]) == (1.0, 1.0)
+    runs = study(both(of("RDES", (0,), **FAILED), of("GES", (1,), distance=5.0, theta_0=2.0)))
+    c9, c5 = verdict_on("C9", runs).numbers, verdict_on("C5", runs, paths(runs, 1.0, SOME)).numbers
+    assert (c9["failed"], c9["stuck"], [*c9["medians"]]) == (2, 2, [*PAPER])
+    assert (c5["path"], c5["cost"], c5["theta"]) == (0, 0, 0)
+    assert verdict_on("C6", runs).numbers == {"told": 0.5, "alone": 1.0}
+
+
+def test_a_run_costs_less_with_the_probability_that_counts_every_pair_alike():
+    runs = study(of("TDC", final_cost=900.0))
+    assert own_claims.costs_less(runs, "TDC", "GES").value == 1
+    assert own_claims.costs_less(runs, "GES", "TDC").value == 0
+    assert np.isnan(own_claims.costs_less(runs, "TDC", "none").value)
+    numbers = verdict_on("B1", runs).numbers
+    assert (numbers["better"].value, numbers["second"]) == (1, 0)
+    assert numbers["first"] == pytest.approx(0.1)
+    assert verdict_on("B1", runs[runs.learner != "GES"]).numbers == {}
+
+
+def test_runs_that_kept_the_constraints_are_counted_with_those_that_were_stopped():
+    runs = study(both(of("RDES", SOME, stopped="diverged"), of("DES", (0,), inputs=1)))
+    found = kept_without_noise(runs, ("DES", "RDES"))
+    assert found.groupby("learner").sum().to_dict("index") == {
+        "DES": {"kept": 8, "stopped": 0},
+        "RDES": {"kept": 10, "stopped": 4},
+    }
+
+
+# Divergence and instability of a run
+
+
+@pytest.mark.parametrize(
+    ("columns", "diverged", "unstable"),
+    [
+        ({"cost_ratio": thresholds.DIVERGED}, False, False),
+        ({"cost_ratio": np.nextafter(thresholds.DIVERGED, 2)}, True, True),
+        ({"cost_ratio": np.inf}, True, True),
+        ({"cost_ratio": 0.1, "stopped": "diverged: theta"}, True, True),
+        ({"cost_ratio": np.nan, "stopped": "diverged: theta"}, True, True),
+        ({"cost_ratio": np.nan}, pd.NA, pd.NA),
+        ({"late_cost_range": thresholds.UNSTABLE}, False, False),
+        ({"late_cost_range": np.nextafter(thresholds.UNSTABLE, 1)}, False, True),
+        ({"late_cost_range": np.inf}, False, True),
+    ],
+)
+def test_stopped_runs_and_costs_above_a_border_are_divergence_and_instability(
+    columns, diverged, unstable
+):
+    runs = study(of("DES", **columns), learners=("DES",))
+    assert thresholds.divergence(runs).unique().tolist() == [diverged]
+    assert thresholds.instability(runs).unique().tolist() == [unstable]
+
+
+def test_a_run_is_judged_from_its_records_as_from_the_table():
+    named = [Experiment(name, episodes=6, steps=6) for name in (*PAPER, "frozen")]
+    named += [Experiment("ES", alpha=1e5, seed=1, episodes=6, steps=6)]
+    named += [Experiment("frozen", seed=1, episodes=6, steps=6)]
+    found = {one: run(one) for one in named}
+    for seed, (cost, lost, lost_arm) in enumerate(
+        [(1, 0, 1), (10, 0, 1), (10, 0, 3), (1, 3, 3)], start=2
+    ):  # the frozen arm's late episodes are cut short
+        for name, factor, late in (("ES", cost, lost), ("frozen", 1, lost_arm)):
+            one = Experiment(name, seed=seed, episodes=6, steps=6)
+            steps = (records := run(one)).steps
+            failed = steps["episode"] >= 6 - late
+            changes = {
+                "status": np.where(failed, 2, steps["status"]),
+                "cost": steps["cost"] * factor,
+            }
+            found[one] = replace(records, steps=steps | changes)
+    runs = table([summarise(records) for records in found.values()])
+    for judged, expected in (
+        (thresholds.diverged, thresholds.divergence(runs)),
+        (thresholds.unstable, thresholds.instability(runs)),
+    ):
+        each = [judged(Runs(found), *pair) for pair in found.items()]
+        assert each == expected.fillna(False).tolist()
+        assert set(each) == {True, False}
+    es = runs[(runs.learner == "ES") & (runs.seed > 1)]
+    assert thresholds.divergence(es).tolist() == [False, True, False, pd.NA]
+    for experiment, records in found.items():
+        (one,) = pd.DataFrame([row(summarise(records))]).to_dict("records")
+        assert experiment_of(one) == experiment
+
+
+def test_the_share_achieved_is_1_at_the_possible_cost_0_at_theta_init_and_negative_beyond():
+    runs = pd.DataFrame(
+        {
+            "layout": ["A"] * 6 + ["B", "C"],
+            "initial_cost": 100.0,
+            "final_cost": [80.0, 100.0, 90.0, 120.0, np.inf, 90.0, 90.0, 90.0],
+            "stopped": ["finished"] * 5 + ["diverged: it went"] + ["finished"] * 2,
+        }
+    )
+    shares = thresholds.share_of_possible(runs, {"A": 0.2, "B": 0.0})
+    worst = [-np.inf, -np.inf]
+    np.testing.assert_allclose(shares, [1.0, 0.0, 0.5, -1.0, *worst, np.nan, np.nan], atol=1e-12)
+
+
+# Other borders, and halves
+
+FIELDS = dict.fromkeys(("name", "statement", "question", "measured", "border", "would_change"), "X")
+FIELDS |= {"threshold": 0.5}
+GAINS, LOSSES = AtLeast(**FIELDS), AtMost(**FIELDS)
+CONTRAST = Contrast(wrong="fell", worst="broke", **FIELDS)
+VALUES = pd.DataFrame({"one": np.linspace(0.1, 1.0, 10)})
+
+
+def test_other_borders_give_other_outcomes_and_steady_ones_do_not():
+    borders = [0.05, 0.25, 0.5, 0.95, 1.05]
+    gained, lost = (one.at_borders(VALUES, borders) for one in (GAINS, LOSSES))
+    assert gained.share.tolist() == pytest.approx([1.0, 0.8, 0.6, 0.1, 0.0])
+    assert lost.share.tolist() == pytest.approx([0.0, 0.2, 0.5, 0.9, 1.0])
+    assert gained.outcome.tolist() == [REPRODUCED, PARTLY, PARTLY, NOT, NOT]
+    assert ((gained.low <= gained.share) & (gained.share <= gained.high)).all()
+    assert LOSSES.steady(VALUES / 10)
+    assert not LOSSES.steady(VALUES)
+    ratios = replace(LOSSES, nothing=1.0)  # then 0.75 and 0 stand beside 0.5
+    assert ratios.steady(VALUES + 1)
+    assert not ratios.steady(0.5 + VALUES / 5)
+    unknown = VALUES * np.nan
+    assert GAINS.at_borders(unknown, borders).empty
+    assert GAINS.steady(unknown)
+
+
+def test_a_contrast_asks_the_first_arm_to_be_above_and_the_second_not():
+    values = pd.DataFrame({"one": [0.6, 0.6, 0.5, np.nan], "other": [0.5, 0.6, 0.5, 0.5]})
+    assert CONTRAST.answers(values).tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("pairs", "counts", "as_claimed", "against", "p"),
+    [
+        ([(2, 2)] * 10, (10, 10), 0, 0, 1.0),
+        ([(2, 1)] * 4, (4, 0), 4, 0, 0.125),
+        ([(1, 2)] * 4 + [(2, 2)], (1, 5), 0, 4, 0.125),
+        ([(2, 1), (1, np.inf), (2, np.nan)], (1, 1), 1, 1, 1.0),
+    ],
+)
+def test_only_pairs_that_differ_tell_the_learners_apart(pairs, counts, as_claimed, against, p):
+    cells = [("A", decay, seed) for decay in ("step", "episode") for seed in range(len(pairs))]
+    index = pd.MultiIndex.from_tuples(cells, names=["layout", "decay", "seed"])
+    values = pd.DataFrame(pairs * 2, index, columns=["DES", "RDES"])
+    found = halves(("DES", "RDES"), values, {"diverged": 1.5, "lost": np.finfo(float).max})
+    assert [(one.wrong, one.decay) for one in found] == [
+        *product(("diverged", "lost"), ("step", "episode"))
+    ]
+    for one in found[:2]:
+        assert (one.counts, one.pairs) == (counts, len(values.dropna()) / 2)
+        assert (one.as_claimed, one.against) == (as_claimed, against)
+        assert one.p == pytest.approx(p)
+    assert sum(found[2].counts) == np.isinf(values).to_numpy().sum() / 2
+
+
+# Time
+
+CLAIMED, NEAR = (0.9, 1.1), (0.8, 1.25)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "waited", "expected"),
+    [
+        (0.9, 1.1, 0, REPRODUCED),
+        (0.9, 1.1, WAITED, REPRODUCED),
+        (0.9, 1.1, WAITED + 0.01, UNDECIDABLE),
+        (0.89, 1.0, 0, UNDECIDABLE),
+        (1.0, 1.11, 0, UNDECIDABLE),
+        (0.8, 0.89, 0, PARTLY),
+        (1.11, 1.249, IDLE + 0.01, PARTLY),
+        (0.79, 0.85, 0, UNDECIDABLE),
+        (1.2, 1.25, 0, UNDECIDABLE),
+        (0.85, 1.2, 0, UNDECIDABLE),  # near on both sides, and as claimed between them
+        (0.5, 0.79, 0, NOT),
+        (1.25, 2.0, 0, NOT),
+        (0.5, 2.0, 0, UNDECIDABLE),
+        (np.nan, np.nan, 0, UNDECIDABLE),
+    ],
+)
+def test_an_interval_on_one_side_of_every_border_decides(low, high, waited, expected):
+    assert decide(Ratio((low + high) / 2, low, high, waited), CLAIMED, NEAR) == expected
+
+
+@given(st.tuples(st.floats(0.5, 1.6), st.floats(0.5, 1.6)).map(sorted), st.floats(0, 1))
+def test_the_outcome_of_an_interval_is_that_of_every_number_in_it(ends, at):
+    low, high = ends
+    value = min(max(low + at * (high - low), low), high)
+    one, every = (decide(Ratio(value, *of, 0), CLAIMED, NEAR) for of in ((value,) * 2, ends))
+    assert every in (one, UNDECIDABLE)
+
+
+@pytest.mark.parametrize(
+    ("name", "given_", "outcome"),
+    [
+        ("C3", {"rdes": 0.39}, PARTLY),
+        ("C3", {"rdes": 0.4}, REPRODUCED),
+        ("C3", {"rdes": 0.6}, REPRODUCED),
+        ("C3", {"rdes": 0.62, "width": 0.01}, PARTLY),
+        ("C3", {"rdes": 0.62, "width": 0.03}, UNDECIDABLE),
+        ("C3", {"rdes": 1.0}, NOT),
+        ("C3", {"solvers": ("fatrop",)}, UNDECIDABLE),
+        ("C3", {"solvers": ()}, UNDECIDABLE),
+        ("C4", {"ges": 0.79}, NOT),
+        ("C4", {"ges": 0.9}, REPRODUCED),
+        ("C4", {"ges": 1.1}, REPRODUCED),
+        ("C4", {"ges": 1.2}, PARTLY),
+        ("C4", {"ges": 1.25}, NOT),
+    ],
+)
+def test_claims_about_time_are_decided_with_the_paper_s_solver(name, given_, outcome):
+    taken = timings(**given_)
+    verdict = verdict_on(name, timings=taken)
+    assert (verdict.claim, verdict.outcome) == (name, outcome)
+    if "ipopt" in given_.get("solvers", ["ipopt"]):
+        assert list(verdict.numbers) == ["ipopt", "fatrop"]
+        assert verdict.ratio == verdict.numbers["ipopt"].value
+    assert verdict_on(name, timings=taken[:1]).outcome == UNDECIDABLE  # ES alone
+
+
+# The theorem
+
+
+@pytest.mark.parametrize(
+    ("holds", "outcome"),
+    [
+        ({(SMOOTH, LINEAR): True, (SMOOTH,): True}, REPRODUCED),
+        ({(SMOOTH, LINEAR): True, (SMOOTH,): False}, REPRODUCED),  # the other one applies
+        ({(SMOOTH, LINEAR): False, (SMOOTH,): True}, NOT),
+        ({(LINEAR,): False, (SMOOTH,): False}, NOT),
+        ({}, UNDECIDABLE),
+    ],
+)
+def test_c8_needs_every_assumption_of_one_theorem(holds, outcome):
+    made = tuple(Assumption(f"{by}", "so", holds=one, by=by) for by, one in holds.items())
+    verdict = verdict_on("C8", assumptions=made)
+    assert (verdict.claim, verdict.outcome, verdict.assumptions) == ("C8", outcome, made)
+
+
+SMOOTH_VALUE = "the value is three times differentiable in theta"
+FASTER = "w moves faster than theta, alpha / beta to 0"
+GRADIENT = "the update follows the gradient of the MSPBE, curvature included"
+
+
+@pytest.mark.parametrize(
+    ("beta", "found", "holding"),
+    [
+        (1e-8, Measured(0.1, 0.5, 0.1), set()),
+        (1e-7, Measured(0.1, 0.5, 0.1), set()),
+        (2e-7, Measured(0.1, 0.5, 0.1), {FASTER}),
+        (1e-8, Measured(0.0, 0.5, 0.1), {SMOOTH_VALUE}),
+        (1e-8, Measured(0.1, 0.5, 0.0), {GRADIENT}),
+    ],
+)
+def test_settings_and_measurements_can_meet_three_assumptions_of_nine(beta, found, holding):
+    made = audit(Experiment("GES", beta=beta), found)
+    assert {a.theorem for a in made if a.holds} == holding
+    by = {a.theorem: a.by for a in made}
+    assert (len(made), by["the value is linear in theta"]) == (9, (LINEAR,))
+    assert (by[SMOOTH_VALUE], by[FASTER]) == ((SMOOTH,), THEOREMS)
+
+
+@pytest.mark.parametrize("on_boundary", [False, True])
+def test_the_audit_measures_kinks_memory_and_the_dropped_term(on_boundary):
+    touching = (0.5, 2.2 - 1.25 * np.sqrt(1 + paper.THETA_INIT[-1]), 0.0)  # layout A
+    steps = {
+        "state": np.array([touching if on_boundary else (-2.0, -2.0, 0.0)] * 4),
+        "theta": np.tile(paper.THETA_INIT, (4, 1)),
+        "delta": np.array([1.0, 2.0, 3.0, 4.0]),
+    }
+    records, size = Records({"theta": paper.THETA_INIT}, steps, {}, {}), np.array([2.0])
+    found = measured(Experiment("GES"), records, Curvature(size, size, size / 4))
+    assert (found.kinks, found.dropped) == (on_boundary, 0.25)
+    assert found.memory == pytest.approx(1)
+
+
+# Texts
+
+
+@pytest.mark.parametrize("claim", EVERY.values(), ids=EVERY)
+def test_every_claim_names_question_measure_and_border(claim):
+    texts = (claim.statement, claim.measured, claim.border, claim.test, claim.would_change)
+    assert all(texts)
+    assert claim.question.endswith("?")
+    if claim.name in CLAIMS:
+        assert re.search(r"“.+”.*\((Section|Table) [IV]+(-[A-C])?\)|” hours", claim.quotation)
+        assert claim.implied == (claim.name == "C9")
+    if claim.name in BY_RUNS:
+        assert claim.short
+        assert claim.borders[0] < claim.threshold < claim.borders[-1]
+        assert (np.diff(claim.borders) > 0).all()
+    if claim.name in ASKED:
+        assert claim.learners
+        assert claim.label
+
+
+def test_all_claims_are_judged_in_order():
+    runs = study()
+    made = [Assumption("a finite MDP", "it is not", holds=False)]
+    judged = paper_claims.judge(runs, paths=paths(runs), timings=timings(), assumptions=made)
+    assert [v.claim for v in judged] == [f"C{i}" for i in range(1, 10)] == list(CLAIMS)
+    assert [v.claim for v in own_claims.judge_own(runs)] == list(own_claims.OWN_CLAIMS)
+    assert [v.claim for v in paper_claims.judge_times(timings())] == ["C3", "C4"]
+
+
+def test_c1_and_c2_ask_about_divergence_and_instability_of_each_run():
+    rng, many = np.random.default_rng(0), {}
+    ratios, ranges = [0.9, 1.4, 1.6, np.inf], [0.01, 0.04, 0.06, np.inf]
+    for one in ("DES", "RDES", "ES", "GES"):
+        for seed in SEEDS:
+            columns = {"cost_ratio": rng.choice(ratios), "late_cost_range": rng.choice(ranges)}
+            many[one, seed] = columns | {"stopped": rng.choice(["finished", "diverged: it went"])}
+    runs = study(lambda e: many.get((e.learner, e.seed), {}))
+    for name, judged in (("C1", thresholds.divergence), ("C2", thresholds.instability)):
+        one, other = (judged(arm) for arm in arms(runs, *BY_RUNS[name].learners))
+        answers = BY_RUNS[name].answers(BY_RUNS[name].measure(runs, {}))
+        assert answers.tolist() == (one & ~other).dropna().tolist()
