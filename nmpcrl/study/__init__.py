@@ -1,4 +1,4 @@
-"""What is run, and where it is kept: the paper's numbers, layouts, experiments and records."""
+"""The paper's numbers, layouts and experiments, their runs, and the store of records."""
 
 from nmpcrl.study import paper
 from nmpcrl.study.design import paper_runs, sweep

@@ -1,7 +1,7 @@
-"""Where the paper is silent or contradicts itself, and how it is read here.
+"""Gaps and contradictions of the paper, and their readings.
 
-Each use in the code carries `# departure X`; a test holds both sides together, and the book renders
-this table. The texts are Markdown.
+Each use in the code carries `# departure X`, which a test checks, and the book renders this table.
+The texts are Markdown.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from dataclasses import dataclass
 class Departure:
     """One gap of the paper and its reading."""
 
-    gap: str  # what the paper says or leaves out
-    reading: str  # what is done here
-    why: str  # the evidence for it, or the reason
-    variant: str = ""  # how to run the other reading, where one can be run
+    gap: str  # in the paper
+    reading: str  # of this library
+    why: str  # evidence or reason
+    variant: str = ""  # fields of `Experiment` for the other reading, if there are any
 
 
 DEPARTURES = {
@@ -154,7 +154,7 @@ DEPARTURES = {
     "P": Departure(
         gap="'Diverges', 'unstable' and 'the same policy' are not defined.",
         reading="The thresholds in `thresholds.py` and the rule in `rule.py`, which"
-        " were fixed before any claim was put to the study.",
+        " were fixed before any claim was tested.",
         why="A verdict needs them.",
     ),
     "Q": Departure(

@@ -1,5 +1,4 @@
-"""Every number of the paper: Table I and the task. Where it is silent or contradicts itself, see
-`DEPARTURES`."""
+"""The numbers of the paper, Table I and the task; `DEPARTURES` has its gaps and contradictions."""
 
 from collections.abc import Iterable, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""`run` trains as an experiment or a trial says, judges theta without noise, and keeps records."""
+"""`run` trains an experiment or a trial, evaluates theta without noise, and returns records."""
 
 import gc
 import time
@@ -28,8 +28,8 @@ from nmpcrl.study.records import (
 from nmpcrl.study.setup import Job, job_of
 from nmpcrl.study.trial import Trial
 
-UNKNOWN = Successor(np.nan)  # of a step that was not bootstrapped
-UNSOLVED: Any = SimpleNamespace(  # stands in for a solve that failed or was not asked for
+UNKNOWN = Successor(np.nan)  # of a step without a bootstrap
+UNSOLVED: Any = SimpleNamespace(  # in the place of a solve that failed or was not needed
     value=np.nan,
     features=np.nan,
     restarts=0,
@@ -42,14 +42,14 @@ UNSOLVED: Any = SimpleNamespace(  # stands in for a solve that failed or was not
 def run(
     named: Experiment | Trial, on_episode: Callable[[int, float], None] | None = None
 ) -> Records:
-    """Train and evaluate as it says; the same experiment or trial gives the same numbers.
+    """Train and evaluate; the same experiment or trial gives the same numbers.
 
     Args:
-        named: names the run; what an experiment's learner does not read is set to its default.
-        on_episode: called after each episode with how many are done and the episode's summed cost.
+        named: the run; fields that an experiment's learner does not read have their defaults.
+        on_episode: called after each episode with the number of episodes and the summed cost.
     """
     job = job_of(named)
-    gc.freeze()  # the collector need not look through all that was imported, again and again
+    gc.freeze()  # the collector need not search the imported modules again and again
     try:
         return _run(job, on_episode)
     finally:
@@ -84,7 +84,7 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
     table["alpha_phi2"] = job.alpha * (table["features"] ** 2).sum(axis=1)
     facts: Facts = {
         "stopped": stopped,
-        "solver": solver,  # what solved: fatrop where riccati was not to be had, if only once
+        "solver": solver,  # another than the run's own if it took over, if only once
         "seconds": float(table["seconds"].sum()),
         "final_cost": final_cost(judged["cost"]),
     }
@@ -92,7 +92,7 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
 
 
 def _tables(job: Job) -> tuple[Table, Table]:
-    """Room for `Records.steps` and `Records.evaluations`."""
+    """Empty tables for `Records.steps` and `Records.evaluations`."""
     nmpc = job.controller.nmpc
     sizes = nmpc.n, nmpc.m, job.weights.theta.size
     return (
@@ -102,7 +102,7 @@ def _tables(job: Job) -> tuple[Table, Table]:
 
 
 def _solvers(step: Step) -> list[str]:
-    """What solved the problems of a step."""
+    """The solvers of a step's problems."""
     successor = (step.update and step.update.successor) or UNKNOWN
     return [one.solver for one in (step.plan, step.solution, successor.solution) if one]
 
@@ -139,7 +139,7 @@ def _row(step: Step, seconds: float) -> StepRow:
 
 
 def _evaluation(job: Job, weights: Weights, episode: int) -> EvaluationRow:
-    """The row of `Records.evaluations` for the policy of `weights`; the first rollout is kept."""
+    """The row of `Records.evaluations` for the policy of `weights`: states of the first rollout."""
     steps, rng = job.steps, np.random.default_rng(job.judged)
     rollout, *others = (
         evaluate(job.controller, weights.theta, steps, rng=rng, **job.environment)

@@ -1,7 +1,4 @@
-"""Problems that others have posed, and such whose truth is known: each a plan, a plant and a start.
-
-They are read by `Nmpc`, `train` and `evaluate` as a user's own are.
-"""
+"""Problems of other authors, and problems with a known truth: each a plan, a plant and a start."""
 
 from nmpcrl.study.problems import grid, gros_zanon, lqr
 

@@ -1,7 +1,7 @@
-"""The linear example with a wrong model of Gros and Zanon (2020), as the examples of mpcrl have it.
+"""The linear example with a wrong model of Gros and Zanon (2020), as in the examples of mpcrl.
 
-The plant is x+ = A x + B u + (e, 0), e uniform in [-0.1, 0], and pulls the first state across the
-bound that its stage cost punishes. The plan knows neither A and B nor e, and learns all it has.
+The plant is x+ = A x + B u + (e, 0), e uniform in [-0.1, 0]; it pulls the first state across the
+bound that the stage cost punishes. The plan knows neither A and B nor e; all of it is learned.
 """
 
 import numpy as np
@@ -19,11 +19,11 @@ TRUE_A, TRUE_B = np.array([[0.9, 0.35], [0.0, 1.1]]), np.array([[0.0813], [0.2]]
 DISTURBANCE = (-0.1, 0.0)  # bounds of e
 WRONG_A, WRONG_B = np.array([[1.0, 0.25], [0.0, 1.0]]), np.array([[0.0312], [0.25]])
 TERMINAL = solve_discrete_are(WRONG_A, WRONG_B, np.eye(2) / 2, np.eye(1) / 4)  # P
-LOOSE = np.array([1.0, 0.0])  # by which mpcrl's plan begins above the plant's upper bound
+LOOSE = np.array([1.0, 0.0])  # first x_upper of mpcrl's plan, above the plant's bound
 
 
 def problem(*, informed: bool = False) -> Problem:
-    """The plan.
+    """The plan, which minimises
 
     V0 + sum_i gamma^i (|x_i|^2 + u_i^2 / 2) / 2 + f'(x_i, u_i) + x_N' P x_N, and
     gamma^(i-1) 100/2 a unit by which x_i leaves its bounds, i = 1, ..., N: f and P are not
@@ -31,7 +31,7 @@ def problem(*, informed: bool = False) -> Problem:
     wrong model.
 
     Args:
-        informed: whether it begins with the plant's A, B, bounds and mean disturbance.
+        informed: whether theta begins at the plant's A, B, bounds and mean disturbance.
     """
     late = {"weight": PENALTY / 2 / GAMMA, "stages": slice(1, None)}
     mean = np.array([np.mean(DISTURBANCE), 0.0])
@@ -66,13 +66,13 @@ def problem(*, informed: bool = False) -> Problem:
 
 
 def plant(state: Vector, action: Vector, rng: np.random.Generator) -> tuple[Vector, float, bool]:
-    """A step of the plant: next state, cost of this one, and no end."""
+    """A step of the plant: next state, cost, and no end."""
     later = TRUE_A @ state + TRUE_B @ action
     later[0] += rng.uniform(*DISTURBANCE)
     return later, cost(state, action), False
 
 
 def cost(state: Vector, action: Vector) -> float:
-    """(|s|^2 + a^2 / 2 + 100' what of s lies out of bounds) / 2."""
+    """(|s|^2 + a^2 / 2 + 100' (distance of s from its bounds)) / 2."""
     outside = np.maximum(0, LOWER - state) + np.maximum(0, state - UPPER)
     return float(0.5 * (state @ state + 0.5 * action @ action + PENALTY * outside.sum()))

@@ -1,6 +1,7 @@
-"""A linear plant with a quadratic cost, of which A, B, Q and R are learned: the truth is known.
+"""A linear plant with a quadratic cost, of which A, B, Q and R are learned.
 
-Riccati's equation has the value and the policy of every theta, and Lyapunov's what a policy costs.
+The truth is known: Riccati's equation has the value and the policy of every theta, and Lyapunov's
+the cost of a policy.
 """
 
 from dataclasses import dataclass
@@ -28,32 +29,24 @@ class Truth:
 
     @property
     def cost(self) -> float:
-        """From the start."""
+        """The cost from the start."""
         return float(START @ self.P @ START)
 
 
-def problem(*, informed: bool = False, horizon: int = HORIZON) -> Problem:
-    """The plan: A, B, Q, R, the terminal P and a constant V0 are learned.
+def problem(*, informed: bool = False) -> Problem:
+    """The plan, of which A, B, Q, R, the terminal P and a constant V0 are learned.
 
     Args:
-        informed: whether it begins with the truth, P included.
-        horizon: N.
+        informed: whether theta begins at the truth, P included.
     """
     model = (A, B) if informed else (WRONG_A, WRONG_B)
     best = optimal(*model)
     return Problem(
         states=2,
         inputs=1,
-        horizon=horizon,
+        horizon=HORIZON,
         gamma=GAMMA,
-        theta={
-            "V0": 0.0,
-            "A": model[0],
-            "B": model[1],
-            "Q": Q,
-            "R": R,
-            "P": best.P,
-        },
+        theta={"V0": 0.0, "A": model[0], "B": model[1], "Q": Q, "R": R, "P": best.P},
         model=lambda x, u, th: th["A"] @ x + th["B"] @ u,
         stage=lambda x, u, th: x.T @ th["Q"] @ x + u.T @ th["R"] @ u,
         terminal=lambda x, th: x.T @ th["P"] @ x,
@@ -62,13 +55,13 @@ def problem(*, informed: bool = False, horizon: int = HORIZON) -> Problem:
 
 
 def plant(state: Vector, action: Vector, rng: np.random.Generator) -> tuple[Vector, float, bool]:
-    """A step of the plant: next state, cost of this one, and no end."""
+    """A step of the plant: next state, cost, and no end."""
     later = A @ state + B @ action
     return later, float(state @ Q @ state + action @ R @ action), False
 
 
 def optimal(a: Matrix = A, b: Matrix = B, q: Matrix = Q, r: Matrix = R) -> Truth:
-    """The best policy of a model and its value: Riccati's equation of sqrt(gamma) (A, B)."""
+    """The best policy of a model and its value, by Riccati's equation of sqrt(gamma) (A, B)."""
     root = np.sqrt(GAMMA)
     p = solve_discrete_are(root * a, root * b, q, r)
     return Truth(gain(a, b, r, p), p)
@@ -81,7 +74,7 @@ def gain(a: Matrix, b: Matrix, r: Matrix, p: Matrix) -> Matrix:
 
 
 def worth(k: Matrix) -> Truth:
-    """What u = -K x costs on the plant, by Lyapunov's equation; infinite where it diverges."""
+    """The cost of u = -K x on the plant, by Lyapunov's equation; infinite where it diverges."""
     closed = np.sqrt(GAMMA) * (A - B @ k)
     if np.abs(np.linalg.eigvals(closed)).max() >= 1:
         return Truth(k, np.diag([np.inf, np.inf]))
@@ -89,7 +82,7 @@ def worth(k: Matrix) -> Truth:
 
 
 def recursion(a: Matrix, b: Matrix, q: Matrix, r: Matrix, p: Matrix) -> Truth:
-    """Riccati's recursion of a plan: its policy u = -K x and its value x' P x."""
+    """The policy u = -K x and the value x' P x of a plan, by Riccati's recursion."""
     k = np.zeros((b.shape[1], a.shape[0]))
     for _ in range(HORIZON):
         k = gain(a, b, r, p)
@@ -99,7 +92,7 @@ def recursion(a: Matrix, b: Matrix, q: Matrix, r: Matrix, p: Matrix) -> Truth:
 
 
 def planned(theta: Vector) -> Truth:
-    """What the plan of a theta does and believes, but for V0; Q and P count by halves of Q + Q'."""
+    """The policy and the value, without V0, of a theta's plan; Q and P count as (Q + Q') / 2."""
     parts = problem().split(theta)
     a, b, q, r, p = (parts[name] for name in "ABQRP")
     return recursion(a, b, (q + q.T) / 2, r, (p + p.T) / 2)
