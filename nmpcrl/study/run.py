@@ -139,16 +139,12 @@ def _row(step: Step, seconds: float) -> StepRow:
 
 
 def _evaluation(job: Job, weights: Weights, episode: int) -> EvaluationRow:
-    """The row of `Records.evaluations` for the policy of `weights`: states of the first rollout."""
+    """The row of `Records.evaluations` for the policy of `weights`."""
     steps, rng = job.steps, np.random.default_rng(job.judged)
-    rollout, *others = (
-        evaluate(job.controller, weights.theta, steps, rng=rng, **job.environment)
-        for _ in range(job.rollouts)
-    )
-    cost = float(np.mean([rollout.cost, *(one.cost for one in others)]))
+    rollout = evaluate(job.controller, weights.theta, steps, rng=rng, **job.environment)
     missing = ((0, steps - len(rollout.states)), (0, 0))
     states, actions = (
         np.pad(reached, missing, constant_values=np.nan)
         for reached in (rollout.states, rollout.actions)
     )
-    return EvaluationRow(episode, weights.theta, cost, states, actions)
+    return EvaluationRow(episode, weights.theta, rollout.cost, states, actions)

@@ -32,7 +32,6 @@ class Job:
     evaluate_every: int
     options: dict[str, Any]  # of `train` alone
     environment: dict[str, Any] = field(default_factory=dict)  # of `train` and `evaluate`
-    rollouts: int = 1  # of each evaluation
     judged: int | np.random.SeedSequence = 0  # seed of each evaluation
 
     @property
@@ -61,7 +60,6 @@ def job_of(named: Experiment | Trial) -> Job:
 
 def _job_of_trial(trial: Trial) -> Job:
     """The job of a trial; its noise is that of an `Experiment` with the same seed."""
-    trial.refuse_change()
     noise, learner, world, judged = np.random.SeedSequence(trial.seed).spawn(4)
     theta, controller = np.array(trial.theta), Persistent(trial.nmpc)
     explore = Exploration.draw(
@@ -78,13 +76,8 @@ def _job_of_trial(trial: Trial) -> Job:
         explore,
         np.nan,
         trial.evaluate_every,
-        {
-            "clipped": trial.clipped,
-            "constrained": trial.constrained,
-            "rng": np.random.default_rng(world),
-        },
-        trial.environment,
-        trial.rollouts,
+        {"rng": np.random.default_rng(world)},
+        {"plant": trial.plant, "start": trial.start, "data": trial.data},
         judged,
     )
 
@@ -121,15 +114,14 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
 
 def _compile_trials(trials: Iterable[Trial]) -> None:
     """Solve once with each controller of some trials, with and without a fixed action."""
-    for trial in {(one.nmpc.key, one.constrained): one for one in trials}.values():
+    for trial in {one.nmpc.key: one for one in trials}.values():
         around = environment(trial.nmpc, trial.plant, trial.start)
         state, theta = around.start(np.random.default_rng(trial.seed)), np.array(trial.theta)
         ahead = forecasts(trial.data, trial.nmpc.horizon)
         known = ahead and ahead(0)
         with suppress(SolverError):
             plan = trial.nmpc.solve(state, theta, data=known)
-            if trial.constrained is not False:
-                trial.nmpc.solve(state, theta, plan, plan.action, data=known)
+            trial.nmpc.solve(state, theta, plan, plan.action, data=known)
 
 
 def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, Weights, Exploration]:

@@ -1,14 +1,13 @@
-"""A `Trial` names a run of one's own: any controller, learner and environment.
+"""A `Trial` names a run of a user's own controller, learner or environment.
 
-`fetch`, `fetch_all` and `run` take it as they take an `Experiment`, which names a run of the
-paper's robot. Its records have the same tables.
+`fetch`, `fetch_all` and `run` take a trial as they take an `Experiment`, which names a run of the
+paper's robot. The records of both have the same tables.
 """
 
 import inspect
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -19,73 +18,62 @@ from nmpcrl.learning import Learner
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study.parameters import LARGEST_SEED, ParameterError, whole
 
-AT_LEAST_ONE = ("episodes", "steps", "evaluate_every", "rollouts")
-ABOUT = ("learner", "seed", *AT_LEAST_ONE, "theta")  # fields that its records state
-MOST = 10**9
+COUNTS = ("episodes", "steps", "evaluate_every")
+STATED = ("learner", "seed", *COUNTS, "theta")  # fields that the records have
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One run of one's own.
+    """One run of a user's own.
 
-    All that it is made of is part of its key: edit a function, and the run is done again. Functions
-    may stand in a notebook. What draws anew, such as a generator or a network, is made by `make`.
+    The key of the run holds all fields: after an edit of a function the run is trained again.
+    Functions may be defined in a notebook. Generators and networks are made by `make`.
 
     Raises:
-        ParameterError: a field is not what it may be, or no name can be made of it.
+        ParameterError: a field has a value that is not allowed, or that no key can be made of.
     """
 
-    learner: str  # its name in tables and figures
+    learner: str  # name of the learner in tables and figures
     make: Callable[..., Learner]  # (nmpc) -> learner, or (nmpc, rng) if it has an argument rng
     nmpc: Nmpc
-    theta: Any = None  # to start with; that of the `Problem` if None
+    theta: Any = None  # at the start; by default the theta of the `Problem`
     seed: int = 0  # of the noise, of the environment and of `rng`
     episodes: int = 30
     steps: int = 100  # of an episode, at most
-    plant: Any = None  # this and the next two as in `train`
+    plant: Any = None  # as in `train`, like the next two
     start: Any = None
     data: Any = None
     deviation: Any = 1.0  # of the noise of Eq. (5), a number or one an input
     decay_rate: float = 0.99  # c_epsilon, counted in time steps
-    clipped: bool = True
-    constrained: bool | None = None
     evaluate_every: int = 5  # episodes between rollouts without noise
-    rollouts: int = 1  # whose mean cost judges theta; the same draws each time
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "theta", tuple(map(float, self._first_theta())))
-        whole(0, LARGEST_SEED).check("seed", self.seed)
-        for name in AT_LEAST_ONE:
-            whole(1, MOST).check(name, getattr(self, name))
-        if not callable(self.make):
-            raise ParameterError(f"make = {self.make!r} must be a function of nmpc: a learner is"
-                                 " made anew for each run")  # fmt: skip
-        _ = self.identity
-
-    def _first_theta(self) -> Iterable[float]:
         if not isinstance(self.nmpc, Nmpc):
             raise ParameterError(f"nmpc = {self.nmpc!r} must be an Nmpc")
-        if self.theta is not None:
-            return np.asarray(self.theta, float)
-        if self.nmpc.problem is None:
+        if not callable(self.make):
+            raise ParameterError(f"make = {self.make!r} must be a function of nmpc")
+        if self.theta is None and self.nmpc.problem is None:
             raise ParameterError("theta must be given where the Nmpc has a task and no Problem")
-        return self.nmpc.problem.theta
+        theta = self.nmpc.problem.theta if self.theta is None else np.asarray(self.theta, float)
+        object.__setattr__(self, "theta", tuple(map(float, theta)))
+        whole(0, LARGEST_SEED).check("seed", self.seed)
+        for name in COUNTS:
+            whole(1, 10**9).check(name, getattr(self, name))
+        _ = self.identity  # refused here, and not where the run is stored
 
-    @cached_property
+    @property
     def identity(self) -> dict[str, Any]:
-        """What it is made of, by field."""
+        """The content of every field."""
         try:
-            found = {one.name: content(getattr(self, one.name)) for one in fields(self)}
+            return {"trial": {one.name: content(getattr(self, one.name)) for one in fields(self)}}
         except NoContent as error:
             raise ParameterError(f"this trial cannot be stored: {error}") from error
-        return {"trial": found}
 
     @property
     def stated(self) -> dict[str, Any]:
-        """What its records say that it is."""
-        sizes = {"states": self.nmpc.n, "inputs": self.nmpc.m}
-        named = {name: getattr(self, name) for name in ABOUT} | {"theta": [*self.theta]}
-        return named | sizes
+        """The fields in the records, and the sizes of the problem."""
+        named = {name: getattr(self, name) for name in STATED} | {"theta": [*self.theta]}
+        return named | {"states": self.nmpc.n, "inputs": self.nmpc.m}
 
     @property
     def solver(self) -> str:
@@ -94,47 +82,32 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """For people; the key says the rest."""
+        """The name of the run; its file is named by the key, too."""
         plain = re.sub(r"\W+", "_", self.learner)
         return f"{plain}-seed{self.seed}-{self.episodes}ep"
 
-    @property
-    def environment(self) -> dict[str, Any]:
-        """What `train` and `evaluate` take for it."""
-        return {"plant": self.plant, "start": self.start, "data": self.data}
-
     def made(self, controller: Persistent, rng: np.random.Generator) -> Learner:
-        """The learner, made for this run."""
+        """A learner for one run."""
         takes = inspect.signature(self.make).parameters
         return self.make(controller, rng=rng) if "rng" in takes else self.make(controller)
-
-    def refuse_change(self) -> None:
-        """Refuse to run under the name of what it was when it was made.
-
-        Raises:
-            ParameterError: something that a function of it reads has another value now.
-        """
-        if replace(self).identity != self.identity:
-            raise ParameterError(f"{self}: what it is made of has changed since; make it anew")
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Trial) and self.identity == other.identity
 
     def __hash__(self) -> int:
-        return hash(str(self.identity))
+        return hash(self.name)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """By cloudpickle, which takes functions of a notebook along."""
+        """Pickle functions of a notebook, too."""
         import cloudpickle
 
-        values = {one.name: getattr(self, one.name) for one in fields(self)}
-        return _unpacked, (cloudpickle.dumps(values),)
+        return _unpickled, (cloudpickle.dumps(dict(vars(self))),)
 
     def __str__(self) -> str:
         return f"{self.learner}, seed {self.seed}"
 
 
-def _unpacked(packed: bytes) -> Trial:
+def _unpickled(fields: bytes) -> Trial:
     import cloudpickle
 
-    return Trial(**cloudpickle.loads(packed))
+    return Trial(**cloudpickle.loads(fields))
