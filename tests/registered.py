@@ -7,9 +7,10 @@ from types import ModuleType
 
 from fixed_questions import git
 
+from nmpcrl.studies.agents import SAC_AND_TD3
 from nmpcrl.studies.worlds import WORLDS
 
-INVESTIGATIONS = (WORLDS,)
+INVESTIGATIONS = (SAC_AND_TD3, WORLDS)
 
 
 class _AtCommit(importlib.abc.MetaPathFinder, importlib.abc.Loader):

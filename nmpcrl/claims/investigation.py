@@ -135,6 +135,11 @@ class Investigation:
     prepare: Callable[[Iterable[tuple[Condition, Any]]], None] | None = None  # compiles ahead
     where: Path | None = None  # of the published table; by default the project's folder
 
+    @property
+    def asked(self) -> dict[str, Question]:
+        """The questions by name."""
+        return {one.name: one for one in self.questions}
+
     def key(self, one: Condition) -> str:
         """A hash of all that a row depends on."""
         episodes = self.parts[one.part].episodes

@@ -5,7 +5,6 @@ import os
 import click
 
 from nmpcrl import __version__
-from nmpcrl.commands.agents import agents
 from nmpcrl.commands.bench import bench
 from nmpcrl.commands.grade import grade
 from nmpcrl.commands.investigate import investigate
@@ -46,7 +45,6 @@ for command in (
     suite,
     remedies,
     investigate,
-    agents,
     grade,
     wasm,
 ):

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from nmpcrl.claims.investigation import Investigation
 
 BOOK = {  # the investigations of the book: module and name of each
+    "agents": ("agents", "SAC_AND_TD3"),
     "worlds": ("worlds", "WORLDS"),
 }
 
@@ -28,7 +29,7 @@ def investigate(
 ) -> None:  # fmt: skip
     """Make and judge the rows of an investigation.
 
-    NAME is one of the book's (worlds), or a Python file that defines one
+    NAME is one of the book's (agents, worlds), or a Python file that defines one
     Investigation. Each row is stored as soon as it is made, so a run can be
     interrupted and started again.
 

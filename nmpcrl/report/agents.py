@@ -7,17 +7,27 @@ import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.claims import remedies
-from nmpcrl.claims.agent_questions import AGENTS, PARTS, SEARCH, SEARCHED, SETTINGS
-from nmpcrl.claims.agents import Course, answers, course, rows, searched
-from nmpcrl.claims.population import Answer
+from nmpcrl.claims.investigation import Answer
 from nmpcrl.claims.remedies import RemedyRow
 from nmpcrl.report.cited import Count, cited
 from nmpcrl.report.remedies import entry_named, share_shown
 from nmpcrl.report.tables import html_table
 from nmpcrl.report.text import listed, number
+from nmpcrl.studies.agents import (
+    AGENTS,
+    PARTS,
+    SEARCH,
+    SEARCHED,
+    SETTINGS,
+    Course,
+    answers,
+    course,
+    rows,
+    searched,
+)
 from nmpcrl.study.drawn import JUDGE, TUNE
 
-BUDGET = PARTS["judge"].budget
+BUDGET = PARTS["judge"].episodes
 SHORT = SEARCHED[0].split()[1]  # episodes of the search
 MATCHES, SOLVES = f"matches in {BUDGET} episodes", f"solves in {BUDGET} episodes"
 INIT = r"$\boldsymbol{\theta}_\text{init}$"
@@ -34,7 +44,7 @@ def panels(
     """What a figure shows: by title the courses that are published, and what the search costs.
 
     Args:
-        table: with `agent_published.COLUMNS`.
+        table: of `studies.agents`.
         suite: the published comparison of remedies.
     """
     judged, one = PARTS["judge"], PARTS["one"]
@@ -72,7 +82,7 @@ def finding(table: pd.DataFrame, suite: pd.DataFrame) -> str:
         f" {listed(less)} layouts.",
     ]
     if len(judged) == len(AGENTS):
-        said.append(f"{AGENTS[0]} costs less than {AGENTS[1]} in {_counted(by['SAC or TD3'])}.")
+        said.append(f"{' costs less than '.join(AGENTS)} in {_counted(by['SAC or TD3'])}.")
     matched, solved = (
         sum(_count(by[f"{one.agent} {asked}"]) for one in judged) for asked in (MATCHES, SOLVES)
     )
@@ -85,7 +95,7 @@ def row_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     """One row an agent and one of the search, in HTML, in the layouts in which agents are judged.
 
     Args:
-        table: with `agent_published.COLUMNS`.
+        table: of `studies.agents`.
         suite: the published comparison of remedies.
     """
     places = PARTS["judge"].places
@@ -107,7 +117,7 @@ def longer_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     """What it takes to match theta_init, in HTML: one row an agent and where it is judged.
 
     Args:
-        table: with `agent_published.COLUMNS`.
+        table: of `studies.agents`.
         suite: the published comparison of remedies.
     """
     by, one, seen, new = _by(table, suite), PARTS["one"], len(TUNE), len(JUDGE)
@@ -137,13 +147,13 @@ def tuned() -> str:
     tune, most = PARTS["tune"], max(map(len, SETTINGS.values()))
     return (
         f"Each was tuned with {number(most)} settings, as a remedy is, but in"
-        f" {number(len(tune.places))} layouts with {tune.budget} episodes; the best was judged,"
+        f" {number(len(tune.places))} layouts with {tune.episodes} episodes; the best was judged,"
         f" with {number(PARTS['judge'].seeds)} seed a layout."
     )
 
 
 def _by(table: pd.DataFrame, suite: pd.DataFrame) -> dict[str, Answer]:
-    return {one.question: one for one in answers(table, suite)}
+    return answers(table, suite)
 
 
 def _courses(table: pd.DataFrame, part: str, among: Sequence[str] = ()) -> list[Course]:

@@ -81,7 +81,7 @@ def nearest(one: Encounters, motions: Sequence[Motion]) -> Vector:
 def answered(answers: Iterable[Answer]) -> str:
     """The questions that published runs answer, one item each, in Markdown."""
     there = [one for one in answers if one.outcome != UNDECIDABLE]
-    return answer_items(there, {one.name: one for one in WORLDS.questions}, expected=True)
+    return answer_items(there, WORLDS.asked, expected=True)
 
 
 def suite_rows(table: pd.DataFrame) -> dict[tuple[str, str], Any]:

@@ -6,14 +6,12 @@ import pytest
 from fixed_questions import assert_older, assert_unmoved
 
 from nmpcrl.claims import (
-    agent_questions,
     population_questions,
     remedy_questions,
 )
 
 # a file; its questions; how many there are, and how many have a pilot; what is published of them
 FIXED = [
-    (agent_questions, "AGENT_QUESTIONS", (17, 0), ("agents.json",)),
     (population_questions, "QUESTIONS", (10, 7), ("population.csv",)),
     (remedy_questions, "REMEDY_QUESTIONS", (10, 6), ("suite.json",)),
 ]

@@ -8,7 +8,6 @@ pytestmark = pytest.mark.usefixtures("trains_here")
 @pytest.mark.parametrize(
     ("words", "first", "other"),
     [
-        (("agents",), "tune: 0 of 24 runs", "all: 0 of 4 runs"),
         (("remedies", "--entry", "ES"), "tune: 0 of 60 runs", "judge 50: 0 of 240 runs"),
     ],
 )
@@ -23,7 +22,6 @@ def test_a_dry_run_counts_the_runs_and_says_what_they_take(command, words, first
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("agents", "--part", "best"), "no part 'best'; there are tune, judge, one, all"),
         (("remedies", "--part", "all"), "no part 'all'; there are best, tune, judge 50"),
         (("remedies", "--entry", "SAC"), "no entry 'SAC'"),
     ],
@@ -35,7 +33,6 @@ def test_what_there_is_not_is_refused_with_what_there_is(command, words, said):
 @pytest.mark.parametrize(
     ("words", "entry"),
     [
-        (("agents", "--part", "judge"), "SAC"),
         (("remedies", "--part", "judge 50", "--entry", "ES"), "ES"),
     ],
 )
@@ -43,7 +40,7 @@ def test_nothing_is_judged_before_it_is_tuned(command, words, entry):
     assert_refused(command(*words), f"{entry} is not tuned yet")
 
 
-@pytest.mark.parametrize("name", ["agents", "remedies"])
+@pytest.mark.parametrize("name", ["remedies"])
 def test_what_is_not_published_is_not_judged(command, name):
     assert_refused(command(name, "--judge"), f"nmpcrl {name} --publish")
 

@@ -23,10 +23,6 @@ from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.suite import seed_of
 from nmpcrl.bench import problem_times, sweep
 from nmpcrl.claims import (
-    agent_published,
-    agent_questions,
-    agent_runs,
-    agents,
     evidence,
     finding,
     interventions,
@@ -49,7 +45,7 @@ from nmpcrl.claims import (
 )
 from nmpcrl.report import baselines, whole_study
 from nmpcrl.report import worlds as world_report
-from nmpcrl.studies import worlds
+from nmpcrl.studies import agents, worlds
 from nmpcrl.study import design, paper, provenance
 from nmpcrl.study.drawn import JUDGE, LAYOUTS, SCENARIOS, TUNE
 from nmpcrl.study.experiment import PAPER
@@ -91,7 +87,7 @@ def write() -> None:
 
 study, drawn = published.load, population_published.load
 suite = cache(lambda: remedy_published.load().table)
-trained = cache(lambda: agent_published.load().table)
+trained = cache(lambda: agents.SAC_AND_TD3.table())
 changing = cache(lambda: worlds.WORLDS.table())
 again = cache(interventions.load)
 problems = cache(lambda: other_problems.read(published.place() / other_problems.FILE))
@@ -314,7 +310,7 @@ def expectations() -> Any:
     known = {
         "population": population_questions.QUESTIONS,
         "remedies": remedy_questions.REMEDY_QUESTIONS,
-        "agents": agent_questions.AGENT_QUESTIONS,
+        "agents": agents.SAC_AND_TD3.asked,
         "worlds": {one.name: one for one in worlds.WORLD_QUESTIONS},
         "terminal costs": {one.name: one for one in worlds.TERMINAL_QUESTIONS},
     }
@@ -422,12 +418,12 @@ def best_settings() -> Any:
 
 @entry("agents")
 def answers_on_agents() -> Any:
-    return by_question(agents.answers(trained(), suite()))
+    return by_question(agents.answers(trained(), suite()).values())
 
 
 @entry("agents")
 def answers_without_the_suite() -> Any:
-    return {one.question: one.outcome for one in agents.answers(trained())}
+    return {name: one.outcome for name, one in agents.answers(trained(), suite()[:0]).items()}
 
 
 @entry("agents")
@@ -437,15 +433,15 @@ def rows_of_the_suite() -> Any:
 
 @entry("agents")
 def costs_of_the_best_search() -> Any:
-    found = (agents.searched(suite(), part) for part in agent_questions.SEARCHED)
-    return dict(zip(agent_questions.SEARCHED, found, strict=True))
+    found = (agents.searched(suite(), part) for part in agents.SEARCHED)
+    return dict(zip(agents.SEARCHED, found, strict=True))
 
 
 @entry("agents")
 def courses() -> Any:
     found = {}
     asked = [("judge", ()), ("one", ()), ("all", ()), ("all", [*TUNE]), ("all", [*JUDGE])]
-    for (part, among), agent in product(asked, agent_questions.AGENTS):
+    for (part, among), agent in product(asked, agents.AGENTS):
         one = agents.course(trained(), part, agent, among)
         if one:
             found[f"{agent}, {part}, {len(one.units)}"] = {
@@ -662,7 +658,7 @@ def seeds() -> Any:
     where = {part: [*one.places] for part, one in worlds.PARTS.items()}
     return {
         "remedies": short([seed_of(place, 0) for place in named]),
-        "agents": [agent_runs.seed_of(place, 1) for place in (agent_questions.EVERY, "A", "J001")],
+        "agents": [agents.seed_of(place, 1) for place in (agents.EVERY, "A", "J001")],
         "worlds": {part: short([worlds.WORLDS.seed(place, 1) for place in places])
                    for part, places in where.items()},
     }  # fmt: skip

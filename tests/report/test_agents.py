@@ -5,12 +5,13 @@ import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
 
-from nmpcrl.claims.agent_published import COLUMNS, order
-from nmpcrl.claims.agent_questions import AGENTS, PARTS
-from nmpcrl.claims.agent_runs import judged_in
 from nmpcrl.claims.remedies import COLUMNS as COMPARED
 from nmpcrl.report.agents import finding, in_short, longer_table, panels, row_table, waiting
+from nmpcrl.studies.agents import AGENTS, CHECKPOINTS, PARTS, SAC_AND_TD3
+from nmpcrl.studies.agents_run import judged_in
 from nmpcrl.study.drawn import JUDGE
+
+COLUMNS = SAC_AND_TD3.table().columns
 
 NOTHING = pd.DataFrame(columns=[*COLUMNS])
 SHARES = {"SAC": 1.2, "TD3": 0.97}  # of theta_init's cost, at the end
@@ -24,8 +25,8 @@ def made(*parts, agents=AGENTS, there="a", meanwhile=()):
     """
     found = []
     for part, agent in ((part, agent) for part in parts for agent in agents):
-        points = PARTS[part].checkpoints
-        for place, k in order(part):
+        points = CHECKPOINTS[part]
+        for place, k in PARTS[part].order(agent):
             count = len(judged_in(place))
             costs = np.full((len(points), count), 200.0)
             costs[-1] = 100 * SHARES[agent]

@@ -4,11 +4,12 @@ import pytest
 from fixed_questions import git
 from registered import INVESTIGATIONS, module
 
-from nmpcrl.studies import worlds
+from nmpcrl.studies import agents, worlds
 from nmpcrl.study import published
 
 # today's module; its investigation; commit, module and name of questions that were registered
 REGISTERED = [
+    (agents, agents.SAC_AND_TD3, "2feab64", "nmpcrl.claims.agent_questions", "AGENT_QUESTIONS"),
     (worlds, worlds.WORLDS, "cff09a0", "nmpcrl.claims.world_questions", "WORLD_QUESTIONS"),
     (worlds, worlds.WORLDS, "ff05118", "nmpcrl.claims.terminal_questions", "TERMINAL_QUESTIONS"),
 ]
@@ -37,10 +38,21 @@ def test_thresholds_are_those_registered(today, investigation, commit, name, que
         for one, value in vars(then).items()
         if one.isupper() and isinstance(value, int | float | tuple) and hasattr(today, one)
     }
-    assert {one: getattr(today, one) for one in plain} == plain
+    for one, value in plain.items():
+        now = getattr(today, one)
+        assert (now if isinstance(value, int | float) else tuple(now)) == value
 
 
-def test_parts_are_those_registered():
+def test_settings_and_parts_of_agents_are_those_registered():
+    then = module("2feab64", "nmpcrl.claims.agent_questions")
+    assert (agents.SETTINGS, agents.SPARING) == (then.SETTINGS, then.SPARING)
+    for name, old in then.PARTS.items():
+        now = agents.PARTS[name]
+        assert (now.places, now.seeds, now.episodes) == (old.places, old.seeds, old.budget)
+        assert agents.CHECKPOINTS[name] == old.checkpoints
+
+
+def test_parts_of_worlds_are_those_registered():
     then = module("cff09a0", "nmpcrl.claims.world_questions").PARTS
     then |= {"terminal": module("ff05118", "nmpcrl.claims.terminal_questions").TERMINAL}
     assert [*then] == [*worlds.PARTS]

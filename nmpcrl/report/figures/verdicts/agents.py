@@ -9,8 +9,8 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, NullLocator, PercentFormatter
 
-from nmpcrl.claims.agents import Course
 from nmpcrl.report.figures.style import LIMIT, SUBTITLE, TEAL, WINE, Look, headed, page, subplots
+from nmpcrl.studies.agents import Course
 
 AGENT_LOOKS = {"SAC": Look(WINE, "-", "o"), "TD3": Look(TEAL, (0, (5, 1)), "s")}
 SEARCHED: dict[str, Any] = {"color": "0.25", "linewidth": 1.2, "linestyle": "-."}

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from nmpcrl.claims.agents import Course
 from nmpcrl.report.figures.verdicts.agents import AGENT_LOOKS, courses
+from nmpcrl.studies.agents import Course
 
 EPISODES = (25, 50, 100, 150, 200, 250, 300)
 

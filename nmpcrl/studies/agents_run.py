@@ -1,33 +1,31 @@
-"""SAC and TD3 of stable-baselines3 on `nmpcrl/Robot-v0`: learners that know nothing of an NMPC.
+"""SAC and TD3 of stable-baselines3 on `nmpcrl/Robot-v0`: learners without an NMPC.
 
-They are told where the robot is, where its target and where the obstacles' centres are, and after
-each step what it cost. They have no model: neither of the robot nor of the cost nor of how large an
-obstacle is. `SAC` and `TD3` are entries of the suite.
+An agent observes the state of the robot, its target and the centres of the obstacles, and after
+each step the cost. It has no model: neither of the robot nor of the cost, nor the size of an
+obstacle. `pip install nmpcrl[agents]` brings stable-baselines3.
 """
 
 import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from nmpcrl import Vector
-from nmpcrl.analysis.suite import Entry, Policy, Robot, entry
+from nmpcrl.analysis.suite import LAYOUTS, THETA, Entry, Policy, Robot, followed
+from nmpcrl.claims.investigation import Row
 from nmpcrl.study import paper
+from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.geometry import Centres
+from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.robot import RobotEnv
 from nmpcrl.study.storage.refusal import Refusal
 
-AGENTS = ("SAC", "TD3")
-REWARD = {"SAC": 0.1, "TD3": 0.01}  # the better of the two for each in one layout to tune on
-SETTING: Mapping[str, float] = {  # what can be set of an agent, and is if nothing is said
-    "reward": 0.01,  # factor of minus the cost; `REWARD` has that of each
-    "turn": 1.0,  # share of the turn rates that it may choose from
-    "gradient": 1.0,  # gradient steps a step of the robot
-    "width": 64,  # neurons in each of the two hidden layers
-}
+EVERY = "T01 to T60"  # the place of an agent that is trained in all of `TUNE`
+THERE, AWAY = "a", "-"  # a letter a layout: whether the robot arrives
 RANDOM = 5  # episodes of random actions, with which it begins
 BATCH = 128  # transitions of a gradient step
 RATE = 1e-3  # of Adam
@@ -39,80 +37,105 @@ class NoAgents(Refusal):
     """stable-baselines3 is not installed; the message says how to get it."""
 
 
-@dataclass(frozen=True)
-class Checkpoint:
+class Checkpoint(NamedTuple):
     """An agent after some interaction."""
 
     episodes: int  # begun
     steps: int  # of the robot
-    policy: Policy  # without noise; the agent's own, so that it changes as the training goes on
+    policy: Policy  # without noise; it changes as the training goes on
 
 
-@dataclass(frozen=True)
-class Agent:
-    """An agent as an entry: it is trained as long as the budget goes, and returns its policy."""
+def trained_in(place: str) -> Mapping[str, Centres]:
+    """The layouts of a place."""
+    return TUNE if place == EVERY else {place: LAYOUTS[place]}
 
-    name: str  # of `AGENTS`
-    values: Mapping[str, float]  # of its settings
 
-    def __call__(self, robot: Robot) -> Policy:
-        """Its policy without noise.
+def judged_in(place: str) -> Mapping[str, Centres]:
+    """The layouts in which its policy is judged; of an agent for all, unseen ones as well."""
+    return {**TUNE, **JUDGE} if place == EVERY else trained_in(place)
 
-        Raises:
-            NoAgents: stable-baselines3 is not installed.
-        """
-        made = self.trained(robot.env(), [robot.centres], [robot.budget], robot.seed)
-        return next(made).policy
 
-    def trained(
-        self, env: Any, layouts: Sequence[Centres], checkpoints: Sequence[int], seed: int
-    ) -> Iterator[Checkpoint]:
-        """Train it, and yield it after so many episodes each time.
+def curve(checkpoints: Sequence[int], agent: Entry, place: str, episodes: int, seed: int) -> Row:
+    """Train an agent, and judge it without noise after so many episodes each time.
 
-        Args:
-            env: `nmpcrl/Robot-v0`, all of whose steps and resets are made here.
-            layouts: one is drawn for each episode.
-            checkpoints: episodes, rising.
-            seed: of all that is drawn.
+    Returns:
+        initial, the cost of theta_init in each layout of `judged_in`; costs and arrived (a letter a
+        layout) at each checkpoint; episodes and steps of the robot.
 
-        Raises:
-            NoAgents: stable-baselines3 is not installed.
-            OverBudget: as `env.reset`.
-        """
-        from nmpcrl.learning.network import OneThread
+    Raises:
+        NoAgents: stable-baselines3 is not installed.
+    """
+    robots = [Robot(centres, 1 + len(checkpoints), seed) for centres in judged_in(place).values()]
+    initial = [robot.cost(THETA) for robot in robots]
+    costs, arrived, layouts = [], [], [*trained_in(place).values()]
+    at = Checkpoint(0, 0, np.zeros_like)
+    env = RobotEnv(layouts[0])
+    for at in trained(agent.name, env, layouts, checkpoints, seed, **agent.settings):
+        judged = [_judged(robot, at.policy) for robot in robots]
+        costs.append([cost for cost, _ in judged])
+        arrived.append("".join(THERE if there else AWAY for _, there in judged))
+    return {
+        "initial": initial, "costs": costs, "arrived": arrived, "episodes": at.episodes,
+        "steps": at.steps,
+    }  # fmt: skip
 
-        values = self.values
-        scaled, drawing = _scaled(env, layouts, values), _Drawing()
+
+def _judged(robot: Robot, policy: Policy) -> tuple[float, bool]:
+    """The cost of a rollout, and whether it ends at the target."""
+    rollout = followed(robot, policy)
+    return rollout.cost, bool(robot.task.distance(rollout.states[-1]) <= ARRIVED)
+
+
+def policy_of(robot: Robot, *, name: str, **settings: float) -> Policy:
+    """The policy of an agent that is trained as long as the budget lasts, for the suite."""
+    made = trained(name, robot.env(), [robot.centres], [robot.budget], robot.seed, **settings)
+    return next(made).policy
+
+
+_DEFAULTS: Mapping[str, float] = {
+    "reward": 0.1,  # factor of minus the cost
+    "turn": 1.0,  # share of the turn rates that it may choose from
+    "gradient": 1.0,  # gradient steps a step of the robot
+    "width": 64,  # neurons in each of the two hidden layers
+}
+SAC = Entry("SAC", partial(policy_of, name="SAC"), _DEFAULTS)
+TD3 = Entry("TD3", partial(policy_of, name="TD3"), {**_DEFAULTS, "reward": 0.01})
+
+
+def trained(
+    name: str, env: Any, layouts: Sequence[Centres], checkpoints: Sequence[int], seed: int,
+    **settings: float,
+) -> Iterator[Checkpoint]:  # fmt: skip
+    """Train an agent, and yield it after so many episodes each time.
+
+    Args:
+        name: "SAC" or "TD3".
+        env: `nmpcrl/Robot-v0`, all of whose steps and resets are made here.
+        layouts: one is drawn for each episode.
+        checkpoints: episodes, rising.
+        seed: of all that is drawn.
+        settings: those of `SAC` and `TD3`.
+
+    Raises:
+        NoAgents: stable-baselines3 is not installed.
+        OverBudget: as `env.reset`.
+    """
+    from nmpcrl.learning.network import OneThread
+
+    scaled, drawing = _scaled(env, layouts, settings), _Drawing()
+    with drawing.own():
+        model = _model(name, scaled, settings, checkpoints[-1], seed)
+
+    def policy(observation: Vector) -> Vector:
+        with OneThread():
+            action, _ = model.predict(seen(observation), deterministic=True)
+        return _applied(action, settings["turn"], env)
+
+    for episodes in checkpoints:
+        left = (episodes - scaled.episodes) * paper.STEPS
         with drawing.own():
-            model = _model(self.name, scaled, values, checkpoints[-1], seed)
-
-        def policy(observation: Vector) -> Vector:
-            with OneThread():
-                action, _ = model.predict(seen(observation), deterministic=True)
-            return _applied(action, values["turn"], env)
-
-        for episodes in checkpoints:
-            left = (episodes - scaled.episodes) * paper.STEPS
-            with drawing.own():
-                model.learn(left, reset_num_timesteps=not scaled.episodes)
-            yield Checkpoint(scaled.episodes, scaled.steps, policy)
-
-
-SAC, TD3 = (
-    Entry(
-        name,
-        lambda robot, name=name, **values: Agent(name, values)(robot),
-        {**SETTING, "reward": REWARD[name]},
-    )
-    for name in AGENTS
-)
-ENTRIES = {"SAC": SAC, "TD3": TD3}
-
-
-def agent(name: str) -> Agent:
-    """An agent by its name, such as "SAC[reward=0.1]"."""
-    one = entry(name, ENTRIES)
-    return Agent(one.name, one.settings)
+            model.learn(left, reset_num_timesteps=not scaled.episodes)
+        yield Checkpoint(scaled.episodes, scaled.steps, policy)
 
 
 def seen(observation: Vector) -> Vector:

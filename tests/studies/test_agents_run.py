@@ -6,8 +6,9 @@ import sys
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.agents import AGENTS, ENTRIES, NoAgents, agent, seen
-from nmpcrl.analysis.suite import Robot, followed, judge
+from nmpcrl.analysis.suite import Robot, entry, followed, judge
+from nmpcrl.studies.agents import AGENTS, agent_of
+from nmpcrl.studies.agents_run import SAC, TD3, NoAgents, curve, seen, trained
 from nmpcrl.study import ParameterError, paper
 from nmpcrl.study.drawn import TUNE
 from nmpcrl.study.robot import RobotEnv
@@ -22,11 +23,15 @@ START = np.r_[paper.START, np.ravel(LAYOUT)]
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """One episode of random actions, and few gradient steps after each."""
-    monkeypatch.setattr("nmpcrl.analysis.agents.RANDOM", 1)
+    monkeypatch.setattr("nmpcrl.studies.agents_run.RANDOM", 1)
 
 
 def quick(name):
-    return agent(f"{name}[gradient=0.1,width=8]")
+    return AGENTS[name].with_settings(gradient=0.1, width=8)
+
+
+def checkpoints_of(name, env, layouts, episodes, seed):
+    return trained(name, env, layouts, episodes, seed, **quick(name).settings)
 
 
 @needs_agents
@@ -34,7 +39,7 @@ def quick(name):
 def test_two_trainings_give_the_same_bits_however_often_they_are_looked_at(name):
     first, second = (Robot(LAYOUT, 3, seed=5) for _ in range(2))
     at_once = quick(name)(first)
-    looked = quick(name).trained(second.env(), [LAYOUT], [1, 2, 3], second.seed)
+    looked = checkpoints_of(name, second.env(), [LAYOUT], [1, 2, 3], second.seed)
     before = np.random.get_state()[1].copy()  # noqa: NPY002 which nobody else may notice
     actions = []
     for one in looked:
@@ -48,7 +53,7 @@ def test_two_trainings_give_the_same_bits_however_often_they_are_looked_at(name)
 @needs_agents
 def test_episodes_and_steps_are_counted_and_none_is_begun_in_vain():
     robot = Robot(LAYOUT, 3, seed=0)
-    checkpoints = [*quick("TD3").trained(robot.env(), [LAYOUT], [1, 3], 0)]
+    checkpoints = [*checkpoints_of("TD3", robot.env(), [LAYOUT], [1, 3], 0)]
     assert [(one.episodes, one.steps) for one in checkpoints] == [(1, 130), (3, 390)]
     assert robot.begun == 3
     assert robot.left == 0
@@ -56,13 +61,22 @@ def test_episodes_and_steps_are_counted_and_none_is_begun_in_vain():
 
 @needs_agents
 def test_an_agent_is_an_entry_whose_policy_is_judged_by_the_cost_of_all_others():
-    judged = judge(quick("TD3"), LAYOUT, 7, 2)
+    judged = judge(quick("TD3"), "A", 7, 2)
     assert judged.episodes == 2
     assert not judged.over
     rollout = followed(Robot(LAYOUT, 1, 7), quick("TD3")(Robot(LAYOUT, 2, 7)))
     task = Robot(LAYOUT, 1, 0).task
     charged = sum(map(task.stage_cost, rollout.states, rollout.actions))
     assert judged.cost == pytest.approx(charged, rel=1e-12)
+
+
+@needs_agents
+def test_the_last_checkpoint_is_the_judgement_of_the_suite():
+    found, judged = curve((1, 2), quick("TD3"), "A", 2, 3), judge(quick("TD3"), "A", 3, 2)
+    assert found["costs"][-1] == [judged.cost]
+    assert found["costs"][0] != found["costs"][-1]
+    assert found["initial"] == [judged.initial]
+    assert (found["episodes"], found["steps"], found["arrived"]) == (2, 260, ["-", "-"])
 
 
 @needs_agents
@@ -75,7 +89,7 @@ def test_an_agent_meets_all_the_layouts_it_is_given():
             return super().reset(**options)
 
     layouts = [TUNE["T01"], TUNE["T02"]]
-    [*_] = quick("TD3").trained(Noting(), layouts, [8], 0)
+    [*_] = checkpoints_of("TD3", Noting(), layouts, [8], 0)
     assert met == {*layouts}
 
 
@@ -89,20 +103,20 @@ def test_what_is_seen_is_turned_with_the_robot_and_says_where_target_and_centres
 
 @needs_agents
 def test_a_share_of_the_turn_rates_bounds_what_is_applied():
-    policy = agent("TD3[turn=0.25,gradient=0.1]")(Robot(LAYOUT, 2, seed=0))
+    policy = TD3.with_settings(turn=0.25, gradient=0.1)(Robot(LAYOUT, 2, seed=0))
     actions = np.array([policy(START + 100 * np.eye(11)[i]) for i in range(11)])
     assert (abs(actions) <= [0.6, np.pi / 8]).all()
 
 
-def test_a_setting_is_refused_that_there_is_not():
-    assert agent("SAC[width=32]").values == {**ENTRIES["SAC"].defaults, "width": 32}
-    with pytest.raises(ParameterError, match=r"width = 32\.5 must be a whole number above 0"):
-        agent("SAC[width=32.5]")
-    with pytest.raises(ParameterError, match="must be one of reward, turn, gradient, width"):
-        agent("SAC[alpha=1]")
+def test_a_name_is_an_agent_with_its_settings_and_unknown_ones_are_refused():
+    assert agent_of("SAC[width=32]").settings["width"] == 32
+    assert str(entry("nmpcrl.studies.agents_run:SAC")).endswith("SAC")
+    for name in ("SAC[width=32.5]", "SAC[alpha=1]"):
+        with pytest.raises(ParameterError):
+            agent_of(name)
 
 
 def test_without_the_extra_one_sentence_says_what_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
     with pytest.raises(NoAgents, match=r"SAC needs stable-baselines3: .* nmpcrl\[agents\]"):
-        agent("SAC")(Robot(LAYOUT, 1, seed=0))
+        SAC(Robot(LAYOUT, 1, seed=0))

@@ -1,24 +1,34 @@
-"""What is said of SAC and TD3, on tables that leave no doubt; and what is published of them."""
+"""The answers on SAC and TD3, on tables that leave no doubt."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.claims import agent_published as published
-from nmpcrl.claims.agent_published import COLUMNS, order
-from nmpcrl.claims.agent_questions import AGENT_QUESTIONS, AGENTS, EVERY, PARTS
-from nmpcrl.claims.agent_runs import judged_in
-from nmpcrl.claims.agents import answers, course, rows
-from nmpcrl.claims.published import Damaged, Unpublishable
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.studies.agents import (
+    AGENTS,
+    CHECKPOINTS,
+    PARTS,
+    SAC_AND_TD3,
+    SETTINGS,
+    NotTuned,
+    answers,
+    course,
+    rows,
+    tuned,
+)
+from nmpcrl.studies.agents_run import EVERY, judged_in, trained_in
 from nmpcrl.study.drawn import JUDGE, TUNE
+
+COLUMNS = [*SAC_AND_TD3.table().columns]
+NOTHING = pd.DataFrame(columns=["part", "entry", "layout", "initial", "best", "cost"])
 
 
 def runs(part, agent, share, there="a", seen=None):
     """All runs of an agent: the shares go down to the last, in layouts seen to another one."""
     found = []
-    for place, k in order(part):
-        known, points = judged_in(place), PARTS[part].checkpoints
+    for place, k in PARTS[part].order(agent):
+        known, points = judged_in(place), CHECKPOINTS[part]
         last = [seen if seen and name in TUNE else share for name in known]
         costs = [[200.0 * one for one in last]] * (len(points) - 2)
         found.append(
@@ -28,7 +38,7 @@ def runs(part, agent, share, there="a", seen=None):
              "arrived": [there * len(known)] * len(points), "episodes": points[-1],
              "steps": 130 * points[-1], "seconds": 1.5}
         )  # fmt: skip
-    return pd.DataFrame(found, columns=[*COLUMNS])
+    return pd.DataFrame(found, columns=COLUMNS)
 
 
 def suite(share=0.95, layouts=(*JUDGE,), part="judge 50"):
@@ -39,19 +49,13 @@ def suite(share=0.95, layouts=(*JUDGE,), part="judge 50"):
     )  # fmt: skip
 
 
-@pytest.fixture(autouse=True)
-def place(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path))
-    return tmp_path
-
-
-def by(table, compared=None):
-    return {one.question: one for one in answers(table, compared)}
+def by(table, compared=NOTHING):
+    return answers(table, compared)
 
 
 def test_of_nothing_nothing_can_be_decided():
-    found = by(pd.DataFrame(columns=[*COLUMNS]))
-    assert [*found] == [*AGENT_QUESTIONS]
+    found = by(pd.DataFrame(columns=COLUMNS))
+    assert [*found] == [*SAC_AND_TD3.asked]
     assert {one.outcome for one in found.values()} == {UNDECIDABLE}
 
 
@@ -115,31 +119,24 @@ def test_an_agent_has_a_row_of_the_suite_by_the_share_of_the_possible_gain():
     assert not first.disqualified
 
 
-def test_what_is_read_is_what_was_published_and_agents_come_beside_it():
-    one, two = runs("judge", "SAC", 0.98765), runs("all", "TD3", 1.1)
-    published.extend(one)
-    published.extend(pd.concat([one, two]))
-    both = pd.concat([one, two], ignore_index=True)
-    pd.testing.assert_frame_equal(published.load().table, both, check_dtype=False)
-    assert len(published.load().about["made"]) == 2
+def test_an_agent_is_judged_with_the_setting_that_costs_least_and_not_before_it_is_known():
+    tuning = [
+        {"part": "tune", "arm": str(AGENTS["SAC"].with_settings(**setting)), "place": place,
+         "initial": [100.0], "costs": [[100.0 + abs(i - 2)]]}
+        for i, setting in enumerate(SETTINGS["SAC"]) for place in PARTS["tune"].places
+    ]  # fmt: skip
+    assert str(tuned(pd.DataFrame(tuning), "SAC")) == "SAC[gradient=0.5,width=128]"
+    with pytest.raises(NotTuned, match="the part 'tune' comes first"):
+        tuned(pd.DataFrame(tuning[1:]), "SAC")
 
 
-def test_what_is_not_whole_is_not_published_and_what_was_changed_is_not_read():
-    with pytest.raises(Unpublishable, match="has 5 of 6 runs of the part 'judge'"):
-        published.extend(runs("judge", "SAC", 0.9)[1:])
-    with pytest.raises(Damaged, match="nmpcrl agents --publish"):
-        published.load()
-    path = published.extend(runs("judge", "SAC", 0.98765))
-    path.write_text(path.read_text().replace("98.765", "98.764", 1))
-    with pytest.raises(Damaged, match="it is not what was written"):
-        published.load()
+def test_the_published_settings_are_those_of_the_published_tuning():
+    table = SAC_AND_TD3.table()
+    for part in PARTS:
+        assert {*PARTS[part].settings(table)} == {*table[table.part == part].arm}
 
 
-def test_all_of_it_takes_less_than_a_fifth_of_a_megabyte():
-    rng = np.random.default_rng(0)
-    whole = pd.concat([runs(part, agent, 1.0) for part in PARTS if part != "tune"
-                       for agent in AGENTS])  # fmt: skip
-    whole["initial"] = [rng.uniform(3e3, 5e3, len(one)).tolist() for one in whole.initial]
-    whole["costs"] = [rng.uniform(3e3, 5e3, np.shape(one)).tolist() for one in whole.costs]
-    assert EVERY in {*whole.place}
-    assert published.extend(whole).stat().st_size < 2e5
+def test_one_agent_for_all_is_judged_in_layouts_that_it_never_saw():
+    assert {*trained_in(EVERY)} == {*TUNE}
+    assert {*judged_in(EVERY)} == {*TUNE, *JUDGE}
+    assert {*judged_in("J001")} == {*trained_in("J001")} == {"J001"}
