@@ -21,9 +21,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.analysis.direct_search import NEARBY, PERTURBED, SEARCHES, STEP
 from nmpcrl.analysis.encounters import count
-from nmpcrl.analysis.policy_search import LOWER, SCALE, SPREAD, UPPER
+from nmpcrl.analysis.search import (
+    LOWER,
+    NEARBY,
+    PERTURBED,
+    SCALE,
+    SEARCHES,
+    SPREAD,
+    STEP,
+    UPPER,
+)
 from nmpcrl.analysis.statistics import interquartile_mean, rate
 from nmpcrl.control import SolverError, Task
 from nmpcrl.learning import Diverged, Exploration, Learner, Step, Weights, policy_gradient, train

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from nmpcrl.analysis.gradient_td import dropped_curvature
-from nmpcrl.analysis.policy_search import Search, search_all
+from nmpcrl.analysis.search import Search, search_all
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.processes import time_learners_repeatedly
 from nmpcrl.claims import published

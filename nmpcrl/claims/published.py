@@ -4,7 +4,7 @@
 - `curves.npz`: what figures need of each, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, and the states of the last one;
 - `thetas.npz`: theta after every episode, of the runs that a reader can follow (see `thetas`);
-- `searches.json`: the best theta that `analysis.policy_search` finds in each layout;
+- `searches.json`: the best theta that `analysis.search` finds in each layout;
 - `timings.csv`: of `time_learners`, on which the verdicts on time rest;
 - `about.json`: code, libraries and machine, and when the thresholds were fixed.
 """
@@ -23,9 +23,9 @@ import numpy as np
 import pandas as pd
 
 import nmpcrl
-from nmpcrl.analysis import policy_search
-from nmpcrl.analysis.policy_search import Found, Search
+from nmpcrl.analysis import search
 from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, cost_ratios, experiment_of, row
+from nmpcrl.analysis.search import Found, Search
 from nmpcrl.analysis.summary import Outline, RunSummary
 from nmpcrl.bench.learners import ratio
 from nmpcrl.bench.paired import Ratio
@@ -194,7 +194,7 @@ def publish(
     curves: dict[str, Any] = _curves(list(summaries.values()))
     np.savez_compressed(folder / "curves.npz", **curves)
     thetas.save(folder, summaries, variants)
-    write_json(folder / "searches.json", policy_search.as_lists(searches))
+    write_json(folder / "searches.json", search.as_lists(searches))
     (pd.DataFrame() if timings is None else timings).to_csv(folder / "timings.csv", index=False)
     made = _timed(timings) | ({"searches": made_here()} if searches else {})
     made |= {"audit": asdict(audit)} if audit else {}
@@ -358,7 +358,7 @@ def _read(folder: Path) -> Published:
         rows,
         _timings(folder / "timings.csv"),
         about,
-        policy_search.from_lists(json.loads((folder / "searches.json").read_text("utf-8"))),
+        search.from_lists(json.loads((folder / "searches.json").read_text("utf-8"))),
     )
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.analysis.direct_search import cma_es, grid
 from nmpcrl.analysis.encounters import judged
+from nmpcrl.analysis.search import cma_es, grid
 from nmpcrl.analysis.suite import Robot, entry, judge
 from nmpcrl.claims.investigation import Condition, Row
 from nmpcrl.learning import (

@@ -82,10 +82,7 @@ FILES = (  # whose code bears on the numbers of runs, summaries and searches
     *("control/**/*.py", "learning/**/*.py"),
     *(f"study/{name}.py" for name in ("experiment", "geometry", "learners", "paper", "parameters")),
     *(f"study/{name}.py" for name in ("records", "run", "setup", "trial")),
-    *(
-        f"analysis/{name}.py"
-        for name in ("imitation", "metrics", "policy_search", "rows", "summary")
-    ),
+    *(f"analysis/{name}.py" for name in ("imitation", "metrics", "rows", "search", "summary")),
 )
 OTHER_HOSTS = (  # not among them: compiled for browsers and hosts where no stored run is made
     *("control/browser.py", "control/codegen/browser/", "learning/browser.py"),

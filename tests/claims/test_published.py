@@ -11,8 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from nmpcrl.analysis.policy_search import Found, Search
 from nmpcrl.analysis.rows import row, table
+from nmpcrl.analysis.search import Found, Search
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.claims import published, thetas
 from nmpcrl.claims.published import FILES, Damaged, Published, load, publish

@@ -10,7 +10,7 @@ import pytest
 from raising import raising
 
 from nmpcrl.analysis import summaries
-from nmpcrl.analysis.policy_search import LEAST, Search
+from nmpcrl.analysis.search import LEAST, Search
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict

@@ -86,7 +86,7 @@ IMPORTS = """
 import sys
 from pathlib import Path
 import nmpcrl
-from nmpcrl.analysis.policy_search import Search, search
+from nmpcrl.analysis.search import Search, search
 from nmpcrl.analysis.rows import row
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.study.experiment import Experiment

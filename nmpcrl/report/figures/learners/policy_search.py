@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from nmpcrl import Matrix
-from nmpcrl.analysis.policy_search import Found
+from nmpcrl.analysis.search import Found
 from nmpcrl.analysis.trajectory import describe
 from nmpcrl.report.figures.axes import below, draw_task, map_grid
 from nmpcrl.report.figures.style import LOOKS, TEAL, WINE, headed, page, subplots

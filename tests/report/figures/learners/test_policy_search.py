@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from nmpcrl.analysis.policy_search import Found
+from nmpcrl.analysis.search import Found
 from nmpcrl.report.figures.learners import policy_search
 from nmpcrl.study import paper
 

@@ -1,0 +1,282 @@
+"""Searches for theta that use nothing but the costs of rollouts without noise.
+
+Each direct search calls `cost` at most as often as its budget says, the first time with the start,
+and returns the theta whose rollout cost least; the same seed finds the same theta. `search` is one
+long CMA-ES in a layout, which no learner's budget allows. Its result bounds the best theta from
+one side: a longer search may find a better one.
+"""
+
+from bisect import bisect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from nmpcrl import Vector
+from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.study import paper
+from nmpcrl.study.jobs import parallel
+from nmpcrl.study.parameters import LARGEST_SEED, Allowed, one_of, whole
+
+SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
+LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
+FAILED = 1e6  # stands for the cost of a rollout on which a solve failed
+POINTS = 11  # of the grid
+WIDEST = 0.35  # theta_c at which the grid ends: d_o, where the penalty vanishes  # departure N
+STEP = 0.1  # SPSA: of each component in the first iteration, and the most later, in `SCALE`s
+PERTURBED = 0.05  # SPSA: distance of the two rollouts of an iteration from theta
+DECAY, FADING = 0.602, 0.101  # SPSA: exponents of the step and of the perturbation
+SPREAD = 0.3  # CMA-ES: of the first rollouts, in `SCALE`s
+NEARBY = 1.0  # Bayes: largest distance from the start, in `SCALE`s
+BUDGET = 2000  # rollouts of a published long search,
+CHECK = 200  # of which a build repeats these,
+LEAST = 40  # and the fewest: the first one and some generations
+ALLOWED: Mapping[str, Allowed] = {  # by field of `Search`
+    "layout": one_of(paper.LAYOUTS),
+    "seed": whole(0, LARGEST_SEED - 1),  # CMA-ES is given one more
+    "budget": whole(LEAST, 100_000),
+}
+Cost = Callable[[Vector], float]  # theta -> cost of a rollout; infinite where a solve failed
+Direct = Callable[..., Vector]  # (cost, start, budget, seed, **settings) -> theta
+
+
+class Tried:
+    """The rollouts of a search, in units of `SCALE`, of which there are at most `budget`."""
+
+    def __init__(self, cost: Cost, start: Vector, budget: int) -> None:
+        """Make the first rollout.
+
+        Raises:
+            ValueError: the budget has no room for it.
+        """
+        if budget < 1:
+            raise ValueError(f"budget = {budget} must be at least 1 rollout")
+        self._cost, self._budget = cost, budget
+        self.points: list[Vector] = []
+        self.costs: list[float] = []
+        self.lower, self.upper = LOWER / SCALE, UPPER / SCALE
+        self(np.asarray(start, float) / SCALE)
+
+    def __call__(self, point: Vector) -> float:
+        """The cost of a rollout; `FAILED` where a solve failed."""
+        assert self.left, "the search goes beyond its budget"
+        self.points.append(point)
+        self.costs.append(self._cost(point * SCALE))
+        return min(self.costs[-1], FAILED)
+
+    @property
+    def left(self) -> int:
+        """Rollouts that may still be made."""
+        return self._budget - len(self.costs)
+
+    @property
+    def best(self) -> Vector:
+        """The first point whose cost is least."""
+        return self.points[int(np.argmin(self.costs))]
+
+    @property
+    def theta(self) -> Vector:
+        """The best point as theta."""
+        found: Vector = self.best * SCALE
+        return found
+
+    def descend(self, spread: float, seed: int, *, least: int = 1) -> None:
+        """CMA-ES from the best point until it has converged; Hansen (2016).
+
+        Args:
+            spread: of the first rollouts, in `SCALE`s.
+            seed: of the candidates.
+            least: rollouts of a generation for which there must be room, 0 for all of them.
+        """
+        import cma  # takes a second
+
+        options = {"bounds": [self.lower, self.upper], "seed": seed, "verbose": -9}
+        strategy = cma.CMAEvolutionStrategy(self.best, spread, options)
+        while self.left >= (least or strategy.popsize) and not strategy.stop():
+            asked = strategy.ask()
+            costs = [self(one) for one in asked[: self.left]]
+            if len(costs) == len(asked):
+                strategy.tell(asked, costs)
+
+
+def grid(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
+    """Theta with the best theta_c of `POINTS`, the start's and equidistant ones up to `WIDEST`."""
+    tried = Tried(cost, start, budget)
+    for theta_c in np.linspace(start[-1], WIDEST, POINTS)[1:][: tried.left]:
+        tried(np.r_[start[:-1], theta_c] / SCALE)
+    return tried.theta
+
+
+def spsa(
+    cost: Cost,
+    start: Vector,
+    budget: int,
+    seed: int = 0,
+    *,
+    step: float = STEP,
+    perturbed: float = PERTURBED,
+) -> Vector:
+    """Simultaneous perturbation: two rollouts an iteration, on either side of theta.
+
+    g = (y+ - y-) / (2 c_k) sign, theta <- theta - a_k g, with a_k = a / (k + 1 + A)^0.602 and
+    c_k = perturbed / (k + 1)^0.101; `a` is such that the first step is `step` long in each
+    component. A rollout that is left over judges the last theta.  Source: Spall (1998).
+    """
+    tried, rng = Tried(cost, start, budget), np.random.default_rng(seed)
+    point, delay, a, k = np.asarray(start, float) / SCALE, budget / 20, 0.0, 0
+    while tried.left >= 2:
+        signs = rng.choice([-1.0, 1.0], point.size)
+        c = perturbed / (k + 1) ** FADING
+        up, down = (
+            tried(np.clip(point + side * c * signs, tried.lower, tried.upper)) for side in (1, -1)
+        )
+        slope = (up - down) / (2 * c)
+        a = a or (step * (1 + delay) ** DECAY / abs(slope) if slope else 0.0)
+        length = np.clip(a / (k + 1 + delay) ** DECAY * slope, -step, step)
+        point, k = np.clip(point - length * signs, tried.lower, tried.upper), k + 1
+    if tried.left:
+        tried(point)
+    return tried.theta
+
+
+def cma_es(
+    cost: Cost, start: Vector, budget: int, seed: int = 0, *, spread: float = SPREAD
+) -> Vector:
+    """CMA-ES, begun anew from the best point where it has converged.
+
+    A generation that the budget cuts off is made as far as the budget goes.
+    """
+    tried, again = Tried(cost, start, budget), 0
+    while tried.left:
+        tried.descend(spread, 1 + (seed + 7919 * again) % (2**31 - 2))  # 0 would mean the clock
+        again += 1
+    return tried.theta
+
+
+def bayesian(
+    cost: Cost, start: Vector, budget: int, seed: int = 0, *, nearby: float = NEARBY
+) -> Vector:
+    """Bayesian optimisation by tree-structured Parzen estimators; Bergstra et al. (2011).
+
+    Its first rollouts are drawn from the box within `nearby` of the start: hardly any theta of the
+    full box brings the robot to its target.
+
+    Raises:
+        ImportError: Optuna is not installed; the extra `nmpcrl[search]` has it.
+    """
+    import optuna
+
+    tried = Tried(cost, start, budget)
+    names = [f"{k}: {name}" for k, name in enumerate(paper.THETA_NAMES)]
+    lower = np.maximum(tried.lower, tried.best - nearby)
+    upper = np.minimum(tried.upper, tried.best + nearby)
+    box: dict[str, Any] = {
+        name: optuna.distributions.FloatDistribution(*ends)
+        for name, *ends in zip(names, lower, upper, strict=True)
+    }
+    shown = optuna.logging.get_verbosity()
+    optuna.logging.set_verbosity(optuna.logging.ERROR)  # a line a rollout, else
+    try:
+        study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
+        first = dict(zip(names, tried.best.tolist(), strict=True))
+        value = min(tried.costs[0], FAILED)
+        study.add_trial(optuna.trial.create_trial(params=first, distributions=box, value=value))
+        while tried.left:
+            trial = study.ask(box)
+            study.tell(trial, tried(np.array([trial.params[name] for name in names])))
+    finally:
+        optuna.logging.set_verbosity(shown)
+    return tried.theta
+
+
+SEARCHES: dict[str, Direct] = {"grid": grid, "SPSA": spsa, "CMA-ES": cma_es, "Bayes": bayesian}
+
+
+@dataclass(frozen=True)
+class Search:
+    """One long search; the same one finds the same theta.
+
+    Raises:
+        ParameterError: a field is not what it may be.
+    """
+
+    layout: str = "A"
+    seed: int = 0  # of the candidates that are drawn
+    budget: int = BUDGET  # rollouts without noise
+
+    def __post_init__(self) -> None:
+        for name, allowed in ALLOWED.items():
+            object.__setattr__(self, name, allowed.check(name, getattr(self, name)))
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a search ended, and each improvement on the way; the first rollout is theta_init's."""
+
+    theta: tuple[float, ...]
+    made: int  # rollouts in all
+    rollouts: tuple[int, ...]  # at this one, from 1 on, ...
+    best: tuple[float, ...]  # ... the lowest cost so far fell to this
+
+    @property
+    def initial(self) -> float:
+        """Noise-free cost of theta_init."""
+        return self.best[0]
+
+    @property
+    def cost(self) -> float:
+        """Noise-free cost of theta."""
+        return self.best[-1]
+
+    @property
+    def gain(self) -> float:
+        """Share of theta_init's cost that theta saves."""
+        return 1 - self.cost / self.initial
+
+    def after(self, rollouts: int) -> float:
+        """The lowest cost of so many rollouts, which a search with a smaller budget ends with."""
+        return self.best[bisect(self.rollouts, rollouts) - 1]
+
+
+def search(wanted: Search) -> Found:
+    """The theta of least noise-free cost in a layout that one CMA-ES finds from theta_init."""
+    controller = Persistent(paper.nmpc(wanted.layout))
+    start = np.array(paper.THETA_INIT)
+    tried = Tried(lambda theta: evaluate(controller, theta, paper.STEPS).cost, start, wanted.budget)
+    tried.descend(SPREAD, wanted.seed + 1, least=0)
+    lowest = np.minimum.accumulate(tried.costs)
+    fell = np.flatnonzero(np.r_[True, lowest[1:] < lowest[:-1]])
+    return Found(
+        theta=tuple((tried.points[fell[-1]] * SCALE).tolist()),
+        made=len(tried.costs),
+        rollouts=tuple((fell + 1).tolist()),
+        best=tuple(lowest[fell].tolist()),
+    )
+
+
+def to_make(wanted: Iterable[Search], known: Mapping[Search, Found]) -> tuple[Search, ...]:
+    """The searches that are not known, and the first `CHECK` rollouts of the known ones."""
+    return tuple(replace(one, budget=CHECK) if one in known else one for one in wanted)
+
+
+def search_all(searches: Iterable[Search], workers: int | None = None) -> dict[Search, Found]:
+    """`search` for many, in parallel."""
+    wanted = tuple(dict.fromkeys(searches))
+    found = dict(parallel(search, wanted, workers))
+    return {one: found[one] for one in wanted}
+
+
+def as_lists(found: Mapping[Search, Found]) -> list[list[dict[str, Any]]]:
+    """Searches and results as JSON has them."""
+    return [[asdict(one), asdict(result)] for one, result in found.items()]
+
+
+def from_lists(stored: Iterable[tuple[dict[str, Any], dict[str, Any]]]) -> dict[Search, Found]:
+    """The inverse of `as_lists`."""
+    return {
+        Search(**one): Found(
+            tuple(found["theta"]), found["made"], tuple(found["rollouts"]), tuple(found["best"])
+        )
+        for one, found in stored
+    }

@@ -1,0 +1,174 @@
+"""Searches: they find a known best, every rollout counts, and a long one begins as a short one."""
+
+import importlib.util
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from nmpcrl.analysis import search as searching
+from nmpcrl.analysis.search import (
+    CHECK,
+    LEAST,
+    LOWER,
+    SCALE,
+    SEARCHES,
+    UPPER,
+    WIDEST,
+    Found,
+    Search,
+    Tried,
+    grid,
+    search,
+    search_all,
+    to_make,
+)
+from nmpcrl.claims import published
+from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.study import ParameterError, design, paper
+
+START = np.array(paper.THETA_INIT)
+BEST = START + 0.4 * SCALE
+NEEDS_OPTUNA = pytest.mark.skipif(
+    not importlib.util.find_spec("optuna"), reason="needs the extra nmpcrl[search]"
+)
+ALL = [
+    pytest.param(one, id=name, marks=NEEDS_OPTUNA if name == "Bayes" else ())
+    for name, one in SEARCHES.items()
+]
+EVERY = [one for one in ALL if one.id != "grid"]
+
+
+class Bowl:
+    """A cost that is 7 at `BEST` and infinite far from it; records what is asked."""
+
+    def __init__(self):
+        self.asked = []
+
+    def __call__(self, theta):
+        self.asked.append(np.array(theta))
+        away = np.linalg.norm((theta - BEST) / SCALE)
+        return 7 + away**2 if away < 3 else np.inf
+
+
+@pytest.mark.parametrize("budget", [1, 2, 17])
+@pytest.mark.parametrize("direct", EVERY)
+def test_a_search_stops_exactly_at_its_budget_and_begins_at_the_start(direct, budget):
+    bowl = Bowl()
+    found = direct(bowl, START, budget, 0)
+    assert len(bowl.asked) == budget
+    np.testing.assert_allclose(bowl.asked[0], START)
+    costs = [Bowl()(theta) for theta in bowl.asked]
+    np.testing.assert_array_equal(found, bowl.asked[int(np.argmin(costs))])
+
+
+@pytest.mark.parametrize("direct", EVERY)
+def test_the_same_seed_asks_for_the_same_thetas_within_the_box_and_another_for_others(direct):
+    bowls = [Bowl() for _ in range(3)]
+    for bowl, seed in zip(bowls, (4, 4, 5), strict=True):
+        direct(bowl, START, 60, seed)
+    first, again, other = (np.array(bowl.asked) for bowl in bowls)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+    for asked in (first, other):
+        assert ((asked >= LOWER - 1e-9) & (asked <= UPPER + 1e-9)).all()
+
+
+@pytest.mark.parametrize(("name", "part"), [("SPSA", 0.2), ("CMA-ES", 0.05), ("Bayes", 0.6)])
+def test_300_rollouts_leave_this_part_of_what_is_to_be_gained(name, part):
+    if name == "Bayes":
+        pytest.importorskip("optuna")
+    found = SEARCHES[name](Bowl(), START, 300, 0)
+    assert Bowl()(found) - 7 <= part * (Bowl()(START) - 7)
+
+
+def test_a_search_that_has_converged_spends_the_rest_from_its_best():
+    bowl = Bowl()
+    SEARCHES["CMA-ES"](bowl, START, 3000, 0)
+    assert len(bowl.asked) == 3000
+
+
+@pytest.mark.parametrize(("budget", "made"), [(1, 1), (5, 5), (11, 11), (300, 11)])
+def test_the_grid_has_eleven_points_over_theta_c_alone(budget, made):
+    bowl = Bowl()
+    grid(bowl, START, budget)
+    asked = np.array(bowl.asked)
+    assert len(asked) == made
+    assert (asked[:, :-1] == START[:-1]).all()
+    np.testing.assert_allclose(asked[:, -1], np.linspace(START[-1], WIDEST, 11)[:made])
+    best = grid(lambda theta: abs(theta[-1] - 0.2), START, 11)
+    assert best[-1] == pytest.approx(0.2, abs=0.02)
+
+
+@pytest.mark.parametrize("direct", EVERY)
+def test_where_every_rollout_fails_the_start_is_returned(direct):
+    np.testing.assert_allclose(direct(lambda theta: np.inf, START, 12, 0), START)
+
+
+def test_a_budget_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="budget = 0 must be at least 1 rollout"):
+        Tried(Bowl(), START, 0)
+
+
+# The long search.
+
+
+@pytest.fixture
+def bowl(monkeypatch):
+    """A `Bowl` in the place of rollouts."""
+    made = Bowl()
+    monkeypatch.setattr(
+        searching, "evaluate", lambda _, theta, steps: SimpleNamespace(cost=made(theta))
+    )
+    return made
+
+
+@pytest.mark.parametrize(
+    ("name", "nonsense"), [("layout", "Z"), ("seed", -1), ("seed", 0.5), ("budget", LEAST - 1)]
+)
+def test_a_search_refuses_nonsense_by_name(name, nonsense):
+    with pytest.raises(ParameterError, match=rf"{name} = {nonsense!r} must be"):
+        replace(Search(), **{name: nonsense})
+
+
+def test_the_least_cost_is_found_from_theta_init_on_with_every_improvement(bowl):
+    found = search(Search(budget=1500))
+    assert len(bowl.asked) == found.made <= 1500
+    assert found.cost == pytest.approx(7, abs=1e-3)
+    np.testing.assert_allclose((np.array(found.theta) - BEST) / SCALE, 0, atol=0.05)
+    assert (found.rollouts[0], found.initial) == (1, Bowl()(START))
+    assert (np.diff(found.rollouts) > 0).all()
+    assert (np.diff(found.best) < 0).all()
+    assert found.gain == pytest.approx(1 - found.best[-1] / found.best[0])
+
+
+def test_a_search_begins_as_one_with_a_smaller_budget_and_seeds_differ(bowl):
+    """So that a build can check a published search by its beginning."""
+    long = search(Search(budget=300))
+    for budget in (LEAST, 100, 200):
+        short = search(Search(budget=budget))
+        assert short.cost == long.after(short.made) > long.cost
+    assert long.after(1) == long.initial
+    assert search(Search(budget=100, seed=1)).theta != search(Search(budget=100)).theta
+    known, other = Search(budget=300), Search("B", budget=300)
+    assert to_make([known, other], {known: long}) == (replace(known, budget=CHECK), other)
+
+
+def test_where_all_rollouts_fail_theta_init_is_found(monkeypatch):
+    monkeypatch.setattr(searching, "evaluate", lambda *_: SimpleNamespace(cost=np.inf))
+    found = search(Search(budget=LEAST))
+    assert found == Found(paper.THETA_INIT, found.made, (1,), (np.inf,))
+
+
+@pytest.mark.slow
+def test_the_published_searches_are_those_of_this_code_and_cost_what_a_rollout_costs():
+    known = published.load().searches
+    assert set(known) == set(map(Search, design.LAYOUTS))
+    wanted = Search("D", budget=CHECK)
+    found = search_all([wanted])[wanted]
+    assert found.cost == pytest.approx(known[Search("D")].after(found.made), rel=1e-6)
+    controller = Persistent(paper.nmpc("D"))
+    rollouts = (evaluate(controller, np.array(one), paper.STEPS) for one in (START, found.theta))
+    costs = [rollout.cost for rollout in rollouts]
+    assert (found.initial, found.cost) == pytest.approx(costs, rel=1e-9)
