@@ -1,7 +1,10 @@
 """`nmpcrl investigate` with the book's investigations and with a reader's own file."""
 
+import json
+import re
 import subprocess
 import textwrap
+from pathlib import Path
 
 import pytest
 
@@ -42,6 +45,25 @@ def test_a_reader_s_own_investigation_is_one_file_and_one_verb(own, command):
     assert "first: confirmed (12 of 12 layouts)" in said.stdout
     assert (own.parent / "published" / "mine.csv").exists()
     assert of_file(own).registered == ""
+
+
+def test_the_file_of_the_page_on_your_paper_is_run_interrupted_published_and_judged(
+    tmp_path, monkeypatch, command
+):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    page = Path(__file__).parents[2] / "book" / "your_paper.ipynb"
+    texts = ("".join(cell["source"]) for cell in json.loads(page.read_text())["cells"])
+    (block,) = (re.findall(r"```python\n(.*?)```", text, re.S) for text in texts if "CHAIN" in text)
+    path = tmp_path / "chain.py"
+    path.write_text(block[0])
+    made = command("investigate", str(path), "--workers", "1")
+    assert "P1: confirmed (12 of 12 runs)" in made.stdout
+    log = tmp_path / "runs" / "chain.jsonl"
+    log.write_text(log.read_text()[:-40])
+    assert "all: 59 of 60 rows are stored" in command("investigate", str(path), "--dry-run").stdout
+    assert command("investigate", str(path), "--publish", "--workers", "1").exit_code == 0
+    log.unlink()
+    assert command("investigate", str(path), "--judge").stdout == made.stdout
 
 
 def test_a_committed_file_is_registered_by_its_commit(own):
