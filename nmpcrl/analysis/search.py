@@ -267,16 +267,21 @@ def search_all(searches: Iterable[Search], workers: int | None = None) -> dict[S
     return {one: found[one] for one in wanted}
 
 
-def as_lists(found: Mapping[Search, Found]) -> list[list[dict[str, Any]]]:
-    """Searches and results as JSON has them."""
-    return [[asdict(one), asdict(result)] for one, result in found.items()]
+def as_rows(found: Mapping[Search, Found]) -> list[dict[str, Any]]:
+    """Searches and results, a row each, with lists for tuples."""
+    return [
+        asdict(one)
+        | {"theta": [*result.theta], "made": result.made}
+        | {"rollouts": [*result.rollouts], "best": [*result.best]}
+        for one, result in found.items()
+    ]
 
 
-def from_lists(stored: Iterable[tuple[dict[str, Any], dict[str, Any]]]) -> dict[Search, Found]:
-    """The inverse of `as_lists`."""
+def from_rows(rows: Iterable[dict[str, Any]]) -> dict[Search, Found]:
+    """The inverse of `as_rows`."""
     return {
-        Search(**one): Found(
-            tuple(found["theta"]), found["made"], tuple(found["rollouts"]), tuple(found["best"])
+        Search(one["layout"], one["seed"], one["budget"]): Found(
+            tuple(one["theta"]), one["made"], tuple(one["rollouts"]), tuple(one["best"])
         )
-        for one, found in stored
+        for one in rows
     }

@@ -1,14 +1,13 @@
-"""Where a chapter's evidence comes from: published runs, or runs trained here.
+"""The runs that a chapter rests on: published ones, or runs trained here.
 
-`book/published` holds the whole study as it was trained once, and the book speaks of that. Whoever
-asks for other runs, or for runs of his own, gets those; every figure says whose it shows. What a
-reader's machine makes of a part of the published study is a check, and stands by itself: see
-`reproduce.agreement`.
+The book shows the published study. A reader who asks for other runs gets those, and every figure
+names the origin of its runs. `reproduce.agreement` compares runs made again with published ones.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,8 +19,8 @@ from nmpcrl.analysis.summary import Outline
 from nmpcrl.claims.failure_modes import WELL
 from nmpcrl.claims.published import failure_modes_of, load
 from nmpcrl.learning.rollout import evaluate
-from nmpcrl.study import design, paper
-from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
+from nmpcrl.study import design
+from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.parameters import TRUTH, one_of
 from nmpcrl.study.records import Column, Stopped
 from nmpcrl.study.setup import controller_of
@@ -43,18 +42,15 @@ class Evidence:
         return self.where(self.runs.variant == design.MAIN_TABLE)
 
     def where(self, holds: Iterable[bool]) -> "Evidence":
-        """The runs for which it holds."""
-        kept = list(holds)
-        chosen = {
-            one: summary
-            for (one, summary), keep in zip(self.summaries.items(), kept, strict=True)
-            if keep
-        }
-        return Evidence(Runs(chosen), self.runs[kept].reset_index(drop=True))
+        """The runs with a true value in `holds`."""
+        chosen = list(holds)
+        pairs = zip(self.summaries.items(), chosen, strict=True)
+        summaries = Runs(dict(pair for pair, is_chosen in pairs if is_chosen))
+        return Evidence(summaries, self.runs[chosen].reset_index(drop=True))
 
     @property
     def mark(self) -> str:
-        """What was trained here and what is published, for a caption."""
+        """How many runs were trained here and how many are published, for a caption."""
         fresh = int((self.runs.source == "fresh").sum())
         counts = {"trained for this page": fresh, "published": len(self.runs) - fresh}
         parts = [f"{count} runs {where}" for where, count in counts.items() if count]
@@ -62,7 +58,7 @@ class Evidence:
 
     @property
     def origin(self) -> str:
-        """Whose runs these are, where and in which readings, for numbers on pages."""
+        """The origin, learners, layouts and readings of the runs, for numbers on pages."""
         if self.is_published:
             return "the published main table"
         names = {"layouts": "layout", "noise per": "decay"}
@@ -71,9 +67,8 @@ class Evidence:
 
     @property
     def is_published(self) -> bool:
-        """Whether this is the published main table, whole."""
-        parts = load().variants.items()
-        main = {e for e, part in parts if part == design.MAIN_TABLE}
+        """Whether these runs are the complete published main table."""
+        main = {e for e, part in load().variants.items() if part == design.MAIN_TABLE}
         return set(self.summaries) == main and set(self.runs.source) == {"published"}
 
     @property
@@ -83,79 +78,65 @@ class Evidence:
         return runs[~runs.mechanism.isin(("", WELL))]
 
 
-def needed(
-    source: str,
-    *,
-    learners: Sequence[str] = MAIN,
-    layouts: Sequence[str] = design.LAYOUTS,
-    seeds: Sequence[int] = design.SEEDS,
-    episodes: int = paper.EPISODES,
-) -> tuple[Experiment, ...]:
-    """The runs of the main table that have to be trained here, with their frozen arms.
+def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
+    """The runs of the main table that must be trained here, with their frozen arms.
 
-    All that are asked for if `source` is "fresh", and those that are not published if it is
-    "published".
+    Args:
+        source: "fresh" for all of `asked`, "published" for those that are not published.
+        asked: learners, layouts, seeds and episodes, as `design.main_table` takes them.
 
     Raises:
-        ParameterError: a value is not what it may be.
+        ParameterError: a value is not allowed.
     """
     one_of(SOURCES).check("study", source)
-    asked, known = _asked(learners, layouts, seeds, episodes), load().summaries
-    return tuple(e for e in asked if source == "fresh" or e not in known)
+    runs, known = _asked(**asked), load().summaries
+    return tuple(e for e in runs if source == "fresh" or e not in known)
 
 
-def repeatable(
-    repeat: bool, **asked: Sequence[str] | Sequence[int] | int
-) -> tuple[Experiment, ...]:
-    """Of the runs asked for, the published ones that a build trains again: those of `design.fresh`.
+def repeatable(repeat: bool, **asked: Any) -> tuple[Experiment, ...]:
+    """The published runs of `asked` that a build trains again: those of `design.fresh`.
 
     None unless `repeat` holds.
 
     Raises:
-        ParameterError: `repeat` is neither true nor false, or a value is not what it may be.
+        ParameterError: a value is not allowed.
     """
     again = set(design.fresh()) if TRUTH.check("repeat", repeat) else set()
     known = load().summaries
-    return tuple(e for e in _asked(**asked) if e in again and e in known)  # type: ignore[arg-type]
+    return tuple(e for e in _asked(**asked) if e in again and e in known)
 
 
-def gather(
-    source: str, *, variants: bool = False, **asked: Sequence[str] | Sequence[int] | int
-) -> Evidence:
-    """The runs that a chapter rests on; what `needed` names is trained if it is not stored.
+def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:
+    """The runs that a chapter rests on; those of `needed` are trained if they are not stored.
 
     Args:
         source: "published" or "fresh".
         variants: whether to add the published controls and variants.
-        asked: as `needed` takes it.
+        asked: as for `needed`.
 
     Raises:
-        ParameterError: as `needed`.
+        ParameterError: a value is not allowed.
     """
-    here = fetch_summaries(needed(source, **asked))  # type: ignore[arg-type]
-    published = load()
-    wanted: dict[Experiment, str] = dict.fromkeys(_asked(**asked), design.MAIN_TABLE)  # type: ignore[arg-type]
-    if variants:
-        wanted = {
-            e: name for e, name in published.variants.items() if name != design.MAIN_TABLE
-        } | wanted
-    summaries: dict[Experiment, Outline] = {
-        e: here[e] if e in here else published.summaries[e] for e in wanted
-    }
+    here, published = fetch_summaries(needed(source, **asked)), load()
+    parts = {e: part for e, part in published.variants.items() if part != design.MAIN_TABLE}
+    asked_for = dict.fromkeys(_asked(**asked), design.MAIN_TABLE)
+    parts = parts | asked_for if variants else asked_for
     made = table(here).join(failure_modes_of(here)) if here else table(here)
     rows = {**published.rows, **dict(zip(here, made.to_dict("records"), strict=True))}
-    runs = pd.DataFrame([rows[e] for e in wanted])
-    runs["variant"] = list(wanted.values())
-    runs["source"] = ["fresh" if e in here else "published" for e in wanted]
     ratios = cost_ratios(rows)
-    runs["cost_ratio"] = [ratios[e] for e in wanted]
-    return Evidence(Runs(summaries), runs)
+    runs = pd.DataFrame([rows[e] for e in parts]).assign(
+        variant=list(parts.values()),
+        source=["fresh" if e in here else "published" for e in parts],
+        cost_ratio=[ratios[e] for e in parts],
+    )
+    known: dict[Experiment, Outline] = {**published.summaries, **here}
+    return Evidence(Runs({e: known[e] for e in parts}), runs)
 
 
 def with_inputs(found: Evidence) -> Evidence:
-    """The finished runs with the inputs of their last rollouts, which published runs lack.
+    """The finished runs with the inputs of their last rollouts, solved for from the final theta.
 
-    They are solved for again, from the final theta. A run that was stopped left no policy.
+    Published runs lack inputs, and a run that was stopped left no policy.
     """
     finished = found.where(found.runs.stopped == Stopped.FINISHED)
     thetas = finished.runs[[*THETA]].to_numpy(float)
@@ -182,11 +163,6 @@ def paths(evidence: Evidence) -> Mapping[Experiment, Column]:
     return {experiment: summary.states for experiment, summary in evidence.summaries.items()}
 
 
-def _asked(
-    learners: Sequence[str] = MAIN,
-    layouts: Sequence[str] = design.LAYOUTS,
-    seeds: Sequence[int] = design.SEEDS,
-    episodes: int = paper.EPISODES,
-) -> tuple[Experiment, ...]:
-    runs = design.main_table(learners, layouts, seeds, episodes)
+def _asked(**asked: Any) -> tuple[Experiment, ...]:
+    runs = design.main_table(**asked)
     return tuple(dict.fromkeys((*runs, *map(frozen_arm, runs))))

@@ -9,9 +9,10 @@
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache, cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import published, whole_picture
 from nmpcrl.claims.population import Answer, answers, held, shares
 from nmpcrl.claims.population_questions import RAISED_TO, SAME_CLOSING
-from nmpcrl.claims.published import Damaged, Unpublishable, effort, place, sums
+from nmpcrl.claims.published import Damaged, Unpublishable, place
 from nmpcrl.claims.rule import Paths
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import LAYOUTS
@@ -244,3 +245,15 @@ def _lengthened(positions: Column) -> Column:
     """The positions in metres again; nan after a failed solve."""
     result: Column = np.where(positions == NOWHERE, np.nan, positions / MILLIMETRES)
     return result
+
+
+def sums(folder: Path, files: Iterable[str]) -> dict[str, str]:
+    """What tells that files belong together and are whole."""
+    contents = {name: (folder / name).read_bytes() for name in files}
+    return {name: sha256(content).hexdigest() for name, content in contents.items()}
+
+
+def effort(runs: pd.DataFrame, part: str) -> dict[str, Any]:
+    """How many runs each part has, which a column tells, and how long all took."""
+    counts = runs[part].value_counts(sort=False).to_dict()
+    return {"runs": counts, "hours": float(runs.seconds.sum() / 3600)}

@@ -138,7 +138,7 @@ def of_runs(fresh: Mapping[Experiment, RunSummary], published: Published) -> Pai
 
 def of_times(timings: pd.DataFrame, published: Published) -> Pairs:
     """The contradictions with times taken here; none if another machine took the published ones."""
-    if published.about.get("timings", {}).get("machine") != fingerprint():
+    if published.timed.get("machine") != fingerprint():
         return ()
     return contradictions(judge_times(timings), judge_times(published.timings))
 

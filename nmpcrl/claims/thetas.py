@@ -1,11 +1,10 @@
-"""Theta after every episode of the published runs that a reader can follow: `thetas.npz`.
+"""Theta after every episode of the published runs that a reader can follow.
 
-Learning moves theta by little in an episode, so numbers are kept as what compresses to half: how
-the bits of each, read as an integer, differ from those of the one before.
+Learning moves theta little in an episode. So numbers are stored in a form that compresses to half:
+as the difference between the bits of each, read as an integer, and the bits of the one before.
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,21 +15,20 @@ from nmpcrl.study import design
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column
 
-FILE = "thetas.npz"
-FOLLOWED = (design.MAIN_TABLE, "controls")  # parts of the study; in the others something is changed
+FOLLOWED = (design.MAIN_TABLE, "controls")  # parts of the study; the variants change one thing
 SINGLE, BITS = np.dtype("<f4"), np.dtype("<u4")
+ROWS, SHAPE, PLANES = "theta_rows", "theta_shape", "theta_planes"  # names of the arrays
 
 Bytes = npt.NDArray[np.uint8]
 
 
-def save(
-    folder: Path, summaries: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
-) -> None:
-    """Write theta of the runs that belong to `FOLLOWED`.
+def packed(
+    summaries: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
+) -> dict[str, npt.NDArray[Any]]:
+    """The arrays with theta of the runs that belong to `FOLLOWED`.
 
     Args:
-        folder: where to.
-        summaries: the runs, with their column theta where it is known.
+        summaries: the runs, with a column theta where it is known.
         variants: the part of the study that each belongs to.
     """
     known = {
@@ -42,20 +40,14 @@ def save(
     columns = np.full((len(known), *shape), np.nan, SINGLE)
     for into, theta in zip(columns, known.values(), strict=True):
         into[:, : theta.shape[1]] = theta
-    kept: dict[str, Any] = {
-        "rows": np.array(list(known), int),
-        "shape": columns.shape,
-        "planes": byte_planes(columns),
-    }
-    np.savez_compressed(folder / FILE, **kept)
+    rows, shapes = np.array(list(known), int), np.array(columns.shape)
+    return {ROWS: rows, SHAPE: shapes, PLANES: byte_planes(columns)}
 
 
-def load(folder: Path) -> dict[int, Column]:
-    """Theta by the row of runs.csv, of shape (episodes, d); nan after a run was stopped."""
-    with (folder / FILE).open("rb") as whole, np.load(whole, allow_pickle=False) as file:
-        rows, shape, planes = file["rows"], file["shape"], file["planes"]
-    columns = numbers_of(planes).reshape(shape)
-    return {int(row): theta.T for row, theta in zip(rows, columns, strict=True)}
+def unpacked(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[int, Column]:
+    """Theta by the row of the run, of shape (episodes, d); nan after a run was stopped."""
+    columns = numbers_of(arrays[PLANES]).reshape(arrays[SHAPE])
+    return {int(row): theta.T for row, theta in zip(arrays[ROWS], columns, strict=True)}
 
 
 def byte_planes(numbers: npt.ArrayLike) -> Bytes:
@@ -66,6 +58,6 @@ def byte_planes(numbers: npt.ArrayLike) -> Bytes:
 
 
 def numbers_of(planes: Bytes) -> Column:
-    """What `byte_planes` was given, one after the other."""
+    """The numbers that `byte_planes` was given, in a flat array."""
     steps = np.ascontiguousarray(planes.T).view(BITS)[:, 0]
     return np.cumsum(steps, dtype=BITS).view(SINGLE)

@@ -29,7 +29,7 @@ def compute_effort(found: Published) -> str:
     if not found.rows:
         return NOTHING
     episodes = {e.episodes for e in found.rows}
-    parts = dict(found.about["runs"])
+    parts = dict(found.parts)
     main, controls = parts.pop(design.MAIN_TABLE, 0), parts.pop("controls", 0)
     return (
         f"These are {len(found.rows):,} runs of {listed(sorted(episodes))} episodes: {main:,} in"

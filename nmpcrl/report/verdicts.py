@@ -9,9 +9,10 @@ from nmpcrl.bench.learners import REFERENCE
 from nmpcrl.bench.paired import IDLE, Ratio
 from nmpcrl.claims.assumptions import THEOREMS
 from nmpcrl.claims.own_claims import OWN_CLAIMS
-from nmpcrl.claims.paper_claims import BY_TIME, CLAIMS
+from nmpcrl.claims.paper_claims import BY_TIME
+from nmpcrl.claims.published import EVERY
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
-from nmpcrl.claims.wider_claims import WIDER_CLAIMS, WIDER_THAN
+from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.report.cited import Count
 from nmpcrl.report.text import listed
 from nmpcrl.study.layouts import ARRIVED
@@ -84,11 +85,10 @@ def _widened(verdict: Verdict) -> str:
 
 def _numbers(verdict: Verdict) -> str:
     """The further numbers of a claim that runs decide."""
-    claims = {**CLAIMS, **WIDER_CLAIMS, **OWN_CLAIMS}
     numbers = verdict.numbers
-    if verdict.claim not in claims or not (numbers or verdict.claim in OWN_CLAIMS):
+    if verdict.claim not in EVERY or not (numbers or verdict.claim in OWN_CLAIMS):
         return ""
-    learners = claims[verdict.claim].learners
+    learners = EVERY[verdict.claim].learners
     if verdict.claim in OWN_CLAIMS:
         first, second = learners
         if not numbers:

@@ -86,6 +86,7 @@ def write(
     *,
     batch: Mapping[str, Any],
     registered: str = "",
+    anew: bool = False,
     where: Path | None = None,
 ) -> Path:
     """Write a table, and its arrays if there are any, and note them in the manifest.
@@ -96,6 +97,7 @@ def write(
         arrays: all arrays.
         batch: what was added now, and where, when and with what: `provenance.made_here()`.
         registered: the commit that fixed what would be made, before anything was.
+        anew: whether all rows were made now, so that earlier batches are forgotten.
         where: the folder, by default the project's.
 
     Returns:
@@ -113,8 +115,9 @@ def write(
             content[path.name] = path.read_bytes()
         files = {file: sha256(found).hexdigest() for file, found in content.items()}
         earlier = known.get(name, {})
-        batches = [*earlier.get("batches", ()), dict(batch)]
-        entry = {**earlier, "files": files, "registered": registered, "batches": batches}
+        batches = [*([] if anew else earlier.get("batches", ())), dict(batch)]
+        entry = {**earlier, "files": files, "batches": batches}
+        entry["registered"] = registered or earlier.get("registered", "")
         write_manifest(place, {**known, name: entry})
     return place / f"{name}.csv"
 
@@ -135,7 +138,7 @@ def _manifest(place: Path) -> dict[str, Any]:
         entries: dict[str, Any] = json.loads(path.read_text("utf-8"))
         if entries.pop(SEAL) != hash_of(entries):
             raise ValueError("it is not the file that was written")
-    except (ValueError, LookupError, TypeError, AttributeError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise Damaged(f"{path} is damaged ({error}); {_restore()}") from error
     return entries
 

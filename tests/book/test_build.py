@@ -102,7 +102,7 @@ def test_without_what_is_published_nothing_is_built(driver, tmp_path, monkeypatc
     elif kind != "missing":
         place.mkdir()
     if kind == "damaged":
-        (place / "about.json").write_text("[" * 100_000)
+        (place / "manifest.json").write_text("[" * 100_000)
     sentence = refused(driver("--chapter", chapter))
     assert str(place) in sentence
     assert "`git checkout -- book/published` restores" in sentence

@@ -53,7 +53,7 @@ def test_the_first_paragraph_counts_the_published_verdicts():
 
 
 def test_the_numbers_of_runs_are_those_of_the_published_study():
-    parts = published.load().about["runs"]
+    parts = published.load().parts
     varied = [parts[name] for name in design.VARIANTS if name in parts]
     assert set(re.findall(r"(\d+) runs", README)) == {str(parts["main"]), str(sum(varied))}
     assert f"in {len(varied)} ways" in README
@@ -155,7 +155,7 @@ def test_seconds_of_a_run_are_those_of_the_published_steps_and_name_their_proces
         r" and (\d+) for RDES",
         README.replace("\n", " "),
     )
-    assert said == [(found.about["timings"]["machine"]["processor"], *seconds)]
+    assert said == [(found.timed["machine"]["processor"], *seconds)]
     assert len(re.findall(r"seconds|microseconds|µs", README)) == 1
 
 

@@ -1,4 +1,4 @@
-"""A chapter's evidence: what is trained here and what is published, side by side."""
+"""The runs of a chapter: trained here, published, or both."""
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from nmpcrl.study.design import fresh, main_table
 from nmpcrl.study.experiment import frozen_arm
 
 ASKED = {"learners": ["ES"], "layouts": ["A"], "seeds": [0], "episodes": 2}
+MORE = ASKED | {"seeds": [0, 1]}
 
 
 @pytest.fixture(autouse=True)
@@ -30,29 +31,20 @@ def known():
     return summaries
 
 
-def test_where_nothing_is_published_no_chapter_goes_on():
-    with pytest.raises(published.Damaged, match=r"nothing is published in .* restores"):
+def test_without_published_data_no_chapter_goes_on():
+    with pytest.raises(published.Damaged, match="nothing is published"):
         needed("fresh", **ASKED)
 
 
-def test_what_is_not_published_is_trained_with_its_frozen_arms(monkeypatch):
-    monkeypatch.setattr(evidence, "load", published.Published)
-    wanted = set(needed("fresh", **ASKED))
-    assert wanted == {*main_table(["ES", "frozen"], ["A"], [0], 2)}
-    assert {frozen_arm(e) for e in wanted} <= wanted
-
-
-def test_of_the_published_study_only_what_it_lacks_is_trained(known):
+def test_missing_runs_are_trained_with_their_frozen_arms(known):
+    both = ["ES", "frozen"]
     assert needed("published", **ASKED) == ()
-    lacking = needed("published", **ASKED | {"seeds": [0, 3]})
-    assert set(lacking) == {*main_table(["ES", "frozen"], ["A"], [3], 2)}
-
-
-def test_of_fresh_runs_all_are_trained_here(known):
     assert set(needed("fresh", **ASKED)) == set(known)
+    lacking = set(needed("published", **MORE))
+    assert lacking == {*main_table(both, ["A"], [1], 2)} == {*map(frozen_arm, lacking), *lacking}
 
 
-def test_the_published_runs_that_a_build_trains_again_are_those_of_the_design(monkeypatch):
+def test_a_build_trains_the_published_runs_of_the_design_again(monkeypatch):
     runs = main_table(["ES", "frozen"], ["A", "F"], [0, 1])
     monkeypatch.setattr(evidence, "load", lambda: published.Published(dict.fromkeys(runs)))
     again = evidence.repeatable(True, learners=["ES"], layouts=["A", "F"], seeds=[0, 1])
@@ -75,63 +67,37 @@ def test_the_published_runs_that_a_build_trains_again_are_those_of_the_design(mo
         ({"episodes": 0}, "episodes = 0"),
     ],
 )
-def test_nonsense_is_refused_in_a_sentence(wrong, named):
-    asked = {"source": "fresh", **ASKED, **wrong}
+def test_a_value_that_is_not_allowed_is_refused_in_a_sentence(wrong, named):
     with pytest.raises(ParameterError) as caught:
-        needed(asked.pop("source"), **asked)
+        needed(**{"source": "fresh", **ASKED, **wrong})
     assert named in str(caught.value)
 
 
-def test_published_runs_say_what_they_said_when_they_were_trained(known):
-    found = gather("published", **ASKED)
-    told = table(known)
-    assert set(found.runs.source) == {"published"}
-    assert found.mark == "4 runs published"
+def test_published_runs_have_the_numbers_of_their_training_wherever_else_they_are_stored(known):
+    found, there = gather("published", **ASKED), table(known)
+    assert found.is_published
+    assert (found.mark, found.origin) == ("4 runs published", "the published main table")
     for name in ("final_cost", "training_cost", "cost_ratio", "theta_8", "inside_large"):
-        np.testing.assert_array_equal(found.runs[name], told[name])
+        np.testing.assert_array_equal(found.runs[name], there[name])
     for experiment, summary in known.items():
-        there = found.summaries[experiment]
-        np.testing.assert_allclose(there.episodes["cost"], summary.episodes["cost"], rtol=1e-6)
-        np.testing.assert_allclose(there.states, summary.states, atol=1e-5)
-        assert there.evaluations["episode"].tolist() == summary.evaluations["episode"].tolist()
-
-
-def test_what_is_published_is_what_is_shown_whatever_was_trained_here(known):
-    fetch_summaries(known, progress=False)  # stored here, too
-    assert set(gather("published", **ASKED).runs.source) == {"published"}
-
-
-def test_whose_runs_are_shown_is_known(known):
-    assert gather("published", **ASKED).is_published
-    assert not gather("fresh", **ASKED).is_published
-    assert not gather("published", **ASKED | {"seeds": [0, 1]}).is_published
-    assert gather("fresh", **ASKED).mark == "4 runs trained for this page"
-
-
-def test_inputs_that_are_not_published_are_those_of_the_final_theta(known):
-    found = gather("published", **ASKED)
+        mine = found.summaries[experiment]
+        np.testing.assert_allclose(mine.episodes["cost"], summary.episodes["cost"], rtol=1e-6)
+        np.testing.assert_allclose(mine.states, summary.states, atol=1e-5)
     assert {summary.actions for summary in found.summaries.values()} == {None}
-    whole = evidence.with_inputs(found)
-    for experiment, summary in known.items():
-        np.testing.assert_allclose(whole.summaries[experiment].actions, summary.actions, atol=1e-6)
-    assert len(whole.runs) == len(known)
+    for experiment, one in evidence.with_inputs(found).summaries.items():
+        np.testing.assert_allclose(one.actions, known[experiment].actions, atol=1e-6)
 
 
 def test_runs_trained_here_stand_beside_published_ones(known):
-    found = gather("published", **ASKED | {"seeds": [0, 1]})
+    found = gather("published", **MORE)
     sources = found.runs.groupby("seed").source.unique()
-    assert sources[0].tolist() == ["published"]
-    assert sources[1].tolist() == ["fresh"]
+    assert (sources[0].tolist(), sources[1].tolist()) == (["published"], ["fresh"])
+    assert not found.is_published
     assert found.mark == "4 runs trained for this page, 4 runs published"
     assert (found.runs[found.runs.learner == "frozen"].cost_ratio == 1).all()
     assert set(found.main.summaries) == set(found.summaries)
     only = found.where(found.runs.seed == 1)
-    assert {e.seed for e in only.summaries} == {1}
-    assert len(only.runs) == 4
-
-
-def test_numbers_of_the_published_main_table_are_called_so(known):
-    assert gather("published", **ASKED).origin == "the published main table"
+    assert ({e.seed for e in only.summaries}, len(only.runs)) == ({1}, 4)
     assert gather("fresh", **ASKED).origin == (
         "4 runs trained for this page, of ES, frozen; layouts A; noise per step, episode"
     )

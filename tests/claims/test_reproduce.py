@@ -37,7 +37,7 @@ def published_of(found, made=HERE) -> Published:
     rows = {e: row(one) | {"key": provenance.summary_key(e)} for e, one in found.items()}
     ratios = cost_ratios(rows)
     rows = {e: one | {"cost_ratio": ratios[e]} for e, one in rows.items()}
-    about = made | {"runs": {design.MAIN_TABLE: len(rows)}}
+    about = {"batches": [made | {"runs": {design.MAIN_TABLE: len(rows)}}]}
     return Published(found, dict.fromkeys(rows, design.MAIN_TABLE), rows, about=about)
 
 
@@ -126,7 +126,8 @@ def test_a_batch_is_comparable_where_this_machine_made_it(study):
     known = published_of(study(), ELSEWHERE)
     more, *rest = known.rows
     known = replace(known, variants=dict(known.variants) | {more: "alpha x 3"})
-    added = replace(known, about={**known.about, "additions": [HERE | {"runs": {"alpha x 3": 1}}]})
+    batches = (*known.batches, HERE | {"runs": {"alpha x 3": 1}})
+    added = replace(known, about={"batches": batches})
     assert comparable([more, *rest], known) == set()
     assert comparable([more, *rest, Experiment(seed=99)], added) == {more}
 
@@ -175,7 +176,7 @@ def timings(ratio: float, waited: float = 0.0) -> pd.DataFrame:
     ],
 )
 def test_times_contradict_published_ones_of_this_machine(ratio, waited, made, contradicted):
-    known = Published(timings=timings(0.65), about={"timings": made})
+    known = Published(timings=timings(0.65), timed=made)
     found = of_times(timings(ratio, waited), known)
     assert [here.claim for here, _ in found] == contradicted
 

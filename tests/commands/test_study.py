@@ -143,8 +143,9 @@ def test_verify_refuses_damaged_publications_and_too_large_samples(
     command, published_here, tmp_path
 ):
     assert "7 is more than the 6 published runs" in command("verify", "--sample", "7").stderr
-    (tmp_path / "published/curves.npz").write_bytes(b"")
-    published._load.cache_clear()
+    (tmp_path / "published/runs.npz").write_bytes(b"")
+    for cache in (published._load, published.store._arrays):
+        cache.cache_clear()
     refused = command("verify")
     assert refused.exit_code == 1
     assert "is damaged" in refused.output

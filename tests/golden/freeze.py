@@ -240,7 +240,9 @@ def ratios_of_times() -> Any:
 
 @entry("study")
 def batches() -> Any:
-    known = {"six": study().batches, "drawn": [drawn().about, *drawn().about["additions"]]}
+    first, *others = study().batches
+    six = [{**first, "runs": study().parts}, *others]  # the first one lists all runs
+    known = {"six": six, "drawn": [drawn().about, *drawn().about["additions"]]}
     names = ("date", "epochs", "versions", "hours", "runs")
     return {
         name: [{one: batch.get(one) for one in names} for batch in batches]
@@ -616,7 +618,7 @@ def arrays() -> Any:
 @cache
 def keys_of_runs() -> dict[Any, tuple[str, str]]:
     """Keys of each run of the study and of its summary, with the versions that made it."""
-    with mock.patch.object(provenance, "installed", study().about["versions"].__getitem__):
+    with mock.patch.object(provenance, "installed", study().batches[0]["versions"].__getitem__):
         return {e: (provenance.key(e), provenance.summary_key(e)) for e in design.whole_study()}
 
 

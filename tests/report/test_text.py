@@ -66,7 +66,8 @@ def table(*rows: tuple[str, str, bool]) -> pd.DataFrame:
 
 
 def test_the_effort_names_runs_hours_machine_and_versions():
-    found = Published(rows={Experiment(seed=s): {} for s in range(1320)}, about=ABOUT)
+    rows = {Experiment(seed=s): {} for s in range(1320)}
+    found = Published(rows=rows, about={"batches": [ABOUT]})
     said = text.compute_effort(found)
     for part in ("1,320 runs of 300 episodes", "1,200 in", "60 with", "60 in 2 variants"):
         assert part in said
@@ -76,7 +77,7 @@ def test_the_effort_names_runs_hours_machine_and_versions():
         "python 3.11.9 and casadi 3.8.2",
     ):
         assert part in said
-    assert found.about["runs"]["main"] == 1200  # what was read is not taken apart
+    assert found.parts["main"] == 1200  # the sentence takes nothing out
 
 
 def test_where_nothing_is_published_the_page_says_so_and_what_to_do():

@@ -89,8 +89,8 @@ def version() -> tuple[str, datetime]:
         found = subprocess.check_output(command, text=True, stderr=subprocess.DEVNULL)
         commit, date = found.split()
     except (OSError, subprocess.CalledProcessError):
-        about = from_yaml("book/published/about.json")
-        commit, date = "", about["date"]
+        first, *_ = from_yaml("book/published/manifest.json")["runs"]["batches"]
+        commit, date = "", first["date"]
     when = datetime.fromisoformat(date)
     words = f"Version {__version__}, {when.day} {when:%B %Y}"
     return words + (f", commit {commit}" if commit else ""), when
