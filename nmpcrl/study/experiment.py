@@ -1,4 +1,4 @@
-"""An `Experiment` is a frozen value that names one run."""
+"""An `Experiment` is an immutable value that names one run."""
 
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
