@@ -52,10 +52,12 @@ class Trial:
             raise ParameterError(f"nmpc = {self.nmpc!r} must be an Nmpc")
         if not callable(self.make):
             raise ParameterError(f"make = {self.make!r} must be a function of nmpc")
-        if self.theta is None and self.nmpc.problem is None:
-            raise ParameterError("theta must be given where the Nmpc has a task and no Problem")
-        theta = self.nmpc.problem.theta if self.theta is None else np.asarray(self.theta, float)
-        object.__setattr__(self, "theta", tuple(map(float, theta)))
+        theta = self.theta
+        if theta is None:
+            if self.nmpc.problem is None:
+                raise ParameterError("theta must be given where the Nmpc has a task and no Problem")
+            theta = self.nmpc.problem.theta
+        object.__setattr__(self, "theta", tuple(map(float, np.asarray(theta, float))))
         whole(0, LARGEST_SEED).check("seed", self.seed)
         for name in COUNTS:
             whole(1, 10**9).check(name, getattr(self, name))
