@@ -1,6 +1,11 @@
 """`nmpcrl bench`: how long solves, steps and runs take."""
 
+from typing import TYPE_CHECKING
+
 import click
+
+if TYPE_CHECKING:
+    from nmpcrl.bench.live import Live
 
 PROBLEMS = 100_000  # of a sweep
 
@@ -45,70 +50,53 @@ def bench(
       nmpcrl bench --sweep 1000
     """
     if sweep is not None:
-        _sweep(sweep)
+        from nmpcrl.bench import sweep as sweeps
+
+        click.echo(f"{sweeps.sweep(sweep)}\n{sweeps.path()}: stored")
     elif problems:
-        _problems()
+        from nmpcrl.analysis import other_problems
+
+        for said, true in other_problems.make().predictions().values():
+            click.echo(f"{'yes' if true else 'no '}  {said}")
+        click.echo(f"{other_problems.path()}: stored")
     elif sizes:
-        _sizes()
+        from nmpcrl.bench import problem_times
+
+        found = problem_times.make()
+        for table in (found.sizes, found.peers):
+            click.echo(table.round(1).to_string(index=False))
+        click.echo(f"{problem_times.path()}: stored")
     elif publish:
         _publish_timing()
     elif live:
-        _print_live()
+        from nmpcrl.bench import live as figures
+
+        _print_live(figures.measure())
     else:
         _print_times(length, again=again)
-
-
-def _sweep(problems: int) -> None:
-    """Print the outcomes of a sweep, and where its table is stored."""
-    from nmpcrl.bench import sweep
-
-    click.echo(str(sweep.sweep(problems)))
-    click.echo(f"{sweep.path()}: stored")
-
-
-def _problems() -> None:
-    """Run other people's problems, and say which predictions came true and where all is stored."""
-    from nmpcrl.analysis import other_problems
-
-    for said, true in other_problems.make().predictions().values():
-        click.echo(f"{'yes' if true else 'no '}  {said}")
-    click.echo(f"{other_problems.path()}: stored")
-
-
-def _sizes() -> None:
-    """Time problems of many sizes and those of Chapter 10, and say where the times are stored."""
-    from nmpcrl.bench import problem_times
-
-    found = problem_times.make()
-    for table in (found.sizes, found.peers):
-        click.echo(table.round(1).to_string(index=False))
-    click.echo(f"{problem_times.path()}: stored")
 
 
 def _print_times(length: str, *, again: bool) -> None:
     """Print a row for each target, and where the benchmark is stored."""
     from nmpcrl.bench import live, suite, targets
-    from nmpcrl.bench.live_targets import live_targets
 
     measured = suite.measure(length) if again else suite.read_or_measure(length)
-    rows = targets.rows(measured)
-    _print_table(rows)
+    _print_table(targets.rows(measured))
     about = measured["about"]
     took = f"{about['length']}, {about['date']}, {about['seconds']:.0f} s"
     others = f"other programs used up to {about['others']:.0%} of the cores"
     click.echo(f"{suite.path()}: {took}; {others}")
     if found := live.stored():
-        _print_table(targets.table_of(live_targets(found)))
-        click.echo(f"{live.path()}: {found.get('date', 'of an unknown date')}")
+        _print_live(found)
 
 
-def _print_live() -> None:
-    """Measure the live figures, and print a row for each of their targets."""
+def _print_live(found: "Live") -> None:
+    """Print a row for each target of the live figures, and where their times are stored."""
     from nmpcrl.bench import live, targets
     from nmpcrl.bench.live_targets import live_targets
 
-    _print_table(targets.table_of(live_targets(live.measure())))
-    click.echo(f"{live.path()}: stored")
+    _print_table(targets.table_of(live_targets(found)))
+    click.echo(f"{live.path()}: {found.get('date', 'of an unknown date')}")
 
 
 def _print_table(rows: list[tuple[str, str, str, str]]) -> None:

@@ -7,17 +7,14 @@ from typing import Any
 
 import click
 
-from nmpcrl.commands.options import refuse_unwritable
-from nmpcrl.commands.tables import counted, duration
-from nmpcrl.commands.workers import check
+from nmpcrl.commands.options import WORKERS, refuse_unwritable
 
 Option = Callable[[Callable[..., None]], Callable[..., None]]
 OPTIONS: tuple[Option, ...] = (
-    click.option("--workers", metavar="N", type=int, help="Processes; by default one per core."),
+    WORKERS,
     click.option("--dry-run", is_flag=True, help="Only report what is missing, and its price."),
     click.option("--publish", is_flag=True, help="Put what is whole beside what is published."),
     click.option("--judge", is_flag=True, help="Only say what the published runs say."),
-    click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for."),
 )
 
 
@@ -64,7 +61,6 @@ def carry_out(
     dry_run: bool,
     publish: bool,
     judge: bool,
-    yes: bool,
 ) -> None:
     """What such a command does."""
     from nmpcrl.claims import published
@@ -75,7 +71,6 @@ def carry_out(
         return
     refuse_file()
     chosen = some(parts, runs.order, "part")
-    check(workers, sure=yes)
     if publish:
         refuse_unwritable(published.place())
     if dry_run:
@@ -109,10 +104,10 @@ def report(
         missing = [one for one in runs if one not in found]
         left = price(missing, found)
         total += left
-        words = f"; the others take about {duration(left)} of one core" if missing else ""
-        count = counted(len(runs), "run")
+        words = f"; the others take about {left / 3600:.1f} h of one core" if missing else ""
+        count = f"{len(runs):,} runs"
         click.echo(f"{part}: {len(runs) - len(missing)} of {count} are stored{words}")
-    click.echo(f"all that is missing: about {duration(total)} of one core")
+    click.echo(f"all that is missing: about {total / 3600:.1f} h of one core")
 
 
 def say_answers(answers: Iterable[Any], questions: Mapping[str, Any] | None = None) -> None:

@@ -1,6 +1,7 @@
 """`nmpcrl grade`: points of the notebooks that students hand in."""
 
 import csv
+import re
 from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
@@ -9,7 +10,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from nmpcrl.commands.options import FOLDER, NewFile
-from nmpcrl.commands.tables import columns
 
 if TYPE_CHECKING:
     from nmpcrl.course.grading import Mark
@@ -18,6 +18,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 FIELDS = ("student", "notebook", "exercise", "points", "of", "why")
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet computes begins so
+CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]")  # what a terminal obeys
 HEADER = ("student", "notebook", "points", "of", "by hand")
 NO_SANDBOX = (
     "The notebooks ran with your rights: limits and a temporary folder are no sandbox."
@@ -82,9 +83,10 @@ def grade(
     Example:
       nmpcrl grade . --out grades.csv --time-limit 300
     """
+    import pandas as pd
+
     from nmpcrl.course import grading
     from nmpcrl.course.execution import Limits
-    from nmpcrl.study.storage.place import harmless
 
     limits = Limits(time_limit, cell_limit, memory)
     rows = []
@@ -94,25 +96,23 @@ def grade(
         writer = csv.writer(file)
         writer.writerow(FIELDS)
         for each in chain([first], graded):
-            rows.append(total(each))
+            rows.append([cell(word) for word in total(each)])
             student, notebook, got, of, by_hand = rows[-1]
             writer.writerows([cell(getattr(mark, name)) for name in FIELDS] for mark in each)
             left = f"{by_hand} more are given by hand." if by_hand != "0" else ""
-            writer.writerow((cell(student), cell(notebook), "total", got, of, left))
+            writer.writerow((student, notebook, "total", got, of, left))
             file.flush()
-            click.echo(harmless(f"{notebook}: {got} of {of}"), err=True)
-    click.echo("\n".join(columns([HEADER, *rows], frozenset({2, 3, 4}))))
+            click.echo(f"{notebook}: {got} of {of}", err=True)
+    click.echo(pd.DataFrame(rows, columns=HEADER).to_string(index=False))
     click.echo(f"\n{len(rows)} notebooks in {out}")
     click.echo(NO_SANDBOX)
 
 
 def cell(value: object) -> object:
     """What a table shows and never computes, nor a terminal obeys: formulas are quoted."""
-    from nmpcrl.study.storage.place import harmless
-
     if not isinstance(value, str):
         return value
-    return harmless(f"'{value}" if value[:1] in FORMULA else value)
+    return CONTROL.sub("?", f"'{value}" if value[:1] in FORMULA else value)
 
 
 def total(marks: "list[Mark]") -> tuple[str, ...]:

@@ -6,6 +6,13 @@ from typing import Any
 
 import click
 
+WORKERS = click.option(
+    "--workers",
+    metavar="N",
+    type=click.IntRange(1),
+    callback=lambda ctx, param, count: count and min(count, os.cpu_count() or 1),
+    help="Processes; by default, and at most, one per core.",
+)
 FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 
 

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from nmpcrl.commands import by_parts
-from nmpcrl.commands.tables import columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,11 +50,13 @@ def remedies(parts: tuple[str, ...], entries: tuple[str, ...], **asked: Any) -> 
 
 def _say() -> None:
     """What to try, and each question's answer."""
+    import pandas as pd
+
     from nmpcrl.claims import remedies, remedy_published
 
     found = remedy_published.load().table
-    for line in columns([HEAD, *map(cells, remedies.advice(found))], right=frozenset((5, 6))):
-        click.echo(line)
+    rows = map(cells, remedies.advice(found))
+    click.echo(pd.DataFrame(rows, columns=HEAD).to_string(index=False))
     by_parts.say_answers(remedies.answers(found))
     for said, true in remedies.expectations(found).items():
         click.echo(f"expected that {said}: {'so it is' if true else 'it is not so'}")

@@ -5,21 +5,19 @@ from pathlib import Path
 
 import click
 
-from nmpcrl.commands.options import NewFile, refuse_unwritable
-from nmpcrl.commands.workers import check
+from nmpcrl.commands.options import WORKERS, NewFile, refuse_unwritable
 
 
 @click.command()
 @click.option("--part", "parts", multiple=True, help="Only this part: main, controls or a variant.")
 @click.option("--population", is_flag=True, help="The runs of the 180 drawn layouts instead.")
-@click.option("--workers", metavar="N", type=int, help="Processes; by default one per core.")
+@WORKERS
 @click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that trains instead.")
 @click.option("--security", metavar="FILE", help="Certificates for a scheduler at tls://.")
 @click.option("--dry-run", is_flag=True, help="Only report what is missing.")
 @click.option("--table", metavar="PATH", type=NewFile(), help="Write a CSV row per episode.")
 @click.option("--publish", is_flag=True, help="Write the runs to book/published.")
 @click.option("--judge", is_flag=True, help="Only show the verdicts on the published study.")
-@click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
 def study(
     parts: tuple[str, ...],
     population: bool,
@@ -30,7 +28,6 @@ def study(
     table: Path | None,
     publish: bool,
     judge: bool,
-    yes: bool,
 ) -> None:
     """Train the runs of the study that are not stored.
 
@@ -58,7 +55,6 @@ def study(
         known = ", ".join(dict.fromkeys(every.values()))
         raise click.ClickException(f"there is no part {unknown[0]!r}; the parts are {known}")
     wanted = {e: part for e, part in every.items() if not parts or part in parts}
-    check(workers, sure=yes)
     if scheduler is not None:
         cluster.check(scheduler, security=security)
     elif security is not None:

@@ -2,10 +2,7 @@
 
 import click
 
-from nmpcrl.commands.tables import columns
-from nmpcrl.commands.workers import check
-
-HEAD: tuple[str, ...] = ("entry", "layouts", "solved", "gain", "episodes", "CPU time")
+from nmpcrl.commands.options import WORKERS
 
 
 @click.command()
@@ -14,10 +11,9 @@ HEAD: tuple[str, ...] = ("entry", "layouts", "solved", "gain", "episodes", "CPU 
 @click.option("--budget", type=int, default=300, show_default=True, help="Episodes a layout.")
 @click.option("--layouts", metavar="N", type=int, help="Only the first N of the 120, or 40.")
 @click.option("--seeds", metavar="N", type=int, default=2, show_default=True, help="A layout.")
-@click.option("--workers", metavar="N", type=int, help="Processes; by default one per core.")
+@WORKERS
 @click.option("--list", "listed", is_flag=True, help="Only list the shipped entries.")
-@click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
-def suite(policy: str | None, moving: bool, workers: int | None, listed: bool, yes: bool,
+def suite(policy: str | None, moving: bool, workers: int | None, listed: bool,
           **asked: int | None) -> None:  # fmt: skip
     """Judge an entry on 120 layouts or among moving obstacles.
 
@@ -32,6 +28,8 @@ def suite(policy: str | None, moving: bool, workers: int | None, listed: bool, y
       nmpcrl suite --policy CMA-ES --budget 50 --moving
       nmpcrl suite --policy my_tuner:factory --layouts 10
     """
+    import pandas as pd
+
     from nmpcrl.analysis.suite import ENTRIES, judge_all, leaderboard
 
     if listed:
@@ -39,22 +37,17 @@ def suite(policy: str | None, moving: bool, workers: int | None, listed: bool, y
         return
     if policy is None:
         raise click.ClickException("--policy names an entry: MODULE:FACTORY, or a shipped one")
-    check(workers, sure=yes)
     judged = judge_all(policy, moving=moving, workers=workers, **asked)  # type: ignore[arg-type]
     (row,) = leaderboard(judged).itertuples()
     shares = ("disqualified",) * 2 if row.over else (f"{row.solved:.0%}", f"{row.gain:.1%}")
-    cells: tuple[str, ...] = (
-        row.entry,
-        f"{row.places}",
-        *shares,
-        f"{row.episodes}",
-        f"{row.seconds:.0f} s",
-    )
-    lines = [HEAD, cells]
-    if moving:
-        lines = [(HEAD[0], "scenarios", *HEAD[2:], "never inside"), (*cells, f"{row.clear:.0%}")]
-    for line in columns(lines, right=frozenset((1, 4, 5))):
-        click.echo(line)
+    cells = {
+        "entry": row.entry,
+        "scenarios" if moving else "layouts": row.places,
+        **dict(zip(("solved", "gain"), shares, strict=True)),
+        "episodes": row.episodes,
+        "CPU time": f"{row.seconds:.0f} s",
+    } | ({"never inside": f"{row.clear:.0%}"} if moving else {})
+    click.echo(pd.DataFrame([cells]).to_string(index=False))
     if row.over:
         said = f"it began more than {asked['budget']} episodes in {row.over}"
         raise click.ClickException(f"{row.entry} is disqualified: {said}")

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import click
 
-from nmpcrl.commands.tables import counted
-from nmpcrl.commands.workers import check
+from nmpcrl.commands.options import WORKERS
 
 RELOCKED = 60  # runs that are trained afresh before the code is locked anew
 
@@ -15,16 +14,14 @@ RELOCKED = 60  # runs that are trained afresh before the code is locked anew
     "--sample", type=click.IntRange(0), default=0, help="Train so many more runs and compare them."
 )
 @click.option("--relock", is_flag=True, help="Check that an edit changes no bit; lock the code.")
-@click.option("--workers", metavar="N", type=int, help="Processes; by default one per core.")
-@click.option("--yes", "-y", is_flag=True, help="Start more workers than there is room for.")
-def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
+@WORKERS
+def verify(sample: int, relock: bool, workers: int | None) -> None:
     """Compare the runs trained here with the published ones.
 
     \b
     Example:
       nmpcrl verify --sample 5
     """
-    check(workers, sure=yes)
     from nmpcrl.analysis import summaries
     from nmpcrl.claims import published, reproduce
 
@@ -35,7 +32,7 @@ def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
         )
     if relock:
         done = reproduce.relock(known, sample or RELOCKED, workers=workers)
-        said = f"{counted(done.published + done.stored, 'run')} trained again gave the same bits"
+        said = f"{done.published + done.stored} runs trained again gave the same bits"
         click.echo(f"{said}, {done.published} as published, {done.stored} as stored: {done.lock}")
         return
     stored = {e for e in known.rows if summaries.path_of(e).exists()}
@@ -47,10 +44,10 @@ def verify(sample: int, relock: bool, workers: int | None, yes: bool) -> None:
         )
     found = summaries.fetch_summaries((e for e in known.rows if e in wanted), workers=workers)
     wrong, exact = reproduce.compare(found, known), len(reproduce.comparable(found, known))
-    ways = {"bit for bit": exact, "by distribution": len(found) - exact}
-    parts = [f"{count} {way}" for way, count in ways.items() if count]
-    said = f"{counted(len(found), 'run')} compared with the published ones, {' and '.join(parts)}"
-    click.echo(f"{said}: {counted(len(wrong), 'contradiction')}")
+    click.echo(
+        f"runs compared with the published ones: {exact} bit for bit, {len(found) - exact} by"
+        f" distribution; contradictions: {len(wrong)}"
+    )
     if len(wrong):
         click.echo(wrong.to_string(index=False))
         raise SystemExit(1)

@@ -10,7 +10,7 @@ from nmpcrl.analysis import other_problems, summaries
 from nmpcrl.bench import live, problem_times, suite, sweep
 from nmpcrl.claims import publish, published, reproduce
 from nmpcrl.commands import main
-from nmpcrl.study import Experiment, cluster, fetch
+from nmpcrl.study import Experiment, cluster, fetch, jobs
 from nmpcrl.study.storage import executor
 
 LINES = 1500
@@ -24,6 +24,7 @@ BAD = (
 )
 LONG = (  # replaced by a refusal
     *((summaries, "fetch_summaries"), (cluster, "executor"), (executor, "processes")),
+    (jobs, "processes"),
     *((publish, "publish_timing"), (reproduce, "relock")),
     *((other_problems, "make"), (problem_times, "make"), (suite, "measure")),
     *((suite, "read_or_measure"), (sweep, "sweep"), (live, "measure")),
@@ -83,6 +84,7 @@ def test_no_command_line_ends_in_a_traceback(fast):
     "line",
     [
         *("train", "study", "verify --sample 1", "show ES", "suite --policy ES"),
+        "investigate worlds --part moving",
         *("bench", "bench --sweep 5", "bench --live", "bench --problems", "bench --sizes"),
     ],
 )

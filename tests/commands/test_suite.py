@@ -22,7 +22,7 @@ def test_a_row_is_printed_and_says_among_moving_obstacles_how_often_none_is_ente
     head, row = command("suite", *FROZEN, "1", "--moving").stdout.splitlines()
     assert head.split()[1] == "scenarios"
     assert head.endswith("never inside")
-    assert row.endswith("0 s  100% [21%, 100%]")
+    assert row.endswith(" 100% [21%, 100%]")
     assert command("suite", "--list").stdout.split() == [*ENTRIES]
 
 
