@@ -22,7 +22,7 @@ from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.solves import transposed
 from nmpcrl.claims.evidence import Evidence
-from nmpcrl.claims.published import failure_modes_of
+from nmpcrl.claims.failure_modes import failure_modes
 from nmpcrl.control import differential_drive
 from nmpcrl.learning import browser as in_browser
 from nmpcrl.study import Experiment, Runs, design, paper
@@ -316,7 +316,7 @@ def evidence_of(
     """A main table in which every learner saves a tenth at once; `unlike` says what is not so."""
     wanted = design.main_table(layouts=layouts, seeds=seeds, episodes=episodes)
     summaries = {one: summary_of(one, **unlike(one)) for one in wanted}
-    runs = table(summaries).join(failure_modes_of(summaries))
+    runs = table(summaries).join(failure_modes(summaries))
     runs["variant"] = design.MAIN_TABLE
     runs["source"] = [source(one) for one in wanted]
     return Evidence(Runs(summaries), runs)

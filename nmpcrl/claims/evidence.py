@@ -16,8 +16,8 @@ from nmpcrl import Vector
 from nmpcrl.analysis.rows import THETA, cost_ratios, table
 from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import Outline
-from nmpcrl.claims.failure_modes import WELL
-from nmpcrl.claims.published import failure_modes_of, load
+from nmpcrl.claims.failure_modes import WELL, failure_modes
+from nmpcrl.claims.published import load
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design
 from nmpcrl.study.experiment import Experiment, frozen_arm
@@ -121,7 +121,7 @@ def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:
     parts = {e: part for e, part in published.variants.items() if part != design.MAIN_TABLE}
     asked_for = dict.fromkeys(_asked(**asked), design.MAIN_TABLE)
     parts = parts | asked_for if variants else asked_for
-    made = table(here).join(failure_modes_of(here)) if here else table(here)
+    made = table(here).join(failure_modes(here)) if here else table(here)
     rows = {**published.rows, **dict(zip(here, made.to_dict("records"), strict=True))}
     ratios = cost_ratios(rows)
     runs = pd.DataFrame([rows[e] for e in parts]).assign(

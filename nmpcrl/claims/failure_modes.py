@@ -1,17 +1,17 @@
-"""Failure modes: why a run went wrong, and how its last rollout ended, read off its summary.
+"""Failure modes: why a run went wrong, and how its last rollout ended, from its summary.
 
 A run went wrong if it was stopped or diverged in training (`thresholds.divergence`), or if its
 final noise-free cost is above theta_init's by more than `BETTER`. Its cost rose between the last
-rollout without noise that was not above theta_init's by so much and the first that was; where none
-was, in its last episodes. In these some ten episodes the mechanisms are looked for in the order of
-`Mechanism`, and the first one found is the one, because each can bring about those after it. What
-came first within these episodes, a summary cannot tell.
+rollout without noise at or below that border and the first above it; without such a rollout, in its
+last episodes. In these some ten episodes the mechanisms are looked for in the order of `Mechanism`,
+and the first one found counts, because each can bring about the later ones. A summary cannot tell
+which came first within these episodes.
 
-The thresholds were fixed before they were put to the study, but after a look at the ranges of
+The thresholds were fixed before they were applied to the study, but after a look at the ranges of
 these columns in five short runs. They sort runs, and decide no claim.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any
 
@@ -37,7 +37,7 @@ CUT_SHORT = 0.5
 
 
 class Mechanism(StrEnum):
-    """What was at work when the cost of a run rose, in the order in which it is looked for."""
+    """Why the cost of a run rose, in the order in which the reasons are looked for."""
 
     STEP = "overshoot"
     NETWORK = "network"
@@ -57,7 +57,7 @@ class Ending(StrEnum):
 
 
 class Failure(StrEnum):
-    """Where a run went wrong; the first of these that it did."""
+    """Where a run went wrong; the first of these counts."""
 
     STOPPED = "stopped"
     TRAINING = "training"
@@ -66,42 +66,35 @@ class Failure(StrEnum):
 
 MECHANISMS, ENDINGS = tuple(Mechanism), tuple(Ending)
 WELL = "went well"  # in the place of a mechanism
-NAMED = ("learner", "layout", "decay", "seed")
+FAILURE_MODE = ["ending", "wrong", "mechanism", "episode"]
+NONE = {"ending": "", "wrong": "", "mechanism": "", "episode": pd.NA}  # of a frozen arm
 
 
-def failure_modes(
-    summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary],
-) -> pd.DataFrame:
-    """What became of each run that learned, one row a run.
+def failure_modes(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
+    """The failure mode of each run, one row a run, in order.
 
     Args:
         summaries: runs and their frozen arms.
 
     Returns:
-        Columns learner, layout, decay, seed, ending (of the last rollout: an `Ending`), cost
-        (noise-free, at the end, over theta_init's), wrong (a `Failure`, or ""), episode (after
-        which the cost rose; missing where nothing went wrong) and mechanism (a `Mechanism`, or
-        `WELL`).
+        Columns ending (of the last rollout: an `Ending`), wrong (a `Failure`, or ""), mechanism (a
+        `Mechanism`, or `WELL`) and episode (after which the cost rose; missing for a run that went
+        well); empty for the frozen arms.
 
     Raises:
         KeyError: the frozen arm of a run is not among them.
     """
-    listed = list(summaries.values() if isinstance(summaries, Mapping) else summaries)
-    named = {run.name: run for run in listed}
-    runs = table(listed)
-    shares = runs.final_cost / runs.initial_cost
-    rows = []
-    for run, share, wrong in zip(listed, shares, went_wrong(runs), strict=True):
-        if run.name.learner == "frozen":
-            continue
-        names = {name: run.experiment[name] for name in NAMED}
-        first_rollout = named[frozen_arm(run.name)].states
-        rows.append(names | {"cost": share} | failure_mode(run, wrong, first_rollout))
-    return pd.DataFrame(rows)
+    learned = [e for e in summaries if e.learner != "frozen"]
+    first_rollouts = {e: summaries[frozen_arm(e)].states for e in learned}
+    rows = [
+        failure_mode(run, wrong, first_rollouts[e]) if e in first_rollouts else NONE
+        for (e, run), wrong in zip(summaries.items(), went_wrong(table(summaries)), strict=True)
+    ]
+    return pd.DataFrame(rows, columns=FAILURE_MODE)
 
 
 def failure_mode(run: RunSummary, wrong: Failure | None, first_rollout: Column) -> dict[str, Any]:
-    """What became of one run: ending, wrong, episode and mechanism of `failure_modes`.
+    """The failure mode of one run: `FAILURE_MODE` by name.
 
     Args:
         run: one that learned.
@@ -112,13 +105,13 @@ def failure_mode(run: RunSummary, wrong: Failure | None, first_rollout: Column) 
     return {
         "ending": ending(run.states, task),
         "wrong": wrong or "",
-        "episode": rise(run).start if wrong else pd.NA,
         "mechanism": mechanism(run, task, first_rollout) if wrong else WELL,
+        "episode": rise(run).start if wrong else pd.NA,
     }
 
 
 def went_wrong(runs: pd.DataFrame) -> list[Failure | None]:
-    """Where each run went wrong, or None for nowhere."""
+    """Where each run went wrong, or None."""
     signs = {
         Failure.STOPPED: was_stopped(runs),
         Failure.TRAINING: divergence(runs).fillna(False),
@@ -139,11 +132,11 @@ def rise(run: RunSummary) -> slice:
 
 
 def mechanism(run: RunSummary, task: Task, first_rollout: Column) -> Mechanism:
-    """Which mechanism was at work when the cost of a run rose.
+    """The mechanism by which the cost of a run rose.
 
     Args:
         run: one that went wrong.
-        task: what it was trained in.
+        task: of its training.
         first_rollout: states of theta_init's rollout without noise, shape (K + 1, n).
     """
     window = rise(run)
@@ -163,7 +156,7 @@ def overshot(run: RunSummary, window: slice) -> bool:
 
 
 def over_predicted(run: RunSummary, window: slice) -> bool:
-    """Whether the network predicted too much: see `OVER_PREDICTED`; False for who has none."""
+    """Whether the network predicted too much: see `OVER_PREDICTED`; False without a network."""
     bias, delta = run.episodes["bias"][window], run.episodes["delta"][window]
     known = np.isfinite(bias) & np.isfinite(delta)
     share = paper.GAMMA * bias[known].sum() / delta[known].sum() if known.any() else 0.0
@@ -187,11 +180,11 @@ def cut_short(run: RunSummary, window: slice) -> bool:
 
 
 def ending(states: Column, task: Task) -> Ending:
-    """How a rollout ended, the worst that can be said of it.
+    """How a rollout ended; the worst of several endings.
 
     Args:
         states: shape (K + 1, n); nan from a failed solve on.
-        task: what the robot moves in.
+        task: the robot's.
     """
     if np.isnan(states).any():
         return Ending.FAILED

@@ -1,8 +1,8 @@
-"""What was found, in a few numbers: whether a gap closed, theta_c by hand, and how RDES ended.
+"""The main finding in a few numbers: closed gaps, theta_c set by hand, and how RDES ended.
 
 theta_c tightens the obstacle constraint, Eq. (2f). A gap that the first rollout goes through closes
-at a theta_c that is known before anything is trained (`trajectory.closes_at`). Each run of ES and
-GES is sorted by the theta_c that it ends with, which is known only afterwards.
+at a theta_c that is known before training (`trajectory.closes_at`). Runs of ES and GES are sorted
+by their final theta_c, which is known only after training.
 """
 
 from collections.abc import Mapping
@@ -29,27 +29,27 @@ Count: TypeAlias = tuple[int, int]  # yes, of
 
 @dataclass(frozen=True)
 class Finding:
-    """What the published study found, in counts of runs or layouts, and in shares of the cost."""
+    """Counts of runs or layouts of the published study, and shares of the cost."""
 
-    arrived_open: Count  # runs of `LEARNERS` that solve their layout, every gap being open
-    arrived_closed: Count  # such runs, theta_c having closed a gap
-    open_in: tuple[str, ...]  # the layouts of the former
-    closed_in: tuple[str, ...]  # and of the latter
-    learned: float  # median reduction of the noise-free cost by the former
-    by_hand: Count  # layouts that are solved with theta_c = d_o and all else as it was
-    better: Count  # of these, where that costs less than each run of `LEARNERS` ends at
+    arrived_open: Count  # runs of `LEARNERS` with open gaps that solve their layout
+    arrived_closed: Count  # such runs with a closed gap
+    open_in: tuple[str, ...]  # layouts of the runs with open gaps
+    closed_in: tuple[str, ...]  # and of those with a closed one
+    learned: float  # median reduction of the noise-free cost by runs with open gaps that solve it
+    by_hand: Count  # layouts that theta_init with theta_c = d_o solves
+    better: Count  # of these, layouts where it costs less than any run of `LEARNERS` in the end
     saved_by_hand: float  # median of these layouts
-    lost_by_hand: tuple[float, float]  # least and most that it costs more in the others
+    lost_by_hand: tuple[float, float]  # least and largest increase of the cost in the others
     saved_there: float  # median of the runs in the layouts that are solved
     stopped: Count  # runs of RDES, with noise that decays per episode
     stopped_early: int  # of these, within `EARLY` episodes
     stopped_per_step: Count  # the same with noise that decays per step
     early_per_step: int
-    not_there: Mapping[str, Count]  # runs that did not end at the target, of some learners
-    above: Mapping[str, Count]  # runs that end at a higher cost than theta_init's
-    worse: Mapping[str, Count]  # and by more than `BETTER`
+    not_there: Mapping[str, Count]  # by learner, runs that did not end at the target
+    above: Mapping[str, Count]  # runs with a higher final cost than theta_init's
+    worse: Mapping[str, Count]  # runs whose cost is higher by more than `BETTER`
     seconds: float  # of one core, a run of ES with the compiled solver
-    hours: float  # that the robot moves in a run
+    hours: float  # of the robot's motion in a run
 
 
 def finding(found: Published) -> Finding | None:
@@ -101,7 +101,7 @@ def _with_gaps(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _stopped(main: pd.DataFrame, decay: str) -> tuple[Count, int]:
-    """How many runs of RDES were stopped in one reading, and how many of these within `EARLY`."""
+    """Stopped runs of RDES in one reading, and how many were stopped within `EARLY` episodes."""
     rdes = main[(main.learner == "RDES") & (main.decay == decay)]
     stopped = rdes[was_stopped(rdes)]
     early = int((stopped.steps_done <= EARLY * paper.STEPS).sum())
@@ -109,7 +109,7 @@ def _stopped(main: pd.DataFrame, decay: str) -> tuple[Count, int]:
 
 
 def _by_hand(layout: str) -> tuple[float, bool]:
-    """The reduction of the cost with theta_c = d_o, and whether that solves the layout."""
+    """The reduction of the cost with theta_c = d_o, and whether it solves the layout."""
     task = paper.task(layout)
     before, after = (_rollout(layout, c) for c in (paper.THETA_INIT[THETA_C], task.margin))
     saved = 1 - after.cost / before.cost
@@ -117,7 +117,7 @@ def _by_hand(layout: str) -> tuple[float, bool]:
 
 
 def _rollout(layout: str, theta_c: float) -> Rollout:
-    """Without noise, with theta_init but for theta_c."""
+    """A rollout without noise with theta_init and another theta_c."""
     theta = np.array([*paper.THETA_INIT[:THETA_C], theta_c])
     return evaluate(Persistent(paper.nmpc(layout)), theta, paper.STEPS)
 

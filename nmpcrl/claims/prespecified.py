@@ -1,10 +1,9 @@
-"""When the thresholds and the rule were fixed, as anybody can check: a commit, and its date.
+"""The commit that fixed the thresholds and the rule, and the definitions that came later.
 
-They were fixed in the first commit since which every committed state of the code has had each of
-`NUMBERS`, by name and value, as it is today; what surrounds them may have moved. The commit is kept
-with the published data, and a test asks git whether it is still the one. What is asked of the
-population of layouts came later and stands in `population_questions`; of remedies, in
-`remedy_questions`.
+It is the first commit since which every committed state of the code has had each of `NUMBERS`, by
+name and value, as it is today; the code around them may have changed. The manifest of the published
+data names it, and a test compares it with git. The questions of an investigation are registered by
+the commit that the manifest names for it.
 """
 
 from collections.abc import Mapping
@@ -14,23 +13,13 @@ from typing import Any
 from nmpcrl.analysis import metrics
 from nmpcrl.claims import rule, thresholds
 
-HOMES = {  # where the thresholds stand, and the numbers of the rule for shares
-    thresholds: (
-        "DIVERGED",
-        "UNSTABLE",
-        "HALF",
-        "SAME_TIME",
-        "SAME_PATH",
-        "SAME_COST",
-        "MORE_ACCURATE",
-        "BETTER",
-        "NEAR_HALF",
-        "NEAR_SAME_TIME",
-    ),
-    rule: ("MAJORITY", "NEARLY_ALL", "NEARLY_NONE"),
-    metrics: ("TOUCH",),
+MODULES = {  # with the thresholds, and the numbers of the rule for shares
+    thresholds: "DIVERGED UNSTABLE HALF SAME_TIME SAME_PATH SAME_COST MORE_ACCURATE BETTER"
+    " NEAR_HALF NEAR_SAME_TIME",
+    rule: "MAJORITY NEARLY_ALL NEARLY_NONE",
+    metrics: "TOUCH",
 }
-NUMBERS = {name: getattr(home, name) for home, names in HOMES.items() for name in names}
+NUMBERS = {name: getattr(home, name) for home, names in MODULES.items() for name in names.split()}
 
 
 @dataclass(frozen=True)
@@ -43,13 +32,13 @@ class Commit:
 
 @dataclass(frozen=True)
 class Decision:
-    """A definition that came after the thresholds, which stayed as they were."""
+    """A definition that came after the thresholds, which did not change."""
 
     commit: str
     date: str  # as in `Commit`
     when: str  # what had been seen by then
-    what: str  # is decided otherwise, in a sentence
-    moved: str  # what became otherwise by it, in a sentence
+    what: str  # the definition, in a sentence
+    moved: str  # its effect, in a sentence
 
 
 SINCE = (  # in the order in which they were made
@@ -126,14 +115,14 @@ SINCE = (  # in the order in which they were made
 
 @dataclass(frozen=True)
 class Fixed:
-    """The commit in which the thresholds were fixed, and the one in which runs were published."""
+    """The commit that fixed the thresholds, and the one that published the first runs."""
 
     thresholds: Commit
-    published: Commit  # the first runs; the thresholds' commit is an ancestor of it
+    published: Commit  # a descendant of the other
 
 
 def fixed(about: Mapping[str, Any]) -> Fixed | None:
-    """When the thresholds were fixed; unknown if that was said of other numbers than today's.
+    """The two commits; None if the manifest has other numbers than today's.
 
     Args:
         about: of `published.load()`.

@@ -28,7 +28,7 @@ from nmpcrl.bench.learners import ratio
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import assumptions, thetas
 from nmpcrl.claims.assumptions import Measured
-from nmpcrl.claims.failure_modes import failure_mode, failure_modes, went_wrong
+from nmpcrl.claims.failure_modes import FAILURE_MODE, failure_mode, failure_modes, went_wrong
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import CLAIMS
 from nmpcrl.claims.rule import Claim, Observations
@@ -45,7 +45,6 @@ from nmpcrl.study.records import Column
 __all__ = ["Damaged", "Published", "Unpublishable", "extend", "load", "place", "publish"]
 
 RUNS, SEARCHES, TIMINGS = "runs", "searches", "timings"
-FAILURE_MODE = ["ending", "wrong", "mechanism", "episode"]  # columns; frozen arms have none
 COLUMNS = (*FIELDS, *OUTCOME, "variant", "key", *FAILURE_MODE)
 AUDITED = Experiment("GES")  # the run in which the assumptions of C8 are measured
 
@@ -177,7 +176,7 @@ def publish(
     """
     labels = {e: {"variant": variants[e], "key": summary_key(e)} for e in summaries}
     runs = pd.DataFrame([row(one) | labels[e] for e, one in summaries.items()])
-    runs = runs.join(failure_modes_of(summaries))
+    runs = runs.join(failure_modes(summaries))
     arrays = _curves(list(summaries.values())) | thetas.packed(summaries, variants)
     measured = {"audit": asdict(audit)} if audit else {}
     store.write(RUNS, runs, arrays, batch=_batch(runs) | measured, anew=True)
@@ -239,15 +238,6 @@ def _row_beside(found: Published, e: Experiment, one: RunSummary, part: str) -> 
     (wrong,) = went_wrong(pd.DataFrame([made | {"cost_ratio": ratio}]))
     mode = failure_mode(one, wrong, found.summaries[arm].states)
     return made | {"variant": part, "key": summary_key(e)} | mode
-
-
-def failure_modes_of(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
-    """`FAILURE_MODE` of each run, in order; the frozen arms have none."""
-    learned = [e for e in summaries if e.learner != "frozen"]
-    modes = failure_modes(summaries)[FAILURE_MODE].to_dict("records")
-    known = dict(zip(learned, modes, strict=True))
-    none = {"ending": "", "wrong": "", "episode": pd.NA, "mechanism": ""}
-    return pd.DataFrame([known.get(e, none) for e in summaries], columns=FAILURE_MODE)
 
 
 def _curves(summaries: list[RunSummary]) -> dict[str, Column]:

@@ -1,10 +1,9 @@
-"""Robustness analysis: what becomes of each verdict when one choice of the study is another.
+"""Robustness: each verdict when one choice that the paper leaves open is made differently.
 
-The choices are those that the paper leaves open (a multiverse analysis, Steegen et al. 2016). A row
-of the map is a layout, a reading of the decay, or a variant of the plan; a column is a claim that
-runs decide. A cell has the outcome there and says whether it differs from the outcome that it is
-compared with: a layout or a reading is compared with the whole main table, a variant with the main
-table in the same cells of layout, decay and seed.
+This is a multiverse analysis (Steegen et al. 2016). A row of the map is a layout, a reading of the
+decay, or a variant of the design; a column is a claim that runs decide. A cell has the outcome
+there beside another: a layout or a reading is compared with the complete main table, a variant with
+the main table in the same cells of layout, decay and seed.
 """
 
 from collections.abc import Hashable, Iterable
@@ -27,7 +26,7 @@ PARTS = {"layout": "B", "decay": "C"}  # of the main table, with the departures 
 
 
 def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
-    """The map: the main table as a whole, its parts (`part_changes`), and `variant_changes`.
+    """The map: the complete main table, its parts (`part_changes`), and `variant_changes`.
 
     Args:
         runs: of `rows.table`, with a column `variant`.
@@ -37,7 +36,18 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
         `COLUMNS` after `departure`, a letter of `DEPARTURES` or "".
     """
     verdicts = judge_runs(runs[runs.variant == design.MAIN_TABLE], paths)
-    whole = pd.DataFrame([_whole(verdict) for verdict in verdicts])
+    whole = pd.DataFrame(
+        {
+            "variant": WHOLE,
+            "claim": one.claim,
+            "outcome": one.outcome,
+            "base": one.outcome,
+            "changes": False,
+            "share": np.nan if one.share is None else one.share,
+            "pairs": one.counts["all"][1],
+        }
+        for one in verdicts
+    )
     rows = [whole, part_changes(verdicts), variant_changes(runs, paths)]
     found = pd.concat(rows, ignore_index=True)
     found.insert(0, "departure", found.variant.map(departure))
@@ -45,12 +55,12 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
 
 def not_run(runs: pd.DataFrame) -> tuple[str, ...]:
-    """The variants of the plan that there is no run of."""
+    """The variants of the design without a run."""
     return tuple(name for name in design.VARIANTS if name not in set(runs.variant))
 
 
 def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The runs behind a row of the map, and those that it is compared with.
+    """The runs behind a row of the map, and the runs that it is compared with.
 
     Args:
         runs: as `robustness_map` takes them.
@@ -66,18 +76,10 @@ def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame
 
 
 def departure(variant: str) -> str:
-    """The letter of the departure that a row of the map reads otherwise, or ""."""
+    """The letter of the departure that a row of the map changes, or ""."""
     if variant in design.VARIANTS:
         return design.VARIANTS[variant].departure
     return "" if variant == WHOLE else PARTS[_part(variant)[0]]
-
-
-def _whole(verdict: Verdict) -> dict[str, Any]:
-    """The row of the whole main table, which changes nothing."""
-    named = {"variant": WHOLE, "claim": verdict.claim, "outcome": verdict.outcome}
-    share = np.nan if verdict.share is None else verdict.share
-    pairs = verdict.counts["all"][1]
-    return named | {"base": verdict.outcome, "changes": False, "share": share, "pairs": pairs}
 
 
 def _part(variant: str) -> tuple[str, str]:
@@ -86,19 +88,18 @@ def _part(variant: str) -> tuple[str, str]:
     return words[0], words[-1]
 
 
-# `base` is the outcome that `outcome` is compared with; `changes` says that both are decided and
-# differ; `share` and `base_share` are of yes; `pairs` answered; `p` is the chance of shares so
-# different if the choice changed nothing (Fisher's exact test, as if runs were independent). A
-# layout has none: its runs hardly differ from seed to seed, so that it is one observation.
+# `outcome` is compared with `base`; `changes` holds if both are decided and differ; `share` and
+# `base_share` are of yes; `pairs` is the number of answers; `p` is the probability of shares so
+# different without an effect (Fisher's exact test, as if runs were independent). A layout has no p:
+# its runs hardly differ from seed to seed, so that it is one observation.
 COLUMNS = ("variant", "claim", "outcome", "base", "changes", "share", "base_share", "pairs", "p")
 
 
 def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
-    """The outcome of every claim in every variant, beside that of the main table's same cells.
+    """The outcome of every claim in every variant, beside the same cells of the main table.
 
-    A learner of the paper that a variant does not run is one that it does not change, so its runs
-    of the main table stand in for it. A claim that asks none of the changed learners has no row,
-    for it cannot change, and neither have the controls, which change no learner of the paper.
+    A variant runs only the learners of the paper that it changes; the others' runs come from the
+    main table. A claim that asks none of the changed learners has no row, nor have the controls.
 
     Args:
         runs: of `rows.table`, with a column `variant`.
@@ -124,31 +125,30 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
 
 def part_changes(verdicts: Iterable[Verdict]) -> pd.DataFrame:
-    """The outcome of every claim in each layout and reading of the decay, beside that of all.
+    """The outcome of every claim in each layout and reading of the decay, beside the overall one.
 
-    It changes a verdict only where the verdict depends on it: see `Verdict.depends_on`.
+    A part changes a verdict only if the verdict depends on it: see `Verdict.depends_on`.
 
     Returns:
-        `COLUMNS`; `base` is the outcome over the whole table, `base_share` the share in its rest.
+        `COLUMNS`; `base` is the overall outcome, `base_share` the share in the other parts.
     """
     rows = []
     for verdict in (one for one in verdicts if one.counts):
         all_yes, all_of = verdict.counts["all"]
-        for field, words, outcomes in (
-            ("layout", "layout", verdict.by_layout),
-            ("decay", "decay per", verdict.by_decay),
-        ):
-            for name, outcome in outcomes.items():
-                yes, of = verdict.counts[name]
-                rest = Cell(verdict.outcome, all_yes - yes, all_of - of)
-                row = _row(f"{words} {name}", verdict.claim, Cell(outcome, yes, of), rest)
-                row["changes"] = row["changes"] and verdict.depends_on(field)
-                rows.append(row | ({"p": np.nan} if field == "layout" else {}))
+        parts = [("layout", f"layout {name}", name) for name in verdict.by_layout]
+        parts += [("decay", f"decay per {name}", name) for name in verdict.by_decay]
+        for field, variant, name in parts:
+            yes, of = verdict.counts[name]
+            outcome = (verdict.by_layout | verdict.by_decay)[name]
+            rest = Cell(verdict.outcome, all_yes - yes, all_of - of)
+            row = _row(variant, verdict.claim, Cell(outcome, yes, of), rest)
+            row["changes"] = row["changes"] and verdict.depends_on(field)
+            rows.append(row | ({"p": np.nan} if field == "layout" else {}))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
 class Cell(NamedTuple):
-    """An outcome and the answers that it rests on."""
+    """An outcome and its answers."""
 
     outcome: Outcome
     yes: int

@@ -1,12 +1,11 @@
-"""The thresholds that claims are judged by, and the numbers of runs that they are compared with.
+"""The thresholds of the claims, and the numbers of runs that are compared with them.
 
-The thresholds, and the rule in `rule` by which the answers of many runs become a verdict,
-were fixed while the study was being trained and before any claim was put to it, and are
-not to be moved after. A first study, of two seeds in layout A, had been seen by then.
-# departure P
+The thresholds, and the rule of `rule` by which answers become a verdict, were fixed while the study
+was being trained and before any claim was tested on it, and stay as they are. A first study, of two
+seeds in layout A, had been seen by then.  # departure P
 
-A run that got stuck, hit an obstacle, failed or left the box answers like any other: its cost is
-what it is, and infinite where a solve failed or training had to be stopped.
+A run that got stuck, hit an obstacle, failed or left the box answers like any other. Its cost is
+infinite where a solve failed or training was stopped.
 """
 
 from collections.abc import Mapping
@@ -21,7 +20,7 @@ from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records, Stopped
 from nmpcrl.study.store import Runs
 
-# A run diverged if it had to be stopped, or if its training cost over the last 20 episodes has a
+# A run diverged if it was stopped, or if its training cost over the last 20 episodes has a
 # median above this multiple of the frozen arm's under the same noise.
 DIVERGED = 1.5
 # A run is unstable if it diverged, or if its noise-free cost ranges over more than this share of
@@ -48,7 +47,7 @@ NEAR_SAME_TIME = (0.8, 1.25)
 
 
 def was_stopped(runs: pd.DataFrame) -> pd.Series:
-    """Whether training had to be stopped; False for a run that is missing."""
+    """Whether training was stopped; False for a missing run."""
     return runs.stopped.notna() & (runs.stopped != Stopped.FINISHED)
 
 
@@ -58,36 +57,33 @@ def training_cost_ratio(runs: pd.DataFrame) -> pd.Series:
 
 
 def divergence(runs: pd.DataFrame) -> pd.Series:
-    """Which runs diverged (see `DIVERGED`); missing where there is nothing to compare them with."""
+    """Which runs diverged (see `DIVERGED`); missing without a frozen arm for comparison."""
     ratio = training_cost_ratio(runs)
     return (ratio > DIVERGED).astype("boolean").where(ratio.notna())
 
 
 def late_cost_range(runs: pd.DataFrame) -> pd.Series:
-    """Range of the noise-free cost over theta_init's; infinite where the run diverged.
-
-    nan where it is not known whether it diverged.
-    """
+    """Range of the noise-free cost over theta_init's; infinite for divergence, nan if unknown."""
     gone = divergence(runs)
     return runs.late_cost_range.mask(gone.fillna(False).astype(bool), np.inf).where(gone.notna())
 
 
 def instability(runs: pd.DataFrame) -> pd.Series:
-    """Which runs are unstable (see `UNSTABLE`); missing where that is not known."""
+    """Which runs are unstable (see `UNSTABLE`); missing where unknown."""
     numbers = late_cost_range(runs)
     return (numbers > UNSTABLE).astype("boolean").where(numbers.notna())
 
 
 def cost_reduction(runs: pd.DataFrame) -> pd.Series:
-    """Share of theta_init's noise-free cost by which each run's is lower in the end.
+    """Share of theta_init's noise-free cost that each run saves in the end.
 
-    Minus infinity where a rollout failed, and where training had to be stopped.
+    Minus infinity where a rollout failed or training was stopped.
     """
     return (1 - runs.final_cost / runs.initial_cost).mask(was_stopped(runs), -np.inf)
 
 
 def improves(runs: pd.DataFrame) -> pd.Series:
-    """Which runs end at a noise-free cost that is lower than theta_init's by at least `BETTER`."""
+    """Which runs end at a noise-free cost below theta_init's by at least `BETTER`."""
     return cost_reduction(runs) >= BETTER
 
 
@@ -102,13 +98,11 @@ def solved(runs: pd.DataFrame) -> pd.Series:
 
 
 def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
-    """Share of the reduction that is possible in its layout that each run achieves in the end.
-
-    1 is as good as what is possible and 0 as theta_init; nan where nothing is known to be possible.
+    """The reduction of each run over the possible one in its layout; nan where that is unknown.
 
     Args:
         runs: of `rows.table`.
-        possible: by which share of theta_init's noise-free cost it can be lowered, by layout.
+        possible: by layout, the share of theta_init's noise-free cost that can be saved.
     """
     known = {layout: share for layout, share in possible.items() if share > 0}
     return cost_reduction(runs) / runs.layout.map(known).astype(float)
@@ -117,14 +111,14 @@ def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.S
 def cost_difference(first: pd.DataFrame, second: pd.DataFrame) -> pd.Series:
     """Final noise-free cost of the first arm minus the second's, in shares of theta_init's.
 
-    Two that failed cost the same.
+    Two failed runs cost the same.
     """
     more = (first.final_cost - second.final_cost) / first.initial_cost
     return more.where(first.final_cost != second.final_cost, 0.0)
 
 
 def path_distance(first: Column | None, second: Column | None) -> float:
-    """Largest distance [m] of two trajectories at the same time; nan where one is missing."""
+    """Largest distance [m] of two trajectories at the same time; nan if one is missing."""
     if first is None or second is None:
         return np.nan
     return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))

@@ -1,23 +1,22 @@
-"""When the thresholds were fixed: what is published of it, compared with the history."""
+"""The commits that fixed the thresholds and published the runs, compared with git."""
 
 import ast
 import re
 import subprocess
-from pathlib import Path
 
 import fixed_questions
 import pytest
-from fixed_questions import no_history
+from fixed_questions import ROOT, no_history
 
 from nmpcrl.claims import prespecified, published
 from nmpcrl.claims.prespecified import NUMBERS, SINCE, Commit, Fixed, fixed
+from nmpcrl.study import published as store
 
-ROOT = Path(__file__).resolve().parents[2]
 ASSIGNED = f"^({'|'.join(NUMBERS)}) = "
 
 
 def git(*arguments: str) -> str:
-    """What git says of this project; without its whole history, as `no_history` says."""
+    """The output of git in UTC; 1, for nothing found, is no failure."""
     asked = ["git", "-C", str(ROOT), *arguments]
     done = subprocess.run(asked, capture_output=True, text=True, env={"TZ": "UTC", "LC_ALL": "C"})
     if done.returncode > 1:
@@ -33,7 +32,7 @@ def history():
 
 @pytest.mark.usefixtures("history")
 @pytest.mark.parametrize("required", ["CI", "NMPCRL_REQUIRE_HISTORY", "ANYTHING_ELSE"])
-def test_without_the_history_questions_are_skipped_aloud(tmp_path, monkeypatch, required):
+def test_a_shallow_clone_skips_or_fails_these_tests(tmp_path, monkeypatch, required):
     for name in ("CI", "NMPCRL_REQUIRE_HISTORY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv(required, "true")
@@ -51,7 +50,7 @@ def commit(name: str) -> Commit:
 
 
 def numbers_in(state: str) -> dict:
-    """Those that were assigned at the left margin in a state of the code."""
+    """The numbers that were assigned at the left margin in a state of the code."""
     found = {}
     for line in git("grep", "-h", "-E", ASSIGNED, state, "--", "nmpcrl").splitlines():
         name, _, value = line.partition(" = ")
@@ -61,39 +60,32 @@ def numbers_in(state: str) -> dict:
 
 
 @pytest.mark.usefixtures("history")
-def test_every_state_since_the_commit_that_is_named_has_todays_numbers_and_the_one_before_not():
+def test_the_thresholds_are_those_of_the_named_commit_and_older_than_the_runs():
     found = fixed(published.load().about)
     changes = git("log", "--topo-order", "--format=%H", "-E", "-G", ASSIGNED, "--", "*.py").split()
     first = changes.index(found.thresholds.hash)
     assert all(numbers_in(state) == NUMBERS for state in changes[: first + 1])
     assert numbers_in(f"{found.thresholds.hash}^") != NUMBERS
-
-
-@pytest.mark.usefixtures("history")
-def test_the_thresholds_were_fixed_before_the_first_runs_were_published():
-    found = fixed(published.load().about)
     added = git("log", "--format=%H", "--diff-filter=A", "--", "book/published/runs.csv").split()
-    assert found.published.hash == added[-1]
+    assert found.published.hash == added[-1] == store.about("runs")["first"]["all"]
+    assert store.about("runs")["registered"] == found.thresholds.hash
     assert found.thresholds.hash in git("rev-list", found.published.hash).split()
     for one in (found.thresholds, found.published):
         assert commit(one.hash) == one
 
 
-def test_what_was_said_of_other_numbers_is_not_read(monkeypatch):
+@pytest.mark.usefixtures("history")
+@pytest.mark.parametrize("one", SINCE, ids=lambda one: one.commit)
+def test_each_later_decision_is_a_commit_of_that_date(one):
+    known = commit(one.commit)
+    assert known.hash.startswith(one.commit)
+    assert known.date == one.date
+    assert [one.date for one in SINCE] == sorted(one.date for one in SINCE)
+
+
+def test_other_numbers_have_no_commit(monkeypatch):
     about = published.load().about
     assert isinstance(fixed(about), Fixed)
     assert fixed({}) is None
     monkeypatch.setitem(prespecified.NUMBERS, "DIVERGED", 1.4)
     assert fixed(about) is None
-
-
-@pytest.mark.usefixtures("history")
-@pytest.mark.parametrize("one", SINCE, ids=lambda one: one.commit)
-def test_what_was_decided_later_is_a_commit_of_that_date(one):
-    known = commit(one.commit)
-    assert known.hash.startswith(one.commit)
-    assert known.date == one.date
-
-
-def test_decisions_are_listed_in_their_order():
-    assert [one.date for one in SINCE] == sorted(one.date for one in SINCE)
