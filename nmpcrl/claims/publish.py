@@ -1,4 +1,4 @@
-"""The study is published: with times and searches of this machine, or part by part."""
+"""Publication of the study with times and searches made on this machine."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +10,6 @@ from nmpcrl.bench.processes import time_learners_repeatedly
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import measured
 from nmpcrl.claims.paper_claims import judge_times
-from nmpcrl.claims.thetas import FOLLOWED
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.study.design import LAYOUTS
 from nmpcrl.study.experiment import Experiment
@@ -46,23 +45,3 @@ def publish_timing() -> tuple[Verdict, ...]:
     if UNDECIDABLE not in {verdict.outcome for verdict in judged}:
         published.republish(timings)
     return judged
-
-
-def publish_parts(
-    runs: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
-) -> Path:
-    """Publish some runs beside the published ones.
-
-    Args:
-        runs: of complete parts of the study that are not published yet.
-        variants: the part that each belongs to.
-
-    Raises:
-        Unpublishable: as `published.extend`.
-    """
-    further = {e: one for e, one in runs.items() if variants[e] not in FOLLOWED}
-    if len(further) < len(runs):
-        raise published.Unpublishable(
-            f"the parts {' and '.join(FOLLOWED)} are published with the whole study only"
-        )
-    return published.extend(further, variants)

@@ -10,7 +10,7 @@
 The verdicts are computed from these when they are read.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -177,7 +177,7 @@ def publish(
     labels = {e: {"variant": variants[e], "key": summary_key(e)} for e in summaries}
     runs = pd.DataFrame([row(one) | labels[e] for e, one in summaries.items()])
     runs = runs.join(failure_modes(summaries))
-    arrays = _curves(list(summaries.values())) | thetas.packed(summaries, variants)
+    arrays = _curves(summaries.values()) | thetas.packed(summaries, variants)
     measured = {"audit": asdict(audit)} if audit else {}
     store.write(RUNS, runs, arrays, batch=_batch(runs) | measured, anew=True)
     if timings is not None:
@@ -201,21 +201,21 @@ def extend(summaries: Mapping[Experiment, RunSummary], variants: Mapping[Experim
 
     Args:
         summaries: the runs.
-        variants: the part of the study that each belongs to: none of `thetas.FOLLOWED`.
+        variants: the part of the study that each belongs to.
 
     Returns:
         The folder.
 
     Raises:
         Damaged: a file is missing, or is not the file that was written.
-        Unpublishable: a run is published already, or its frozen arm is not published.
+        Unpublishable: a run is published already, or its frozen arm is not published, or its part
+            is published with the complete study only.
     """
-    found, curves = load(), store.arrays(RUNS)
+    found, before = load(), store.arrays(RUNS)
     runs = pd.DataFrame([_row_beside(found, e, one, variants[e]) for e, one in summaries.items()])
-    more = _curves(list(summaries.values()))
-    joined = {name: _below(curves[name], column) for name, column in more.items()}
     table = pd.DataFrame([*found.rows.values(), *runs.to_dict("records")])
-    store.write(RUNS, table, curves | joined, batch=_batch(runs))
+    curves = before | _curves(summaries.values(), before)
+    store.write(RUNS, table, curves, batch=_batch(runs))
     _load.cache_clear()
     return place()
 
@@ -229,6 +229,8 @@ def _batch(runs: pd.DataFrame) -> dict[str, Any]:
 def _row_beside(found: Published, e: Experiment, one: RunSummary, part: str) -> dict[str, Any]:
     """The row of a further run, with its failure mode beside the published frozen arm."""
     arm = frozen_arm(e)
+    if part in thetas.FOLLOWED:
+        raise Unpublishable(f"the part {part!r} is published with the complete study only")
     if e in found.rows:
         raise Unpublishable(f"{e} is published already, in the part {found.variants[e]!r}")
     if arm not in found.rows:
@@ -240,14 +242,23 @@ def _row_beside(found: Published, e: Experiment, one: RunSummary, part: str) -> 
     return made | {"variant": part, "key": summary_key(e)} | mode
 
 
-def _curves(summaries: list[RunSummary]) -> dict[str, Column]:
-    """Columns of all runs, padded with nan to one length; shape (runs, ...)."""
+def _curves(
+    summaries: Iterable[RunSummary], before: Mapping[str, Column] = MappingProxyType({})
+) -> dict[str, Column]:
+    """Columns of all runs below those of earlier runs, padded with nan; shape (runs, ...)."""
+    rows = [
+        {
+            "cost": one.episodes["cost"],
+            "judged_after": one.evaluations["episode"],
+            "judged_cost": one.evaluations["cost"],
+            "judged_theta": one.evaluations["theta"],
+            "states": one.states,
+        }
+        for one in summaries
+    ]
     return {
-        "cost": _padded([one.episodes["cost"] for one in summaries]),
-        "judged_after": _padded([one.evaluations["episode"] for one in summaries]),
-        "judged_cost": _padded([one.evaluations["cost"] for one in summaries]),
-        "judged_theta": _padded([one.evaluations["theta"] for one in summaries]),
-        "states": _padded([one.states for one in summaries]),
+        name: _padded([*before.get(name, ()), *(columns[name] for columns in rows)])
+        for name in rows[0]
     }
 
 
@@ -282,17 +293,3 @@ def _outline_of(
         None,
         {"stopped": row["stopped"], "seconds": row["seconds"]},
     )
-
-
-def _below(first: Column, second: Column) -> Column:
-    """Two arrays, one below the other, padded with nan to one length."""
-    length = max(first.shape[1], second.shape[1])
-    padded = (
-        np.pad(
-            one,
-            [(0, 0), (0, length - one.shape[1]), *[(0, 0)] * (one.ndim - 2)],
-            constant_values=np.nan,
-        )
-        for one in (first, second)
-    )
-    return np.concatenate([*padded])

@@ -7,7 +7,7 @@ the main table in the same cells of layout, decay and seed.
 """
 
 from collections.abc import Hashable, Iterable
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -20,6 +20,8 @@ from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
 from nmpcrl.study.experiment import PAPER
+
+Judged: TypeAlias = tuple[Outcome, tuple[int, int]]  # with yes and all answers
 
 WHOLE = "main table"
 PARTS = {"layout": "B", "decay": "C"}  # of the main table, with the departures they read
@@ -36,18 +38,9 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
         `COLUMNS` after `departure`, a letter of `DEPARTURES` or "".
     """
     verdicts = judge_runs(runs[runs.variant == design.MAIN_TABLE], paths)
-    whole = pd.DataFrame(
-        {
-            "variant": WHOLE,
-            "claim": one.claim,
-            "outcome": one.outcome,
-            "base": one.outcome,
-            "changes": False,
-            "share": np.nan if one.share is None else one.share,
-            "pairs": one.counts["all"][1],
-        }
-        for one in verdicts
-    )
+    overall = [(one.claim, (one.outcome, one.counts["all"])) for one in verdicts]
+    unlike = {"base_share": np.nan, "p": np.nan}  # nothing is compared
+    whole = pd.DataFrame([_row(WHOLE, claim, of, of) | unlike for claim, of in overall])
     rows = [whole, part_changes(verdicts), variant_changes(runs, paths)]
     found = pd.concat(rows, ignore_index=True)
     found.insert(0, "departure", found.variant.map(departure))
@@ -110,7 +103,7 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     """
     paper = runs[runs.learner.isin(PAPER)]
     rows = []
-    bases: dict[Hashable, Cell] = {}  # many variants have the same cells
+    bases: dict[Hashable, Judged] = {}  # many variants have the same cells
     for name in paper.variant[paper.variant != MAIN_TABLE].unique():
         after, before = groups(paper, name)
         asked = frozenset(before[CELL].itertuples(index=False, name=None))
@@ -140,41 +133,29 @@ def part_changes(verdicts: Iterable[Verdict]) -> pd.DataFrame:
         for field, variant, name in parts:
             yes, of = verdict.counts[name]
             outcome = (verdict.by_layout | verdict.by_decay)[name]
-            rest = Cell(verdict.outcome, all_yes - yes, all_of - of)
-            row = _row(variant, verdict.claim, Cell(outcome, yes, of), rest)
+            rest = verdict.outcome, (all_yes - yes, all_of - of)
+            row = _row(variant, verdict.claim, (outcome, (yes, of)), rest)
             row["changes"] = row["changes"] and verdict.depends_on(field)
             rows.append(row | ({"p": np.nan} if field == "layout" else {}))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-class Cell(NamedTuple):
-    """An outcome and its answers."""
-
-    outcome: Outcome
-    yes: int
-    of: int
-
-    @property
-    def share(self) -> float:
-        """Share of yes; nan without answers."""
-        return self.yes / self.of if self.of else np.nan
-
-
-def _settled(claim: RunClaim, runs: pd.DataFrame, paths: Paths) -> Cell:
+def _settled(claim: RunClaim, runs: pd.DataFrame, paths: Paths) -> Judged:
     verdict = claim.settled(Observations(runs, paths))
-    return Cell(verdict.outcome, *verdict.counts["all"])
+    return verdict.outcome, verdict.counts["all"]
 
 
-def _row(variant: str, claim: str, judged: Cell, base: Cell) -> dict[str, Any]:
-    answers = [[cell.yes, cell.of - cell.yes] for cell in (judged, base)]
+def _row(variant: str, claim: str, judged: Judged, base: Judged) -> dict[str, Any]:
+    (outcome, (yes, of)), (other, (base_yes, base_of)) = judged, base
+    answers = [[yes, of - yes], [base_yes, base_of - base_yes]]
     return {
         "variant": variant,
         "claim": claim,
-        "outcome": judged.outcome,
-        "base": base.outcome,
-        "changes": differ(judged.outcome, base.outcome),
-        "share": judged.share,
-        "base_share": base.share,
-        "pairs": judged.of,
-        "p": float(stats.fisher_exact(answers).pvalue) if judged.of and base.of else np.nan,
+        "outcome": outcome,
+        "base": other,
+        "changes": differ(outcome, other),
+        "share": yes / of if of else np.nan,
+        "base_share": base_yes / base_of if base_of else np.nan,
+        "pairs": of,
+        "p": float(stats.fisher_exact(answers).pvalue) if of and base_of else np.nan,
     }

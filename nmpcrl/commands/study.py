@@ -89,9 +89,10 @@ def study(
         click.echo(f"{publish_runs(found)}: published")
         _judge_population()
     elif publish:
-        from nmpcrl.claims.publish import publish_parts, publish_study
+        from nmpcrl.claims.publish import publish_study
+        from nmpcrl.claims.published import extend
 
-        place = (publish_parts if parts else publish_study)(found, wanted)
+        place = (extend if parts else publish_study)(found, wanted)
         click.echo(f"{place}: published")
         _judge()
     if len(found) < len(wanted):

@@ -148,22 +148,18 @@ def test_further_runs_are_added_and_the_published_ones_stay(known, folder):
 
 
 @pytest.mark.parametrize(
-    ("experiment", "refusal"),
+    ("experiment", "part", "refusal"),
     [
-        (RUNS[0], "is published already, in the part 'main'"),
-        (replace(FURTHER, seed=7), "the frozen arm of ES .* is not published"),
+        (RUNS[0], "N = 2", "is published already, in the part 'main'"),
+        (replace(FURTHER, seed=7), "N = 2", "the frozen arm of ES .* is not published"),
+        (FURTHER, "controls", "'controls' is published with the complete study only"),
     ],
 )
-def test_runs_that_cannot_stand_beside_the_others_are_refused(known, experiment, refusal):
+def test_runs_that_cannot_stand_beside_the_others_are_refused(known, experiment, part, refusal):
     made = summarise(run(experiment))
     with pytest.raises(Unpublishable, match=refusal):
-        published.extend({experiment: made}, {experiment: "main"})
+        published.extend({experiment: made}, {experiment: part})
     assert list(load().rows) == list(RUNS)
-
-
-def test_the_main_table_and_the_controls_are_published_as_a_whole_only():
-    with pytest.raises(Unpublishable, match="with the whole study only"):
-        publish.publish_parts({Experiment(): None}, {Experiment(): "main"})
 
 
 @pytest.mark.parametrize("name", ["runs.csv", "runs.npz", "searches.csv", "timings.csv"])
