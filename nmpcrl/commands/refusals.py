@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 INSTEAD = {  # of commands that earlier versions had
+    "agents": "use `nmpcrl investigate agents`",
     "clean": "delete files in the folder of the runs yourself",
     "compare": "read two runs with `nmpcrl.study.fetch` and compare their tables",
     "completion": "click writes the script: `_NMPCRL_COMPLETE=bash_source nmpcrl`",
