@@ -213,7 +213,7 @@ class Investigation:
         """Seconds of processor time that the missing rows of a part take."""
         known, one = self.known(), self.parts[part]
         known = known[known.part == part]
-        means = known.groupby("arm").seconds.mean() if len(known) else {}
+        means = known.groupby("arm").seconds.mean().dropna() if len(known) else {}
         asked = (each.arm for each in self.missing(part))
         return float(sum(means.get(arm, one.seconds * one.episodes) for arm in asked))
 

@@ -27,7 +27,6 @@ PROBLEMS = 100_000  # of a sweep
     type=int,
     help=f"Solve N drawn problems, {PROBLEMS:,} by default, and count the outcomes.",
 )
-@click.option("--problems", is_flag=True, help="Run the problems of Chapter 10 anew.")
 @click.option("--sizes", is_flag=True, help="Only time problems of many sizes, and beside mpcrl.")
 def bench(
     length: str,
@@ -35,7 +34,6 @@ def bench(
     publish: bool,
     live: bool,
     sweep: int | None,
-    problems: bool,
     sizes: bool,
 ) -> None:
     """Measure how long solves, steps and runs take.
@@ -53,12 +51,6 @@ def bench(
         from nmpcrl.bench import sweep as sweeps
 
         click.echo(f"{sweeps.sweep(sweep)}\n{sweeps.path()}: stored")
-    elif problems:
-        from nmpcrl.analysis import other_problems
-
-        for said, true in other_problems.make().predictions().values():
-            click.echo(f"{'yes' if true else 'no '}  {said}")
-        click.echo(f"{other_problems.path()}: stored")
     elif sizes:
         from nmpcrl.bench import problem_times
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 BOOK = {  # the investigations of the book: module and name of each
     "agents": ("agents", "SAC_AND_TD3"),
+    "other_problems": ("other_problems", "OTHER_PROBLEMS"),
     "worlds": ("worlds", "WORLDS"),
 }
 
@@ -29,8 +30,8 @@ def investigate(
 ) -> None:  # fmt: skip
     """Make and judge the rows of an investigation.
 
-    NAME is one of the book's (agents, worlds), or a Python file that defines one
-    Investigation. Each row is stored as soon as it is made, so a run can be
+    NAME is one of the book's (agents, other_problems, worlds), or a Python file
+    that defines one Investigation. Each row is stored as soon as it is made, so a run can be
     interrupted and started again.
 
     \b

@@ -6,7 +6,7 @@ import click
 import pytest
 from raising import raising
 
-from nmpcrl.analysis import other_problems, summaries
+from nmpcrl.analysis import summaries
 from nmpcrl.bench import live, problem_times, suite, sweep
 from nmpcrl.claims import publish, published, reproduce
 from nmpcrl.commands import main
@@ -26,7 +26,7 @@ LONG = (  # replaced by a refusal
     *((summaries, "fetch_summaries"), (cluster, "executor"), (executor, "processes")),
     (jobs, "processes"),
     *((publish, "publish_timing"), (reproduce, "relock")),
-    *((other_problems, "make"), (problem_times, "make"), (suite, "measure")),
+    *((problem_times, "make"), (suite, "measure")),
     *((suite, "read_or_measure"), (sweep, "sweep"), (live, "measure")),
 )
 
@@ -85,7 +85,7 @@ def test_no_command_line_ends_in_a_traceback(fast):
     [
         *("train", "study", "verify --sample 1", "show ES", "suite --policy ES"),
         "investigate worlds --part moving",
-        *("bench", "bench --sweep 5", "bench --live", "bench --problems", "bench --sizes"),
+        *("bench", "bench --sweep 5", "bench --live", "bench --sizes"),
     ],
 )
 def test_the_refusals_stand_where_the_commands_look(fast, line):

@@ -17,7 +17,6 @@ import numpy as np
 import pandas as pd
 from plain_values import array, plain, plain_name, processor, short, table
 
-from nmpcrl.analysis import other_problems
 from nmpcrl.analysis.difficulty import raised_cost
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.suite import seed_of
@@ -43,9 +42,10 @@ from nmpcrl.claims import (
     whole_picture,
     wider_claims,
 )
+from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.report import baselines, whole_study
 from nmpcrl.report import worlds as world_report
-from nmpcrl.studies import agents, worlds
+from nmpcrl.studies import agents, other_problems, worlds
 from nmpcrl.study import design, paper, provenance
 from nmpcrl.study.drawn import JUDGE, LAYOUTS, SCENARIOS, TUNE
 from nmpcrl.study.experiment import PAPER
@@ -90,7 +90,7 @@ suite = cache(lambda: remedy_published.load().table)
 trained = cache(lambda: agents.SAC_AND_TD3.table())
 changing = cache(lambda: worlds.WORLDS.table())
 again = cache(interventions.load)
-problems = cache(lambda: other_problems.read(published.place() / other_problems.FILE))
+problems = cache(lambda: other_problems.runs(other_problems.OTHER_PROBLEMS.table()))
 every = cache(lambda: evidence.gather("published", variants=True))
 six_paths = cache(lambda: evidence.paths(every()))
 
@@ -532,29 +532,30 @@ def costs() -> Any:
             "ended": int(np.isfinite(tests).sum()),
             "tests": array(tests),
         }
-        for arm, tests in problems().tests().items()
+        for arm, tests in problems().tests.items()
     }
 
 
 @entry("problems")
 def predictions() -> Any:
-    return {name: true for name, (_, true) in problems().predictions().items()}
+    answers = other_problems.OTHER_PROBLEMS.answers(other_problems.OTHER_PROBLEMS.table())
+    return {name: one.outcome == REPRODUCED for name, one in answers.items()}
 
 
 @entry("problems")
 def references() -> Any:
-    return problems().references
+    rows = other_problems.OTHER_PROBLEMS.table().query("part == 'references'").set_index("arm")
+    return {**problems().references, "theta": rows.theta["best_theta"]}
 
 
 @entry("problems")
 def spread_of_solvers() -> Any:
     runs = problems().spreads
-    frame = pd.DataFrame({name: [getattr(one, name) for one in runs] for name in
-                          ("before", "nudged", "after")})  # fmt: skip
-    for solver in runs[0].peers:
-        frame[solver] = [one.peers[solver] for one in runs]
-        frame[f"{solver}, steps"] = [one.made[solver] for one in runs]
-    gaps = np.array([one.gap for one in runs])
+    frame = runs[["before", "nudged", "after"]].copy()
+    for solver in other_problems.PEERS:
+        frame[solver] = runs[solver]
+        frame[f"{solver}, steps"] = runs[f"steps of {solver}"]
+    gaps = np.array([*runs.gap])
     return {"median": frame.median(), "mean": frame.mean(), "gap": np.median(gaps, axis=0)}
 
 
@@ -564,6 +565,14 @@ def sweep_of_drawn_problems() -> Any:
 
 
 # What is published, as it is loaded.
+
+
+def _columns(rows: pd.DataFrame, names: str) -> pd.DataFrame:
+    """Columns as they were frozen: seeds by that name, series as tuples."""
+    found = rows.rename(columns={"k": "seed"})[names.split()].copy()
+    for name in {"costs", "theta", "gap"} & {*found}:
+        found[name] = found[name].map(tuple)
+    return found
 
 
 @entry("tables")
@@ -581,10 +590,10 @@ def tables() -> Any:
         "remedies": suite(),
         "agents": trained(),
         "worlds": changing(),
-        "other problems": pd.DataFrame(map(vars, problems().courses)),
-        "spread of solvers": pd.DataFrame([{**vars(one), "peers": [*one.peers.values()],
-                                            "made": [*one.made.values()]}
-                                           for one in problems().spreads]),
+        "other problems": _columns(problems().courses, "arm seed costs test theta"),
+        "spread of solvers": _columns(
+            problems().spreads, "seed peers made before nudged after gap"
+        ),
         "times by size": times.sizes,
         "times beside mpcrl": times.peers,
         "searches": pd.DataFrame([vars(one) | vars(two) for one, two in study().searches.items()]),

@@ -7,10 +7,15 @@ from registered import INVESTIGATIONS
 from nmpcrl.claims.investigation import Condition, rounded
 
 DRAWN = 5
+CHAOTIC = "other_problems"  # its runs magnify 1e-10 to 1e-4: its own test compares their beginning
 
 
 @pytest.mark.weekly
-@pytest.mark.parametrize("investigation", INVESTIGATIONS, ids=lambda one: one.name)
+@pytest.mark.parametrize(
+    "investigation",
+    [one for one in INVESTIGATIONS if one.name != CHAOTIC],
+    ids=lambda one: one.name,
+)
 def test_drawn_rows_made_afresh_are_the_published_ones(investigation):
     table = investigation.table()
     order = np.random.default_rng(0).permutation(len(table))[:DRAWN]

@@ -1,19 +1,18 @@
 """Figures of other people's problems: learners and what was possible, solvers, and known truths."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from nmpcrl import Vector
-from nmpcrl.analysis.other_problems import OtherProblems, References
-from nmpcrl.analysis.solver_spread import Spread
 from nmpcrl.analysis.statistics import interquartile_mean
-from nmpcrl.analysis.wrong_model import ARMS, WINDOW
 from nmpcrl.report.figures.axes import below, jitter
 from nmpcrl.report.figures.style import INK, LIMIT, LOOKS, TEAL, WINE, Look, headed, page, subplots
+from nmpcrl.studies.other_problems import ARMS, PEERS, WINDOW, Runs
 
 OWN = {
     "LSTD-Q, every step": Look(WINE, (0, (3, 1, 1, 1)), "p"),
@@ -30,11 +29,11 @@ NAMES = {  # of what the learners are compared with, and how far above its line 
 
 
 @page
-def courses(found: OtherProblems) -> Figure:
+def courses(found: Runs) -> Figure:
     """Cost of a training step, by arm: interquartile mean of the seeds, with its interval."""
     figure, axes = subplots(height=3.6, tall=3.2)
     for arm, look in ARM_LOOKS.items():
-        runs = np.array([one.costs for one in found.courses if one.arm == arm])
+        runs = np.array([*found.courses.costs[found.courses.arm == arm]])
         steps = WINDOW * (np.arange(runs.shape[1]) + 0.5)
         estimates = [interquartile_mean(window, ["all"] * len(window)) for window in runs.T]
         value, low, high = (
@@ -44,37 +43,37 @@ def courses(found: OtherProblems) -> Figure:
         axes.fill_between(steps, low, high, color=look.color, alpha=0.15, linewidth=0)
         axes.plot(steps, value, label=arm, **look.line)
     _lines(axes, found.references)
-    axes.set(yscale="log", ylim=(0.7 * found.references.best_policy, MOST))
+    axes.set(yscale="log", ylim=(0.7 * found.references["best_policy"], MOST))
     axes.set(xlabel="learning step", ylabel="cost of a step [-]")
     below(figure, axes.get_legend_handles_labels()[0])
     return headed(figure, _first(found))
 
 
 @page
-def ends(found: OtherProblems) -> Figure:
+def ends(found: Runs) -> Figure:
     """Cost without noise on the action of each seed's last theta, beside what is possible."""
     figure, axes = subplots(height=3.4, tall=3.4)
-    for place, (arm, costs) in enumerate(found.tests().items()):
+    for place, (arm, costs) in enumerate(found.tests.items()):
         look, shown = ARM_LOOKS[arm], np.minimum(np.sort(costs), MOST)
         where = place + jitter(len(costs), 0.3)
         axes.plot(shown, where, look.marker, color=look.color, markersize=3)
         axes.plot(np.median(shown), place, "|", color="black", markersize=20)
     for (name, (label, _)), dashes in zip(NAMES.items(), ("--", "-.", ":"), strict=True):
-        value = getattr(found.references, name)
+        value = found.references[name]
         axes.axvline(value, label=label, color="0.35", linewidth=0.9, linestyle=dashes)
     axes.set_yticks(range(len(ARMS)), list(ARMS), fontsize="small")
     axes.invert_yaxis()
     axes.set(xscale="log", xlabel="cost of a step [-]")
-    axes.set_xlim(0.8 * found.references.best_policy, 1.3 * MOST)
+    axes.set_xlim(0.8 * found.references["best_policy"], 1.3 * MOST)
     below(figure, axes.get_legend_handles_labels()[0])
-    lost = sum(int((costs >= MOST).sum()) for costs in found.tests().values())
+    lost = sum(int((costs >= MOST).sum()) for costs in found.tests.values())
     return headed(figure, f"{lost} of {len(found.courses)} runs end at {MOST:g} or more")
 
 
-def _lines(axes: Axes, references: References) -> None:
+def _lines(axes: Axes, references: "pd.Series[float]") -> None:
     """What the learners are compared with."""
     for name, (label, above) in NAMES.items():
-        value = getattr(references, name)
+        value = references[name]
         axes.axhline(value, **LIMIT)
         axes.annotate(
             label, (0.99, value), (0, above), xycoords=("axes fraction", "data"),
@@ -82,23 +81,24 @@ def _lines(axes: Axes, references: References) -> None:
         )  # fmt: skip
 
 
-def _first(found: OtherProblems) -> str:
+def _first(found: Runs) -> str:
     """The title: which arm ends lowest, and at how much of what was possible."""
-    medians = {arm: float(np.median(costs)) for arm, costs in found.tests().items()}
+    medians = {arm: float(np.median(costs)) for arm, costs in found.tests.items()}
     least = min(medians, key=medians.__getitem__)
-    times = medians[least] / found.references.best_policy
+    times = medians[least] / found.references["best_policy"]
     return f"{least} ends lowest, at {times:.1f} times the cost of the best policy"
 
 
 @page
-def spreads(found: Sequence[Spread]) -> Figure:
+def spreads(found: Runs) -> Figure:
     """J of each seed by solver and order, and how a difference in theta grows."""
     figure, (left, right) = subplots(1, 2, height=3.2)
+    table = found.spreads
     columns = {
-        "mpcrl,\nIpopt": [one.peers["ipopt"] for one in found],
-        "mpcrl,\nIpopt 1e-10": [one.peers["ipopt, 1e-10"] for one in found],
-        "ours,\nits order": [one.before for one in found],
-        "ours,\nnewest theta": [one.after for one in found],
+        "mpcrl,\nIpopt": table[PEERS[0]],
+        "mpcrl,\nIpopt 1e-10": table[PEERS[1]],
+        "ours,\nits order": table.before,
+        "ours,\nnewest theta": table.after,
     }
     for seed in zip(*columns.values(), strict=True):
         left.plot(range(len(columns)), seed, color="0.55", linewidth=0.6)
@@ -106,14 +106,14 @@ def spreads(found: Sequence[Spread]) -> Figure:
         left.plot(place, np.mean(costs), "_", color=WINE, markersize=24, markeredgewidth=2.5)
     left.set_xticks(range(len(columns)), list(columns), fontsize="small")
     left.set(ylabel="J of 100 steps", title="each seed, and the mean")
-    gaps = np.array([one.gap for one in found])
+    gaps = np.array([*table.gap])
     steps = np.arange(1, gaps.shape[1] + 1)
     low, middle, high = np.quantile(gaps, (0.1, 0.5, 0.9), axis=0)
     right.fill_between(steps, low, high, color=TEAL, alpha=0.2, linewidth=0)
     right.semilogy(steps, middle, color=TEAL)
     right.set(xlabel="learning step", ylabel="difference of theta", title="from 1e-10 on")
     apart = np.abs(np.divide(columns["mpcrl,\nIpopt"], columns["mpcrl,\nIpopt 1e-10"]) - 1)
-    order = np.mean([one.after for one in found]) / np.mean([one.before for one in found]) - 1
+    order = table.after.mean() / table.before.mean() - 1
     return headed(
         figure,
         f"A tolerance moves J of one seed by up to {apart.max():.0%}, and the order of update and"

@@ -1,0 +1,329 @@
+"""Learners on the example of Gros and Zanon (2020), and what the choice of a solver moves there.
+
+Part "learners": every arm meets the same disturbance and noise of a seed. Step sizes were chosen
+with three other seeds, from three to six values each; the one of "LSTD-Q, every step" is that of
+mpcrl's example. Part "references": costs of a step that the learners are compared with.
+
+Part "spread": mpcrl's Q-learning with several solvers, then ours with the same disturbances. Its
+step of Newton has the outer product of one gradient for a Hessian, and 1e-3 of the identity:
+
+    theta <- theta + 0.05 delta phi / (1e-3 + |phi|^2).
+
+mpcrl acts with what it planned before that step: the order "before". `train` plans anew: "after".
+
+The questions were written down before the seeds were run.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from nmpcrl import Matrix, Vector
+from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, Row
+from nmpcrl.claims.verdict import NOT, REPRODUCED
+from nmpcrl.control import Nmpc, SolverError
+from nmpcrl.learning import (
+    Diverged,
+    Exploration,
+    Learner,
+    Weights,
+    expected_sarsa,
+    frozen,
+    gradient_tdc,
+    lstd_q,
+    policy_gradient,
+    q_learning,
+    td_error,
+    train,
+)
+from nmpcrl.study.problems import grid
+from nmpcrl.study.problems import gros_zanon as gz
+
+STEPS, WINDOW = 1000, 50  # of a run, and those whose costs are averaged
+DEVIATION = 0.05  # of the normal noise that is added to the action
+SEEDS = 50
+EPISODES, EPISODE = 20, 100  # of a test: no noise on the action
+TEST_SEED = 10**6  # its disturbances, the same for all
+POINTS, INPUTS = 161, 121  # of the grid on which the best policy is found
+BUDGET, SPREAD = 400, 0.05  # thetas that the search tries, and how far from the start it begins
+SEARCH_EPISODES, SEARCH_SEED = 10, 2 * 10**6  # of the cost that the search sees
+PEER_STEPS = 100  # of mpcrl's own test, whose seed is 69
+RATE, RIDGE = 0.05, 1e-3
+NUDGE = 1e-10  # of theta as it begins
+PEERS = ("ipopt", "ipopt, 1e-10", "fatrop")
+
+ARMS: Mapping[str, Callable[[Nmpc], Learner]] = {
+    "frozen": frozen,
+    "LSTD-Q, every step": lambda nmpc: lstd_q(nmpc, 0.05, every=1),
+    "LSTD-Q, batches of 20": lambda nmpc: lstd_q(nmpc, 0.02, every=20),
+    "QL": lambda nmpc: q_learning(nmpc, 1e-4),
+    "ES": lambda nmpc: expected_sarsa(nmpc, 1e-4),
+    "TDC": lambda nmpc: gradient_tdc(nmpc, 1e-4, 1e-4),
+    "DPG": lambda nmpc: policy_gradient(nmpc, 1e-3, every=100),
+}
+
+
+def row(
+    test: float = np.nan,  # mean cost of a step without noise on the action, with the last theta
+    costs: Iterable[float] = (),  # mean over each window of training; infinite after divergence
+    theta: Iterable[float] = (),
+    peers: Iterable[float] = (),  # J of mpcrl by solver, of the steps it made,
+    made: Iterable[int] = (),  # and how many these are
+    before: float = np.nan,  # J of ours in mpcrl's order,
+    nudged: float = np.nan,  # the same from theta + NUDGE,
+    after: float = np.nan,  # and with the newest theta
+    gap: Iterable[float] = (),  # largest difference of theta after each step, nudged or not
+) -> Row:
+    """A row; columns that a part does not measure have these values."""
+    lists = {"costs": costs, "theta": theta, "peers": peers, "made": made, "gap": gap}
+    numbers = {"test": test, "before": before, "nudged": nudged, "after": after}
+    return {**numbers, **{name: [*map(_plain, one)] for name, one in lists.items()}}
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+@cache
+def controller() -> Nmpc:
+    """The plan that learns."""
+    return Nmpc(gz.problem())
+
+
+def learn(
+    make: Callable[[Nmpc], Learner], _: str, __: int, seed: int, *, steps: int = STEPS
+) -> Row:
+    """Train a learner for one episode, and test the theta that it ends with."""
+    nmpc, problem = controller(), gz.problem()
+    disturbance, noise = (np.random.default_rng([k, seed]) for k in (0, 1))
+    explore = Exploration(DEVIATION * noise.normal(size=(1, steps, 1)), np.ones((1, steps)))
+    costs, theta = np.full(steps, np.inf), problem.theta
+    weights = Weights(theta, np.zeros(theta.size))
+    world: dict[str, Any] = {"plant": gz.plant, "start": gz.START, "rng": disturbance}
+    try:
+        for step in train(make(nmpc), nmpc, weights, explore, **world):
+            costs[step.time], theta = step.cost, step.weights.theta
+        test = judge(theta)
+    except Diverged:
+        test = np.inf
+    windows = np.nan_to_num(costs, nan=np.inf).reshape(-1, min(WINDOW, steps)).mean(axis=1)
+    return row(test, windows, theta)
+
+
+def judge(theta: Vector, episodes: int = EPISODES, seed: int = TEST_SEED) -> float:
+    """Mean cost of a step of the plan's policy; infinite where a solve failed."""
+    plan = None
+
+    def act(state: Vector) -> Vector:
+        nonlocal plan
+        plan = controller().solve(state, theta, plan)
+        return plan.action
+
+    try:
+        return mean_cost(act, episodes, seed)
+    except (SolverError, ValueError):
+        return np.inf
+
+
+def mean_cost(
+    act: Callable[[Vector], Vector], episodes: int = EPISODES, seed: int = TEST_SEED
+) -> float:
+    """Mean cost of a step of any policy, over episodes of `EPISODE` steps from the start."""
+    rng, total = np.random.default_rng(seed), 0.0
+    for _ in range(episodes):
+        state = gz.START
+        for _ in range(EPISODE):
+            state, cost, _ = gz.plant(state, act(state), rng)
+            total += cost
+    return total / (episodes * EPISODE)
+
+
+def searched() -> Vector:
+    """The theta of the least mean cost that CMA-ES finds; it sees disturbances of its own."""
+    import cma  # takes a second
+
+    def cost(theta: Any) -> float:
+        return min(judge(np.asarray(theta), SEARCH_EPISODES, SEARCH_SEED), 1e6)
+
+    start = gz.problem(informed=True).theta
+    strategy, tried = cma.CMAEvolutionStrategy(start, SPREAD, {"seed": 1, "verbose": -9}), 0
+    while not strategy.stop() and tried < BUDGET:
+        asked = strategy.ask()
+        strategy.tell(asked, [cost(one) for one in asked])
+        tried += len(asked)
+    return np.asarray(strategy.result.xbest)
+
+
+def refer(theta: Callable[[], Vector] | None, *_: Any) -> Row:
+    """The test of a plan with some theta, or of the policy of dynamic programming."""
+    if theta is None:
+        return row(mean_cost(grid.best(points=POINTS, inputs=INPUTS).action))
+    found = theta()
+    return row(judge(found), theta=found)
+
+
+def spread(_: Any, __: str, ___: int, seed: int) -> Row:
+    """Q-learning with one seed, in every way."""
+    from nmpcrl.study.problems import peers  # takes seconds to import
+
+    runs = {solver: peers.run(solver, seed, PEER_STEPS) for solver in PEERS}
+    e = max((one.disturbances for one in runs.values()), key=len)
+    theta = gz.problem().theta
+    nudge = NUDGE * np.random.default_rng(seed).normal(size=theta.size)
+    costs, path = q_learn(theta, e)
+    near, near_path = q_learn(theta + nudge, e)
+    fresh, _ = q_learn(theta, e, newest=True)
+    return row(
+        peers=[one.costs.sum() for one in runs.values()],
+        made=[len(one.costs) for one in runs.values()],
+        before=float(costs.sum()),
+        nudged=float(near.sum()),
+        after=float(fresh.sum()),
+        gap=np.abs(near_path - path).max(axis=1),
+    )
+
+
+def q_learn(theta: Vector, e: Vector, *, newest: bool = False) -> tuple[Vector, Matrix]:
+    """Costs and thetas of Q-learning without exploration.
+
+    Args:
+        theta: to start with.
+        e: disturbance of each step.
+        newest: whether to plan anew after theta has moved, before acting.
+    """
+    nmpc, state, costs, path = controller(), gz.START, [], []
+    plan = nmpc.solve(state, theta)
+    for one in e:
+        if newest:
+            plan = nmpc.solve(state, theta, plan)
+        action = plan.action
+        solution = nmpc.solve(state, theta, plan, action)
+        costs.append(gz.cost(state, action))
+        state = gz.TRUE_A @ state + gz.TRUE_B @ action + np.array([one, 0.0])
+        plan = nmpc.solve(state, theta, plan)
+        delta = td_error(costs[-1], gz.GAMMA, solution.value, plan.value)
+        theta = normalised_step(theta, delta, solution.features)
+        path.append(theta)
+    return np.array(costs), np.array(path)
+
+
+def normalised_step(theta: Vector, delta: float, phi: Vector) -> Vector:
+    """theta + 0.05 delta phi / (1e-3 + |phi|^2)."""
+    moved: Vector = theta + RATE * delta * phi / (RIDGE + phi @ phi)
+    return moved
+
+
+class Runs(NamedTuple):
+    """The rows by part, as figures and pages use them."""
+
+    tests: dict[str, Vector]  # the last cost of each seed, by arm
+    courses: pd.DataFrame  # of the learners
+    references: "pd.Series[float]"  # test by arm
+    spreads: pd.DataFrame  # with a column for J of each of `PEERS`, and "steps of" each
+
+
+def runs(table: pd.DataFrame) -> Runs:
+    """The rows of a table by part."""
+    courses, references, spreads = (
+        table[table.part == part].reset_index(drop=True)
+        for part in ("learners", "references", "spread")
+    )
+    spreads[[*PEERS]] = [*spreads.peers]
+    spreads[[f"steps of {one}" for one in PEERS]] = [*spreads.made]
+    tests = {str(arm): each.to_numpy() for arm, each in courses.groupby("arm", sort=False).test}
+    return Runs(tests, courses, references.set_index("arm").test, spreads)
+
+
+def question(name: str, text: str, holds: Callable[[Runs], bool]) -> Question:
+    """A prediction; its answer is whether it came true."""
+
+    def answer(table: pd.DataFrame) -> Answer:
+        return Answer(REPRODUCED if holds(runs(table)) else NOT)
+
+    return Question(name, text, REPRODUCED, answer)
+
+
+def _below(found: Runs) -> bool:
+    informed = found.references["informed"]
+    return all((found.tests[arm] < informed).mean() >= 0.9 for arm in ("QL", "ES", "DPG"))
+
+
+def _medians(found: Runs) -> dict[str, float]:
+    return {arm: float(np.median(costs)) for arm, costs in found.tests.items()}
+
+
+def _no_optimum(found: Runs) -> bool:
+    learned = min(one for arm, one in _medians(found).items() if arm != "frozen")
+    return learned > 1.2 * float(found.references["best_policy"])
+
+
+def _stable(found: Runs) -> bool:
+    arms = ("QL", "ES", "TDC", "DPG")
+    return all(np.isfinite(found.tests[arm]).mean() >= 0.96 for arm in arms)
+
+
+def _single(found: Runs) -> bool:
+    apart = (found.spreads["ipopt"] / found.spreads["ipopt, 1e-10"] - 1).abs()
+    return bool(apart.median() > 0.005 and apart.max() > 0.03)
+
+
+def _near(first: str, second: str, within: float, found: Runs) -> bool:
+    return bool(abs(found.spreads[first].mean() / found.spreads[second].mean() - 1) < within)
+
+
+QUESTIONS = (
+    question("informed", "In at least 45 of 50 seeds QL, ES and DPG each end below the plan that"
+             " begins with the plant's A, B and mean disturbance.", _below),
+    question("every step", "The median of LSTD-Q at every step ends above that of QL.",
+             lambda found: _medians(found)["LSTD-Q, every step"] > _medians(found)["QL"]),
+    question("optimum", "No arm's median ends within 20 % of the best policy.", _no_optimum),
+    question("alike", "The medians of QL and ES differ by less than 30 %.",
+             lambda found: abs(_medians(found)["QL"] / _medians(found)["ES"] - 1) < 0.3),
+    question("stable", "At least 48 of 50 seeds of QL, ES, TDC and DPG end with a finite cost.",
+             _stable),
+    question("single", "Of two tolerances of Ipopt, the median seed's J differs by more than"
+             " 0.5 %, and some seed's by more than 3 %.", _single),
+    question("mean", "The means of J over the seeds differ by less than 1 %.",
+             partial(_near, "ipopt", "ipopt, 1e-10", 0.01)),
+    question("fatrop", "With fatrop mpcrl's agent stops before its 100th step in at least 45 of 50"
+             " seeds.",
+             lambda found: (found.spreads["steps of fatrop"] < PEER_STEPS).mean() >= 0.9),
+    question("ours", "Riccati in mpcrl's order has a mean J within 1 % of mpcrl's.",
+             partial(_near, "before", "ipopt, 1e-10", 0.01)),
+    question("chaos", "1e-10 in theta becomes more than 1e-4 within 100 steps in at least 45 of 50"
+             " seeds.", lambda found: (found.spreads.gap.map(max) > 1e-4).mean() >= 0.9),
+    question("order", "To act with the newest theta lowers J in at least 45 of 50 seeds.",
+             lambda found: (found.spreads.after < found.spreads.before).mean() >= 0.9),
+)  # fmt: skip
+
+
+def seed_of(_: str, k: int) -> int:
+    """The k-th seed."""
+    return k
+
+
+OTHER_PROBLEMS = Investigation(
+    name="other_problems",
+    parts={
+        "references": Part(
+            refer,
+            {
+                "wrong": lambda: gz.problem().theta,
+                "informed": lambda: gz.problem(informed=True).theta,
+                "best_theta": searched,
+                "best_policy": None,
+            },
+            ("Gros and Zanon",),
+            1,
+            seconds=60,
+        ),
+        "spread": Part(spread, {"Q-learning": None}, ("Gros and Zanon",), 1, SEEDS, seconds=5),
+        "learners": Part(learn, ARMS, ("Gros and Zanon",), 1, SEEDS, seconds=1),
+    },
+    questions=QUESTIONS,
+    seed=seed_of,
+    digits=7,
+)
