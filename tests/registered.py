@@ -9,9 +9,10 @@ from fixed_questions import git
 
 from nmpcrl.studies.agents import SAC_AND_TD3
 from nmpcrl.studies.other_problems import OTHER_PROBLEMS
+from nmpcrl.studies.remedies import REMEDIES
 from nmpcrl.studies.worlds import WORLDS
 
-INVESTIGATIONS = (SAC_AND_TD3, OTHER_PROBLEMS, WORLDS)
+INVESTIGATIONS = (SAC_AND_TD3, OTHER_PROBLEMS, REMEDIES, WORLDS)
 
 
 class _AtCommit(importlib.abc.MetaPathFinder, importlib.abc.Loader):

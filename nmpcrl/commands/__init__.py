@@ -9,7 +9,6 @@ from nmpcrl.commands.bench import bench
 from nmpcrl.commands.grade import grade
 from nmpcrl.commands.investigate import investigate
 from nmpcrl.commands.refusals import Commands
-from nmpcrl.commands.remedies import remedies
 from nmpcrl.commands.runs import runs
 from nmpcrl.commands.show import show
 from nmpcrl.commands.study import study
@@ -43,7 +42,6 @@ for command in (
     verify,
     bench,
     suite,
-    remedies,
     investigate,
     grade,
     wasm,

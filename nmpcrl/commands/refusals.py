@@ -11,6 +11,7 @@ INSTEAD = {  # of commands that earlier versions had
     "compare": "read two runs with `nmpcrl.study.fetch` and compare their tables",
     "completion": "click writes the script: `_NMPCRL_COMPLETE=bash_source nmpcrl`",
     "evaluate": "use `nmpcrl show`",
+    "remedies": "use `nmpcrl investigate remedies`",
     "world": "use `nmpcrl investigate worlds`",
 }
 

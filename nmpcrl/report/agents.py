@@ -6,13 +6,12 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
-from nmpcrl.claims import remedies
 from nmpcrl.claims.investigation import Answer
-from nmpcrl.claims.remedies import RemedyRow
 from nmpcrl.report.cited import Count, cited
 from nmpcrl.report.remedies import entry_named, share_shown
 from nmpcrl.report.tables import html_table
 from nmpcrl.report.text import listed, number
+from nmpcrl.studies import remedies
 from nmpcrl.studies.agents import (
     AGENTS,
     PARTS,
@@ -25,6 +24,7 @@ from nmpcrl.studies.agents import (
     rows,
     searched,
 )
+from nmpcrl.studies.remedies import RemedyRow
 from nmpcrl.study.drawn import JUDGE, TUNE
 
 BUDGET = PARTS["judge"].episodes
@@ -99,7 +99,7 @@ def row_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
         suite: the published comparison of remedies.
     """
     places = PARTS["judge"].places
-    there = (suite.part == SEARCHED[0]) & (suite.entry == SEARCH) & suite.layout.isin(places)
+    there = (suite.part == SEARCHED[0]) & (suite.entry == SEARCH) & suite.place.isin(places)
     search = remedies.row(SEARCHED[0], SEARCH, suite[there])
     header = ("Entry", "Share of the possible gain", "Solved", "Episodes", "CPU time")
     caption = f"Agents from nothing, and a search from hand-set weights, in {len(places)} layouts."

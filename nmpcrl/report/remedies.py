@@ -8,10 +8,12 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, rate
-from nmpcrl.claims.investigation import Answer
-from nmpcrl.claims.population_questions import WORDS
-from nmpcrl.claims.remedies import Advice, RemedyRow, rows, shares, solved
-from nmpcrl.claims.remedy_questions import (
+from nmpcrl.claims.investigation import WORDS, Answer
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.report.cited import cited
+from nmpcrl.report.tables import BADGES, html_table
+from nmpcrl.report.text import listed
+from nmpcrl.studies.remedies import (
     ADVICE,
     ADVISED,
     FIRST,
@@ -19,13 +21,14 @@ from nmpcrl.claims.remedy_questions import (
     NEVER,
     OPEN,
     PARTS,
-    REMEDY_QUESTIONS,
+    REMEDIES,
     SECOND,
+    Advice,
+    RemedyRow,
+    rows,
+    shares,
+    solved,
 )
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.report.cited import cited
-from nmpcrl.report.tables import BADGES, html_table
-from nmpcrl.report.text import listed
 
 COLOURS = {  # of a word, as of a verdict
     FIRST: REPRODUCED, SECOND: REPRODUCED, LATER: PARTLY, OPEN: UNDECIDABLE, NEVER: NOT,
@@ -68,7 +71,7 @@ def advice_table(advice: Iterable[Advice], caption: str) -> str:
         caption: of the table.
     """
     judged = (PARTS[part] for part in ADVISED)
-    budgets = (f"With {one.budget} episodes (seeds a layout: {one.seeds})" for one in judged)
+    budgets = (f"With {one.episodes} episodes (seeds a layout: {one.seeds})" for one in judged)
     header = ("Entry", "Try it", *budgets)
     return html_table(caption, header, map(_cells, advice), headed=True)
 
@@ -83,7 +86,7 @@ def named_table(table: pd.DataFrame, part: str) -> str:
     """One row an entry of a part, in HTML, the control among them; or that nothing is published.
 
     Args:
-        table: with `remedies.COLUMNS`.
+        table: of `REMEDIES`.
         part: with the few layouts that are shown one by one.
     """
     order = sorted(rows(table, part), key=lambda row: (-np.nan_to_num(row.gain.value), row.seconds))
@@ -91,10 +94,10 @@ def named_table(table: pd.DataFrame, part: str) -> str:
         return f"<p>Nothing is published yet of the part <em>{escape(part)}</em>.</p>"
     one = PARTS[part]
     caption = (
-        f"Share of the possible gain by layout with {one.budget} episodes, mean of {one.seeds}"
+        f"Share of the possible gain by layout with {one.episodes} episodes, mean of {one.seeds}"
         " seeds; in italics where not every seed solves the layout."
     )
-    header = ("Entry", *one.layouts, "Solved", "CPU time")
+    header = ("Entry", *one.places, "Solved", "CPU time")
     by = ((row, table[(table.part == part) & (table.entry == row.entry)]) for row in order)
     return html_table(caption, header, (_named(row, runs) for row, runs in by), headed=True)
 
@@ -205,7 +208,7 @@ def expectation_items(expected: Mapping[str, bool]) -> str:
 
 def answer_items(
     answers: Iterable[Answer],
-    questions: Mapping[str, Any] = REMEDY_QUESTIONS,
+    questions: Mapping[str, Any] = REMEDIES.asked,
     *,
     expected: bool = False,
 ) -> str:

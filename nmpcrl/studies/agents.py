@@ -19,9 +19,9 @@ import pandas as pd
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis import suite
 from nmpcrl.analysis.suite import HELD_OUT, TOLERANCE, Entry
-from nmpcrl.claims import remedies, remedy_published
 from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, share
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
+from nmpcrl.studies import remedies
 from nmpcrl.studies.agents_run import EVERY, SAC, TD3, THERE, curve, judged_in, require
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.storage.refusal import Refusal
@@ -243,7 +243,7 @@ def questions(compared: pd.DataFrame | None = None) -> tuple[Question, ...]:
 
     def beside(answer: Callable[..., Answer]) -> Callable[[pd.DataFrame], Answer]:
         def answered(table: pd.DataFrame) -> Answer:
-            known = remedy_published.load().table if compared is None else compared
+            known = remedies.REMEDIES.table() if compared is None else compared
             return answer(table, known)
 
         return answered
@@ -265,7 +265,7 @@ def answers(table: pd.DataFrame, compared: pd.DataFrame) -> dict[str, Answer]:
 def searched(compared: pd.DataFrame, part: str) -> pd.Series:
     """What the best search costs in each layout of a part, in parts of theta_init's."""
     runs = compared[(compared.part == part) & (compared.entry == SEARCH)]
-    return (runs.cost / runs.initial).groupby(runs.layout, sort=False).mean()
+    return (runs.cost / runs.initial).groupby(runs.place, sort=False).mean()
 
 
 def rows(table: pd.DataFrame, compared: pd.DataFrame) -> tuple[remedies.RemedyRow, ...]:
@@ -275,13 +275,13 @@ def rows(table: pd.DataFrame, compared: pd.DataFrame) -> tuple[remedies.RemedyRo
         table: of `SAC_AND_TD3`.
         compared: the published comparison, which has J_best of each layout.
     """
-    best = compared.groupby("layout").best.first()
+    best = compared.groupby("place").best.first()
     runs = table[(table.part == "judge") & table.place.isin(best.index)]
     last = pd.DataFrame(
         {
             "entry": agents_of(runs),
-            "name": runs.arm,
-            "layout": runs.place,
+            "arm": runs.arm,
+            "place": runs.place,
             "initial": [each[0] for each in runs.initial],
             "best": runs.place.map(best),
             "cost": [each[-1][0] for each in runs.costs],

@@ -26,7 +26,6 @@ from nmpcrl.analysis.suite import (
     seed_of,
     solved,
 )
-from nmpcrl.claims import remedy_published
 from nmpcrl.learning import Exploration, Weights, evaluate, expected_sarsa, train
 from nmpcrl.study import Experiment, ParameterError, paper, published, run
 from nmpcrl.study.drawn import JUDGE, SCENARIOS
@@ -268,9 +267,9 @@ def test_two_calls_give_the_same_judgements_but_for_their_time():
     "base", [pytest.param(one, marks=() if one in QUICK else pytest.mark.slow) for one in ENTRIES]
 )
 def test_an_entry_ends_where_the_published_one_did(base):
-    table = remedy_published.load().table
+    table = published.read("remedies")
     known = table[(table.part == "judge 50") & (table.entry == base)].iloc[0]
-    found = judge(entry(known["name"]), known.layout, seed_of(known.layout, known.k), 50)
+    found = judge(entry(known.arm), known.place, seed_of(known.place, known.k), 50)
     assert found.cost == pytest.approx(known.cost, rel=1e-4)
     assert (found.episodes, found.arrived) == (known.episodes, known.arrived)
 

@@ -5,15 +5,11 @@ from pathlib import Path
 import pytest
 from fixed_questions import assert_older, assert_unmoved
 
-from nmpcrl.claims import (
-    population_questions,
-    remedy_questions,
-)
+from nmpcrl.claims import population_questions
 
 # a file; its questions; how many there are, and how many have a pilot; what is published of them
 FIXED = [
     (population_questions, "QUESTIONS", (10, 7), ("population.csv",)),
-    (remedy_questions, "REMEDY_QUESTIONS", (10, 6), ("suite.json",)),
 ]
 each_file = pytest.mark.parametrize(("file", "name", "counts", "runs"), FIXED)
 

@@ -32,9 +32,6 @@ from nmpcrl.claims import (
     population_questions,
     prespecified,
     published,
-    remedies,
-    remedy_published,
-    remedy_questions,
     reproduce,
     robustness,
     rule,
@@ -45,7 +42,7 @@ from nmpcrl.claims import (
 from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.report import baselines, whole_study
 from nmpcrl.report import worlds as world_report
-from nmpcrl.studies import agents, other_problems, worlds
+from nmpcrl.studies import agents, other_problems, remedies, worlds
 from nmpcrl.study import design, paper, provenance
 from nmpcrl.study.drawn import JUDGE, LAYOUTS, SCENARIOS, TUNE
 from nmpcrl.study.experiment import PAPER
@@ -86,7 +83,7 @@ def write() -> None:
 # What is asked of below, loaded once.
 
 study, drawn = published.load, population_published.load
-suite = cache(lambda: remedy_published.load().table)
+suite = cache(lambda: remedies.REMEDIES.table())
 trained = cache(lambda: agents.SAC_AND_TD3.table())
 changing = cache(lambda: worlds.WORLDS.table())
 again = cache(interventions.load)
@@ -311,7 +308,7 @@ def the_raised_costs() -> Any:
 def expectations() -> Any:
     known = {
         "population": population_questions.QUESTIONS,
-        "remedies": remedy_questions.REMEDY_QUESTIONS,
+        "remedies": remedies.REMEDIES.asked,
         "agents": agents.SAC_AND_TD3.asked,
         "worlds": {one.name: one for one in worlds.WORLD_QUESTIONS},
         "terminal costs": {one.name: one for one in worlds.TERMINAL_QUESTIONS},
@@ -380,7 +377,7 @@ def which_runs_are_made_again() -> Any:
 
 @entry("remedies")
 def answers_on_remedies() -> Any:
-    return by_question(remedies.answers(suite()))
+    return by_question(remedies.REMEDIES.answers(suite()).values())
 
 
 @entry("remedies")
@@ -398,7 +395,7 @@ def what_was_expected() -> Any:
 def rows() -> Any:
     return {
         part: {one.entry: one for one in remedies.rows(suite(), part)}
-        for part in remedy_questions.PARTS
+        for part in [*remedies.PARTS][1:]
     }
 
 
@@ -587,7 +584,7 @@ def tables() -> Any:
         "drawn layouts": drawn().layouts.reset_index(),
         "where rollouts stop arriving": drawn().stops.reset_index(),
         "runs made again": again(),
-        "remedies": suite(),
+        "remedies": suite().rename(columns={"arm": "name", "place": "layout"}),
         "agents": trained(),
         "worlds": changing(),
         "other problems": _columns(problems().courses, "arm seed costs test theta"),

@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 from bs4 import BeautifulSoup
 
-from nmpcrl.claims.remedies import COLUMNS as COMPARED
 from nmpcrl.report.agents import finding, in_short, longer_table, panels, row_table, waiting
 from nmpcrl.studies.agents import AGENTS, CHECKPOINTS, PARTS, SAC_AND_TD3
 from nmpcrl.studies.agents_run import judged_in
+from nmpcrl.studies.remedies import REMEDIES
 from nmpcrl.study.drawn import JUDGE
 
 COLUMNS = SAC_AND_TD3.table().columns
@@ -42,12 +42,12 @@ def suite():
     """The search, at 0.95 of theta_init's cost, where half of what is possible is gained."""
     there = [("judge 50", layout) for layout in JUDGE] + [("named 50", "A")]
     rows = [
-        {"part": part, "entry": "Bayes", "name": "Bayes", "layout": layout, "initial": 100.0,
+        {"part": part, "entry": "Bayes", "arm": "Bayes", "place": layout, "initial": 100.0,
          "best": 90.0, "cost": 95.0, "arrived": True, "episodes": 50, "over": False,
          "seconds": 2.0}
         for part, layout in there
     ]  # fmt: skip
-    return pd.DataFrame(rows, columns=[*COMPARED])
+    return pd.DataFrame(rows, columns=REMEDIES.table().columns)
 
 
 def plain(text):

@@ -8,20 +8,7 @@ import pytest
 from bs4 import BeautifulSoup
 
 from nmpcrl.analysis.statistics import Estimate
-from nmpcrl.claims.population import Answer
-from nmpcrl.claims.remedies import COLUMNS, Advice, RemedyRow
-from nmpcrl.claims.remedy_questions import (
-    ADVICE,
-    ADVISED,
-    FIRST,
-    LATER,
-    NEVER,
-    OPEN,
-    PARTS,
-    REMEDY_QUESTIONS,
-    SECOND,
-    SETTINGS,
-)
+from nmpcrl.claims.investigation import Answer
 from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.report import remedies
 from nmpcrl.report.remedies import (
@@ -31,11 +18,25 @@ from nmpcrl.report.remedies import (
     in_short,
     rule,
 )
+from nmpcrl.studies.remedies import (
+    ADVICE,
+    ADVISED,
+    FIRST,
+    LATER,
+    NEVER,
+    OPEN,
+    PARTS,
+    REMEDIES,
+    SECOND,
+    SETTINGS,
+    Advice,
+    RemedyRow,
+)
 from nmpcrl.studies.worlds import WORLDS
 
 SHORT, LONG = ADVISED
 
-WORLD = {one.name: one for one in WORLDS.questions}
+WORLD = WORLDS.asked
 
 
 def row(entry, part=SHORT, gain=(0.8, 0.7, 0.9), name=None):
@@ -92,16 +93,16 @@ def runs():
     part = PARTS["named 50"]
     found = [
         {
-            "part": "named 50", "entry": entry, "name": entry, "layout": layout, "k": k,
+            "part": "named 50", "entry": entry, "arm": entry, "place": layout, "k": k,
             "initial": 100.0, "best": 80.0, "cost": cost, "arrived": cost < 90, "episodes": 50,
             "over": entry == "DES", "seconds": 0.5,
         }
         for entry, cost in (("ES", 110.0), ("SPSA", 84.0), ("DES", 200.0))
-        for layout in part.layouts
+        for layout in part.places
         for k in range(part.seeds)
     ]  # fmt: skip
-    table = pd.DataFrame(found, columns=[*COLUMNS])
-    table.loc[(table.entry == "ES") & (table.layout == "A") & (table.k == 0), "cost"] = np.inf
+    table = pd.DataFrame(found, columns=REMEDIES.table().columns)
+    table.loc[(table.entry == "ES") & (table.place == "A") & (table.k == 0), "cost"] = np.inf
     return table
 
 
@@ -154,10 +155,13 @@ def test_an_answer_stands_beside_its_pilot():
     name = "faster auxiliary weights"
     numbers = {"difference": -0.1, "low": -0.2, "high": -0.05}
     said = answer_items(
-        [Answer("guard", REPRODUCED, {"layouts": (14, 15)}), Answer(name, NOT, {}, numbers)]
+        [
+            Answer(REPRODUCED, {"layouts": (14, 15)}, question="guard"),
+            Answer(NOT, numbers=numbers, question=name),
+        ]
     )
     first, second = said.splitlines()
-    assert REMEDY_QUESTIONS["guard"].pilot in first
+    assert REMEDIES.asked["guard"].pilot in first
     assert "Confirmed: 14 of 15 layouts [70%, 99%]." in first
     assert "Contradicted: ; " not in second
     assert "the difference is −0.10 [−0.20, −0.05]" in second
@@ -166,29 +170,31 @@ def test_an_answer_stands_beside_its_pilot():
 
 def test_what_decides_comes_before_what_stands_beside_it():
     numbers = {"correlation": 0.35, "low": 0.02, "high": 0.6}
-    one = Answer("crowding", REPRODUCED, numbers=numbers, beside={"scenarios with any": (21, 40)})
+    beside = {"scenarios with any": (21, 40)}
+    one = Answer(REPRODUCED, numbers=numbers, beside=beside, question="crowding")
     said = answer_items([one], WORLD, expected=True)
     assert "Confirmed: the correlation is 0.35 [0.02, 0.60]; 21 of 40 scenarios with any." in said
 
 
 def test_two_questions_with_the_same_words_are_told_apart():
-    charts = [Answer(name, NOT) for name in WORLD if name.startswith("a chart")]
+    charts = [Answer(NOT, question=name) for name in WORLD if name.startswith("a chart")]
     cost, error = answer_items(charts, WORLD, expected=True).splitlines()
     assert "chart on the cost" in cost
     assert "chart on the TD error" in error
 
 
 def test_an_answer_that_was_not_expected_says_which_one_was():
-    both = [Answer("guard", one, {"layouts": (14, 15)}) for one in (REPRODUCED, NOT)]
+    both = [Answer(one, {"layouts": (14, 15)}, question="guard") for one in (REPRODUCED, NOT)]
     same, other = answer_items(both, expected=True).splitlines()
-    assert REMEDY_QUESTIONS["guard"].expected == REPRODUCED
+    assert REMEDIES.asked["guard"].expected == REPRODUCED
     assert other.endswith(" Expected: confirmed.")
     assert "Expected" not in same + answer_items(both)
 
 
 def test_an_answer_says_what_it_knows_of_single_layouts():
     numbers = {"CMA-ES in A": 0.984, "CMA-ES in F": 0.38, "ES in A": -0.53, "ES in F": -np.inf}
-    said = answer_items([Answer("search and learning", REPRODUCED, {"layouts": (9, 9)}, numbers)])
+    one = Answer(REPRODUCED, {"layouts": (9, 9)}, numbers, question="search and learning")
+    said = answer_items([one])
     assert (
         "9 of 9 layouts [70%, 100%]; CMA-ES has 0.98 in A, 0.38 in F; ES has −0.53 in A,"
         " a failed solve in F." in said
@@ -196,7 +202,8 @@ def test_an_answer_says_what_it_knows_of_single_layouts():
 
 
 def test_an_answer_without_counts_is_a_word():
-    said = answer_items([Answer("guard", NOT), Answer("guard", NOT, {"layouts": (0, 0)})])
+    both = [Answer(NOT, counts, question="guard") for counts in ({}, {"layouts": (0, 0)})]
+    said = answer_items(both)
     assert [line.split("** ")[1] for line in said.splitlines()] == [
         "Contradicted.", "Contradicted: 0 of 0 layouts."
     ]  # fmt: skip

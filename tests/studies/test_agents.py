@@ -21,7 +21,7 @@ from nmpcrl.studies.agents_run import EVERY, judged_in, trained_in
 from nmpcrl.study.drawn import JUDGE, TUNE
 
 COLUMNS = [*SAC_AND_TD3.table().columns]
-NOTHING = pd.DataFrame(columns=["part", "entry", "layout", "initial", "best", "cost"])
+NOTHING = pd.DataFrame(columns=["part", "entry", "place", "initial", "best", "cost"])
 
 
 def runs(part, agent, share, there="a", seen=None):
@@ -44,7 +44,7 @@ def runs(part, agent, share, there="a", seen=None):
 def suite(share=0.95, layouts=(*JUDGE,), part="judge 50"):
     """The best search."""
     return pd.DataFrame(
-        [{"part": part, "entry": "Bayes", "layout": one, "initial": 100.0, "best": 90.0,
+        [{"part": part, "entry": "Bayes", "place": one, "initial": 100.0, "best": 90.0,
           "cost": 100.0 * share + k} for one in layouts for k in (-1, 1)]
     )  # fmt: skip
 

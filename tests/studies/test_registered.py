@@ -4,12 +4,13 @@ import pytest
 from fixed_questions import git
 from registered import INVESTIGATIONS, module
 
-from nmpcrl.studies import agents, worlds
+from nmpcrl.studies import agents, remedies, worlds
 from nmpcrl.study import published
 
 # today's module; its investigation; commit, module and name of questions that were registered
 REGISTERED = [
     (agents, agents.SAC_AND_TD3, "2feab64", "nmpcrl.claims.agent_questions", "AGENT_QUESTIONS"),
+    (remedies, remedies.REMEDIES, "ebf53a4", "nmpcrl.claims.remedy_questions", "REMEDY_QUESTIONS"),
     (worlds, worlds.WORLDS, "cff09a0", "nmpcrl.claims.world_questions", "WORLD_QUESTIONS"),
     (worlds, worlds.WORLDS, "ff05118", "nmpcrl.claims.terminal_questions", "TERMINAL_QUESTIONS"),
 ]
@@ -50,6 +51,20 @@ def test_settings_and_parts_of_agents_are_those_registered():
         now = agents.PARTS[name]
         assert (now.places, now.seeds, now.episodes) == (old.places, old.seeds, old.budget)
         assert agents.CHECKPOINTS[name] == old.checkpoints
+
+
+def test_settings_parts_and_advice_of_remedies_are_those_registered():
+    then = module("ebf53a4", "nmpcrl.claims.remedy_questions")
+    for name in ("SETTINGS", "ADVICE", "EXPECTED_FIRST"):
+        assert [*getattr(remedies, name).items()] == [*getattr(then, name).items()]
+    assert [*remedies.PARTS] == ["best", *then.PARTS]
+    assert remedies.PARTS["best"].episodes == then.YARDSTICK
+    for name, old in then.PARTS.items():
+        now = remedies.PARTS[name]
+        assert (now.episodes, now.places, now.seeds) == (old.budget, old.layouts, old.seeds)
+        for entry in remedies.SETTINGS:
+            runs = [(layout, k) for layout in old.layouts_of(entry) for k in range(old.seeds)]
+            assert all(now.order(arm) == runs for arm in remedies.arms(entry))
 
 
 def test_parts_of_worlds_are_those_registered():

@@ -10,8 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from nmpcrl.analysis.suite import Judgement
-from nmpcrl.claims.remedies import Advice
-from nmpcrl.claims.remedy_questions import ADVISED, FIRST, NEVER, PARTS, SECOND
 from nmpcrl.report.figures.style import (
     AT_ONE,
     INK,
@@ -24,6 +22,7 @@ from nmpcrl.report.figures.style import (
     page,
     subplots,
 )
+from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, PARTS, SECOND, Advice
 
 COLOURS = {FIRST: TEAL, SECOND: TEAL, NEVER: WINE}  # others are in ink
 MARKS = {FIRST: "D", SECOND: "D", NEVER: "X"}  # others are round
@@ -100,7 +99,7 @@ def _panel(axes: Axes, advice: Sequence[Advice], part: str) -> None:
     axes.set_yticks(range(len(advice)), names, fontsize="small")
     axes.set(xlim=(LEAST, MOST), ylim=(len(advice) - 0.4, -0.6))
     axes.set(xlabel="share of the possible gain [-]")
-    axes.set_title(f"{PARTS[part].budget} episodes", fontsize="medium", fontweight="normal")
+    axes.set_title(f"{PARTS[part].episodes} episodes", fontsize="medium", fontweight="normal")
 
 
 def _mark(axes: Axes, y: int, one: Advice, part: str) -> None:

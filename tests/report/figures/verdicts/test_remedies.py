@@ -4,9 +4,8 @@ import numpy as np
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.analysis.suite import Judgement
-from nmpcrl.claims.remedies import Advice, RemedyRow
-from nmpcrl.claims.remedy_questions import ADVISED, FIRST, NEVER, SECOND
 from nmpcrl.report.figures.verdicts.remedies import DEAREST, by_budget, gains
+from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, SECOND, Advice, RemedyRow
 
 
 def row(entry, part, *gain):

@@ -1,0 +1,265 @@
+"""The comparison of remedies: made-up rows whose shares, advice and answers are known by hand."""
+
+import cloudpickle
+import numpy as np
+import pandas as pd
+import pytest
+
+from nmpcrl.analysis import suite
+from nmpcrl.analysis.suite import ENTRIES, LAYOUTS, Judgement
+from nmpcrl.claims.investigation import rounded
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.studies import remedies, worlds
+from nmpcrl.studies.remedies import (
+    ADVISED,
+    FIRST,
+    LATER,
+    NEVER,
+    OPEN,
+    PARTS,
+    REMEDIES,
+    SECOND,
+    SETTINGS,
+    YARDSTICK,
+    NotTuned,
+    advice,
+    arms,
+    best_setting,
+    expectations,
+    greatest,
+    rows,
+    shares,
+    solved,
+)
+from nmpcrl.study.drawn import JUDGE, TUNE
+
+RUN = {
+    "part": "judge 50", "entry": "ES", "arm": "ES", "place": "J001", "k": 0, "initial": 4000.0,
+    "best": 3000.0, "cost": 3500.0, "arrived": True, "episodes": 50, "over": False, "seconds": 1.0,
+}  # fmt: skip
+PILOT = {"part": "named 300", "place": "A", "cost": 3470.0}
+HALF = np.r_[np.zeros(10), np.full(10, 0.1)]
+MIXED = np.tile([0.1, -0.1], 10)
+
+
+def table(*some):
+    return pd.DataFrame([RUN | one for one in some])
+
+
+def block(entry, part="judge 50", gains=0.5, arm=None, layouts=20, **fields):
+    """One run a layout, whose share of the possible gain is given, alike or layout by layout."""
+    given = np.broadcast_to(gains, layouts)
+    where = PARTS[part].places[:layouts]
+    return [
+        {"entry": entry, "arm": arm or entry, "part": part, "place": place,
+         "cost": 4000 - 1000 * share} | fields
+        for place, share in zip(where, given, strict=True)
+    ]  # fmt: skip
+
+
+def tune(entry, *gains, **fields):
+    """The tuning of an entry, by setting."""
+    settings = zip(arms(entry), gains, strict=False)
+    return [one for arm, gain in settings for one in block(entry, "tune", gain, arm, 15, **fields)]
+
+
+@pytest.mark.parametrize(
+    ("runs", "share", "well"),
+    [
+        ([{}, {"k": 1, "cost": 3100.0}], [0.7], [True]),  # seeds are averaged first
+        ([{}, {"k": 1, "cost": np.inf}], [-np.inf], [False]),  # a failed solve is infinitely bad
+        ([{"cost": 2900.0}], [1.1], [True]),  # the search for J_best is no bound
+        ([{}, {"place": "J002", "best": 3981.0}], [0.5], [True, True]),  # hardly any is possible
+        ([{}, {"place": "J002", "best": 3979.0}], [0.5, 500 / 21], [True, True]),
+        ([{"cost": 4000.0}], [0.0], [True]),
+        ([{"cost": 4000.1}], [-1e-4], [False]),  # it costs more than before
+        ([{}, {"k": 1, "arrived": False}], [0.5], [False]),  # under every seed
+    ],
+)
+def test_what_is_gained_and_what_is_solved(runs, share, well):
+    found = table(*runs)
+    assert shares(found).tolist() == pytest.approx(share)
+    assert solved(found).tolist() == well
+    (one,) = rows(found, "judge 50")
+    assert (one.layouts, one.left_out) == (len(well), len(well) - len(share))
+
+
+def test_the_best_setting_has_the_greatest_gain_and_is_the_first_of_equal_ones():
+    assert best_setting(table(*tune("ES", 0.2, -np.inf, 0.4, 0.4))) == "ES[alpha=3e-07]"
+    assert best_setting(table(*tune("ES", -np.inf))) == "ES"
+
+
+@pytest.mark.parametrize(
+    ("blocks", "expected"),
+    [
+        ([block("ES", over=True), block("ES", "judge 300")], []),  # beyond its budget
+        ([block("frozen", gains=0.9)], []),
+        # the greatest lower end, and not the greatest value
+        ([block("CMA-ES", gains=np.r_[np.full(6, 0.1), np.full(14, 1.0)]),
+          block("SPSA", gains=0.8), block("ES", gains=0.3)],
+         [("SPSA", FIRST), ("CMA-ES", SECOND), ("ES", LATER)]),
+        # ties at 50 episodes go by the lower end at 300, and then by time
+        ([block("SPSA", gains=0.801), block("CMA-ES", gains=0.799),
+          block("ES", gains=0.8, seconds=9), block("SPSA", "judge 300", 0.5),
+          block("CMA-ES", "judge 300", 0.9), block("ES", "judge 300", 0.5)],
+         [("CMA-ES", FIRST), ("SPSA", SECOND), ("ES", LATER)]),
+        # never: below 0 at every budget; open: not above 0 at one
+        ([block("DPG", gains=-0.5), block("DPG", "judge 300", -0.2), block("ES", gains=-0.5),
+          block("ES", "judge 300", 0.2)], [("ES", OPEN), ("DPG", NEVER)]),
+        # the interval counts, and not the value
+        ([block("ES", gains=np.tile([-0.5, 1.0], 10)), block("GES", gains=0.01)],
+         [("GES", FIRST), ("ES", OPEN)]),
+        # fewer than half of the layouts solved
+        ([block("CMA-ES", gains=0.9, arrived=False), block("SPSA", gains=0.1)],
+         [("SPSA", FIRST), ("CMA-ES", NEVER)]),
+    ],
+)  # fmt: skip
+def test_advice_follows_its_rule(blocks, expected):
+    found = advice(table(*(one for some in blocks for one in some)))
+    assert [(one.entry, one.word) for one in found] == expected
+
+
+def test_the_tuning_is_part_of_the_price():
+    (one,) = advice(table(*block("ES"), *tune("ES", 0.1, 0.2)))
+    assert (one.entry, one.tuning) == ("ES", 2 * 15 * 50)
+
+
+def test_the_expected_order_is_compared_with_the_one_found():
+    found = table(
+        *block("undone-GN-J", gains=0.9), *block("CMA-ES", gains=0.8),
+        *block("undone-GN-J", "judge 300", 0.9), *block("CMA-ES", "judge 300", 0.8),
+        *block("DPG", gains=-0.5),
+    )  # fmt: skip
+    assert greatest(found) == {50: "undone-GN-J", 300: "undone-GN-J"}
+    assert expectations(found) == {
+        "undone-GN-J is first with 50 episodes": True,
+        "CMA-ES is first with 300 episodes": False,
+        "DPG is never advised": True,
+    }
+
+
+def test_without_runs_no_question_is_decided():
+    found = REMEDIES.answers(table(*block("frozen")))
+    assert {one.outcome for one in found.values()} == {UNDECIDABLE}
+
+
+LOST = block("grid", "judge 300", 0.1, layouts=10, arrived=False)
+WON = block("grid", "judge 300", 0.9)[10:]
+FAILING = tune("RDES", 0.5) + block("RDES", "tune", arm=[*arms("RDES")][3], layouts=15,
+                                    arrived=False)  # fmt: skip
+GUARDED = [*arms("guarded-RDES")]
+
+
+@pytest.mark.parametrize(
+    ("name", "runs", "outcome", "counts"),
+    [
+        ("search and learning",
+         [*block("CMA-ES", "judge 300", 0.95), *block("ES", "judge 300", 0.5)[:15]], REPRODUCED,
+         {"layouts": (15, 15)}),
+        ("search nears the best", block("CMA-ES", "judge 300", 0.95), REPRODUCED,
+         {"layouts": (20, 20)}),
+        ("search nears the best", block("CMA-ES", "judge 300", 0.89), NOT, {"layouts": (0, 20)}),
+        ("undone steps on the loop's cost gain", block("undone-GN-J", gains=HALF), PARTLY,
+         {"layouts": (10, 20)}),
+        ("undone steps on the TD error gain", block("undone-LSTD-Q", gains=0.1), REPRODUCED,
+         {"layouts": (20, 20)}),
+        ("one number by hand", [*LOST, *WON, *block("GES", "judge 300", 0.5)], REPRODUCED,
+         {"layouts": (10, 10)}),
+        ("guard", [*FAILING, *block("guarded-RDES", "tune", arm=GUARDED[3], layouts=15)],
+         REPRODUCED, {"layouts": (15, 15)}),
+        ("guard", [*FAILING, *block("guarded-RDES", "tune", arm=GUARDED[3], layouts=15,
+                                    arrived=False), *tune("guarded-RDES", 0.5)], NOT,
+         {"layouts": (0, 15)}),
+        ("faster auxiliary weights", [*block("GES"), *block("GES-3", gains=0.6)], REPRODUCED, {}),
+        ("lengths or directions", [*block("guarded-RDES"), *block("control-RDES", gains=0.6)],
+         NOT, {}),
+        ("averaging", [*block("ES", gains=-np.inf), *block("averaged-ES", gains=-np.inf)], PARTLY,
+         {}),
+        ("undo", [*block("ES"), *block("undone-ES", gains=0.5 + MIXED)], PARTLY, {}),
+    ],
+)  # fmt: skip
+def test_questions_are_answered_by_their_rule(name, runs, outcome, counts):
+    one = REMEDIES.answers(table(*runs))[name]
+    assert (one.outcome, one.counts) == (outcome, counts)
+    assert (one.words == "no difference shown") == (outcome == PARTLY and not counts)
+
+
+def test_an_answer_has_its_numbers():
+    pilot = [PILOT, *block("ES", "judge 300"), *block("CMA-ES", "judge 300")]
+    found = REMEDIES.answers(table(*pilot))["search and learning"]
+    assert found.numbers == {"ES in A": pytest.approx(0.53)}
+    found = REMEDIES.answers(table(*block("ES"), *block("undone-ES", gains=0.5 + MIXED)))["undo"]
+    assert found.beside == {"layouts with more": (10, 20)}
+    assert found.numbers["low"] < 0 < found.numbers["high"]
+
+
+def test_every_entry_is_compared_and_begins_its_tuning_with_its_default():
+    assert [*SETTINGS] == [*ENTRIES]
+    for entry, settings in SETTINGS.items():
+        assert bool(settings) == bool(ENTRIES[entry].defaults)
+        assert next(iter(arms(entry))) == entry
+        assert len(arms(entry)) == max(len(settings), 1)
+    assert {*PARTS["tune"].places} <= {*TUNE}
+    assert all({*PARTS[part].places} <= {*JUDGE} for part in ADVISED)
+    assert all({*part.places} <= {*LAYOUTS} & {*PARTS["best"].places} for part in PARTS.values())
+
+
+@pytest.fixture
+def judged(tmp_path, monkeypatch, trains_here):
+    """Nothing is trained: of ES the second setting gains most."""
+    asked = []
+
+    def judge(entry, place, seed, episodes):
+        asked.append((str(entry), place, seed, episodes))
+        cost = 3000.0 if episodes == YARDSTICK else 3200.0 if entry.changed else 3500.0
+        return Judgement(4000.0, cost, True, min(episodes, 50), seconds=2.0)
+
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
+    monkeypatch.setenv("NMPCRL_PUBLISHED", str(tmp_path / "published"))
+    monkeypatch.setattr(remedies, "judge", judge)
+    here = lambda make, items, *_: ((one, make(one)) for one in items)  # noqa: E731
+    monkeypatch.setattr("nmpcrl.claims.investigation.parallel", here)
+    monkeypatch.setattr(remedies, "SETTINGS", {"grid": (), "ES": ({}, {"alpha": 3e-8})})
+    return asked
+
+
+def test_rows_are_made_in_order_and_the_best_setting_is_judged(judged):
+    with pytest.raises(NotTuned, match=r"J_best of T01 .* 'best' comes first"):
+        REMEDIES.complete(["tune"], workers=1)
+    REMEDIES.complete(["best"], workers=1)
+    assert {(one[0], *one[2:]) for one in judged[-141:]} == {("CMA-ES", 9_000_000, YARDSTICK)}
+    with pytest.raises(NotTuned, match="ES is not tuned yet: the part 'tune' comes first"):
+        REMEDIES.conditions("judge 50")
+    REMEDIES.complete(["tune", "judge 300"], workers=1)
+    made = REMEDIES.log().table()
+    assert {*made[made.part == "judge 300"].arm} == {"grid", "ES[alpha=3e-08]"}
+    assert {*made.best} == {3000.0}
+    assert {*made[made.part == "tune"].seconds} == {2.0}  # of the entry, not of its judge
+    by_arm = [[one[1:] for one in judged if one[0] == arm and one[1] in TUNE] for arm in arms("ES")]
+    assert by_arm[0] == by_arm[1]  # all settings meet the same layouts and seeds
+    REMEDIES.publish()
+    assert len(REMEDIES.table()) == len(made) == 141 + 2 * 15 + 2 * 60
+
+
+def test_published_arms_are_those_of_the_published_tuning_and_can_be_sent_to_a_worker():
+    known = REMEDIES.table()
+    for part in [*PARTS][1:]:
+        conditions = REMEDIES.conditions(part)
+        there = known[known.part == part]
+        assert {*conditions} == {*there[["part", "arm", "place", "k"]].itertuples(False, None)}
+    cloudpickle.dumps((REMEDIES, next(iter(conditions.items()))))
+
+
+def test_worlds_begin_anew_with_the_entry_to_try_first():
+    first = advice(REMEDIES.table())[0]
+    assert (first.word, first.rows["judge 50"].name) == (FIRST, worlds.REMEDY)
+    assert suite.entry(worlds.REMEDY).name == first.entry
+
+
+@pytest.mark.weekly
+def test_a_search_for_the_best_cost_made_again_ends_at_the_published_one():
+    known = REMEDIES.table()
+    one, setting = next((one, it) for one, it in REMEDIES.conditions("best").items()
+                        if one.place == "J003")  # fmt: skip
+    made = REMEDIES.make(one, setting)
+    assert {rounded(made["cost"], REMEDIES.digits)} == {*known[known.place == "J003"].best}
