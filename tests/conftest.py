@@ -25,8 +25,7 @@ from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import failure_modes
 from nmpcrl.control import differential_drive
 from nmpcrl.learning import browser as in_browser
-from nmpcrl.study import Experiment, Runs, design, paper
-from nmpcrl.study.storage import executor
+from nmpcrl.study import Experiment, Runs, design, jobs, paper
 
 settings.register_profile("fixed", deadline=None, derandomize=True)  # the machine may be busy
 settings.register_profile("random", deadline=None, derandomize=False, print_blob=True)
@@ -151,17 +150,22 @@ def edition_of_course(shared, long_runs, tmp_path) -> Iterator[Callable[[str], P
 
 @pytest.fixture
 def runs(tmp_path, monkeypatch) -> Path:
-    """A folder of this test's own; and what is set for workers is unset after it."""
+    """A folder of this test's own."""
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    for name in executor.THREADS:
-        monkeypatch.setenv(name, os.environ.get(name, "1"))
     return tmp_path / "runs"
 
 
 @pytest.fixture
 def trains_here(monkeypatch) -> None:
     """Where nobody names an executor, jobs are done in a thread: no process has to start."""
-    monkeypatch.setattr(executor, "processes", lambda *_: ThreadPoolExecutor(1))
+    monkeypatch.setattr(jobs, "processes", lambda _: Thread(1))
+
+
+class Thread(ThreadPoolExecutor):
+    """Stands in for a pool of processes."""
+
+    def shutdown(self, wait=True, *, cancel_futures=False, kill_workers=False) -> None:
+        super().shutdown(wait, cancel_futures=cancel_futures)
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TEXT = (ROOT / "SECURITY.md").read_text()
 UNPICKLERS = {"cloudpickle", "dill", "joblib", "marshal", "pickle", "shelve"}
-UNPICKLING = ("jobs.py", "outcome.py", "trial.py")
+UNPICKLING = ("investigation.py", "jobs.py", "trial.py")
 CALLERS = {"distributed", "ftplib", "http", "httpx", "requests", "smtplib", "socket", "urllib"}
 
 

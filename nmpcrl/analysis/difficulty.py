@@ -21,9 +21,9 @@ from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.control import Task
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
+from nmpcrl.study.files import Column
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED
-from nmpcrl.study.storage.archive import Column
 
 SPACING = 0.15  # [m]; the side of a cell of BARN
 REACH = 3 * SPACING  # [m]; how far BARN's dispersion looks

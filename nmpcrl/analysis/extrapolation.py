@@ -10,10 +10,8 @@ An intervention changes what predicts, and nothing else: the same noise, first w
 and fits.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,10 +21,6 @@ from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Diverged, Step, train
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.setup import controller_of, prepare
-from nmpcrl.study.storage.executor import execute
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PROBE = 1e-5  # alpha delta of the step along which a slope is measured: delta = 100 at the paper's
 
@@ -145,40 +139,6 @@ def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
     except Diverged:
         stopped = True
     return found.outcome(stopped)
-
-
-def compare(
-    experiments: Iterable[Experiment],
-    interventions: Iterable[str] = tuple(INTERVENTIONS),
-    *,
-    workers: int | None = None,
-    progress: bool = True,
-) -> "pd.DataFrame":
-    """`watch` for many, in parallel.
-
-    Returns:
-        Columns learner, layout, decay, seed, intervention, stopped, episodes (that were begun),
-        overshoot (largest alpha ||phi||^2) and feedback (largest median of an episode).
-    """
-    import pandas as pd
-
-    rows: dict[tuple[Experiment, str], dict[str, Any]] = {}
-
-    def keep(one: tuple[Experiment, str], outcome: Outcome) -> str:
-        named = {name: getattr(one[0], name) for name in ("learner", "layout", "decay", "seed")}
-        rows[one] = named | {
-            "intervention": one[1],
-            "stopped": outcome.stopped,
-            "episodes": outcome.episodes,
-            "overshoot": float(np.nanmax(outcome.overshoot, initial=0.0)),
-            "feedback": float(np.nanmax(outcome.feedback, initial=-np.inf)),
-        }
-        return ""
-
-    jobs = {(e, name): partial(watch, e, name) for e in experiments for name in interventions}
-    for error in execute(jobs, keep, workers=workers, progress=progress).values():
-        raise error
-    return pd.DataFrame([rows[one] for one in jobs])
 
 
 class _Columns:

@@ -16,9 +16,9 @@ from nmpcrl.analysis.metrics import LATE
 from nmpcrl.analysis.summary import SIZES, RunSummary
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, frozen_arm
+from nmpcrl.study.files import Column
 from nmpcrl.study.provenance import before
 from nmpcrl.study.records import final_cost
-from nmpcrl.study.storage.archive import Column
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,28 +19,20 @@ from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.records import (
-    INPUTS,
-    STATES,
-    About,
-    Facts,
-    Records,
-    StepStatus,
-    most_evaluations,
-    named_in,
-)
+from nmpcrl.study.files import Column, load_about, load_tables, save_tables
+from nmpcrl.study.records import About, Facts, Records, StepStatus, stated_in
 from nmpcrl.study.setup import controller_of
-from nmpcrl.study.storage.archive import (
-    Column,
-    Field,
-    Form,
-    Forms,
-    load_about,
-    load_arrays,
-    save_arrays,
-)
 
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
+COLUMNS = {
+    "episodes": (
+        *("steps", "failed", "restarts", "outside", "inputs", "over", "cost", "overlap"),
+        *("alpha_phi2", "delta", "loss", "bias", "error", "iterations", "seconds"),
+        *("inside", "theta", "w"),
+    ),
+    "evaluations": ("episode", "theta", "cost", "inside", "overlap", "distance"),
+    "rollout": ("states", "actions"),
+}
 IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
 
 
@@ -99,7 +91,7 @@ class RunSummary(Outline):
         """
         rollout = {"states": self.states, "actions": self.actions}
         tables = {"episodes": self.episodes, "evaluations": self.evaluations, "rollout": rollout}
-        save_arrays(path, {"experiment": self.experiment, "facts": self.facts}, tables)
+        save_tables(path, {"experiment": self.experiment, "facts": self.facts}, tables)
 
     @classmethod
     def load(cls, path: Path) -> "RunSummary":
@@ -109,40 +101,21 @@ class RunSummary(Outline):
             FileNotFoundError: there is none.
             DamagedRecords: it cannot be read whole, or is not a summary.
         """
-        about, tables = load_arrays(path, _forms)
+        about, tables = load_tables(path, COLUMNS)
+        experiment, facts = stated_in(about, path)
         return cls(
-            about["experiment"],
+            experiment,
             tables["episodes"],
             tables["evaluations"],
             tables["rollout"]["states"],
             tables["rollout"]["actions"],
-            about["facts"],
+            cast(SummaryFacts, facts),
         )
 
     @staticmethod
     def about(path: Path) -> About:
         """The experiment's fields and the facts, as `Records.about`."""
-        about = load_about(path, _forms)
-        return About(about["experiment"], about["facts"])
-
-
-def _forms(about: dict[str, Any]) -> Forms:
-    """Of the tables of a summary."""
-    experiment = named_in(about)
-    d, sizes = len(experiment.theta), len(SIZES)
-    counts = ("steps", "failed", "restarts", "outside", "inputs", "over")
-    numbers = ("cost", "overlap", "alpha_phi2", "delta", "loss", "bias", "error", "iterations")
-    episodes: list[Field] = [(name, int) for name in counts]
-    episodes += [(name, float) for name in (*numbers, "seconds")]
-    episodes += [("inside", int, sizes), ("theta", float, d), ("w", float, d)]
-    evaluations: list[Field] = [("episode", int), ("theta", float, d), ("cost", float)]
-    evaluations += [("inside", int, sizes), ("overlap", float), ("distance", float)]
-    rollout: list[Field] = [("states", float, STATES), ("actions", float, INPUTS)]
-    return {
-        "episodes": Form(episodes, [experiment.episodes]),
-        "evaluations": Form(evaluations, range(1, most_evaluations(experiment) + 1)),
-        "rollout": Form(rollout, [experiment.steps]),
-    }
+        return stated_in(load_about(path), path)
 
 
 def summarise(records: Records) -> RunSummary:

@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,8 @@ import numpy as np
 import nmpcrl
 from nmpcrl.bench.solves import closed_loop, watched
 from nmpcrl.study import Experiment, paper, run, store
+from nmpcrl.study.files import write_json
 from nmpcrl.study.parameters import Refusal
-from nmpcrl.study.storage import place
-from nmpcrl.study.storage.atomic import write_json
 
 Live = dict[str, Any]  # numbers by what is measured; what could not be is absent
 
@@ -119,7 +117,7 @@ def measure(site: Path = SITE) -> Live:
         if laboratory in pages:
             found["fit"] = fitted(browser, laboratory)
             found["runs"] = {one: trained(browser, laboratory, one) for one in LEARNERS}
-    place.keep(path(), partial(write_json, content=found))
+    write_json(path(), found)
     return found
 
 

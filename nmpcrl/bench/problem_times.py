@@ -16,9 +16,9 @@ from nmpcrl.bench import processes
 from nmpcrl.bench.problem_sizes import VARIED, Sizes, times
 from nmpcrl.bench.solves import columns_of
 from nmpcrl.study import sealed, store
+from nmpcrl.study.files import check_folder
 from nmpcrl.study.limits import need_numba
 from nmpcrl.study.parameters import Refusal
-from nmpcrl.study.storage.place import check_folder
 
 FILE = "problem_times.json"
 STEPS = 1000  # of a run in Chapter 10

@@ -20,7 +20,7 @@ from nmpcrl.bench.problem_sizes import Sizes
 from nmpcrl.bench.solves import Columns, transposed
 from nmpcrl.study import paper
 from nmpcrl.study.design import sweep
-from nmpcrl.study.storage.executor import THREADS
+from nmpcrl.study.jobs import ONE_THREAD
 from nmpcrl.study.store import fetch_all
 
 PROCESSES = 7  # leave Student's interval 2.4 standard errors wide on each side; 21 would leave 2.1
@@ -159,7 +159,7 @@ def _alone(*arguments: str) -> tuple[dict[str, Any], str]:
     """What `fresh` prints in a process of its own, and what that says on standard error."""
     done = subprocess.run(
         [sys.executable, "-m", "nmpcrl.bench.fresh_process", *arguments],
-        env=os.environ | dict.fromkeys(THREADS, "1"),
+        env=os.environ | ONE_THREAD,
         capture_output=True,
         text=True,
     )

@@ -20,9 +20,8 @@ from nmpcrl.bench.processes import PROCESSES, at_once, first_calls, time_learner
 from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
 from nmpcrl.study import limits, paper, provenance, store
+from nmpcrl.study.files import write_json
 from nmpcrl.study.parameters import one_of
-from nmpcrl.study.storage import place
-from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.machine import machine
 
 Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
@@ -212,7 +211,7 @@ def _measured(kept: Bench, stages: Iterable[Stage], length: str, progress: bool)
             )
         )
         kept["about"] |= _summed(kept["stages"].values())
-        place.keep(path(), partial(write_json, content=kept))
+        write_json(path(), kept)
     return kept
 
 

@@ -6,7 +6,6 @@ state anywhere in the box, the eight weights of theta log-uniform, so that some 
 
 import time
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,11 @@ from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
 from nmpcrl.study import paper, sealed, store
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.files import check_folder
+from nmpcrl.study.jobs import parallel
 from nmpcrl.study.limits import need_numba
 from nmpcrl.study.parameters import whole
 from nmpcrl.study.setup import compile_ahead
-from nmpcrl.study.storage.executor import execute
-from nmpcrl.study.storage.place import check_folder
 from nmpcrl.study.storage.refusal import Refusal
 
 SEED = 2025
@@ -109,7 +108,7 @@ def sweep(problems: int, *, workers: int | None = None, progress: bool = True) -
         ParameterError: it is no number of problems.
         StoreError: the table could not be kept; nothing is solved.
         Refusal: numba is not installed, and riccati solves nothing without it.
-        RuntimeError: riccati could not be compiled, so that another solver would have been judged.
+        Failed: riccati could not be compiled, so that another solver would have been judged.
     """
     problems = PROBLEMS.check("problems", problems)
     need_numba("a sweep is of riccati, which it compiles")
@@ -119,24 +118,16 @@ def sweep(problems: int, *, workers: int | None = None, progress: bool = True) -
     whole, rest = divmod(problems, OF_A_LAYOUT)
     sizes = [OF_A_LAYOUT] * whole + [rest] * (rest > 0)
 
-    def keep(_: int, tally: Tally) -> str:
-        nonlocal total
+    label = "layouts" if progress else ""
+    for _, tally in parallel(_tally, [*enumerate(sizes)], workers, label):
         total += tally
-        return f"{total.failed} given up"
-
-    failures = execute(
-        {layout: partial(tally_of, layout, size) for layout, size in enumerate(sizes)},
-        keep,
-        workers=workers,
-        progress=progress,
-        size=sizes.__getitem__,
-        unit="problem",
-    )
-    for error in failures.values():
-        raise error
     table = SweepTable(total, {"seed": SEED, **sealed.about(time.perf_counter() - began)})
     sealed.keep(path(), {"about": table.about, "tally": asdict(total)}, indent=1)
     return table
+
+
+def _tally(layout_and_size: tuple[int, int]) -> Tally:
+    return tally_of(*layout_and_size)
 
 
 def path() -> Path:

@@ -7,8 +7,8 @@ from typing import Any
 
 from nmpcrl.claims.published import Damaged, place
 from nmpcrl.study import sealed
+from nmpcrl.study.files import write_json
 from nmpcrl.study.provenance import made_here
-from nmpcrl.study.storage.atomic import write_json
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from filelock import FileLock
 from nmpcrl.claims.rule import read
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.study import published
+from nmpcrl.study.files import folder
 from nmpcrl.study.jobs import parallel
 from nmpcrl.study.provenance import (
     EPOCHS,
@@ -38,7 +39,6 @@ from nmpcrl.study.provenance import (
     versions,
 )
 from nmpcrl.study.published import Unpublishable
-from nmpcrl.study.storage.place import folder
 from nmpcrl.study.storage.refusal import Refusal
 
 WORDS = {REPRODUCED: "confirmed", PARTLY: "confirmed in part", NOT: "contradicted"}

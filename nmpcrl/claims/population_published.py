@@ -30,11 +30,11 @@ from nmpcrl.claims.rule import Paths
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import LAYOUTS
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.files import write_json
 from nmpcrl.study.population_design import COMPARED, HORIZONS, name_of, whole_population
 from nmpcrl.study.provenance import made_here
 from nmpcrl.study.records import Column
 from nmpcrl.study.sealed import seal_of
-from nmpcrl.study.storage.atomic import write_json
 
 TABLE, PATHS, MEASURED, ABOUT = (
     f"population{name}" for name in (".csv", "_paths.npz", "_layouts.csv", ".json")

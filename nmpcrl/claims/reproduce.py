@@ -244,7 +244,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
         )
     compile_ahead(drawn)
     ordered = sorted(drawn, key=seconds_of, reverse=True)
-    train = partial(summaries.make, expected=provenance.signature(), afresh=True)
+    train = partial(summaries.make, afresh=True)
     fresh = dict(parallel(train, ordered, workers, "runs"))
     wrong = [found for e in drawn if (found := unequal(e, row(fresh[e]), before[e]))]
     if wrong:

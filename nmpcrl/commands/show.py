@@ -34,8 +34,8 @@ def show(run: str, out: Path | None) -> None:
     from nmpcrl.report.run import verdict
     from nmpcrl.study import DamagedRecords, Experiment, Records
     from nmpcrl.study.experiment import frozen_arm
+    from nmpcrl.study.files import write_file
     from nmpcrl.study.provenance import is_accepted, warn_of_changes
-    from nmpcrl.study.storage.atomic import write_whole
     from nmpcrl.study.store import read
 
     records = Records.load(path)
@@ -49,5 +49,5 @@ def show(run: str, out: Path | None) -> None:
         with suppress(FileNotFoundError, DamagedRecords):
             frozen = read(frozen_arm(Experiment(**records.experiment)))
     figure = run_page(records, frozen)
-    write_whole(out, lambda file: write(figure, file, kind))
+    write_file(out, lambda file: write(figure, file, kind))
     click.echo(f"{verdict(records)}\n{out}")

@@ -13,7 +13,6 @@ from nmpcrl.commands.options import WORKERS, NewFile, refuse_unwritable
 @click.option("--population", is_flag=True, help="The runs of the 180 drawn layouts instead.")
 @WORKERS
 @click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that trains instead.")
-@click.option("--security", metavar="FILE", help="Certificates for a scheduler at tls://.")
 @click.option("--dry-run", is_flag=True, help="Only report what is missing.")
 @click.option("--table", metavar="PATH", type=NewFile(), help="Write a CSV row per episode.")
 @click.option("--publish", is_flag=True, help="Write the runs to book/published.")
@@ -23,7 +22,6 @@ def study(
     population: bool,
     workers: int | None,
     scheduler: str | None,
-    security: str | None,
     dry_run: bool,
     table: Path | None,
     publish: bool,
@@ -44,21 +42,15 @@ def study(
     from nmpcrl.analysis import summaries
     from nmpcrl.study import cluster, design, population_design
     from nmpcrl.study.limits import seconds_of
-    from nmpcrl.study.storage.place import refuse_file
 
     if judge:
         _judge_population() if population else _judge()
         return
-    refuse_file()
     every = population_design.whole_population() if population else design.whole_study()
     if unknown := sorted(set(parts) - set(every.values())):
         known = ", ".join(dict.fromkeys(every.values()))
         raise click.ClickException(f"there is no part {unknown[0]!r}; the parts are {known}")
     wanted = {e: part for e, part in every.items() if not parts or part in parts}
-    if scheduler is not None:
-        cluster.check(scheduler, security=security)
-    elif security is not None:
-        raise click.ClickException("--security needs --scheduler")
     if publish:
         from nmpcrl.claims import published
 
@@ -69,7 +61,7 @@ def study(
     click.echo(f"{stored} in {summaries.folder()}; the others take about {hours:.1f} h of one core")
     if dry_run:
         return
-    there = cluster.executor(scheduler, security=security) if scheduler else nullcontext()
+    there = cluster.executor(scheduler) if scheduler else nullcontext()
     with there as executor:
         found = summaries.fetch_summaries(
             wanted, executor=executor, workers=workers, strict=publish

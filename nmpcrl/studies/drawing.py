@@ -26,6 +26,7 @@ import numpy as np
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import FOLDER, Scenario
+from nmpcrl.study.files import write_json
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED, screen
 from nmpcrl.study.moving import (
@@ -43,7 +44,6 @@ from nmpcrl.study.moving import (
     inside,
     still,
 )
-from nmpcrl.study.storage.atomic import write_json
 
 AREA = ((-1.5, 7.5), (-1.5, 5.0))  # of the drawn centres, x and y [m]
 APART = 2.2  # least distance of two drawn centres [m]: no disc touches another

@@ -51,6 +51,10 @@ class Failed(Refusal):
         self.failures = tuple(failures)
         self.add_note(first.traceback)
 
+    def _render_traceback_(self) -> list[str]:
+        """The sentence and the traceback of the worker, as IPython shows them."""
+        return [*super()._render_traceback_(), *self.__notes__]
+
 
 def parallel(
     function: Callable[[Item], Result],

@@ -23,8 +23,8 @@ import pandas as pd
 from filelock import FileLock
 
 import nmpcrl
+from nmpcrl.study.files import write_file, write_json
 from nmpcrl.study.provenance import hash_of
-from nmpcrl.study.storage.atomic import write_json, write_whole
 from nmpcrl.study.storage.refusal import Refusal
 
 MANIFEST = "manifest.json"
@@ -108,10 +108,10 @@ def write(
     with FileLock(place / ".lock"):
         known = _manifest(place)
         content = {f"{name}.csv": _csv(table)}
-        write_whole(place / f"{name}.csv", lambda file: file.write(content[f"{name}.csv"]))
+        write_file(place / f"{name}.csv", lambda file: file.write(content[f"{name}.csv"]))
         if arrays:
             path = place / f"{name}.npz"
-            write_whole(path, lambda file: np.savez_compressed(file, **dict(arrays)))  # type: ignore[arg-type]
+            write_file(path, lambda file: np.savez_compressed(file, **dict(arrays)))  # type: ignore[arg-type]
             content[path.name] = path.read_bytes()
         files = {file: sha256(found).hexdigest() for file, found in content.items()}
         earlier = known.get(name, {})

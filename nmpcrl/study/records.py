@@ -3,28 +3,18 @@
 Analyses read records and nothing else. Loading never unpickles.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple, NotRequired, Protocol, TypedDict, TypeVar
+from typing import Any, NamedTuple, NotRequired, Protocol, TypedDict
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.parameters import whole
-from nmpcrl.study.storage.archive import (
-    Column,
-    DamagedRecords,
-    Field,
-    Form,
-    Forms,
-    load_about,
-    load_arrays,
-    save_arrays,
-)
+from nmpcrl.study.files import Column, DamagedRecords, load_about, load_tables, save_tables
 from nmpcrl.study.storage.machine import Fingerprint
 
 __all__ = [
@@ -42,10 +32,9 @@ __all__ = [
 LAST = 3  # rollouts that the final cost averages
 STATES = len(paper.START)  # n of the robot
 INPUTS = len(paper.THETA_INIT) - 2 * STATES - 1  # m of the robot
-MOST = 10**9  # of anything
 REMOVED = {"plant": "model"}  # fields that old files have, and the value that is read
 
-Read = TypeVar("Read")
+Field = tuple[str, type] | tuple[str, type, int | tuple[int, ...]]  # name, type[, shape]
 
 
 class Stopped(StrEnum):
@@ -218,7 +207,7 @@ class Records:
             OSError: it cannot be written; what was there stays.
         """
         about = {"experiment": self.experiment, "facts": self.facts}
-        save_arrays(path, about, {"steps": self.steps, "evaluations": self.evaluations})
+        save_tables(path, about, {"steps": self.steps, "evaluations": self.evaluations})
 
     @classmethod
     def load(cls, path: Path) -> "Records":
@@ -228,8 +217,9 @@ class Records:
             FileNotFoundError: there is none.
             DamagedRecords: it cannot be read whole, or is not what a run leaves behind.
         """
-        about, tables = load_arrays(path, _forms)
-        return cls(about["experiment"], tables["steps"], tables["evaluations"], about["facts"])
+        about, tables = load_tables(path, COLUMNS)
+        experiment, facts = stated_in(about, path)
+        return cls(experiment, tables["steps"], tables["evaluations"], facts)
 
     @staticmethod
     def about(path: Path) -> About:
@@ -239,64 +229,27 @@ class Records:
             FileNotFoundError: there is no file.
             DamagedRecords: it does not say what a run says, or has other columns.
         """
-        about = load_about(path, _forms)
-        return About(about["experiment"], about["facts"])
+        return stated_in(load_about(path), path)
 
 
-def named_in(about: dict[str, Any]) -> Experiment:
-    """The experiment of a file, which also has the `Facts` that every run has.
+COLUMNS = {
+    "steps": (*StepRow._fields, "alpha_phi2"),
+    "evaluations": EvaluationRow._fields,
+}
+
+
+def stated_in(about: dict[str, Any], path: Path) -> About:
+    """The experiment and the facts that a file states.
 
     Raises:
-        ValueError: it does not name one, or a fact is missing.
+        DamagedRecords: it states none.
     """
-    return _with_facts(about, lambda named: Experiment(**named))
-
-
-class Sizes(NamedTuple):
-    """Of a run's tables."""
-
-    states: int
-    inputs: int
-    theta: int
-    episodes: int
-    steps: int
-    evaluate_every: int
-
-
-def _sizes(named: dict[str, Any]) -> Sizes:
-    """Those of an experiment, or of a trial, which states how many states and inputs it has."""
-    if "states" in named:
-        states, inputs, *others = (
-            whole(1, MOST).check(name, named[name])
-            for name in ("states", "inputs", "episodes", "steps", "evaluate_every")
-        )
-        return Sizes(states, inputs, len(named["theta"]), *others)
-    one = Experiment(**named)
-    return Sizes(STATES, INPUTS, len(one.theta), one.episodes, one.steps, one.evaluate_every)
-
-
-def _with_facts(about: dict[str, Any], read: Callable[[dict[str, Any]], Read]) -> Read:
-    """What `read` makes of the name of a run that has all `Facts`; a ValueError if it has not."""
     try:
         fields = about["experiment"].items()
-        about["experiment"] = {name: value for name, value in fields if REMOVED.get(name) != value}
-        named = read(about["experiment"])
-        for fact in Facts.__required_keys__:
-            kind = Facts.__annotations__[fact]
-            if not isinstance(about["facts"][fact], int | float if kind is float else kind):
-                raise ValueError(f"its {fact} is {about['facts'][fact]!r}")
-    except (AttributeError, LookupError, TypeError) as error:
-        raise ValueError("it does not say which run it is, or what became of it") from error
-    return named
-
-
-def _forms(about: dict[str, Any]) -> Forms:
-    """Of the tables of a run."""
-    sizes = _with_facts(about, _sizes)
-    n, m, d, episodes, steps, _ = sizes
-    of_steps = [*step_fields(n, m, d), ("alpha_phi2", float)]
-    of_evaluations = evaluation_fields(n, m, d, steps)
-    return {
-        "steps": Form(of_steps, range(episodes * steps + 1)),
-        "evaluations": Form(of_evaluations, range(1, most_evaluations(sizes) + 1)),
-    }
+        experiment = {name: value for name, value in fields if REMOVED.get(name) != value}
+        if "states" not in experiment:  # which a trial has
+            Experiment(**experiment)
+        facts: Facts = about["facts"]
+        return About(experiment, facts | {"solver": facts["solver"]})
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        raise DamagedRecords(f"{path} does not say which run it is") from error

@@ -3,13 +3,11 @@
 import json
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
+from nmpcrl.study.files import write_json
 from nmpcrl.study.provenance import environment, hash_of
-from nmpcrl.study.storage import place
-from nmpcrl.study.storage.atomic import write_json
 from nmpcrl.study.storage.machine import machine
 
 Made = TypeVar("Made")
@@ -22,9 +20,9 @@ def seal_of(content: Mapping[str, Any]) -> str:
 
 
 def keep(path: Path, content: Mapping[str, Any], indent: int | None = None) -> None:
-    """Keep it with its seal, as `place.keep` does."""
+    """Write it with its seal."""
     whole = {**content, "seal": seal_of(content)}
-    place.keep(path, partial(write_json, content=whole, indent=indent))
+    write_json(path, whole, indent)
 
 
 def content_of(path: Path) -> dict[str, Any]:

@@ -1,21 +1,27 @@
-"""Where runs are kept: `fetch` and `fetch_all` train what is missing and read what is there.
+"""Runs on disk: `fetch` and `fetch_all` read stored runs, and train and store the others.
 
-A run's file is named by its experiment or its trial and by the key of `provenance`. A file that is
-damaged or of another run is set aside, and the run is done again. A trained run is not lost, even
-if it cannot be written. Runs that another process trains in the same folder are awaited.
+A file is named by its experiment or trial and by the key of `provenance`. The lock `.locks/NAME`
+lets one process at a time train a run; the system frees it when the process ends.
 """
 
-import re
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
+
+from filelock import FileLock, Timeout
 
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.files import DamagedRecords, say, unwritable
+from nmpcrl.study.files import StoreError as StoreError
+from nmpcrl.study.files import check_folder as check_folder
+from nmpcrl.study.files import folder as folder
 from nmpcrl.study.geometry import short_name
+from nmpcrl.study.jobs import Failed, Failure, parallel
+from nmpcrl.study.limits import seconds_of
 from nmpcrl.study.provenance import (
     before,
     identity,
@@ -23,44 +29,23 @@ from nmpcrl.study.provenance import (
     key,
     locked_hash,
     provenance,
+    signature,
     warn_of_changes,
 )
-from nmpcrl.study.records import About, DamagedRecords, Facts, Records, most_evaluations
+from nmpcrl.study.records import About, Facts, Records
 from nmpcrl.study.run import run
 from nmpcrl.study.setup import compile_ahead
-from nmpcrl.study.storage.executor import execute
-from nmpcrl.study.storage.place import (
-    StoreError,
-    check_folder,
-    folder,
-    keep,
-    refusal,
-    say,
-    set_aside,
-)
-from nmpcrl.study.storage.reservation import reservations, reserved
 from nmpcrl.study.trial import Trial
 
-__all__ = [
-    "Runs",
-    "StoreError",
-    "check_folder",
-    "fetch",
-    "fetch_all",
-    "folder",
-    "is_stored",
-    "name_of",
-    "path_of",
-    "stored",
-]
+Run = TypeVar("Run")
+Named = Experiment | Trial  # names a run
+TRIALS = "trials"  # subfolder of their runs
+LOCKS = ".locks"
+STEP, REST = 350, 20_000  # bytes of a file, at most
 
-Run = TypeVar("Run")  # Records, or a summary of them
-Named = Experiment | Trial  # what names a run
-TRIALS = "trials"  # the folder of their runs, in that of the others
-NUMBERS = 20  # at most, of a step beside its vectors
 
-POLL = 0.25  # seconds between two looks at what others are at
-STEP, ROLLOUT_STEP, REST = 300, 40, 20_000  # bytes that a run's file takes at most
+class OtherCode(RuntimeError):
+    """A worker has other code, or other versions of libraries."""
 
 
 class Runs(Mapping[Experiment, Run]):
@@ -93,6 +78,202 @@ class Runs(Mapping[Experiment, Run]):
         return tuple(dict.fromkeys(getattr(experiment, field) for experiment in self))
 
 
+Value = TypeVar("Value")  # Records or a summary: has experiment, facts, save, load and about
+
+
+class Store(Generic[Value]):
+    """Values of one kind in files, one for each experiment or trial."""
+
+    def __init__(
+        self, kind: Any, make: Callable[..., Value], key: Callable[[Any], str], subfolder: str = ""
+    ) -> None:
+        """A store in a subfolder of the runs, by the class of its values.
+
+        `make` is called in workers; the beginning of `key` is part of a file's name.
+        """
+        self.kind, self.make, self.key, self.subfolder = kind, make, key, subfolder
+
+    def path_of(self, named: Named) -> Path:
+        """The file of one value."""
+        place = folder() / (TRIALS if isinstance(named, Trial) else self.subfolder)
+        return place / f"{name_of(named)}-{self.key(named)[:10]}.npz"
+
+    def read(self, named: Named) -> Value:
+        """The stored value.
+
+        Raises:
+            FileNotFoundError: there is none.
+            DamagedRecords: the file is damaged, or of another run.
+        """
+        warn_of_changes()
+        path = self.path_of(named)
+        value: Any = self.kind.load(path)
+        check_run(path, named, value.experiment, value.facts)
+        return value  # type: ignore[no-any-return]
+
+    def is_stored(self, named: Named) -> bool:
+        """Whether there is a file that says it has the value; only `read` reads all of it."""
+        path = self.path_of(named)
+        try:
+            check_run(path, named, *self.kind.about(path))
+        except (FileNotFoundError, DamagedRecords):
+            return False
+        return True
+
+    def fetch(self, named: Named, **options: Any) -> Value:
+        """The value: read if it is stored, otherwise made with these options and stored.
+
+        Raises:
+            StoreError: it is not stored, and cannot be.
+        """
+        try:
+            return self.read(named)
+        except (FileNotFoundError, DamagedRecords):
+            check_folder(_size_of(named))
+        with self._alone(named):
+            value = self.read_or_set_aside(named)
+            if value is None:
+                value = self.make(named, **options)
+                self.keep(named, value)
+            return value
+
+    def fetch_all(
+        self, names: Iterable[Named], *, label: str = "", strict: bool = True, **options: Any
+    ) -> dict[Any, Value]:
+        """`fetch` for many: `parallel` makes missing values with these options, the longest first.
+
+        Values that another process is making come last.
+
+        Raises:
+            StoreError: values are missing and cannot be stored.
+            Failed: values could not be made, and `strict` holds; all others are stored.
+        """
+        wanted, found = tuple(dict.fromkeys(names)), dict[Any, Value]()
+        for named in wanted:
+            with suppress(FileNotFoundError, DamagedRecords):
+                found[named] = self.read(named)
+        missing = sorted((one for one in wanted if one not in found), key=_seconds_of, reverse=True)
+        if missing:
+            check_folder(sum(map(_size_of, missing)))
+            compile_ahead(missing)
+        failures, make = list[Failure](), partial(_make, self.make, signature())
+        while missing:
+            left = _Reserved(self, missing, found)
+            try:
+                for named, value in parallel(make, left, label=label, **options):
+                    self.keep(named, value)
+                    found[named] = value
+                    left.locks.pop(named).release()
+            except Failed as error:
+                failures += error.failures
+            finally:
+                for lock in left.locks.values():
+                    lock.release()
+            if missing := left.others:
+                self._alone(missing[0]).lock.release()
+        if failures and strict:
+            raise Failed(failures, len(wanted))
+        if failures:
+            say(str(Failed(failures, len(wanted))))
+        return {one: found[one] for one in wanted if one in found}
+
+    def keep(self, named: Named, value: Any) -> None:
+        """Store a value, unless another solver than the experiment's made it.
+
+        Raises:
+            StoreError: the file cannot be written.
+        """
+        if other := solved_by_another(named, value.facts):
+            say(f"{named} is not stored: it was {other}")
+            return
+        path = self.path_of(named)
+        try:
+            value.save(path)
+        except OSError as error:
+            raise unwritable(path, error) from error
+
+    def lock(self, named: Named) -> FileLock:
+        """The lock of a value; not acquired."""
+        locks = folder() / LOCKS
+        locks.mkdir(parents=True, exist_ok=True)
+        return FileLock(locks / self.path_of(named).stem, thread_local=False)
+
+    def _alone(self, named: Named) -> Any:
+        """Wait for the lock of a value."""
+        lock = self.lock(named)
+        try:
+            return lock.acquire(timeout=0)
+        except Timeout:
+            say(f"{named} is being trained by another process; waiting for it")
+            return lock.acquire()
+
+    def read_or_set_aside(self, named: Named) -> Value | None:
+        """The stored value; a damaged file is renamed. For the process that has the lock."""
+        path = self.path_of(named)
+        try:
+            return self.read(named)
+        except FileNotFoundError:
+            return None
+        except DamagedRecords as error:
+            aside = path.with_suffix(".damaged")
+            path.replace(aside)
+            say(f"{error}; it is now {aside.name}, and the run is made again")
+            return None
+
+
+class _Reserved(Generic[Value]):
+    """Missing values whose lock this process gets; each is locked when it is drawn."""
+
+    def __init__(self, store: Store[Value], names: list[Named], found: dict[Any, Value]) -> None:
+        self.store, self.names, self.found = store, names, found
+        self.locks = dict[Named, FileLock]()
+        self.others = list[Named]()  # locked by other processes
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __iter__(self) -> Iterator[Named]:
+        for named in self.names:
+            lock = self.store.lock(named)
+            try:
+                lock.acquire(timeout=0)
+            except Timeout:
+                self.others.append(named)
+                continue
+            self.locks[named] = lock
+            value = self.store.read_or_set_aside(named)
+            if value is None:
+                yield named
+            else:  # stored meanwhile
+                self.found[named] = value
+                self.locks.pop(named).release()
+
+
+def _make(make: Callable[[Named], Value], expected: str, named: Named) -> Value:
+    """Make a value in a worker that has the `signature` of the process that asked."""
+    if signature() != expected:
+        raise OtherCode("the worker has other code, or other versions of libraries")
+    return make(named)
+
+
+def _size_of(named: Named) -> int:
+    """Bytes of a file, at most."""
+    return named.episodes * named.steps * STEP + REST
+
+
+def _seconds_of(named: Named) -> float:
+    return seconds_of(named) if isinstance(named, Experiment) else 0.0
+
+
+def train(named: Named, **options: Any) -> Records:
+    """A run with its provenance."""
+    records = run(named, **options)
+    return replace(records, facts={**records.facts, **provenance(named)})
+
+
+RUNS = Store(Records, train, key)
+
+
 def fetch(experiment: Named, **options: Any) -> Records:
     """The run of an experiment or a trial: read if it is stored, otherwise trained and stored.
 
@@ -105,13 +286,7 @@ def fetch(experiment: Named, **options: Any) -> Records:
     Raises:
         StoreError: the run is not stored, and could not be.
     """
-    try:
-        return read(experiment)
-    except (FileNotFoundError, DamagedRecords):
-        check_folder(size_of(experiment))
-    name = path_of(experiment).name
-    with reserved(folder(), name, lambda: wait_for([name], experiment)):
-        return _read_or_train(experiment, **options)[0]
+    return RUNS.fetch(experiment, **options)
 
 
 def fetch_all(
@@ -121,111 +296,23 @@ def fetch_all(
     workers: int | None = None,
     progress: bool = True,
 ) -> Runs[Records]:
-    """`fetch` for many: what is missing is trained in parallel, one thread a process.
+    """`fetch` for many: missing runs are trained in parallel, one thread a process.
 
     Args:
         experiments: the runs wanted, trials among them.
-        executor: trains them, on workers that see the same folder; by default processes.
+        executor: trains them, such as a Dask client's; by default new processes.
         workers: how many processes; by default as many as there are cores.
-        progress: whether to show a bar with episodes done, time left and the latest cost.
+        progress: whether to show a bar.
 
     Raises:
-        StoreError: runs are missing and cannot be stored; nothing is trained.
-        Exception: what the first of them raised that could not be trained; the others are stored.
+        StoreError: runs are missing and cannot be stored.
+        Failed: runs could not be trained; the others are stored.
     """
-    experiments = tuple(dict.fromkeys(experiments))
-    missing = [e for e in experiments if not is_stored(e)]
-    if missing:
-        check_folder(sum(map(size_of, missing)))
-        compile_ahead(missing)
-    unstored: dict[Named, Records] = {}
-    options = {"executor": executor, "workers": workers, "progress": progress}
-    while missing:
-        missing = _train(missing, unstored, **options)
-    found: dict[Any, Records] = {e: unstored[e] if e in unstored else fetch(e) for e in experiments}
-    return Runs(found)
+    label = "runs" if progress else ""
+    return Runs(RUNS.fetch_all(experiments, executor=executor, workers=workers, label=label))
 
 
-def _train(missing: list[Named], unstored: dict[Named, Records], **options: Any) -> list[Named]:
-    """Train what nobody else is at; what is left, once one of those is no longer."""
-    left = _elsewhere(missing)
-
-    def keep(experiment: Named, trained: _Trained | None) -> str:
-        if trained is None:
-            left.append(experiment)
-            return ""
-        if trained.unstored:
-            unstored[experiment] = trained.unstored
-        return f"{experiment}: cost {trained.cost:.0f}"
-
-    failures = execute(
-        {e: partial(_fetch_quietly, e) for e in missing if e not in left},
-        keep,
-        size=lambda e: e.episodes,
-        unit="ep",
-        **options,
-    )
-    for error in failures.values():
-        raise error
-    if left:
-        wait_for([path_of(e).name for e in left], left[0])
-    return left
-
-
-def _elsewhere(experiments: list[Named]) -> list[Named]:
-    """Those that somebody is at."""
-    taken = reservations(folder()).taken(path_of(e).name for e in experiments)
-    return [e for e in experiments if path_of(e).name in taken]
-
-
-class _Trained(NamedTuple):
-    """What a worker hands back: its records go to disk and not through the pipe, if they can."""
-
-    cost: float
-    unstored: Records | None
-
-
-def _fetch_quietly(experiment: Named) -> _Trained | None:
-    """What a worker does; None if somebody else is at the run."""
-    mine, name = reservations(folder()), path_of(experiment).name
-    if not mine.take([name]):
-        return None
-    try:
-        records, is_kept = _read_or_train(experiment)
-    finally:
-        mine.release([name])
-    return _Trained(float(records.facts["final_cost"]), None if is_kept else records)
-
-
-def read(experiment: Named) -> Records:
-    """The stored run.
-
-    Raises:
-        FileNotFoundError: there is none.
-        DamagedRecords: it is not whole, or another run.
-    """
-    path = path_of(experiment)
-    records = Records.load(path)
-    check_run(path, experiment, records.experiment, records.facts)
-    warn_of_changes()
-    return records
-
-
-def _read_or_train(experiment: Named, **options: Any) -> tuple[Records, bool]:
-    """The run, and whether it is where it belongs; for who has reserved it."""
-    path = path_of(experiment)
-    try:
-        return read(experiment), True
-    except FileNotFoundError:
-        pass
-    except DamagedRecords as error:
-        set_aside(path, error)
-    records = run(experiment, **options)
-    records = replace(records, facts={**records.facts, **provenance(experiment)})
-    if other := solved_by_another(experiment, records.facts):
-        say(f"{experiment} is not stored: it was {other}")
-        return records, False
-    return records, keep(path, records.save)
+path_of, read, is_stored = RUNS.path_of, RUNS.read, RUNS.is_stored
 
 
 def solved_by_another(experiment: Named, facts: Facts) -> str:
@@ -251,7 +338,10 @@ def check_run(path: Path, experiment: Named, fields: Mapping[str, Any], facts: F
         if fields != experiment.stated or "key" not in facts:
             raise DamagedRecords(f"{path} holds another run")
     else:
-        stated = Experiment(**{**before(), **fields})
+        try:
+            stated = Experiment(**{**before(), **fields})
+        except (TypeError, ValueError) as error:
+            raise DamagedRecords(f"{path} does not say which run it is") from error
         if identity(stated) != identity(experiment):
             raise DamagedRecords(f"{path} holds another run, {name_of(stated)}")
     if facts.get("key", key(experiment)) != key(experiment):
@@ -262,76 +352,25 @@ def check_run(path: Path, experiment: Named, fields: Mapping[str, Any], facts: F
         raise DamagedRecords(f"{path} holds a run {other}")
 
 
-def is_stored(experiment: Named) -> bool:
-    """Whether there is a file that says it is the run; all of it is read only by `fetch`."""
-    return is_there(path_of(experiment), experiment, Records.about)
-
-
-def is_there(
-    path: Path,
-    experiment: Named,
-    about: Callable[[Path], About],
-) -> bool:
-    """Whether a file says that it is of a run; `about` reads that."""
-    try:
-        check_run(path, experiment, *about(path))
-    except (FileNotFoundError, DamagedRecords):
-        return False
-    return True
-
-
 def stored() -> dict[Path, About]:
     """Every run in the folder: its experiment's fields and its facts, by path.
 
     Raises:
-        StoreError: there is no such folder, but something else, or it cannot be read.
+        StoreError: the folder cannot be read.
     """
     try:
         paths = sorted(folder().iterdir())
     except FileNotFoundError:
         return {}
     except OSError as error:
-        raise StoreError(refusal(f"cannot be read ({error.strerror})")) from error
-    whole = {}
+        raise StoreError(f"{folder()} cannot be read ({error.strerror})") from error
+    found = {}
     for path in filter(lambda path: path.suffix == ".npz", paths):
         try:
-            about = Records.about(path)
-            _check_name(path, about)
-            whole[path] = about
-        except (FileNotFoundError, DamagedRecords) as error:
+            found[path] = Records.about(path)
+        except (OSError, DamagedRecords) as error:
             say(f"{error}; it is ignored")
-    return whole
-
-
-def _check_name(path: Path, about: About) -> None:
-    """See that a file which has the name of a run has that of its own."""
-    own = f"{name_of(Experiment(**about.experiment))}-{about.facts.get('key', '')[:10]}"
-    if re.fullmatch(r".*-seed\d+-\d+ep-[0-9a-f]{10}", path.stem) and path.stem != own:
-        raise DamagedRecords(f"{path} holds another run, {own}")
-
-
-def size_of(experiment: Named) -> int:
-    """How many bytes the file of a run takes at most."""
-    e, step = experiment, STEP
-    if isinstance(e, Trial):
-        step = 8 * (NUMBERS + e.nmpc.n + e.nmpc.m + 3 * len(e.theta))
-    return e.steps * (step * e.episodes + ROLLOUT_STEP * most_evaluations(e)) + REST
-
-
-def wait_for(names: list[str], first: Named) -> None:
-    """Say that another process is training runs, and wait until it has finished one."""
-    more = len(names) - 1
-    others = f"{more} other{'s' * (more > 1)}"
-    said = f"{first} and {others} are" if more else f"{first} is"
-    say(f"{said} being trained by another process; waiting for it")
-    while len(reservations(folder()).taken(names)) == len(names):
-        time.sleep(POLL)
-
-
-def path_of(experiment: Named) -> Path:
-    """The file of one run."""
-    place = folder() / TRIALS if isinstance(experiment, Trial) else folder()
-    return place / f"{name_of(experiment)}-{key(experiment)[:10]}.npz"
+    return found
 
 
 def name_of(experiment: Named) -> str:

@@ -9,7 +9,6 @@ from nmpcrl.analysis.extrapolation import (
     INTERVENTIONS,
     Held,
     TrueSlope,
-    compare,
     feedback,
     watch,
 )
@@ -103,14 +102,6 @@ def test_without_theta_as_an_input_nothing_is_fed_back():
 def test_a_learner_without_a_network_is_refused():
     with pytest.raises(TypeError, match="'ES' has no network"):
         watch(Experiment("ES", **SHORT))
-
-
-@pytest.mark.slow
-def test_a_comparison_has_a_row_a_run_and_intervention(outcomes):
-    found = compare([Experiment("RDES", **SHORT)], workers=1, progress=False)
-    assert found.intervention.tolist() == [*INTERVENTIONS]
-    assert not found.stopped.any()
-    assert found.overshoot[0] == outcomes["none"].overshoot[1]
 
 
 @pytest.mark.slow

@@ -25,7 +25,6 @@ from nmpcrl.claims.reproduce import (
 )
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import Experiment, design, provenance, sweep
-from nmpcrl.study.storage.executor import THREADS
 from nmpcrl.study.storage.machine import fingerprint
 
 HERE = {"machine": fingerprint(), "versions": provenance.environment()}
@@ -245,8 +244,6 @@ def test_a_sample_is_spread_over_parts_and_learners():
 def lock(tmp_path, monkeypatch):
     """Runs and a lock of this test; the lock is of the code as it is."""
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    for name in THREADS:
-        monkeypatch.setenv(name, "1")
     monkeypatch.setattr(provenance, "LOCK", tmp_path / "sources.lock.json")
 
     here = lambda train, runs, *_: [(e, train(e)) for e in runs]  # noqa: E731

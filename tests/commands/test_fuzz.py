@@ -11,7 +11,6 @@ from nmpcrl.bench import live, problem_times, suite, sweep
 from nmpcrl.claims import publish, published, reproduce
 from nmpcrl.commands import main
 from nmpcrl.study import Experiment, cluster, fetch, jobs
-from nmpcrl.study.storage import executor
 
 LINES = 1500
 SHORT = Experiment(episodes=1, steps=5)
@@ -23,8 +22,7 @@ BAD = (
     *("tcp://", "tcp://nowhere", "tls://127.0.0.1:1", "foo", "1,1,1", "1,1,0,0,0,1,1,0,nan", "ES-"),
 )
 LONG = (  # replaced by a refusal
-    *((summaries, "fetch_summaries"), (cluster, "executor"), (executor, "processes")),
-    (jobs, "processes"),
+    *((summaries, "fetch_summaries"), (cluster, "executor"), (jobs, "processes")),
     *((publish, "publish_timing"), (reproduce, "relock")),
     *((problem_times, "make"), (suite, "measure")),
     *((suite, "read_or_measure"), (sweep, "sweep"), (live, "measure")),

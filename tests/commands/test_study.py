@@ -13,7 +13,7 @@ from nmpcrl.analysis.search import LEAST, Search, search_all
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict
-from nmpcrl.study import design, sweep
+from nmpcrl.study import design, store, sweep
 
 SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
 STUDY = {
@@ -75,10 +75,10 @@ def test_study_trains_a_part_of_itself(command, small, trains_here):
 
 def test_a_run_that_fails_is_reported_and_the_others_are_stored(command, trained, monkeypatch):
     next(summaries.path_of(e) for e in STUDY if e.learner == "ES" and e.seed == 1).unlink()
-    monkeypatch.setattr(summaries, "run", raising(ArithmeticError("a mistake")))
+    monkeypatch.setattr(store, "run", raising(ArithmeticError("a mistake")))
     ended = command("study")
     assert ended.exit_code == 1
-    assert "1 of 6 runs failed" in ended.output
+    assert "1 of 6 failed" in ended.output
     assert "ArithmeticError: a mistake" in ended.output
 
 
@@ -161,7 +161,7 @@ def test_a_study_without_numba_is_refused(command, published_here, monkeypatch):
     monkeypatch.setattr(summaries, "environment", lambda: {"numba": "absent"})
     refused = command("study")
     assert refused.exit_code == 1
-    assert "Error: numba is not installed, and without it riccati" in refused.output
+    assert "OtherSolver: numba is not installed, and without it riccati" in refused.output
 
 
 @pytest.mark.parametrize(("outcome", "code"), [(rule.PARTLY, 0), (rule.UNDECIDABLE, 1)])
