@@ -15,7 +15,7 @@ export OMP_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help book pdf article course release smoke chapter lab study bench test test-slow test-site test-weekly test-lab test-course test-clusters check locks clean anew
+.PHONY: help book pdf article course release smoke chapter lab study bench test test-slow test-site test-weekly test-lab test-course check locks clean anew
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 18
@@ -54,7 +54,7 @@ bench: .venv/ready  ## Measure how long solves, steps and runs take, and print w
 # On all cores, up to four. A target that names files does so to read no others: tests/conftest.py
 # lets no test with its marker stand elsewhere.
 PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist worksteal
-DEMANDING := slow or browser or network or slurm
+DEMANDING := slow or browser or network
 ELSEWHERE := built or lab or course or weekly
 
 test: .venv/ready  ## What takes little of the tests of the library, its commands and the book's sources
@@ -74,9 +74,6 @@ test-lab: .venv-lab/ready  ## Open every chapter, executed too, in JupyterLab; n
 
 test-course: .venv/ready  ## Run every notebook of the course, as students and as teachers get it, and grade it
 	@$(PYTEST) -m course $(if $(ONLY),-k "$(ONLY)") tests/book/test_course.py tests/course/test_graded_chapters.py
-
-test-clusters: .venv/ready  ## The programs for clusters against a SLURM, which it installs as root
-	@$(if $(filter-out 0,$(shell id -u)),sudo) .ci/clusters
 
 check: .venv/ready  ## Lint, format, types, and the structure of the notebooks without executing any
 	@$(BIN)/ruff check .

@@ -17,7 +17,6 @@ from nmpcrl.study.departures import DEPARTURES
 ROOT = Path(__file__).resolve().parents[2]
 NOTATION = (ROOT / "book/notation.md").read_text()
 REPRODUCE = (ROOT / "book/reproduce.md").read_text()
-CLUSTER = (ROOT / "book/cluster.md").read_text()
 MODULES: dict[str, list[Path]] = {}  # by name; two rooms may have one of the same
 for path in sorted((ROOT / "nmpcrl").rglob("*.py")):
     MODULES.setdefault(path.stem, []).append(path)
@@ -141,7 +140,7 @@ def test_the_options_that_the_page_lists_are_those_of_the_command():
     assert set(listed) == {option.opts[0] for option in options}
 
 
-@pytest.mark.parametrize("code", blocks("python") + blocks("python", CLUSTER))
+@pytest.mark.parametrize("code", blocks("python"))
 def test_what_the_pages_import_is_there(code):
     for node in ast.walk(ast.parse(code)):
         if isinstance(node, ast.ImportFrom) and node.module.startswith("nmpcrl"):
