@@ -46,57 +46,49 @@ def records(
     return Records(asked, steps, evaluations, {"stopped": "finished"})
 
 
-def test_the_training_cost_is_the_sum_over_each_episode():
-    assert metrics.training_cost(records([[1, 2], [3, 4]])) == pytest.approx([3, 7])
+@pytest.mark.parametrize(
+    ("costs", "changes", "expected"),
+    [
+        ([[1, 2], [3, 4]], {}, [3, 7]),
+        ([[1, 2], [3, np.nan]], {"status": [0, 0, 0, 2]}, [3, np.nan]),  # cut short
+        ([[1, 2], [3, 4]], {"status": [0, 0, 0, 2]}, [3, np.nan]),  # its last update failed
+        ([[1, 2]], {"status": [0, 1]}, [3]),  # a restart is no failure
+        ([[1, 2]], {"episodes": 3}, [3, np.nan, np.nan]),  # never reached
+    ],
+)
+def test_the_training_cost_is_the_sum_over_each_episode_that_went_to_its_end(
+    costs, changes, expected
+):
+    found = metrics.training_cost(records(costs, **changes))
+    assert found == pytest.approx(expected, nan_ok=True)
 
 
-def test_an_episode_that_a_failed_solve_cut_short_has_no_training_cost():
-    run = records([[1, 2], [3, np.nan]], status=[0, 0, 0, 2])
-    assert metrics.training_cost(run) == pytest.approx([3, np.nan], nan_ok=True)
-
-
-def test_an_episode_whose_last_update_failed_has_no_training_cost():
-    run = records([[1, 2], [3, 4]], status=[0, 0, 0, 2])
-    assert np.isnan(metrics.training_cost(run)[1])
-
-
-def test_a_restarted_solve_counts():
-    run = records([[1, 2]], status=[0, 1])
-    assert metrics.training_cost(run) == pytest.approx([3])
-
-
-def test_an_episode_that_was_never_reached_has_no_training_cost():
-    assert np.isnan(metrics.training_cost(records([[1, 2]], episodes=3))[1:]).all()
-
-
-def test_the_final_cost_is_the_mean_of_the_last_rollouts():
-    run = records([[1]], judged=[100, 50, 40, 30, 20])
-    assert metrics.final_cost(run) == pytest.approx(30)
+@pytest.mark.parametrize(
+    ("judged", "final", "gain"),
+    [
+        ([100, 50, 40, 30, 20], 30, 0.7),
+        ([100, 150, 150, 150], 150, -0.5),
+        ([100, 50, np.inf, 40], np.inf, -np.inf),
+    ],
+)
+def test_the_final_cost_is_the_mean_of_the_last_rollouts(judged, final, gain):
+    run = records([[1]], judged=judged)
     assert metrics.initial_cost(run) == 100
+    assert (metrics.final_cost(run), metrics.gain(run)) == (final, pytest.approx(gain))
 
 
-def test_one_failed_rollout_at_the_end_makes_the_final_cost_infinite():
-    assert metrics.final_cost(records([[1]], judged=[100, 50, np.inf, 40])) == np.inf
-
-
-@pytest.mark.parametrize(("last", "gain"), [(80, 0.2), (100, 0.0), (150, -0.5)])
-def test_the_gain_is_the_share_of_the_cost_that_learning_took_away(last, gain):
-    assert metrics.gain(records([[1]], judged=[100, last, last, last])) == pytest.approx(gain)
-
-
-def test_the_late_cost_range_is_judged_in_the_second_half_only():
-    run = records(np.ones((4, 1)), judged=[100, 900, 70, 60, 65], at=[0, 1, 2, 3, 4])
-    assert metrics.late_cost_range(run) == pytest.approx(0.1)
-
-
-def test_a_run_without_a_rollout_in_the_second_half_has_an_unbounded_range():
-    assert metrics.late_cost_range(records(np.ones((4, 1)), judged=[100, 90], at=[0, 1])) == np.inf
-
-
-@pytest.mark.parametrize("late", [(np.inf, 60), (np.inf, np.inf)])
-def test_a_failed_rollout_in_the_second_half_makes_the_range_unbounded(late):
-    run = records(np.ones((4, 1)), judged=[100, 70, *late], at=[0, 1, 3, 4])
-    assert metrics.late_cost_range(run) == np.inf
+@pytest.mark.parametrize(
+    ("judged", "at", "expected"),
+    [
+        ([100, 900, 70, 60, 65], [0, 1, 2, 3, 4], 0.1),
+        ([100, 90], [0, 1], np.inf),  # no rollout in the second half
+        ([100, 70, np.inf, 60], [0, 1, 3, 4], np.inf),
+        ([100, 70, np.inf, np.inf], [0, 1, 3, 4], np.inf),
+    ],
+)
+def test_the_late_cost_range_is_judged_in_the_second_half_only(judged, at, expected):
+    run = records(np.ones((4, 1)), judged=judged, at=at)
+    assert metrics.late_cost_range(run) == pytest.approx(expected)
 
 
 def test_the_cost_ratio_compares_the_medians_of_the_last_episodes():
@@ -139,16 +131,11 @@ def test_the_distance_between_thetas_is_relative_and_symmetric():
     assert metrics.theta_distance(a, a) == 0
 
 
-def test_a_state_on_the_boundary_of_an_obstacle_is_no_violation():
+def test_neither_the_boundary_of_an_obstacle_nor_an_unknown_state_is_a_violation():
     task = scene()
-    clearance = 1.25
-    states = np.array([[clearance, 0, 0], [clearance - 1e-3, 0, 0], [5, 5, 0]])
+    states = np.array([[1.25, 0, 0], [1.25 - 1e-3, 0, 0], [5, 5, 0], [np.nan] * 3])
     (worst,) = metrics.obstacle_violations(states, task)
     assert worst == pytest.approx(task.overlap(states[1]).max())
-
-
-def test_the_states_after_a_failed_rollout_are_no_violations():
-    assert metrics.obstacle_violations(np.full((2, 3), np.nan), scene()).size == 0
 
 
 def test_an_input_on_its_bound_is_no_violation():
@@ -170,11 +157,8 @@ def test_independent_errors_have_no_memory_and_alternating_ones_a_negative_one()
     free = records(np.ones((1, 4000)), delta=rng.normal(size=4000))
     assert abs(metrics.memory(free)) < 0.05
     assert metrics.memory(records(np.ones((1, 4)), delta=[1, -1, 1, -1])) == pytest.approx(-1)
-
-
-def test_steps_without_a_td_error_are_left_out_of_the_memory():
-    run = records(np.ones((1, 6)), delta=[np.nan, np.nan, 1, 2, 3, 4])
-    assert metrics.memory(run) == pytest.approx(1)
+    unknown = records(np.ones((1, 6)), delta=[np.nan, np.nan, 1, 2, 3, 4])
+    assert metrics.memory(unknown) == pytest.approx(1)
 
 
 def scene() -> Task:
