@@ -1,6 +1,6 @@
-"""Runs as tables: one row a run, which names it and says what became of it.
+"""Runs as tables: one row a run, with its name and its outcome.
 
-The columns of a row are `FIELDS`, those of the experiment, and then `OUTCOME`. `runs.csv`, every
+The columns are `FIELDS`, the fields of the experiment, and then `OUTCOME`. `runs.csv`, every
 verdict and every table of the book rest on them.
 """
 
@@ -29,32 +29,16 @@ VECTORS = ("theta", "start", "target")  # fields that a row holds as text
 THETA = tuple(f"theta_{i}" for i in range(len(paper.THETA_INIT)))  # the final theta, by component
 INSIDE = tuple(f"inside_{size}" for size in SIZES)  # states in an obstacle: in training,
 EVAL_INSIDE = tuple(f"eval_{name}" for name in INSIDE)  # and without noise
+COUNTED = ("failed", "restarts", "outside", "inputs")  # summed over the episodes
 OUTCOME = (
-    "stopped",
-    "initial_cost",
-    "final_cost",
-    "best_cost",
-    "late_cost_range",
-    "training_cost",
-    "cut_short",
-    "failed",
-    "restarts",
-    "outside",
-    "inputs",
-    "steps_done",
-    "over",
-    "bias",
-    "error",
-    "distance",
-    "iterations",
-    "seconds",
+    *("stopped", "initial_cost", "final_cost", "best_cost", "late_cost_range", "training_cost"),
+    *("cut_short", *COUNTED, "steps_done", "over"),
+    *("bias", "error", "distance", "iterations", "seconds"),
     *INSIDE,
     *EVAL_INSIDE,
-    "worst_overlap",
-    "eval_worst_overlap",
+    *("worst_overlap", "eval_worst_overlap"),
     *THETA,
-    "imitation_with",
-    "imitation_without",
+    *("imitation_with", "imitation_without"),
 )
 
 
@@ -67,12 +51,13 @@ OLDER = {name: as_text(value) for name, value in before().items()}  # fields tha
 
 
 def row(summary: RunSummary) -> dict[str, Any]:
-    """One flat row: the experiment's fields, then what became of it."""
+    """One flat row: the fields of the experiment, then the outcome."""
     experiment, episodes, evaluations = summary.experiment, summary.episodes, summary.evaluations
     named = {name: as_text(experiment.get(name, OLDER.get(name))) for name in FIELDS}
     late = slice(-min(LATE, max(1, experiment["episodes"] // 2)), None)
-    cost = evaluations["cost"]
-    columns = {
+    cost, steps = evaluations["cost"], episodes["steps"].sum()
+    imitation = summary.facts.get("imitation", {})
+    outcome = {
         "stopped": summary.facts["stopped"],
         "initial_cost": float(cost[0]),
         "final_cost": final_cost(cost),
@@ -82,33 +67,23 @@ def row(summary: RunSummary) -> dict[str, Any]:
         ),
         "training_cost": metrics.late_training_cost(episodes["cost"]),
         "cut_short": int(np.isnan(episodes["cost"]).sum()),
-        "failed": int(episodes["failed"].sum()),
-        "restarts": int(episodes["restarts"].sum()),
-        "outside": int(episodes["outside"].sum()),
-        "inputs": int(episodes["inputs"].sum()),
-        "steps_done": int(episodes["steps"].sum()),
-        "over": float(episodes["over"].sum() / max(1, episodes["steps"].sum())),
+        **{name: int(episodes[name].sum()) for name in COUNTED},
+        "steps_done": int(steps),
+        "over": float(episodes["over"].sum() / max(1, steps)),
         "bias": _median(episodes["bias"][late]),
         "error": _median(episodes["error"][late]),
         "distance": float(evaluations["distance"][-1]),
         "iterations": float(np.nanmean(episodes["iterations"])),
         "seconds": float(summary.facts["seconds"]),
-    }
-    for names, table in ((INSIDE, episodes), (EVAL_INSIDE, evaluations)):
-        counts = table["inside"].sum(axis=0)
-        columns |= dict(zip(names, map(int, counts), strict=True))
-    columns |= {
+        **_totals(INSIDE, episodes),
+        **_totals(EVAL_INSIDE, evaluations),
         "worst_overlap": float(np.nanmax(episodes["overlap"])),
         "eval_worst_overlap": float(np.nanmax(evaluations["overlap"])),
-    }
-    theta = _last_known(episodes["theta"], experiment["theta"])
-    columns |= dict(zip(THETA, map(float, theta), strict=True))
-    imitation = summary.facts.get("imitation", {})
-    columns |= {
+        **dict(zip(THETA, _last_known(episodes["theta"], experiment["theta"]), strict=True)),
         "imitation_with": imitation.get("with_theta", np.nan),
         "imitation_without": imitation.get("without_theta", np.nan),
     }
-    return named | columns
+    return named | outcome
 
 
 def experiment_of(row: Mapping[str, Any]) -> Experiment:
@@ -167,7 +142,12 @@ def _median(values: Vector) -> float:
     return float(np.nanmedian(values)) if np.isfinite(values).any() else np.nan
 
 
-def _last_known(theta: Column, first: Iterable[float]) -> Vector:
+def _totals(names: Iterable[str], table: Mapping[str, Column]) -> dict[str, int]:
+    """How many states are in an obstacle, by `SIZES`."""
+    return dict(zip(names, map(int, table["inside"].sum(axis=0)), strict=True))
+
+
+def _last_known(theta: Column, first: Iterable[float]) -> list[float]:
     """theta after the last episode that was reached."""
     reached = np.flatnonzero(np.isfinite(theta).all(axis=1))
-    return theta[reached[-1]] if reached.size else np.array(list(first))
+    return [*map(float, theta[reached[-1]] if reached.size else first)]

@@ -271,82 +271,76 @@ def learned(
     return judged_theta(weights)
 
 
-def trust_region(radius: float) -> TrustRegion:
-    """The trust region of every entry that takes Gauss-Newton steps; the radius is in `SCALE`s."""
-    return TrustRegion(radius, SCALE)
+def searched(robot: Robot, *, search: str, **settings: float) -> Vector:
+    """The theta whose rollout cost least in a direct search from theta_init."""
+    return SEARCHES[search](robot.cost, THETA, robot.budget, robot.seed, **settings)
 
 
-def lstd_q(_: Learner, robot: Robot, radius: float, **__: float) -> Learner:
-    """Gauss-Newton steps on the TD error."""
-    return lstd_q_within(robot.controller, trust_region(radius), bounds=BOUNDS)
+def _guarded(learner: Learner, _: Robot, alpha: float) -> Learner:
+    return guarded(learner, alpha)
 
 
-def gn_j(_: Learner, robot: Robot, radius: float, **__: float) -> Learner:
-    """Gauss-Newton steps on the cost of the closed loop."""
-    return closed_loop(robot.controller, trust_region(radius), BOUNDS)
+def _control(learner: Learner, _: Robot, alpha: float) -> Learner:
+    return directed(guarded(learner, alpha), alpha)
 
 
-def undone(change: Change) -> Change:
+def _averaged(learner: Learner, robot: Robot, **_: float) -> Learner:
+    return averaged(learner, skip=robot.budget * paper.STEPS // 2)
+
+
+def _lstd_q(_: Learner, robot: Robot, radius: float) -> Learner:
+    return lstd_q_within(robot.controller, TrustRegion(radius, SCALE), bounds=BOUNDS)
+
+
+def _gn_j(_: Learner, robot: Robot, radius: float) -> Learner:
+    return closed_loop(robot.controller, TrustRegion(radius, SCALE), BOUNDS)
+
+
+def _dpg(_: Learner, robot: Robot, radius: float) -> Learner:
+    region = TrustRegion(radius, SCALE)
+    return policy_gradient(robot.controller, optimiser=region, bounds=BOUNDS)
+
+
+def _undone(change: Change) -> Change:
     """`change`, and steps after which a confirming rollout costs more are undone."""
     return lambda learner, robot, every, **settings: undo(
         change(learner, robot, **settings), robot.cost, int(every)
     )
 
 
-def searched(robot: Robot, *, search: str, **settings: float) -> Vector:
-    """The theta whose rollout cost least in a direct search from theta_init."""
-    return SEARCHES[search](robot.cost, THETA, robot.budget, robot.seed, **settings)
+def _learned(
+    name: str, change: Change | None = None, learner: str = "ES", **settings: float
+) -> Entry:
+    return Entry(name, partial(learned, learner=learner, change=change), settings)
 
 
-ALPHA, RADIUS, EVERY = {"alpha": paper.ALPHA}, {"radius": 0.3}, {"every": 1}
-CHANGES: Mapping[str, tuple[str, Change, dict[str, float]]] = {  # learner, change and settings
-    "TDRC": (
-        "ES",
-        lambda _, robot, **settings: tdrc(robot.controller, **settings),
-        {**ALPHA, "regularisation": REGULARISATION},
-    ),
-    "GES-3": (
-        "ES",
-        lambda _, robot, **settings: normalised_ges(robot.controller, **settings),
-        {**ALPHA, "ratio": 3.0},
-    ),
-    "guarded-ES": ("ES", lambda learner, _, alpha: guarded(learner, alpha), ALPHA),
-    "guarded-RDES": ("RDES", lambda learner, _, alpha: guarded(learner, alpha), ALPHA),
-    "control-RDES": (
-        "RDES", lambda learner, _, alpha: directed(guarded(learner, alpha), alpha), ALPHA,
-    ),
-    "averaged-ES": (
-        "ES",
-        lambda learner, robot, **_: averaged(learner, skip=robot.budget * paper.STEPS // 2),
-        ALPHA,
-    ),
-    "undone-ES": ("ES", undone(lambda learner, *_, **__: learner), ALPHA | EVERY),
-    "undone-LSTD-Q": ("ES", undone(lstd_q), RADIUS | EVERY),
-    "GN-J": ("ES", gn_j, RADIUS),
-    "undone-GN-J": ("ES", undone(gn_j), RADIUS | EVERY),
-    "DPG": (
-        "ES",
-        lambda _, robot, radius: policy_gradient(
-            robot.controller, optimiser=trust_region(radius), bounds=BOUNDS
-        ),
-        RADIUS,
-    ),
-}  # fmt: skip
-SEARCHED: Mapping[str, dict[str, float]] = {
-    "SPSA": {"step": STEP, "perturbed": PERTURBED}, "CMA-ES": {"spread": SPREAD},
-    "Bayes": {"nearby": NEARBY},
-}  # fmt: skip
+def _searched(name: str, **settings: float) -> Entry:
+    return Entry(name, partial(searched, search=name), settings)
+
+
+ALPHA, RADIUS = paper.ALPHA, 0.3  # step size; radius of trust regions, in `SCALE`s
 ENTRIES: Mapping[str, Entry] = {
     one.name: one
     for one in (
         Entry("frozen", lambda _: THETA.copy()),
-        Entry("grid", partial(searched, search="grid")),
-        *(Entry(name, partial(learned, learner=name), ALPHA)
-          for name in ("ES", "GES", "TDC", "RDES", "DES")),
-        *(Entry(name, partial(learned, learner=learner, change=change), settings)
-          for name, (learner, change, settings) in CHANGES.items()),
-        *(Entry(name, partial(searched, search=name), settings)
-          for name, settings in SEARCHED.items()),
+        _searched("grid"),
+        *(_learned(one, learner=one, alpha=ALPHA) for one in ("ES", "GES", "TDC", "RDES", "DES")),
+        _learned("TDRC", lambda _, robot, **own: tdrc(robot.controller, **own),
+                 alpha=ALPHA, regularisation=REGULARISATION),
+        _learned("GES-3", lambda _, robot, **own: normalised_ges(robot.controller, **own),
+                 alpha=ALPHA, ratio=3.0),
+        _learned("guarded-ES", _guarded, alpha=ALPHA),
+        _learned("guarded-RDES", _guarded, "RDES", alpha=ALPHA),
+        _learned("control-RDES", _control, "RDES", alpha=ALPHA),
+        _learned("averaged-ES", _averaged, alpha=ALPHA),
+        _learned("undone-ES", _undone(lambda learner, *_, **__: learner), alpha=ALPHA, every=1),
+        _learned("undone-LSTD-Q", _undone(_lstd_q), radius=RADIUS, every=1),
+        _learned("GN-J", _gn_j, radius=RADIUS),
+        _learned("undone-GN-J", _undone(_gn_j), radius=RADIUS, every=1),
+        _learned("DPG", _dpg, radius=RADIUS),
+        _searched("SPSA", step=STEP, perturbed=PERTURBED),
+        _searched("CMA-ES", spread=SPREAD),
+        _searched("Bayes", nearby=NEARBY),
     )
 }  # fmt: skip
 

@@ -26,26 +26,23 @@ def test_a_straight_trajectory_is_as_long_as_its_ends_are_apart(task):
     found = describe(states, task, 0.5)
     assert found.length == pytest.approx(11.0)
     assert found.clearance == pytest.approx(np.hypot(0.5, 2.0) - 1.25)
+    assert describe(along(np.array([[3.0, 1.0]])), task, 0.5).clearance == pytest.approx(-0.25)
 
 
-def test_the_robot_has_arrived_when_it_is_at_the_target_to_stay(task):
-    away = np.array([3.0, 0.1, 2.0, 0.6, 0.4, 0.0])
-    states = along(np.column_stack([8.5 - away, np.full(6, 2.0)]))
-    assert describe(states, task, 0.5).arrival == pytest.approx(4 * 0.5)
-    assert describe(states[:-2], task, 0.5).arrival == np.inf
-
-
-def test_where_it_looks_does_not_matter_to_arriving(task):
-    states = along(np.tile([8.5, 2.0], (3, 1)))
-    states[:, 2] = -np.pi / 2
-    assert describe(states, task, 0.5).arrival == 0
-
-
-def test_a_rollout_that_failed_never_arrives(task):
-    states = along(np.tile([8.5, 2.0], (4, 1)))
-    assert describe(states, task, 0.5).arrival == 0
-    states[2:] = np.nan
-    assert describe(states, task, 0.5).arrival == np.inf
+@pytest.mark.parametrize(
+    ("away", "heading", "arrival"),
+    [
+        ([3.0, 0.1, 2.0, 0.6, 0.4, 0.0], np.pi / 2, 4 * 0.5),  # it left once
+        ([3.0, 0.1, 2.0, 0.6], np.pi / 2, np.inf),
+        ([0.0, 0.0, 0.0], -np.pi / 2, 0),  # wherever it looks
+        ([0.0, 0.0, np.nan, np.nan], np.pi / 2, np.inf),  # a solve failed
+    ],
+)
+def test_the_robot_has_arrived_when_it_is_at_the_target_to_stay(task, away, heading, arrival):
+    states = along(np.column_stack([8.5 - np.array(away), np.full(len(away), 2.0)]))
+    states[:, 2] = heading
+    states[np.isnan(away)] = np.nan
+    assert describe(states, task, 0.5).arrival == pytest.approx(arrival)
 
 
 def test_coming_close_is_charged_only_within_the_margin_and_far_from_the_target(task):
@@ -58,10 +55,6 @@ def test_coming_close_is_charged_only_within_the_margin_and_far_from_the_target(
     assert describe(along(np.array([[8.5, 2.1]])), near, 0.5).penalty == 0
 
 
-def test_inside_an_obstacle_the_room_is_negative(task):
-    assert describe(along(np.array([[3.0, 1.0]])), task, 0.5).clearance == pytest.approx(-0.25)
-
-
 def test_a_gap_closes_where_its_width_is_nothing():
     task = paper.task("A")
     path = np.array([[5.5, 0.5], [7.5, 2.5]])
@@ -70,7 +63,4 @@ def test_a_gap_closes_where_its_width_is_nothing():
     assert shut == pytest.approx((np.hypot(1.5, 2.5) / 2.5) ** 2 - 1)
     beside_a_wall = paper.task_among(((7.0, -1.0),)), np.array([[7.0, -2.8], [8.0, -2.8]])
     assert closes_at(*beside_a_wall) == pytest.approx((2 / 1.25) ** 2 - 1)
-
-
-def test_a_path_through_no_gap_never_meets_a_closed_one():
-    assert closes_at(paper.task("A"), np.full((3, 2), [1.7, 1.4])) == np.inf
+    assert closes_at(paper.task("A"), np.full((3, 2), [1.7, 1.4])) == np.inf  # through no gap
