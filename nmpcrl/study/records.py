@@ -1,13 +1,10 @@
-"""What a run leaves behind: two tables of equal-length columns, and facts; one .npz file.
-
-Analyses read records and nothing else. Loading never unpickles.
-"""
+"""The records of a run: two tables of equal-length columns, and facts, in one .npz file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple, NotRequired, Protocol, TypedDict
+from typing import Any, NamedTuple, NotRequired, TypedDict
 
 import numpy as np
 
@@ -32,40 +29,40 @@ __all__ = [
 LAST = 3  # rollouts that the final cost averages
 STATES = len(paper.START)  # n of the robot
 INPUTS = len(paper.THETA_INIT) - 2 * STATES - 1  # m of the robot
-REMOVED = {"plant": "model"}  # fields that old files have, and the value that is read
+REMOVED = {"plant": "model"}  # former fields of experiments, with the one value that is read
 
 Field = tuple[str, type] | tuple[str, type, int | tuple[int, ...]]  # name, type[, shape]
 
 
 class Stopped(StrEnum):
-    """How training ended; the fact `stopped` begins with it, and may go on with ": " and why."""
+    """The end of training: the first word of the fact `stopped`, before ": " and the reason."""
 
     FINISHED = "finished"
     DIVERGED = "diverged"
 
 
 class Facts(TypedDict):
-    """What a run says of itself."""
+    """Facts about a run; the last four are those of `provenance`, once the run is stored."""
 
-    stopped: str  # how training ended, as `Stopped` has it
-    solver: str  # what solved
+    stopped: str  # the end of training, as `Stopped` says
+    solver: str  # that found the plans
     seconds: float
     final_cost: float
-    versions: NotRequired[dict[str, str]]  # when stored, that of `provenance`, as all below
+    versions: NotRequired[dict[str, str]]
     machine: NotRequired[Fingerprint]
     key: NotRequired[str]
     sources: NotRequired[str]
 
 
 class About(NamedTuple):
-    """What a file says that it holds."""
+    """The run of a file."""
 
-    experiment: dict[str, Any]  # the fields of the Experiment, as the code that wrote it had them
+    experiment: dict[str, Any]  # its fields, as the code had them that wrote the file
     facts: Facts
 
 
 class StepStatus(IntEnum):
-    """How the solves of a step went: the column `status`."""
+    """The worst result of a step's solves: the column `status`."""
 
     SOLVED = 0
     RESTARTED = 1
@@ -73,25 +70,25 @@ class StepStatus(IntEnum):
 
     @classmethod
     def of(cls, *, failed: bool, restarts: int) -> "StepStatus":
-        """The worst status of a step's solves."""
+        """The status of a step."""
         return cls.FAILED if failed else cls.RESTARTED if restarts else cls.SOLVED
 
 
 def final_cost(cost: Vector) -> float:
     """Noise-free cost at the end of a run: the mean of its last rollouts, `LAST` or fewer.
 
-    The first rollout judges theta_init and is never among them. Infinite where one of them failed,
-    or where training was stopped before there was any.
+    The first rollout, which judges theta_init, does not count. The cost is infinite where a rollout
+    failed, or where training stopped before the second one.
 
     Args:
-        cost: of every rollout, theta_init's first, shape (rollouts,).
+        cost: of every rollout, shape (rollouts,).
     """
     learned = cost[1:][-LAST:]
     return float(learned.mean()) if learned.size else np.inf
 
 
 class StepRow(NamedTuple):
-    """A row of `Records.steps`, but for alpha_phi2, which is filled when a run has ended."""
+    """A row of `Records.steps`, without alpha_phi2, which is computed at the end of a run."""
 
     episode: int
     time: int
@@ -133,50 +130,33 @@ def step_fields(n: int, m: int, d: int) -> list[Field]:
 
 
 def evaluation_fields(n: int, m: int, d: int, steps: int) -> list[Field]:
-    """Those of `EvaluationRow`, for rollouts of so many steps."""
+    """The columns of `EvaluationRow` for rollouts of so many steps."""
     return _fields(EvaluationRow, {"theta": d, "states": (steps, n), "actions": (steps, m)})
 
 
 def _fields(row: type[NamedTuple], shapes: Mapping[str, Any]) -> list[Field]:
-    """One column a field of a row; those that are arrays have a shape."""
+    """A column for each field of a row; arrays have a shape."""
     kinds = row.__annotations__
     return [
         (name, float, shapes[name]) if name in shapes else (name, kinds[name]) for name in kinds
     ]
 
 
-class Judged(Protocol):
-    """What is judged every few episodes."""
-
-    @property
-    def episodes(self) -> int:
-        """Of training."""
-
-    @property
-    def evaluate_every(self) -> int:
-        """Episodes between rollouts without noise."""
-
-
-def most_evaluations(run: Judged) -> int:
-    """How many rollouts without noise a run has at most: the first, the last and those between."""
-    return run.episodes // run.evaluate_every + 2
-
-
 class Table:
-    """Rows of named numbers and arrays, with room for all from the start."""
+    """Rows of named numbers and arrays, for which memory is taken once."""
 
     def __init__(self, fields: list[Field], capacity: int) -> None:
-        """Make room for `capacity` rows of `fields`, as `np.dtype` takes them."""
+        """Take memory for `capacity` rows of `fields`, as `np.dtype` takes them."""
         self._rows = np.empty(capacity, fields)
         self._size = 0
 
     def append(self, row: tuple[Any, ...]) -> None:
-        """Fill the next row; one value a field, in their order, as a named tuple has them."""
+        """Fill the next row with a value for each field, in their order."""
         self._rows[self._size] = row
         self._size += 1
 
     def columns(self) -> dict[str, Column]:
-        """One array a name, its first axis the rows that were filled."""
+        """An array for each name, of the rows that were filled."""
         filled = self._rows[: self._size]
         return {name: filled[name].copy() for name in filled.dtype.fields or ()}
 
@@ -189,13 +169,13 @@ class Records:
     value, next_value, delta, features (d,), theta (d,), w (d,), loss, status (a `StepStatus`),
     restarts, violation (how far a plan leaves the box [m]), iterations, solves,
     solve_seconds, fit_seconds, seconds, alpha_phi2 (alpha ||phi||^2). theta and w are those after
-    the step. What a step does not have is nan.
+    the step. Numbers that a step lacks are nan.
 
-    Columns of `evaluations`, one row per rollout without noise: episode (so many were trained),
+    Columns of `evaluations`, one row per rollout without noise: episode (number of trained ones),
     theta (d,), cost (infinite where a solve failed), states (K + 1, n), actions (K + 1, m).
     """
 
-    experiment: dict[str, Any]  # the fields of the Experiment, or what a Trial states
+    experiment: dict[str, Any]  # the fields of the Experiment, or `Trial.stated`
     steps: dict[str, Column]
     evaluations: dict[str, Column]
     facts: Facts
@@ -204,7 +184,7 @@ class Records:
         """Write the whole file beside `path`, then rename it into place.
 
         Raises:
-            OSError: it cannot be written; what was there stays.
+            OSError: the file cannot be written; an earlier one stays.
         """
         about = {"experiment": self.experiment, "facts": self.facts}
         save_tables(path, about, {"steps": self.steps, "evaluations": self.evaluations})
@@ -214,8 +194,8 @@ class Records:
         """Read a file that `save` wrote.
 
         Raises:
-            FileNotFoundError: there is none.
-            DamagedRecords: it cannot be read whole, or is not what a run leaves behind.
+            FileNotFoundError: there is no file.
+            DamagedRecords: the file is damaged, or has other columns than a run.
         """
         about, tables = load_tables(path, COLUMNS)
         experiment, facts = stated_in(about, path)
@@ -227,7 +207,7 @@ class Records:
 
         Raises:
             FileNotFoundError: there is no file.
-            DamagedRecords: it does not say what a run says, or has other columns.
+            DamagedRecords: the file is damaged, or names no run.
         """
         return stated_in(load_about(path), path)
 
@@ -242,7 +222,7 @@ def stated_in(about: dict[str, Any], path: Path) -> About:
     """The experiment and the facts that a file states.
 
     Raises:
-        DamagedRecords: it states none.
+        DamagedRecords: the file names no run.
     """
     try:
         fields = about["experiment"].items()

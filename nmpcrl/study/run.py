@@ -22,7 +22,6 @@ from nmpcrl.study.records import (
     Table,
     evaluation_fields,
     final_cost,
-    most_evaluations,
     step_fields,
 )
 from nmpcrl.study.setup import Job, job_of
@@ -97,7 +96,7 @@ def _tables(job: Job) -> tuple[Table, Table]:
     sizes = nmpc.n, nmpc.m, job.weights.theta.size
     return (
         Table(step_fields(*sizes), job.episodes * job.steps),
-        Table(evaluation_fields(*sizes, job.steps), most_evaluations(job)),
+        Table(evaluation_fields(*sizes, job.steps), job.episodes // job.evaluate_every + 2),
     )
 
 
