@@ -162,8 +162,9 @@ def test_each_border_belongs_to_yes(name, changes, apart, outcome):
 
 def test_two_that_failed_are_not_the_same_policy_and_cost_the_same():
     runs = study(of("all", **FAILED))
-    found = outcomes(runs, {e: np.full((3, 3), np.nan) for e in paths(runs)})
-    assert found["C5"] == found["B2"] == NOT
+    found = outcomes(runs)
+    lost = outcomes(runs, {e: np.full((3, 3), np.nan) for e in paths(runs)})
+    assert found["C5"] == lost["C5"] == found["B2"] == NOT
     assert found["B1"] == found["B3"] == found["B4"] == REPRODUCED
 
 
@@ -203,7 +204,9 @@ def test_the_learners_of_a_claim_decide_it_and_no_others(name):
         assert verdict_on(name, some, rollouts).outcome == UNDECIDABLE
         cut = pd.concat([some, runs[(runs.learner == learner) & (runs.seed > 0)]])
         asked_once = 20 if name == "C9" else 10  # of C9 each run, of the others each cell
-        assert verdict_on(name, cut, rollouts).counts["all"][1] == asked_once - 2
+        fewer = verdict_on(name, cut, rollouts)
+        assert fewer.counts["all"][1] == asked_once - 2
+        assert fewer.missing == 2 or name != "C6"  # it covers the cells of all four learners
 
 
 @pytest.mark.parametrize(
@@ -472,6 +475,7 @@ def test_claims_about_time_are_decided_with_the_paper_s_solver(name, given_, out
         ({(SMOOTH, LINEAR): True, (SMOOTH,): False}, REPRODUCED),  # the other one applies
         ({(SMOOTH, LINEAR): False, (SMOOTH,): True}, NOT),
         ({(LINEAR,): False, (SMOOTH,): False}, NOT),
+        ({(LINEAR,): False}, NOT),  # of the other theorem nothing is known
         ({}, UNDECIDABLE),
     ],
 )

@@ -7,8 +7,15 @@ from quiet_rows import quiet_row
 
 from nmpcrl.analysis.rows import experiment_of
 from nmpcrl.claims.paper_claims import judge_runs
-from nmpcrl.claims.robustness import WHOLE, departure, groups, not_run, robustness_map
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.robustness import (
+    WHOLE,
+    departure,
+    groups,
+    not_run,
+    part_changes,
+    robustness_map,
+)
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study import Experiment, design
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import PAPER
@@ -74,6 +81,13 @@ def test_a_variant_changes_the_cells_of_its_own_row_and_no_others(found):
     c5 = changed.loc[LITERAL, "C5"]
     assert (c5.share, c5.base_share, c5.pairs) == (0, 1, 10)
     assert c5.p == pytest.approx(2 / 184756)  # of 20 over 10 ways to deal ten yes, the two ends
+
+
+@pytest.mark.parametrize(("other", "changes"), [(PARTLY, False), (REPRODUCED, True)])
+def test_a_part_changes_a_verdict_only_if_the_parts_differ(other, changes):
+    layouts, counts = {"A": PARTLY, "B": other}, {"all": (19, 20), "A": (9, 10), "B": (10, 10)}
+    verdict = Verdict("C1", "", REPRODUCED, by_layout=layouts, counts=counts)
+    assert part_changes([verdict]).changes.tolist() == [changes, False]
 
 
 def test_a_layout_is_one_observation_and_has_no_p(found):
