@@ -1,51 +1,57 @@
 """Modules as Git has them at the commit that registered an investigation."""
 
-import importlib.abc
-import importlib.util
+import io
+import subprocess
 import sys
+import tarfile
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from tempfile import mkdtemp
 from types import ModuleType
 
-from fixed_questions import git
+from fixed_questions import ROOT, git
 
 from nmpcrl.studies.agents import SAC_AND_TD3
+from nmpcrl.studies.difficulty import DIFFICULTY
+from nmpcrl.studies.interventions import INTERVENTIONS
 from nmpcrl.studies.other_problems import OTHER_PROBLEMS
+from nmpcrl.studies.population import POPULATION
 from nmpcrl.studies.remedies import REMEDIES
 from nmpcrl.studies.worlds import WORLDS
 
-INVESTIGATIONS = (SAC_AND_TD3, OTHER_PROBLEMS, REMEDIES, WORLDS)
+INVESTIGATIONS = (
+    SAC_AND_TD3, DIFFICULTY, INTERVENTIONS, OTHER_PROBLEMS, POPULATION, REMEDIES, WORLDS,
+)  # fmt: skip
 
 
-class _AtCommit(importlib.abc.MetaPathFinder, importlib.abc.Loader):
-    """Finds modules of the library that today's library does not have."""
-
-    def __init__(self, commit: str) -> None:
-        self.commit = commit
-
-    def find_spec(self, name, path=None, target=None):
-        if name.startswith("nmpcrl.") and git("ls-tree", self.commit, "--", self._file(name)):
-            return importlib.util.spec_from_loader(name, self)
-        return None
-
-    def exec_module(self, module: ModuleType) -> None:
-        text = git("show", f"{self.commit}:{self._file(module.__name__)}")
-        exec(compile(text, module.__name__, "exec"), vars(module))
-
-    @staticmethod
-    def _file(name: str) -> str:
-        return f"{name.replace('.', '/')}.py"
+@cache
+def library(commit: str) -> Path:
+    """A folder with the library of a commit."""
+    git("cat-file", "-e", f"{commit}^{{commit}}")  # skips, or fails, without the history
+    asked = ["git", "-C", str(ROOT), "archive", commit, "nmpcrl"]
+    archive = subprocess.run(asked, check=True, capture_output=True).stdout
+    folder = Path(mkdtemp(prefix=f"nmpcrl-{commit}-"))
+    with tarfile.open(fileobj=io.BytesIO(archive)) as file:
+        file.extractall(folder, filter="data")
+    return folder
 
 
+@cache
 def module(commit: str, name: str) -> ModuleType:
-    """A module of a commit; what it imports is today's, where today's library has it."""
-    finder, known = _AtCommit(commit), {*sys.modules}
-    module = importlib.util.module_from_spec(finder.find_spec(name))
-    sys.meta_path.append(finder)
+    """A module of a commit, which imports the library of the same commit."""
+    path, today = str(library(commit)), _imported()
+    for one in today:
+        del sys.modules[one]
+    sys.path.insert(0, path)
     try:
-        sys.modules[name] = module  # dataclasses look their module up
-        finder.exec_module(module)
+        return import_module(name)
     finally:
-        sys.meta_path.remove(finder)
-        for added in {*sys.modules} - known:
-            if isinstance(getattr(sys.modules[added], "__loader__", None), _AtCommit):
-                del sys.modules[added]
-    return module
+        sys.path.remove(path)
+        for one in _imported():
+            del sys.modules[one]
+        sys.modules.update(today)
+
+
+def _imported() -> dict[str, ModuleType]:
+    return {k: one for k, one in sys.modules.items() if k.partition(".")[0] == "nmpcrl"}

@@ -12,6 +12,7 @@ ties with another failure. nan is refused, because it cannot be said what it wou
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -143,6 +144,38 @@ def performance_profile(scores: Vector, thresholds: Vector) -> pd.DataFrame:
             "high": [one.high for one in reached],
         }
     )
+
+
+def over_layouts(
+    statistic: Callable[..., Any], *columns: Vector, resamples: int = RESAMPLES
+) -> Estimate:
+    """A statistic of columns with one row a layout, and its percentile interval.
+
+    A draw in which the statistic is nan, such as one without a failure, does not count.
+
+    Args:
+        statistic: of the columns, over their last axis.
+        columns: each of shape (layouts,).
+        resamples: of the bootstrap.
+
+    Raises:
+        ValueError: there is no layout, the columns differ in length, or the statistic is over
+            all axes.
+    """
+    layouts = {len(one) for one in columns}
+    if len(layouts) != 1 or not min(layouts):
+        raise ValueError(f"columns of {sorted(layouts)} layouts: one length above 0 is needed")
+    (count,), rng = layouts, np.random.default_rng(SEED)
+    arrays = [np.asarray(one) for one in columns]
+    value = statistic(*arrays)
+    chosen = rng.integers(count, size=(resamples, count))
+    drawn = np.asarray(statistic(*(one[chosen] for one in arrays)))
+    if drawn.shape != (resamples,):
+        raise ValueError(f"a statistic of shape {drawn.shape}: one over the last axis is needed")
+    known = drawn[np.isfinite(drawn)]
+    tail = (1 - CONFIDENCE) / 2
+    bounds = np.quantile(known, (tail, 1 - tail)) if known.size else (np.nan, np.nan)
+    return Estimate(float(value), float(bounds[0]), float(bounds[1]))
 
 
 def _known(scores: Vector) -> Vector:

@@ -16,6 +16,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
+from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.setup import controller_of
 
@@ -106,6 +107,14 @@ def cliff(cost: Callable[[float], float], grid: Vector, costs: Vector) -> float:
         middle = (low + high) / 2
         low, high = (low, middle) if cost(middle) > border else (middle, high)
     return low
+
+
+def raised_cost(layout: str | Centres, theta: Vector, share: float) -> float:
+    """By which share of its cost a rollout costs more with theta_c raised by another share."""
+    controller = Persistent(paper.nmpc(layout))
+    raised = np.array([*theta[:-1], (1 + share) * theta[-1]])
+    before, after = (evaluate(controller, one, paper.STEPS).cost for one in (theta, raised))
+    return after / before - 1
 
 
 def ending(summary: RunSummary) -> Ending:

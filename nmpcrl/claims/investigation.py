@@ -77,6 +77,8 @@ class Part:
     places: Sequence[str]
     episodes: int
     seeds: int = 1
+    begin: int = 0  # k of the first seed
+    at: Callable[[], Sequence[tuple[str, int]]] | None = None  # place and k of rows, if no grid
     deterministic: Collection[str] = ()  # arms that draw nothing: one seed
     first: Mapping[str, int] = field(default_factory=dict)  # arms of the first places only
     seconds: float = 0.03  # of processor time an episode, as long as no row of the arm is known
@@ -87,9 +89,11 @@ class Part:
 
     def order(self, arm: str) -> list[tuple[str, int]]:
         """Place and k of each row of an arm."""
+        if self.at:
+            return [*self.at()]
         places = self.places[: self.first.get(arm)]
         seeds = 1 if arm in self.deterministic else self.seeds
-        return [(place, k) for place in places for k in range(seeds)]
+        return [(place, k) for place in places for k in range(self.begin, self.begin + seeds)]
 
 
 @dataclass(frozen=True)
@@ -116,7 +120,7 @@ class Question:
     name: str
     question: str  # in words
     expected: Outcome
-    answer: Callable[[pd.DataFrame], Answer]
+    answer: Callable[[Any], Answer]  # of the table, or of `Investigation.evidence`
     pilot: str = ""  # the sentence of an earlier, smaller experiment
 
 
@@ -132,6 +136,8 @@ class Investigation:
     epoch: int = 1  # raised by hand where an edit changes a number
     libraries: Sequence[str] = ()  # whose versions matter, beside those of every run
     digits: int | None = None  # to which published numbers are rounded
+    arrays: Sequence[str] = ()  # columns of lists, published in NAME.npz for the rows with one
+    evidence: Callable[[pd.DataFrame], Any] = lambda table: table  # that questions are asked of
     prepare: Callable[[Iterable[tuple[Condition, Any]]], None] | None = None  # compiles ahead
     where: Path | None = None  # of the published table; by default the project's folder
 
@@ -213,13 +219,17 @@ class Investigation:
         """Seconds of processor time that the missing rows of a part take."""
         known, one = self.known(), self.parts[part]
         known = known[known.part == part]
-        means = known.groupby("arm").seconds.mean().dropna() if len(known) else {}
+        means = known.groupby("arm").seconds.mean().dropna() if "seconds" in known else {}
         asked = (each.arm for each in self.missing(part))
         return float(sum(means.get(arm, one.seconds * one.episodes) for arm in asked))
 
     def answers(self, table: pd.DataFrame) -> dict[str, Answer]:
-        """The answers to all questions, by name."""
-        return {one.name: replace(one.answer(table), question=one.name) for one in self.questions}
+        """The answers of a table to all questions, by name."""
+        return self.judge(self.evidence(table))
+
+    def judge(self, known: Any) -> dict[str, Answer]:
+        """The answers of `evidence` to all questions, by name."""
+        return {one.name: replace(one.answer(known), question=one.name) for one in self.questions}
 
     def publish(self) -> Path:
         """Add the complete arms that were made here to the published table.
@@ -242,10 +252,16 @@ class Investigation:
         if not new:
             raise Unpublishable(f"no arm of {self.name} is complete and new")
         added = pd.concat(new)
+        arrays = published.arrays(self.name, self.where) if self.arrays and len(there) else {}
+        for name in {*self.arrays} & {*added}:
+            lists = [arrays[name]] if name in arrays else []
+            arrays[name] = np.concatenate([*lists, np.array([*added[name].dropna()])])
+        added = added.drop(columns=[*self.arrays], errors="ignore")
         batch = made_here() | {"rows": added.groupby("part", sort=False).size().to_dict()}
         return published.write(
             self.name,
             pd.concat([there, added], ignore_index=True),
+            arrays,
             batch=batch,
             registered=self.registered,
             where=self.where,
@@ -268,8 +284,9 @@ def _timed(investigation: Investigation, job: tuple[Condition, Any]) -> Row:
 
 def _same(first: pd.DataFrame, second: pd.DataFrame) -> bool:
     """Whether two blocks have the same numbers, the time that they took apart."""
-    one, other = (block.drop(columns="seconds").reset_index(drop=True) for block in (first, second))
-    return bool(one.equals(other[one.columns]))
+    names = [name for name in first.columns if name != "seconds"]
+    one, other = (block[names].reset_index(drop=True) for block in (first, second))
+    return bool(one.equals(other))
 
 
 def rounded(value: Any, digits: int | None) -> Any:

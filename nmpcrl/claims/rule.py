@@ -32,8 +32,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
-from nmpcrl.analysis.predictors import over_layouts
-from nmpcrl.analysis.statistics import Estimate, rate
+from nmpcrl.analysis.statistics import Estimate, over_layouts, rate
 from nmpcrl.claims.verdict import (
     NOT,
     PARTLY,

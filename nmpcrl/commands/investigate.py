@@ -12,7 +12,10 @@ if TYPE_CHECKING:
 
 BOOK = {  # the investigations of the book: module and name of each
     "agents": ("agents", "SAC_AND_TD3"),
+    "interventions": ("interventions", "INTERVENTIONS"),
     "other_problems": ("other_problems", "OTHER_PROBLEMS"),
+    "population": ("population", "POPULATION"),
+    "population_layouts": ("difficulty", "DIFFICULTY"),
     "remedies": ("remedies", "REMEDIES"),
     "worlds": ("worlds", "WORLDS"),
 }
@@ -31,8 +34,9 @@ def investigate(
 ) -> None:  # fmt: skip
     """Make and judge the rows of an investigation.
 
-    NAME is one of the book's (agents, other_problems, remedies, worlds), or a Python
-    file that defines one Investigation. Each row is stored as soon as it is made, so a run can be
+    NAME is one of the book's (agents, interventions, other_problems, population,
+    population_layouts, remedies, worlds), or a Python file that defines one
+    Investigation. Each row is stored as soon as it is made, so a run can be
     interrupted and started again.
 
     \b

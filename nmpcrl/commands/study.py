@@ -10,7 +10,6 @@ from nmpcrl.commands.options import WORKERS, NewFile, refuse_unwritable
 
 @click.command()
 @click.option("--part", "parts", multiple=True, help="Only this part: main, controls or a variant.")
-@click.option("--population", is_flag=True, help="The runs of the 180 drawn layouts instead.")
 @WORKERS
 @click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that trains instead.")
 @click.option("--dry-run", is_flag=True, help="Only report what is missing.")
@@ -19,7 +18,6 @@ from nmpcrl.commands.options import WORKERS, NewFile, refuse_unwritable
 @click.option("--judge", is_flag=True, help="Only show the verdicts on the published study.")
 def study(
     parts: tuple[str, ...],
-    population: bool,
     workers: int | None,
     scheduler: str | None,
     dry_run: bool,
@@ -31,22 +29,20 @@ def study(
 
     Finished runs are stored, so the study can be interrupted and started again.
     With --publish and --part, the runs of these parts are published beside the
-    published ones. The parts of --population are judge, tune, "N = 20", "N = 40",
-    "judge imitating", "alpha x 3" and "judge again".
+    published ones.
 
     \b
     Example:
       nmpcrl study --part main --table episodes.csv.gz
-      nmpcrl study --population --part judge --dry-run
     """
     from nmpcrl.analysis import summaries
-    from nmpcrl.study import cluster, design, population_design
+    from nmpcrl.study import cluster, design
     from nmpcrl.study.limits import seconds_of
 
     if judge:
-        _judge_population() if population else _judge()
+        _judge()
         return
-    every = population_design.whole_population() if population else design.whole_study()
+    every = design.whole_study()
     if unknown := sorted(set(parts) - set(every.values())):
         known = ", ".join(dict.fromkeys(every.values()))
         raise click.ClickException(f"there is no part {unknown[0]!r}; the parts are {known}")
@@ -74,13 +70,7 @@ def study(
         frames = [tidy([one]).assign(variant=wanted[e]) for e, one in found.items()]
         pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
         click.echo(f"{table}: written")
-    if publish and population:
-        from nmpcrl.claims import population_published
-
-        publish_runs = population_published.extend if parts else population_published.publish
-        click.echo(f"{publish_runs(found)}: published")
-        _judge_population()
-    elif publish:
+    if publish:
         from nmpcrl.claims.publish import publish_study
         from nmpcrl.claims.published import extend
 
@@ -97,18 +87,3 @@ def _judge() -> None:
 
     for verdict in published.load().verdicts:
         click.echo(f"{verdict.claim} {verdict.words}")
-
-
-def _judge_population() -> None:
-    """Print in which share of the layouts each claim holds, and each question's answer."""
-    from nmpcrl.claims import population_published
-
-    found = population_published.load()
-    for row in found.shares().itertuples():
-        interval = f"{row.share:.0%} [{row.low:.0%}, {row.high:.0%}]"
-        where = f"{row.holding} of {row.layouts} layouts, {interval}"
-        click.echo(f"{row.claim}: {where}; {row.outcome}")
-    for answer in found.answers():
-        every = {**answer.counts, **answer.beside}
-        counts = ", ".join(f"{name} {yes} of {of}" for name, (yes, of) in every.items())
-        click.echo(f"{answer.question}: {answer.words}" + (f" ({counts})" if counts else ""))

@@ -5,22 +5,28 @@ from html import escape
 
 import pandas as pd
 
-from nmpcrl.analysis.difficulty import PILOT
-from nmpcrl.analysis.predictors import auc
-from nmpcrl.claims.population import asked, at_the_gap, improve_by_gap, succeeds
-from nmpcrl.claims.population_published import PopulationRuns
-from nmpcrl.claims.population_questions import CLOSES_BEFORE, EXPECTED
 from nmpcrl.claims.thresholds import BETTER
-from nmpcrl.claims.whole_picture import PICTURE
 from nmpcrl.report.cited import Count
 from nmpcrl.report.prose import filled
 from nmpcrl.report.tables import BADGES, html_table
 from nmpcrl.report.text import listed
+from nmpcrl.studies.difficulty import PILOT
+from nmpcrl.studies.population import (
+    CLOSES_BEFORE,
+    EXPECTED,
+    PICTURE,
+    Drawn,
+    asked,
+    at_the_gap,
+    improve_by_gap,
+    succeeds,
+)
+from nmpcrl.studies.predictors import auc
 from nmpcrl.study.design import LAYOUTS, MAIN_TABLE, VARIANTS
-from nmpcrl.study.population_design import name_of
+from nmpcrl.study.drawn import name_of
 
 
-def in_short(found: PopulationRuns) -> str:
+def in_short(found: Drawn) -> str:
     """Where ES fails in drawn layouts, by what is known before training, then by what is not."""
     es, ends = succeeds(found.main), at_the_gap(found.main, found.layouts)
     closes = found.layouts.loc[es.index, PILOT]
@@ -55,7 +61,7 @@ def whole_or_nearest(tried: pd.DataFrame) -> str:
     """Where the paper's whole picture appears, or what comes nearest to it: a sentence in Markdown.
 
     Args:
-        tried: of `whole_picture.everywhere`, not empty.
+        tried: of `population.everywhere`, not empty.
     """
     appears = tried[tried.whole == len(PICTURE)]
     if len(appears):

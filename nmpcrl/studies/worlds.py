@@ -26,8 +26,7 @@ from nmpcrl.claims.rule import read
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
 from nmpcrl.studies import worlds_run as runs
 from nmpcrl.studies.worlds_run import EVERY, sequence
-from nmpcrl.study.drawn import JUDGE, SCENARIOS
-from nmpcrl.study.population_design import COMPARED
+from nmpcrl.study.drawn import COMPARED, JUDGE, SCENARIOS
 
 BACK = 0.02  # of theta_init's cost: a share that exceeds the one before a change by less is back
 SOON = 50  # episodes: "back" within so many is soon

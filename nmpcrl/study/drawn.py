@@ -6,9 +6,11 @@ obstacles that move are M01 to M40.
 """
 
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.moving import KINDS, Motion
 
@@ -27,6 +29,24 @@ LAYOUTS: dict[str, Centres] = {
 }
 TUNE = {name: centres for name, centres in LAYOUTS.items() if name[0] == "T"}
 JUDGE = {name: centres for name, centres in LAYOUTS.items() if name[0] == "J"}
+# Numbers of the first 15 layouts of `JUDGE` of either kind; a test chooses them again.
+CLOSING = (3, 4, 24, 29, 31, 32, 37, 44, 46, 50, 58, 65, 77, 82, 89)
+OPEN = (1, 2, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17)
+COMPARED = tuple(f"J{i:03}" for i in sorted(CLOSING + OPEN))  # with other horizons and step sizes
+
+
+def name_of(layout: str | Centres) -> str:
+    """The name of a drawn layout, given as a field of an `Experiment`.
+
+    Raises:
+        KeyError: it is none of `LAYOUTS`.
+    """
+    return _names()[layout]
+
+
+@cache
+def _names() -> dict[Any, str]:
+    return {Experiment(layout=centres).layout: name for name, centres in LAYOUTS.items()}
 
 
 def _motion(kind: str, fields: dict[str, float | list[float]]) -> Motion:

@@ -1,6 +1,7 @@
 """Estimates against closed forms, and intervals against how often they cover what is true."""
 
 import time
+from functools import partial
 from math import comb
 
 import numpy as np
@@ -11,6 +12,7 @@ from nmpcrl.analysis.statistics import (
     CONFIDENCE,
     Estimate,
     interquartile_mean,
+    over_layouts,
     paired_p,
     performance_profile,
     probability_of_improvement,
@@ -178,6 +180,25 @@ def test_the_profile_says_which_share_of_the_runs_reaches_each_threshold():
 def test_what_is_not_known_is_refused(estimate, scores, said):
     with pytest.raises(ValueError, match=f"{said} scores are nan"):
         estimate(np.array(scores, float))
+
+
+def test_the_bootstrap_of_a_share_of_layouts_is_about_as_wide_as_wilson_s_interval():
+    found, wilson = over_layouts(partial(np.mean, axis=-1), np.arange(120) < 60), rate(60, 120)
+    assert found.value == 0.5
+    assert (found.low, found.high) == pytest.approx((wilson.low, wilson.high), abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("statistic", "columns", "said"),
+    [
+        (np.mean, (np.zeros(2), np.zeros(3)), r"columns of \[2, 3\] layouts"),
+        (np.mean, (np.zeros(0),), r"columns of \[0\] layouts"),
+        (np.mean, (np.arange(4.0),), "over the last axis is needed"),
+    ],
+)
+def test_columns_of_one_length_and_statistics_of_the_last_axis_are_needed(statistic, columns, said):
+    with pytest.raises(ValueError, match=said):
+        over_layouts(statistic, *columns)
 
 
 def test_an_estimate_is_shown_with_its_interval():

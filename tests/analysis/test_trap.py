@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.analysis.trap import cliff, ending, stands, stretch
+from nmpcrl.analysis.trap import cliff, ending, raised_cost, stands, stretch
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.run import run
@@ -72,3 +72,9 @@ def test_the_cliff_is_found_between_two_points_of_the_grid():
     assert found == pytest.approx(0.137, abs=1e-3)
     assert cost(found) < 101
     assert np.isnan(cliff(cost, grid[:2], np.array([100.0, 119.0])))
+
+
+def test_raising_theta_c_across_the_closing_of_a_gap_costs_much_and_by_nothing_nothing():
+    theta = np.array([*paper.THETA_INIT[:-1], 0.15])
+    assert raised_cost("E", theta, 0.0) == 0
+    assert raised_cost("E", theta, 1 / 3) > 0.5

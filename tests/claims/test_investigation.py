@@ -108,6 +108,32 @@ def test_complete_arms_are_published_rounded_and_read_as_they_were_written(folde
     assert about["registered"] == "abc"
 
 
+def with_paths(setting, place, episodes, seed):
+    row = run(setting, place, episodes, seed) | {"seconds": 7.0}
+    return row if place == "a" else row | {"path": [[seed, 1], [2, -3]]}
+
+
+def test_rows_may_have_lists_that_are_published_apart_and_a_time_of_their_own():
+    places = lambda: [("b", 2), ("a", 1)]  # noqa: E731
+    grid = Part(with_paths, {"one": 1.0}, ("a", "b"), 10, begin=1)
+    parts = {"grid": grid, "listed": Part(with_paths, {"one": 1.0}, (), 10, at=places)}
+    made = toy(parts=parts, arrays=("path",), evidence=lambda table: table[table.k == 1])
+    assert [*made.conditions("grid")] == [("grid", "one", "a", 1), ("grid", "one", "b", 1)]
+    for part in parts:
+        made.complete([part], workers=1)
+        made.publish()
+    table = made.table()
+    assert [*zip(table.place, table.k, strict=True)] == [("a", 1), ("b", 1), ("b", 2), ("a", 1)]
+    assert "path" not in table
+    assert {*table.seconds} == {7.0}
+    assert published.arrays("toy")["path"].tolist() == [[[981, 1], [2, -3]], [[982, 1], [2, -3]]]
+    with pytest.raises(Unpublishable, match="no arm of toy is complete and new"):
+        made.publish()
+    asked = Question("rows", "How many?", NOT, lambda rows: Answer(NOT, {"rows": (0, len(rows))}))
+    found = toy(questions=(asked,), evidence=made.evidence).answers(table)
+    assert found["rows"].counts == {"rows": (0, 3)}
+
+
 def test_what_is_published_is_neither_changed_nor_published_twice_nor_in_part():
     toy().complete(["tune"], workers=1)
     toy().publish()

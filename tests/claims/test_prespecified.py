@@ -50,9 +50,12 @@ def commit(name: str) -> Commit:
 
 
 def numbers_in(state: str) -> dict:
-    """The numbers that were assigned at the left margin in a state of the code."""
-    found = {}
-    for line in git("grep", "-h", "-E", ASSIGNED, state, "--", "nmpcrl").splitlines():
+    """The numbers that were assigned at the left margin in a state of the code.
+
+    Investigations have names and commits of their own.
+    """
+    found, rooms = {}, ("nmpcrl", ":!nmpcrl/studies")
+    for line in git("grep", "-h", "-E", ASSIGNED, state, "--", *rooms).splitlines():
         name, _, value = line.partition(" = ")
         if re.match(r"[\d(.]", value):  # and not another thing of the same name
             found[name] = ast.literal_eval(value.partition("#")[0].strip())

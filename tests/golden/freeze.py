@@ -7,6 +7,7 @@ published; nothing is trained. `test_golden` compares all of them with what the 
 import json
 import sys
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -17,36 +18,31 @@ import numpy as np
 import pandas as pd
 from plain_values import array, plain, plain_name, processor, short, table
 
-from nmpcrl.analysis.difficulty import raised_cost
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.suite import seed_of
 from nmpcrl.bench import problem_times, sweep
 from nmpcrl.claims import (
     evidence,
     finding,
-    interventions,
     own_claims,
     paper_claims,
-    population,
-    population_published,
-    population_questions,
     prespecified,
     published,
     reproduce,
     robustness,
     rule,
     thresholds,
-    whole_picture,
     wider_claims,
 )
 from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.report import baselines, whole_study
 from nmpcrl.report import worlds as world_report
-from nmpcrl.studies import agents, other_problems, remedies, worlds
+from nmpcrl.studies import agents, interventions, other_problems, population, remedies, worlds
+from nmpcrl.studies.predictors import predictor_scores
 from nmpcrl.study import design, paper, provenance
+from nmpcrl.study import published as published_tables
 from nmpcrl.study.drawn import JUDGE, LAYOUTS, SCENARIOS, TUNE
 from nmpcrl.study.experiment import PAPER
-from nmpcrl.study.population_design import whole_population
 
 FOLDER = Path(__file__).parent
 ROLLOUT = 6  # digits of a rollout's cost, which are the same on all machines
@@ -82,11 +78,11 @@ def write() -> None:
 
 # What is asked of below, loaded once.
 
-study, drawn = published.load, population_published.load
+study, drawn = published.load, population.load
 suite = cache(lambda: remedies.REMEDIES.table())
 trained = cache(lambda: agents.SAC_AND_TD3.table())
 changing = cache(lambda: worlds.WORLDS.table())
-again = cache(interventions.load)
+again = cache(lambda: interventions.ends(interventions.INTERVENTIONS.table()))
 problems = cache(lambda: other_problems.runs(other_problems.OTHER_PROBLEMS.table()))
 every = cache(lambda: evidence.gather("published", variants=True))
 six_paths = cache(lambda: evidence.paths(every()))
@@ -239,7 +235,11 @@ def ratios_of_times() -> Any:
 def batches() -> Any:
     first, *others = study().batches
     six = [{**first, "runs": study().parts}, *others]  # the first one lists all runs
-    known = {"six": six, "drawn": [drawn().about, *drawn().about["additions"]]}
+    parts = published_tables.about("population")["batches"]
+    totals = {part: n for one in parts for part, n in one["rows"].items()}
+    every_run = [one | {"runs": one["rows"]} for one in parts]
+    every_run[0]["runs"] = {part: totals[part] for part in population.PARTS}
+    known = {"six": six, "drawn": every_run}
     names = ("date", "epochs", "versions", "hours", "runs")
     return {
         name: [{one: batch.get(one) for one in names} for batch in batches]
@@ -252,12 +252,12 @@ def batches() -> Any:
 
 @entry("population")
 def shares() -> Any:
-    return drawn().shares().set_index("claim")
+    return drawn().shares.set_index("claim")
 
 
 @entry("population")
 def shares_in_A_to_F() -> Any:
-    main, names = study().main, list(population_questions.EXPECTED)
+    main, names = study().main, list(population.EXPECTED)
     runs = study().table[study().table.variant == design.MAIN_TABLE]
     assert len(main) == len(runs)
     return population.shares(population.held(runs, study().paths, names, str)).set_index("claim")
@@ -271,32 +271,33 @@ def where_each_claim_holds() -> Any:
 @entry("population")
 def verdicts_that_stand() -> Any:
     outcomes = {one.claim: one.outcome for one in study().verdicts}
-    found = drawn().shares()
+    found = drawn().shares
     return {one.claim: outcomes[one.claim] == one.outcome for one in found.itertuples()
             if one.claim in outcomes}  # fmt: skip
 
 
 @entry("population")
 def answers() -> Any:
-    return by_question(drawn().answers())
+    found = population.POPULATION.judge(drawn())
+    return by_question(found[one.name] for one in population.QUESTIONS if one.name != "cliff")
 
 
 @entry("population")
 def other_answers() -> Any:
-    main, six = study().main, again().query("part == 'six'")
     return {
-        "cliff": plain(by_question([population.cliff(raised())]), ROLLOUT),
-        "extrapolation": by_question([population.extrapolation(six)]),
-        "early overshoot in A to F": by_question([population.early_overshoot(main)]),
+        "cliff": plain(by_question([named("cliff", population.cliff(raised()))]), ROLLOUT),
+        "extrapolation": by_question(interventions.INTERVENTIONS.judge(again()).values()),
+        "early overshoot in A to F": by_question(
+            [named("early overshoot", population.early_overshoot(study().main))]
+        ),
     }
 
 
-@cache
-def raised() -> pd.Series:
-    """By which share the cost of each layout's best theta rises with theta_c."""
-    share = population_questions.CLIFF_RAISED
-    best = {search.layout: np.array(found.theta) for search, found in study().searches.items()}
-    return pd.Series({name: raised_cost(name, theta, share) for name, theta in best.items()})
+raised = cache(population.raised)
+
+
+def named(question: str, answer: Any) -> Any:
+    return replace(answer, question=question)
 
 
 @entry("population")
@@ -307,7 +308,9 @@ def the_raised_costs() -> Any:
 @entry("population")
 def expectations() -> Any:
     known = {
-        "population": population_questions.QUESTIONS,
+        "population": {
+            one.name: one for one in (*population.QUESTIONS, *interventions.INTERVENTIONS.questions)
+        },
         "remedies": remedies.REMEDIES.asked,
         "agents": agents.SAC_AND_TD3.asked,
         "worlds": {one.name: one for one in worlds.WORLD_QUESTIONS},
@@ -317,14 +320,14 @@ def expectations() -> Any:
         name: {one: asked.expected for one, asked in questions.items()}
         for name, questions in known.items()
     }
-    return expected | {"shares": population_questions.EXPECTED}
+    return expected | {"shares": population.EXPECTED}
 
 
 @entry("population")
 def predictors() -> Any:
     parts, layouts = drawn().runs.groupby("part"), drawn().layouts
     tuned, judged = population.succeeds(parts.get_group("tune")), population.succeeds(drawn().main)
-    return population.predictor_scores(layouts, tuned, judged)
+    return predictor_scores(layouts, tuned, judged)
 
 
 @entry("population")
@@ -347,7 +350,7 @@ def at_the_gap() -> Any:
 @entry("population")
 def whole_picture_tried() -> Any:
     tried = drawn().tried
-    columns = ["setting", "layout", "decay", *whole_picture.PICTURE, "whole", "answers"]
+    columns = ["setting", "layout", "decay", *population.PICTURE, "whole", "answers"]
     return {
         "cells": table(tried),
         "by setting": tried.groupby(["setting", "whole"], sort=False).size(),
@@ -368,7 +371,9 @@ def runs_made_again() -> Any:
 
 @entry("population")
 def which_runs_are_made_again() -> Any:
-    names = list(interventions.runs())
+    one = interventions.INTERVENTIONS
+    chosen = [(part, at) for part, each in one.parts.items() for at in each.order("nudged")]
+    names = [f"{part} {at[0]} {one.seed(*at)}" for part, at in chosen]
     return {"first": names[:5], "count": len(names), "all": short(names)}
 
 
@@ -650,9 +655,21 @@ def all_keys() -> Any:
     }
 
 
+def plan_of_drawn() -> dict[Any, str]:
+    """The runs in drawn layouts with their parts: learner by learner, layout by layout."""
+    plan = {}
+    for part in population.PARTS:
+        rows = pd.DataFrame([*population.POPULATION.conditions(part)])
+        rows["learner"] = [arm.split()[0] for arm in rows.arm]
+        for _, some in rows.groupby("learner", sort=False):
+            order = some.assign(at=some.place.factorize()[0]).sort_values("at", kind="stable")
+            plan |= dict.fromkeys(population.experiments(order), part)
+    return plan
+
+
 @entry("keys")
 def plans() -> Any:
-    known = {"six": design.whole_study(), "drawn": whole_population()}
+    known = {"six": design.whole_study(), "drawn": plan_of_drawn()}
     lists = {
         name: [[plain(provenance.identity(e)), part] for e, part in plan.items()]
         for name, plan in known.items()

@@ -4,11 +4,9 @@ import re
 
 import pandas as pd
 
-from nmpcrl.analysis.difficulty import OPEN
-from nmpcrl.claims.population import shares
-from nmpcrl.claims.population_published import PopulationRuns
-from nmpcrl.claims.whole_picture import PICTURE
 from nmpcrl.report.drawn import in_short, share_table, whole_or_nearest
+from nmpcrl.studies.difficulty import OPEN
+from nmpcrl.studies.population import PICTURE, Drawn, shares
 from nmpcrl.study.drawn import JUDGE
 from nmpcrl.study.experiment import Experiment
 
@@ -48,7 +46,7 @@ def test_in_short_counts_as_improved_what_saves_a_per_cent_and_asks_of_gaps_wher
     }
     runs["final_cost"] = runs.initial_cost * [costs[layout] for layout in runs.layout]
     closes = pd.DataFrame({"closes": {"J001": 0.3, "J002": 0.1, "J003": OPEN}})
-    said = re.sub(r"<[^>]+>", "", in_short(PopulationRuns(runs, {}, closes)))
+    said = re.sub(r"<[^>]+>", "", in_short(Drawn(runs, {}, closes)))
     said, each = " ".join(said.split()), len(runs[runs.learner == "ES"]) // 3
     assert "Of 3 drawn layouts ES improves 1." in said
     assert "it does not improve 1 of 1 layouts" in said

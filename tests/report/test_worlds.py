@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from nmpcrl.analysis.encounters import Counted, Encounters
-from nmpcrl.claims.population import Answer
+from nmpcrl.claims.investigation import Answer
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report import worlds
 from nmpcrl.studies.worlds import ORACLES, WORLD_QUESTIONS
@@ -30,9 +30,9 @@ def test_what_is_saved_is_a_share_of_the_same_layout_and_there_is_no_oracle_of_a
 def test_what_is_not_decided_is_not_listed():
     names = [one.name for one in WORLD_QUESTIONS]
     outcomes = (REPRODUCED, REPRODUCED, PARTLY, NOT, UNDECIDABLE)
-    given = [Answer(name, outcome, {"layouts": (1, 2)})
+    given = [Answer(outcome, {"layouts": (1, 2)}, question=name)
              for name, outcome in zip(names, outcomes, strict=False)]  # fmt: skip
-    of_another_chapter = Answer("full terminal cost", REPRODUCED, {"layouts": (1, 2)})
+    of_another_chapter = Answer(REPRODUCED, {"layouts": (1, 2)}, question="full terminal cost")
     said = worlds.decided([*given, of_another_chapter])
     assert said == dict(zip(("asked", "confirmed", "partly", "contradicted"), "5211", strict=True))
     assert [line[:2] for line in worlds.answered(given).splitlines()] == ["- "] * 4

@@ -1,47 +1,122 @@
 """Parts, thresholds and questions are those that were committed before the first row was made."""
 
+import ast
+from dataclasses import asdict
+from operator import attrgetter
+from pathlib import Path
+
+import pandas as pd
 import pytest
 from fixed_questions import git
 from registered import INVESTIGATIONS, module
 
-from nmpcrl.studies import agents, remedies, worlds
+from nmpcrl.studies import (
+    agents,
+    difficulty,
+    interventions,
+    population,
+    predictors,
+    remedies,
+    worlds,
+)
+from nmpcrl.studies.population import POPULATION
 from nmpcrl.study import published
 
-# today's module; its investigation; commit, module and name of questions that were registered
-REGISTERED = [
-    (agents, agents.SAC_AND_TD3, "2feab64", "nmpcrl.claims.agent_questions", "AGENT_QUESTIONS"),
-    (remedies, remedies.REMEDIES, "ebf53a4", "nmpcrl.claims.remedy_questions", "REMEDY_QUESTIONS"),
-    (worlds, worlds.WORLDS, "cff09a0", "nmpcrl.claims.world_questions", "WORLD_QUESTIONS"),
-    (worlds, worlds.WORLDS, "ff05118", "nmpcrl.claims.terminal_questions", "TERMINAL_QUESTIONS"),
-]
-each = pytest.mark.parametrize(
-    ("today", "investigation", "commit", "name", "questions"), REGISTERED
-)
+NAMES = ("today", "investigations", "commit", "name", "questions", "parts")
+REGISTERED = [  # today's modules; commit, module and name of questions; their parts in `first`
+    (
+        (agents,), (agents.SAC_AND_TD3,),
+        "2feab64", "nmpcrl.claims.agent_questions", "AGENT_QUESTIONS", ("all",),
+    ),
+    (
+        (remedies,), (remedies.REMEDIES,),
+        "ebf53a4", "nmpcrl.claims.remedy_questions", "REMEDY_QUESTIONS", ("all",),
+    ),
+    (
+        (worlds,), (worlds.WORLDS,),
+        "cff09a0", "nmpcrl.claims.world_questions", "WORLD_QUESTIONS", ("all",),
+    ),
+    (
+        (worlds,), (worlds.WORLDS,),
+        "ff05118", "nmpcrl.claims.terminal_questions", "TERMINAL_QUESTIONS", ("terminal",),
+    ),
+    (
+        (population, difficulty, predictors), (POPULATION, interventions.INTERVENTIONS),
+        "46c248b", "nmpcrl.claims.population_questions", "QUESTIONS", tuple(population.PARTS),
+    ),
+]  # fmt: skip
+each = pytest.mark.parametrize(NAMES, REGISTERED)
 
 
 @each
 def test_questions_and_expectations_are_those_registered(
-    today, investigation, commit, name, questions
+    today, investigations, commit, name, questions, parts
 ):
     then = getattr(module(commit, name), questions)
-    now = {one.name: one for one in investigation.questions if one.name in then}
-    assert [*now] == [*then]
+    every = (one for each in investigations for one in each.questions)
+    now = {one.name: one for one in every if one.name in then}
+    assert {*now} == {*then}
     for one in now.values():
         old = then[one.name]
         assert (one.question, one.expected, one.pilot) == (old.question, old.expected, old.pilot)
 
 
 @each
-def test_thresholds_are_those_registered(today, investigation, commit, name, questions):
-    then = module(commit, name)
-    plain = {
+def test_thresholds_are_those_registered(today, investigations, commit, name, questions, parts):
+    now = {one: value for each in today for one, value in vars(each).items()}
+    then = {
         one: value
-        for one, value in vars(then).items()
-        if one.isupper() and isinstance(value, int | float | tuple) and hasattr(today, one)
+        for one, value in vars(module(commit, name)).items()
+        if one.isupper() and isinstance(value, int | float | tuple) and one in now
     }
-    for one, value in plain.items():
-        now = getattr(today, one)
-        assert (now if isinstance(value, int | float) else tuple(now)) == value
+    plain = {
+        one: now[one] if isinstance(now[one], int | float) else tuple(now[one]) for one in then
+    }
+    assert plain == then
+
+
+def test_the_expected_shares_and_runs_in_drawn_layouts_are_those_registered():
+    questions = module("46c248b", "nmpcrl.claims.population_questions")
+    assert {name: asdict(one) for name, one in population.EXPECTED.items()} == {
+        name: asdict(one) for name, one in questions.EXPECTED.items()
+    }
+    then = module("46c248b", "nmpcrl.study.population_design").arms()
+    plan = pd.DataFrame(one for part in population.PARTS for one in POPULATION.conditions(part))
+    for part in (part for part in then if "judge" not in part):
+        rows = plan[plan.part == part]
+        assert {*map(_varied, population.experiments(rows))} == {*map(_varied, then[part])}
+    every = [one for runs in then.values() for one in runs]  # judged in three steps, not in two
+    assert {*map(_varied, population.experiments(plan))} == {*map(_varied, every)}
+
+
+_varied = attrgetter("learner", "layout", "decay", "seed", "horizon", "alpha", "episodes")
+
+
+@pytest.mark.parametrize(
+    ("commit", "names", "parts"),
+    [
+        ("a02ad04", ("DRAW, SAMPLE", "NUDGE"), ("six", "drawn")),
+        ("f8a3b4d", ("DRAW, SAMPLE", "NUDGE", "_stopped", "_shuffled"), ("others",)),
+    ],
+)
+def test_the_runs_that_are_made_again_are_those_registered(commit, names, parts):
+    then = ast.parse(git("show", f"{commit}:nmpcrl/claims/interventions.py"))
+    now = ast.parse(Path(interventions.__file__).read_text("utf-8"))
+    assert [_defined(then, name) for name in names] == [_defined(now, name) for name in names]
+    assert tuple(interventions.ARMS) == ast.literal_eval(_defined(then, "ARMS"))
+    first = published.about("interventions")["first"]
+    for part in parts:
+        assert git("rev-parse", commit) in git("rev-list", f"{first[part]}^").split()
+
+
+def _defined(tree, name):
+    """The code of a function, or the value of a constant."""
+    for node in tree.body:
+        if getattr(node, "name", "") == name:
+            return ast.unparse(node)
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]).strip("()") == name:
+            return ast.unparse(node.value)
+    raise AssertionError(name)
 
 
 def test_settings_and_parts_of_agents_are_those_registered():
@@ -79,10 +154,10 @@ def test_parts_of_worlds_are_those_registered():
 
 
 @each
-def test_they_are_older_than_the_rows(today, investigation, commit, name, questions):
-    first = published.about(investigation.name)["first"]
-    part = "terminal" if questions == "TERMINAL_QUESTIONS" else "all"
-    assert git("rev-parse", commit) in git("rev-list", f"{first[part]}^").split()
+def test_they_are_older_than_the_rows(today, investigations, commit, name, questions, parts):
+    first = published.about(investigations[0].name)["first"]
+    for part in parts:
+        assert git("rev-parse", commit) in git("rev-list", f"{first[part]}^").split()
 
 
 def test_every_investigation_is_published_with_the_columns_of_its_conditions():

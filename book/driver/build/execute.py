@@ -34,7 +34,7 @@ KERNEL = {  # the environment of what executes a chapter
 }
 
 # In chapters that compile a plant or problem of their own, or read the runs of drawn layouts.
-LONG = (b"Plant(", b"Problem(", b"study.problems", b"population_published")
+LONG = (b"Plant(", b"Problem(", b"study.problems", b"studies import population")
 
 
 def weight(job: tuple[Path, Given]) -> tuple[bool, int]:

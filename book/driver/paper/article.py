@@ -30,7 +30,7 @@ from pypdf import PdfReader
 from driver.paper import markup
 from driver.paper.pdf import version
 from driver.project import ROOT, Failure, from_yaml, reported, shown
-from nmpcrl.claims import evidence, population_published, prespecified, published, robustness
+from nmpcrl.claims import evidence, prespecified, published, robustness
 from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.finding import Finding, finding
 from nmpcrl.claims.own_claims import OWN_CLAIMS
@@ -43,6 +43,7 @@ from nmpcrl.report import verdicts as sentences
 from nmpcrl.report.figures.verdicts import claims as verdicts
 from nmpcrl.report.figures.verdicts import failure_modes
 from nmpcrl.report.open_questions import QUESTIONS
+from nmpcrl.studies import population
 from nmpcrl.study import design, paper
 from nmpcrl.study.departures import DEPARTURES
 from nmpcrl.study.experiment import MAIN
@@ -128,7 +129,7 @@ def _sentences(given: Source) -> dict[str, str]:
         "effort": text.compute_effort(found),
         "layouts": text.by_layout_and_decay(given.claims),
         "variants": text.verdicts_changed(given.changed),
-        "drawn": drawn.in_short(population_published.load()),
+        "drawn": drawn.in_short(population.load()),
     }
     return {name: markup.text(one) for name, one in parts.items()}
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.claims.population_questions import STANDING, STOOD
 from nmpcrl.course import Outcome, choice, exercise, formula, function, number, varied
+from nmpcrl.studies.population import STANDING, STOOD
 
 WAYS = STANDING * np.array([0.1, 0.5, 0.98, 1.02, 1.5, 4.0])  # [m] near the limit, and far from it
 

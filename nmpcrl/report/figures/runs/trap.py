@@ -10,7 +10,6 @@ from matplotlib.patches import Circle
 
 from nmpcrl import Vector
 from nmpcrl.analysis.trap import Stand, stretch
-from nmpcrl.claims.population_questions import STANDING
 from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import MAPS, draw_task, over_episodes
 from nmpcrl.report.figures.sheet import sheet
@@ -26,6 +25,7 @@ from nmpcrl.report.figures.style import (
     page,
     subplots,
 )
+from nmpcrl.studies.population import STANDING
 
 PANELS = tuple(("map", name) for name in ("value", "delta", "theta_c", "cost"))
 ROWS, HEIGHT, TALL = (1.4, 1, 1, 1), 5.6, (2.9, 1.8, 1.4, 1.4, 1.4)

@@ -11,8 +11,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import PercentFormatter
 
-from nmpcrl.analysis.difficulty import MEASURES, OPEN, PILOT
-from nmpcrl.claims.population_questions import EXPECTED
 from nmpcrl.claims.thresholds import improves
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.report.drawn import label
@@ -28,6 +26,8 @@ from nmpcrl.report.figures.style import (
     page,
     subplots,
 )
+from nmpcrl.studies.difficulty import MEASURES, OPEN, PILOT
+from nmpcrl.studies.population import EXPECTED
 
 LOOK: Mapping[Outcome, tuple[str, str]] = {  # colour and mark of an outcome
     REPRODUCED: (TEAL, "D"), PARTLY: (INK, "o"), NOT: (WINE, "X"),
@@ -94,7 +94,7 @@ def predictors(scores: pd.DataFrame, runs: pd.DataFrame, closes: pd.Series) -> F
     """Where ES ends against where a gap closes, and how well each measure tells that beforehand.
 
     Args:
-        scores: of `population.predictor_scores`.
+        scores: of `predictors.predictor_scores`.
         runs: of ES, of `rows.table`.
         closes: theta_c at which the first gap of the first trajectory closes, a run's layout each.
     """

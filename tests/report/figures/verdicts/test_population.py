@@ -5,13 +5,12 @@ from itertools import cycle, pairwise
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.difficulty import MEASURES, PILOT
 from nmpcrl.analysis.statistics import Estimate
-from nmpcrl.claims.population import shares
-from nmpcrl.claims.population_questions import EXPECTED
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED
 from nmpcrl.report.figures.sheet import NARROW
 from nmpcrl.report.figures.verdicts import population as figures
+from nmpcrl.studies.difficulty import MEASURES, PILOT
+from nmpcrl.studies.population import EXPECTED, shares
 
 
 def where(**holding):

@@ -1,19 +1,24 @@
-"""How well a number that is known beforehand tells where learning succeeds.
+"""How well a number that is known before training predicts where learning succeeds.
 
 A predictor is a logistic regression of one measure, fitted on some layouts and scored on others: by
 the area under the ROC curve, which asks whether successes rank above failures, and by the Brier
 score, which asks for the probabilities themselves. The bootstrap draws layouts, never runs.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from scipy import optimize, stats
 
 from nmpcrl import Vector
-from nmpcrl.analysis.statistics import CONFIDENCE, RESAMPLES, SEED, Estimate
+from nmpcrl.analysis.statistics import over_layouts
+from nmpcrl.studies.difficulty import MEASURES, PILOT
+
+RIDGE = 1.0  # penalty of the logistic regression, of the squared slope of the standardised measure
+RESAMPLES = 2000  # of the bootstrap over layouts
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,7 @@ class Logistic:
         return result
 
 
-def fit(measure: Vector, success: Vector, ridge: float) -> Logistic:
+def fit(measure: Vector, success: Vector, ridge: float = RIDGE) -> Logistic:
     """Least log loss with `ridge` times half of the squared slope added, which keeps it finite.
 
     Args:
@@ -77,33 +82,37 @@ def brier(probability: Vector, success: Vector) -> Any:
     return np.mean((np.asarray(probability) - np.asarray(success, float)) ** 2, axis=-1)
 
 
-def over_layouts(
-    statistic: Callable[..., Any], *columns: Vector, resamples: int = RESAMPLES
-) -> Estimate:
-    """A statistic of columns with one row a layout, and its percentile interval.
-
-    A draw in which the statistic is nan, such as one without a failure, does not count.
+def predictor_scores(difficulty: pd.DataFrame, tuned: pd.Series, judged: pd.Series) -> pd.DataFrame:
+    """Each measure as a predictor of success, fitted on some layouts and scored on others.
 
     Args:
-        statistic: of the columns, over their last axis.
-        columns: each of shape (layouts,).
-        resamples: of the bootstrap.
+        difficulty: columns `MEASURES`, a row a layout.
+        tuned: whether learning succeeds, by layout, for the fit.
+        judged: the same, by layout, for the scores.
 
-    Raises:
-        ValueError: there is no layout, the columns differ in length, or the statistic is over
-            all axes.
+    Returns:
+        A row a measure: slope (of the standardised measure), auc and brier, each an `Estimate`,
+        and ahead, by how much the area of `PILOT` is larger (an `Estimate`; 0 for itself).
     """
-    layouts = {len(one) for one in columns}
-    if len(layouts) != 1 or not min(layouts):
-        raise ValueError(f"columns of {sorted(layouts)} layouts: one length above 0 is needed")
-    (count,), rng = layouts, np.random.default_rng(SEED)
-    arrays = [np.asarray(one) for one in columns]
-    value = statistic(*arrays)
-    chosen = rng.integers(count, size=(resamples, count))
-    drawn = np.asarray(statistic(*(one[chosen] for one in arrays)))
-    if drawn.shape != (resamples,):
-        raise ValueError(f"a statistic of shape {drawn.shape}: one over the last axis is needed")
-    known = drawn[np.isfinite(drawn)]
-    tail = (1 - CONFIDENCE) / 2
-    bounds = np.quantile(known, (tail, 1 - tail)) if known.size else (np.nan, np.nan)
-    return Estimate(float(value), float(bounds[0]), float(bounds[1]))
+    y = judged.to_numpy(bool)
+    fits = {
+        name: fit(difficulty[name][tuned.index].to_numpy(float), tuned.to_numpy(bool))
+        for name in MEASURES
+    }
+    probability = {name: one(difficulty.loc[judged.index, name]) for name, one in fits.items()}
+    drawn = partial(over_layouts, resamples=RESAMPLES)
+    return pd.DataFrame(
+        {
+            name: {
+                "slope": fits[name].slope,
+                "auc": drawn(auc, probability[name], y),
+                "brier": drawn(brier, probability[name], y),
+                "ahead": drawn(_ahead, probability[PILOT], probability[name], y),
+            }
+            for name in MEASURES
+        }
+    ).T
+
+
+def _ahead(first: Vector, second: Vector, success: Vector) -> Any:
+    return auc(first, success) - auc(second, success)

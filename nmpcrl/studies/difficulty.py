@@ -1,8 +1,8 @@
-"""How hard a layout looks before anything is trained: the measures that may predict success.
+"""Measures of a layout before training, which may predict success: an investigation of its own.
 
-The first five are those by which BARN orders its maps (Perille et al. 2020, "Benchmarking Metric
-Ground Navigation"), written anew from their definitions. There they are counted in the cells of a
-grid, along its shortest path, and averaged over the path. Here
+The first five are the measures by which BARN orders its maps (Perille et al. 2020, "Benchmarking
+Metric Ground Navigation"), written anew from their definitions. BARN counts cells of a grid along
+its shortest path, and averages over the path. Here
 
 - obstacles are discs and walls are lines, so that distances are exact and not numbers of cells; a
   disc is as wide as plans at theta_c = 0 keep, which is the configuration space of the robot;
@@ -18,10 +18,11 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.trajectory import closes_at
+from nmpcrl.claims.investigation import Investigation, Part, Row
 from nmpcrl.control import Task
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
-from nmpcrl.study.files import Column
+from nmpcrl.study.drawn import COMPARED, LAYOUTS
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED
 
@@ -31,11 +32,16 @@ SIGHTS = 8  # directions in which visibility looks
 SECTORS = 16  # directions in which dispersion looks
 RAISED = 0.01  # of theta_c, for the slope of the cost
 OPEN = 1.0  # theta_c beyond which it does not matter where a gap closes
+HORIZONS = (20, 40)  # beside the paper's
+SAME_CLOSING = 0.05  # of theta_c: the step of the grid on which two horizons close the same gap
+RAISED_TO = 0.5  # the end of that grid
+GRID = np.arange(0, RAISED_TO + 1e-9, SAME_CLOSING)
+STOPS = {n: f"stops_{n}" for n in (paper.HORIZON, *HORIZONS)}  # columns by horizon
 
 
 @dataclass(frozen=True)
 class Difficulty:
-    """Measures of one layout; the higher, the easier, unless said."""
+    """Measures of one layout; the higher, the easier, unless a comment says "the harder"."""
 
     closest: float  # mean distance [m] to the closest obstacle or wall
     visibility: float  # mean distance [m] to what is seen in `SIGHTS` directions
@@ -48,13 +54,13 @@ class Difficulty:
     closes: float  # theta_c at which the first gap of the path closes, at most `OPEN`
 
 
-PILOT = "closes"  # what predicted every failure of the pilot
+PILOT = "closes"  # predicted every failure of the pilot
 MEASURES = tuple(one.name for one in fields(Difficulty))
 RIVALS = tuple(name for name in MEASURES if name != PILOT)
 
 
 def measure(centres: Centres) -> Difficulty:
-    """All measures of a layout; two rollouts and one solve are made."""
+    """All measures of a layout, from two rollouts and one solve."""
     task = paper.task_among(centres)
     controller, theta = Persistent(paper.controller(task)), np.array(paper.THETA_INIT)
     first = evaluate(controller, theta, paper.STEPS)
@@ -70,19 +76,15 @@ def measure(centres: Centres) -> Difficulty:
     )
 
 
-def as_row(centres: Centres) -> dict[str, float]:
-    """`measure`, by name."""
-    return asdict(measure(centres))
-
-
 def barn(path: Matrix, task: Task) -> dict[str, float]:
     """The five measures of BARN along a path, shape (points, 2)."""
     points = spaced(path)
     across = sight(points, SIGHTS, task)
+    blocked = sight(points, SECTORS, task) <= REACH
     return {
         "closest": float(clearance(points, task).mean()),
         "visibility": float(across.mean()),
-        "dispersion": float(_changes(sight(points, SECTORS, task) <= REACH).mean()),
+        "dispersion": float((blocked != np.roll(blocked, 1, axis=1)).sum(axis=1).mean()),
         "dimension": float((across[:, : SIGHTS // 2] + across[:, SIGHTS // 2 :]).min(1).mean()),
         "tortuosity": _length(path) / float(np.linalg.norm(path[-1] - path[0])),
     }
@@ -100,14 +102,6 @@ def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
         if len(states) < paper.STEPS or task.distance(states[-1]) > ARRIVED:
             return float(theta_c)
     return np.nan
-
-
-def raised_cost(layout: str | Centres, theta: Vector, share: float) -> float:
-    """By which share of its cost a rollout costs more with theta_c raised by another share."""
-    controller = Persistent(paper.nmpc(layout))
-    raised = np.array([*theta[:-1], (1 + share) * theta[-1]])
-    before, after = (evaluate(controller, one, paper.STEPS).cost for one in (theta, raised))
-    return after / before - 1
 
 
 def until_arrival(states: Matrix, task: Task) -> Matrix:
@@ -132,9 +126,9 @@ def clearance(points: Matrix, task: Task) -> Vector:
 
 
 def sight(points: Matrix, directions: int, task: Task) -> Matrix:
-    """Distance [m] from points, shape (k, 2), to what is met first in so many directions.
+    """Distance [m] from points, shape (k, 2), to the first disc or wall in so many directions.
 
-    The directions go around, from that of x on.
+    The directions go around, beginning with that of x.
     """
     angle = np.arange(directions) * 2 * np.pi / directions
     ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -157,12 +151,6 @@ def _to_walls(points: Matrix, ray: Matrix, task: Task) -> Matrix:
     return result
 
 
-def _changes(blocked: Column) -> Vector:
-    """How often neighbours around a point differ, shape (points,)."""
-    result: Vector = (blocked != np.roll(blocked, 1, axis=1)).sum(axis=1)
-    return result
-
-
 def _centres(task: Task) -> Matrix:
     return np.stack(task.discs[:2], axis=1)
 
@@ -174,3 +162,23 @@ def _radius(task: Task) -> float:
 
 def _length(path: Matrix) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+def of_layout(_: str, place: str, *unused: int) -> Row:
+    """The row of a layout; theta_c at which rollouts stop arriving only in compared layouts."""
+    centres, known = LAYOUTS[place], place in COMPARED
+    stops = {
+        column: stops_arriving(centres, horizon, GRID) if known else np.nan
+        for horizon, column in STOPS.items()
+    }
+    return asdict(measure(centres)) | stops
+
+
+DIFFICULTY = Investigation(
+    name="population_layouts",
+    parts={"before training": Part(of_layout, {"theta_init": ""}, tuple(LAYOUTS), 0, seconds=2)},
+    questions=(),  # those of `population` read the table
+    seed=lambda place, k: k,  # nothing is drawn
+    registered="46c248b",
+    digits=9,
+)

@@ -1,0 +1,45 @@
+"""Which runs of RDES are made again with one thing taken away, and how their ends are counted."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nmpcrl.analysis.extrapolation import Outcome
+from nmpcrl.studies import interventions
+from nmpcrl.studies.interventions import ARMS, INTERVENTIONS
+
+
+def test_all_stopped_runs_are_made_again_beginning_with_one_of_each_of_50_drawn_layouts():
+    six, drawn = (INTERVENTIONS.parts[part].order("nudged") for part in ("six", "drawn"))
+    assert (len({*six}), len({*drawn})) == (len(six), len(drawn)) == (37, 133)
+    assert len({place for place, _ in drawn[:50]}) == 50
+
+
+def test_a_nudged_run_starts_a_little_beside_theta_init(monkeypatch):
+    watched = []
+
+    def watch(experiment, intervention):
+        watched.append((experiment.layout, experiment.seed, experiment.theta[0], intervention))
+        return Outcome(True, *[np.array([1.0, 2.0])] * 4)
+
+    monkeypatch.setattr(interventions, "watch", watch)
+    rows = [interventions.again(setting, "D", 300, 3) for setting in ARMS.values()]
+    assert rows == [{"episodes": 1}] * 3
+    assert watched[:2] == [("D", 3, 1.0, "theta held"), ("D", 3, 1.0, "true slope")]
+    assert watched[2] == ("D", 3, pytest.approx(1 + 1e-9, abs=1e-12), "none")
+
+
+def test_a_share_draws_layouts_and_a_difference_pairs_runs():
+    ends = {("A", 0): (300, 20), ("A", 1): (300, 299), ("B", 0): (10, 5)}
+    rows = [{"part": "six", "arm": arm, "place": place, "k": k, "episodes": one}
+            for (place, k), both in ends.items()
+            for arm, one in zip(("true slope", "nudged"), both, strict=True)]  # fmt: skip
+    runs = interventions.ends(pd.DataFrame(rows))
+    assert runs.groupby("intervention").stopped.sum().to_dict() == {
+        "none": 3, "nudged": 3, "true slope": 1,
+    }  # fmt: skip
+    assert interventions.survival(runs, "true slope").counts == {"survive, true slope": (2, 3)}
+    found = interventions.live(runs, "true slope")
+    assert (found.value, found.low, found.high) == (pytest.approx(2 / 3), 0, 1)
+    assert interventions.live(runs, "nudged").value == 0
+    assert interventions.live(runs, "true slope", "nudged").value == found.value

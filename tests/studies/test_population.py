@@ -1,0 +1,268 @@
+"""The runs in drawn layouts: their parts, and answers to evidence that is made up."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from nmpcrl.analysis.rows import FIELDS, OUTCOME, as_text
+from nmpcrl.claims import published as six
+from nmpcrl.claims.own_claims import OWN_CLAIMS
+from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.rule import Observations
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.claims.wider_claims import WIDER_CLAIMS
+from nmpcrl.studies import population
+from nmpcrl.studies.difficulty import MEASURES, OPEN, PILOT
+from nmpcrl.studies.population import EXPECTED, JUDGED, PARTS, PICTURE, POPULATION, seed_of
+from nmpcrl.studies.predictors import predictor_scores
+from nmpcrl.study.design import MAIN_TABLE, VARIANTS
+from nmpcrl.study.drawn import COMPARED, JUDGE, LAYOUTS
+from nmpcrl.study.experiment import MAIN, Experiment, frozen_arm
+
+NAMES = [*JUDGE][:20]
+FAILING = NAMES[:4]
+BOTH = ("step", "episode")
+
+
+def made(part, learner, name, *, better=True, decay="step", **numbers):
+    """The row of a run that ends 5 % better than theta_init, or as much worse."""
+    own = {"horizon": int(part[4:])} if part.startswith("N") else {}
+    one = Experiment(learner, layout=LAYOUTS[name], decay=decay, seed=seed_of(name, 0), **own)
+    row = {field: as_text(getattr(one, field)) for field in FIELDS}
+    row |= dict.fromkeys(OUTCOME, 0.0) | {"stopped": "finished", "initial_cost": 100.0}
+    row |= {"final_cost": 95.0 if better else 105.0, "cost_ratio": 1.0, "part": part}
+    row |= {"imitation_with": 1.0, "imitation_without": 2.0, "moved": np.nan, "worth": np.nan}
+    return row | {"delta_first": 2.0, "delta_last": 1.0} | numbers
+
+
+def judged(**numbers):
+    """All learners of the main table; each fails in `FAILING`."""
+    return pd.DataFrame(
+        made("judge", learner, name, better=name not in FAILING, decay=decay, **numbers)
+        for learner in MAIN for name in NAMES for decay in BOTH
+    )  # fmt: skip
+
+
+def shares(runs):
+    names = runs[["learner", "layout", "decay", "seed"]].to_dict("records")
+    paths = {Experiment(**one): np.zeros((130, 3)) for one in names}
+    return population.shares(population.held(runs, paths)).set_index("claim")
+
+
+@pytest.fixture(scope="module")
+def measures():
+    """The gap closes early where learning fails, and the other measures are noise."""
+    rng = np.random.default_rng(0)
+    found = pd.DataFrame(rng.normal(size=(len(LAYOUTS), len(MEASURES))), [*LAYOUTS], [*MEASURES])
+    return found.assign(**{PILOT: [0.1 if n in (*FAILING, "T01") else 0.6 for n in found.index]})
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    return population.load()
+
+
+# The runs.
+
+
+def test_each_run_has_its_frozen_arm_and_a_counterpart_among_the_judged():
+    plan = {part: population.experiments(pd.DataFrame([*POPULATION.conditions(part)]))
+            for part in PARTS}  # fmt: skip
+    every = {e for runs in plan.values() for e in runs}
+    assert len(every) == sum(map(len, plan.values())) == 3720
+    assert all(frozen_arm(one) in every for one in every)
+    judged = [one for part in JUDGED for one in plan[part]]
+    assert len(judged) == len(MAIN) * 120 * 2 * 2
+    cells = {(one.learner, one.layout, one.decay, one.seed) for one in judged}
+    others = [one for part, runs in plan.items() if part[0] in "Na" for one in runs]
+    assert {(one.learner, one.layout, one.decay, one.seed) for one in others} <= cells
+    seeds = [seed_of(name, k) for name in LAYOUTS for k in (0, 1)]
+    assert len({*seeds}) == len(seeds)
+
+
+def test_a_row_is_the_summary_s_with_its_path_in_millimetres(made_up, monkeypatch):
+    found = made_up(layouts=(JUDGE["J001"],), seeds=(seed_of("J001", 1),))
+    states = np.full((131, 3), np.nan)
+    states[:-1] = 0.12345
+    changed = {e: _with(one, states) for e, one in found.summaries.items()}
+    monkeypatch.setattr(population, "SUMMARIES", SimpleNamespace(fetch=changed.get))
+    rows = []
+    for one, setting in POPULATION.conditions("judge again").items():
+        if one.place == "J001":
+            row = population.of_run(setting, "J001", 300, seed_of("J001", one.k))
+            rows.append(one._asdict() | row)
+    assert {*rows[0]} - {*POPULATION.table().columns} <= {"positions"}
+    made = population.of_table(pd.DataFrame(rows))
+    assert made.runs.final_cost.tolist() == pytest.approx(
+        [changed[e].evaluations["cost"][-1] for e in population.experiments(pd.DataFrame(rows))]
+    )
+    assert {e.learner for e in made.paths} == {"RDES", "GES"}
+    for path in made.paths.values():
+        assert (path[:-1] == 0.123).all()
+        assert np.isnan(path[-1]).all()
+    assert made.runs.cost_ratio.notna().all()
+
+
+def _with(summary, states):
+    fields = {name: getattr(summary, name) for name in summary.__dataclass_fields__}
+    return type(summary)(**fields | {"states": states})
+
+
+# Claims.
+
+
+def test_a_claim_holds_in_a_layout_where_more_than_half_of_its_answers_are_yes():
+    ends = {"J001": (True, False), "J002": (True, True)}
+    rows = [
+        made("judge", "ES", name, better=yes, decay=decay)
+        for name, both in ends.items()
+        for yes, decay in zip(both, BOTH, strict=True)
+    ]
+    where = population.held(pd.DataFrame(rows), {})
+    assert where[["claim", "layout", "yes", "of", "holds"]].to_numpy().tolist() == [
+        ["ES improves", "J001", 1, 2, False], ["ES improves", "J002", 2, 2, True],
+    ]  # fmt: skip
+
+
+def test_shares_count_layouts_and_every_claim_on_the_main_table_has_an_expected_one():
+    found = shares(judged())
+    claims = {**BY_RUNS, **WIDER_CLAIMS, **OWN_CLAIMS}
+    decided = {name for name, claim in claims.items() if {*claim.learners} <= {*MAIN}}
+    alone = {f"{learner} improves" for learner in MAIN if learner != "frozen"}
+    assert {*found.index} == {*EXPECTED} == decided | alone
+    assert found.loc["C9", ["holding", "layouts", "outcome", "within"]].tolist() == [
+        16, 20, PARTLY, True,
+    ]  # fmt: skip
+    assert found.loc["C9", "low"] < 0.8 < found.loc["C9", "high"]
+    assert found.holding[["C6", "C5"]].tolist() == [20, 20]  # all paths are the same
+    assert found.loc["C2", "outcome"] == NOT
+
+
+@pytest.mark.parametrize(("overlap", "outcome"), [(0.0, PARTLY), (0.5, NOT)])
+def test_a_weaker_question_counts_in_drawn_layouts_as_it_does_in_a_to_f(overlap, outcome):
+    runs = judged(inside_small=1.0, eval_worst_overlap=overlap)
+    found = shares(runs)
+    for claim, verdict in (("C7", BY_RUNS["C7"]), ("W7", WIDER_CLAIMS["W7"])):
+        assert found.loc[claim, "holding"] == 0
+        assert found.loc[claim, "outcome"] == outcome
+        assert verdict.settled(Observations(runs)).outcome == outcome
+
+
+# The whole picture, in published runs.
+
+
+def test_the_picture_is_sought_everywhere_with_the_claims_own_answers(drawn):
+    tried, named = drawn.tried, six.load()
+    there = tried[tried.layout.isin([*"ABCDEF"])]
+    assert {*there.setting} == {MAIN_TABLE, *VARIANTS} - {"controls"}
+    assert (there.setting == MAIN_TABLE).sum() == 12
+    assert not tried.duplicated(["setting", "layout", "decay"]).any()
+    main = named.table[named.table.variant == MAIN_TABLE]
+    by_cell = tried.set_index(["setting", "layout", "decay"])
+    for name in PICTURE:
+        claim = BY_RUNS[name]
+        answers = claim.answers(claim.measure(main, named.paths)).dropna().astype(bool)
+        for cell in (("A", "step"), ("D", "episode")):
+            mean = answers.xs(cell, level=["layout", "decay"]).mean()
+            assert by_cell.loc[(MAIN_TABLE, *cell), name] == mean
+    same, other = by_cell.loc["greedy", "D", "step"], by_cell.loc[MAIN_TABLE, "D", "step"]
+    assert same.C5 == other.C5  # of learners that the variant does not change
+    assert same.C1 != other.C1
+
+
+def test_the_nearest_comes_first_and_only_a_whole_one_confirms(drawn):
+    assert all(a >= b for a, b in pairwise(drawn.tried.whole))
+    assert [*drawn.tried.whole] == [*(drawn.tried[[*PICTURE]] == 1).sum(axis=1)]
+    some = pd.DataFrame({"whole": [3, 1]})
+    near = population.whole_picture(some)
+    assert (near.outcome, near.numbers) == (NOT, {"tried": 2.0, "most": 3.0})
+    found = population.whole_picture(some + 1)
+    assert (found.outcome, found.beside) == (REPRODUCED, {"settings": (1, 2)})
+    assert found.words == "found by search"
+    assert population.whole_picture(some[:0]).outcome == UNDECIDABLE
+
+
+# Other questions.
+
+
+def test_the_measure_that_tells_success_is_ahead_of_noise(measures):
+    success = population.succeeds(judged())
+    assert [*success.index[~success]] == FAILING
+    tuned = pd.Series({name: name != "T01" for name in LAYOUTS if name[0] == "T"})
+    scores = predictor_scores(measures, tuned, success)
+    assert (scores.auc[PILOT].value, scores.ahead[PILOT].value) == (1, 0)
+    assert scores.brier[PILOT].value < scores.brier["cost"].value
+    answer = population.predictors(scores)
+    assert answer.outcome in (REPRODUCED, PARTLY)
+    assert answer.numbers["cost"] == 1 - scores.auc["cost"].value
+    none_fails = predictor_scores(measures, tuned, success | True)
+    assert population.predictors(none_fails).outcome == UNDECIDABLE
+
+
+def test_closing_gaps_is_confirmed_by_both_halves_only(measures):
+    success = population.succeeds(judged())
+    answer = population.closing_gaps(measures, success)
+    assert [*answer.counts.values()] == [(4, 4), (16, 16)]
+    assert (answer.outcome, answer.words) == (REPRODUCED, "confirmed")
+    assert population.closing_gaps(measures, success | True).outcome == NOT
+
+
+def test_a_longer_horizon_is_asked_for_where_the_short_one_fails():
+    first, second, *_ = names = [*COMPARED][:8]
+    rows = [made("judge", "ES", name, better=name == first) for name in names]
+    rows += [made("N = 20", "ES", name, better=False) for name in names]
+    rows += [made("N = 40", "ES", name, better=name == second) for name in names]
+    assert population.horizon(pd.DataFrame(rows)).counts == {"layouts still fail": (6, 7)}
+
+
+def test_the_same_gap_closes_at_the_same_theta_c_up_to_a_step_of_the_grid():
+    stops = pd.DataFrame({10: [0.2, 0.2, np.nan, 0.1], 20: [0.25, 0.4, 0.1, np.nan], 40: 0.2})
+    assert population.gaps_and_horizon(stops).counts == {"layouts the same": (1, 3)}
+
+
+def test_the_trap_is_asked_of_the_runs_that_do_not_arrive():
+    rows = [made("judge", "ES", name, distance=0.1) for name in NAMES]
+    there = {"decay": "episode", "better": False, "distance": 5, "moved": 0.0, "worth": 0.9}
+    rows += [made("judge", "ES", name, **there) for name in FAILING]
+    rows[-1] |= {"worth": 1.1, "delta_last": 3.0}
+    known = population.Drawn(pd.DataFrame(rows), {}, pd.DataFrame())
+    for question in ("trap", "accurate and worse"):
+        counts = POPULATION.asked[question].answer(known).counts
+        assert counts == {"layouts": (3, 4), "runs": (3, 4)}
+
+
+def test_early_overshoot_is_of_the_runs_that_were_stopped():
+    stopped = {"stopped": "diverged: theta", "over": 0.01, "steps_done": 10 * 130}
+    rows = [made("judge", "RDES", name, decay="episode", **stopped) for name in NAMES]
+    runs = pd.DataFrame(rows + [made("judge", "RDES", name) for name in NAMES])
+    answer = population.early_overshoot(runs)
+    assert (answer.outcome, answer.beside) == (REPRODUCED, {"runs stopped": (20, 20)})
+    assert population.early_overshoot(runs.assign(steps_done=100 * 130)).outcome == NOT
+    assert population.early_overshoot(runs[20:]).outcome == UNDECIDABLE
+
+
+def test_a_cliff_is_where_a_little_more_theta_c_costs_half():
+    answer = population.cliff(pd.Series({"A": 0.0, "B": 0.6, "C": 1.4, "D": 0.1}))
+    assert (answer.counts, answer.numbers) == ({"layouts": (2, 4)}, {"most": 1.4})
+
+
+def test_of_open_and_closed_gaps_only_runs_where_there_is_one_are_counted():
+    ends = [("J001", 0.3, 0.2, True), ("J002", 0.1, 0.2, False), ("J003", OPEN, 1.2, True)]
+    rows = [made("judge", "ES", name, better=one, theta_8=c) for name, _, c, one in ends]
+    rows.append(made("judge", "ES", "J001", final_cost=99.5, theta_8=0.2))
+    closes = pd.DataFrame({PILOT: {name: closed for name, closed, *_ in ends}})
+    found = population.at_the_gap(pd.DataFrame(rows), closes)
+    assert found.gap.tolist() == [True, True, False, True]
+    assert population.improve_by_gap(found) == {"open": (1, 2), "closed": (0, 1)}
+
+
+def test_questions_whose_rows_are_missing_are_not_decidable(drawn):
+    first = POPULATION.table().query("part == 'judge' and arm == 'ES step'")
+    found = POPULATION.answers(first)
+    assert {name for name, one in found.items() if one.outcome != UNDECIDABLE} == {
+        "ES improves", "closing gaps", "gaps and horizon", "trap", "accurate and worse", "cliff",
+        "whole picture",
+    }  # fmt: skip
