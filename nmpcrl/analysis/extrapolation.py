@@ -18,7 +18,7 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, Successor, Transition
 from nmpcrl.learning.rollout import Persistent
-from nmpcrl.learning.training import Diverged, Step, train
+from nmpcrl.learning.training import Diverged, train
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.setup import controller_of, prepare
 
@@ -62,7 +62,7 @@ class TrueSlope(Held):
 
 
 def untouched(network: Imitation, controller: Persistent) -> Bootstrap:
-    """What an experiment has."""
+    """The network of the experiment."""
     return network
 
 
@@ -89,7 +89,7 @@ def feedback(
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What became of one run; a column has a row an episode that was begun."""
+    """One run; a column has a row an episode that was begun, nan where nothing was predicted."""
 
     stopped: bool
     theta: Matrix  # at the end, shape (episodes, d)
@@ -104,7 +104,7 @@ class Outcome:
 
 
 def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
-    """Train a learner that imitates, with one of `INTERVENTIONS`, and watch what theta feeds back.
+    """Train a learner that imitates, with one of `INTERVENTIONS`, and measure its `feedback`.
 
     Raises:
         KeyError: there is no such intervention.
@@ -124,7 +124,8 @@ def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
             fed.append(feedback(network, transition, theta, learner.gamma))
         return successor
 
-    found, stopped = _Columns(), False
+    stopped, thetas = False, list[Vector]()
+    rows: list[list[tuple[float, float, float]]] = []  # by episode, of the steps with a prediction
     steps = train(
         replace(learner, bootstrap=watched),
         controller,
@@ -135,36 +136,21 @@ def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
     )
     try:
         for step in steps:
-            found.add(step, experiment.alpha, fed)
+            if step.episode == len(thetas):
+                thetas.append(step.weights.theta)
+                rows.append([])
+            thetas[-1] = step.weights.theta
+            if step.solution and step.update and step.update.delta is not None:
+                phi = step.solution.features
+                square = experiment.alpha * float(phi @ phi)
+                rows[-1].append((step.update.delta, square, fed[-1]))
     except Diverged:
         stopped = True
-    return found.outcome(stopped)
-
-
-class _Columns:
-    """What `Outcome` says of each episode, while it grows."""
-
-    def __init__(self) -> None:
-        self._theta: list[Vector] = []
-        self._steps: list[list[tuple[float, float, float]]] = []
-
-    def add(self, step: Step, alpha: float, fed: list[float]) -> None:
-        """One step; the last of `fed` is its own, if it had a prediction."""
-        if step.episode == len(self._theta):
-            self._theta.append(step.weights.theta)
-            self._steps.append([(np.nan, np.nan, np.nan)])
-        self._theta[-1] = step.weights.theta
-        if step.solution and step.update and step.update.delta is not None:
-            phi = step.solution.features
-            self._steps[-1].append((step.update.delta, alpha * float(phi @ phi), fed[-1]))
-
-    def outcome(self, stopped: bool) -> Outcome:
-        """The columns of what was added; nan in an episode without a prediction."""
-        episodes = [np.array(rows[1:] or rows).T for rows in self._steps]
-        return Outcome(
-            stopped,
-            np.array(self._theta),
-            np.array([np.sqrt(np.mean(delta**2)) for delta, _, _ in episodes]),
-            np.array([overshoot.max() for _, overshoot, _ in episodes]),
-            np.array([np.median(own) for _, _, own in episodes]),
-        )
+    columns = [np.array(each or [(np.nan,) * 3]).T for each in rows]
+    return Outcome(
+        stopped,
+        np.array(thetas),
+        np.array([np.sqrt(np.mean(delta**2)) for delta, _, _ in columns]),
+        np.array([overshoot.max() for _, overshoot, _ in columns]),
+        np.array([np.median(own) for _, _, own in columns]),
+    )

@@ -1,4 +1,4 @@
-"""From records to numbers: pure functions."""
+"""Numbers of one run, from its records."""
 
 from collections.abc import Callable
 
