@@ -7,11 +7,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import NotRequired, TypedDict, cast
 
-import psutil
-
 CPUINFO = Path("/proc/cpuinfo")
-BOOT = Path("/proc/sys/kernel/random/boot_id")  # another after each start of the machine
-NAMESPACE = Path("/proc/self/ns/pid")  # another in each container
 SETTINGS = (  # environment variables that choose other machine code
     *("NUMBA_DISABLE_JIT", "NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"),
     *("OPENBLAS_CORETYPE", "ATEN_CPU_CAPABILITY", "MKL_CBWR", "GLIBC_TUNABLES"),
@@ -64,22 +60,3 @@ def fingerprint() -> Fingerprint:
 def _cpuinfo() -> tuple[str, ...]:
     """The lines in which Linux describes the processor; none on other systems."""
     return tuple(CPUINFO.read_text().splitlines()) if CPUINFO.exists() else ()
-
-
-@cache
-def host() -> str:
-    """The host or container, until its next start: within it, a process has one number."""
-    told = [platform.node(), *map(_told_by, (BOOT, NAMESPACE))]
-    return sha256("\n".join(told).encode()).hexdigest()[:8]
-
-
-def is_running(process: int) -> bool:
-    """Whether there is a process of this number on this `host`."""
-    return bool(psutil.pid_exists(process))
-
-
-def _told_by(path: Path) -> str:
-    try:
-        return str(path.readlink()) if path.is_symlink() else path.read_text()
-    except OSError:
-        return ""
