@@ -13,7 +13,6 @@ from nmpcrl.claims.prespecified import NUMBERS, SINCE, Commit, Fixed, fixed
 from nmpcrl.study import published as store
 
 ASSIGNED = f"^({'|'.join(NUMBERS)}) = "
-WHERE = ("nmpcrl", ":!nmpcrl/studies")  # an investigation has numbers of its own
 
 
 def git(*arguments: str) -> str:
