@@ -39,7 +39,8 @@ RUN = {
 }  # fmt: skip
 PILOT = {"part": "named 300", "place": "A", "cost": 3470.0}
 HALF = np.r_[np.zeros(10), np.full(10, 0.1)]
-MIXED = np.tile([0.1, -0.1], 10)
+MIXED = np.tile([0.15, -0.1], 10)  # above 0, but not surely
+WIDE = np.r_[np.full(6, 0.1), np.full(14, 1.0)]
 
 
 def table(*some):
@@ -66,7 +67,7 @@ def tune(entry, *gains, **fields):
 @pytest.mark.parametrize(
     ("runs", "share", "well"),
     [
-        ([{}, {"k": 1, "cost": 3100.0}], [0.7], [True]),  # seeds are averaged first
+        ([{}, {"k": 1, "cost": 3100.0, "episodes": 49}], [0.7], [True]),  # seeds are averaged first
         ([{}, {"k": 1, "cost": np.inf}], [-np.inf], [False]),  # a failed solve is infinitely bad
         ([{"cost": 2900.0}], [1.1], [True]),  # the search for J_best is no bound
         ([{}, {"place": "J002", "best": 3981.0}], [0.5], [True, True]),  # hardly any is possible
@@ -81,7 +82,7 @@ def test_what_is_gained_and_what_is_solved(runs, share, well):
     assert shares(found).tolist() == pytest.approx(share)
     assert solved(found).tolist() == well
     (one,) = rows(found, "judge 50")
-    assert (one.layouts, one.left_out) == (len(well), len(well) - len(share))
+    assert (one.layouts, one.left_out, one.rollouts) == (len(well), len(well) - len(share), 50)
 
 
 def test_the_best_setting_has_the_greatest_gain_and_is_the_first_of_equal_ones():
@@ -95,7 +96,7 @@ def test_the_best_setting_has_the_greatest_gain_and_is_the_first_of_equal_ones()
         ([block("ES", over=True), block("ES", "judge 300")], []),  # beyond its budget
         ([block("frozen", gains=0.9)], []),
         # the greatest lower end, and not the greatest value
-        ([block("CMA-ES", gains=np.r_[np.full(6, 0.1), np.full(14, 1.0)]),
+        ([block("CMA-ES", gains=WIDE),
           block("SPSA", gains=0.8), block("ES", gains=0.3)],
          [("SPSA", FIRST), ("CMA-ES", SECOND), ("ES", LATER)]),
         # ties at 50 episodes go by the lower end at 300, and then by time
@@ -127,7 +128,7 @@ def test_the_tuning_is_part_of_the_price():
 def test_the_expected_order_is_compared_with_the_one_found():
     found = table(
         *block("undone-GN-J", gains=0.9), *block("CMA-ES", gains=0.8),
-        *block("undone-GN-J", "judge 300", 0.9), *block("CMA-ES", "judge 300", 0.8),
+        *block("undone-GN-J", "judge 300", 0.8), *block("CMA-ES", "judge 300", WIDE),
         *block("DPG", gains=-0.5),
     )  # fmt: skip
     assert greatest(found) == {50: "undone-GN-J", 300: "undone-GN-J"}
@@ -145,7 +146,7 @@ def test_without_runs_no_question_is_decided():
 
 LOST = block("grid", "judge 300", 0.1, layouts=10, arrived=False)
 WON = block("grid", "judge 300", 0.9)[10:]
-FAILING = tune("RDES", 0.5) + block("RDES", "tune", arm=[*arms("RDES")][3], layouts=15,
+FAILING = tune("RDES", 0.5, 0.5, 0.5) + block("RDES", "tune", arm=[*arms("RDES")][3], layouts=15,
                                     arrived=False)  # fmt: skip
 GUARDED = [*arms("guarded-RDES")]
 
@@ -168,7 +169,7 @@ GUARDED = [*arms("guarded-RDES")]
         ("guard", [*FAILING, *block("guarded-RDES", "tune", arm=GUARDED[3], layouts=15)],
          REPRODUCED, {"layouts": (15, 15)}),
         ("guard", [*FAILING, *block("guarded-RDES", "tune", arm=GUARDED[3], layouts=15,
-                                    arrived=False), *tune("guarded-RDES", 0.5)], NOT,
+                                    arrived=False), *tune("guarded-RDES", 0.5, 0.5, 0.5)], NOT,
          {"layouts": (0, 15)}),
         ("faster auxiliary weights", [*block("GES"), *block("GES-3", gains=0.6)], REPRODUCED, {}),
         ("lengths or directions", [*block("guarded-RDES"), *block("control-RDES", gains=0.6)],
