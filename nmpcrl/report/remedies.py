@@ -2,13 +2,12 @@
 
 from collections.abc import Iterable, Mapping
 from html import escape
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, rate
-from nmpcrl.claims.investigation import WORDS, Answer
+from nmpcrl.claims.investigation import WORDS, Answer, Question
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report.cited import cited
 from nmpcrl.report.tables import BADGES, html_table
@@ -208,7 +207,7 @@ def expectation_items(expected: Mapping[str, bool]) -> str:
 
 def answer_items(
     answers: Iterable[Answer],
-    questions: Mapping[str, Any] = REMEDIES.asked,
+    questions: Mapping[str, Question] = REMEDIES.asked,
     *,
     expected: bool = False,
 ) -> str:
@@ -216,28 +215,14 @@ def answer_items(
 
     Args:
         answers: in the order in which they are shown.
-        questions: that they answer, by name; those on remedies unless said.
-        expected: whether to say of what it is asked, and which outcome was expected, where it is
-            another.
+        questions: of an investigation, by name.
+        expected: whether to name the question, and the expected outcome where it is another.
     """
-    return "\n".join(
-        _item(one, asked, _asked_of(asked) * expected) + _otherwise(one, asked) * expected
-        for one, asked in ((one, questions[one.question]) for one in answers)
-    )
+    return "\n".join(_item(one, questions[one.question], expected) for one in answers)
 
 
-def _asked_of(asked: Any) -> str:
-    return f" *Asked of: {asked.asked_of}.*" if hasattr(asked, "asked_of") else f" ({asked.name})"
-
-
-def _otherwise(answer: Answer, asked: Any) -> str:
-    """Which outcome was expected, if another one."""
-    other = asked.expected != answer.outcome
-    return f" Expected: {WORDS.get(asked.expected, asked.expected)}." if other else ""
-
-
-def _item(answer: Answer, asked: Any, of_what: str) -> str:
-    """The pilot and the question; the outcome, what decided it, and what stands beside that."""
+def _item(answer: Answer, asked: Question, expected: bool) -> str:
+    """The pilot, the question, the outcome and its counts and numbers."""
     pilot = f"The pilot: “{asked.pilot}” " if asked.pilot else ""
     said = [f"{yes} of {of} {name}{_bounds(yes, of)}" for name, (yes, of) in answer.counts.items()]
     for name in ("difference", "correlation"):
@@ -247,7 +232,11 @@ def _item(answer: Answer, asked: Any, of_what: str) -> str:
     said += [f"{yes} of {of} {name}" for name, (yes, of) in answer.beside.items()]
     said += [f"{entry} has {', '.join(each)}" for entry, each in _by_layout(answer.numbers).items()]
     because = f": {'; '.join(said)}" if said else ""
-    return f"- {pilot}**{asked.question}**{of_what} {answer.words.capitalize()}{because}."
+    name = f" ({asked.name})" if expected else ""
+    line = f"- {pilot}**{asked.question}**{name} {answer.words.capitalize()}{because}."
+    if not expected or asked.expected == answer.outcome:
+        return line
+    return f"{line} Expected: {WORDS.get(asked.expected, asked.expected)}."
 
 
 def _bounds(yes: int, of: int) -> str:
