@@ -176,7 +176,7 @@ def of_layout(_: str, place: str, *unused: int) -> Row:
 
 DIFFICULTY = Investigation(
     name="population_layouts",
-    parts={"before training": Part(of_layout, {"theta_init": ""}, tuple(LAYOUTS), 0, seconds=2)},
+    parts={"before training": Part(of_layout, {"theta_init": ""}, tuple(LAYOUTS), 1, seconds=2)},
     questions=(),  # those of `population` read the table
     seed=lambda place, k: k,  # nothing is drawn
     registered="46c248b",

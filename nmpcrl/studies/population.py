@@ -10,7 +10,7 @@ several answers in a layout, one or two in each reading of the decay; it holds t
 left out: a layout answers what its runs can tell.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, cached_property
 from itertools import product
@@ -64,6 +64,7 @@ DEAD_BY = 20  # episodes: a run that was stopped by then overshot early
 
 SEEDS = 2  # of each layout
 STEP_SIZE = 3  # times alpha, in the search for the paper's whole picture
+LARGER = f"alpha x {STEP_SIZE}"
 SOLVING = ("frozen", "ES", "GES", "TDC")
 IMITATING = ("RDES", "DES")
 SOLVING_TWICE = ("frozen", "ES", "GES")  # for predictors and horizons: the cheap ones
@@ -159,7 +160,7 @@ PARTS = {
     "tune": _part(arms(SOLVING_TWICE), TUNE),
     **{f"N = {n}": _part(arms(SOLVING_TWICE, horizon=n), COMPARED) for n in HORIZONS},
     "judge imitating": _part(arms(IMITATING), JUDGE),
-    f"alpha x {STEP_SIZE}": _part(arms(PAPER, ["step"], alpha=STEP_SIZE * paper.ALPHA), COMPARED),
+    LARGER: _part(arms(PAPER, ["step"], alpha=STEP_SIZE * paper.ALPHA), COMPARED),
     "judge again": _part(arms((*SOLVING, *IMITATING)), JUDGE, begin=1),
 }
 
@@ -345,16 +346,17 @@ def _holding(claim: str) -> Callable[[Drawn], Answer]:
 # The whole picture. A cell is a layout and a reading of the decay in a setting.
 
 
-def picture(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
-    """How much of the paper's picture holds in each layout and reading, the most first.
+def picture(runs: pd.DataFrame, paths: Paths, setting: str) -> pd.DataFrame:
+    """How much of the paper's picture holds in each layout and reading.
 
     Args:
         runs: of one setting, with all four of the paper's learners.
         paths: as `paper_claims.judge` takes them.
+        setting: its name.
 
     Returns:
         Columns layout and decay, of each of `PICTURE` the share of yes, whole (how many claims have
-        nothing but yes) and answers (the mean share); cells in which all four were answered.
+        nothing but yes), answers (the mean share) and setting; cells with all four answers.
     """
     known, columns = asked(), {}
     for name in PICTURE:
@@ -364,38 +366,22 @@ def picture(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     found = pd.DataFrame(columns).dropna()
     found["whole"] = (found[[*PICTURE]] == 1).sum(axis=1)
     found["answers"] = found[[*PICTURE]].mean(axis=1)
-    return _nearest_first(found.reset_index())
+    return found.reset_index().assign(setting=setting)
 
 
 def everywhere(
     drawn: pd.DataFrame, drawn_paths: Paths, named: pd.DataFrame, named_paths: Paths
 ) -> pd.DataFrame:
-    """The cells of `picture` in drawn layouts (by part) and in A to F (by variant).
+    """The cells of `picture` in drawn layouts and in A to F, the nearest to the picture first.
 
-    Returns:
-        The columns of `picture`, and setting: `MAIN_TABLE`, or what is changed.
+    A learner that a variant does not change has its runs of the main table in it.
     """
-    found = [picture(runs, drawn_paths).assign(setting=one) for one, runs in _by_part(drawn)]
-    found += [picture(runs, named_paths).assign(setting=one) for one, runs in _by_variant(named)]
-    return _nearest_first(pd.concat(found))
-
-
-def _by_part(runs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
-    yield MAIN_TABLE, runs[runs.part.isin(JUDGED)]
-    for part in runs.part[runs.part.str.startswith("alpha")].unique():
-        yield str(part), runs[runs.part == part]
-
-
-def _by_variant(runs: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
-    """A learner that a variant does not change has its runs of the main table in it."""
-    yield MAIN_TABLE, runs[runs.variant == MAIN_TABLE]
-    for name in runs.variant[runs.learner.isin(PAPER)].unique():
-        if name != MAIN_TABLE:
-            yield str(name), groups(runs, name)[0]
-
-
-def _nearest_first(found: pd.DataFrame) -> pd.DataFrame:
-    return found.sort_values(
+    settings = {MAIN_TABLE: drawn[drawn.part.isin(JUDGED)], LARGER: drawn[drawn.part == LARGER]}
+    found = [picture(runs, drawn_paths, one) for one, runs in settings.items() if len(runs)]
+    found.append(picture(named[named.variant == MAIN_TABLE], named_paths, MAIN_TABLE))
+    varied = named.variant[named.learner.isin(PAPER) & (named.variant != MAIN_TABLE)].unique()
+    found += [picture(groups(named, name)[0], named_paths, str(name)) for name in varied]
+    return pd.concat(found).sort_values(
         ["whole", "answers"], ascending=False, kind="stable", ignore_index=True
     )
 
