@@ -1,7 +1,7 @@
-"""What a study keeps of a run: tables by episode and by rollout instead of by step.
+"""Summaries of runs: tables by episode and by rollout instead of by step.
 
-A run's records take megabytes, most of them noise, and are trained again in seconds; a summary
-takes a hundredth of that and is enough for every figure, verdict and mechanism of the study.
+The records of a run take megabytes, and the run is trained again in seconds; a summary takes a
+hundredth of that and is enough for every figure and verdict of the study.
 """
 
 from collections.abc import Mapping
@@ -84,10 +84,10 @@ class RunSummary(Outline):
     facts: SummaryFacts
 
     def save(self, path: Path) -> None:
-        """Write the whole file beside `path`, then rename it into place.
+        """Write a temporary file, then rename it to `path`.
 
         Raises:
-            OSError: it cannot be written; what was there stays.
+            OSError: the file cannot be written; an earlier one stays.
         """
         rollout = {"states": self.states, "actions": self.actions}
         tables = {"episodes": self.episodes, "evaluations": self.evaluations, "rollout": rollout}
@@ -99,7 +99,7 @@ class RunSummary(Outline):
 
         Raises:
             FileNotFoundError: there is none.
-            DamagedRecords: it cannot be read whole, or is not a summary.
+            DamagedRecords: the file is damaged, or no summary.
         """
         about, tables = load_tables(path, COLUMNS)
         experiment, facts = stated_in(about, path)

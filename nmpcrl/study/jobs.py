@@ -71,7 +71,7 @@ def parallel(
     Args:
         function: called in a worker; it may be defined in a notebook.
         items: drawn in order, each shortly before a worker is free for it.
-        workers: processes with one thread each; by default as many as `check_workers` says.
+        workers: processes with one thread each; by default `usable_workers()`.
         label: of a progress bar; without a label there is none.
         executor: makes the calls in place of new processes, `AHEAD` at a time.
 
@@ -79,7 +79,9 @@ def parallel(
         ParameterError: `workers` is no number of processes.
         Failed: jobs failed; raised at the end.
     """
-    count = check_workers(workers, sure=True)
+    if workers is not None and (type(workers) is not int or workers < 1):
+        raise ParameterError(f"workers = {workers!r} must be a whole number, 1 or more")
+    count = workers or usable_workers()
     total = len(items) if isinstance(items, Sized) else None
     count = count if total is None else min(count, max(total, 1))
     fresh = iter(items)
@@ -194,29 +196,11 @@ def _end_with_parent(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def check_workers(workers: int | None, *, sure: bool = False) -> int:
-    """The number of processes to start: `workers`, or what cores and memory allow.
-
-    Args:
-        workers: the number asked for.
-        sure: allow more than there are cores and memory for.
-
-    Raises:
-        ParameterError: `workers` is no number of processes, or too large.
-    """
+def usable_workers() -> int:
+    """The number of processes that cores and memory of this machine or container allow."""
     from joblib.externals.loky import cpu_count
 
-    cores, free = int(cpu_count()), float(psutil.virtual_memory().available)
+    free = float(psutil.virtual_memory().available)
     if LIMIT.exists() and (limit := LIMIT.read_text().strip()).isdigit():
         free = min(free, float(limit))
-    fitting = max(1, int(free / MEMORY))
-    if workers is None:
-        return min(cores, fitting)
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-        raise ParameterError(f"workers = {workers!r} must be a whole number, 1 or more")
-    if workers > min(cores, fitting) and not sure:
-        raise ParameterError(
-            f"workers = {workers} must be at most {min(cores, fitting)}: {cores} cores, and"
-            f" {free / 1e9:.1f} GB of memory at {MEMORY / 1e9:.2f} GB each"
-        )
-    return workers
+    return max(1, min(int(cpu_count()), int(free / MEMORY)))

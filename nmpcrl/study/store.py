@@ -27,7 +27,6 @@ from nmpcrl.study.provenance import (
     identity,
     is_accepted,
     key,
-    locked_hash,
     provenance,
     signature,
     warn_of_changes,
@@ -112,7 +111,7 @@ class Store(Generic[Value]):
         return value  # type: ignore[no-any-return]
 
     def is_stored(self, named: Named) -> bool:
-        """Whether there is a file that says it has the value; only `read` reads all of it."""
+        """Whether a file names the value and its key; `read` alone checks its tables."""
         path = self.path_of(named)
         try:
             check_run(path, named, *self.kind.about(path))
@@ -323,16 +322,10 @@ def solved_by_another(experiment: Named, facts: Facts) -> str:
 
 
 def check_run(path: Path, experiment: Named, fields: Mapping[str, Any], facts: Facts) -> None:
-    """See that a file is of the run asked for.
-
-    Args:
-        path: of the file.
-        experiment: names the run.
-        fields: of the experiment that the file names, or what a trial states.
-        facts: that it states.
+    """Refuse a file of another run, or of code with other numbers, by what it states.
 
     Raises:
-        DamagedRecords: it is of another run, or of code with other numbers.
+        DamagedRecords: the message says what the file holds.
     """
     if isinstance(experiment, Trial):
         if fields != experiment.stated or "key" not in facts:
@@ -346,7 +339,7 @@ def check_run(path: Path, experiment: Named, fields: Mapping[str, Any], facts: F
             raise DamagedRecords(f"{path} holds another run, {name_of(stated)}")
     if facts.get("key", key(experiment)) != key(experiment):
         raise DamagedRecords(f"{path} holds a run of other code or other versions than it says")
-    if not is_accepted(facts.get("sources", locked_hash())):
+    if not is_accepted(facts.get("sources")):
         raise DamagedRecords(f"{path} holds a run of code that is neither this nor locked")
     if other := solved_by_another(experiment, facts):
         raise DamagedRecords(f"{path} holds a run {other}")

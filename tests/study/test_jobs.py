@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from nmpcrl.study.jobs import ONE_THREAD, Failed, check_workers, parallel
+from nmpcrl.study.jobs import ONE_THREAD, Failed, parallel, usable_workers
 from nmpcrl.study.parameters import ParameterError
 
 PROGRAM = """
@@ -140,18 +140,14 @@ def test_items_are_drawn_when_their_turn_comes(monkeypatch):
 @pytest.mark.parametrize("workers", [0, -1, 1.5, True, "2"])
 def test_a_number_of_workers_is_refused_by_its_value(workers):
     with pytest.raises(ParameterError, match=f"workers = {workers!r} must be a whole number"):
-        check_workers(workers)
+        list(parallel(abs, [1], workers))
 
 
-def test_more_workers_than_cores_or_memory_need_a_yes(monkeypatch, tmp_path):
-    most = check_workers(None)
-    assert check_workers(most) == most
-    with pytest.raises(ParameterError, match=f"must be at most {most}"):
-        check_workers(most + 1)
-    assert check_workers(most + 1, sure=True) == most + 1
+def test_there_are_no_more_workers_than_cores_and_memory_for(monkeypatch, tmp_path):
+    assert 1 <= usable_workers() <= (os.cpu_count() or 1)
     (tmp_path / "memory.max").write_text("500000000\n")
     monkeypatch.setattr("nmpcrl.study.jobs.LIMIT", tmp_path / "memory.max")
-    assert check_workers(None) == 1
+    assert usable_workers() == 1
 
 
 @pytest.mark.slow
