@@ -6,8 +6,10 @@ import pytest
 from registered import INVESTIGATIONS
 
 from nmpcrl.claims.investigation import Condition, rounded
+from nmpcrl.study.learners import LEARNERS
 
 DRAWN = 5
+PRICE = ("seconds", "iterations", "restarts")  # other where a solver starts otherwise
 CHAOTIC = "other_problems"  # its runs magnify 1e-10 to 1e-4: its own test compares their beginning
 
 
@@ -17,12 +19,16 @@ CHAOTIC = "other_problems"  # its runs magnify 1e-10 to 1e-4: its own test compa
     [one for one in INVESTIGATIONS if one.name != CHAOTIC],
     ids=lambda one: one.name,
 )
-def test_drawn_rows_made_afresh_are_the_published_ones(investigation):
+def test_drawn_rows_made_afresh_are_the_published_ones(investigation, tmp_path, monkeypatch):
+    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
     table = investigation.table()
+    if investigation.name == "population":  # a network's products round otherwise on other machines
+        networks = [name for name, one in LEARNERS.items() if one.network]
+        table = table[~table.arm.str.split().str[0].isin(networks)]
     order = np.random.default_rng(0).permutation(len(table))[:DRAWN]
     for row in table.iloc[order].to_dict("records"):
         one = Condition(*(row.pop(name) for name in Condition._fields))
         made = investigation.make(one, investigation.conditions(one.part)[one])
-        row.pop("seconds", None)
+        row = {name: value for name, value in row.items() if name not in PRICE}
         again = {name: rounded(made[name], investigation.digits) for name in row}
         pd.testing.assert_series_equal(pd.Series(again), pd.Series(row), check_dtype=False)
