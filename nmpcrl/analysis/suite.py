@@ -55,8 +55,8 @@ from nmpcrl.study.jobs import Failed, parallel
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.moving import TASK, World, centres, controller, extrapolated
 from nmpcrl.study.parameters import refused, shortened, whole
+from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.setup import prepare
-from nmpcrl.study.storage.refusal import Refusal
 
 if TYPE_CHECKING:
     import pandas as pd

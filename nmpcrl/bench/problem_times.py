@@ -12,10 +12,10 @@ from typing import Any
 import pandas as pd
 from tqdm import tqdm
 
-from nmpcrl.bench import processes
+from nmpcrl.bench import processes, sealed
 from nmpcrl.bench.problem_sizes import VARIED, Sizes, times
 from nmpcrl.bench.solves import columns_of
-from nmpcrl.study import sealed, store
+from nmpcrl.study import store
 from nmpcrl.study.files import check_folder
 from nmpcrl.study.limits import need_numba
 from nmpcrl.study.parameters import Refusal
@@ -56,7 +56,7 @@ def make(*, progress: bool = True) -> ProblemTimes:
         sizes = times(measure=_noticed(processes.problem_of_sizes, bar))
     about = sealed.about(time.perf_counter() - began)
     content = {"sizes": columns_of(sizes), "peers": columns_of(peers), "about": about}
-    sealed.keep(path(), content, indent=1)
+    sealed.save(path(), content)
     return ProblemTimes(sizes, peers, about)
 
 

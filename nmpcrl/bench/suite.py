@@ -21,8 +21,8 @@ from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
 from nmpcrl.study import limits, paper, provenance, store
 from nmpcrl.study.files import write_json
+from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import one_of
-from nmpcrl.study.storage.machine import machine
 
 Bench = dict[str, dict[str, Any]]  # lists of one length by name, by what is measured
 Stage = tuple[str, Callable[[], Bench]]

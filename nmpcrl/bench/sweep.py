@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.bench import sealed
 from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
-from nmpcrl.study import paper, sealed, store
+from nmpcrl.study import paper, store
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.files import check_folder
 from nmpcrl.study.jobs import parallel
 from nmpcrl.study.limits import need_numba
 from nmpcrl.study.parameters import whole
+from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.setup import compile_ahead
-from nmpcrl.study.storage.refusal import Refusal
 
 SEED = 2025
 PROBLEMS = whole(1, 10**9)  # that a sweep may have
@@ -122,7 +123,7 @@ def sweep(problems: int, *, workers: int | None = None, progress: bool = True) -
     for _, tally in parallel(_tally, [*enumerate(sizes)], workers, label):
         total += tally
     table = SweepTable(total, {"seed": SEED, **sealed.about(time.perf_counter() - began)})
-    sealed.keep(path(), {"about": table.about, "tally": asdict(total)}, indent=1)
+    sealed.save(path(), {"about": table.about, "tally": asdict(total)})
     return table
 
 

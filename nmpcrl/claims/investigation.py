@@ -39,7 +39,7 @@ from nmpcrl.study.provenance import (
     versions,
 )
 from nmpcrl.study.published import Unpublishable
-from nmpcrl.study.storage.refusal import Refusal
+from nmpcrl.study.refusal import Refusal
 
 WORDS = {REPRODUCED: "confirmed", PARTLY: "confirmed in part", NOT: "contradicted"}
 

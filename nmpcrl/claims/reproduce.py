@@ -31,9 +31,9 @@ from nmpcrl.study import design, provenance
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.jobs import parallel
 from nmpcrl.study.limits import seconds_of
+from nmpcrl.study.machine import fingerprint
+from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.setup import compile_ahead
-from nmpcrl.study.storage.machine import fingerprint
-from nmpcrl.study.storage.refusal import Refusal
 
 Row = Mapping[str, Any]
 Pairs = tuple[tuple[Verdict, Verdict], ...]  # found here, published

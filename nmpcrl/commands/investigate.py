@@ -80,7 +80,7 @@ def load(name: str) -> "Investigation":
 
 def report(one: "Investigation", parts: tuple[str, ...]) -> None:
     """How many rows of each part are stored, and what the others take."""
-    from nmpcrl.study.storage.refusal import Refusal
+    from nmpcrl.study.refusal import Refusal
 
     for part in parts:
         try:

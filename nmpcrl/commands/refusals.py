@@ -43,7 +43,7 @@ class Commands(click.Group):
 
 def sentence(error: Exception) -> str:
     """The message for the user; empty if the error is a mistake of the library."""
-    from nmpcrl.study.storage.refusal import Refusal
+    from nmpcrl.study.refusal import Refusal
 
     if isinstance(error, Refusal):
         return str(error)

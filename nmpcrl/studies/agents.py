@@ -24,7 +24,7 @@ from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.studies import remedies
 from nmpcrl.studies.agents_run import EVERY, SAC, TD3, THERE, curve, judged_in, require
 from nmpcrl.study.drawn import JUDGE, TUNE
-from nmpcrl.study.storage.refusal import Refusal
+from nmpcrl.study.refusal import Refusal
 
 AGENTS: Mapping[str, Entry] = {"SAC": SAC, "TD3": TD3}
 _SETTINGS: tuple[Mapping[str, float], ...] = ({}, {"turn": 0.5}, {"gradient": 0.5, "width": 128})

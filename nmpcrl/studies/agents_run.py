@@ -21,8 +21,8 @@ from nmpcrl.study import paper
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED
+from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.robot import RobotEnv
-from nmpcrl.study.storage.refusal import Refusal
 
 EVERY = "T01 to T60"  # the place of an agent that is trained in all of `TUNE`
 THERE, AWAY = "a", "-"  # a letter a layout: whether the robot arrives

@@ -39,7 +39,7 @@ from nmpcrl.learning import (
     td_error,
     train,
 )
-from nmpcrl.study.problems import grid
+from nmpcrl.studies import dynamic_programming
 from nmpcrl.study.problems import gros_zanon as gz
 
 STEPS, WINDOW = 1000, 50  # of a run, and those whose costs are averaged
@@ -160,7 +160,7 @@ def searched() -> Vector:
 def refer(theta: Callable[[], Vector] | None, *_: Any) -> Row:
     """The test of a plan with some theta, or of the policy of dynamic programming."""
     if theta is None:
-        return row(mean_cost(grid.best(points=POINTS, inputs=INPUTS).action))
+        return row(mean_cost(dynamic_programming.best(POINTS, INPUTS).action))
     found = theta()
     return row(judge(found), theta=found)
 

@@ -33,7 +33,7 @@ from nmpcrl.analysis.suite import ENTRIES, EPOCH, Entry, judge, seed_of
 from nmpcrl.claims.investigation import Answer, Condition, Investigation, Part, Question, Row, share
 from nmpcrl.claims.rule import MAJORITY
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
-from nmpcrl.study.storage.refusal import Refusal
+from nmpcrl.study.refusal import Refusal
 
 Setting: TypeAlias = tuple[Entry, Mapping[str, float]]  # an entry, and J_best of each layout
 

@@ -18,7 +18,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from nmpcrl.study.storage.refusal import Refusal
+from nmpcrl.study.refusal import Refusal
 
 Column = NDArray[Any]
 Tables = dict[str, dict[str, Column]]  # columns by name, by the name of their table

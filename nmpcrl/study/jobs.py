@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, TypeVar
 import psutil
 from tqdm import tqdm
 
-from nmpcrl.study.storage.refusal import ParameterError, Refusal
+from nmpcrl.study.refusal import ParameterError, Refusal
 
 ATTEMPTS = 3  # how often a job is begun whose process is killed
 AHEAD = 128  # jobs given to an executor of the caller's at a time

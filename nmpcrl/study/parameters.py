@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from nmpcrl.study.storage.refusal import ParameterError as ParameterError
-from nmpcrl.study.storage.refusal import Refusal as Refusal
+from nmpcrl.study.refusal import ParameterError as ParameterError
+from nmpcrl.study.refusal import Refusal as Refusal
 
 LARGEST_SEED = 2**31 - 1  # that the generators of all libraries take
 MOST_VALUES = 10_000  # of a list

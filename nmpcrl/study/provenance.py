@@ -36,7 +36,7 @@ from typing import Any, TypedDict
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import LEARNERS
-from nmpcrl.study.storage.machine import Fingerprint, fingerprint
+from nmpcrl.study.machine import Fingerprint, fingerprint
 from nmpcrl.study.trial import Trial
 
 # Raised by hand where an edit of the room changes a number; then every run is trained anew.

@@ -25,7 +25,7 @@ from filelock import FileLock
 import nmpcrl
 from nmpcrl.study.files import write_file, write_json
 from nmpcrl.study.provenance import hash_of
-from nmpcrl.study.storage.refusal import Refusal
+from nmpcrl.study.refusal import Refusal
 
 MANIFEST = "manifest.json"
 SEAL = "hash of all the rest"

@@ -12,7 +12,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.files import Column, DamagedRecords, load_about, load_tables, save_tables
-from nmpcrl.study.storage.machine import Fingerprint
+from nmpcrl.study.machine import Fingerprint
 
 __all__ = [
     "About",

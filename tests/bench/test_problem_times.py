@@ -48,7 +48,7 @@ def test_times_that_were_changed_are_refused(found, tmp_path):
     content = json.loads(problem_times.path().read_text())
     content["peers"]["run_s"][0] /= 2
     (tmp_path / "x.json").write_text(json.dumps(content))
-    with pytest.raises(problem_times.DamagedTimes, match=r"not what was written.*--sizes"):
+    with pytest.raises(problem_times.DamagedTimes, match=r"not the file that was written.*--sizes"):
         problem_times.read(tmp_path / "x.json")
     with pytest.raises(problem_times.DamagedTimes, match="missing or damaged"):
         problem_times.read(tmp_path / "none.json")

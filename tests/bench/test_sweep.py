@@ -153,5 +153,5 @@ def test_a_sweep_in_processes_counts_what_one_in_this_process_does(here, monkeyp
 def test_a_number_that_was_changed_in_a_sweep_is_noticed(tmp_path):
     known = (ROOT / "book/published/sweep.json").read_text()
     (tmp_path / "sweep.json").write_text(known.replace('"failed": 6', '"failed": 0'))
-    with pytest.raises(sweep.DamagedSweep, match="it is not what was written"):
+    with pytest.raises(sweep.DamagedSweep, match="it is not the file that was written"):
         sweep.read(tmp_path / "sweep.json")

@@ -16,7 +16,7 @@ from nmpcrl.claims.investigation import (
 from nmpcrl.claims.verdict import NOT, REPRODUCED, UNDECIDABLE
 from nmpcrl.study import published
 from nmpcrl.study.published import Damaged, Unpublishable
-from nmpcrl.study.storage.refusal import Refusal
+from nmpcrl.study.refusal import Refusal
 
 CALLS = []
 

@@ -19,8 +19,8 @@ from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.study import Experiment, paper, run, sweep
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import EPOCHS, environment, summary_key
-from nmpcrl.study.storage.machine import fingerprint
 
 SMALL = {"episodes": 4, "steps": 6, "evaluate_every": 2}
 RUNS = (

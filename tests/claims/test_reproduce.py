@@ -25,7 +25,7 @@ from nmpcrl.claims.reproduce import (
 )
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import Experiment, design, provenance, sweep
-from nmpcrl.study.storage.machine import fingerprint
+from nmpcrl.study.machine import fingerprint
 
 HERE = {"machine": fingerprint(), "versions": provenance.environment()}
 ELSEWHERE = HERE | {"machine": fingerprint() | {"processor": "another"}}

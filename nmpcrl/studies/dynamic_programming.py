@@ -1,7 +1,7 @@
-"""Dynamic programming on a grid: the best policy of the plant of `gros_zanon`, whatever theta.
+"""The best policy of the plant of `gros_zanon`, by dynamic programming on a grid of states.
 
-Howard's policy iteration, values interpolated bilinearly between the points of the grid, and
-the expectation over e by the midpoints of equal intervals.
+Howard's policy iteration interpolates values bilinearly between the points of the grid, and takes
+the expectation over e at the midpoints of equal intervals.
 """
 
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ from scipy.sparse.linalg import spsolve
 from nmpcrl import Matrix, Vector
 from nmpcrl.study.problems import gros_zanon as gz
 
-LEAST, MOST = np.array([-0.6, -1.2]), np.array([1.4, 1.2])  # of the states on the grid
-SWEEPS = 100  # policy iteration ends after fewer
-NODES = 8  # of the disturbance
+LEAST, MOST = np.array([-0.6, -1.2]), np.array([1.4, 1.2])  # corners of the grid
+SWEEPS = 100  # of policy iteration, at most
+NODES = 8  # midpoints at which the disturbance is taken
 
 Axes = tuple[Vector, Vector]
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Points of the states and the inputs, and what is best in each."""
+    """The value and the best input at each point of the grid."""
 
     axes: Axes
     value: Matrix  # shape (points, points)
@@ -41,18 +41,13 @@ class Grid:
         found: Vector = np.clip(self._policy(inside), -1, 1)
         return found
 
-    def worth(self, state: Vector) -> float:
-        """The value of a state."""
-        found = RegularGridInterpolator(self.axes, self.value)
-        return float(found(np.clip(state, LEAST, MOST))[0])
-
 
 def best(points: int, inputs: int) -> Grid:
     """The best policy of the plant.
 
     Args:
-        points: of either state.
-        inputs: in [-1, 1] that are tried; the best is refined by a parabola.
+        points: of the grid, along each axis.
+        inputs: to choose from in [-1, 1]; a parabola refines the best one.
     """
     axes = (np.linspace(LEAST[0], MOST[0], points), np.linspace(LEAST[1], MOST[1], points))
     states = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2)
@@ -78,7 +73,7 @@ def best(points: int, inputs: int) -> Grid:
 
 
 def _transition(states: Matrix, action: float, e: Vector, axes: Axes) -> sparse.csr_array:
-    """The chance of each point to follow each, by bilinear weights."""
+    """The probability of each successor of each point, by bilinear weights."""
     later = states @ gz.TRUE_A.T + action * gz.TRUE_B[:, 0]
     everyone, points = np.arange(len(states)), len(axes[1])
     rows, columns, weights = [], [], []
@@ -94,7 +89,7 @@ def _transition(states: Matrix, action: float, e: Vector, axes: Axes) -> sparse.
 
 
 def _cell(values: Vector, axis: Vector) -> tuple[NDArray[np.int_], Vector]:
-    """The point below each value, and where the value lies between that and the next, 0 to 1."""
+    """The index of the point below each value, and the share of the way to the next point."""
     at = np.clip((values - axis[0]) / (axis[1] - axis[0]), 0, len(axis) - 1)
     below = np.minimum(at.astype(int), len(axis) - 2)
     return below, at - below

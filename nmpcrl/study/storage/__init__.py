@@ -1,1 +1,0 @@
-"""The machine, and errors whose message is a sentence."""
