@@ -359,19 +359,34 @@ class RowLog:
         return pd.DataFrame([*self.rows.values()])
 
 
+def counted(yes: pd.Series) -> tuple[int, int]:
+    """How many answers are yes, and how many there are."""
+    return int(yes.sum()), len(yes)
+
+
 def share(
     yes: pd.Series, unit: str = "layouts", numbers: Mapping[str, float] | None = None
 ) -> Answer:
     """The answer of a share of yes, by `rule.read`."""
-    count = int(yes.sum()), len(yes)
+    count = counted(yes)
     return Answer(read(*count), {unit: count}, numbers or {})
 
 
+def cheaper(ratio: pd.Series, unit: str = "layouts") -> Answer:
+    """The answer to whether a ratio of costs lies below 1, with its median."""
+    return share(ratio < 1, unit, {"median ratio": float(ratio.median())})
+
+
+def above_zero(low: float, high: float) -> Outcome:
+    """Confirmed if an interval lies above 0, contradicted if below, else in part."""
+    return REPRODUCED if low > 0 else NOT if high < 0 else PARTLY
+
+
 def means(table: pd.DataFrame, part: str, column: str = "cost") -> pd.DataFrame:
-    """The mean over seeds, a row a place and a column an arm; nan where nothing is known."""
-    there = table[table.part == part]
-    found = there.assign(value=there[column].astype(float))
-    return found.groupby(["place", "arm"], sort=False).value.mean().unstack("arm")
+    """The mean over seeds, a row a place and a column an arm; nan where no row is known."""
+    rows = table[table.part == part]
+    known = rows.assign(value=rows[column].astype(float))
+    return known.groupby(["place", "arm"], sort=False).value.mean().unstack("arm")
 
 
 def lower(

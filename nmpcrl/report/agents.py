@@ -69,12 +69,12 @@ def waiting(table: pd.DataFrame) -> str:
 
 def finding(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     """What each agent costs after the budget that others have, and the search; "" if unknown."""
-    judged, by = _courses(table, "judge"), _by(table, suite)
+    judged, by = _courses(table, "judge"), answers(table, suite)
     if not judged:
         return ""
     costs = [f"{_median(one)} times as much ({one.agent})" for one in judged]
     less = [f"{_counted(by[f'{one.agent} or the best search'])} ({one.agent})" for one in judged]
-    short = float(searched(suite, SEARCHED[0]).reindex(judged[0].units).median())
+    short = float(searched(suite, SEARCHED[0]).reindex(judged[0].shares.columns).median())
     shown = cited(f"{short:.2f}", short, f"cost over theta_init's, {SEARCH}: published")
     said = [
         f"**{_head(judged, by)}**: in the median {listed(costs)}.",
@@ -110,7 +110,7 @@ def row_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
 def in_short(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     """The same in a sentence."""
     judged = _courses(table, "judge")
-    return f"{_head(judged, _by(table, suite))}." if judged else waiting(table)
+    return f"{_head(judged, answers(table, suite))}." if judged else waiting(table)
 
 
 def longer_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
@@ -120,7 +120,7 @@ def longer_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
         table: of `studies.agents`.
         suite: the published comparison of remedies.
     """
-    by, one, seen, new = _by(table, suite), PARTS["one"], len(TUNE), len(JUDGE)
+    by, one, seen, new = answers(table, suite), PARTS["one"], len(TUNE), len(JUDGE)
     asked: dict[str, tuple[str, Sequence[str], str]] = {  # where: part, layouts, in a question
         f"for layout A, {one.seeds} seeds": ("one", (), "in one layout"),
         f"for {seen} layouts, in these": ("all", [*TUNE], f"over the {seen}"),
@@ -152,13 +152,9 @@ def tuned() -> str:
     )
 
 
-def _by(table: pd.DataFrame, suite: pd.DataFrame) -> dict[str, Answer]:
-    return answers(table, suite)
-
-
 def _courses(table: pd.DataFrame, part: str, among: Sequence[str] = ()) -> list[Course]:
     """Those that are published."""
-    return [one for agent in AGENTS if (one := course(table, part, agent, among)) is not None]
+    return [one for agent in AGENTS if len((one := course(table, part, agent, among)).last)]
 
 
 def _head(judged: Sequence[Course], by: Mapping[str, Answer]) -> str:

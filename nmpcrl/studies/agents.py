@@ -8,10 +8,10 @@ judged. It **matches** theta_init where its rollout without noise costs no more,
 layout where it also ends at the target. A training costs most of an hour or less of one core.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -19,7 +19,7 @@ import pandas as pd
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis import suite
 from nmpcrl.analysis.suite import HELD_OUT, TOLERANCE, Entry
-from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, share
+from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, cheaper, share
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.studies import remedies
 from nmpcrl.studies.agents_run import EVERY, SAC, TD3, THERE, curve, judged_in, require
@@ -32,8 +32,7 @@ SETTINGS: Mapping[str, tuple[Mapping[str, float], ...]] = {  # the default first
     "SAC": (*_SETTINGS, {"reward": 0.01}),
     "TD3": (*_SETTINGS, {"reward": 0.1}),
 }
-SPARING = 0.5  # gradient steps a step, at most, in `LONG`
-LONG = ("one", "all")
+SPARING = 0.5  # gradient steps a step of the robot, at most, in "one" and "all"
 SEARCH, SEARCHED = "Bayes", ("judge 50", "named 50")  # the best search, in these published parts
 RESAMPLES = 2000  # of the bootstrap over layouts or seeds
 
@@ -47,11 +46,6 @@ CHECKPOINTS: Mapping[str, tuple[int, ...]] = {  # episodes after which the polic
 
 class NotTuned(Refusal):
     """An agent cannot be judged before its tuning is complete."""
-
-
-def agent_of(arm: str) -> Entry:
-    """The agent of an arm, with its settings."""
-    return suite.entry(arm, AGENTS)
 
 
 def tuned(table: pd.DataFrame, name: str) -> Entry:
@@ -72,20 +66,20 @@ def tuned(table: pd.DataFrame, name: str) -> Entry:
     return min(costs, key=lambda one: costs[one])
 
 
-def _judged(table: pd.DataFrame) -> dict[str, Entry]:
-    return {str(one): one for one in (tuned(table, name) for name in AGENTS)}
+def _named(entries: Iterable[Entry]) -> dict[str, Entry]:
+    return {str(one): one for one in entries}
 
 
-def _sparing(table: pd.DataFrame) -> dict[str, Entry]:
-    """The tuned agents with at most `SPARING` gradient steps a step."""
-    best = (tuned(table, name) for name in AGENTS)
-    less = (one.with_settings(gradient=min(one.settings["gradient"], SPARING)) for one in best)
-    return {str(one): one for one in less}
+def _tuned(most: float) -> Callable[[pd.DataFrame], dict[str, Entry]]:
+    """The tuned agents, with at most so many gradient steps a step of the robot."""
 
+    def arms(table: pd.DataFrame) -> dict[str, Entry]:
+        best = (tuned(table, name) for name in AGENTS)
+        return _named(
+            one.with_settings(gradient=min(one.settings["gradient"], most)) for one in best
+        )
 
-def _tuning() -> dict[str, Entry]:
-    every = (one.with_settings(**it) for name, one in AGENTS.items() for it in SETTINGS[name])
-    return {str(one): one for one in every}
+    return arms
 
 
 def _part(name: str, arms: Any, places: Sequence[str], seeds: int = 1) -> Part:
@@ -93,11 +87,14 @@ def _part(name: str, arms: Any, places: Sequence[str], seeds: int = 1) -> Part:
     return Part(partial(curve, checkpoints), arms, places, checkpoints[-1], seeds, seconds=0.6)
 
 
+_EVERY_SETTING = _named(
+    AGENTS[name].with_settings(**one) for name, every in SETTINGS.items() for one in every
+)
 PARTS = {
-    "tune": _part("tune", _tuning(), ("T01", "T02", "T03")),
-    "judge": _part("judge", _judged, tuple(f"J{i:03}" for i in range(1, 7))),
-    "one": _part("one", _sparing, ("A",), 4),
-    "all": _part("all", _sparing, (EVERY,), 2),
+    "tune": _part("tune", _EVERY_SETTING, ("T01", "T02", "T03")),
+    "judge": _part("judge", _tuned(np.inf), tuple(f"J{i:03}" for i in range(1, 7))),
+    "one": _part("one", _tuned(SPARING), ("A",), 4),
+    "all": _part("all", _tuned(SPARING), (EVERY,), 2),
 }
 
 
@@ -108,25 +105,33 @@ def seed_of(place: str, k: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What an agent costs while it is trained, in parts of theta_init's."""
+    """What an agent costs while it is trained, in parts of theta_init's cost."""
 
     agent: str
-    units: tuple[str, ...]  # layouts, or where it is trained in one its seeds
-    episodes: tuple[int, ...]  # of each checkpoint
-    shares: Matrix  # shape (checkpoints, units)
-    there: Matrix  # whether the robot arrives, under every seed, as `shares`
+    shares: pd.DataFrame  # a row a checkpoint; a column a layout, or in part "one" a seed
+    there: pd.DataFrame  # whether the robot arrives, under every seed, as `shares`
+
+    @property
+    def episodes(self) -> list[int]:
+        """Of each checkpoint."""
+        return [*self.shares.index]
+
+    @property
+    def last(self) -> pd.Series:
+        """The shares at the last checkpoint."""
+        return self.shares.iloc[-1]
 
     @property
     def median(self) -> Vector:
-        """Over the units, at each checkpoint."""
+        """Over layouts or seeds, at each checkpoint."""
         found: Vector = np.median(self.shares, axis=1)
         return found
 
     @property
     def interval(self) -> Matrix:
-        """Of the median, of 95 %, by a bootstrap over the units; shape (2, checkpoints)."""
-        rng, units = np.random.default_rng(0), len(self.units)
-        drawn = self.shares[:, rng.integers(units, size=(RESAMPLES, units))]
+        """Of the median, of 95 %, by a bootstrap over the columns; shape (2, checkpoints)."""
+        rng, units = np.random.default_rng(0), self.shares.shape[1]
+        drawn = self.shares.to_numpy()[:, rng.integers(units, size=(RESAMPLES, units))]
         ends: Matrix = np.quantile(np.median(drawn, axis=2), [0.025, 0.975], axis=1)
         return ends
 
@@ -139,9 +144,17 @@ class Course:
         first = float(self.episodes[int(yes.argmax())]) if yes.any() else np.inf
         return first, float(self.episodes[stays]) if stays < len(yes) else np.inf
 
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The median at the end, and when it matches theta_init; nothing without runs."""
+        if self.shares.empty:
+            return {}
+        first, always = self.matched
+        return {"median": float(self.median[-1]), "matches first": first, "matches from": always}
 
-def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()) -> Course | None:
-    """How an agent did in a part; None where it is not known.
+
+def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()) -> Course:
+    """How an agent does in a part; without columns where no run is known.
 
     Args:
         table: of `SAC_AND_TD3`.
@@ -149,74 +162,64 @@ def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()
         agent: its name.
         among: layouts to look at, of an agent for all.
     """
-    runs = table[(table.part == part) & (agents_of(table) == agent)]
-    if runs.empty:
-        return None
-    shares = np.array(
-        [np.array(row.costs) / np.array(row.initial) for row in runs.itertuples()]
-    )  # run, checkpoint, layout
-    there = np.array([[[*one] for one in row.arrived] for row in runs.itertuples()]) == THERE
-    episodes = CHECKPOINTS[part]
-    if runs.place.iloc[0] != EVERY:
-        one_seed = len({*runs.k}) == 1
-        units = tuple(
-            str(place if one_seed else k) for place, k in zip(runs.place, runs.k, strict=True)
-        )
-        return Course(agent, units, episodes, shares[:, :, 0].T, there[:, :, 0].T)
-    known = [*judged_in(EVERY)]
-    some = [known.index(name) for name in among or known]
-    mean, each = shares.mean(axis=0), there.all(axis=0)
-    return Course(agent, tuple(among or known), episodes, mean[:, some], each[:, some])
+    points = CHECKPOINTS[part]
+    shares, there = [pd.DataFrame(index=points)], [pd.DataFrame(index=points)]
+    for run in table[(table.part == part) & (agents_of(table) == agent)].itertuples():
+        units = [str(run.k)] if part == "one" else [*judged_in(run.place)]
+        shares.append(pd.DataFrame(np.array(run.costs) / run.initial, points, units))
+        there.append(pd.DataFrame([[*one] for one in run.arrived], points, units) == THERE)
+    mean, every = (pd.concat(one, axis=1).T.groupby(level=0, sort=False) for one in (shares, there))
+    found = (mean.mean().astype(float).T, every.all().astype(bool).T)
+    return Course(agent, *(one[[*among]] if among and len(one.T) else one for one in found))
 
 
-def _matches(part: str, among: Sequence[str] = ()) -> Callable[..., Answer]:
-    def answer(agent: str, table: pd.DataFrame, compared: pd.DataFrame) -> Answer:
-        one = course(table, part, agent, among)
-        return share(_last(one) <= 1 + TOLERANCE, "layouts", _median_of(one))
+class Known(NamedTuple):
+    """What questions are asked of."""
+
+    table: pd.DataFrame  # of `SAC_AND_TD3`
+    compared: pd.DataFrame  # the comparison of remedies
+
+
+def _matches(part: str, among: Sequence[str] = ()) -> Callable[[str, Known], Answer]:
+    def answer(agent: str, known: Known) -> Answer:
+        one = course(known.table, part, agent, among)
+        return share(one.last <= 1 + TOLERANCE, numbers=one.numbers)
 
     return answer
 
 
-def _solves(agent: str, table: pd.DataFrame, compared: pd.DataFrame) -> Answer:
-    one = course(table, "judge", agent)
-    return share((_last(one) <= 1 + TOLERANCE) & _there(one), "layouts")
+def _solves(agent: str, known: Known) -> Answer:
+    one = course(known.table, "judge", agent)
+    return share((one.last <= 1 + TOLERANCE) & one.there.iloc[-1].astype(bool))
 
 
-def _matches_once(agent: str, table: pd.DataFrame, compared: pd.DataFrame) -> Answer:
-    one = course(table, "one", agent)
-    best = pd.Series(one.shares.min(axis=0) if one else [], dtype=float)
-    return share(best <= 1 + TOLERANCE, "seeds", _median_of(one))
+def _matches_once(agent: str, known: Known) -> Answer:
+    one = course(known.table, "one", agent)
+    return share(one.shares.min() <= 1 + TOLERANCE, "seeds", one.numbers)
 
 
-def _against(part: str, among: Sequence[str] = ()) -> Callable[..., Answer]:
-    """Whether an agent costs less at the end than the search does, where both are known."""
+def _against(part: str, among: Sequence[str] = ()) -> Callable[[str, Known], Answer]:
+    """Whether an agent costs less at the end than the search, where both are known."""
 
-    def answer(agent: str, table: pd.DataFrame, compared: pd.DataFrame) -> Answer:
-        one = course(table, part, agent, among)
-        other = searched(compared, SEARCHED[part == "one"])
+    def answer(agent: str, known: Known) -> Answer:
+        last = course(known.table, part, agent, among).last
+        search = searched(known.compared, SEARCHED[part == "one"])
         if part == "one":  # each seed beside the mean of the search in this layout
-            there = other.reindex(PARTS[part].places).iloc[0]
-            other = pd.Series(there, index=one.units if one else [], dtype=float)
-        both = pd.DataFrame({"agent": _last(one), "other": other}).dropna()
-        if one is not None:
-            both = both.loc[[unit for unit in one.units if unit in both.index]]
-        ratio = both["agent"] / both["other"]
-        unit = "seeds" if part == "one" else "layouts"
-        return share(ratio < 1, unit, {"median ratio": _median(ratio)})
+            search = pd.Series(search.get("A", np.nan), last.index)
+        both = pd.DataFrame({"agent": last, "search": search}, dtype=float).dropna()
+        return cheaper(both["agent"] / both["search"], "seeds" if part == "one" else "layouts")
 
     return answer
 
 
-def _one_or_other(table: pd.DataFrame, compared: pd.DataFrame) -> Answer:
-    found = {name: course(table, "judge", name) for name in AGENTS}
-    last = {name: _last(one) for name, one in found.items() if one}
-    both = pd.DataFrame(last, columns=[*AGENTS]).dropna()
-    ratio = both["SAC"] / both["TD3"]
-    return share(ratio < 1, "layouts", {"median ratio": _median(ratio)})
+def _one_or_other(known: Known) -> Answer:
+    last = {name: course(known.table, "judge", name).last for name in AGENTS}
+    both = pd.DataFrame(last, dtype=float).dropna()
+    return cheaper(both["SAC"] / both["TD3"])
 
 
 # name, question, expected of SAC and of TD3, answer
-_ASKED: Sequence[tuple[str, str, Outcome, Outcome, Callable[..., Answer]]] = (
+_ASKED: Sequence[tuple[str, str, Outcome, Outcome, Callable[[str, Known], Answer]]] = (
     ("matches in 300 episodes", "Does {} match theta_init with 300 episodes?",
      PARTLY, PARTLY, _matches("judge")),
     ("solves in 300 episodes", "Does {} solve the layout with 300 episodes?", NOT, NOT, _solves),
@@ -238,28 +241,23 @@ _ASKED: Sequence[tuple[str, str, Outcome, Outcome, Callable[..., Answer]]] = (
 )  # fmt: skip
 
 
-def questions(compared: pd.DataFrame | None = None) -> tuple[Question, ...]:
-    """The questions, answered beside a comparison of remedies; by default the published one."""
-
-    def beside(answer: Callable[..., Answer]) -> Callable[[pd.DataFrame], Answer]:
-        def answered(table: pd.DataFrame) -> Answer:
-            known = remedies.REMEDIES.table() if compared is None else compared
-            return answer(table, known)
-
-        return answered
-
-    asked = (
-        Question(f"{agent} {name}", text.format(agent), both[i], beside(partial(answer, agent)))
+QUESTIONS = (
+    *(
+        Question(f"{agent} {name}", text.format(agent), expected[i], partial(answer, agent))
         for i, agent in enumerate(AGENTS)
-        for name, text, *both, answer in _ASKED
-    )
-    last = "Does SAC cost less than TD3 with 300 episodes each?"
-    return (*asked, Question("SAC or TD3", last, PARTLY, beside(_one_or_other)))
+        for name, text, *expected, answer in _ASKED
+    ),
+    Question(
+        "SAC or TD3",
+        "Does SAC cost less than TD3 with 300 episodes each?",
+        PARTLY, _one_or_other,
+    ),
+)  # fmt: skip
 
 
 def answers(table: pd.DataFrame, compared: pd.DataFrame) -> dict[str, Answer]:
     """The answers beside a comparison of remedies, by the names of the questions."""
-    return replace(SAC_AND_TD3, questions=questions(compared)).answers(table)
+    return SAC_AND_TD3.judge(Known(table, compared))
 
 
 def searched(compared: pd.DataFrame, part: str) -> pd.Series:
@@ -277,59 +275,31 @@ def rows(table: pd.DataFrame, compared: pd.DataFrame) -> tuple[remedies.RemedyRo
     """
     best = compared.groupby("place").best.first()
     runs = table[(table.part == "judge") & table.place.isin(best.index)]
-    last = pd.DataFrame(
-        {
-            "entry": agents_of(runs),
-            "arm": runs.arm,
-            "place": runs.place,
-            "initial": [each[0] for each in runs.initial],
-            "best": runs.place.map(best),
-            "cost": [each[-1][0] for each in runs.costs],
-            "arrived": [each[-1] == THERE for each in runs.arrived],
-            "episodes": runs.episodes,
-            "over": runs.episodes > PARTS["judge"].episodes,
-            "seconds": runs.seconds,
-        }
+    last = runs.assign(
+        entry=agents_of(runs),
+        initial=[each[0] for each in runs.initial],
+        best=runs.place.map(best),
+        cost=[each[-1][0] for each in runs.costs],
+        arrived=[each[-1] == THERE for each in runs.arrived],
+        over=runs.episodes > PARTS["judge"].episodes,
     )
-    there = (last[last.entry == agent] for agent in AGENTS)
-    agents = (one for one in there if len(one))
-    return tuple(remedies.row("judge 300", str(one.entry.iloc[0]), one) for one in agents)
+    by_agent = last.groupby("entry")
+    return tuple(remedies.row("judge 300", str(agent), each) for agent, each in by_agent)
 
 
 def agents_of(table: pd.DataFrame) -> pd.Series:
-    """The agent of each run, with whatever setting."""
+    """The agent of each run, whatever its setting."""
     return table.arm.map(lambda arm: arm.partition("[")[0])
-
-
-def _last(one: Course | None) -> pd.Series:
-    """The shares at the end."""
-    return pd.Series(dtype=float) if one is None else pd.Series(one.shares[-1], one.units)
-
-
-def _there(one: Course | None) -> pd.Series:
-    """Whether the robot arrives at the end."""
-    return pd.Series(dtype=bool) if one is None else pd.Series(one.there[-1], one.units)
-
-
-def _median(values: pd.Series) -> float:
-    return float(values.median()) if len(values) else np.nan
-
-
-def _median_of(one: Course | None) -> dict[str, float]:
-    """When the median matches theta_init, and what it is at the end."""
-    if one is None:
-        return {}
-    first, always = one.matched
-    return {"median": float(one.median[-1]), "matches first": first, "matches from": always}
 
 
 SAC_AND_TD3 = Investigation(
     name="agents",
     parts=PARTS,
-    questions=questions(),
+    questions=QUESTIONS,
     seed=seed_of,
     registered="2feab64",
     libraries=("cma", "optuna", "stable-baselines3"),
     digits=6,
+    evidence=lambda table: Known(table, remedies.REMEDIES.table()),
     prepare=lambda missing: require(),
 )

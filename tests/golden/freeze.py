@@ -447,14 +447,14 @@ def courses() -> Any:
     asked = [("judge", ()), ("one", ()), ("all", ()), ("all", [*TUNE]), ("all", [*JUDGE])]
     for (part, among), agent in product(asked, agents.AGENTS):
         one = agents.course(trained(), part, agent, among)
-        if one:
-            found[f"{agent}, {part}, {len(one.units)}"] = {
+        if len(one.last):
+            found[f"{agent}, {part}, {len(one.last)}"] = {
                 "episodes": one.episodes,
                 "median": one.median,
                 "interval": one.interval,
                 "matched": one.matched,
-                "shares": array(one.shares),
-                "there": one.there.mean(axis=1),
+                "shares": array(one.shares.to_numpy()),
+                "there": one.there.mean(axis=1).to_numpy(),
             }
     return found
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.suite import Robot, entry, followed, judge
-from nmpcrl.studies.agents import AGENTS, agent_of
+from nmpcrl.studies.agents import AGENTS
 from nmpcrl.studies.agents_run import SAC, TD3, NoAgents, curve, seen, trained
 from nmpcrl.study import ParameterError, paper
 from nmpcrl.study.drawn import TUNE
@@ -109,11 +109,11 @@ def test_a_share_of_the_turn_rates_bounds_what_is_applied():
 
 
 def test_a_name_is_an_agent_with_its_settings_and_unknown_ones_are_refused():
-    assert agent_of("SAC[width=32]").settings["width"] == 32
+    assert entry("SAC[width=32]", AGENTS).settings["width"] == 32
     assert str(entry("nmpcrl.studies.agents_run:SAC")).endswith("SAC")
     for name in ("SAC[width=32.5]", "SAC[alpha=1]"):
         with pytest.raises(ParameterError):
-            agent_of(name)
+            entry(name, AGENTS)
 
 
 def test_without_the_extra_one_sentence_says_what_is_missing(monkeypatch):

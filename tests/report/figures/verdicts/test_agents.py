@@ -1,6 +1,7 @@
 """The figure of SAC and TD3: the title says when they match, and each panel has both."""
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl.report.figures.verdicts.agents import AGENT_LOOKS, courses
 from nmpcrl.studies.agents import Course
@@ -13,7 +14,8 @@ def made(agent, last, episodes=EPISODES, units=6):
     fall = np.geomspace(3, last, len(episodes))[:, None]
     shares = fall * np.linspace(0.95, 1.05, units)
     names = tuple(map(str, range(units)))
-    return Course(agent, names, episodes, shares, np.full(shares.shape, fill_value=False))
+    known = pd.DataFrame(shares, episodes, names)
+    return Course(agent, known, known > np.inf)
 
 
 def test_the_title_says_from_when_on_the_median_matches_and_each_panel_has_both_agents():
