@@ -14,7 +14,7 @@ mpcrl acts with what it planned before that step: the order "before". `train` pl
 The questions were written down before the seeds were run.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -66,25 +66,22 @@ ARMS: Mapping[str, Callable[[Nmpc], Learner]] = {
 }
 
 
-def row(
-    test: float = np.nan,  # mean cost of a step without noise on the action, with the last theta
-    costs: Iterable[float] = (),  # mean over each window of training; infinite after divergence
-    theta: Iterable[float] = (),
-    peers: Iterable[float] = (),  # J of mpcrl by solver, of the steps it made,
-    made: Iterable[int] = (),  # and how many these are
-    before: float = np.nan,  # J of ours in mpcrl's order,
-    nudged: float = np.nan,  # the same from theta + NUDGE,
-    after: float = np.nan,  # and with the newest theta
-    gap: Iterable[float] = (),  # largest difference of theta after each step, nudged or not
-) -> Row:
-    """A row; columns that a part does not measure have these values."""
-    lists = {"costs": costs, "theta": theta, "peers": peers, "made": made, "gap": gap}
-    numbers = {"test": test, "before": before, "nudged": nudged, "after": after}
-    return {**numbers, **{name: [*map(_plain, one)] for name, one in lists.items()}}
+_NUMBERS = ("test", "before", "nudged", "after")
+_LISTS = ("costs", "theta", "peers", "made", "gap")
 
 
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
+def row(**measured: Any) -> Row:
+    """A row; a number that a part does not measure is nan, a list empty.
+
+    Args:
+        measured: test (mean cost of a step without noise on the action, with the last theta);
+            costs (mean over each window of training, infinite after divergence); theta; peers (J
+            of mpcrl by solver) and made (steps of each); J of ours in mpcrl's order (before), from
+            theta + `NUDGE` (nudged), and with the newest theta (after); gap (largest difference of
+            theta after each step between the runs before and nudged).
+    """
+    lists = {name: np.asarray(measured.get(name, ())).tolist() for name in _LISTS}
+    return {name: float(measured.get(name, np.nan)) for name in _NUMBERS} | lists
 
 
 @cache
@@ -110,7 +107,7 @@ def learn(
     except Diverged:
         test = np.inf
     windows = np.nan_to_num(costs, nan=np.inf).reshape(-1, min(WINDOW, steps)).mean(axis=1)
-    return row(test, windows, theta)
+    return row(test=test, costs=windows, theta=theta)
 
 
 def judge(theta: Vector, episodes: int = EPISODES, seed: int = TEST_SEED) -> float:
@@ -160,9 +157,9 @@ def searched() -> Vector:
 def refer(theta: Callable[[], Vector] | None, *_: Any) -> Row:
     """The test of a plan with some theta, or of the policy of dynamic programming."""
     if theta is None:
-        return row(mean_cost(dynamic_programming.best(POINTS, INPUTS).action))
+        return row(test=mean_cost(dynamic_programming.best(POINTS, INPUTS).action))
     found = theta()
-    return row(judge(found), theta=found)
+    return row(test=judge(found), theta=found)
 
 
 def spread(_: Any, __: str, ___: int, seed: int) -> Row:
@@ -179,9 +176,9 @@ def spread(_: Any, __: str, ___: int, seed: int) -> Row:
     return row(
         peers=[one.costs.sum() for one in runs.values()],
         made=[len(one.costs) for one in runs.values()],
-        before=float(costs.sum()),
-        nudged=float(near.sum()),
-        after=float(fresh.sum()),
+        before=costs.sum(),
+        nudged=near.sum(),
+        after=fresh.sum(),
         gap=np.abs(near_path - path).max(axis=1),
     )
 
@@ -217,12 +214,25 @@ def normalised_step(theta: Vector, delta: float, phi: Vector) -> Vector:
 
 
 class Runs(NamedTuple):
-    """The rows by part, as figures and pages use them."""
+    """The rows by part, of which questions are asked and figures drawn."""
 
     tests: dict[str, Vector]  # the last cost of each seed, by arm
     courses: pd.DataFrame  # of the learners
     references: "pd.Series[float]"  # test by arm
     spreads: pd.DataFrame  # with a column for J of each of `PEERS`, and "steps of" each
+
+    @property
+    def medians(self) -> dict[str, float]:
+        """Of the last costs, by arm."""
+        return {arm: float(np.median(costs)) for arm, costs in self.tests.items()}
+
+    def nearly_all(self, arms: Iterable[str], below: float, share: float) -> bool:
+        """Whether so many seeds of each arm end below a cost."""
+        return all((self.tests[arm] < below).mean() >= share for arm in arms)
+
+    def apart(self, first: str, second: str) -> float:
+        """The relative difference of two means of J."""
+        return float(abs(self.spreads[first].mean() / self.spreads[second].mean() - 1))
 
 
 def runs(table: pd.DataFrame) -> Runs:
@@ -237,32 +247,9 @@ def runs(table: pd.DataFrame) -> Runs:
     return Runs(tests, courses, references.set_index("arm").test, spreads)
 
 
-def question(name: str, text: str, holds: Callable[[Runs], bool]) -> Question:
-    """A prediction; its answer is whether it came true."""
-
-    def answer(table: pd.DataFrame) -> Answer:
-        return Answer(REPRODUCED if holds(runs(table)) else NOT)
-
-    return Question(name, text, REPRODUCED, answer)
-
-
-def _below(found: Runs) -> bool:
-    informed = found.references["informed"]
-    return all((found.tests[arm] < informed).mean() >= 0.9 for arm in ("QL", "ES", "DPG"))
-
-
-def _medians(found: Runs) -> dict[str, float]:
-    return {arm: float(np.median(costs)) for arm, costs in found.tests.items()}
-
-
 def _no_optimum(found: Runs) -> bool:
-    learned = min(one for arm, one in _medians(found).items() if arm != "frozen")
-    return learned > 1.2 * float(found.references["best_policy"])
-
-
-def _stable(found: Runs) -> bool:
-    arms = ("QL", "ES", "TDC", "DPG")
-    return all(np.isfinite(found.tests[arm]).mean() >= 0.96 for arm in arms)
+    least = min(one for arm, one in found.medians.items() if arm != "frozen")
+    return least > 1.2 * float(found.references["best_policy"])
 
 
 def _single(found: Runs) -> bool:
@@ -270,40 +257,41 @@ def _single(found: Runs) -> bool:
     return bool(apart.median() > 0.005 and apart.max() > 0.03)
 
 
-def _near(first: str, second: str, within: float, found: Runs) -> bool:
-    return bool(abs(found.spreads[first].mean() / found.spreads[second].mean() - 1) < within)
-
-
-QUESTIONS = (
-    question("informed", "In at least 45 of 50 seeds QL, ES and DPG each end below the plan that"
-             " begins with the plant's A, B and mean disturbance.", _below),
-    question("every step", "The median of LSTD-Q at every step ends above that of QL.",
-             lambda found: _medians(found)["LSTD-Q, every step"] > _medians(found)["QL"]),
-    question("optimum", "No arm's median ends within 20 % of the best policy.", _no_optimum),
-    question("alike", "The medians of QL and ES differ by less than 30 %.",
-             lambda found: abs(_medians(found)["QL"] / _medians(found)["ES"] - 1) < 0.3),
-    question("stable", "At least 48 of 50 seeds of QL, ES, TDC and DPG end with a finite cost.",
-             _stable),
-    question("single", "Of two tolerances of Ipopt, the median seed's J differs by more than"
-             " 0.5 %, and some seed's by more than 3 %.", _single),
-    question("mean", "The means of J over the seeds differ by less than 1 %.",
-             partial(_near, "ipopt", "ipopt, 1e-10", 0.01)),
-    question("fatrop", "With fatrop mpcrl's agent stops before its 100th step in at least 45 of 50"
-             " seeds.",
-             lambda found: (found.spreads["steps of fatrop"] < PEER_STEPS).mean() >= 0.9),
-    question("ours", "Riccati in mpcrl's order has a mean J within 1 % of mpcrl's.",
-             partial(_near, "before", "ipopt, 1e-10", 0.01)),
-    question("chaos", "1e-10 in theta becomes more than 1e-4 within 100 steps in at least 45 of 50"
-             " seeds.", lambda found: (found.spreads.gap.map(max) > 1e-4).mean() >= 0.9),
-    question("order", "To act with the newest theta lowers J in at least 45 of 50 seeds.",
-             lambda found: (found.spreads.after < found.spreads.before).mean() >= 0.9),
+# name, prediction, whether it comes true
+_PREDICTED: Sequence[tuple[str, str, Callable[[Runs], bool]]] = (
+    ("informed", "In at least 45 of 50 seeds QL, ES and DPG each end below the plan that begins"
+     " with the plant's A, B and mean disturbance.",
+     lambda found: found.nearly_all(("QL", "ES", "DPG"), found.references["informed"], 0.9)),
+    ("every step", "The median of LSTD-Q at every step ends above that of QL.",
+     lambda found: found.medians["LSTD-Q, every step"] > found.medians["QL"]),
+    ("optimum", "No arm's median ends within 20 % of the best policy.", _no_optimum),
+    ("alike", "The medians of QL and ES differ by less than 30 %.",
+     lambda found: abs(found.medians["QL"] / found.medians["ES"] - 1) < 0.3),
+    ("stable", "At least 48 of 50 seeds of QL, ES, TDC and DPG end with a finite cost.",
+     lambda found: found.nearly_all(("QL", "ES", "TDC", "DPG"), np.inf, 0.96)),
+    ("single", "Of two tolerances of Ipopt, the median seed's J differs by more than 0.5 %, and"
+     " some seed's by more than 3 %.", _single),
+    ("mean", "The means of J over the seeds differ by less than 1 %.",
+     lambda found: found.apart("ipopt", "ipopt, 1e-10") < 0.01),
+    ("fatrop", "With fatrop mpcrl's agent stops before its 100th step in at least 45 of 50 seeds.",
+     lambda found: (found.spreads["steps of fatrop"] < PEER_STEPS).mean() >= 0.9),
+    ("ours", "Riccati in mpcrl's order has a mean J within 1 % of mpcrl's.",
+     lambda found: found.apart("before", "ipopt, 1e-10") < 0.01),
+    ("chaos", "1e-10 in theta becomes more than 1e-4 within 100 steps in at least 45 of 50 seeds.",
+     lambda found: (found.spreads.gap.map(max) > 1e-4).mean() >= 0.9),
+    ("order", "To act with the newest theta lowers J in at least 45 of 50 seeds.",
+     lambda found: (found.spreads.after < found.spreads.before).mean() >= 0.9),
 )  # fmt: skip
 
 
-def seed_of(_: str, k: int) -> int:
-    """The k-th seed."""
-    return k
+def _came_true(holds: Callable[[Runs], bool], found: Runs) -> Answer:
+    return Answer(REPRODUCED if holds(found) else NOT)
 
+
+QUESTIONS = tuple(
+    Question(name, text, REPRODUCED, partial(_came_true, holds)) for name, text, holds in _PREDICTED
+)
+PLACE = ("Gros and Zanon",)
 
 OTHER_PROBLEMS = Investigation(
     name="other_problems",
@@ -316,14 +304,15 @@ OTHER_PROBLEMS = Investigation(
                 "best_theta": searched,
                 "best_policy": None,
             },
-            ("Gros and Zanon",),
+            PLACE,
             1,
             seconds=60,
         ),
-        "spread": Part(spread, {"Q-learning": None}, ("Gros and Zanon",), 1, SEEDS, seconds=5),
-        "learners": Part(learn, ARMS, ("Gros and Zanon",), 1, SEEDS, seconds=1),
+        "spread": Part(spread, {"Q-learning": None}, PLACE, 1, SEEDS, seconds=5),
+        "learners": Part(learn, ARMS, PLACE, 1, SEEDS, seconds=1),
     },
     questions=QUESTIONS,
-    seed=seed_of,
+    seed=lambda _, k: k,
+    evidence=runs,
     digits=7,
 )

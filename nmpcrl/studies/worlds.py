@@ -34,6 +34,7 @@ from nmpcrl.claims.investigation import (
 from nmpcrl.claims.rule import read
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.studies import worlds_run as runs
+from nmpcrl.studies.worlds_problems import TERMINALS
 from nmpcrl.studies.worlds_run import EVERY, sequence
 from nmpcrl.study.drawn import COMPARED, JUDGE, SCENARIOS
 
@@ -52,7 +53,6 @@ VIEWS = ("known", "extrapolated", "frozen")
 ORACLES = ("speed", "turn", "drift", "slip")  # faults of which an oracle knows the model
 WITHOUT = ("lag", "noise")
 DEVIATIONS = ("0.02", "0.05", "0.1")  # [m] and [rad], of the measured state
-TERMINALS = ("diagonal", "full", "learned")  # the paper's first
 CHANGES = ("once", "every 50", "random")
 REMEDY = "Bayes[nearby=2]"  # the entry that the comparison of remedies says to try first
 
@@ -70,17 +70,7 @@ CHANGING = {
     **grid(["RDES", "DES"], ["told"], ["plain", "recent"]),
     **grid(["frozen"], ["cost", "delta", "never"], ["plain"]),
 }
-
-
-def _shifting(rate: str) -> dict[str, Any]:
-    return {name: partial(runs.shifting, rate, setting) for name, setting in CHANGING.items()}
-
-
-def _call(setting: Callable[..., Any], place: str, episodes: int, seed: int) -> Any:
-    return setting(place, episodes, seed)
-
-
-_ONCE = {f"remedy {REMEDY}": partial(runs.begun_anew, "once", REMEDY)}
+ONCE = CHANGING | grid(["remedy"], [REMEDY])
 PARTS = {
     "moving": Part(
         runs.moving,
@@ -99,9 +89,12 @@ PARTS = {
         seeds=2,
         deterministic=(*grid([*ORACLES, *WITHOUT], ["init", "grid"]), *grid(ORACLES, ["oracle"])),
     ),
-    "once": Part(_call, _shifting("once") | _ONCE, SEQUENCES, 300),
-    "every 50": Part(_call, _shifting("every 50"), SEQUENCES, 300),
-    "random": Part(_call, _shifting("random"), SEQUENCES, 300),
+    **{
+        rate: Part(
+            partial(runs.shifting, rate), ONCE if rate == "once" else CHANGING, SEQUENCES, 300
+        )
+        for rate in CHANGES
+    },
     "carry": Part(
         runs.carry, {one: one for one in ("frozen", "ES", "CMA-ES")}, LAYOUTS, 300,
         first={"frozen": 1},
@@ -242,8 +235,8 @@ def back(series: list[float], change: int) -> float:
 
 
 def _back_soon(table: pd.DataFrame) -> Answer:
-    told = table[(table.part == "once") & (table.arm == "ES told plain")]
-    found = [back(row.series, changes("once", row.place)[0]) for row in told.itertuples()]
+    runs = table[(table.part == "once") & (table.arm == "ES told plain")]
+    found = [back(run.series, changes("once", run.place)[0]) for run in runs.itertuples()]
     until = pd.Series(found, dtype=float)
     return share(until <= SOON, "sequences", {"median episodes": float(until.median())})
 

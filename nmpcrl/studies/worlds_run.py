@@ -71,7 +71,7 @@ def explored(episodes: int, seed: int) -> Exploration:
 
 
 def learned(nmpc: Persistent, world: World, theta: Vector, episodes: int, seed: int) -> Vector:
-    """What ES makes of theta in a world; the last with which a solver can be called."""
+    """Train ES in a world; the last theta with which a solver can be called."""
     weights = Weights(theta, np.full(theta.size, paper.W_INIT))
     how: dict[str, Any] = {"rng": np.random.default_rng([seed, 1]), **world.environment}
     try:
@@ -144,8 +144,10 @@ def begun_anew(rate: str, name: str, place: str, episodes: int, seed: int) -> Ro
     return row(alone.cost / alone.initial, arrived=alone.arrived)
 
 
-def shifting(rate: str, setting: tuple[str, str, str], place: str, episodes: int, seed: int) -> Row:
+def shifting(rate: str, setting: tuple[str, ...], place: str, episodes: int, seed: int) -> Row:
     """A learner where the layout changes; costs are shares of theta_init's in the same layout."""
+    if setting[0] == "remedy":
+        return begun_anew(rate, setting[1], place, episodes, seed)
     kind, knows, reaction = setting
     names, order = sequence(rate, place, episodes)
     layouts, nmpc = [JUDGE[name] for name in names], controller()

@@ -83,7 +83,7 @@ def _lines(axes: Axes, references: "pd.Series[float]") -> None:
 
 def _first(found: Runs) -> str:
     """The title: which arm ends lowest, and at how much of what was possible."""
-    medians = {arm: float(np.median(costs)) for arm, costs in found.tests.items()}
+    medians = found.medians
     least = min(medians, key=medians.__getitem__)
     times = medians[least] / found.references["best_policy"]
     return f"{least} ends lowest, at {times:.1f} times the cost of the best policy"
