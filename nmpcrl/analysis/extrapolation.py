@@ -1,17 +1,17 @@
 """Why the more accurate network dies sooner: what theta does as an input of the network, Eq. (11).
 
 A step theta + alpha delta phi changes V in s by alpha delta phi'phi, and the target gamma Q(s+, a+)
-by alpha delta gamma psi'phi, where psi is the slope in theta of whatever predicts. Their ratio is
-the `feedback`: below 1 the TD error shrinks, above 1 a step makes it larger. A second solve has
-psi = phi+. A network without theta has psi = 0. One with theta has the slope that it learned from
-the thetas seen so far, which lie along one line, and it is asked at the end of it.
+by alpha delta gamma psi'phi, where psi is the prediction's slope in theta. The ratio is the
+`feedback`: below 1 a step shrinks the TD error, above 1 it enlarges the TD error. A second solve
+has psi = phi+, a network without theta has psi = 0. A network with theta has learned its slope
+from the thetas seen so far, which lie along one line, and is asked at the end of this line.
 
-An intervention changes what predicts, and nothing else: the same noise, first weights, examples
-and fits.
+An intervention changes the prediction alone: noise, first weights, examples and fits are the same.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -26,70 +26,53 @@ PROBE = 1e-5  # alpha delta of the step along which a slope is measured: delta =
 
 
 @dataclass
-class Held:
-    """The network is asked with theta of the start of the episode; it learns as before."""
+class StartTheta:
+    """Asks the network with the first theta of the episode; the network learns as before.
+
+    With `true_slope` the change of the NMPC's own V in s+ since that theta is added.
+    """
 
     network: Imitation
     controller: Persistent
-    theta: Vector | None = field(default=None, init=False)  # None where an episode begins
+    true_slope: bool = False
+    theta: Vector | None = field(default=None, init=False)  # None before an episode
 
     def __call__(self, transition: Transition, theta: Vector) -> Successor | None:
-        """Value the next state under the theta that is held."""
-        if self.theta is None:
-            self.theta = theta
-        successor = self._value(transition, theta, self.theta)
-        if transition.last:
-            self.theta = None
-        return successor
-
-    def _value(self, transition: Transition, theta: Vector, held: Vector) -> Successor | None:
-        return self.network(transition, held)
-
-
-@dataclass
-class TrueSlope(Held):
-    """`Held`, and what theta has changed since is the NMPC's own change of V in s+."""
-
-    def _value(self, transition: Transition, theta: Vector, held: Vector) -> Successor | None:
-        successor = self.network(transition, held)
-        if successor is None or transition.end:
+        """Value the next state."""
+        first = theta if self.theta is None else self.theta
+        self.theta = None if transition.last else first
+        successor = self.network(transition, first)
+        if not self.true_slope or successor is None or transition.end:
             return successor
         now, then = (
             self.controller.solve(transition.next_state, one, transition.solution).value
-            for one in (theta, held)
+            for one in (theta, first)
         )
         return replace(successor, value=successor.value + now - then)
 
 
-def untouched(network: Imitation, controller: Persistent) -> Bootstrap:
-    """The network of the experiment."""
-    return network
-
-
 INTERVENTIONS: Mapping[str, Callable[[Imitation, Persistent], Bootstrap]] = {
-    "none": untouched,
-    "theta held": Held,
-    "true slope": TrueSlope,
+    "none": lambda network, _: network,
+    "theta held": StartTheta,
+    "true slope": partial(StartTheta, true_slope=True),
 }
 
 
-def feedback(
-    network: Imitation, transition: Transition, theta: Vector, gamma: float, probe: float = PROBE
-) -> float:
-    """gamma psi'phi / phi'phi, psi being the network's slope in theta at (s+, a+), along phi."""
+def feedback(network: Imitation, transition: Transition, theta: Vector, gamma: float) -> float:
+    """gamma psi'phi / phi'phi; psi is the network's slope in theta at (s+, a+), along phi."""
     phi, where = transition.solution.features, transition.next_state
     ahead, behind = (
         network.network.predict(
-            network.inputs(where, transition.solution.next_action, theta + sign * probe * phi)
+            network.inputs(where, transition.solution.next_action, theta + sign * PROBE * phi)
         )
         for sign in (1, -1)
     )
-    return float(gamma * (ahead - behind) / (2 * probe * (phi @ phi)))
+    return float(gamma * (ahead - behind) / (2 * PROBE * (phi @ phi)))
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One run; a column has a row an episode that was begun, nan where nothing was predicted."""
+    """One run, by episode begun; nan where the episode has no prediction."""
 
     stopped: bool
     theta: Matrix  # at the end, shape (episodes, d)
@@ -99,7 +82,7 @@ class Outcome:
 
     @property
     def episodes(self) -> int:
-        """How many were begun."""
+        """Number of episodes begun."""
         return len(self.theta)
 
 

@@ -1,12 +1,11 @@
-"""What a sample of runs says of all runs: estimates with intervals of 95 %.
+"""Estimates from a sample of runs, with intervals of 95 %.
 
-Scores are summed up as Agarwal et al. (2021) propose: by the interquartile mean and the probability
-of improvement, with a percentile bootstrap that draws within each stratum, here a layout. What is
-inferred holds for these layouts, not for others. Rates get Wilson's (1927) interval, which also has
-a width where all runs agree; a bootstrap would return the one share that it saw.
+Scores have the interquartile mean and the probability of improvement of Agarwal et al. (2021), with
+a percentile bootstrap that draws within each stratum, here a layout: the interval is one over runs
+in these layouts. Rates have Wilson's (1927) interval, which has a width even if all runs agree.
 
-A failed rollout costs infinitely much and counts as that: it is worse than any that arrived, and it
-ties with another failure. nan is refused, because it cannot be said what it would stand for.
+A failed rollout has infinite cost: it is worse than any arrival and ties with another failure.
+Scores that are nan are refused.
 """
 
 from collections.abc import Callable, Hashable, Sequence
@@ -27,7 +26,7 @@ SEED = 0  # of the bootstrap: the same runs give the same interval
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value and its interval; nan bounds where there are too few runs for one."""
+    """A value and its interval; the bounds are nan where there are too few runs."""
 
     value: float
     low: float
@@ -40,14 +39,14 @@ class Estimate:
 
 @cache
 def rate(held: int, of: int) -> Estimate:
-    """Share of independent runs in which something held, with Wilson's interval.
+    """Share `held` of `of` independent runs, with Wilson's interval.
 
-    For runs of several layouts it errs on the wide side: a fixed number of runs in each varies less
-    than as many drawn from the mixture (Hoeffding 1956). That runs of one seed meet the same noise
-    in every layout is left out of account.
+    For several layouts the interval is too wide rather than too narrow: a fixed number of runs in
+    each varies less than as many runs drawn from the mixture (Hoeffding 1956). Runs of one seed,
+    which have the same noise in every layout, are treated as independent.
 
     Raises:
-        ValueError: there are no runs, or more held than there are.
+        ValueError: `of` is 0, or `held` is not between 0 and `of`.
     """
     if not 0 <= held <= of or not of:
         raise ValueError(f"{held} of {of} runs is not a rate")
@@ -56,9 +55,7 @@ def rate(held: int, of: int) -> Estimate:
 
 
 def paired_p(gained: int, lost: int) -> float:
-    """McNemar's exact two-sided p: pairs whose answer changed go either way with the same chance.
-
-    1 where no pair changed.
+    """McNemar's exact two-sided p of the pairs whose answer changed; 1 if no pair changed.
 
     Args:
         gained: pairs that answer yes only with the change.
@@ -69,16 +66,14 @@ def paired_p(gained: int, lost: int) -> float:
 
 
 def interquartile_mean(scores: Vector, strata: Sequence[Hashable]) -> Estimate:
-    """Mean of the middle half of the scores: a mean that a quarter of failures cannot move.
-
-    Infinite where more runs failed than that.
+    """Mean of the middle half of the scores; infinite if more than a quarter of the runs failed.
 
     Args:
         scores: one a run, shape (runs,).
         strata: the layout of each run.
 
     Raises:
-        ValueError: a score is nan, or there are none.
+        ValueError: a score is nan, or there is no score.
     """
     known = _known(scores)
 
@@ -94,9 +89,9 @@ def probability_of_improvement(
 ) -> Estimate:
     """Probability that a run of the first learner costs less than one of the second.
 
-    Within a layout every run of the one is compared with every run of the other, a tie counting one
-    half (Mann and Whitney's U); the layouts weigh the same. Runs of one seed meet the same noise,
-    so the bootstrap draws them together.
+    Within a layout every run of the first is compared with every run of the second; a tie counts
+    one half (Mann and Whitney's U). Layouts have equal weights. Runs of one seed have the same
+    noise, so the bootstrap draws them together.
 
     Args:
         first: costs, shape (runs,).
@@ -104,7 +99,7 @@ def probability_of_improvement(
         strata: the layout of each pair.
 
     Raises:
-        ValueError: a cost is nan, there are none, or the two differ in number.
+        ValueError: a cost is nan, there is no cost, or the two differ in number.
     """
     ours, theirs = _known(first), _known(second)
     if len(ours) != len(theirs):
@@ -121,37 +116,12 @@ def probability_of_improvement(
     return _bootstrapped(better, strata)
 
 
-def performance_profile(scores: Vector, thresholds: Vector) -> pd.DataFrame:
-    """Share of the runs whose score reaches each threshold, with the interval of `rate`.
-
-    Args:
-        scores: one a run, the higher the better, shape (runs,).
-        thresholds: tau, in the order wanted.
-
-    Returns:
-        Columns threshold, share, low and high. The band is pointwise.
-
-    Raises:
-        ValueError: a score is nan, or there are none.
-    """
-    known = _known(scores)
-    reached = [rate(int((known >= tau).sum()), len(known)) for tau in thresholds]
-    return pd.DataFrame(
-        {
-            "threshold": np.asarray(thresholds, float),
-            "share": [one.value for one in reached],
-            "low": [one.low for one in reached],
-            "high": [one.high for one in reached],
-        }
-    )
-
-
 def over_layouts(
     statistic: Callable[..., Any], *columns: Vector, resamples: int = RESAMPLES
 ) -> Estimate:
     """A statistic of columns with one row a layout, and its percentile interval.
 
-    A draw in which the statistic is nan, such as one without a failure, does not count.
+    A draw whose statistic is nan or infinite does not count.
 
     Args:
         statistic: of the columns, over their last axis.
@@ -190,9 +160,8 @@ def _bootstrapped(statistic: Callable[..., Vector], strata: Sequence[Hashable]) 
     """The statistic of all runs, and its percentile interval under draws within each stratum.
 
     Args:
-        statistic: of the numbers of the runs drawn from each stratum, shapes (..., runs in it).
-        strata: the stratum of each run. One with a single run has no spread to draw from, and the
-            bounds are nan.
+        statistic: of the indices of the runs drawn from each stratum, shapes (..., runs in it).
+        strata: the stratum of each run; with a single run in one of them the bounds are nan.
     """
     codes, names = pd.factorize(pd.Series(list(strata)))
     members = [np.flatnonzero(codes == code) for code in range(len(names))]

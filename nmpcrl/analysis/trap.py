@@ -1,18 +1,18 @@
-"""The trap: the robot stands before a closed gap, and learning closes it further.
+"""The trap: the robot stands before a closed gap, and learning closes the gap further.
 
-Standing, the robot pays the stage cost l at every step, for ever l / (1 - gamma). The plan, which
-hopes to arrive or to stop paying for the gap, is worth less. So delta = l + gamma V - V is above 0,
-and a step along phi makes V larger: theta_c grows, since V does with it. The value gets more
-accurate while the policy gets worse.
+A standing robot pays the stage cost l at every step, l / (1 - gamma) in all. Its plan expects to
+arrive or to pass the gap and costs less: delta = l + gamma V - V is above 0. A step along phi
+raises V and with it theta_c. The value gets more accurate while the policy gets worse.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import dropwhile, takewhile
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.analysis.metrics import root_mean_square
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
@@ -20,33 +20,17 @@ from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.setup import controller_of
 
-STOOD = 10  # steps at the end of a rollout in which it is seen whether the robot stands
-PART = 20  # episodes at either end of training over which delta is compared
-RISE = 0.2  # share of the cost by which it rises at a cliff, from one theta_c of a grid to the next
-CLOSE = 1e-3  # of theta_c, to which a cliff is found
-
-
-@dataclass(frozen=True)
-class Ending:
-    """The end of a run without noise, and what became of the TD error on the way."""
-
-    moved: (
-        float  # way [m] in the last `STOOD` steps; nan where the robot arrived, or a solve failed
-    )
-    worth: float  # V over l / (1 - gamma) there; nan where the robot arrived
-    delta_first: float  # root mean square over the first `PART` episodes
-    delta_last: float  # and over the last
-    phi_c: float  # slope of V in theta_c there; nan where the robot arrived
-
-
-NOTHING = (np.nan, np.nan, np.nan)
+STOOD = 10  # last steps of a rollout, over which the robot's way is measured
+PART = 20  # first and last episodes of training, over which delta is compared
+RISE = 0.2  # relative rise of the cost at a cliff, from one theta_c of a grid to the next
+CLOSE = 1e-3  # accuracy in theta_c of a cliff
 
 
 @dataclass(frozen=True, eq=False)
 class Stand:
-    """Where the rollout of a theta ends without noise, and what the plan says of that place."""
+    """The end of a rollout of theta without noise, and the plan's value there."""
 
-    episode: int  # after which theta was this
+    episode: int  # after which the run had this theta
     theta_c: float
     delta: float  # root mean square over that episode; nan before the first
     states: Matrix
@@ -55,16 +39,16 @@ class Stand:
     moved: float  # way [m] in its last `STOOD` steps
     stage_cost: float  # l, in its last step
     value: float  # V there
-    phi_c: float  # and its slope in theta_c
+    phi_c: float  # slope of V in theta_c there
 
     @property
     def forever(self) -> float:
-        """What standing there for ever costs, l / (1 - gamma)."""
+        """Cost of standing there for ever, l / (1 - gamma)."""
         return self.stage_cost / (1 - paper.GAMMA)
 
 
 def stands(summary: RunSummary, episodes: Iterable[int]) -> list[Stand]:
-    """The rollouts of a run's theta after some of its episodes, the 0th being the start."""
+    """The rollouts of a run's theta after some of its episodes; 0 is the start."""
     experiment = summary.name
     controller: Persistent = controller_of(experiment)
     thetas = np.vstack([experiment.theta, summary.episodes["theta"]])
@@ -75,7 +59,7 @@ def stands(summary: RunSummary, episodes: Iterable[int]) -> list[Stand]:
 def stand(
     controller: Persistent, theta: Vector, steps: int, episode: int = 0, delta: float = np.nan
 ) -> Stand:
-    """The rollout of one theta; episode and delta are noted."""
+    """The rollout of one theta; episode and delta are copied into the result."""
     rollout = evaluate(controller, theta, steps)
     states, task = rollout.states, controller.nmpc.task
     there = controller.solve(states[-1], theta)
@@ -85,7 +69,7 @@ def stand(
 
 
 def stretch(found: Iterable[Stand], standing: float) -> list[Stand]:
-    """The first unbroken part of some stands in which the robot is away and moves less [m]."""
+    """The first run of stands in which the robot is away and moves less than `standing` [m]."""
     stands_there = dropwhile(lambda one: one.arrived or one.moved >= standing, found)
     return [*takewhile(lambda one: not one.arrived and one.moved < standing, stands_there)]
 
@@ -110,45 +94,41 @@ def cliff(cost: Callable[[float], float], grid: Vector, costs: Vector) -> float:
 
 
 def raised_cost(layout: str | Centres, theta: Vector, share: float) -> float:
-    """By which share of its cost a rollout costs more with theta_c raised by another share."""
+    """Relative rise of a rollout's cost where theta_c is raised by a share."""
     controller = Persistent(paper.nmpc(layout))
     raised = np.array([*theta[:-1], (1 + share) * theta[-1]])
     before, after = (evaluate(controller, one, paper.STEPS).cost for one in (theta, raised))
     return after / before - 1
 
 
-def ending(summary: RunSummary) -> Ending:
-    """What a summary tells of the trap."""
-    moved, worth, phi_c = _standing(summary) if _is_away(summary) else NOTHING
+def ending(summary: RunSummary) -> dict[str, float]:
+    """The end of a run's last rollout without noise, and the TD errors on the way.
+
+    Returns:
+        moved (way [m] in the last `STOOD` steps), worth (V over l / (1 - gamma) at the end),
+        delta_first and delta_last (root mean square over the first and the last `PART` episodes)
+        and phi_c (slope of V in theta_c at the end). moved, worth and phi_c are nan where the
+        robot arrived or a solve failed.
+    """
     delta = summary.episodes["delta"]
     reached = delta[np.isfinite(delta)]
-    return Ending(moved, worth, _rms(reached[:PART]), _rms(reached[-PART:]), phi_c)
-
-
-def as_row(summary: RunSummary) -> dict[str, float]:
-    """`ending`, by name."""
-    return asdict(ending(summary))
-
-
-def _is_away(summary: RunSummary) -> bool:
-    """Whether the last rollout went to its end without arriving."""
-    whole = bool(np.isfinite(summary.states).all())
-    return whole and bool(summary.evaluations["distance"][-1] > ARRIVED)
-
-
-def _standing(summary: RunSummary) -> tuple[float, float, float]:
-    """Way, worth and slope at the end of the last rollout."""
-    experiment, state, theta = summary.name, summary.states[-1], summary.evaluations["theta"][-1]
-    controller: Persistent = controller_of(experiment)
-    solution = controller.solve(state, theta)
+    first, last = (
+        root_mean_square(part) if part.size else np.nan
+        for part in (reached[:PART], reached[-PART:])
+    )
+    found = {"moved": np.nan, "worth": np.nan, "delta_first": first, "delta_last": last}
+    finished = np.isfinite(summary.states).all()
+    if not finished or summary.evaluations["distance"][-1] <= ARRIVED:
+        return found | {"phi_c": np.nan}
+    state, controller = summary.states[-1], controller_of(summary.name)
+    solution = controller.solve(state, summary.evaluations["theta"][-1])
     cost = controller.nmpc.task.stage_cost(state, summary.actions[-1])
-    worth = solution.value * (1 - controller.gamma) / cost
-    return _way(summary.states), worth, float(solution.features[-1])
+    found |= {
+        "moved": _way(summary.states),
+        "worth": solution.value * (1 - controller.gamma) / cost,
+    }
+    return found | {"phi_c": float(solution.features[-1])}
 
 
 def _way(states: Matrix) -> float:
     return float(np.linalg.norm(np.diff(states[-STOOD - 1 :, :2], axis=0), axis=1).sum())
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else np.nan

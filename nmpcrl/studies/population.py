@@ -121,7 +121,7 @@ def of_run(setting: Experiment, place: str, episodes: int, seed: int) -> Row:
     """The row of a run, which is trained unless its summary is stored."""
     experiment = replace(setting, layout=LAYOUTS[place], episodes=episodes, seed=seed)
     summary = SUMMARIES.fetch(experiment)
-    known = row(summary) | (ending := trap.as_row(summary))
+    known = row(summary) | (ending := trap.ending(summary))
     found = {name: known[name] for name in (*OUTCOME, *ending)}
     if experiment.learner in FOLLOWED:
         found["positions"] = in_millimetres(summary.states[:, :2])

@@ -5,13 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from nmpcrl.analysis.extrapolation import (
-    INTERVENTIONS,
-    Held,
-    TrueSlope,
-    feedback,
-    watch,
-)
+from nmpcrl.analysis.extrapolation import INTERVENTIONS, StartTheta, feedback, watch
 from nmpcrl.learning.bootstrap import Successor
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.run import run
@@ -20,16 +14,15 @@ SHORT = {"layout": "B", "seed": 1, "decay": "episode", "episodes": 2, "steps": 9
 
 
 class Linear:
-    """A network that predicts 3 a'theta, and remembers what it was asked with."""
+    """A network that predicts 3 a'theta."""
 
     def __init__(self, a):
-        self.network, self.a, self.asked = self, np.asarray(a, float), []
+        self.network, self.a = self, np.asarray(a, float)
 
     def inputs(self, state, action, theta):
         return theta
 
     def predict(self, theta):
-        self.asked.append(theta)
         return 3 * self.a @ theta
 
     def __call__(self, transition, theta):
@@ -43,35 +36,26 @@ def transition(phi=(1.0, 2.0), last=False):
     )
 
 
-def test_feedback_of_a_linear_network_is_gamma_times_its_slope_along_phi():
+@pytest.mark.parametrize("a", [(0.5, -0.1), (1 / 3, 2 / 3)])
+def test_feedback_of_a_linear_network_is_gamma_times_its_slope_along_phi(a):
     phi = np.array([1.0, 2.0])
-    network = Linear([0.5, -0.1])
-    expected = 0.9 * 3 * (network.a @ phi) / (phi @ phi)
-    assert feedback(network, transition(phi), np.ones(2), 0.9) == pytest.approx(expected)
+    expected = 0.9 * 3 * (a @ phi) / (phi @ phi)  # 0.9 where the slope is phi
+    assert feedback(Linear(a), transition(phi), np.ones(2), 0.9) == pytest.approx(expected)
 
 
-def test_a_network_whose_slope_is_phi_feeds_back_gamma():
-    phi = np.array([1.0, 2.0])
-    assert feedback(Linear(phi / 3), transition(phi), np.ones(2), 0.97) == pytest.approx(0.97)
-
-
-def test_theta_is_held_until_the_episode_is_over():
-    network = Linear([1.0])
-    held = Held(network, None)
-    for theta, last in ((1.0, False), (2.0, False), (3.0, True), (4.0, False)):
-        held(transition(last=last), np.array([theta]))
-    assert np.ravel(network.asked).tolist() == [1.0, 1.0, 1.0, 4.0]
-
-
-def test_with_the_true_slope_the_prediction_moves_as_the_value_does():
+@pytest.mark.parametrize(
+    ("true_slope", "values"), [(False, [3, 3, 3, 12]), (True, [3, 3 + 40 - 10, 3 + 90 - 10, 12])]
+)
+def test_the_first_theta_of_an_episode_predicts_and_the_true_slope_is_the_change_of_v(
+    true_slope, values
+):
     controller = SimpleNamespace(
         solve=lambda state, theta, start: SimpleNamespace(value=10 * theta[0] ** 2)
     )
-    bootstrap = TrueSlope(Linear([1.0]), controller)
-    first = bootstrap(transition(), np.array([1.0]))
-    second = bootstrap(transition(), np.array([2.0]))
-    assert first.value == 3.0
-    assert second.value == 3.0 + 40.0 - 10.0
+    bootstrap = StartTheta(Linear([1.0]), controller, true_slope)
+    steps = ((1.0, False), (2.0, False), (3.0, True), (4.0, False))
+    found = [bootstrap(transition(last=last), np.array([theta])).value for theta, last in steps]
+    assert found == values
 
 
 @pytest.fixture(scope="module")
@@ -86,20 +70,14 @@ def test_interventions_change_nothing_before_the_network_is_fitted(outcomes):
     assert len({one.theta[1].tobytes() for one in outcomes.values()}) == len(outcomes)
 
 
-def test_the_untouched_run_is_that_of_the_study(outcomes):
+def test_the_run_without_an_intervention_is_a_run_of_the_study(outcomes):
     steps = run(Experiment("RDES", **SHORT)).steps
     assert np.array_equal(outcomes["none"].theta[-1], steps["theta"][-1])
     delta = steps["delta"][steps["episode"] == 1]
     assert outcomes["none"].delta[1] == pytest.approx(np.sqrt(np.nanmean(delta**2)))
-
-
-def test_without_theta_as_an_input_nothing_is_fed_back():
-    outcome = watch(Experiment("DES", **SHORT))
-    assert np.isnan(outcome.feedback[0])
-    assert outcome.feedback[1] == 0
-
-
-def test_a_learner_without_a_network_is_refused():
+    without_theta = watch(Experiment("DES", **SHORT)).feedback
+    assert np.isnan(without_theta[0])
+    assert without_theta[1] == 0
     with pytest.raises(TypeError, match="'ES' has no network"):
         watch(Experiment("ES", **SHORT))
 

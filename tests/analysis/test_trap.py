@@ -23,23 +23,17 @@ def standing():
     return frozen(0.2)
 
 
-def test_before_a_closed_gap_the_robot_stands_and_the_plan_is_worth_less_than_standing(standing):
+def test_before_a_closed_gap_the_robot_stands_and_its_td_error_is_above_0(standing):
     found = ending(standing)
-    assert found.moved < 0.05
-    assert 0 < found.worth < 1
-    assert found.phi_c > 0
-
-
-def test_so_the_td_error_there_is_above_0(standing):
-    experiment, state = standing.name, standing.states[-1]
-    cost = experiment.task.stage_cost(state, standing.actions[-1])
-    value = ending(standing).worth * cost / (1 - paper.GAMMA)
+    assert found["moved"] < 0.05
+    assert 0 < found["worth"] < 1
+    assert found["phi_c"] > 0
+    cost = standing.name.task.stage_cost(standing.states[-1], standing.actions[-1])
+    value = found["worth"] * cost / (1 - paper.GAMMA)
     assert cost + paper.GAMMA * value - value > 0
-
-
-def test_of_a_run_that_arrives_nothing_is_said_but_of_its_td_error():
-    found = ending(frozen(paper.THETA_INIT[-1]))
-    assert np.isnan([found.moved, found.worth, found.phi_c]).all()
+    delta = np.r_[np.full(20, 3.0), 9.0, np.full(20, 4.0), np.nan]
+    arrived = replace(frozen(paper.THETA_INIT[-1]), episodes={"delta": delta})
+    np.testing.assert_array_equal([*ending(arrived).values()], [np.nan, np.nan, 3, 4, np.nan])
 
 
 def test_a_stand_is_the_end_of_a_rollout_and_agrees_with_the_summary(standing):
@@ -51,8 +45,8 @@ def test_a_stand_is_the_end_of_a_rollout_and_agrees_with_the_summary(standing):
     assert last.delta == 3
     assert not last.arrived
     np.testing.assert_array_equal(last.states, standing.states)
-    assert last.value / last.forever == pytest.approx(found.worth)
-    assert (last.moved, last.phi_c) == pytest.approx((found.moved, found.phi_c))
+    assert last.value / last.forever == pytest.approx(found["worth"])
+    assert (last.moved, last.phi_c) == pytest.approx((found["moved"], found["phi_c"]))
 
 
 def test_a_stretch_is_the_first_unbroken_part_in_which_the_robot_stands():

@@ -17,7 +17,7 @@ from matplotlib.ticker import PercentFormatter
 
 from nmpcrl import Vector
 from nmpcrl.analysis.gradient_td import Curvature
-from nmpcrl.analysis.statistics import Estimate, interquartile_mean, performance_profile
+from nmpcrl.analysis.statistics import Estimate, interquartile_mean
 from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import paper_claims, thresholds
 from nmpcrl.claims.evidence import Evidence, paths
@@ -291,8 +291,8 @@ def _counts(axis: Axes, runs: pd.DataFrame, column: str) -> None:
 def _profile(axis: Axes, saved: Vector, learner: str) -> None:
     """Share of runs that save at least as much."""
     thresholds = np.linspace(*PROFILED, 121)
-    reached = performance_profile(saved, thresholds)
-    axis.plot(thresholds, reached.share, label=learner, **LOOKS[learner].line)
+    reached = [np.mean(saved >= threshold) for threshold in thresholds]
+    axis.plot(thresholds, reached, label=learner, **LOOKS[learner].line)
 
 
 def _bar(axis: Axes, row: float, mine: pd.Series, reference: pd.Series) -> float:
