@@ -145,6 +145,8 @@ def _manifest(place: Path) -> dict[str, Any]:
 
 def _content(place: Path, name: str, suffix: str) -> bytes:
     """The bytes of a published file, if they are those that were written."""
+    if not (place / MANIFEST).exists():
+        raise Damaged(f"nothing is published in {place}; {_restore()}")
     path = place / f"{name}{suffix}"
     known = _manifest(place).get(name, {}).get("files", {})
     try:
