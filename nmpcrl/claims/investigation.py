@@ -377,9 +377,9 @@ def cheaper(ratio: pd.Series, unit: str = "layouts") -> Answer:
     return share(ratio < 1, unit, {"median ratio": float(ratio.median())})
 
 
-def above_zero(low: float, high: float) -> Outcome:
-    """Confirmed if an interval lies above 0, contradicted if below, else in part."""
-    return REPRODUCED if low > 0 else NOT if high < 0 else PARTLY
+def above(low: float, high: float, limit: float = 0.0) -> Outcome:
+    """Confirmed if an interval lies above a limit, contradicted if below, else in part."""
+    return REPRODUCED if low > limit else NOT if high < limit else PARTLY
 
 
 def means(table: pd.DataFrame, part: str, column: str = "cost") -> pd.DataFrame:

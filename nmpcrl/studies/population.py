@@ -34,6 +34,8 @@ from nmpcrl.claims.investigation import (
     Part,
     Question,
     Row,
+    above,
+    counted,
     share,
 )
 from nmpcrl.claims.own_claims import OWN_CLAIMS
@@ -403,8 +405,8 @@ def closing_gaps(layouts: pd.DataFrame, judged: pd.Series) -> Answer:
     """The answer of the measures of layouts, and of whether ES improves in each."""
     closes = layouts.loc[judged.index, PILOT] < CLOSES_BEFORE
     counts = {
-        "layouts fail where it closes": _count(~judged[closes]),
-        "layouts succeed elsewhere": _count(judged[~closes]),
+        "layouts fail where it closes": counted(~judged[closes]),
+        "layouts succeed elsewhere": counted(judged[~closes]),
     }
     outcomes = {read(*count) for count in counts.values()}
     worst = [one for one in (NOT, UNDECIDABLE) if one in outcomes]
@@ -416,8 +418,7 @@ def predictors(scores: pd.DataFrame) -> Answer:
     """The answer of `predictor_scores`."""
     ahead = [scores.ahead[name] for name in RIVALS]
     lows, highs = [one.low for one in ahead], [one.high for one in ahead]
-    outcome: Outcome = REPRODUCED if min(lows) > 0 else NOT if min(highs) < 0 else PARTLY
-    outcome = outcome if np.isfinite(lows).all() else UNDECIDABLE
+    outcome = above(min(lows), min(highs)) if np.isfinite(lows).all() else UNDECIDABLE
     numbers = {name: one.value for name, one in zip(RIVALS, ahead, strict=True)}
     beside = {"other measures surely behind": (sum(low > 0 for low in lows), len(lows))}
     return Answer(outcome, numbers=numbers, beside=beside)
@@ -458,10 +459,10 @@ def _gets_worse(away: pd.DataFrame) -> pd.Series:
 
 def caught(runs: pd.DataFrame, yes: Callable[[pd.DataFrame], pd.Series]) -> Answer:
     """The share of layouts in which all runs of ES that do not arrive say yes."""
-    away = _of(runs, "ES").query(f"distance > {ARRIVED}")
+    away = runs[(runs.learner == "ES") & (runs.distance > ARRIVED)]
     answers = yes(away)
-    count = _count(answers.groupby(away.layout).all())
-    return Answer(read(*count), {"layouts": count, "runs": _count(answers)})
+    count = counted(answers.groupby(away.layout).all())
+    return Answer(read(*count), {"layouts": count, "runs": counted(answers)})
 
 
 def at_the_gap(runs: pd.DataFrame, layouts: pd.DataFrame) -> pd.DataFrame:
@@ -478,7 +479,7 @@ def at_the_gap(runs: pd.DataFrame, layouts: pd.DataFrame) -> pd.DataFrame:
         (theta_c at which the gap does, `difficulty.OPEN` where there is none), gap (whether there
         is one) and closed (whether theta_c ended above the value at which it closes).
     """
-    es = _of(runs, "ES").reset_index(drop=True)
+    es = runs[runs.learner == "ES"].reset_index(drop=True)
     closes = layouts[PILOT][es.layout.map(name_of)].to_numpy()
     gap = closes < OPEN
     found = {"improves": improves(es), "away": es.distance > ARRIVED, "closes": closes, "gap": gap}
@@ -492,29 +493,26 @@ def improve_by_gap(ends: pd.DataFrame) -> dict[str, tuple[int, int]]:
         ends: of `at_the_gap`.
     """
     there = ends[ends.gap]
-    return {
-        "open": _count(there.improves[~there.closed]),
-        "closed": _count(there.improves[there.closed]),
-    }
+    ways = {"open": ~there.closed, "closed": there.closed}
+    return {way: counted(there.improves[some]) for way, some in ways.items()}
 
 
 def early_overshoot(runs: pd.DataFrame) -> Answer:
     """The answer of RDES's stopped runs in the reading per episode."""
-    rdes = _of(runs, "RDES").query("decay == 'episode'")
+    rdes = runs.query("learner == 'RDES' and decay == 'episode'")
     stopped = rdes[was_stopped(rdes)]
     early = stopped.steps_done < DEAD_BY * stopped.steps
     answers = {"layouts overshot": stopped.over > 0, "layouts early": early}
     counts = {
-        name: _count(yes.groupby(stopped.layout).mean() > MAJORITY) for name, yes in answers.items()
+        name: counted(yes.groupby(stopped.layout).mean() > MAJORITY)
+        for name, yes in answers.items()
     }
-    outcome = PARTLY
+    beside = {"runs stopped": (len(stopped), len(rdes))}
     if not len(stopped):
-        outcome = UNDECIDABLE
-    elif min(rate(*count).low for count in counts.values()) > MAJORITY:
-        outcome = REPRODUCED
-    elif min(rate(*count).high for count in counts.values()) < MAJORITY:
-        outcome = NOT
-    return Answer(outcome, counts, beside={"runs stopped": (len(stopped), len(rdes))})
+        return Answer(UNDECIDABLE, counts, beside=beside)
+    rates = [rate(*count) for count in counts.values()]
+    ends = min(one.low for one in rates), min(one.high for one in rates)
+    return Answer(above(*ends, MAJORITY), counts, beside=beside)
 
 
 def raised() -> pd.Series:
@@ -527,14 +525,6 @@ def raised() -> pd.Series:
 def cliff(raised: pd.Series) -> Answer:
     """The answer of `raised`."""
     return share(raised >= CLIFF_COST, numbers={"most": float(raised.max())})
-
-
-def _of(runs: pd.DataFrame, learner: str) -> pd.DataFrame:
-    return runs[runs.learner == learner]
-
-
-def _count(yes: pd.Series) -> tuple[int, int]:
-    return int(yes.sum()), len(yes)
 
 
 QUESTIONS: Sequence[Question] = (

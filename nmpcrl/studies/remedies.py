@@ -30,9 +30,19 @@ import pandas as pd
 from nmpcrl.analysis import suite
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
 from nmpcrl.analysis.suite import ENTRIES, EPOCH, Entry, judge, seed_of
-from nmpcrl.claims.investigation import Answer, Condition, Investigation, Part, Question, Row, share
+from nmpcrl.claims.investigation import (
+    Answer,
+    Condition,
+    Investigation,
+    Part,
+    Question,
+    Row,
+    above,
+    share,
+)
 from nmpcrl.claims.rule import MAJORITY
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
+from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.refusal import Refusal
 
 Setting: TypeAlias = tuple[Entry, Mapping[str, float]]  # an entry, and J_best of each layout
@@ -149,9 +159,7 @@ def _settings(_: pd.DataFrame) -> list[Entry]:
     return [one for entry in SETTINGS if SETTINGS[entry] for one in arms(entry).values()]
 
 
-_TUNED = tuple(f"T{i:02}" for i in range(1, 16))
-_JUDGED = tuple(f"J{i:03}" for i in range(1, 121))
-_NAMED = ("A", "B", "C", "D", "E", "F")
+_TUNED, _JUDGED, _NAMED = tuple(TUNE)[:15], tuple(JUDGE), tuple("ABCDEF")
 _NONE = dict.fromkeys(CONTROLS, 0)
 _SEARCH = {"CMA-ES": (ENTRIES["CMA-ES"], dict[str, float]())}
 PARTS: Mapping[str, Part] = {
@@ -319,9 +327,8 @@ def expectations(table: pd.DataFrame) -> dict[str, bool]:
         if budget in first
     }
     words = {one.entry: one.word for one in advice(table)}
-    never = {f"{one} is never advised": words[one] == NEVER for one in EXPECTED_NEVER
-             if one in words}  # fmt: skip
-    return said | never
+    known = words.keys() & {*EXPECTED_NEVER}
+    return said | {f"{one} is never advised": words[one] == NEVER for one in sorted(known)}
 
 
 # Questions.
@@ -392,7 +399,7 @@ def _difference(first: str, second: str) -> Callable[[pd.DataFrame], Answer]:
         if len(more) < 2:
             return Answer(UNDECIDABLE, {"layouts": (0, len(more))})
         found = gain(more)
-        outcome: Outcome = REPRODUCED if found.low > 0 else NOT if found.high < 0 else PARTLY
+        outcome = above(found.low, found.high)
         numbers = {"difference": found.value, "low": found.low, "high": found.high}
         beside = {"layouts with more": (int((more > 0).sum()), len(more))}
         said = NO_DIFFERENCE if outcome == PARTLY else ""

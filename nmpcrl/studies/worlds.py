@@ -26,7 +26,7 @@ from nmpcrl.claims.investigation import (
     Investigation,
     Part,
     Question,
-    above_zero,
+    above,
     cheaper,
     lower,
     share,
@@ -141,7 +141,7 @@ def _crowded(table: pd.DataFrame) -> Answer:
     rng = np.random.default_rng(0)
     drawn = [pairs[rng.integers(len(pairs), size=len(pairs))] for _ in range(RESAMPLES)]
     low, high = np.nanquantile([_correlation(one) for one in drawn], [0.025, 0.975])
-    outcome = above_zero(low, high)
+    outcome = above(low, high)
     numbers = {"correlation": _correlation(pairs), "low": float(low), "high": float(high)}
     beside = {"scenarios with any": (int((inside > 0).sum()), len(inside))}
     said = "no correlation shown" if outcome == PARTLY else ""
