@@ -85,7 +85,7 @@ class Tried:
         """CMA-ES from the best point until it has converged; Hansen (2016).
 
         Args:
-            spread: of the first rollouts, in `SCALE`s.
+            spread: of the first rollouts, in units of `SCALE`.
             seed: of the candidates.
             least: rollouts of a generation for which there must be room, 0 for all of them.
         """

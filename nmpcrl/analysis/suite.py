@@ -196,7 +196,7 @@ class Entry:
     """
 
     name: str
-    run: Callable[..., Any]  # (robot, **settings) -> theta or `Policy`
+    run: Callable[..., Any]  # (robot, settings by name) -> theta or `Policy`
     defaults: Mapping[str, float] = field(default_factory=dict)
     changed: Mapping[str, float] = field(default_factory=dict)  # settings that differ from these
 
@@ -240,7 +240,7 @@ def learned(
     Args:
         robot: where.
         learner: its name in the study.
-        change: (learner, robot, **settings) -> the learner that is trained.
+        change: (learner, robot, settings by name) -> the learner that is trained.
         settings: alpha, to which beta of GES and TDC keeps its ratio; `every`, the episodes
             between two rollouts that confirm and count; others for `change`.
 
@@ -508,7 +508,7 @@ def leaderboard(judged: "pd.DataFrame") -> "pd.DataFrame":
         Columns entry, places, solved (share of the places), gain (interquartile mean over places
         of the mean over seeds), episodes (most in any place), seconds (in all), clear (share of
         the places in which no state is in a moving obstacle) and over (the first place in which
-        the budget was exceeded, or ""); shares are `Estimate`s.
+        the budget was exceeded, or ""); each share is an `Estimate`.
     """
     import pandas as pd
 

@@ -39,7 +39,7 @@ def afford(
     experiments: Iterable[Experiment],
     *,
     sure: bool | None = None,
-    lift: str = f"{SURE}=1 in the environment",
+    lift: str = "NMPCRL_YES=1 in the environment",
 ) -> None:
     """Refuse runs that take more than `HOURS` together, and a run of more than `STEPS` steps.
 
