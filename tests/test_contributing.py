@@ -17,7 +17,7 @@ import pytest
 
 from nmpcrl.commands import main
 from nmpcrl.study import paper
-from nmpcrl.study.provenance import changed, sources
+from nmpcrl.study.lock import changed, sources
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text()

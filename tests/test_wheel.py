@@ -14,9 +14,9 @@ from driver.course import course
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPT = """
 import nmpcrl
-from nmpcrl.study import paper, provenance
+from nmpcrl.study import lock, paper
 
-assert provenance.locked()
+assert lock.locked()
 print(paper.nmpc().solve(paper.START, paper.THETA_INIT).solver, nmpcrl.__file__)
 """
 

@@ -19,7 +19,7 @@ from nmpcrl.bench.paired import IDLE
 from nmpcrl.bench.processes import PROCESSES, at_once, first_calls, time_learners_afresh, whole_runs
 from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
-from nmpcrl.study import limits, paper, provenance, store
+from nmpcrl.study import limits, lock, paper, provenance, store
 from nmpcrl.study.files import write_json
 from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import one_of
@@ -261,9 +261,7 @@ def path() -> Path:
 
 def depends_on() -> str:
     """A hash of all that the times depend on, but for what else the machine does."""
-    return provenance.hash_of(
-        [provenance.sources_hash(), provenance.room_hash("bench"), versions(), machine()]
-    )
+    return provenance.hash_of([lock.sources_hash(), lock.room_hash("bench"), versions(), machine()])
 
 
 def versions() -> dict[str, str | None]:

@@ -29,15 +29,8 @@ from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.study import published
 from nmpcrl.study.files import folder
 from nmpcrl.study.jobs import parallel
-from nmpcrl.study.provenance import (
-    EPOCHS,
-    hash_of,
-    installed,
-    is_accepted,
-    made_here,
-    sources_hash,
-    versions,
-)
+from nmpcrl.study.lock import is_accepted, sources_hash
+from nmpcrl.study.provenance import EPOCHS, hash_of, installed, made_here, versions
 from nmpcrl.study.published import Unpublishable
 from nmpcrl.study.refusal import Refusal
 

@@ -27,7 +27,7 @@ from nmpcrl.claims.paper_claims import judge_runs, judge_times
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.claims.wider_claims import judge_wider
-from nmpcrl.study import design, provenance
+from nmpcrl.study import design, lock, provenance
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.jobs import parallel
 from nmpcrl.study.limits import seconds_of
@@ -256,12 +256,12 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
         )
     for experiment, made in fresh.items():  # the next edit is compared with these
         summaries.keep(experiment, made)
-    return Relocked(provenance.relock(), len(exact), len(drawn) - len(exact))
+    return Relocked(lock.relock(), len(exact), len(drawn) - len(exact))
 
 
 def _stored_by_lock(e: Experiment) -> RunSummary | None:
     """The stored summary, if locked code made it on such a machine with such versions."""
     one, here = summaries.read(e), (fingerprint(), provenance.environment())
-    if one is None or one.facts.get("sources") not in provenance.locks():
+    if one is None or one.facts.get("sources") not in lock.locks():
         return None
     return one if (one.facts.get("machine"), one.facts.get("versions")) == here else None

@@ -39,7 +39,7 @@ def runs(name: str, sort: str, reverse: bool, as_json: bool) -> None:
       nmpcrl runs GES-A --sort cost
       nmpcrl runs "*-episode-seed0" --json
     """
-    from nmpcrl.study.provenance import is_accepted, warn_of_changes
+    from nmpcrl.study.lock import is_accepted, warn_of_changes
     from nmpcrl.study.store import folder, stored
 
     found = [(path, about) for path, about in stored().items() if begins(path, name)]

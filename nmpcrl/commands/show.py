@@ -35,7 +35,7 @@ def show(run: str, out: Path | None) -> None:
     from nmpcrl.study import DamagedRecords, Experiment, Records
     from nmpcrl.study.experiment import frozen_arm
     from nmpcrl.study.files import write_file
-    from nmpcrl.study.provenance import is_accepted, warn_of_changes
+    from nmpcrl.study.lock import is_accepted, warn_of_changes
     from nmpcrl.study.store import read
 
     records = Records.load(path)

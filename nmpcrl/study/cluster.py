@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from urllib.parse import urlsplit
 
-from nmpcrl.study.provenance import signature
+from nmpcrl.study.lock import signature
 from nmpcrl.study.refusal import Refusal
 
 

@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 
 from filelock import FileLock, Timeout
 
+from nmpcrl.study import lock
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.files import DamagedRecords, say, unwritable
 from nmpcrl.study.files import StoreError as StoreError
@@ -22,15 +23,9 @@ from nmpcrl.study.files import folder as folder
 from nmpcrl.study.geometry import short_name
 from nmpcrl.study.jobs import Failed, Failure, parallel
 from nmpcrl.study.limits import seconds_of
-from nmpcrl.study.provenance import (
-    before,
-    identity,
-    is_accepted,
-    key,
-    provenance,
-    signature,
-    warn_of_changes,
-)
+from nmpcrl.study.lock import is_accepted, signature, warn_of_changes
+from nmpcrl.study.machine import fingerprint
+from nmpcrl.study.provenance import before, environment, identity, key
 from nmpcrl.study.records import About, Facts, Records
 from nmpcrl.study.run import run
 from nmpcrl.study.setup import compile_ahead
@@ -265,9 +260,15 @@ def _seconds_of(named: Named) -> float:
 
 
 def train(named: Named, **options: Any) -> Records:
-    """A run with its provenance."""
+    """The records of a run; their facts name versions, machine, key and sources."""
     records = run(named, **options)
-    return replace(records, facts={**records.facts, **provenance(named)})
+    facts: Facts = records.facts | {
+        "versions": environment(),
+        "machine": fingerprint(),
+        "key": key(named),
+        "sources": lock.sources_hash(),
+    }
+    return replace(records, facts=facts)
 
 
 RUNS = Store(Records, train, key)

@@ -10,7 +10,7 @@ import pytest
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import RunSummary, summarise
-from nmpcrl.study import Experiment, fetch, provenance, run, store, sweep
+from nmpcrl.study import Experiment, fetch, lock, provenance, run, store, sweep
 from nmpcrl.study.jobs import Failed
 
 QUICK = Experiment("frozen", episodes=2, steps=3, evaluate_every=1)
@@ -64,7 +64,7 @@ def test_a_stored_summary_is_read_and_says_what_it_depends_on(folder, trained):
     assert_same_summary(RunSummary.load(path), found)
     assert found.facts["key"] == provenance.key(QUICK)
     assert found.facts["versions"] == provenance.environment()
-    assert found.facts["sources"] == provenance.sources_hash()
+    assert found.facts["sources"] == lock.sources_hash()
     assert store.stored() == {}  # the run itself is not kept
     assert_same_summary(here([QUICK, QUICK])[QUICK], found)
     assert_same_summary(summaries.read(QUICK), found)
@@ -75,9 +75,9 @@ def test_a_stored_summary_is_read_and_says_what_it_depends_on(folder, trained):
 def test_a_stored_run_is_summarised_and_trained_only_afresh(trained, monkeypatch):
     records = fetch(QUICK)
     assert trained == [QUICK]
-    then = provenance.sources_hash()
-    monkeypatch.setattr(provenance, "locked_hash", lambda: then)
-    monkeypatch.setattr(provenance, "sources_hash", lambda: "edited since")
+    then = lock.sources_hash()
+    monkeypatch.setattr(lock, "locked_hash", lambda: then)
+    monkeypatch.setattr(lock, "sources_hash", lambda: "edited since")
     found = here([QUICK])[QUICK]
     assert_same_summary(found, summarise(records))
     assert found.facts["seconds"] == records.facts["seconds"]
@@ -89,10 +89,10 @@ def test_a_stored_run_is_summarised_and_trained_only_afresh(trained, monkeypatch
 
 def test_a_summary_of_edited_code_is_made_again_when_the_edit_is_reverted(monkeypatch, trained):
     with monkeypatch.context() as edited:
-        edited.setattr(provenance, "sources_hash", lambda: "of an edit")
+        edited.setattr(lock, "sources_hash", lambda: "of an edit")
         here([QUICK])
     assert not summaries.is_stored(QUICK)
-    assert here([QUICK])[QUICK].facts["sources"] == provenance.sources_hash()
+    assert here([QUICK])[QUICK].facts["sources"] == lock.sources_hash()
     assert len(trained) == 2
 
 

@@ -66,7 +66,7 @@ def test_other_versions_or_another_machine_measure_again(counted, monkeypatch, c
 @pytest.mark.parametrize("what", ["sources_hash", "room_hash"])
 def test_another_source_measures_again(counted, monkeypatch, what):
     measured_here("short")
-    monkeypatch.setattr(suite.provenance, what, lambda *_: "other")
+    monkeypatch.setattr(suite.lock, what, lambda *_: "other")
     measured_here("short")
     assert counted == ["short", "short"]
 

@@ -24,7 +24,7 @@ from nmpcrl.claims.reproduce import (
     sample,
 )
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
-from nmpcrl.study import Experiment, design, provenance, sweep
+from nmpcrl.study import Experiment, design, lock, provenance, sweep
 from nmpcrl.study.machine import fingerprint
 
 HERE = {"machine": fingerprint(), "versions": provenance.environment()}
@@ -241,21 +241,21 @@ def test_a_sample_is_spread_over_parts_and_learners():
 
 
 @pytest.fixture
-def lock(tmp_path, monkeypatch):
+def locked(tmp_path, monkeypatch):
     """Runs and a lock of this test; the lock is of the code as it is."""
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    monkeypatch.setattr(provenance, "LOCK", tmp_path / "sources.lock.json")
+    monkeypatch.setattr(lock, "LOCK", tmp_path / "sources.lock.json")
 
     here = lambda train, runs, *_: [(e, train(e)) for e in runs]  # noqa: E731
     monkeypatch.setattr(reproduce, "parallel", here)  # in this process, which is patched
-    return provenance.relock()
+    return lock.relock()
 
 
 def edit(monkeypatch, times=1.0, code="edited"):
     """From here on the code is other code, whose runs have costs times a factor."""
     real = summaries.summarise
-    monkeypatch.setattr(provenance, "sources", lambda: {"learning/updates.py": code})
-    monkeypatch.setattr(provenance, "sources_hash", lambda: provenance.hash_of([code]))
+    monkeypatch.setattr(lock, "sources", lambda: {"learning/updates.py": code})
+    monkeypatch.setattr(lock, "sources_hash", lambda: provenance.hash_of([code]))
     monkeypatch.setattr(summaries, "summarise", lambda records: scaled(real(records), times))
 
 
@@ -264,11 +264,11 @@ def train_here():
         summaries.fetch_summaries(sample(KNOWN, 4), executor=executor, progress=False)
 
 
-def test_the_lock_is_written_where_no_bit_has_changed(lock, monkeypatch):
+def test_the_lock_is_written_where_no_bit_has_changed(locked, monkeypatch):
     train_here()
     edit(monkeypatch)
     assert relock(KNOWN, 4)[1:] == (0, 4)
-    assert json.loads(lock.read_text())["sources"] == {"learning/updates.py": "edited"}
+    assert json.loads(locked.read_text())["sources"] == {"learning/updates.py": "edited"}
     edit(monkeypatch, code="edited again")
     assert relock(KNOWN, 4)[1:] == (0, 4)  # runs of the first relock are compared with
 
@@ -280,8 +280,8 @@ def test_the_lock_is_written_where_no_bit_has_changed(lock, monkeypatch):
         (False, 1.0, "only 0 of 4 runs .* `nmpcrl verify --sample 4`"),
     ],
 )
-def test_otherwise_the_lock_stays(lock, monkeypatch, stored, times, refusal):
-    before = lock.read_text()
+def test_otherwise_the_lock_stays(locked, monkeypatch, stored, times, refusal):
+    before = locked.read_text()
     if stored:
         train_here()
     edit(monkeypatch, times)
@@ -289,4 +289,4 @@ def test_otherwise_the_lock_stays(lock, monkeypatch, stored, times, refusal):
         train_here()  # by code that is not locked
     with pytest.raises(CannotRelock, match=refusal):
         relock(KNOWN, 4)
-    assert lock.read_text() == before
+    assert locked.read_text() == before

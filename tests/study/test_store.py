@@ -27,6 +27,7 @@ from nmpcrl.study import (
     fetch,
     fetch_all,
     files,
+    lock,
     provenance,
     run,
     store,
@@ -72,7 +73,7 @@ def test_a_stored_run_is_read_and_says_what_it_depends_on(runs, no_run):
     facts = Records.load(path_of(QUICK)).facts
     assert facts == records.facts
     assert facts["key"] == provenance.key(QUICK)
-    assert facts["sources"] == provenance.sources_hash()
+    assert facts["sources"] == lock.sources_hash()
     assert facts["versions"] == provenance.environment()
     no_run()
     assert_same_numbers(fetch(QUICK), records)
@@ -102,7 +103,7 @@ def of_edited_code(monkeypatch) -> Records:
     """A stored run in which every step of learning was three times as large."""
     step = learners.semi_gradient_step
     with monkeypatch.context() as edited:
-        edited.setattr(provenance, "sources_hash", lambda: "of an edit")
+        edited.setattr(lock, "sources_hash", lambda: "of an edit")
         edited.setattr(
             learners, "semi_gradient_step", lambda theta, by, *rest: step(theta, 3 * by, *rest)
         )
@@ -121,20 +122,18 @@ def test_a_run_of_edited_code_is_trained_again_when_the_edit_is_reverted(monkeyp
 
 
 def test_a_run_of_code_that_the_lock_has_or_had_is_read(monkeypatch, no_run, tmp_path):
-    monkeypatch.setattr(provenance, "LOCK", tmp_path / "sources.lock.json")
+    monkeypatch.setattr(lock, "LOCK", tmp_path / "sources.lock.json")
     records = fetch(QUICK)
-    provenance.relock()
+    lock.relock()
     no_run()
     for edit in ("one", "another"):
-        monkeypatch.setattr(provenance, "sources", lambda edit=edit: {"run.py": edit})
-        monkeypatch.setattr(
-            provenance, "sources_hash", lambda edit=edit: provenance.hash_of([edit])
-        )
-        provenance.relock()
+        monkeypatch.setattr(lock, "sources", lambda edit=edit: {"run.py": edit})
+        monkeypatch.setattr(lock, "sources_hash", lambda edit=edit: provenance.hash_of([edit]))
+        lock.relock()
         assert_same_numbers(fetch(QUICK), records)
     monkeypatch.setitem(provenance.EPOCHS, "study", 2)
-    provenance.relock()
-    assert not provenance.is_accepted(records.facts["sources"])
+    lock.relock()
+    assert not lock.is_accepted(records.facts["sources"])
 
 
 def of_another(experiment: Experiment) -> Callable[[Path], object]:

@@ -51,7 +51,7 @@ def train(experiments: tuple[Any, ...], summaries: tuple[Any, ...]) -> None:
     from nmpcrl.analysis.summaries import fetch_summaries
     from nmpcrl.claims import published, reproduce
     from nmpcrl.study import Experiment
-    from nmpcrl.study.provenance import warn_of_changes
+    from nmpcrl.study.lock import warn_of_changes
     from nmpcrl.study.setup import compile_ahead
     from nmpcrl.study.store import fetch_all
 

@@ -1,0 +1,176 @@
+"""The hashes of the code on which numbers depend, and the lock that they are compared with.
+
+`sources.lock.json` has a hash of every file of `FILES`. Where a file differs from the lock, a test
+fails and every command that reads a run warns, until `nmpcrl verify --relock` has shown with fresh
+runs that no bit has changed, or an epoch of `provenance` is raised, so that all runs are trained
+anew.
+
+A stored run names the hash of the sources that made it. The run is read if this is the present
+hash, the one of the lock, or one of an earlier lock of the same epochs; other runs are trained
+again.
+"""
+
+import ast
+import hashlib
+import json
+import os
+import sys
+import threading
+from collections import Counter
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from nmpcrl.study.provenance import EPOCHS, hash_of, versions
+
+FILES = (  # whose code bears on numbers of runs, summaries and searches
+    *("control/**/*.py", "learning/**/*.py"),
+    *(f"study/{name}.py" for name in ("experiment", "geometry", "learners", "paper", "parameters")),
+    *(f"study/{name}.py" for name in ("records", "run", "setup", "trial")),
+    *(f"analysis/{name}.py" for name in ("imitation", "metrics", "rows", "search", "summary")),
+)
+OTHER_HOSTS = (  # of `FILES`, compiled for browsers and hosts where no stored run is made
+    *("control/browser.py", "control/codegen/browser/", "learning/browser.py"),
+    *("control/solvers/charge.py", "control/solvers/entries.py", "learning/rules.py"),
+)
+ROOT = Path(__file__).parent.parent
+LOCK = Path(__file__).with_name("sources.lock.json")
+WARNED = "NMPCRL_WARNED"  # set in the environment once the warning has been given
+PARSING = threading.Lock()  # Python 3.11 fails where two threads parse at once
+
+
+def signature() -> str:
+    """A hash of versions, epochs and sources: equal in processes that make the same numbers."""
+    return hash_of([versions(), EPOCHS, sources_hash()])
+
+
+def sources(root: Path = ROOT) -> dict[str, str]:
+    """The hash of each file of `FILES` that has code, by path."""
+    found = {path.relative_to(root).as_posix(): path for one in FILES for path in root.glob(one)}
+    with PARSING:
+        codes = {name: code(path.read_text("utf-8")) for name, path in sorted(found.items())}
+    return {
+        name: hashlib.sha256(text.encode()).hexdigest()
+        for name, text in codes.items()
+        if text and not name.startswith(OTHER_HOSTS)
+    }
+
+
+@cache
+def sources_hash() -> str:
+    """One hash of all `sources`; a moved file does not change it."""
+    return hash_of(sorted(sources().values()))
+
+
+def room_hash(room: str) -> str:
+    """One hash of the code of a package."""
+    return hash_of([code(path.read_text("utf-8")) for path in sorted((ROOT / room).rglob("*.py"))])
+
+
+def locked() -> dict[str, str]:
+    """The `sources` of the lock."""
+    return dict(_lock()["sources"])
+
+
+def locked_hash() -> str:
+    """The `sources_hash` of the lock."""
+    return hash_of(sorted(locked().values()))
+
+
+def locks() -> tuple[str, ...]:
+    """The hashes of the lock and of the earlier locks of these epochs."""
+    lock = _lock()
+    return (locked_hash(), *(lock["earlier"] if lock["epochs"] == EPOCHS else ()))
+
+
+def is_accepted(made: str | None) -> bool:
+    """Whether sources with this `sources_hash` make the present numbers; None for unstored runs."""
+    return made in (None, sources_hash(), *locks())
+
+
+def changed(now: Mapping[str, str], lock: Mapping[str, str]) -> list[str]:
+    """The files whose code is in one of two `sources` only, without moved files."""
+    new, old = Counter(now.values()), Counter(lock.values())
+    added = {path for path, found in now.items() if new[found] > old[found]}
+    return sorted(added | {path for path, found in lock.items() if old[found] > new[found]})
+
+
+def relock() -> Path:
+    """Write the lock; the old one becomes an earlier lock, unless an epoch was raised."""
+    same = LOCK.exists() and _lock()["epochs"] == EPOCHS
+    earlier = list(dict.fromkeys([*locks()[1:], locked_hash()])) if same else []
+    lock = {"epochs": EPOCHS, "earlier": earlier, "sources": sources()}
+    LOCK.write_text(json.dumps(lock, indent=1) + "\n", "utf-8")
+    return LOCK
+
+
+def _lock() -> dict[str, Any]:
+    return dict(json.loads(LOCK.read_text("utf-8")))
+
+
+@cache
+def warn_of_changes() -> None:
+    """Warn once, in this process and its children, that stored runs may be of other code."""
+    if os.environ.get(WARNED):
+        return
+    if files := changed(sources(), locked()):
+        os.environ[WARNED] = "1"
+        print(
+            f"{', '.join(files)}: changed since the stored runs were trained;"
+            " `nmpcrl verify --relock` shows whether the numbers stay the same; if not, raise the"
+            " epoch of the room in nmpcrl/study/provenance.py",
+            file=sys.stderr,
+        )
+
+
+def code(text: str) -> str:
+    """A module's syntax tree as text, without comments, docstrings and types of functions.
+
+    It has the imports that are used or that rename, with the last name of a module of this package,
+    so that a file can be moved. The text is the same on every version of Python.
+    """
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            node.returns = None
+        elif isinstance(node, ast.arg):
+            node.annotation = None
+    return "\n".join([*sorted(_imports(tree)), *map(_shape, filter(_counts, tree.body))])
+
+
+def _imports(tree: ast.AST) -> set[str]:
+    """The imported names that are used or renamed, each with its module."""
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            module = getattr(node, "module", None) or ""
+            place = module.rpartition(".")[2] if module.startswith("nmpcrl.") else module
+            for one in node.names:
+                name = one.asname or one.name.partition(".")[0]
+                if name in used or one.asname not in (None, one.name):
+                    found.add(f"from {place} import {one.name} as {name}")
+    return found
+
+
+def _counts(node: Any) -> bool:
+    """Whether a statement is more than an import, a docstring or the list of exports."""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return False
+    exports = isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__"
+    return not exports and not isinstance(node, ast.Import | ast.ImportFrom)
+
+
+def _shape(node: Any) -> str:
+    """`ast.dump`, but the same text on every version of Python."""
+    if isinstance(node, list):
+        return f"[{', '.join(_shape(one) for one in node if _counts(one))}]"
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    fields = (
+        f"{name}={_shape(value)}"
+        for name, value in ast.iter_fields(node)
+        if name not in ("ctx", "kind", "type_comment", "type_params") and value not in (None, [])
+    )
+    return f"{type(node).__name__}({', '.join(fields)})"

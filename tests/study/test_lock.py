@@ -1,0 +1,151 @@
+"""The hash of a file's code, the files in the lock, and the runs of earlier locks."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from nmpcrl.study import lock, provenance
+from nmpcrl.study.lock import changed, code, sources
+
+MODULE = '''"""A module."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from nmpcrl.study.paper import ALPHA as RATE
+from nmpcrl.study.records import final_cost
+
+__all__ = ["Rule", "step"]
+
+
+class Rule:
+    """A rule."""
+
+    rate: float = RATE  # of learning
+
+
+def step(theta: float, by: Callable[[float], float]) -> float:
+    """A step."""
+    return np.abs(theta) - Rule.rate * by(final_cost(theta))
+'''
+NUMBERS = [
+    ("= RATE", "= 2 * RATE"),
+    ("np.abs(theta)", "theta"),
+    ("Rule.rate * by", "by"),
+    ("import ALPHA", "import BETA"),
+    ("import final_cost", "import initial_cost as final_cost"),
+    ("import numpy as np", "import jax.numpy as np"),
+    ("nmpcrl.study.records", "nmpcrl.analysis.metrics"),
+    ("rate: float", "rate: int"),
+]
+NO_NUMBERS = [
+    ("A module", "Some module"),
+    ("A step.", "One step.\n\n    With a second paragraph.\n    "),
+    ("  # of learning", ""),
+    ("\n\n\ndef", "\n\n\n# A comment.\n\n\ndef"),
+    ("by: Callable[[float], float]", "by: Callable[..., float]"),
+    (") -> float:", ") -> object:"),
+    ("import Callable", "import Callable, Mapping"),
+    ("import numpy as np", "import math\n\nimport numpy as np"),
+    ('["Rule", "step"]', '["step"]'),
+    ("nmpcrl.study.records", "nmpcrl.study.below.records"),
+]
+
+
+@pytest.mark.parametrize(("before", "after"), [*NUMBERS, *NO_NUMBERS])
+def test_an_edit_is_noticed_where_it_can_change_a_number(before, after):
+    assert before in MODULE
+    edited = MODULE.replace(before, after, 1)
+    assert (code(edited) != code(MODULE)) == ((before, after) in NUMBERS)
+
+
+def test_a_package_that_passes_a_name_on_as_another_counts_and_one_that_does_not_is_empty():
+    assert code('"""A package."""\n\nfrom nmpcrl.study.run import run\n\n__all__ = ["run"]\n') == ""
+    assert code("from nmpcrl.study.run import run as train\n")
+
+
+def test_a_moved_file_is_not_changed_and_an_edited_one_is():
+    before = {"a.py": "1", "b.py": "2", "c.py": "2"}
+    assert changed({"a.py": "1", "b.py": "2", "d/c.py": "2"}, before) == []
+    assert changed({"a.py": "3", "b.py": "2", "c.py": "2"}, before) == ["a.py"]
+    assert changed({"d/a.py": "3", "b.py": "2", "c.py": "2"}, before) == ["a.py", "d/a.py"]
+    assert changed({"a.py": "1", "b.py": "2"}, before) == ["b.py", "c.py"]
+
+
+WITHOUT_NUMBERS = {  # files that a run imports and that store, lock, describe or start processes
+    *("study/jobs.py", "study/lock.py", "study/provenance.py", "study/store.py", "study/design.py"),
+    *("study/files.py", "study/limits.py", "study/machine.py", "study/refusal.py"),
+}
+IMPORTS = """
+import sys
+from pathlib import Path
+import nmpcrl
+from nmpcrl.analysis.search import Search, search
+from nmpcrl.analysis.rows import row
+from nmpcrl.analysis.summary import summarise
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.run import run
+
+for learner in ("ES", "RDES", "GES"):
+    row(summarise(run(Experiment(learner, episodes=1, steps=5, evaluate_every=1))))
+search(Search(budget=40))
+for module in list(sys.modules.values()):
+    if module.__name__.startswith("nmpcrl."):
+        print(Path(module.__file__).relative_to(Path(nmpcrl.__file__).parent).as_posix())
+"""
+
+
+def test_every_file_that_a_run_its_summary_and_a_search_import_is_in_the_lock():
+    """If a new file bears on no number: add it to `WITHOUT_NUMBERS`, else to `FILES`."""
+    made = subprocess.run(
+        [sys.executable, "-c", IMPORTS], capture_output=True, text=True, check=True
+    )
+    imported = {name for name in made.stdout.split() if code((lock.ROOT / name).read_text())}
+    listed = set(sources())
+    assert imported - listed - WITHOUT_NUMBERS == set()
+    assert {one for one in listed - imported if one.startswith(("study", "analysis"))} == set()
+    assert all(any(lock.ROOT.glob(one)) for one in lock.FILES)
+    assert all((lock.ROOT / one).exists() for one in lock.OTHER_HOSTS)
+
+
+def test_the_code_is_what_the_lock_has():
+    """If this fails: `nmpcrl verify --relock`, or raise the epoch of the room and relock."""
+    assert changed(sources(), lock.locked()) == []
+    assert json.loads(lock.LOCK.read_text())["epochs"] == provenance.EPOCHS
+
+
+@pytest.mark.parametrize("begins", ["07237effb4b1545a", "44134a116cb64ab0"])
+def test_runs_of_the_first_edition_are_read(begins):
+    """The last two source hashes of that edition."""
+    (made,) = (one for one in lock.locks() if one.startswith(begins))
+    assert lock.is_accepted(made)
+
+
+def test_an_earlier_lock_is_accepted_until_an_epoch_is_raised(tmp_path, monkeypatch):
+    monkeypatch.setattr(lock, "LOCK", tmp_path / "lock.json")
+    lock.relock()
+    made = lock.locked_hash()
+    for edit in ("first", "second"):
+        monkeypatch.setattr(lock, "sources", lambda edit=edit: {"run.py": edit})
+        monkeypatch.setattr(lock, "sources_hash", lambda edit=edit: provenance.hash_of([edit]))
+        assert lock.is_accepted(made)
+        lock.relock()
+    assert lock.is_accepted(made)
+    assert not lock.is_accepted(provenance.hash_of(["third"]))
+    monkeypatch.setitem(provenance.EPOCHS, "study", 2)
+    lock.relock()
+    assert not lock.is_accepted(made)
+
+
+def test_a_warning_names_the_changed_files_once(monkeypatch, capsys):
+    then = {**sources(), "learning/updates.py": "another"}
+    monkeypatch.setattr(lock, "locked", lambda: then)
+    monkeypatch.setenv(lock.WARNED, "")
+    for _ in range(2):
+        lock.warn_of_changes.__wrapped__()
+    said = capsys.readouterr().err
+    assert said.startswith("learning/updates.py: changed since the stored runs were trained")
+    assert said.count("\n") == 1
