@@ -247,11 +247,9 @@ QUESTIONS = (
         for i, agent in enumerate(AGENTS)
         for name, text, *expected, answer in _ASKED
     ),
-    Question(
-        "SAC or TD3",
-        "Does SAC cost less than TD3 with 300 episodes each?",
-        PARTLY, _one_or_other,
-    ),
+    Question("SAC or TD3",
+             "Does SAC cost less than TD3 with 300 episodes each?",
+             PARTLY, _one_or_other),
 )  # fmt: skip
 
 

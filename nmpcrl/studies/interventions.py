@@ -133,12 +133,10 @@ INTERVENTIONS = Investigation(
         for part in ("six", "drawn")
     },
     questions=(
-        Question(
-            "extrapolation",
-            "Does RDES survive if the network is asked with theta of the start of the episode, and"
-            " nothing else is changed?",
-            REPRODUCED, survival,
-        ),
+        Question("extrapolation",
+                 "Does RDES survive if the network is asked with theta of the start of the episode,"
+                 " and nothing else is changed?",
+                 REPRODUCED, survival),
     ),
     seed=lambda place, k: population.seed_of(place, k) if place in LAYOUTS else k,
     evidence=ends,

@@ -528,62 +528,44 @@ def cliff(raised: pd.Series) -> Answer:
 
 
 QUESTIONS: Sequence[Question] = (
-    Question(
-        "closing gaps",
-        "Does ES fail where the gap closes by then, and succeed where it does not?",
-        PARTLY, lambda drawn: closing_gaps(drawn.layouts, succeeds(drawn.main)),
-        "ES fails exactly where the first gap of the first trajectory closes at theta_c below"
-        f" {CLOSES_BEFORE}.",
-    ),
-    Question(
-        "predictors",
-        "Does the closing of the first gap tell better than each rival where ES succeeds?",
-        PARTLY, _predictors,
-    ),
-    Question(
-        "horizon",
-        "Does ES still fail with N = 20 and N = 40 where it fails with N = 10?",
-        REPRODUCED, lambda drawn: horizon(drawn.runs),
-        "The horizon was not too short.",
-    ),
-    Question(
-        "gaps and horizon",
-        "With theta_c raised and nothing learned, does the robot stop arriving at the same"
-        " theta_c for N = 10, 20 and 40?",
-        REPRODUCED, lambda drawn: gaps_and_horizon(drawn.stops),
-        "A gap closes at the same theta_c whatever the horizon.",
-    ),
-    Question(
-        "trap",
-        "Is that so where ES ends without having arrived?",
-        REPRODUCED, lambda drawn: caught(drawn.main, _stands),
-        "The robot stands, and the plan's value is below l / (1 - gamma): so delta > 0 and"
-        " theta_c grows.",
-    ),
-    Question(
-        "accurate and worse",
-        "Does |delta| fall while the noise-free cost rises?",
-        REPRODUCED, lambda drawn: caught(drawn.main, _gets_worse),
-        "In the trap the value gets more accurate while the policy gets worse.",
-    ),
-    Question(
-        "cliff",
-        f"Does theta_c raised by {CLIFF_RAISED:.0%} cost at least {CLIFF_COST:.0%}?",
-        PARTLY, lambda drawn: cliff(raised()),
-        "Beside the best theta, 1 to 2 % more theta_c costs 50 to 140 %.",
-    ),
-    Question(
-        "early overshoot",
-        "Is that so of RDES in the reading per episode with ES's alpha, and of no other?",
-        REPRODUCED, lambda drawn: early_overshoot(drawn.main),
-        "RDES overshoots early: most of its runs that are stopped have alpha ||phi||^2 > 2, and"
-        f" most are dead by episode {DEAD_BY}.",
-    ),
-    Question(
-        "whole picture",
-        "Is there a layout, reading and step size in which C1, C2, C5 and C9 hold together?",
-        NOT, lambda drawn: whole_picture(drawn.tried),
-    ),
+    Question("closing gaps",
+             "Does ES fail where the gap closes by then, and succeed where it does not?",
+             PARTLY, lambda drawn: closing_gaps(drawn.layouts, succeeds(drawn.main)),
+             "ES fails exactly where the first gap of the first trajectory closes at theta_c below"
+             f" {CLOSES_BEFORE}."),
+    Question("predictors",
+             "Does the closing of the first gap tell better than each rival where ES succeeds?",
+             PARTLY, _predictors),
+    Question("horizon",
+             "Does ES still fail with N = 20 and N = 40 where it fails with N = 10?",
+             REPRODUCED, lambda drawn: horizon(drawn.runs),
+             "The horizon was not too short."),
+    Question("gaps and horizon",
+             "With theta_c raised and nothing learned, does the robot stop arriving at the same"
+             " theta_c for N = 10, 20 and 40?",
+             REPRODUCED, lambda drawn: gaps_and_horizon(drawn.stops),
+             "A gap closes at the same theta_c whatever the horizon."),
+    Question("trap",
+             "Is that so where ES ends without having arrived?",
+             REPRODUCED, lambda drawn: caught(drawn.main, _stands),
+             "The robot stands, and the plan's value is below l / (1 - gamma): so delta > 0 and"
+             " theta_c grows."),
+    Question("accurate and worse",
+             "Does |delta| fall while the noise-free cost rises?",
+             REPRODUCED, lambda drawn: caught(drawn.main, _gets_worse),
+             "In the trap the value gets more accurate while the policy gets worse."),
+    Question("cliff",
+             f"Does theta_c raised by {CLIFF_RAISED:.0%} cost at least {CLIFF_COST:.0%}?",
+             PARTLY, lambda drawn: cliff(raised()),
+             "Beside the best theta, 1 to 2 % more theta_c costs 50 to 140 %."),
+    Question("early overshoot",
+             "Is that so of RDES in the reading per episode with ES's alpha, and of no other?",
+             REPRODUCED, lambda drawn: early_overshoot(drawn.main),
+             "RDES overshoots early: most of its runs that are stopped have alpha ||phi||^2 > 2,"
+             f" and most are dead by episode {DEAD_BY}."),
+    Question("whole picture",
+             "Is there a layout, reading and step size in which C1, C2, C5 and C9 hold together?",
+             NOT, lambda drawn: whole_picture(drawn.tried)),
 )  # fmt: skip
 
 POPULATION = Investigation(

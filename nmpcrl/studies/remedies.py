@@ -408,57 +408,41 @@ def _difference(first: str, second: str) -> Callable[[pd.DataFrame], Answer]:
     return answer
 
 
+_SEARCH_BEFORE = (
+    "CMA-ES with 300 rollouts has 0.98, 1.0, 0.99, 0.99, 0.71 and 0.38 of the possible gain in"
+)
 QUESTIONS = (
-    Question(
-        "search and learning",
-        "Has CMA-ES more of the possible gain than ES with 300 episodes each?",
-        REPRODUCED, _search_and_learning,
-        "CMA-ES with 300 rollouts has 0.98, 1.0, 0.99, 0.99, 0.71 and 0.38 of the possible gain in"
-        " A to F, where ES has 0.53, 0.47, 0.72 and 0.45 and fails.",
-    ),
-    Question(
-        "search nears the best",
-        "Has CMA-ES at least 0.9 of the possible gain with 300 rollouts?",
-        PARTLY, _nears,
-        "CMA-ES with 300 rollouts has 0.98, 1.0, 0.99, 0.99, 0.71 and 0.38 of the possible gain in"
-        " A to F.",
-    ),
+    Question("search and learning",
+             "Has CMA-ES more of the possible gain than ES with 300 episodes each?",
+             REPRODUCED, _search_and_learning,
+             f"{_SEARCH_BEFORE} A to F, where ES has 0.53, 0.47, 0.72 and 0.45 and fails."),
+    Question("search nears the best",
+             "Has CMA-ES at least 0.9 of the possible gain with 300 rollouts?",
+             PARTLY, _nears, f"{_SEARCH_BEFORE} A to F."),
     *(
         Question(f"undone steps on the {what} gain", f"Does {entry} gain?", REPRODUCED,
                  _gains(entry), "Gauss-Newton with undo gained in 18 of 18.")
         for what, entry in (("loop's cost", "undone-GN-J"), ("TD error", "undone-LSTD-Q"))
     ),
-    Question(
-        "one number by hand",
-        "Does the grid over theta_c cost less than GES with 300 episodes?",
-        REPRODUCED, _by_hand,
-        "theta_c by hand does better than GES wherever the robot still arrives.",
-    ),
-    Question(
-        "faster auxiliary weights",
-        "Has GES with beta = 3 alpha and a normalised step more of the gain than GES?",
-        PARTLY, _difference("GES-3", "GES"),
-    ),
-    Question(
-        "guard",
-        "Does RDES with the guard solve the layout where RDES with that step size does not?",
-        REPRODUCED, _guard, "The guard stops the overshoot.",
-    ),
-    Question(
-        "lengths or directions",
-        "Has RDES with the guard more of the gain than its lengths in ES's direction?",
-        NOT, _difference("guarded-RDES", "control-RDES"),
-    ),
-    Question(
-        "averaging",
-        "Has the averaged theta of ES more of the gain than its last theta?",
-        NOT, _difference("averaged-ES", "ES"),
-    ),
-    Question(
-        "undo",
-        "Has ES with undo more of the gain than ES with as much interaction?",
-        PARTLY, _difference("undone-ES", "ES"),
-    ),
+    Question("one number by hand",
+             "Does the grid over theta_c cost less than GES with 300 episodes?",
+             REPRODUCED, _by_hand,
+             "theta_c by hand does better than GES wherever the robot still arrives."),
+    Question("faster auxiliary weights",
+             "Has GES with beta = 3 alpha and a normalised step more of the gain than GES?",
+             PARTLY, _difference("GES-3", "GES")),
+    Question("guard",
+             "Does RDES with the guard solve the layout where RDES with that step size does not?",
+             REPRODUCED, _guard, "The guard stops the overshoot."),
+    Question("lengths or directions",
+             "Has RDES with the guard more of the gain than its lengths in ES's direction?",
+             NOT, _difference("guarded-RDES", "control-RDES")),
+    Question("averaging",
+             "Has the averaged theta of ES more of the gain than its last theta?",
+             NOT, _difference("averaged-ES", "ES")),
+    Question("undo",
+             "Has ES with undo more of the gain than ES with as much interaction?",
+             PARTLY, _difference("undone-ES", "ES")),
 )  # fmt: skip
 
 REMEDIES = Investigation(

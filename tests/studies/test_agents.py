@@ -49,63 +49,55 @@ def suite(share=0.95, layouts=(*JUDGE,), part="judge 50"):
     )  # fmt: skip
 
 
-def by(table, compared=NOTHING):
-    return answers(table, compared)
+def every_other(table):
+    """The same runs, every second of which costs 1.3 times as much as theta_init at the end."""
+    ends = [each[-1] if i % 2 else [130.0] for i, each in enumerate(table.costs)]
+    costs = [[*each[:-1], end] for each, end in zip(table.costs, ends, strict=True)]
+    return table.assign(costs=costs)
 
 
-def test_of_nothing_nothing_can_be_decided():
-    found = by(pd.DataFrame(columns=COLUMNS))
+def test_without_runs_no_question_is_decided():
+    found = answers(pd.DataFrame(columns=COLUMNS), NOTHING)
     assert [*found] == [*SAC_AND_TD3.asked]
     assert {one.outcome for one in found.values()} == {UNDECIDABLE}
 
 
-def test_an_agent_matches_where_it_costs_no_more_and_solves_where_it_also_arrives():
-    found = by(
-        pd.concat([runs("judge", "SAC", 1.0, there="-"), runs("judge", "TD3", 0.9)]), suite()
-    )
-    assert found["SAC matches in 300 episodes"].outcome == REPRODUCED
-    assert found["SAC solves in 300 episodes"].outcome == NOT
-    assert found["TD3 solves in 300 episodes"].outcome == REPRODUCED
-    assert found["SAC or TD3"].outcome == NOT
-    assert found["SAC or the best search"].outcome == NOT
-    assert found["TD3 or the best search"].outcome == REPRODUCED
-    assert found["TD3 or the best search"].numbers["median ratio"] == pytest.approx(0.9 / 0.95)
+@pytest.mark.parametrize(
+    ("table", "compared", "expected"),
+    [
+        (pd.concat([runs("judge", "SAC", 1.0, there="-"), runs("judge", "TD3", 0.9)]), suite(),
+         {"SAC matches in 300 episodes": (REPRODUCED, 6, 6),
+          "SAC solves in 300 episodes": (NOT, 0, 6),
+          "TD3 solves in 300 episodes": (REPRODUCED, 6, 6),
+          "SAC or TD3": (NOT, 0, 6),
+          "SAC or the best search": (NOT, 0, 6),
+          "TD3 or the best search": (REPRODUCED, 6, 6)}),
+        (every_other(runs("judge", "SAC", 0.9)), NOTHING,
+         {"SAC matches in 300 episodes": (PARTLY, 3, 6)}),
+        (runs("one", "TD3", 0.9), suite(0.8, ["A"], "named 50"),
+         {"TD3 matches in one layout": (REPRODUCED, 4, 4),
+          "TD3 or the best search in one layout": (NOT, 0, 4),
+          "SAC matches in one layout": (UNDECIDABLE, 0, 0)}),
+        (runs("all", "SAC", 1.1, seen=0.9), suite(),
+         {"SAC matches over the 60": (REPRODUCED, 60, 60),
+          "SAC matches on the 120": (NOT, 0, 120),
+          "SAC or the best search on the 120": (NOT, 0, 120)}),
+    ],
+)  # fmt: skip
+def test_answers_follow_from_costs_and_arrivals(table, compared, expected):
+    found = answers(table, compared)
+    said = {name: (found[name].outcome, *found[name].counts.values()) for name in expected}
+    assert said == {name: (outcome, (yes, of)) for name, (outcome, yes, of) in expected.items()}
 
 
-def test_in_one_layout_it_is_said_after_how_many_episodes_the_median_matches():
+def test_an_answer_has_the_median_ratio_and_the_episodes_after_which_the_median_matches():
+    ratio = answers(runs("judge", "TD3", 0.9), suite())["TD3 or the best search"].numbers
+    assert ratio["median ratio"] == pytest.approx(0.9 / 0.95)
     table = runs("one", "TD3", 0.9)
-    found = by(table, suite(0.8, ["A"], "named 50"))
-    said = found["TD3 matches in one layout"]
-    assert said.outcome == REPRODUCED
-    assert said.counts == {"seeds": (4, 4)}
-    assert said.numbers["matches first"] == said.numbers["matches from"] == 500
-    assert found["TD3 or the best search in one layout"].outcome == NOT
-    assert found["SAC matches in one layout"].outcome == UNDECIDABLE
-
-
-def test_a_match_that_does_not_last_is_no_match_from_then_on():
-    table = runs("one", "TD3", 0.9)
+    one = answers(table, NOTHING)["TD3 matches in one layout"].numbers
+    assert one["matches first"] == one["matches from"] == 500
     table["costs"] = [[[90.0], *each[1:-1], [101.0]] for each in table.costs]
-    one = course(table, "one", "TD3")
-    assert one.matched == (25, np.inf)
-
-
-def test_one_agent_for_all_is_judged_in_what_it_saw_and_in_what_it_did_not():
-    found = by(runs("all", "SAC", 1.1, seen=0.9), suite())
-    assert found["SAC matches over the 60"].outcome == REPRODUCED
-    assert found["SAC matches over the 60"].counts == {"layouts": (60, 60)}
-    assert found["SAC matches on the 120"].outcome == NOT
-    assert found["SAC matches on the 120"].counts == {"layouts": (0, 120)}
-    assert found["SAC or the best search on the 120"].counts == {"layouts": (0, 120)}
-    assert np.isinf(found["SAC matches on the 120"].numbers["matches first"])
-
-
-def test_between_all_and_none_a_question_is_answered_in_part():
-    table = runs("judge", "SAC", 0.9)
-    table["costs"] = [
-        each if i % 2 else [*each[:-1], [130.0]] for i, each in enumerate(table.costs)
-    ]
-    assert by(table)["SAC matches in 300 episodes"].outcome == PARTLY
+    assert course(table, "one", "TD3").matched == (25, np.inf)
 
 
 def test_an_agent_has_a_row_of_the_suite_by_the_share_of_the_possible_gain():
