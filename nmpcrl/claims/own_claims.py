@@ -143,5 +143,5 @@ OWN_CLAIMS: dict[str, RunClaim] = {
 
 
 def judge_own(runs: pd.DataFrame) -> tuple[Verdict, ...]:
-    """The verdicts on our own claims, in order; `runs` as for `paper_claims.judge`."""
+    """The verdicts on our own claims, in order; `runs` as for `paper_claims.judge_runs`."""
     return tuple(claim.judge(Observations(runs)) for claim in OWN_CLAIMS.values())

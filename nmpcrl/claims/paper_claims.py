@@ -3,7 +3,7 @@
 The borders are in `thresholds`, and the rule by which answers become a verdict is in `rule`.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -37,7 +37,7 @@ from nmpcrl.claims.thresholds import (
     was_stopped,
 )
 from nmpcrl.claims.timing import TimeClaim
-from nmpcrl.claims.verdict import NOT, REPRODUCED, Assumption, Verdict
+from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
 from nmpcrl.study.experiment import PAPER
 from nmpcrl.study.layouts import ARRIVED
 
@@ -363,34 +363,20 @@ BY_RUNS = {name: claim for name, claim in CLAIMS.items() if isinstance(claim, Ru
 BY_TIME = {name: claim for name, claim in CLAIMS.items() if isinstance(claim, TimeClaim)}
 
 
-def judge(
-    runs: pd.DataFrame,
-    *,
-    paths: Paths,
-    timings: pd.DataFrame,
-    assumptions: Iterable[Assumption],
-) -> tuple[Verdict, ...]:
-    """Every claim of the paper, in order.
-
-    Args:
-        runs: of `rows.table`, all of one setting; a missing learner leaves its claims undecided.
-        paths: states of the last rollout without noise; only those of RDES and GES are read.
-        timings: of `time_learners`; what is not in it is not decided.
-        assumptions: of `audit`.
-
-    Raises:
-        ValueError: the runs are of several settings.
-    """
-    observed = Observations(runs, paths, timings, tuple(assumptions))
-    return tuple(claim.judge(observed) for claim in CLAIMS.values())
-
-
 def judge_times(timings: pd.DataFrame) -> tuple[Verdict, ...]:
-    """The claims that times alone decide, as `judge` has them."""
+    """The verdicts on the claims about times."""
     return tuple(claim.judge(Observations(timings=timings)) for claim in BY_TIME.values())
 
 
 def judge_runs(runs: pd.DataFrame, paths: Paths) -> tuple[Verdict, ...]:
-    """The claims that the runs alone decide, as `judge` has them."""
+    """The verdicts on the claims about runs, in order.
+
+    Args:
+        runs: of `rows.table`, all of one setting; a missing learner leaves its claims undecided.
+        paths: states of the last rollout without noise, of RDES and GES.
+
+    Raises:
+        ValueError: the runs are of several settings.
+    """
     observed = Observations(runs, paths)
     return tuple(claim.judge(observed) for claim in BY_RUNS.values())

@@ -24,8 +24,6 @@ from nmpcrl.analysis import search
 from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, cost_ratios, experiment_of, row
 from nmpcrl.analysis.search import Found, Search
 from nmpcrl.analysis.summary import Outline, RunSummary
-from nmpcrl.bench.learners import ratio
-from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import assumptions, thetas
 from nmpcrl.claims.assumptions import Measured
 from nmpcrl.claims.failure_modes import FAILURE_MODE, failure_mode, failure_modes, went_wrong
@@ -76,7 +74,7 @@ class Published:
 
     @property
     def paths(self) -> dict[Experiment, Column]:
-        """States of each run's last rollout, as `paper_claims.judge` takes them."""
+        """States of each run's last rollout, as `paper_claims.judge_runs` takes them."""
         return {e: one.states for e, one in self.summaries.items()}
 
     @property
@@ -114,10 +112,6 @@ class Published:
     @cached_property
     def _added(self) -> Observations:
         return Observations(self.table[self.table.variant.isin(thetas.FOLLOWED)])
-
-    def ratio(self, solver: str, learner: str) -> Ratio:
-        """Time of a learner's step over that of one of ES, as `bench.learners.ratio` has it."""
-        return ratio(self.timings, solver, learner)
 
 
 def load() -> Published:

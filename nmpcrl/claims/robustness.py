@@ -32,7 +32,7 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
     Args:
         runs: of `rows.table`, with a column `variant`.
-        paths: as `judge` takes them.
+        paths: as `judge_runs` takes them.
 
     Returns:
         `COLUMNS` after `departure`, a letter of `DEPARTURES` or "".
@@ -96,7 +96,7 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
     Args:
         runs: of `rows.table`, with a column `variant`.
-        paths: as `judge` takes them, of the variants and of the main table.
+        paths: as `judge_runs` takes them, of the variants and of the main table.
 
     Returns:
         `COLUMNS`, one row a variant and claim, in order.

@@ -5,8 +5,9 @@ from typing import Any
 
 import pandas as pd
 
+from nmpcrl.claims import prespecified
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
-from nmpcrl.claims.prespecified import SINCE, Fixed
+from nmpcrl.claims.prespecified import Fixed
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.reproduce import Agreement
 from nmpcrl.claims.robustness import PARTS
@@ -132,7 +133,8 @@ def fixed(found: Fixed | None) -> str:
 def decided_since() -> str:
     """One item a definition that came after the thresholds: when, what, and what it moved."""
     return "\n".join(
-        f"- `{one.commit}` ({one.date} UTC, {one.when}): {one.what} {one.moved}" for one in SINCE
+        f"- `{one.commit}` ({one.date} UTC, {one.when}): {one.what} {one.moved}"
+        for one in prespecified.decided_since().itertuples()
     )
 
 

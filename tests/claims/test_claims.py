@@ -544,9 +544,8 @@ def test_every_claim_names_question_measure_and_border(claim):
 
 def test_all_claims_are_judged_in_order():
     runs = study()
-    made = [Assumption("a finite MDP", "it is not", holds=False)]
-    judged = paper_claims.judge(runs, paths=paths(runs), timings=timings(), assumptions=made)
-    assert [v.claim for v in judged] == [f"C{i}" for i in range(1, 10)] == list(CLAIMS)
+    assert list(CLAIMS) == [f"C{i}" for i in range(1, 10)]
+    assert [v.claim for v in paper_claims.judge_runs(runs, paths(runs))] == list(BY_RUNS)
     assert [v.claim for v in own_claims.judge_own(runs)] == list(own_claims.OWN_CLAIMS)
     assert [v.claim for v in paper_claims.judge_times(timings())] == ["C3", "C4"]
 

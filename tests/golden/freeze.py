@@ -21,6 +21,7 @@ from plain_values import array, plain, plain_name, processor, short, table
 from nmpcrl.analysis.statistics import interquartile_mean
 from nmpcrl.analysis.suite import seed_of
 from nmpcrl.bench import problem_times, sweep
+from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import (
     evidence,
     finding,
@@ -228,7 +229,9 @@ def searches() -> Any:
 @entry("study")
 def ratios_of_times() -> Any:
     pairs = study().timings[["solver", "learner"]].itertuples(index=False, name=None)
-    return {f"{learner}, {solver}": study().ratio(solver, learner) for solver, learner in pairs}
+    return {
+        f"{learner}, {solver}": ratio(study().timings, solver, learner) for solver, learner in pairs
+    }
 
 
 @entry("study")
