@@ -6,7 +6,7 @@ is nan, and then the answer is missing, too.
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -56,10 +56,8 @@ class RunClaim(Claim):
 
     def judge(self, observed: Observations) -> Verdict:
         """The verdict, by the rule of `rule`, with further numbers."""
-        verdict, names = self.settled(observed), self.learners
-        if not self.numbers:
-            return verdict
-        return replace(verdict, numbers=self.numbers(observed.runs, observed.paths, names))
+        further = self.numbers and self.numbers(observed.runs, observed.paths, self.learners)
+        return replace(self.settled(observed), numbers=further or {})
 
     def settled(self, observed: Observations) -> Verdict:
         """The verdict with its counts, without the further numbers, which take longer."""
@@ -85,17 +83,15 @@ class RunClaim(Claim):
         for border in borders:
             answers = self.answers(values, border)
             if len(answers):
-                yes, of = int(answers.sum()), len(answers)
-                share = rate(yes, of)
-                rows.append((border, share.value, share.low, share.high, read(yes, of)))
+                count = int(answers.sum()), len(answers)
+                rows.append((border, *astuple(rate(*count)), read(*count)))
         names = ["border", "share", "low", "high"]
         return pd.DataFrame(rows, columns=[*names, "outcome"]).astype(dict.fromkeys(names, float))
 
     def steady(self, values: Values) -> bool:
         """Whether the outcome is the same with a border half and twice as far from `nothing`."""
         around = self.nothing + (self.threshold - self.nothing) * np.array([0.5, 1.0, 2.0])
-        result: bool = self.at_borders(values, around).outcome.nunique() <= 1
-        return result
+        return bool(self.at_borders(values, around).outcome.nunique() <= 1)
 
     def _of_each(self, number: Number, runs: pd.DataFrame) -> Values:
         found = arms(runs, *self.learners, among=self.among)
@@ -108,8 +104,7 @@ class AtMost(RunClaim):
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """See `RunClaim.yes`."""
-        numbers = _long(values)
-        return _known(numbers <= border, numbers)
+        return _known((numbers := _long(values)) <= border, numbers)
 
 
 class AtLeast(RunClaim):
@@ -117,8 +112,7 @@ class AtLeast(RunClaim):
 
     def yes(self, values: Values, border: float) -> pd.Series:
         """See `RunClaim.yes`."""
-        numbers = _long(values)
-        return _known(numbers >= border, numbers)
+        return _known((numbers := _long(values)) >= border, numbers)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -37,7 +37,7 @@ CUT_SHORT = 0.5
 
 
 class Mechanism(StrEnum):
-    """Why the cost of a run rose, in the order in which the reasons are looked for."""
+    """Why the cost of a run rose, in the order of the search."""
 
     STEP = "overshoot"
     NETWORK = "network"
@@ -66,8 +66,8 @@ class Failure(StrEnum):
 
 MECHANISMS, ENDINGS = tuple(Mechanism), tuple(Ending)
 WELL = "went well"  # in the place of a mechanism
-FAILURE_MODE = ["ending", "wrong", "mechanism", "episode"]
 NONE = {"ending": "", "wrong": "", "mechanism": "", "episode": pd.NA}  # of a frozen arm
+FAILURE_MODE = [*NONE]
 
 
 def failure_modes(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
@@ -94,11 +94,11 @@ def failure_modes(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
 
 
 def failure_mode(run: RunSummary, wrong: Failure | None, first_rollout: Column) -> dict[str, Any]:
-    """The failure mode of one run: `FAILURE_MODE` by name.
+    """The failure mode of a run that learned: `FAILURE_MODE` by name.
 
     Args:
-        run: one that learned.
-        wrong: where it went wrong.
+        run: its summary.
+        wrong: where it went wrong, if it did.
         first_rollout: states of theta_init's rollout without noise, shape (K + 1, n).
     """
     task = run.name.task
@@ -132,30 +132,19 @@ def rise(run: RunSummary) -> slice:
 
 
 def mechanism(run: RunSummary, task: Task, first_rollout: Column) -> Mechanism:
-    """The mechanism by which the cost of a run rose.
-
-    Args:
-        run: one that went wrong.
-        task: of its training.
-        first_rollout: states of theta_init's rollout without noise, shape (K + 1, n).
-    """
+    """The mechanism by which the cost of a run rose; arguments as for `failure_mode`."""
     window = rise(run)
     signs = {
-        Mechanism.STEP: overshot(run, window),
-        Mechanism.NETWORK: over_predicted(run, window),
-        Mechanism.GAP: gap_closed(run, window, task, first_rollout),
-        Mechanism.SOLVER: cut_short(run, window),
+        Mechanism.STEP: (run.episodes["alpha_phi2"][window] > OVERSHOOT).any(),
+        Mechanism.NETWORK: _over_predicted(run, window),
+        Mechanism.GAP: _gap_closed(run, window, task, first_rollout),
+        Mechanism.SOLVER: _cut_short(run, window),
         Mechanism.OTHER: True,
     }
     return next(name for name in Mechanism if signs[name])
 
 
-def overshot(run: RunSummary, window: slice) -> bool:
-    """Whether a step moved theta so far that the TD error grew: see `OVERSHOOT`."""
-    return bool((run.episodes["alpha_phi2"][window] > OVERSHOOT).any())
-
-
-def over_predicted(run: RunSummary, window: slice) -> bool:
+def _over_predicted(run: RunSummary, window: slice) -> bool:
     """Whether the network predicted too much: see `OVER_PREDICTED`; False without a network."""
     bias, delta = run.episodes["bias"][window], run.episodes["delta"][window]
     known = np.isfinite(bias) & np.isfinite(delta)
@@ -163,7 +152,7 @@ def over_predicted(run: RunSummary, window: slice) -> bool:
     return bool(share >= OVER_PREDICTED)
 
 
-def gap_closed(run: RunSummary, window: slice, task: Task, first_rollout: Column) -> bool:
+def _gap_closed(run: RunSummary, window: slice, task: Task, first_rollout: Column) -> bool:
     """Whether theta_c grew until no plan fits through a gap that the first rollout went through."""
     start = run.experiment["theta"][-1]
     reached = np.fmax.reduce(run.episodes["theta"][window, -1], initial=start)
@@ -171,7 +160,7 @@ def gap_closed(run: RunSummary, window: slice, task: Task, first_rollout: Column
     return any(width > 0 >= after[sides] for sides, width in before.items())
 
 
-def cut_short(run: RunSummary, window: slice) -> bool:
+def _cut_short(run: RunSummary, window: slice) -> bool:
     """Whether solves failed: see `CUT_SHORT`."""
     judged = run.evaluations["episode"] == window.stop
     failed = np.isinf(run.evaluations["cost"][judged]).any()

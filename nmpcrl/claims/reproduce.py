@@ -25,7 +25,7 @@ from nmpcrl.claims import rule
 from nmpcrl.claims.own_claims import judge_own
 from nmpcrl.claims.paper_claims import judge_runs, judge_times
 from nmpcrl.claims.published import Published
-from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
+from nmpcrl.claims.verdict import Verdict, differ
 from nmpcrl.claims.wider_claims import judge_wider
 from nmpcrl.study import design, lock, provenance
 from nmpcrl.study.experiment import Experiment
@@ -65,7 +65,7 @@ def comparable(runs: Iterable[Experiment], published: Published) -> set[Experime
         for part in batch.get("runs", {})
         if all(batch.get(name) == value for name, value in here.items())
     }
-    found = {e for e in runs if e in published.rows and published.variants[e] in parts}
+    found = [e for e in runs if published.variants.get(e) in parts]
     return {e for e in found if published.rows[e]["key"] == provenance.summary_key(e)}
 
 
@@ -108,23 +108,23 @@ def _widened(values: pd.Series, slack: float) -> tuple[float, float]:
 
 
 def contradictions(found: Iterable[Verdict], known: Iterable[Verdict]) -> Pairs:
-    """The pairs of verdicts on one claim that cannot both be right."""
-    there = {verdict.claim: verdict for verdict in known}
-    pairs = [(one, there[one.claim]) for one in found if one.claim in there]
-    return tuple(pair for pair in pairs if _contradict(*pair))
-
-
-def _contradict(one: Verdict, other: Verdict) -> bool:
-    """Whether two decided outcomes differ by more than chance.
+    """The pairs of verdicts on one claim whose outcomes differ by more than chance.
 
     Of two samples from one source, fewer than one pair in a hundred has intervals of 95 % that do
     not overlap. A verdict without an interval rests on no sample.
     """
-    if UNDECIDABLE in (one.outcome, other.outcome) or one.outcome == other.outcome:
-        return False
-    if one.interval is None or other.interval is None:
-        return True
-    return one.interval[1] < other.interval[0] or other.interval[1] < one.interval[0]
+    there = {verdict.claim: verdict for verdict in known}
+    pairs = [(one, there[one.claim]) for one in found if one.claim in there]
+    return tuple(
+        (one, other)
+        for one, other in pairs
+        if differ(one.outcome, other.outcome)
+        and not (one.interval and other.interval and _overlap(one.interval, other.interval))
+    )
+
+
+def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    return one[0] <= other[1] and other[0] <= one[1]
 
 
 def of_runs(fresh: Mapping[Experiment, RunSummary], published: Published) -> Pairs:
@@ -147,17 +147,10 @@ def _verdicts(
     fresh: Mapping[Experiment, RunSummary], published: Published
 ) -> tuple[tuple[Verdict, ...], tuple[Verdict, ...]]:
     """The verdicts on runs made here, and on published runs of the same layouts and readings."""
-    named = ("learner", *rule.CELL)
-    mine = {
-        e: one
-        for e, one in fresh.items()
-        if e == Experiment(**{name: getattr(e, name) for name in named})
-    }
-    cells = {(e.layout, e.decay) for e in mine}
-    shared = [
-        part == design.MAIN_TABLE and (e.layout, e.decay) in cells
-        for e, part in published.variants.items()
-    ]
+    plain = (Experiment(e.learner, layout=e.layout, decay=e.decay, seed=e.seed) for e in fresh)
+    mine = {e: one for (e, one), other in zip(fresh.items(), plain, strict=True) if e == other}
+    cells, parts = {(e.layout, e.decay) for e in mine}, published.variants.items()
+    shared = [part == design.MAIN_TABLE and (e.layout, e.decay) in cells for e, part in parts]
     if not any(shared):
         return (), ()
     here, there = table(mine), published.table[shared]
@@ -183,20 +176,17 @@ class Agreement:
 def agreement(fresh: Mapping[Experiment, RunSummary], published: Published) -> Agreement:
     """How the runs made here agree with the published main table; other runs are skipped."""
     mine = {e: one for e, one in fresh.items() if published.variants.get(e) == design.MAIN_TABLE}
-    pairs = {e: (row(one), published.rows[e]) for e, one in mine.items()}
-    differing = [pair for e, pair in pairs.items() if unequal(e, *pair)]
-    close = sum(_nearly_equal(*pair) for pair in differing)
-    here, there = _verdicts(mine, published)
-    return Agreement(len(mine), len(mine) - len(differing), close, here, there)
-
-
-def _nearly_equal(here: Row, there: Row) -> bool:
-    mine, theirs = ([float(one[name]) for name in NUMBERS] for one in (here, there))
-    return bool(np.allclose(mine, theirs, rtol=EXACT, atol=EXACT))
+    pairs = [
+        [[float(one[name]) for name in NUMBERS] for one in (row(run), published.rows[e])]
+        for e, run in mine.items()
+    ]
+    differing = [(here, there) for here, there in pairs if here != there]
+    close = sum(np.allclose(*pair, rtol=EXACT, atol=EXACT) for pair in differing)
+    return Agreement(len(mine), len(mine) - len(differing), close, *_verdicts(mine, published))
 
 
 class CannotRelock(Refusal):
-    """The lock stays as it is; the message has the reason."""
+    """Runs have changed, or there are none to compare with, so the lock stays as it is."""
 
 
 class Relocked(NamedTuple):

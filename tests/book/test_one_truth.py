@@ -8,6 +8,7 @@ import pytest
 from bs4 import BeautifulSoup, Tag
 from driver import project
 
+from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import published
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.report import halves

@@ -1,6 +1,5 @@
 """Every claim can have each outcome, and each border is respected exactly."""
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
@@ -22,7 +21,7 @@ from nmpcrl.claims import own_claims, paper_claims, thresholds
 from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS, Measured, audit, measured
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, halves
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
-from nmpcrl.claims.rule import Observations, arms
+from nmpcrl.claims.rule import Observations
 from nmpcrl.claims.timing import WAITED, decide
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Assumption, Verdict
 from nmpcrl.claims.wider_claims import WIDER_CLAIMS, WIDER_THAN
@@ -33,6 +32,7 @@ SEEDS, SOME = range(5), range(2)
 EVERY = {**CLAIMS, **WIDER_CLAIMS, **own_claims.OWN_CLAIMS}
 BAD, SWAYING = {"cost_ratio": 1.6}, {"late_cost_range": 0.06}
 LOST = {"final_cost": 500.0, "stopped": "diverged: theta"}
+GONE = {"stopped": "diverged: it went"}
 FAILED = {"final_cost": np.inf}
 
 Changes = Callable[[Experiment], dict[str, Any]]
@@ -103,7 +103,9 @@ def outcomes(runs: pd.DataFrame, rollouts=None) -> dict[str, str]:
         ((), SEEDS, NOT),
     ],
 )
-@pytest.mark.parametrize(("name", "why"), [("C1", BAD), ("C2", SWAYING), ("C2", BAD)])
+@pytest.mark.parametrize(
+    ("name", "why"), [("C1", BAD), ("C1", GONE), ("C2", SWAYING), ("C2", BAD), ("C2", GONE)]
+)
 def test_a_contrast_asks_in_how_many_pairs_only_the_first_went_wrong(
     name, why, first, second, outcome
 ):
@@ -522,24 +524,13 @@ def test_the_audit_measures_kinks_memory_and_the_dropped_term(on_boundary):
     assert found.memory == pytest.approx(1)
 
 
-# Texts
+# All claims
 
 
-@pytest.mark.parametrize("claim", EVERY.values(), ids=EVERY)
-def test_every_claim_names_question_measure_and_border(claim):
-    texts = (claim.statement, claim.measured, claim.border, claim.test, claim.would_change)
-    assert all(texts)
-    assert claim.question.endswith("?")
-    if claim.name in CLAIMS:
-        assert re.search(r"“.+”.*\((Section|Table) [IV]+(-[A-C])?\)|” hours", claim.quotation)
-        assert claim.implied == (claim.name == "C9")
-    if claim.name in BY_RUNS:
-        assert claim.short
-        assert claim.borders[0] < claim.threshold < claim.borders[-1]
-        assert (np.diff(claim.borders) > 0).all()
-    if claim.name in ASKED:
-        assert claim.learners
-        assert claim.label
+@pytest.mark.parametrize("claim", BY_RUNS.values(), ids=BY_RUNS)
+def test_other_borders_lie_on_both_sides_of_the_claim_s_own(claim):
+    assert claim.borders[0] < claim.threshold < claim.borders[-1]
+    assert (np.diff(claim.borders) > 0).all()
 
 
 def test_all_claims_are_judged_in_order():
@@ -548,17 +539,3 @@ def test_all_claims_are_judged_in_order():
     assert [v.claim for v in paper_claims.judge_runs(runs, paths(runs))] == list(BY_RUNS)
     assert [v.claim for v in own_claims.judge_own(runs)] == list(own_claims.OWN_CLAIMS)
     assert [v.claim for v in paper_claims.judge_times(timings())] == ["C3", "C4"]
-
-
-def test_c1_and_c2_ask_about_divergence_and_instability_of_each_run():
-    rng, many = np.random.default_rng(0), {}
-    ratios, ranges = [0.9, 1.4, 1.6, np.inf], [0.01, 0.04, 0.06, np.inf]
-    for one in ("DES", "RDES", "ES", "GES"):
-        for seed in SEEDS:
-            columns = {"cost_ratio": rng.choice(ratios), "late_cost_range": rng.choice(ranges)}
-            many[one, seed] = columns | {"stopped": rng.choice(["finished", "diverged: it went"])}
-    runs = study(lambda e: many.get((e.learner, e.seed), {}))
-    for name, judged in (("C1", thresholds.divergence), ("C2", thresholds.instability)):
-        one, other = (judged(arm) for arm in arms(runs, *BY_RUNS[name].learners))
-        answers = BY_RUNS[name].answers(BY_RUNS[name].measure(runs, {}))
-        assert answers.tolist() == (one & ~other).dropna().tolist()
