@@ -99,13 +99,13 @@ PARTS = {
 
 
 def seed_of(place: str, k: int) -> int:
-    """The k-th seed of a place; of a layout as in the suite."""
+    """The k-th seed of a place; in one layout the seed of the suite."""
     return 6 * HELD_OUT + k if place == EVERY else suite.seed_of(place, k)
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What an agent costs while it is trained, in parts of theta_init's cost."""
+    """The costs of an agent during training, over theta_init's cost."""
 
     agent: str
     shares: pd.DataFrame  # a row a checkpoint; a column a layout, or in part "one" a seed
@@ -113,7 +113,7 @@ class Course:
 
     @property
     def episodes(self) -> list[int]:
-        """Of each checkpoint."""
+        """Episodes before each checkpoint."""
         return [*self.shares.index]
 
     @property
@@ -123,13 +123,13 @@ class Course:
 
     @property
     def median(self) -> Vector:
-        """Over layouts or seeds, at each checkpoint."""
+        """The median share over layouts or seeds, at each checkpoint."""
         found: Vector = np.median(self.shares, axis=1)
         return found
 
     @property
     def interval(self) -> Matrix:
-        """Of the median, of 95 %, by a bootstrap over the columns; shape (2, checkpoints)."""
+        """Ends of the median's interval of 95 %, by a bootstrap over the columns."""
         rng, units = np.random.default_rng(0), self.shares.shape[1]
         drawn = self.shares.to_numpy()[:, rng.integers(units, size=(RESAMPLES, units))]
         ends: Matrix = np.quantile(np.median(drawn, axis=2), [0.025, 0.975], axis=1)
@@ -154,7 +154,7 @@ class Course:
 
 
 def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()) -> Course:
-    """How an agent does in a part; without columns where no run is known.
+    """The course of an agent in a part; without columns where no run is known.
 
     Args:
         table: of `SAC_AND_TD3`.
@@ -174,7 +174,7 @@ def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()
 
 
 class Known(NamedTuple):
-    """What questions are asked of."""
+    """The two tables that questions are asked of."""
 
     table: pd.DataFrame  # of `SAC_AND_TD3`
     compared: pd.DataFrame  # the comparison of remedies
@@ -259,7 +259,7 @@ def answers(table: pd.DataFrame, compared: pd.DataFrame) -> dict[str, Answer]:
 
 
 def searched(compared: pd.DataFrame, part: str) -> pd.Series:
-    """What the best search costs in each layout of a part, in parts of theta_init's."""
+    """The cost of the best search in each layout of a part, over theta_init's cost."""
     runs = compared[(compared.part == part) & (compared.entry == SEARCH)]
     return (runs.cost / runs.initial).groupby(runs.place, sort=False).mean()
 

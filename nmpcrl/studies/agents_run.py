@@ -51,12 +51,12 @@ def trained_in(place: str) -> Mapping[str, Centres]:
 
 
 def judged_in(place: str) -> Mapping[str, Centres]:
-    """The layouts in which its policy is judged; of an agent for all, unseen ones as well."""
+    """The layouts in which a policy is judged; an agent for all is judged in unseen ones, too."""
     return {**TUNE, **JUDGE} if place == EVERY else trained_in(place)
 
 
 def curve(checkpoints: Sequence[int], agent: Entry, place: str, episodes: int, seed: int) -> Row:
-    """Train an agent, and judge it without noise after so many episodes each time.
+    """Train an agent, and judge it without noise at each checkpoint.
 
     Returns:
         initial, the cost of theta_init in each layout of `judged_in`; costs and arrived (a letter a
@@ -87,7 +87,7 @@ def _judged(robot: Robot, policy: Policy) -> tuple[float, bool]:
 
 
 def policy_of(robot: Robot, *, name: str, **settings: float) -> Policy:
-    """The policy of an agent that is trained as long as the budget lasts, for the suite."""
+    """Train an agent with all episodes of the budget, for the suite."""
     made = trained(name, robot.env(), [robot.centres], [robot.budget], robot.seed, **settings)
     return next(made).policy
 
@@ -106,7 +106,7 @@ def trained(
     name: str, env: Any, layouts: Sequence[Centres], checkpoints: Sequence[int], seed: int,
     **settings: float,
 ) -> Iterator[Checkpoint]:  # fmt: skip
-    """Train an agent, and yield it after so many episodes each time.
+    """Train an agent, and yield it at each checkpoint.
 
     Args:
         name: "SAC" or "TD3".
@@ -139,7 +139,7 @@ def trained(
 
 
 def seen(observation: Vector) -> Vector:
-    """What an agent sees of an observation of `nmpcrl/Robot-v0`, in numbers of about 1.
+    """The observation of an agent, of an observation of `nmpcrl/Robot-v0`, in numbers of about 1.
 
     From the robot, and as it is turned, the target and each centre, in parts of `FAR`; then how far
     the heading is from that at the target, in radians, its cosine and its sine.
@@ -159,7 +159,7 @@ def _applied(scaled: ArrayLike, turn: float, env: Any) -> Vector:
 
 
 def _scaled(env: Any, layouts: Sequence[Centres], values: Mapping[str, float]) -> Any:
-    """The robot's task in numbers of about 1, which counts what is begun.
+    """The robot's task in numbers of about 1, which counts episodes and steps.
 
     An episode begins with its first step: stable-baselines3 resets once more after the last one.
     """
@@ -168,7 +168,7 @@ def _scaled(env: Any, layouts: Sequence[Centres], values: Mapping[str, float]) -
     box: Any = gymnasium.spaces.Box
 
     class Scaled(gymnasium.Env[Vector, Vector]):
-        """What an agent acts in."""
+        """The environment that stable-baselines3 sees."""
 
         def __init__(self) -> None:
             self.episodes, self.steps, self.begun, self.layout = 0, 0, False, layouts[0]
@@ -209,7 +209,7 @@ def require(name: str = "an agent") -> Any:
 
 
 def _model(name: str, env: Any, values: Mapping[str, float], episodes: int, seed: int) -> Any:
-    """The agent of stable-baselines3, which learns after each episode and keeps every transition.
+    """The agent of stable-baselines3; it learns after each episode and forgets no transition.
 
     Raises:
         NoAgents: it is not installed.
@@ -237,14 +237,14 @@ def _model(name: str, env: Any, values: Mapping[str, float], episodes: int, seed
 
 
 class _Drawing:
-    """What an agent draws from NumPy's and torch's global generators, and nobody else does."""
+    """The state of NumPy's and torch's global generators while an agent draws from them."""
 
     def __init__(self) -> None:
         self.state: Any = None
 
     @contextmanager
     def own(self) -> Iterator[None]:
-        """Go on drawing; after it both generators are as they were before."""
+        """Set both generators to the agent's state, and afterwards back."""
         import torch
 
         from nmpcrl.learning.network import OneThread

@@ -41,7 +41,7 @@ STOPS = {n: f"stops_{n}" for n in (paper.HORIZON, *HORIZONS)}  # columns by hori
 
 @dataclass(frozen=True)
 class Difficulty:
-    """Measures of one layout; the higher, the easier, unless a comment says "the harder"."""
+    """Measures of one layout: a higher one means easier, or harder where a comment says so."""
 
     closest: float  # mean distance [m] to the closest obstacle or wall
     visibility: float  # mean distance [m] to what is seen in `SIGHTS` directions
@@ -105,7 +105,7 @@ def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
 
 
 def until_arrival(states: Matrix, task: Task) -> Matrix:
-    """The positions of a trajectory up to the first at the target; all if it does not arrive."""
+    """The positions of a trajectory up to its arrival; all without an arrival."""
     there = np.flatnonzero(np.linalg.norm(states - task.target, axis=1) <= ARRIVED)
     return states[: there[0] + 1 if there.size else None, :2]
 
@@ -126,7 +126,7 @@ def clearance(points: Matrix, task: Task) -> Vector:
 
 
 def sight(points: Matrix, directions: int, task: Task) -> Matrix:
-    """Distance [m] from points, shape (k, 2), to the first disc or wall in so many directions.
+    """Distance [m] from points, shape (k, 2), to the first disc or wall in each direction.
 
     The directions go around, beginning with that of x.
     """
@@ -156,7 +156,7 @@ def _centres(task: Task) -> Matrix:
 
 
 def _radius(task: Task) -> float:
-    """Of the discs in the configuration space at theta_c = 0 [m]."""
+    """The radius of the discs in the configuration space at theta_c = 0 [m]."""
     return float(task.discs[2].max() / 2)
 
 

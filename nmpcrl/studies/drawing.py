@@ -63,7 +63,7 @@ STEEPEST = 0.5  # of the drawn coefficients
 
 
 def layout_sampler(seed: int) -> Iterator[Centres]:
-    """Layouts of four obstacles whose centres are `APART`, on a grid, without end."""
+    """An endless sequence of four centres each, `APART` from each other and on a grid."""
     rng = np.random.default_rng(seed)
     (left, right), (bottom, top) = AREA
     while True:
@@ -90,7 +90,7 @@ def named() -> dict[str, Centres]:
 
 
 def population() -> Iterator[Centres]:
-    """The layouts of the population in the order of the draws, without end; each takes 0.2 s."""
+    """The endless population of layouts, in the order of the draws; each takes 0.2 s."""
     known = set(paper.LAYOUTS.values())
     for layout in layout_sampler(POPULATION_SEED):
         if layout not in known and screen(layout).passed:
@@ -132,12 +132,12 @@ def draw(
 
 
 def _rounded(values: Any) -> Any:
-    """Numbers with three digits behind the point: the file has the motion itself."""
+    """Numbers as the file has them: three digits behind the point."""
     return tuple(round(float(one), 3) for one in values)
 
 
 def scenario_sampler(seed: int = SCENARIO_SEED) -> Iterator[Scenario]:
-    """Scenarios without end."""
+    """An endless sequence of drawn scenarios."""
     rng = np.random.default_rng(seed)
     while True:
         number = int(rng.integers(NUMBERS[0], NUMBERS[1] + 1))
@@ -151,7 +151,7 @@ def scenario_sampler(seed: int = SCENARIO_SEED) -> Iterator[Scenario]:
 
 
 def accepted(scenario: Scenario) -> bool:
-    """Whether a scenario meets the criteria; nothing is trained in it."""
+    """Whether a scenario meets the three criteria."""
     for point, steps in ((paper.START, AT_START), (paper.TARGET, AT_TARGET)):
         away = np.linalg.norm(centres(scenario, steps) - point[:2], axis=2)
         if away.min() < CLEARANCE / 2 * np.sqrt(1 + TASK.margin):

@@ -71,7 +71,7 @@ def _shuffled(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def again(setting: tuple[str, float], place: str, episodes: int, seed: int) -> Row:
-    """The number of episodes that a run has with an intervention; all if it is not stopped."""
+    """The number of complete episodes of a run with an intervention."""
     intervention, nudge = setting
     outcome = watch(
         Experiment(
@@ -84,7 +84,7 @@ def again(setting: tuple[str, float], place: str, episodes: int, seed: int) -> R
 
 
 def ends(table: pd.DataFrame) -> pd.DataFrame:
-    """Whether each run is stopped: as it was ("none"), and with each arm.
+    """Whether each run is stopped: without an intervention ("none"), and with each arm.
 
     Returns:
         Columns part, layout, seed, intervention and stopped.
@@ -99,7 +99,7 @@ def ends(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def survival(runs: pd.DataFrame, arm: str = "theta held") -> Answer:
-    """The answer of A to F to the question "extrapolation", or to the same of another arm.
+    """The answer of layouts A to F to the question "extrapolation", for any arm.
 
     Args:
         runs: of `ends`.
@@ -110,7 +110,7 @@ def survival(runs: pd.DataFrame, arm: str = "theta held") -> Answer:
 
 
 def live(runs: pd.DataFrame, arm: str, than: str = "none") -> Estimate:
-    """The share of runs that live with an arm, minus that with another; interval over layouts.
+    """The share of runs that live with an arm, minus the share with another; interval over layouts.
 
     Args:
         runs: of `ends`, of one part.

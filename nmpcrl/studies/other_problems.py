@@ -86,7 +86,7 @@ def row(**measured: Any) -> Row:
 
 @cache
 def controller() -> Nmpc:
-    """The plan that learns."""
+    """The NMPC whose theta is learned."""
     return Nmpc(gz.problem())
 
 
@@ -155,7 +155,7 @@ def searched() -> Vector:
 
 
 def refer(theta: Callable[[], Vector] | None, *_: Any) -> Row:
-    """The test of a plan with some theta, or of the policy of dynamic programming."""
+    """The test of the NMPC with a theta, or of the policy of dynamic programming."""
     if theta is None:
         return row(test=mean_cost(dynamic_programming.best(POINTS, INPUTS).action))
     found = theta()
@@ -163,7 +163,7 @@ def refer(theta: Callable[[], Vector] | None, *_: Any) -> Row:
 
 
 def spread(_: Any, __: str, ___: int, seed: int) -> Row:
-    """Q-learning with one seed, in every way."""
+    """Q-learning with one seed: by mpcrl with each solver, and by this library."""
     from nmpcrl.study.problems import peers  # takes seconds to import
 
     runs = {solver: peers.run(solver, seed, PEER_STEPS) for solver in PEERS}
@@ -223,11 +223,11 @@ class Runs(NamedTuple):
 
     @property
     def medians(self) -> dict[str, float]:
-        """Of the last costs, by arm."""
+        """The median of the last costs, by arm."""
         return {arm: float(np.median(costs)) for arm, costs in self.tests.items()}
 
     def nearly_all(self, arms: Iterable[str], below: float, share: float) -> bool:
-        """Whether so many seeds of each arm end below a cost."""
+        """Whether at least a share of the seeds of each arm ends below a cost."""
         return all((self.tests[arm] < below).mean() >= share for arm in arms)
 
     def apart(self, first: str, second: str) -> float:

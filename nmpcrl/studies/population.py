@@ -79,7 +79,7 @@ NOWHERE = np.iinfo(np.int16).min  # a position after a failed solve
 
 @dataclass(frozen=True)
 class Share:
-    """In which share of the layouts a claim is expected to hold."""
+    """The share of the layouts in which a claim is expected to hold."""
 
     low: float
     high: float
@@ -145,7 +145,7 @@ def in_metres(positions: Any) -> Column:
 
 
 def seed_of(place: str, k: int) -> int:
-    """The seed number k of a layout, which no other layout has."""
+    """The k-th seed of a layout; no two layouts have a seed in common."""
     return SEEDS * [*LAYOUTS].index(place) + k
 
 
@@ -189,7 +189,7 @@ def _setting(one: Condition) -> Experiment:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """The runs, with what claims and questions need beside them."""
+    """Runs, paths and measures of layouts, of which claims and questions are asked."""
 
     runs: pd.DataFrame  # of `rows.table`, with `part` and the columns of `trap`
     paths: Paths  # positions alone, shape (K + 1, 2)
@@ -202,7 +202,7 @@ class Drawn:
 
     @property
     def stops(self) -> pd.DataFrame:
-        """theta_c at which the compared layouts' rollouts stop arriving, a column a horizon."""
+        """The theta_c from which rollouts in compared layouts do not arrive, a column a horizon."""
         return self.layouts.loc[[*COMPARED], [*STOPS.values()]].set_axis([*STOPS], axis=1)
 
     @cached_property
@@ -212,7 +212,7 @@ class Drawn:
 
     @cached_property
     def tried(self) -> pd.DataFrame:
-        """As `everywhere`, with the published runs in layouts A to F."""
+        """The cells of `everywhere`, with the published runs in layouts A to F."""
         named = six.load()
         return everywhere(self.runs, self.paths, named.table, named.paths)
 
@@ -235,7 +235,7 @@ def of_table(table: pd.DataFrame) -> Drawn:
 
 
 def _positions(table: pd.DataFrame) -> list[Any]:
-    """The positions of each row: as made here, or else the published ones."""
+    """The positions of each row: made here or published."""
     if "positions" in table:
         return [*table.positions]
     rows = (one for one in _conditions(POPULATION.table()) if _setting(one).learner in FOLLOWED)
@@ -305,7 +305,7 @@ def held(
 
 
 def shares(where: pd.DataFrame) -> pd.DataFrame:
-    """In which share of the layouts each claim holds, beside the expected one.
+    """The share of the layouts in which each claim holds, beside the expected share.
 
     Args:
         where: of `held`.
@@ -349,7 +349,7 @@ def _holding(claim: str) -> Callable[[Drawn], Answer]:
 
 
 def picture(runs: pd.DataFrame, paths: Paths, setting: str) -> pd.DataFrame:
-    """How much of the paper's picture holds in each layout and reading.
+    """The part of the paper's picture that holds in each layout and reading.
 
     Args:
         runs: of one setting, with all four of the paper's learners.
@@ -487,7 +487,7 @@ def at_the_gap(runs: pd.DataFrame, layouts: pd.DataFrame) -> pd.DataFrame:
 
 
 def improve_by_gap(ends: pd.DataFrame) -> dict[str, tuple[int, int]]:
-    """How many runs improve, of those in layouts with a gap: by whether it ended open or closed.
+    """Runs that improve, and all runs, in layouts with a gap, by whether it ended open or closed.
 
     Args:
         ends: of `at_the_gap`.
@@ -516,7 +516,7 @@ def early_overshoot(runs: pd.DataFrame) -> Answer:
 
 
 def raised() -> pd.Series:
-    """By which share the cost of the best theta rises with theta_c, by layout from A to F."""
+    """The share by which the cost of the best theta rises with theta_c, by layout from A to F."""
     best = {search.layout: np.array(one.theta) for search, one in six.load().searches.items()}
     each = {name: trap.raised_cost(name, best[name], CLIFF_RAISED) for name in sorted(best)}
     return pd.Series(each, dtype=float)

@@ -140,7 +140,7 @@ def _part(
     seeds: int = 1,
     first: Mapping[str, int] | None = None,
 ) -> Part:
-    """A part whose rows need J_best of its layouts; `first` is by entry."""
+    """A part whose rows need J_best of its layouts; `first` has the number of places by entry."""
 
     def settings(table: pd.DataFrame) -> dict[str, Setting]:
         best = table.groupby("place").best.first() if len(table) else {}
@@ -155,7 +155,7 @@ def _part(
 
 
 def _settings(_: pd.DataFrame) -> list[Entry]:
-    """Every entry that has settings, with each."""
+    """Every entry with each of its settings."""
     return [one for entry in SETTINGS if SETTINGS[entry] for one in arms(entry).values()]
 
 
@@ -184,7 +184,7 @@ def _compile_ahead(missing: Iterable[tuple[Condition, Setting]]) -> None:
 
 @dataclass(frozen=True)
 class RemedyRow:
-    """What an entry did in one part."""
+    """The result of an entry in one part."""
 
     part: str
     entry: str
@@ -277,7 +277,7 @@ class Advice:
 
 
 def advice(table: pd.DataFrame) -> tuple[Advice, ...]:
-    """What to try first, second and never, in that order, by `ADVICE`."""
+    """The advice on each entry by `ADVICE`, the first to try first."""
     judged = [row for part in ADVISED for row in rows(table, part)]
     refused = {CONTROL, *(row.entry for row in judged if row.disqualified)}
     found: dict[str, dict[str, RemedyRow]] = {}
@@ -295,14 +295,14 @@ def advice(table: pd.DataFrame) -> tuple[Advice, ...]:
 
 
 def _word(judged: list[RemedyRow]) -> str:
-    """Never, open, or later for all that may be first."""
+    """The advice before first and second are chosen."""
     if all(one.gain.high < 0 or one.solved.high < HALF for one in judged):
         return NEVER
     return LATER if all(one.gain.low > 0 for one in judged) else OPEN
 
 
 def _order(judged: Mapping[str, RemedyRow]) -> tuple[float, ...]:
-    """The greater lower end first, with the first budget, then the next; then the less time."""
+    """The key by which entries are sorted: rounded lower ends by budget, then time."""
     ends = [-round(judged[part].gain.low, DIGITS) if part in judged else np.inf for part in ADVISED]
     known = next(iter(judged.values()))
     return (*(np.inf if np.isnan(one) else one for one in ends), known.seconds)
@@ -319,7 +319,7 @@ def greatest(table: pd.DataFrame) -> dict[int, str]:
 
 
 def expectations(table: pd.DataFrame) -> dict[str, bool]:
-    """Whether the expected order came true, of all that is known."""
+    """Whether each expectation came true, as far as rows are known."""
     first = greatest(table)
     said = {
         f"{entry} is first with {budget} episodes": first[budget] == entry
@@ -377,7 +377,7 @@ def _by_hand(table: pd.DataFrame) -> Answer:
 
 
 def _guard(table: pd.DataFrame) -> Answer:
-    """By layout: with how many of the step sizes with which RDES fails does the guard solve it?"""
+    """Asked by layout of the step sizes with which RDES fails: does the guard solve most?"""
     found = {}
     for entry in ("RDES", "guarded-RDES"):
         runs = _runs(table, "tune", entry)

@@ -40,7 +40,7 @@ def schedule(rate: str, episodes: int, rng: np.random.Generator) -> list[int]:
 
 @dataclass
 class Chart:
-    """Shewhart's chart of individual values: fires where one lies far from the `WINDOW` before it.
+    """Shewhart's chart of individual values: fires at a value far from the `WINDOW` before.
 
     It fires if |x - mean| > LIMIT s, s the standard deviation of those, and then begins anew.
     On independent normal values it does so falsely with the probability that a t of WINDOW - 1
@@ -62,7 +62,7 @@ class Chart:
 
 
 class Recent(np.random.Generator):
-    """Draws mini-batches of which the late examples are part most often: a replay's generator.
+    """A generator for replay that draws late examples most often.
 
     Without replacement, with weights exp(-age / `AGE`), by the largest of Gumbel's keys.
     """
@@ -79,7 +79,7 @@ class Recent(np.random.Generator):
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """One episode of a changing world, as it was left."""
+    """The end of one episode of a changing world."""
 
     layout: int  # the number of the true one
     seen: int  # that of the one which the controller planned with

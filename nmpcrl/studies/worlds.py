@@ -133,7 +133,7 @@ def _inside(arms: list[str], yes: Callable[..., Any]) -> Callable[[pd.DataFrame]
 
 
 def _crowded(table: pd.DataFrame) -> Answer:
-    """The rank correlation of crowding and states inside an obstacle, with its interval."""
+    """Whether crowding and states inside an obstacle have a rank correlation above 0."""
     inside = means(table, "moving", "inside")["extrapolated init"].dropna()
     if len(inside) < 10:
         return Answer(UNDECIDABLE, {"scenarios": (0, len(inside))})
@@ -149,7 +149,7 @@ def _crowded(table: pd.DataFrame) -> Answer:
 
 
 def _correlation(pairs: np.ndarray) -> float:
-    """Of the ranks; nan where one of the two does not vary."""
+    """The correlation of ranks; nan where one column is constant."""
     ranks = rankdata(pairs, axis=0).T
     return float(np.corrcoef(ranks)[0, 1]) if ranks.std(axis=1).all() else np.nan
 
@@ -198,7 +198,7 @@ def _aligned(table: pd.DataFrame) -> Answer:
 
 
 def changes(part: str, place: str) -> list[int]:
-    """The episodes that bring a change."""
+    """The first episode of each new layout."""
     _, order = sequence(part, place, PARTS[part].episodes)
     return [e for e, (before, after) in enumerate(pairwise(order), start=1) if after != before]
 
@@ -210,7 +210,7 @@ def after(part: str, place: str, series: list[float]) -> float:
 
 
 def shares(table: pd.DataFrame, part: str) -> pd.DataFrame:
-    """`after` by place and arm: the cost since the first change, over theta_init there."""
+    """`after` of each run, a row a place and a column an arm."""
     there = table[(table.part == part) & table.arm.isin([*CHANGING])]
     found = [after(part, row.place, row.series) for row in there.itertuples()]
     return means(there.assign(share=found), part, "share")
@@ -273,7 +273,7 @@ def _pays(table: pd.DataFrame) -> Answer:
 
 
 def carried(table: pd.DataFrame, arm: str) -> pd.DataFrame:
-    """What theta costs, over theta_init: by where it was learned, and where it is judged."""
+    """The cost of theta over theta_init's: a row where theta was learned, a column where judged."""
     rows = table[table.part == "carry"].set_index(["arm", "place"]).series
     if not {arm, "frozen"} <= {*rows.index.get_level_values("arm")}:
         return pd.DataFrame()

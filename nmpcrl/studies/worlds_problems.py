@@ -33,7 +33,7 @@ def learned_transition(x: Any, u: Any, th: Any, _: Any) -> Any:
 
 
 def full(x: Any, th: Any, _: Any) -> Any:
-    """Any quadratic terminal cost of x - s_ref that is nowhere negative, by a triangular factor."""
+    """Any positive semidefinite quadratic terminal cost of x - s_ref, by a triangular factor."""
     away = x - TARGET
     scaled = [th["f"][i] * away[i] for i in range(3)]
     for k, (i, j) in enumerate(BELOW):
@@ -42,7 +42,7 @@ def full(x: Any, th: Any, _: Any) -> Any:
 
 
 def bumps(x: Any, th: Any, _: Any) -> Any:
-    """The paper's terminal cost, and a weight for each of `BUMPS`."""
+    """The paper's terminal cost plus a weighted sum of `BUMPS`."""
     cost = diagonal(x, th)
     for k, bump in enumerate(BUMPS):
         cost += HEIGHT * th["bumps"][k] / (1 + square((x[:2] - bump) / WIDTHS, 2)) ** 2

@@ -65,7 +65,7 @@ def row(
 
 
 def explored(episodes: int, seed: int) -> Exploration:
-    """The paper's noise."""
+    """The paper's noise on the action."""
     rng, shape = np.random.default_rng([seed, 0]), (episodes, paper.STEPS, 2)
     return Exploration.draw(rng, shape, deviation=paper.NOISE, decay_rate=paper.DECAY_RATE)
 
@@ -99,7 +99,7 @@ def found(policy: str, nmpc: Persistent, world: World, episodes: int, seed: int)
 
 
 def moving(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row:
-    """A view and a policy among obstacles that move."""
+    """The row of a view and a policy among obstacles that move."""
     view, policy = setting
     motions = SCENARIOS[place]
     nmpc, world = controller(len(motions)), World(motions, PREDICTORS[view])
@@ -108,7 +108,7 @@ def moving(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Ro
 
 
 def model(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row:
-    """A policy in a body with a fault; the mean cost where the body draws."""
+    """The row of a policy in a robot with a fault; the mean cost where the fault is random."""
     fault, policy = FAULTS[setting[0]], setting[1]
     nmpc = controller(learned_model=policy not in ("init", "grid", "ES"))
     world = World(still(JUDGE[place]), fault=fault)
@@ -138,7 +138,7 @@ def sequence(rate: str, place: str, episodes: int) -> tuple[list[str], list[int]
 
 
 def begun_anew(rate: str, name: str, place: str, episodes: int, seed: int) -> Row:
-    """An entry of the suite in the last layout of a sequence, with the episodes that are left."""
+    """An entry of the suite in the last layout of a sequence, with the remaining episodes."""
     names, order = sequence(rate, place, episodes)
     alone = judge(entry(name), names[-1], seed, episodes - order.index(order[-1]))
     return row(alone.cost / alone.initial, arrived=alone.arrived)
@@ -167,7 +167,7 @@ def shifting(rate: str, setting: tuple[str, ...], place: str, episodes: int, see
 
 
 def _maker(kind: str, nmpc: Persistent, seed: int, *, recent: bool) -> Callable[[float], Learner]:
-    """(factor of alpha) -> learner."""
+    """A function that makes a learner, given a factor of alpha."""
     plain: dict[str, Callable[[float], Learner]] = {
         "ES": lambda factor: expected_sarsa(nmpc, factor * paper.ALPHA),
         "frozen": lambda _: frozen(nmpc),
@@ -222,7 +222,7 @@ def terminal(kind: str, place: str, episodes: int, seed: int) -> Row:
 
 
 def compile_ahead(missing: Iterable[tuple[Condition, Any]]) -> None:
-    """Compile what the runs call, so that no row counts the time of it."""
+    """Compile each controller once, so that no row includes the time of a compilation."""
     kinds: dict[tuple[int, bool, str], None] = {}
     for one, setting in missing:
         size = len(SCENARIOS[one.place]) if one.part == "moving" else 4
