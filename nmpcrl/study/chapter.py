@@ -20,12 +20,9 @@ MOST = {"alpha": 1e-5, "beta": 1e-4}  # 100 and 10,000 times the paper's
 def check(**declared: Any) -> None:
     """Refuse a value that is not allowed, and a name that the chapter does not declare.
 
-    `check(seeds=seeds, layout=layout)` stands in the second cell. A parameter that is a field of
-    `Experiment`, or the plural of one, is checked here, and any other one where it is used.
-    Papermill sets whatever name it is given, so a misspelt one would change nothing.
-
-    Raises:
-        ParameterError: in one sentence.
+    The second cell calls `check(seeds=seeds, layout=layout)`. Fields of `Experiment` and their
+    plurals are checked; other parameters are checked where they are used. Papermill accepts any
+    name, so that a misspelt one would change nothing.
     """
     for name in sorted(_injected() - set(declared)):
         close = get_close_matches(name, declared, n=1)

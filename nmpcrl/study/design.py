@@ -1,7 +1,7 @@
 """Sets of runs: grids of field values, a chapter's runs, and the parts of the main study.
 
-The main table varies what the paper leaves open and no single value can be chosen for: layout,
-reading of the exploration decay, and seed. A variant changes one other thing.
+The main table varies layout, reading of the exploration decay, and seed, which the paper leaves
+open. A variant changes one other field.
 """
 
 from collections.abc import Mapping, Sequence
@@ -189,17 +189,14 @@ def controls() -> tuple[Experiment, ...]:
 
 
 def variant(name: str) -> tuple[Experiment, ...]:
-    """The runs of one variant, with the frozen arms that they are compared with."""
+    """The runs of one variant, and the baselines with a frozen theta."""
     one = VARIANTS[name]
     runs = sweep(learner=one.learners, **VARIED | dict(one.fields))
     return (*runs, *dict.fromkeys(map(frozen_arm, runs)))
 
 
 def whole_study() -> dict[Experiment, str]:
-    """Every run of the study with the name of its part, the main table first.
-
-    A run that two parts share has the name of the first.
-    """
+    """Every run of the study with the name of the first part that has it."""
     parts = {MAIN_TABLE: main_table(), "controls": controls()}
     parts |= {name: variant(name) for name in VARIANTS}
     named: dict[Experiment, str] = {}

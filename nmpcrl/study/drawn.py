@@ -1,8 +1,7 @@
-"""Layouts and scenarios that `studies.drawing` drew, before anything was run in them.
+"""Layouts and scenarios that `studies.drawing` drew before any run.
 
-There are 60 layouts to tune on, T01 to T60, and 120 to judge on, J001 to J120. Whatever is chosen
-(a step size, a threshold of a predictor) is chosen on `TUNE`, and judged on `JUDGE`. Scenarios with
-obstacles that move are M01 to M40.
+Step sizes and thresholds are chosen in `TUNE`, the 60 layouts T01 to T60, and judged in `JUDGE`,
+the 120 layouts J001 to J120. Scenarios with moving obstacles are M01 to M40.
 """
 
 import json

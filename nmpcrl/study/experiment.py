@@ -128,7 +128,7 @@ class Experiment:
 
     @property
     def canonical(self) -> "Experiment":
-        """The same run, with the default in every field that its learner does not read."""
+        """The same run, with defaults in the fields that its learner does not read."""
         changed: dict[str, Any] = {
             one.name: one.default
             for one in fields(self)
@@ -143,5 +143,5 @@ class Experiment:
 
 
 def frozen_arm(experiment: Experiment) -> Experiment:
-    """The baseline of a run: the same noise and controller, and a theta that never moves."""
+    """The baseline of a run: same noise and controller, and a constant theta."""
     return replace(experiment, learner="frozen", constrained=False).canonical

@@ -1,7 +1,7 @@
-"""What a plant may do otherwise than the model: a `Fault`, and the body that has it.
+"""Differences between the plant and the model: a `Fault`, and the `Body` that has it.
 
-Each is a map of the inputs, a drift, or noise in what is measured, so that a body without any moves
-as the paper's robot to the last bit. A lag is a state that the controller does not see.
+A fault is a map of the inputs, a drift, or noise of the measurement. A body without faults moves as
+the paper's robot to the last bit. A lag is a state that the controller does not measure.
 """
 
 from collections.abc import Mapping
@@ -19,13 +19,13 @@ BASE = 0.5  # [m] between the wheels: the robot's diameter
 
 @dataclass(frozen=True)
 class Fault:
-    """How a body differs from the model; it does not where nothing is said.
+    """A difference between body and model; the defaults are the model.
 
     Raises:
         ParameterError: a share lies outside [0, 1], or a time or deviation below 0.
     """
 
-    grip: float = 1.0  # share of the speed that is kept
+    grip: float = 1.0  # share of the speed that arrives
     lag: float = 0.0  # [s], time constant of both inputs
     bias: float = 0.0  # [rad/s], added to the turn rate
     drift: tuple[float, float] = (0.0, 0.0)  # [m/s]
@@ -40,15 +40,12 @@ class Fault:
 
     def draw(self, rng: np.random.Generator) -> "Body":
         """The body of an episode."""
-        kept = 1 - rng.uniform(0, self.slip, 2) if self.slip else np.ones(2)
-        return Body(self, wheels(*kept) @ np.diag([self.grip, 1.0]))
+        shares = 1 - rng.uniform(0, self.slip, 2) if self.slip else np.ones(2)
+        return Body(self, wheels(*shares) @ np.diag([self.grip, 1.0]))
 
     @property
     def model(self) -> dict[str, Matrix]:
-        """What an oracle knows before an episode, as parameters of `world.problem`'s model.
-
-        Lag and noise are not among them.
-        """
+        """Gain, bias and drift before an episode, as parameters of a learned model."""
         mean = 1 - self.slip / 2
         gain = np.diag([mean * self.grip, mean])
         return {"gain": gain, "bias": np.array(self.bias), "drift": np.array(self.drift)}
@@ -66,16 +63,16 @@ FAULTS: Mapping[str, Fault] = {
 
 
 def wheels(right: float, left: float) -> Matrix:
-    """The inputs that arrive, (speed, turn rate), where the wheels keep these shares of theirs."""
+    """The matrix from given to actual (speed, turn rate), by the share that each wheel turns."""
     both, apart = (right + left) / 2, right - left
     return np.array([[both, apart * BASE / 4], [apart / BASE, both]])
 
 
 class Body:
-    """The robot of one episode, which remembers the inputs that lag."""
+    """The robot of one episode, with the inputs that lag as a state."""
 
     def __init__(self, fault: Fault, gain: Matrix) -> None:
-        """It stands still."""
+        """Begin at rest."""
         self._fault, self._gain, self._applied = fault, gain, np.zeros(2)
         self._follows = 1 - np.exp(-robot().period / fault.lag) if fault.lag else 1.0
         self._shift = robot().period * np.array([*fault.drift, 0.0])
@@ -95,5 +92,5 @@ class Body:
 
 @cache
 def robot() -> Plant:
-    """The paper's robot, made once, since its step is compiled."""
+    """The paper's robot; its step is compiled once."""
     return differential_drive()

@@ -21,9 +21,8 @@ Centres = tuple[tuple[float, float], ...]
 def layout(named: Mapping[str, Centres]) -> Allowed:
     """The name of a layout, or the centres of its obstacles [m].
 
-    A layout is stored as one word: its name if it has one, otherwise its centres as text,
-    `0.5,2.2 3,0.5`. So the same centres are the same layout however they were given, and every
-    table, file and command line can hold one. The order of the obstacles counts.
+    A layout is stored as one word, its name or its centres as `0.5,2.2 3,0.5`, so that equal
+    centres are equal layouts, and fit in a table. The order of the obstacles counts.
     """
 
     def read(value: Any) -> str:
@@ -37,7 +36,7 @@ def layout(named: Mapping[str, Centres]) -> Allowed:
 
 
 def centres_of(given: Any, named: Mapping[str, Centres]) -> Centres:
-    """The centres of a layout's obstacles [m], whichever way it is given.
+    """The centres of the obstacles [m] of a layout in any form.
 
     Raises:
         ParameterError: it is no layout.

@@ -1,4 +1,4 @@
-"""The criteria for layouts of obstacles, decided before anything was trained.
+"""The criteria for layouts of obstacles, fixed before any training.
 
 A layout may be used if
 
@@ -6,10 +6,10 @@ A layout may be used if
 2. start and target lie outside every penalty zone, Upsilon = 0;
 3. without noise, the controller with theta_init is at the target after K = 129 steps.
 
-It is called *closing* if a gap that this first rollout goes through is closed at theta_c = 0.35,
-where learning may be heading (departure N), and *open* otherwise. A is the first layout that was
-tried; the others are the first that a seeded sampler drew and `screen` accepted
-(`nmpcrl.studies.drawing`), so that none was selected for what is learned in it.
+A layout is *closing* if theta_c = 0.35, which learning may approach (departure N), closes a gap of
+this first rollout, and *open* otherwise. A was the first layout tried; the others are the first
+that a seeded sampler drew and `screen` accepted (`nmpcrl.studies.drawing`), so that no layout was
+selected for its results.
 """
 
 from collections.abc import Sequence

@@ -35,7 +35,7 @@ DECAYS = {"step": count_steps, "episode": count_episodes}  # departure C
 
 
 class Generators(NamedTuple):
-    """A generator for each purpose, so that all learners of a seed meet the same noise."""
+    """A generator for each purpose; all learners of a seed have the same noise."""
 
     noise: np.random.Generator
     network: np.random.Generator

@@ -1,4 +1,4 @@
-"""The time that experiments take, and the runs that are too long to begin."""
+"""The time that experiments take, and the limits of time and memory."""
 
 import os
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""This machine, and what of it changes the last digits of numbers."""
+"""This machine, and its properties that change the last digits of numbers."""
 
 import os
 import platform
@@ -24,7 +24,7 @@ class Machine(TypedDict):
 
 
 class Fingerprint(Machine):
-    """What must be equal, beside code and versions, for the same bits."""
+    """The properties that must be equal for the same bits, like code and versions."""
 
     library: str  # of C: sines and cosines
     abilities: str  # a hash of the processor's instruction sets, for which code is compiled
@@ -32,7 +32,7 @@ class Fingerprint(Machine):
 
 
 def machine() -> Machine:
-    """This machine, in short."""
+    """This machine, for a page."""
     names = [line.partition(":")[2].strip() for line in _cpuinfo() if line.startswith("model name")]
     return {
         "processor": names[0] if names else platform.processor() or "unknown",
@@ -43,7 +43,7 @@ def machine() -> Machine:
 
 
 def fingerprint() -> Fingerprint:
-    """This machine, as it is compared with the machine of stored and published runs."""
+    """This machine, for a comparison with the machines of stored and published runs."""
     lines = ("flags", "Features", "cpu family", "model\t")
     found = sorted({line for line in _cpuinfo() if line.startswith(lines)})
     abilities = sha256("\n".join(found).encode()).hexdigest()[:16]

@@ -1,7 +1,7 @@
-"""The robot's task among obstacles that move, as a `Problem`, and the world in which it is done.
+"""The robot's task among moving obstacles as a `Problem`, and the environment that has them.
 
-A motion is a function of the time in seconds, defined before the start, too. A predictor gives the
-centres of the obstacles at a plan's stages, from what is known at its first.
+A motion is a function of the time in seconds, negative times included. A predictor gives the
+centres of the obstacles at the stages of a plan, by what is known at the first stage.
 
     min   sum_i gamma^i (||theta_x (x_i - s_ref)||^2 + ||theta_u u_i||^2 + omega' sigma_i) + ...
     s.t.  Xi(x_i, o_i) + theta_c <= sigma_i
@@ -9,12 +9,8 @@ centres of the obstacles at a plan's stages, from what is known at its first.
 This is Eq. (2) with centres o_i that are data of each stage, and a soft box. In the paper's layouts
 it has the value of the paper's controller to seven digits.
 
-**The theory.** V_theta(s) becomes V_theta(s, t): the state of the Markov chain includes the time,
-or the motions' phase. Bootstrapped by a second solve with the data of t + 1, the TD error is that
-of the larger chain; with a network of (s, a) alone it is not. A predictor that errs makes every
-value one of another chain, so that the TD error has no zero at the true value. Within an episode
-that ends, there is no stationary law of the states to converge under, and "converges" means over
-episodes.
+The value becomes V_theta(s, t). The TD error is the one of the Markov chain with the time in its
+state if a second solve with the data of t + 1 bootstraps it, and if the predictor is exact.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -114,12 +110,12 @@ def still(layout: Sequence[Point]) -> tuple[Motion, ...]:
 
 
 def known(motions: Sequence[Motion], t: int, horizon: int = HORIZON) -> Vector:
-    """The motion itself, shape (N + 1, M, 2)."""
+    """The true centres, shape (N + 1, M, 2)."""
     return centres(motions, np.arange(t, t + horizon + 1))
 
 
 def extrapolated(motions: Sequence[Motion], t: int, horizon: int = HORIZON) -> Vector:
-    """The velocity since the last step continued: exact where it is constant."""
+    """The velocity of the last step, continued; exact where the velocity is constant."""
     before, now = centres(motions, [t - 1, t])
     ahead: Vector = now + np.multiply.outer(np.arange(horizon + 1), now - before)
     return ahead
@@ -216,10 +212,7 @@ def inside(states: Matrix, motions: Sequence[Motion]) -> NDArray[np.bool_]:
 
 
 class World:
-    """An environment with a clock: the plant, the start and the data of `train` and `evaluate`.
-
-    A world serves one run at a time: `begin` sets the clock to 0 and draws the episode's body.
-    """
+    """Plant, start and data of `train` and `evaluate`, with a clock, for one run at a time."""
 
     def __init__(
         self,
@@ -229,13 +222,13 @@ class World:
         fault: Fault = NONE,
         seen: Sequence[Motion] | None = None,
     ) -> None:
-        """Set the obstacles, their predictor and the body.
+        """Set up the environment.
 
         Args:
             motions: of the obstacles.
-            predict: the controller's predictor, one of `PREDICTORS`.
-            fault: the difference of the body from the model.
-            seen: the obstacles that the controller predicts; `motions` if absent.
+            predict: one of `PREDICTORS`.
+            fault: difference between body and model.
+            seen: motions that the controller predicts; `motions` if absent.
         """
         self.motions, self.predict, self.fault = tuple(motions), predict, fault
         self.seen = self.motions if seen is None else tuple(seen)
@@ -250,14 +243,14 @@ class World:
         return {"plant": self.step, "start": self.begin, "data": self.data}
 
     def begin(self, rng: np.random.Generator) -> Vector:
-        """The measured start."""
+        """Set the clock to 0, draw the body of the episode, and return the measured start."""
         self._body, self.states = self.fault.draw(rng), [np.array(paper.START)]
         return self._body.measure(self.states[0], rng)
 
     def step(
         self, _: Vector, action: Vector, rng: np.random.Generator
     ) -> tuple[Vector, float, bool]:
-        """The next state, measured, and the charge of the true one."""
+        """The next state as measured, and the charge of the true state."""
         state = self.states[-1]
         at = self._at[len(self.states) - 1]
         self.states.append(self._body.step(state, action))

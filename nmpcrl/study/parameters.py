@@ -1,4 +1,4 @@
-"""The values that parameters may have: described in words, and checked."""
+"""Checks of parameters, with the allowed values in words."""
 
 import re
 from collections import Counter
@@ -21,7 +21,7 @@ LONGEST = 100  # characters of a value in a message
 
 
 class Unfit(ValueError):
-    """The reason for a refusal: the end of the sentence "NAME = VALUE ..."."""
+    """An unfit value; the message ends the sentence "NAME = VALUE ..."."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Allowed:
     ends: tuple[float, float] | None = None  # the least and the largest, if they are numbers
 
     def check(self, name: str, value: Any) -> Any:
-        """Convert a value to a type of Python's own: an int for NumPy's, a tuple for a list.
+        """Convert a value to a type of Python's own, such as an int for NumPy's.
 
         Raises:
             ParameterError: the parameter `name` may not have this value.
@@ -133,7 +133,7 @@ TRUTH = Allowed("true or false", _truth)
 
 
 def _need(holds: bool) -> None:
-    """Refuse a value for which this does not hold."""
+    """Raise a ValueError if a condition does not hold."""
     if not holds:
         raise ValueError
 
@@ -145,7 +145,7 @@ def is_list(value: Any) -> bool:
 
 
 def refused(name: str, value: Any, text: str) -> ParameterError:
-    """The refusal of a value that must be something else, which `text` says."""
+    """The error for a value that must be as `text` says."""
     return ParameterError(f"{name} = {shown(value)} must be {text}")
 
 

@@ -42,7 +42,7 @@ class Stopped(StrEnum):
 
 
 class Facts(TypedDict):
-    """Facts about a run; the last four are those of `provenance`, once the run is stored."""
+    """Facts about a run; a stored run has the last four."""
 
     stopped: str  # the end of training, as `Stopped` says
     solver: str  # that found the plans
@@ -55,9 +55,9 @@ class Facts(TypedDict):
 
 
 class About(NamedTuple):
-    """The run of a file."""
+    """The experiment and the facts of a file."""
 
-    experiment: dict[str, Any]  # its fields, as the code had them that wrote the file
+    experiment: dict[str, Any]  # the fields when the file was written
     facts: Facts
 
 
@@ -75,13 +75,9 @@ class StepStatus(IntEnum):
 
 
 def final_cost(cost: Vector) -> float:
-    """Noise-free cost at the end of a run: the mean of its last rollouts, `LAST` or fewer.
+    """Mean cost of the last rollouts without noise, `LAST` or fewer, without the first rollout.
 
-    The first rollout, which judges theta_init, does not count. The cost is infinite where a rollout
-    failed, or where training stopped before the second one.
-
-    Args:
-        cost: of every rollout, shape (rollouts,).
+    It is infinite where a rollout failed, and where there is only the rollout of theta_init.
     """
     learned = cost[1:][-LAST:]
     return float(learned.mean()) if learned.size else np.inf
@@ -143,10 +139,10 @@ def _fields(row: type[NamedTuple], shapes: Mapping[str, Any]) -> list[Field]:
 
 
 class Table:
-    """Rows of named numbers and arrays, for which memory is taken once."""
+    """Rows of named numbers and arrays in memory of fixed size."""
 
     def __init__(self, fields: list[Field], capacity: int) -> None:
-        """Take memory for `capacity` rows of `fields`, as `np.dtype` takes them."""
+        """Take memory for `capacity` rows of `fields`, in the form of `np.dtype`."""
         self._rows = np.empty(capacity, fields)
         self._size = 0
 
@@ -156,7 +152,7 @@ class Table:
         self._size += 1
 
     def columns(self) -> dict[str, Column]:
-        """An array for each name, of the rows that were filled."""
+        """The filled rows, as an array for each field."""
         filled = self._rows[: self._size]
         return {name: filled[name].copy() for name in filled.dtype.fields or ()}
 
@@ -181,7 +177,7 @@ class Records:
     facts: Facts
 
     def save(self, path: Path) -> None:
-        """Write the whole file beside `path`, then rename it into place.
+        """Write a complete file beside `path`, then rename it.
 
         Raises:
             OSError: the file cannot be written; an earlier one stays.

@@ -1,13 +1,13 @@
-"""What cannot be done is refused in one sentence, without a traceback where IPython shows it."""
+"""Errors whose message is one sentence, which IPython shows without a traceback."""
 
 
 class Refusal(ValueError):
-    """What was asked for cannot be done; the message is one sentence that says why."""
+    """An impossible request; the message says why."""
 
     def _render_traceback_(self) -> list[str]:
-        """What IPython shows in the place of a traceback, and so Jupyter and papermill."""
+        """The lines that IPython, Jupyter and papermill show for a traceback."""
         return [f"{type(self).__name__}: {self}"]
 
 
 class ParameterError(Refusal):
-    """A parameter is not what it may be; the message names it, its value and what is allowed."""
+    """A value that is not allowed; the message has the parameter, the value, and allowed values."""

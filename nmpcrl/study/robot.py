@@ -66,8 +66,8 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         Args:
             layout: A to F, T01 to T60, or the centres of obstacles; one of the 60 of `TUNE` is
                 drawn at each reset if absent.
-            motions: of the obstacles, where they move; the layout has their first centres then.
-            steps: after so many an episode is truncated.
+            motions: of moving obstacles, whose first centres are the layout.
+            steps: of an episode, which is truncated then.
             render_mode: None or "rgb_array".
             draw: (task, states so far) -> pixels; `gymnasium.make` passes one.
 
@@ -109,7 +109,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         return self._observation(), {"layout": layout}
 
     def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
-        """One period; an action outside the bounds is clipped.
+        """Move for one period; an action outside the bounds is clipped.
 
         Raises:
             gymnasium.error.ResetNeeded: no episode has begun, or it is over.
@@ -131,7 +131,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         return self._observation(), -cost, False, over, {"distance": distance}
 
     def render(self) -> Any:
-        """The layout and the way so far, shape (height, width, 3); None without a render mode.
+        """The layout and the path so far, shape (height, width, 3); None without a render mode.
 
         Raises:
             ParameterError: the environment has no `draw`.
@@ -149,18 +149,10 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
 
 
 class NmpcPolicy:
-    """The NMPC with some theta as a policy of `RobotEnv`: observation -> action.
-
-    The last plan is the warm start; `reset` and another layout forget it.
-    """
+    """The NMPC as a policy of `RobotEnv`; the last plan in a layout is the warm start."""
 
     def __init__(self, theta: Vector | None = None, **options: Any) -> None:
-        """Make the policy.
-
-        Args:
-            theta: NMPC parameters, shape (9,); theta_init if absent.
-            options: of `paper.controller`, such as the horizon.
-        """
+        """Set theta, shape (9,), by default theta_init, and options of `paper.controller`."""
         self.theta = np.array(paper.THETA_INIT if theta is None else theta, float)
         self._options = options
         self._centres: Centres = ()
@@ -174,7 +166,7 @@ class NmpcPolicy:
         """The first input of the plan.
 
         Raises:
-            SolverError: no plan was found, from a standing start either.
+            SolverError: the solver found no plan, from a standing start either.
         """
         state, rest = observation[:3], observation[3:].reshape(-1, 2).tolist()
         centres = tuple((x, y) for x, y in rest)

@@ -28,7 +28,7 @@ from nmpcrl.study.setup import Job, job_of
 from nmpcrl.study.trial import Trial
 
 UNKNOWN = Successor(np.nan)  # of a step without a bootstrap
-UNSOLVED: Any = SimpleNamespace(  # in the place of a solve that failed or was not needed
+UNSOLVED: Any = SimpleNamespace(  # for a solve that failed or was not needed
     value=np.nan,
     features=np.nan,
     restarts=0,

@@ -21,7 +21,7 @@ from nmpcrl.study.trial import Trial
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Everything that a run needs."""
+    """Controller, learner, weights, noise and options of a run."""
 
     stated: dict[str, Any]  # the run's fields, as its records have them
     controller: Persistent
@@ -59,7 +59,7 @@ def job_of(named: Experiment | Trial) -> Job:
 
 
 def _job_of_trial(trial: Trial) -> Job:
-    """The job of a trial; its noise is that of an `Experiment` with the same seed."""
+    """The job of a trial; an `Experiment` with the same seed has the same noise."""
     noise, learner, world, judged = np.random.SeedSequence(trial.seed).spawn(4)
     theta, controller = np.array(trial.theta), Persistent(trial.nmpc)
     explore = Exploration.draw(

@@ -1,7 +1,6 @@
 """A `Trial` names a run of a user's own controller, learner or environment.
 
-`fetch`, `fetch_all` and `run` take a trial as they take an `Experiment`, which names a run of the
-paper's robot. The records of both have the same tables.
+`fetch`, `fetch_all` and `run` take trials and experiments alike; their records have equal tables.
 """
 
 import inspect
@@ -24,7 +23,7 @@ STATED = ("learner", "seed", *COUNTS, "theta")  # fields that the records have
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One run of a user's own.
+    """One run with a user's own parts.
 
     The key of the run holds all fields: after an edit of a function the run is trained again.
     Functions may be defined in a notebook. Generators and networks are made by `make`.
@@ -84,7 +83,7 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """The name of the run; its file is named by the key, too."""
+        """The name of the run; the name of its file has the key, too."""
         plain = re.sub(r"\W+", "_", self.learner)
         return f"{plain}-seed{self.seed}-{self.episodes}ep"
 

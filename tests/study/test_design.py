@@ -1,7 +1,7 @@
 """Sets of runs: sweeps, replicas, and the study with what each run is compared with."""
 
 from collections import Counter
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -9,8 +9,7 @@ import pytest
 from nmpcrl.analysis.summary import RunSummary, separation, summarise
 from nmpcrl.claims.reproduce import FEWEST
 from nmpcrl.report.figures.runs import perturbed as figure
-from nmpcrl.study import Experiment, ParameterError, design, paper, paper_runs, run, sweep
-from nmpcrl.study.departures import DEPARTURES
+from nmpcrl.study import Experiment, ParameterError, design, run, sweep
 from nmpcrl.study.experiment import MAIN, PAPER, frozen_arm
 from nmpcrl.study.learners import DECAYS
 
@@ -60,13 +59,6 @@ def test_a_sweep_refuses_axes(axes, said):
     with pytest.raises(ParameterError) as caught:
         sweep(**axes)
     assert said in str(caught.value)
-
-
-def test_a_chapter_has_five_learners_two_decays_and_its_seeds():
-    runs = paper_runs(episodes=7, seeds=[4, 5])
-    cells = Counter((e.learner, e.decay, e.seed, e.episodes, e.layout) for e in runs)
-    assert cells == Counter((n, d, s, 7, "A") for n in (*PAPER, "frozen") for d in DECAYS
-                            for s in (4, 5))  # fmt: skip
 
 
 def test_a_replica_differs_in_the_twelfth_digit_of_theta_x():
@@ -139,28 +131,3 @@ def test_a_variant_changes_one_thing(name):
             base = replace(experiment, **{key: getattr(default, key) for key in changed})
             assert differing(experiment, base) == changed
             assert base in TABLE
-
-
-@pytest.mark.parametrize("name", design.BASELINES)
-def test_readings_of_des_are_run_in_every_layout_in_both_readings_of_the_decay(name):
-    runs = design.variant(name)
-    learning = {one for one in runs if one.learner != "frozen"}
-    cells = Counter((one.learner, one.network, one.layout, one.decay) for one in learning)
-    assert cells == Counter({("DES", name, layout, d): 5 for layout in "ABCDEF" for d in DECAYS})
-    assert {STUDY[one] for one in learning} == {name}
-    assert set(runs) - learning < TABLE
-
-
-def test_variants_name_known_departures_and_no_two_are_the_same():
-    assert {one.departure for one in design.VARIANTS.values()} - {""} <= set(DEPARTURES)
-    named = Counter(str(sorted(dict(v.fields).items())) for v in design.VARIANTS.values())
-    assert max(named.values()) == 1
-
-
-def test_a_frozen_arm_meets_the_same_noise_and_ignores_what_only_learning_uses():
-    one = Experiment("GES", seed=3, layout="D", decay="episode", beta=1.0, alpha=2.0, horizon=5)
-    arm = frozen_arm(one)
-    assert differing(one, arm) == {"learner", "alpha", "beta"}
-    assert frozen_arm(arm) == arm
-    assert arm.episodes == paper.EPISODES
-    assert {field.name for field in fields(Experiment)} == set(design.FIELDS)

@@ -1,7 +1,6 @@
 """An experiment names one run: what it refuses, that it repeats, and what its records say."""
 
 import dataclasses
-from dataclasses import replace
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -11,7 +10,6 @@ import pytest
 from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.control.codegen import jit
 from nmpcrl.study import Experiment, ParameterError, paper, run
-from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.provenance import key
 from nmpcrl.study.records import Records, StepStatus
@@ -107,18 +105,6 @@ def test_the_centres_of_a_named_layout_are_that_layout():
         assert key(drawn) == key(Experiment(layout=name))
     backwards = Experiment(layout=paper.LAYOUTS["A"][::-1])
     assert key(backwards) != key(Experiment())  # sums are made in their order
-
-
-def test_an_experiment_has_the_task_that_it_names():
-    one = Experiment(layout=DRAWN, start=(0, 1, 2), target=(5, 5, 1), box="soft")
-    np.testing.assert_array_equal(one.task.discs[:2], np.transpose(DRAWN))
-    np.testing.assert_array_equal(one.task.start, (0, 1, 2))
-    np.testing.assert_array_equal(one.task.target, (5, 5, 1))
-    assert one.task.soft_box
-    assert str(one).startswith("ES in layout drawn-")
-    assert frozen_arm(one) == replace(one, learner="frozen")
-    apart = [Experiment(), *(replace(one, **{name: getattr(Experiment(), name)}) for name in MOVED)]
-    assert len({key(e) for e in (one, *apart)}) == 5
 
 
 def test_a_run_among_drawn_obstacles_begins_and_ends_where_it_is_to(tmp_path):

@@ -29,11 +29,9 @@ def test_a_body_without_faults_moves_as_the_robot_to_the_last_bit():
 )
 def test_a_step_straight_ahead(fault, moved):
     np.testing.assert_allclose(fault.draw(RNG(0)).step(STATE, ACTION) - STATE, moved, atol=1e-12)
-
-
-def test_a_bias_turns_a_robot_that_is_not_told_to_turn():
-    body = Fault(bias=0.1).draw(RNG(0))
-    assert body.step(STATE, ACTION)[2] == pytest.approx(0.1 * robot().period)
+    assert Fault(bias=0.1).draw(RNG(0)).step(STATE, ACTION)[2] == pytest.approx(
+        0.1 * robot().period
+    )
 
 
 def test_a_lag_follows_the_input_as_a_first_order_system_does():

@@ -124,22 +124,6 @@ def test_runs_of_the_first_edition_are_read(begins):
     assert lock.is_accepted(made)
 
 
-def test_an_earlier_lock_is_accepted_until_an_epoch_is_raised(tmp_path, monkeypatch):
-    monkeypatch.setattr(lock, "LOCK", tmp_path / "lock.json")
-    lock.relock()
-    made = lock.locked_hash()
-    for edit in ("first", "second"):
-        monkeypatch.setattr(lock, "sources", lambda edit=edit: {"run.py": edit})
-        monkeypatch.setattr(lock, "sources_hash", lambda edit=edit: provenance.hash_of([edit]))
-        assert lock.is_accepted(made)
-        lock.relock()
-    assert lock.is_accepted(made)
-    assert not lock.is_accepted(provenance.hash_of(["third"]))
-    monkeypatch.setitem(provenance.EPOCHS, "study", 2)
-    lock.relock()
-    assert not lock.is_accepted(made)
-
-
 def test_a_warning_names_the_changed_files_once(monkeypatch, capsys):
     then = {**sources(), "learning/updates.py": "another"}
     monkeypatch.setattr(lock, "locked", lambda: then)

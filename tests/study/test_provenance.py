@@ -43,11 +43,6 @@ def test_stored_runs_keep_their_keys(monkeypatch, one, begins):
     assert key(one)[:10] == begins
 
 
-def test_the_key_does_not_depend_on_how_a_value_was_written():
-    assert key(Experiment(alpha=1)) == key(Experiment(alpha=1.0))
-    assert key(Experiment(theta=[1] * 9)) == key(Experiment(theta=(1.0,) * 9))
-
-
 def test_the_centres_of_a_layout_count_and_not_its_letter(monkeypatch):
     before = key(Experiment(layout="A")), key(Experiment(layout="B"))
     monkeypatch.setitem(paper.LAYOUTS, "Z", paper.LAYOUTS["B"])

@@ -11,7 +11,6 @@ import pytest
 
 from nmpcrl.study import DamagedRecords, Experiment, Records
 from nmpcrl.study.records import (
-    StepStatus,
     Table,
     evaluation_fields,
     final_cost,
@@ -59,9 +58,13 @@ def path(tmp_path):
     return tmp_path / "folder" / "run.npz"
 
 
-def test_what_is_saved_is_loaded(path):
-    example().save(path)
-    assert_equal(Records.load(path), example())
+def test_the_latest_saved_run_is_loaded(path):
+    with pytest.raises(FileNotFoundError):
+        Records.load(path)
+    for rows in (400, 40):
+        example(rows).save(path)
+        assert_equal(Records.load(path), example(rows))
+    assert Records.about(path) == (as_read(example().experiment), example().facts)
 
 
 def test_a_run_of_the_first_edition_which_named_its_plant_is_read(path):
@@ -72,29 +75,6 @@ def test_a_run_of_the_first_edition_which_named_its_plant_is_read(path):
     replace(old, experiment={**old.experiment, "plant": "slipping"}).save(path)
     with pytest.raises(DamagedRecords, match="does not say which run"):
         Records.load(path)
-
-
-def test_what_a_run_is_about_can_be_read_alone(path):
-    example().save(path)
-    assert Records.about(path) == (as_read(example().experiment), example().facts)
-
-
-def test_saving_again_replaces_the_file_and_a_missing_file_is_missing(path):
-    with pytest.raises(FileNotFoundError):
-        Records.load(path)
-    for rows in (400, 4):
-        example(rows).save(path)
-        assert_equal(Records.load(path), example(rows))
-
-
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 0.99])
-def test_a_file_cut_short_is_damaged(path, share):
-    example().save(path)
-    content = path.read_bytes()
-    path.write_bytes(content[: int(share * len(content))])
-    for read in (Records.load, Records.about):
-        with pytest.raises(DamagedRecords, match=r"run\.npz"):
-            read(path)
 
 
 def test_a_wrong_byte_is_noticed_or_changes_nothing(path):
@@ -205,11 +185,3 @@ def test_the_filled_rows_of_a_table_become_whole_columns():
 )
 def test_the_final_cost_averages_the_last_rollouts_but_never_the_first(cost, expected):
     assert final_cost(np.array(cost)) == expected
-
-
-@pytest.mark.parametrize(
-    ("failed", "restarts", "status"),
-    [(False, 0, StepStatus.SOLVED), (False, 2, StepStatus.RESTARTED), (True, 2, StepStatus.FAILED)],
-)
-def test_the_status_of_a_step_is_the_worst_of_its_solves(failed, restarts, status):
-    assert StepStatus.of(failed=failed, restarts=restarts) is status

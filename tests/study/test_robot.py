@@ -1,8 +1,5 @@
 """The public tasks for Gymnasium, and the NMPC as a policy in one of them."""
 
-import subprocess
-import sys
-
 import gymnasium
 import numpy as np
 import pytest
@@ -36,12 +33,6 @@ def follow(env, policy, **options):
 def test_gymnasiums_own_checks_pass(layout):
     env = gymnasium.make(ROBOT, layout=layout, render_mode="rgb_array", steps=3)
     check_env(env.unwrapped, skip_render_check=layout is not None)
-
-
-def test_a_module_before_the_name_is_enough():
-    code = 'import gymnasium; print(gymnasium.make("nmpcrl.gym:nmpcrl/Robot-v0").spec.id)'
-    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    assert said.stdout.strip() == "nmpcrl/Robot-v0"
 
 
 @pytest.mark.parametrize("layout", ["A", "E"])

@@ -48,7 +48,7 @@ def test_a_learner_is_what_its_entry_says_and_reads_only_what_its_entry_names(na
 
 
 @pytest.mark.parametrize("name", LEARNERS)
-def test_an_entry_says_how_many_solves_a_step_makes_and_whether_theta_moves(name):
+def test_a_step_makes_the_solves_of_its_entry_and_theta_moves_where_it_says(name):
     wanted = Experiment(name, episodes=2, steps=70)  # a network is fitted in the second
     steps = run(wanted).steps
     assert steps["solves"][-1] == LEARNERS[name].solves + wanted.values_actions

@@ -1,4 +1,4 @@
-"""Problems of other authors, and problems with a known truth: each a plan, a plant and a start."""
+"""Problems of other authors, and with known solutions: each has a plan, a plant and a start."""
 
 from nmpcrl.study.problems import gros_zanon, lqr
 

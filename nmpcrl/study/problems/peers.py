@@ -1,4 +1,4 @@
-"""`gros_zanon` and `lqr` as csnlp and mpcrl have them (F. Airaldi): peers that share no code.
+"""`gros_zanon` and `lqr` in csnlp and mpcrl (F. Airaldi), which share no code with this package.
 
 Plan, plant and agent of `gros_zanon` are those of mpcrl's example of Q-learning: a step of Newton
 for each transition, with the outer product of Q's gradient for a Hessian, and no exploration.
@@ -6,7 +6,7 @@ for each transition, with the outer product of Q's gradient for a Hessian, and n
 
 import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -39,11 +39,10 @@ SOLVERS: Mapping[str, tuple[str, dict[str, Any]]] = MappingProxyType(
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """An episode of the agent; it is shorter where a solve failed."""
+    """An episode of the agent; a failed solve ends it."""
 
     costs: Vector  # of each step
     disturbances: Vector  # e of each step
-    failure: str = ""
 
 
 def run(solver: str, seed: int, steps: int) -> Run:
@@ -54,17 +53,14 @@ def run(solver: str, seed: int, steps: int) -> Run:
         seed: of the disturbance.
         steps: of the episode.
     """
-    world, failure = World(steps), ""
-    with silent():
-        try:
-            agent(gros_zanon_plan(solver)).train(world, episodes=1, seed=seed)
-        except MpcSolverError as error:
-            failure = str(error)
+    world = World(steps)
+    with silent(), suppress(MpcSolverError):
+        agent(gros_zanon_plan(solver)).train(world, episodes=1, seed=seed)
     disturbances = [
         float(later[0] - (gz.TRUE_A @ state + gz.TRUE_B @ action)[0])
         for state, action, later in world.transitions
     ]
-    return Run(np.array(world.costs), np.array(disturbances), failure)
+    return Run(np.array(world.costs), np.array(disturbances))
 
 
 def agent(
@@ -157,7 +153,7 @@ class World(gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: Any = None
     ) -> tuple[Vector, dict[str, Any]]:
-        """Back to the start."""
+        """Return to the start."""
         super().reset(seed=seed)
         self._state = self._start
         return self._state, {}
