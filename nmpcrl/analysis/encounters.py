@@ -1,4 +1,4 @@
-"""How a robot fares among obstacles that move, and how crowded their space and time are."""
+"""Collisions of a robot with moving obstacles, and how crowded a scenario is."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ GRID = 0.1  # [m], of the points at which crowding is counted
 
 
 class Counted(NamedTuple):
-    """How often a robot and obstacles met."""
+    """Contacts of a robot with obstacles."""
 
     inside: int  # states in an obstacle
     collisions: int  # times that an obstacle was entered
@@ -24,7 +24,7 @@ class Counted(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Encounters:
-    """A rollout without noise on the action; the true states are judged, not the measured ones."""
+    """A rollout without noise on the action, by its true states."""
 
     states: Matrix  # true ones, shape (<= K + 2, 3)
     cost: float  # infinite where a solve failed
@@ -33,21 +33,14 @@ class Encounters:
 
 
 def count(states: Matrix, motions: Sequence[Motion]) -> Counted:
-    """The states in an obstacle, and how often one was entered."""
+    """Count the states in an obstacle, and the entries."""
     there = inside(states, motions)
     entered = there[1:] & ~there[:-1]
     return Counted(int(there.any(axis=1).sum()), int(entered.sum() + there[:1].sum()))
 
 
 def judged(nmpc: Persistent, theta: Vector, world: World, seed: int = 0) -> Encounters:
-    """Follow the policy of theta through an episode.
-
-    Args:
-        nmpc: acts.
-        theta: its parameters.
-        world: where.
-        seed: of what the world draws.
-    """
+    """An episode of the policy of theta in a world; the seed is of the world's noise."""
     rng = np.random.default_rng(seed)  # the published draws
     rollout = evaluate(nmpc, theta, paper.STEPS, rng=rng, **world.environment)
     states = np.array(world.states[: len(rollout.costs) + 1])
@@ -58,10 +51,10 @@ def judged(nmpc: Persistent, theta: Vector, world: World, seed: int = 0) -> Enco
 
 
 def crowding(motions: Sequence[Motion]) -> float:
-    """The share of space and time that obstacles take: points of a grid between start and target.
+    """The share of space and time that obstacles cover between start and target.
 
-    The rectangle from start to target, as high as a disc to either side; each point at the time
-    at which a robot at constant speed along x would be there, within five seconds.
+    The points are a grid of the rectangle from start to target, enlarged by a disc to either side;
+    each at the time of a robot with constant speed along x, five seconds earlier to later.
     """
     start, target = np.array(paper.START[:2]), np.array(paper.TARGET[:2])
     low, high = np.minimum(start, target), np.maximum(start, target)

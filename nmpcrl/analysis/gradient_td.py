@@ -1,4 +1,4 @@
-"""A step of GES taken apart: how it differs from a step of ES."""
+"""The two parts of a step of GES: the semi-gradient of ES, and the correction."""
 
 from dataclasses import dataclass
 
@@ -15,18 +15,21 @@ from nmpcrl.study.setup import controller_of
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """What moves theta in each step of a run of GES."""
+    """The two parts of each step of a run of GES."""
 
     episode: Vector  # of each step, shape (steps,)
     semi_gradient: Matrix  # delta phi, shape (steps, d)
     correction: Matrix  # gamma (w'phi) phi+, shape (steps, d)
     delta: Vector  # TD errors
-    predicted: Vector  # w'phi, what w expects delta to be
+    predicted: Vector  # w'phi, the prediction of delta
 
     @property
     def lengths(self) -> tuple[Vector, Vector]:
         """Norms of the semi-gradients and of the corrections."""
-        return _norm(self.semi_gradient), _norm(self.correction)
+        first, second = (
+            np.linalg.norm(one, axis=1) for one in (self.semi_gradient, self.correction)
+        )
+        return first, second
 
     @property
     def share(self) -> float:
@@ -36,13 +39,13 @@ class Directions:
 
     @property
     def net(self) -> float:
-        """How far theta got, over how far the semi-gradients that it met add up to."""
+        """Distance that theta moved over the length of the summed semi-gradients."""
         went = (self.semi_gradient - self.correction).sum(axis=0)
         return float(np.linalg.norm(went) / np.linalg.norm(self.semi_gradient.sum(axis=0)))
 
 
 def directions(records: Records) -> Directions:
-    """Take the steps of a run of GES apart: the correction is what theta did not do of delta phi.
+    """The parts of the steps of a run of GES.
 
     Eq. (16) gives gamma (w'phi) phi+ = delta phi - (theta' - theta) / alpha, without a solve.
     """
@@ -56,14 +59,9 @@ def directions(records: Records) -> Directions:
     return Directions(*(column[known] for column in columns))
 
 
-def _norm(vectors: Matrix) -> Vector:
-    result: Vector = np.linalg.norm(vectors, axis=1)
-    return result
-
-
 @dataclass(frozen=True, eq=False)
 class Curvature:
-    """Sizes of the printed direction and of the dropped term at sampled steps of one run."""
+    """Lengths of the printed direction and of the dropped term at sampled steps of one run."""
 
     episode: Vector
     direction: Vector  # ||delta phi - gamma (w'phi) phi+||
@@ -71,16 +69,16 @@ class Curvature:
 
     @property
     def ratio(self) -> Vector:
-        """How large the dropped term is beside what is printed."""
+        """Length of the dropped term over the length of the printed direction."""
         return self.dropped / self.direction
 
 
 def dropped_curvature(records: Records, *, samples: int = 200) -> Curvature:
-    """Evaluate h along a run of GES, at steps spread evenly over training.
+    """The dropped term h of a run of GES, at steps spread evenly over training.
 
     Args:
         records: a run of GES.
-        samples: how many steps to look at; those at which the Hessian does not exist are left out.
+        samples: number of steps; steps without a Hessian are skipped.
     """
     steps, gamma = records.steps, paper.GAMMA
     nmpc = controller_of(Experiment(**records.experiment)).nmpc

@@ -1,4 +1,4 @@
-"""Does the network need theta? Two networks, the same examples, and episodes that neither saw."""
+"""Does the network need theta? Two networks fitted to the same examples, tested on others."""
 
 from dataclasses import dataclass
 
@@ -9,16 +9,16 @@ from nmpcrl.analysis import metrics
 from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 
-HELD_OUT = 5  # every fifth episode is kept from the networks
-FITS = 4000  # mini-batches that each network is given
+HELD_OUT = 5  # every fifth episode is for testing
+FITS = 4000  # mini-batches of each network
 
 
 @dataclass(frozen=True, eq=False)
 class Imitation:
-    """What two networks make of the held-out steps of one run."""
+    """The predictions of two networks in the held-out steps of one run."""
 
     episode: Vector  # of each held-out step
-    value: Vector  # V_theta(s), what they should say
+    value: Vector  # V_theta(s), the exact value
     without_theta: Vector  # prediction from (s, a), as in DES
     with_theta: Vector  # prediction from (s, a, theta), as in RDES
 
@@ -28,16 +28,16 @@ class Imitation:
 
     @property
     def ratio(self) -> float:
-        """Error with theta over error without; theta helps where this is below 1."""
+        """Error with theta over error without; theta helps if the ratio is below 1."""
         return self.error("with_theta") / self.error("without_theta")
 
 
 def imitate(records: Records, *, fits: int = FITS, seed: int = 0) -> Imitation:
-    """Fit the networks of DES and RDES to the same run, and let both predict held-out episodes.
+    """Fit the networks of DES and RDES to one run, and predict its held-out episodes with both.
 
     Args:
         records: a run whose theta moved; every `HELD_OUT`-th episode is held out.
-        fits: mini-batches a network is given.
+        fits: mini-batches of each network.
         seed: of weights and batches, the same for both networks.
     """
     from nmpcrl.learning.network import QNetwork  # and with it torch

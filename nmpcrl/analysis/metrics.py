@@ -11,15 +11,15 @@ from nmpcrl.study import paper
 from nmpcrl.study.records import Column, Records, StepStatus
 from nmpcrl.study.records import final_cost as records_final_cost
 
-TOUCH = 1e-6  # a violation this small is the solver's tolerance, not a violation
-TIGHT = 0.999  # cosine from which two features are called parallel
-LATE = 20  # episodes that stand for the end of training; at most the second half
+TOUCH = 1e-6  # largest violation that is within the solver's tolerance
+TIGHT = 0.999  # least cosine of parallel features
+LATE = 20  # episodes at the end of training; at most the second half
 
 
 def training_cost(records: Records) -> Vector:
     """Sum of the RL cost over each episode, noise included, shape (episodes,): Figs. 1 and 2.
 
-    nan for an episode that a failed solve cut short, or that was never reached.
+    nan for an episode that a failed solve cut short, or that the run did not reach.
     """
     steps = records.steps
     episodes, length = records.experiment["episodes"], records.experiment["steps"]
@@ -29,7 +29,7 @@ def training_cost(records: Records) -> Vector:
 
 
 def noise_free_cost(records: Records) -> tuple[Column, Vector]:
-    """After how many episodes theta was judged without noise, and the cost it then had."""
+    """The episodes before each rollout without noise, and the rollout's cost."""
     return records.evaluations["episode"], records.evaluations["cost"]
 
 
@@ -55,20 +55,20 @@ def final_rollout(records: Records) -> tuple[Column, Column]:
 
 
 def gain(records: Records) -> float:
-    """Share of the noise-free cost that learning took away; negative if it added."""
+    """Relative reduction of the noise-free cost by learning."""
     return 1 - final_cost(records) / initial_cost(records)
 
 
 def late_cost_range(records: Records) -> float:
-    """Range of the noise-free cost over the second half of training, as a share of the first's.
+    """Range of the noise-free cost in the second half of training, relative to the initial cost.
 
-    Infinite where a rollout failed, or training did not get that far.
+    Infinite if a rollout failed, or training ended earlier.
     """
     return late_cost_range_of(*noise_free_cost(records), records.experiment["episodes"])
 
 
 def late_cost_range_of(episode: Column, cost: Vector, episodes: int) -> float:
-    """`late_cost_range` from the rollouts' episodes and costs; the first one judged theta_init."""
+    """`late_cost_range` by the rollouts' episodes and costs; the first is under theta_init."""
     late = cost[episode >= episodes / 2]
     if not late.size or not np.isfinite(late).all():
         return np.inf
@@ -76,27 +76,23 @@ def late_cost_range_of(episode: Column, cost: Vector, episodes: int) -> float:
 
 
 def late_training_cost(cost: Vector) -> float:
-    """Median training cost of the last `LATE` episodes, or of the second half if that is fewer.
+    """Median of `training_cost` over the last `LATE` episodes, or over a shorter second half.
 
-    An episode that was cut short, or never reached, costs infinitely much.
-
-    Args:
-        cost: of each episode, as `training_cost` gives it, shape (episodes,).
+    An episode whose cost is nan costs infinitely much.
     """
     window = min(LATE, max(1, len(cost) // 2))
     return float(np.median(np.nan_to_num(cost[-window:], nan=np.inf)))
 
 
 def cost_ratio(cost: Vector, frozen: Vector) -> float:
-    """`late_training_cost` of a run over that of its frozen arm, which meets the same noise.
+    """`late_training_cost` of a run over that of the frozen learner under the same noise.
 
-    Infinite where the run lost half of its late episodes, so that it diverged; 0 where the frozen
-    arm did and the run did not; nan where both did. Then the frozen theta fares no better than the
-    one that was learned, and whether learning diverged cannot be said: the answer is missing.
+    Infinite if the run alone lost half of its late episodes, 0 if the frozen learner alone did,
+    nan (not known) if both did.
 
     Args:
-        cost: of each episode of the run, as `training_cost` gives it, shape (episodes,).
-        frozen: that of the run of the frozen learner with the same seed, layout and decay.
+        cost: `training_cost` of the run.
+        frozen: `training_cost` of the frozen learner with the same seed, layout and decay.
     """
     return late_training_cost(cost) / late_training_cost(frozen)
 
@@ -113,22 +109,19 @@ def theta_distance(a: Records, b: Records) -> float:
 
 
 def obstacle_violations(states: Column, task: Task) -> Vector:
-    """Xi of the worst obstacle, where it is above 0 by more than `TOUCH`: one value a violation."""
+    """Xi of the worst obstacle in each state in which it is above `TOUCH`."""
     worst = task.overlap(states).max(axis=-1)
     result: Vector = worst[worst > TOUCH]
     return result
 
 
 def input_violations(actions: Column, lower: Vector, upper: Vector) -> int:
-    """How many actions leave the action space by more than `TOUCH`."""
+    """Number of actions that leave the action space by more than `TOUCH`."""
     return int(((actions < lower - TOUCH) | (actions > upper + TOUCH)).any(axis=-1).sum())
 
 
 def boundary_share(records: Records, task: Task) -> float:
-    """Share of the steps whose state lies on a boundary Xi + theta_c = 0, where V has a kink.
-
-    theta is the one that the step was solved with.  # departure L
-    """
+    """Share of the steps in a state with Xi + theta_c = 0, where V has a kink.  # departure L"""
     edge = task.overlap(records.steps["state"]) + theta_before(records)[:, -1:]
     return float((np.abs(edge) <= TOUCH).any(axis=-1).mean())
 
@@ -140,15 +133,15 @@ def memory(records: Records) -> float:
 
 
 def theta_before(records: Records) -> Vector:
-    """theta that each step was solved with, shape (steps, d)."""
+    """theta of the solve of each step, shape (steps, d)."""
     return np.vstack([records.experiment["theta"], records.steps["theta"][:-1]])
 
 
 def online_error(records: Records) -> Vector:
-    """What each step took for Q(s+, a+) minus what it was; nan where that is not known.
+    """Predicted minus true Q(s+, a+) of each step; nan where the true value is not known.
 
-    The next step of the episode solves in s+, but with the theta that this step moved. Its value is
-    carried back by the gradient: V_theta(s+) = V_theta'(s+) - phi+'(theta' - theta) to first order.
+    The next step of the episode solves in s+ with theta' of this step's update. To first order
+    V_theta(s+) = V_theta'(s+) - phi+'(theta' - theta).
     """
     steps = records.steps
     move = steps["theta"] - theta_before(records)
@@ -173,7 +166,7 @@ def root_mean_square(values: Vector) -> float:
 
 
 def next_over_this(records: Records) -> Vector:
-    """gamma phi'phi+ / phi'phi, step by step: above 1 a semi-gradient step feeds itself."""
+    """gamma phi'phi+ / phi'phi of each step: above 1 a semi-gradient step enlarges delta."""
     steps = records.steps
     this, after = steps["features"][:-1], steps["features"][1:]
     ratio = paper.GAMMA * np.sum(this * after, axis=1) / np.sum(this**2, axis=1)
@@ -183,7 +176,7 @@ def next_over_this(records: Records) -> Vector:
 
 
 def parallel_share(records: Records) -> float:
-    """Share of the steps whose phi and phi+ point the same way, to a cosine of `TIGHT`."""
+    """Share of the steps whose phi and phi+ are parallel, to a cosine of `TIGHT`."""
     steps = records.steps
     this, after = steps["features"][:-1], steps["features"][1:]
     cosine = np.sum(this * after, axis=1) / (

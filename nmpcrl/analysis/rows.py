@@ -1,7 +1,6 @@
-"""Runs as tables: one row a run, with its name and its outcome.
+"""Tables of runs: one row a run, with the columns of `FIELDS` and `OUTCOME`.
 
-The columns are `FIELDS`, the fields of the experiment, and then `OUTCOME`. `runs.csv`, every
-verdict and every table of the book rest on them.
+`runs.csv`, every verdict and every table of the book use these columns.
 """
 
 from collections.abc import Iterable, Mapping
@@ -24,8 +23,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FIELDS = tuple(one.name for one in fields(Experiment))
-NAMES = ("learner", "layout", "decay", "seed", "episodes")  # without them a row names no run
-VECTORS = ("theta", "start", "target")  # fields that a row holds as text
+NAMES = ("learner", "layout", "decay", "seed", "episodes")  # required to name a run
+VECTORS = ("theta", "start", "target")  # fields written as text
 THETA = tuple(f"theta_{i}" for i in range(len(paper.THETA_INIT)))  # the final theta, by component
 INSIDE = tuple(f"inside_{size}" for size in SIZES)  # states in an obstacle: in training,
 EVAL_INSIDE = tuple(f"eval_{name}" for name in INSIDE)  # and without noise
@@ -43,7 +42,7 @@ OUTCOME = (
 
 
 def as_text(value: Any) -> Any:
-    """A field as a table holds it: a vector's numbers between blanks."""
+    """A field in a table: a vector is written as its numbers between blanks."""
     return " ".join(map(repr, value)) if isinstance(value, tuple | list) else value
 
 
@@ -87,9 +86,7 @@ def row(summary: RunSummary) -> dict[str, Any]:
 
 
 def experiment_of(row: Mapping[str, Any]) -> Experiment:
-    """The experiment that a `row` summarises.
-
-    A field for which an older table has no column has the value that all runs had before it.
+    """The experiment of a `row`; a field without a column has its value in all older runs.
 
     Raises:
         LookupError: one of `NAMES` is missing.
@@ -103,8 +100,8 @@ def experiment_of(row: Mapping[str, Any]) -> Experiment:
 
 
 def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> "pd.DataFrame":
-    """One `row` a run, with `cost_ratio` as `cost_ratios` gives it."""
-    import pandas as pd  # not for those who only make summaries
+    """One `row` a run, with the column `cost_ratio` of `cost_ratios`."""
+    import pandas as pd
 
     listed = list(summaries.values() if isinstance(summaries, Mapping) else summaries)
     rows = {one.name: row(one) for one in listed}
@@ -113,7 +110,7 @@ def table(summaries: Mapping[Experiment, RunSummary] | Iterable[RunSummary]) -> 
 
 
 def cost_ratios(rows: Mapping[Experiment, Mapping[str, Any]]) -> dict[Experiment, float]:
-    """`metrics.cost_ratio` of each `row`; nan where its frozen arm is not among them."""
+    """`metrics.cost_ratio` of each `row`; nan without the row of the frozen learner."""
     arms = {e: rows.get(frozen_arm(e)) for e in rows}
     return {
         e: one["training_cost"] / arm["training_cost"] if (arm := arms[e]) else np.nan
@@ -122,7 +119,7 @@ def cost_ratios(rows: Mapping[Experiment, Mapping[str, Any]]) -> dict[Experiment
 
 
 def tidy(summaries: Iterable[RunSummary]) -> "pd.DataFrame":
-    """One row an episode of each run: what names the run, and the columns that are numbers."""
+    """One row an episode of each run: learner, layout, decay, seed and the columns of numbers."""
     import pandas as pd
 
     named = ("learner", "layout", "decay", "seed")
@@ -143,11 +140,11 @@ def _median(values: Vector) -> float:
 
 
 def _totals(names: Iterable[str], table: Mapping[str, Column]) -> dict[str, int]:
-    """How many states are in an obstacle, by `SIZES`."""
+    """Number of states in an obstacle, by `SIZES`."""
     return dict(zip(names, map(int, table["inside"].sum(axis=0)), strict=True))
 
 
 def _last_known(theta: Column, first: Iterable[float]) -> list[float]:
-    """theta after the last episode that was reached."""
+    """theta after the last episode that the run reached."""
     reached = np.flatnonzero(np.isfinite(theta).all(axis=1))
     return [*map(float, theta[reached[-1]] if reached.size else first)]

@@ -1,9 +1,8 @@
-"""Searches for theta that use nothing but the costs of rollouts without noise.
+"""Searches for theta by the costs of rollouts without noise.
 
-Each direct search calls `cost` at most as often as its budget says, the first time with the start,
-and returns the theta whose rollout cost least; the same seed finds the same theta. `search` is one
-long CMA-ES in a layout, which no learner's budget allows. Its result bounds the best theta from
-one side: a longer search may find a better one.
+A direct search calls `cost` at most `budget` times, first with the start, and returns the theta of
+least cost; its result depends on the seed alone. `search` is one CMA-ES in a layout, longer than
+any learner's budget: a lower bound of the possible gain.
 """
 
 from bisect import bisect
@@ -20,21 +19,21 @@ from nmpcrl.study.jobs import parallel
 from nmpcrl.study.parameters import LARGEST_SEED, Allowed, one_of, whole
 
 SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
-LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # where theta is looked for
-FAILED = 1e6  # stands for the cost of a rollout on which a solve failed
+LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # bounds of theta
+FAILED = 1e6  # cost of a rollout in which a solve failed
 POINTS = 11  # of the grid
-WIDEST = 0.35  # theta_c at which the grid ends: d_o, where the penalty vanishes  # departure N
-STEP = 0.1  # SPSA: of each component in the first iteration, and the most later, in `SCALE`s
+WIDEST = 0.35  # last theta_c of the grid: d_o, where the penalty vanishes  # departure N
+STEP = 0.1  # SPSA: of each component, in the first iteration and at most, in `SCALE`s
 PERTURBED = 0.05  # SPSA: distance of the two rollouts of an iteration from theta
 DECAY, FADING = 0.602, 0.101  # SPSA: exponents of the step and of the perturbation
 SPREAD = 0.3  # CMA-ES: of the first rollouts, in `SCALE`s
 NEARBY = 1.0  # Bayes: largest distance from the start, in `SCALE`s
-BUDGET = 2000  # rollouts of a published long search,
-CHECK = 200  # of which a build repeats these,
-LEAST = 40  # and the fewest: the first one and some generations
+BUDGET = 2000  # rollouts of a published long search
+CHECK = 200  # rollouts that a build repeats of a published search
+LEAST = 40  # rollouts of the shortest search: the first one and some generations
 ALLOWED: Mapping[str, Allowed] = {  # by field of `Search`
     "layout": one_of(paper.LAYOUTS),
-    "seed": whole(0, LARGEST_SEED - 1),  # CMA-ES is given one more
+    "seed": whole(0, LARGEST_SEED - 1),  # CMA-ES gets seed + 1
     "budget": whole(LEAST, 100_000),
 }
 Cost = Callable[[Vector], float]  # theta -> cost of a rollout; infinite where a solve failed
@@ -42,14 +41,10 @@ Direct = Callable[..., Vector]  # (cost, start, budget, seed, **settings) -> the
 
 
 class Tried:
-    """The rollouts of a search, in units of `SCALE`, of which there are at most `budget`."""
+    """The rollouts of a search, at most `budget`, at points in units of `SCALE`."""
 
     def __init__(self, cost: Cost, start: Vector, budget: int) -> None:
-        """Make the first rollout.
-
-        Raises:
-            ValueError: the budget has no room for it.
-        """
+        """Make the first rollout; ValueError for a budget below 1."""
         if budget < 1:
             raise ValueError(f"budget = {budget} must be at least 1 rollout")
         self._cost, self._budget = cost, budget
@@ -59,7 +54,7 @@ class Tried:
         self(np.asarray(start, float) / SCALE)
 
     def __call__(self, point: Vector) -> float:
-        """The cost of a rollout; `FAILED` where a solve failed."""
+        """The cost of a rollout; `FAILED` if a solve failed."""
         assert self.left, "the search goes beyond its budget"
         self.points.append(point)
         self.costs.append(self._cost(point * SCALE))
@@ -67,12 +62,12 @@ class Tried:
 
     @property
     def left(self) -> int:
-        """Rollouts that may still be made."""
+        """Rollouts left of the budget."""
         return self._budget - len(self.costs)
 
     @property
     def best(self) -> Vector:
-        """The first point whose cost is least."""
+        """The first point of least cost."""
         return self.points[int(np.argmin(self.costs))]
 
     @property
@@ -87,7 +82,7 @@ class Tried:
         Args:
             spread: of the first rollouts, in units of `SCALE`.
             seed: of the candidates.
-            least: rollouts of a generation for which there must be room, 0 for all of them.
+            least: rollouts left with which a generation may begin; 0 for a complete generation.
         """
         import cma  # takes a second
 
@@ -121,7 +116,7 @@ def spsa(
 
     g = (y+ - y-) / (2 c_k) sign, theta <- theta - a_k g, with a_k = a / (k + 1 + A)^0.602 and
     c_k = perturbed / (k + 1)^0.101; `a` is such that the first step is `step` long in each
-    component. A rollout that is left over judges the last theta.  Source: Spall (1998).
+    component. The last rollout of an even budget judges the last theta.  Source: Spall (1998).
     """
     tried, rng = Tried(cost, start, budget), np.random.default_rng(seed)
     point, delay, a, k = np.asarray(start, float) / SCALE, budget / 20, 0.0, 0
@@ -143,10 +138,7 @@ def spsa(
 def cma_es(
     cost: Cost, start: Vector, budget: int, seed: int = 0, *, spread: float = SPREAD
 ) -> Vector:
-    """CMA-ES, begun anew from the best point where it has converged.
-
-    A generation that the budget cuts off is made as far as the budget goes.
-    """
+    """CMA-ES, restarted from the best point after convergence; the last generation may be cut."""
     tried, again = Tried(cost, start, budget), 0
     while tried.left:
         tried.descend(spread, 1 + (seed + 7919 * again) % (2**31 - 2))  # 0 would mean the clock
@@ -159,8 +151,8 @@ def bayesian(
 ) -> Vector:
     """Bayesian optimisation by tree-structured Parzen estimators; Bergstra et al. (2011).
 
-    Its first rollouts are drawn from the box within `nearby` of the start: hardly any theta of the
-    full box brings the robot to its target.
+    Thetas are drawn within `nearby` of the start: few thetas of the full box bring the robot to
+    its target.
 
     Raises:
         ImportError: Optuna is not installed; the extra `nmpcrl[search]` has it.
@@ -195,14 +187,10 @@ SEARCHES: dict[str, Direct] = {"grid": grid, "SPSA": spsa, "CMA-ES": cma_es, "Ba
 
 @dataclass(frozen=True)
 class Search:
-    """One long search; the same one finds the same theta.
-
-    Raises:
-        ParameterError: a field is not what it may be.
-    """
+    """The name of a long search; ParameterError for a field out of its range."""
 
     layout: str = "A"
-    seed: int = 0  # of the candidates that are drawn
+    seed: int = 0  # of the candidates
     budget: int = BUDGET  # rollouts without noise
 
     def __post_init__(self) -> None:
@@ -212,12 +200,12 @@ class Search:
 
 @dataclass(frozen=True)
 class Found:
-    """Where a search ended, and each improvement on the way; the first rollout is theta_init's."""
+    """The result of a search and each improvement; the first rollout is under theta_init."""
 
     theta: tuple[float, ...]
     made: int  # rollouts in all
-    rollouts: tuple[int, ...]  # at this one, from 1 on, ...
-    best: tuple[float, ...]  # ... the lowest cost so far fell to this
+    rollouts: tuple[int, ...]  # number of the rollout of each improvement, from 1 on
+    best: tuple[float, ...]  # lowest cost from there on
 
     @property
     def initial(self) -> float:
@@ -235,7 +223,7 @@ class Found:
         return 1 - self.cost / self.initial
 
     def after(self, rollouts: int) -> float:
-        """The lowest cost of so many rollouts, which a search with a smaller budget ends with."""
+        """The lowest cost of the first rollouts: the end of a search with a smaller budget."""
         return self.best[bisect(self.rollouts, rollouts) - 1]
 
 
@@ -256,7 +244,7 @@ def search(wanted: Search) -> Found:
 
 
 def to_make(wanted: Iterable[Search], known: Mapping[Search, Found]) -> tuple[Search, ...]:
-    """The searches that are not known, and the first `CHECK` rollouts of the known ones."""
+    """The searches that are not known, and the first `CHECK` rollouts of known ones."""
     return tuple(replace(one, budget=CHECK) if one in known else one for one in wanted)
 
 

@@ -1,9 +1,9 @@
-"""The suite: any learner, tuner or policy, judged where it was not tuned, within a budget.
+"""The suite: judges learners, tuners and policies within a budget, in places of no tuning.
 
-An entry gets a `Robot` in one place, spends at most the budget of episodes, and returns theta or a
-policy, which a rollout without noise judges. A place is a layout of the obstacles or a scenario in
-which they move; it is *solved* if under every seed the robot ends at the target and the rollout
-costs no more than under theta_init. Intervals are over places.
+An entry gets a `Robot` in one place, begins at most the budget of episodes, and returns theta or a
+policy, which a rollout without noise judges. A place is a layout of the obstacles or a scenario of
+moving obstacles. A place is *solved* if under every seed the robot ends at the target and the
+rollout costs no more than under theta_init. Intervals are over places.
 
     >>> judge(entry("CMA-ES[spread=0.1]"), "J001", seed_of("J001", 0), 50).cost  # doctest: +SKIP
 """
@@ -22,16 +22,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.analysis.encounters import count
-from nmpcrl.analysis.search import (
-    LOWER,
-    NEARBY,
-    PERTURBED,
-    SCALE,
-    SEARCHES,
-    SPREAD,
-    STEP,
-    UPPER,
-)
+from nmpcrl.analysis.search import LOWER, NEARBY, PERTURBED, SCALE, SEARCHES, SPREAD, STEP, UPPER
 from nmpcrl.analysis.statistics import interquartile_mean, rate
 from nmpcrl.control import SolverError, Task
 from nmpcrl.learning import Diverged, Exploration, Learner, Step, Weights, policy_gradient, train
@@ -61,14 +52,14 @@ from nmpcrl.study.setup import prepare
 if TYPE_CHECKING:
     import pandas as pd
 
-EPISODES, SEEDS = 300, 2  # a place and seed; a place
+EPISODES, SEEDS = 300, 2  # by default: budget of a judgement, seeds of a place
 MOST_EPISODES, MOST_SEEDS = 10_000, 100
-HELD_OUT = 1_000_000  # the first seed; the study's are below 100
-TOLERANCE = 1e-9  # of a cost that must not exceed another
-EPOCH = 1  # raised by hand where an edit of the suite or its entries changes a number
+HELD_OUT = 1_000_000  # the first seed; the study's seeds are below 100
+TOLERANCE = 1e-9  # relative, of two costs that are compared
+EPOCH = 1  # raised by hand if an edit of the suite or its entries changes a number
 LAYOUTS: Mapping[str, Centres] = {**JUDGE, **TUNE, **paper.LAYOUTS}
 THETA = np.array(paper.THETA_INIT)
-BOUNDS = (LOWER, UPPER)  # of theta where a step may be long
+BOUNDS = (LOWER, UPPER)  # of theta, for learners with a trust region
 
 Policy = Callable[[Vector], Vector]  # observation of `nmpcrl/Robot-v0` -> action
 Change = Callable[..., Learner]  # (learner, robot, **settings)
@@ -88,9 +79,8 @@ class NoEntry(Refusal):
 class Robot:
     """The robot in one place, with a budget of episodes.
 
-    An episode counts from its first step, whether it trains, confirms or tunes: by `train`, by
-    `rollout` and `cost`, or by a reset of `env`. Among obstacles that move the controller plans
-    with the velocity of each obstacle seen since the step before, and `task` has no obstacle.
+    An episode of `train`, `rollout`, `cost` or `env` counts from its first step. Among moving
+    obstacles the controller extrapolates each obstacle's last movement, and `task` has no obstacle.
     """
 
     def __init__(self, place: str | Centres, budget: int, seed: int) -> None:
@@ -98,8 +88,8 @@ class Robot:
 
         Args:
             place: name of a layout or of a scenario (J001, T01, A, M01), or centres [m].
-            budget: episodes that may be begun.
-            seed: of all that an entry draws.
+            budget: largest number of episodes.
+            seed: of everything that an entry draws.
         """
         self.motions: Scenario = SCENARIOS.get(place, ()) if isinstance(place, str) else ()
         self.budget, self.seed, self.begun = budget, seed, 0
@@ -116,42 +106,31 @@ class Robot:
 
     @property
     def left(self) -> int:
-        """Episodes that may still be begun."""
+        """Episodes left of the budget."""
         return max(self.budget - self.begun, 0)
 
     def train(
-        self,
-        learner: Learner,
-        weights: Weights,
-        explore: Exploration,
-        *,
-        constrained: bool = False,
+        self, learner: Learner, weights: Weights, explore: Exploration, **options: Any
     ) -> Iterator[Step]:
-        """`learning.train` in this place.
+        """`learning.train` in this place, with its options, such as `constrained`.
 
         Raises:
             OverBudget: an episode is begun beyond the budget.
             Diverged: as `learning.train`.
         """
-        return train(
-            learner, self.controller, weights, explore, constrained=constrained, **self._world()
-        )
+        return train(learner, self.controller, weights, explore, **options, **self._world())
 
     def rollout(self, theta: Vector) -> Rollout:
-        """`learning.evaluate`: an episode without noise under the policy of theta.
-
-        Raises:
-            OverBudget: it is beyond the budget.
-        """
+        """`learning.evaluate` in this place: an episode without noise; OverBudget as `train`."""
         return evaluate(self.controller, theta, paper.STEPS, **self._world())
 
     def cost(self, theta: Vector) -> float:
-        """The summed cost of `rollout`; infinite where a solve failed."""
+        """The summed cost of `rollout`; infinite if a solve failed."""
         return self.rollout(theta).cost
 
     def env(self) -> Any:
         """`nmpcrl/Robot-v0` in this place; every reset counts as an episode."""
-        from nmpcrl.study.robot import RobotEnv  # Gymnasium, which few entries need
+        from nmpcrl.study.robot import RobotEnv  # imports Gymnasium, which few entries need
 
         robot = self
 
@@ -189,7 +168,7 @@ class Robot:
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A learner, tuner or policy with its settings; called with a `Robot` it returns what it found.
+    """A learner, tuner or policy with its settings: a function of a `Robot`.
 
     >>> str(ENTRIES["CMA-ES"].with_settings(spread=0.1))
     'CMA-ES[spread=0.1]'
@@ -198,7 +177,7 @@ class Entry:
     name: str
     run: Callable[..., Any]  # (robot, settings by name) -> theta or `Policy`
     defaults: Mapping[str, float] = field(default_factory=dict)
-    changed: Mapping[str, float] = field(default_factory=dict)  # settings that differ from these
+    changed: Mapping[str, float] = field(default_factory=dict)  # settings other than the default
 
     def with_settings(self, **settings: float) -> "Entry":
         """The entry with other settings.
@@ -223,7 +202,7 @@ class Entry:
         return {**self.defaults, **self.changed}
 
     def __call__(self, robot: Robot) -> Any:
-        """Theta, or a policy; spends at most the robot's budget."""
+        """Theta or a policy, within the robot's budget."""
         return self.run(robot, **self.settings)
 
     def __str__(self) -> str:
@@ -235,17 +214,14 @@ class Entry:
 def learned(
     robot: Robot, *, learner: str = "ES", change: Change | None = None, **settings: float
 ) -> Vector:
-    """Train a learner of the study, changed or not, as long as the budget lasts.
+    """The last finite theta of a learner of the study, trained as long as the budget lasts.
 
     Args:
-        robot: where.
+        robot: where the learner trains.
         learner: its name in the study.
-        change: (learner, robot, settings by name) -> the learner that is trained.
-        settings: alpha, to which beta of GES and TDC keeps its ratio; `every`, the episodes
-            between two rollouts that confirm and count; others for `change`.
-
-    Returns:
-        The last theta with which a solver can be called.
+        change: (learner, robot, settings by name) -> the learner that is trained in its place.
+        settings: alpha, in proportion to which beta of GES and TDC changes; `every`, the episodes
+            between two confirming rollouts, which count; others for `change`.
     """
     every = int(settings.get("every", 0))
     episodes = (robot.budget - 1) * every // (every + 1) if every else robot.budget
@@ -272,7 +248,7 @@ def learned(
 
 
 def searched(robot: Robot, *, search: str, **settings: float) -> Vector:
-    """The theta whose rollout cost least in a direct search from theta_init."""
+    """The theta of least cost in a direct search from theta_init."""
     return SEARCHES[search](robot.cost, THETA, robot.budget, robot.seed, **settings)
 
 
@@ -280,29 +256,12 @@ def _guarded(learner: Learner, _: Robot, alpha: float) -> Learner:
     return guarded(learner, alpha)
 
 
-def _control(learner: Learner, _: Robot, alpha: float) -> Learner:
-    return directed(guarded(learner, alpha), alpha)
-
-
-def _averaged(learner: Learner, robot: Robot, **_: float) -> Learner:
-    return averaged(learner, skip=robot.budget * paper.STEPS // 2)
-
-
-def _lstd_q(_: Learner, robot: Robot, radius: float) -> Learner:
-    return lstd_q_within(robot.controller, TrustRegion(radius, SCALE), bounds=BOUNDS)
-
-
 def _gn_j(_: Learner, robot: Robot, radius: float) -> Learner:
     return closed_loop(robot.controller, TrustRegion(radius, SCALE), BOUNDS)
 
 
-def _dpg(_: Learner, robot: Robot, radius: float) -> Learner:
-    region = TrustRegion(radius, SCALE)
-    return policy_gradient(robot.controller, optimiser=region, bounds=BOUNDS)
-
-
 def _undone(change: Change) -> Change:
-    """`change`, and steps after which a confirming rollout costs more are undone."""
+    """`change`, with an undo of the steps after which a confirming rollout costs more."""
     return lambda learner, robot, every, **settings: undo(
         change(learner, robot, **settings), robot.cost, int(every)
     )
@@ -331,13 +290,19 @@ ENTRIES: Mapping[str, Entry] = {
                  alpha=ALPHA, ratio=3.0),
         _learned("guarded-ES", _guarded, alpha=ALPHA),
         _learned("guarded-RDES", _guarded, "RDES", alpha=ALPHA),
-        _learned("control-RDES", _control, "RDES", alpha=ALPHA),
-        _learned("averaged-ES", _averaged, alpha=ALPHA),
+        _learned("control-RDES",
+                 lambda learner, _, alpha: directed(guarded(learner, alpha), alpha),
+                 "RDES", alpha=ALPHA),
+        _learned("averaged-ES",
+                 lambda learner, robot, **_: averaged(learner, robot.budget * paper.STEPS // 2),
+                 alpha=ALPHA),
         _learned("undone-ES", _undone(lambda learner, *_, **__: learner), alpha=ALPHA, every=1),
-        _learned("undone-LSTD-Q", _undone(_lstd_q), radius=RADIUS, every=1),
+        _learned("undone-LSTD-Q", _undone(lambda _, robot, radius: lstd_q_within(
+            robot.controller, TrustRegion(radius, SCALE), bounds=BOUNDS)), radius=RADIUS, every=1),
         _learned("GN-J", _gn_j, radius=RADIUS),
         _learned("undone-GN-J", _undone(_gn_j), radius=RADIUS, every=1),
-        _learned("DPG", _dpg, radius=RADIUS),
+        _learned("DPG", lambda _, robot, radius: policy_gradient(
+            robot.controller, optimiser=TrustRegion(radius, SCALE), bounds=BOUNDS), radius=RADIUS),
         _searched("SPSA", step=STEP, perturbed=PERTURBED),
         _searched("CMA-ES", spread=SPREAD),
         _searched("Bayes", nearby=NEARBY),
@@ -348,7 +313,7 @@ ENTRIES: Mapping[str, Entry] = {
 def entry(name: str, known: Mapping[str, Entry] = ENTRIES) -> Entry:
     """An entry by its name: "ES", "CMA-ES[spread=0.1]", or "my_module:factory".
 
-    A factory is a function of a `Robot`; the working directory is searched for its module, too.
+    A factory is a function of a `Robot`; its module may lie in the working directory.
 
     Raises:
         ParameterError: there is no such entry or setting.
@@ -369,7 +334,8 @@ def entry(name: str, known: Mapping[str, Entry] = ENTRIES) -> Entry:
     try:
         factory = getattr(importlib.import_module(module), attribute)
     except (Exception, SystemExit) as error:  # whatever the module raises
-        raise NoEntry(f"entry = {name!r} cannot be imported: {_short(error)}") from error
+        why = shortened(f"{type(error).__name__}: {error}")
+        raise NoEntry(f"entry = {name!r} cannot be imported: {why}") from error
     finally:
         sys.path.remove(here)
     if not callable(factory):
@@ -382,35 +348,35 @@ def entry(name: str, known: Mapping[str, Entry] = ENTRIES) -> Entry:
 
 @dataclass(frozen=True)
 class Judgement:
-    """An entry in one place with one seed."""
+    """The result of an entry in one place with one seed."""
 
     initial: float  # cost under theta_init
-    cost: float  # infinite where a solve failed
+    cost: float  # infinite if a solve failed
     arrived: bool
     episodes: int  # begun
     seconds: float  # of processor time
     over: bool = False  # whether more episodes were begun than the budget
-    inside: int = 0  # states in an obstacle that moves
+    inside: int = 0  # states in a moving obstacle
 
 
 def gain(judged: Any) -> Any:
-    """Share of theta_init's cost that is saved, of a `Judgement` or of a table of them."""
+    """Share of theta_init's cost that is saved: a number of a `Judgement`, a column of a table."""
     return 1 - judged.cost / judged.initial
 
 
 def solved(judged: Any) -> Any:
-    """Whether the robot ends at the target and costs no more than under theta_init; as `gain`."""
+    """Whether the robot ends at the target, at no more cost than under theta_init; as `gain`."""
     return judged.arrived & (judged.cost <= judged.initial * (1 + TOLERANCE))
 
 
 def judge(one: Entry | Callable[[Robot], Any], place: str | Centres, seed: int,
           episodes: int) -> Judgement:  # fmt: skip
-    """Give an entry its robot, and judge what it returns by a rollout without noise.
+    """Judge an entry in one place by a rollout without noise.
 
     Args:
-        one: the entry.
+        one: the entry, or another function of a `Robot`.
         place: as in `Robot`.
-        seed: of all that is drawn.
+        seed: as in `Robot`.
         episodes: the budget.
 
     Raises:
@@ -447,7 +413,7 @@ def seed_of(place: str, k: int) -> int:
 
 
 def scenario_seed(place: str, k: int) -> int:
-    """The k-th seed of a place of the worlds that change, scenario, sequence or layout."""
+    """The k-th seed of a scenario, sequence or layout of the worlds that change."""
     return 5 * HELD_OUT + 1000 * (100 * ord(place[0]) + int(place[1:])) + k
 
 
@@ -465,18 +431,18 @@ def judge_all(
 
     Args:
         name: as `entry` takes it.
-        moving: whether in the scenarios in which obstacles move, not in the layouts of `JUDGE`.
+        moving: in the scenarios of moving obstacles instead of the layouts of `JUDGE`.
         budget: episodes in each place with each seed.
-        layouts: the first so many places; all if absent.
-        seeds: a place.
-        workers: processes; as many as there are cores if absent.
+        layouts: number of places, from the first on; all by default.
+        seeds: number of seeds in each place.
+        workers: processes; by default one for each core.
         progress: whether to show a bar.
 
     Returns:
-        Columns entry, place, k and those of `Judgement`: the same twice but for `seconds`.
+        Columns entry, place, k and the fields of `Judgement`; repeatable except for seconds.
 
     Raises:
-        ParameterError: an argument is not what it may be.
+        ParameterError: an argument is out of its range.
         NoEntry: the entry cannot be imported, or raised an error.
     """
     import pandas as pd
@@ -499,16 +465,13 @@ def judge_all(
 
 
 def leaderboard(judged: "pd.DataFrame") -> "pd.DataFrame":
-    """One row an entry.
-
-    Args:
-        judged: columns entry, place and those of `Judgement`.
+    """The rows of `judge_all`, summarised in one row for each entry.
 
     Returns:
         Columns entry, places, solved (share of the places), gain (interquartile mean over places
         of the mean over seeds), episodes (most in any place), seconds (in all), clear (share of
-        the places in which no state is in a moving obstacle) and over (the first place in which
-        the budget was exceeded, or ""); each share is an `Estimate`.
+        the places without a state in a moving obstacle) and over (the first place in which the
+        budget was exceeded, or ""); each share is an `Estimate`.
     """
     import pandas as pd
 
@@ -554,11 +517,7 @@ def _judge(name: str, episodes: int, job: tuple[str, int]) -> Judgement:
 
 
 def _rollout(robot: Robot, found: Any) -> Rollout:
-    """An episode without noise under theta or a policy.
-
-    Raises:
-        ParameterError: it is neither.
-    """
+    """An episode without noise under theta or a policy; ParameterError for anything else."""
     if callable(found):
         return followed(robot, found)
     try:
@@ -576,7 +535,3 @@ def _rollout(robot: Robot, found: Any) -> Rollout:
 def _failed(error: Exception) -> Rollout:
     nothing: Vector = np.zeros((0, 3))
     return Rollout(nothing, nothing[:, :2], nothing[:, 0], failure=str(error) or "failed")
-
-
-def _short(error: BaseException) -> str:
-    return shortened(f"{type(error).__name__}: {error}")

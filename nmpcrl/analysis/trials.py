@@ -1,4 +1,4 @@
-"""Runs of one's own, compared: one row an evaluation of each `Trial`."""
+"""Tables of a reader's own runs: one row for each evaluation of a `Trial`."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -11,12 +11,9 @@ from nmpcrl.study.records import Records, Stopped
 
 
 def evaluations(runs: Iterable[Records]) -> pd.DataFrame:
-    """Every rollout without noise, at the start and on the way.
+    """Every rollout without noise of some runs, such as the values of `fetch_all`.
 
-    A run that diverges ends in a row of infinite cost: it left no policy.
-
-    Args:
-        runs: records, as the values of `fetch_all`.
+    A run that diverges has no policy: its last row has an infinite cost.
 
     Returns:
         Columns learner, seed, episode, cost (summed, without noise) and theta.
@@ -37,24 +34,20 @@ def _rows(run: Records) -> list[dict[str, Any]]:
 
 
 def final_costs(rows: pd.DataFrame) -> pd.DataFrame:
-    """The last cost of each run: one row a seed, one column a learner.
-
-    Args:
-        rows: of `evaluations`.
-    """
+    """The last cost of each run of `evaluations`: one row a seed, one column a learner."""
     last = rows.groupby(["seed", "learner"]).cost.last()
     return last.unstack("learner")[list(rows.learner.unique())]
 
 
 def summarise(costs: pd.DataFrame, baseline: str) -> pd.DataFrame:
-    """Each learner's interquartile mean, and how likely its run costs less than the baseline's.
+    """Each learner's interquartile mean, and its probability to cost less than the baseline.
 
     Args:
         costs: of `final_costs`; the seeds are one stratum.
-        baseline: the learner with which the others are compared.
+        baseline: the learner that the others are compared with.
 
     Returns:
-        One row a learner and an `Estimate` in each column: "interquartile mean" and
+        One row for each learner and an `Estimate` in each column: "interquartile mean" and
         "P(costs less)".
     """
     strata = ["all"] * len(costs)

@@ -2,8 +2,8 @@
 
     first --cost 0--> second --cost 0--> end
 
-The approximate values are theta in the first state and 2 theta in the second, the end is worth 0,
-so theta = 0 is exactly right. Tsitsiklis and Van Roy (1997); Sutton and Barto (2018), Section 11.2.
+The approximate values are theta in the first state, 2 theta in the second and 0 at the end;
+theta = 0 is exact. Tsitsiklis and Van Roy (1997); Sutton and Barto (2018), Section 11.2.
 """
 
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ class Chain:
 
     @property
     def probabilities(self) -> Vector:
-        """How often each state is updated, shape (2,)."""
+        """Share of the updates made in each state, shape (2,)."""
         return np.array([self.share, 1 - self.share])
 
     def delta(self, theta: Vector, state: int) -> float:
@@ -46,7 +46,7 @@ class Chain:
 
 
 def sampled_step(chain: Chain, rule: UpdateRule, weights: Weights, state: int) -> Weights:
-    """One update made in `state`."""
+    """One update in `state`."""
     delta = chain.delta(weights.theta, state)
     here: Any = Successor(float(PHI[state] @ weights.theta), PHI[state])  # stands in for a solution
     there = Successor(float(PHI_NEXT[state] @ weights.theta), PHI_NEXT[state])
@@ -76,9 +76,9 @@ def follow(
     Args:
         chain: the chain.
         rule: an update rule of `nmpcrl.learning`, such as `semi_gradient(alpha)`.
-        updates: how many.
-        theta: where theta starts.
-        w: where w starts.
+        updates: number of updates.
+        theta: first theta.
+        w: first w.
         rng: draws the state of each update; expected updates if absent.
     """
     weights = Weights(np.array([theta]), np.array([w]))
@@ -107,7 +107,7 @@ def spectral_radius(chain: Chain, rule: UpdateRule) -> float:
 
 
 def auxiliary_fixed_point(chain: Chain, theta: float) -> float:
-    """w where its expected update stops while theta is held: E[phi phi']^-1 E[delta phi]."""
+    """The fixed point of w's expected update for one theta: E[phi phi']^-1 E[delta phi]."""
     correlation, covariance = _moments(chain, theta)
     return correlation / covariance
 
@@ -119,7 +119,7 @@ def mspbe(chain: Chain, theta: float) -> float:
 
 
 def projected_bellman_error(chain: Chain, theta: float) -> float:
-    """The same error from its definition, Eq. (14): back up both values, project, and compare."""
+    """The same error by its definition, Eq. (14): back up both values, project, and compare."""
     rho, basis = chain.probabilities, PHI[:, 0]
     values = basis * theta
     backed_up = COST + chain.gamma * PHI_NEXT[:, 0] * theta
