@@ -105,8 +105,8 @@ def test_what_was_never_reached_is_not_known():
     np.testing.assert_array_equal(found.episodes["theta"][0], exploding.steps["theta"][-1])
 
 
-def test_a_summary_is_stored_and_read_again(short, tmp_path):
-    path = tmp_path / "one.npz"
+def test_a_summary_is_stored_and_read_and_other_files_are_refused(short, records, tmp_path):
+    path, other = tmp_path / "one.npz", tmp_path / "run.npz"
     short.save(path)
     read = RunSummary.load(path)
     assert read.name == SHORT
@@ -117,64 +117,43 @@ def test_a_summary_is_stored_and_read_again(short, tmp_path):
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(DamagedRecords, match="damaged, or not a run"):
         RunSummary.load(path)
-
-
-def test_records_are_not_taken_for_a_summary(records, tmp_path):
-    records.save(tmp_path / "run.npz")
+    records.save(other)
     with pytest.raises(DamagedRecords):
-        RunSummary.load(tmp_path / "run.npz")
+        RunSummary.load(other)
 
 
-def test_a_row_measures_as_the_metrics_do(records, short):
-    summary = row(short)
-    assert summary["final_cost"] == metrics.final_cost(records)
-    assert summary["initial_cost"] == metrics.initial_cost(records)
-    assert summary["late_cost_range"] == metrics.late_cost_range(records)
-    theta = [summary[f"theta_{i}"] for i in range(9)]
+def test_a_row_measures_as_the_metrics_do_and_a_tidy_table_has_a_row_an_episode(records, short):
+    found = row(short)
+    assert tuple(found) == (*rows.FIELDS, *rows.OUTCOME)
+    for name in ("final_cost", "initial_cost", "late_cost_range"):
+        assert found[name] == getattr(metrics, name)(records)
+    theta = [found[f"theta_{i}"] for i in range(9)]
     np.testing.assert_array_equal(theta, metrics.final_theta(records))
-    assert summary["learner"] == "RDES"
-    assert summary["seed"] == 0
-
-
-def test_the_table_holds_each_run_against_its_frozen_arm(records, short):
-    arm = run(frozen_arm(SHORT))
-    frame = table([short, summarise(arm)]).set_index("learner")
-    assert frame.cost_ratio["frozen"] == 1
-    costs = [metrics.training_cost(one) for one in (records, arm)]
-    assert frame.cost_ratio["RDES"] == metrics.cost_ratio(*costs)
-    assert np.isnan(table([short]).cost_ratio[0])
-
-
-@pytest.mark.parametrize("lost", [slice(3, None), slice(2, None)])
-def test_the_table_and_the_metric_agree_where_the_frozen_arm_lost_episodes(short, lost):
-    arm = replace(short, experiment=asdict(frozen_arm(SHORT)))
-    lame = replace(arm, episodes=arm.episodes | {"cost": arm.episodes["cost"].copy()})
-    lame.episodes["cost"][lost] = np.nan
-    frame = table([short, lame]).set_index("learner")
-    expected = metrics.cost_ratio(short.episodes["cost"], lame.episodes["cost"])
-    assert frame.cost_ratio["RDES"] == expected == 0
-
-
-def test_the_tidy_table_has_a_row_an_episode(short):
+    assert (found["learner"], found["seed"]) == ("RDES", 0)
     frame = tidy([short])
-    assert len(frame) == 4
     np.testing.assert_array_equal(frame["theta_c"], short.episodes["theta"][:, -1])
-    assert set(frame.learner) == {"RDES"}
+    assert frame.learner.tolist() == ["RDES"] * 4
 
 
-def test_the_columns_of_a_row_are_those_that_are_named(short):
-    assert tuple(row(short)) == (*rows.FIELDS, *rows.OUTCOME)
+@pytest.mark.parametrize("lost", [slice(4, None), slice(3, None), slice(2, None)])
+def test_the_table_and_the_metric_compare_a_run_with_its_frozen_learner(short, lost):
+    arm = replace(short, experiment=asdict(frozen_arm(SHORT)))
+    arm = replace(arm, episodes=arm.episodes | {"cost": 2 * short.episodes["cost"]})
+    arm.episodes["cost"][lost] = np.nan
+    ratios = table([short, arm]).set_index("learner").cost_ratio
+    expected = metrics.cost_ratio(short.episodes["cost"], arm.episodes["cost"])
+    assert ratios["RDES"] == expected == (0.5 if lost.start == 4 else 0)
+    assert ratios["frozen"] == 1 or lost.start < 4
+    assert np.isnan(table([short]).cost_ratio[0])
 
 
 def test_a_field_that_is_younger_than_a_run_has_what_all_runs_had_before(short, monkeypatch):
     """Today's default may be another one."""
-    monkeypatch.setitem(rows.OLDER, "start", "-1.0 1.0 0.0")
-    monkeypatch.setitem(rows.OLDER, "tolerance", 1e-6)
-    younger = ("start", "tolerance")
+    younger = {"start": "-1.0 1.0 0.0", "tolerance": 1e-6}
+    for name, value in younger.items():
+        monkeypatch.setitem(rows.OLDER, name, value)
     older = {name: value for name, value in short.experiment.items() if name not in younger}
     found = row(replace(short, experiment=older))
-    assert (found["start"], found["tolerance"]) == ("-1.0 1.0 0.0", 1e-6)
-    for name in younger:
-        del found[name]
+    assert {name: found.pop(name) for name in younger} == younger
     named = experiment_of(found)
     assert (named.start, named.tolerance) == ((-1.0, 1.0, 0.0), 1e-6)
