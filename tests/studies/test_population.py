@@ -210,38 +210,42 @@ def test_closing_gaps_is_confirmed_by_both_halves_only(measures):
     assert population.closing_gaps(measures, success | True).outcome == NOT
 
 
-def test_a_longer_horizon_is_asked_for_where_the_short_one_fails():
-    first, second, *_ = names = [*COMPARED][:8]
-    rows = [made("judge", "ES", name, better=name == first) for name in names]
-    rows += [made("N = 20", "ES", name, better=False) for name in names]
-    rows += [made("N = 40", "ES", name, better=name == second) for name in names]
-    assert population.horizon(pd.DataFrame(rows)).counts == {"layouts still fail": (6, 7)}
+FIRST, SECOND = [*COMPARED][:2]
+LONGER = [
+    made("judge", "ES", name, better=name == FIRST) for name in [*COMPARED][:8]
+] + [
+    made(f"N = {n}", "ES", name, better=(n, name) == (40, SECOND))
+    for n in (20, 40) for name in [*COMPARED][:8]
+]  # fmt: skip
+AWAY = {"decay": "episode", "better": False, "distance": 5, "moved": 0.0, "worth": 0.9}
+TRAPPED = [made("judge", "ES", name, distance=0.1) for name in NAMES]
+TRAPPED += [made("judge", "ES", name, **AWAY) for name in FAILING]
+TRAPPED[-1] |= {"worth": 1.1, "delta_last": 3.0}
+ENDED = {"decay": "episode", "stopped": "diverged: theta", "over": 0.01, "steps_done": 10 * 130}
+STOPPED = [made("judge", "RDES", name, **ENDED) for name in NAMES]
+FINISHED = [made("judge", "RDES", name) for name in NAMES]
+
+
+@pytest.mark.parametrize(
+    ("name", "rows", "outcome", "counts"),
+    [
+        ("horizon", LONGER, PARTLY, [(6, 7)]),  # asked where the short one fails
+        ("trap", TRAPPED, PARTLY, [(3, 4), (3, 4)]),  # of layouts, and of runs
+        ("accurate and worse", TRAPPED, PARTLY, [(3, 4), (3, 4)]),
+        ("early overshoot", STOPPED + FINISHED, REPRODUCED, [(20, 20), (20, 20)]),
+        ("early overshoot", [one | {"steps_done": 100 * 130} for one in STOPPED], NOT,
+         [(20, 20), (0, 20)]),
+        ("early overshoot", FINISHED, UNDECIDABLE, [(0, 0), (0, 0)]),
+    ],
+)  # fmt: skip
+def test_questions_are_answered_by_their_rule(name, rows, outcome, counts):
+    answer = POPULATION.asked[name].answer(population.Drawn(pd.DataFrame(rows), {}, None))
+    assert (answer.outcome, [*answer.counts.values()]) == (outcome, counts)
 
 
 def test_the_same_gap_closes_at_the_same_theta_c_up_to_a_step_of_the_grid():
     stops = pd.DataFrame({10: [0.2, 0.2, np.nan, 0.1], 20: [0.25, 0.4, 0.1, np.nan], 40: 0.2})
     assert population.gaps_and_horizon(stops).counts == {"layouts the same": (1, 3)}
-
-
-def test_the_trap_is_asked_of_the_runs_that_do_not_arrive():
-    rows = [made("judge", "ES", name, distance=0.1) for name in NAMES]
-    there = {"decay": "episode", "better": False, "distance": 5, "moved": 0.0, "worth": 0.9}
-    rows += [made("judge", "ES", name, **there) for name in FAILING]
-    rows[-1] |= {"worth": 1.1, "delta_last": 3.0}
-    known = population.Drawn(pd.DataFrame(rows), {}, pd.DataFrame())
-    for question in ("trap", "accurate and worse"):
-        counts = POPULATION.asked[question].answer(known).counts
-        assert counts == {"layouts": (3, 4), "runs": (3, 4)}
-
-
-def test_early_overshoot_is_of_the_runs_that_were_stopped():
-    stopped = {"stopped": "diverged: theta", "over": 0.01, "steps_done": 10 * 130}
-    rows = [made("judge", "RDES", name, decay="episode", **stopped) for name in NAMES]
-    runs = pd.DataFrame(rows + [made("judge", "RDES", name) for name in NAMES])
-    answer = population.early_overshoot(runs)
-    assert (answer.outcome, answer.beside) == (REPRODUCED, {"runs stopped": (20, 20)})
-    assert population.early_overshoot(runs.assign(steps_done=100 * 130)).outcome == NOT
-    assert population.early_overshoot(runs[20:]).outcome == UNDECIDABLE
 
 
 def test_a_cliff_is_where_a_little_more_theta_c_costs_half():

@@ -91,27 +91,23 @@ def test_a_change_that_is_told_resets_theta_or_raises_the_rate_for_a_while(train
     assert raised[-1] == pytest.approx(3 + FOR * RAISED + 2)
 
 
-def test_who_is_never_told_plans_with_the_first_layout(trained):
-    found = trained([0, 1, 1], knows="never", reaction="reset")
-    assert [(one.layout, one.seen) for one in found] == [(0, 0), (1, 0), (1, 0)]
-    assert moved(found) == pytest.approx([1, 2, 3])
+STEADY = RNG(0).normal(4000.0, 30.0, 30).tolist()
 
 
-def test_who_detects_a_change_plans_with_the_new_layout_from_the_next_episode(trained):
-    costs = [*RNG(0).normal(4000.0, 30.0, 30), 5000.0, 5000.0]
-    found = trained([0] * 30 + [1] * 2, costs, knows="cost", reaction="reset")
-    assert [one.alarm for one in found] == [False] * 30 + [True, False]
-    assert [one.seen for one in found[-2:]] == [0, 1]
-    assert moved(found)[-2:] == pytest.approx([31, 1])
-
-
-def test_a_false_alarm_is_reacted_to_and_changes_no_map(trained):
-    costs = [*RNG(0).normal(4000.0, 30.0, 30), 5000.0, 4000.0]
-    found = trained([0] * 32, costs, knows="cost", reaction="reset")
-    assert found[30].alarm
-    assert {one.seen for one in found} == {0}
-    assert moved(found)[-1] == pytest.approx(1)
-
-
-def test_an_episode_that_diverges_leaves_the_last_theta(trained):
-    assert moved(trained([0, 0, 0], [1.0, None, 1.0])) == pytest.approx([1, 1, 2])
+@pytest.mark.parametrize(
+    ("order", "costs", "knows", "seen", "alarms", "theta"),
+    [
+        ([0, 1, 1], [1.0] * 3, "never", [0, 0, 0], [], [1, 2, 3]),
+        ([0] * 30 + [1] * 2, [*STEADY, 5000.0, 5000.0], "cost", [*[0] * 31, 1], [30], [31, 1]),
+        ([0] * 32, [*STEADY, 5000.0, 4000.0], "cost", [0] * 32, [30], [31, 1]),  # a false alarm
+        ([0, 0, 0], [1.0, None, 1.0], "told", [0, 0, 0], [], [1, 1, 2]),  # diverges, keeps theta
+    ],
+)
+def test_a_learner_reacts_to_what_its_controller_knows(
+    trained, order, costs, knows, seen, alarms, theta
+):
+    found = trained(order, costs, knows=knows, reaction="reset")
+    assert [one.layout for one in found] == order
+    assert [one.seen for one in found] == seen
+    assert [e for e, one in enumerate(found) if one.alarm] == alarms
+    assert moved(found)[-len(theta) :] == pytest.approx(theta)
