@@ -37,12 +37,6 @@ def test_longer_runs_take_longer(longer):
     assert seconds_of(Experiment(**longer)) > seconds_of(Experiment())
 
 
-def test_each_fit_of_a_network_takes_its_time():
-    one, four = (Experiment("RDES", network=network) for network in ("plain", "four fits"))
-    fits = 3 * one.episodes * one.steps
-    assert seconds_of(four) - seconds_of(one) == pytest.approx(fits * limits.FIT)
-
-
 def refusal(runs, **options) -> str:
     with pytest.raises(ParameterError) as caught:
         afford(runs, **options)

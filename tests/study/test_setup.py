@@ -5,9 +5,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.learning.rollout import Persistent
-from nmpcrl.study import Experiment, ParameterError, paper, run
+from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.learners import LEARNERS, NETWORKS, Generators, readers
 from nmpcrl.study.setup import controller_of, prepare, step_size
 
@@ -53,38 +52,6 @@ def test_a_step_makes_the_solves_of_its_entry_and_theta_moves_where_it_says(name
     steps = run(wanted).steps
     assert steps["solves"][-1] == LEARNERS[name].solves + wanted.values_actions
     assert (steps["theta"][-1] != steps["theta"][0]).any() == LEARNERS[name].moves
-
-
-@pytest.mark.parametrize(
-    ("registry", "fields"),
-    [(LEARNERS, {"learner": "matched"}), (NETWORKS, {"learner": "DES", "network": "four fits"})],
-)
-def test_an_unknown_name_is_refused_and_nothing_takes_its_place(registry, fields, monkeypatch):
-    wanted, (field, name) = Experiment(**fields, episodes=1), list(fields.items())[-1]
-    monkeypatch.delitem(registry, name)
-    with pytest.raises(KeyError, match=name):
-        prepare(wanted, CONTROLLER)
-    with pytest.raises(ParameterError, match=f"{field} = '{name}' must be one of"):
-        Experiment(**fields)
-
-
-class Unsolvable(Nmpc):
-    def __init__(self):
-        super().__init__(differential_drive(), paper.task())
-
-    def solve(self, state, theta, warm_start=None, action=None):
-        raise SolverError("no optimum", state, theta)
-
-
-def test_only_a_normalised_network_solves_before_training():
-    unsolvable = Persistent(Unsolvable())
-    for network in NETWORKS:
-        wanted = Experiment("RDES", network=network, episodes=1)
-        if network == "normalised":
-            with pytest.raises(SolverError):
-                prepare(wanted, unsolvable)
-        else:
-            prepare(wanted, unsolvable)
 
 
 def test_each_purpose_of_a_seed_has_a_generator_of_its_own(monkeypatch):

@@ -1,7 +1,7 @@
-"""A linear plant with a quadratic cost, of which A, B, Q and R are learned.
+"""A linear plant with a quadratic cost; A, B, Q and R are learned.
 
-The truth is known: Riccati's equation has the value and the policy of every theta, and Lyapunov's
-the cost of a policy.
+Riccati's equation gives the value and the policy of every theta, and Lyapunov's the cost of a
+policy.
 """
 
 from dataclasses import dataclass
@@ -60,11 +60,11 @@ def plant(state: Vector, action: Vector, rng: np.random.Generator) -> tuple[Vect
     return later, float(state @ Q @ state + action @ R @ action), False
 
 
-def optimal(a: Matrix = A, b: Matrix = B, q: Matrix = Q, r: Matrix = R) -> Truth:
+def optimal(a: Matrix = A, b: Matrix = B) -> Truth:
     """The best policy of a model and its value, by Riccati's equation of sqrt(gamma) (A, B)."""
     root = np.sqrt(GAMMA)
-    p = solve_discrete_are(root * a, root * b, q, r)
-    return Truth(gain(a, b, r, p), p)
+    p = solve_discrete_are(root * a, root * b, Q, R)
+    return Truth(gain(a, b, R, p), p)
 
 
 def gain(a: Matrix, b: Matrix, r: Matrix, p: Matrix) -> Matrix:
@@ -81,18 +81,17 @@ def worth(k: Matrix) -> Truth:
     return Truth(k, solve_discrete_lyapunov(closed.T, Q + k.T @ R @ k))
 
 
-def recursion(a: Matrix, b: Matrix, q: Matrix, r: Matrix, p: Matrix) -> Truth:
-    """The policy u = -K x and the value x' P x of a plan, by Riccati's recursion."""
+def planned(theta: Vector) -> Truth:
+    """The policy and the value, without V0, of a theta's plan, by Riccati's recursion.
+
+    Q and P count as (Q + Q') / 2.
+    """
+    parts = problem().split(theta)
+    a, b, q, r, p = (parts[name] for name in "ABQRP")
+    q, p = (q + q.T) / 2, (p + p.T) / 2
     k = np.zeros((b.shape[1], a.shape[0]))
     for _ in range(HORIZON):
         k = gain(a, b, r, p)
         closed: Matrix = a - b @ k
         p = q + k.T @ r @ k + GAMMA * closed.T @ p @ closed
     return Truth(k, p)
-
-
-def planned(theta: Vector) -> Truth:
-    """The policy and the value, without V0, of a theta's plan; Q and P count as (Q + Q') / 2."""
-    parts = problem().split(theta)
-    a, b, q, r, p = (parts[name] for name in "ABQRP")
-    return recursion(a, b, (q + q.T) / 2, r, (p + p.T) / 2)
