@@ -1,7 +1,8 @@
 """The linear example with a wrong model of Gros and Zanon (2020), as in the examples of mpcrl.
 
 The plant is x+ = A x + B u + (e, 0), e uniform in [-0.1, 0]; it pulls the first state across the
-bound that the stage cost penalises. All parameters of the plan are learned, from a wrong A and B, and without the mean of e.
+bound that the stage cost penalises. All parameters of the plan are learned, from a wrong A and B
+and without the mean of e.
 """
 
 import numpy as np
