@@ -256,12 +256,10 @@ def search_all(searches: Iterable[Search], workers: int | None = None) -> dict[S
 
 
 def as_rows(found: Mapping[Search, Found]) -> list[dict[str, Any]]:
-    """Searches and results, a row each, with lists for tuples."""
+    """One row for each search and its result, with lists in the place of tuples."""
     return [
-        asdict(one)
-        | {"theta": [*result.theta], "made": result.made}
-        | {"rollouts": [*result.rollouts], "best": [*result.best]}
-        for one, result in found.items()
+        {name: [*value] if isinstance(value, tuple) else value for name, value in row.items()}
+        for row in (asdict(one) | asdict(result) for one, result in found.items())
     ]
 
 

@@ -12,6 +12,7 @@ import importlib
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import islice
@@ -239,17 +240,10 @@ def learned(
     made = change(made, robot, **settings) if change else made
     if not episodes:
         return weights.theta
-    try:
+    with suppress(Diverged):
         for step in robot.train(made, weights, explore, constrained=experiment.values_actions):
             weights = weights if absurd(step.weights) else step.weights
-    except Diverged:
-        pass
     return judged_theta(weights)
-
-
-def searched(robot: Robot, *, search: str, **settings: float) -> Vector:
-    """The theta of least cost in a direct search from theta_init."""
-    return SEARCHES[search](robot.cost, THETA, robot.budget, robot.seed, **settings)
 
 
 def _guarded(learner: Learner, _: Robot, alpha: float) -> Learner:
@@ -274,7 +268,10 @@ def _learned(
 
 
 def _searched(name: str, **settings: float) -> Entry:
-    return Entry(name, partial(searched, search=name), settings)
+    def search(robot: Robot, **own: float) -> Vector:
+        return SEARCHES[name](robot.cost, THETA, robot.budget, robot.seed, **own)
+
+    return Entry(name, search, settings)
 
 
 ALPHA, RADIUS = paper.ALPHA, 0.3  # step size; radius of trust regions, in `SCALE`s
@@ -498,8 +495,7 @@ def followed(robot: Robot, policy: Policy) -> Rollout:
     """An episode of a policy in `nmpcrl/Robot-v0`."""
     env = robot.env()
     observation, _ = env.reset()
-    actions, costs = [], []
-    over = False
+    actions, costs, over = [], [], False
     while not over:
         try:
             action = np.array(policy(observation.copy()), float)

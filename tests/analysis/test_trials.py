@@ -59,21 +59,14 @@ def test_each_run_has_its_learner_and_its_seed(nmpc):
     assert not np.array_equal(found.theta.iloc[1], found.theta.iloc[3])
 
 
-def rows_of(costs: dict[str, list[float]]) -> pd.DataFrame:
-    return pd.DataFrame(
-        [
-            {"learner": name, "seed": seed, "episode": episode, "cost": cost + 5 - episode}
-            for name, values in costs.items()
-            for seed, cost in enumerate(values)
-            for episode in (0, 5)
-        ]
-    )
-
-
 def test_learners_are_compared_with_the_baseline_by_the_last_cost_of_each_run():
-    final = final_costs(rows_of({"mine": [3.0, 1.0, 2.0, 2.0], "ES": [4.0, 5.0, 6.0, 7.0]}))
-    assert [*final] == ["mine", "ES"]
-    assert final["mine"].tolist() == [3.0, 1.0, 2.0, 2.0]
+    costs = {"mine": [3.0, 1.0, 2.0, 2.0], "ES": [4.0, 5.0, 6.0, 7.0]}
+    columns = ["learner", "seed", "episode", "cost"]
+    final = final_costs(pd.DataFrame(
+        [(name, seed, episode, cost + 5 - episode) for name, values in costs.items()
+         for seed, cost in enumerate(values) for episode in (0, 5)], columns=columns
+    ))  # fmt: skip
+    assert final.to_dict("list") == costs
     table = summarise(final, "ES")
     assert table.loc["mine", "interquartile mean"].value == 2.0
     assert table["P(costs less)"].map(lambda one: one.value).tolist() == [1.0, 0.5]
