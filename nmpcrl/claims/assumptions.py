@@ -50,62 +50,55 @@ def measured(experiment: Experiment, records: Records, curvature: Curvature) -> 
 
 def audit(experiment: Experiment, found: Measured) -> tuple[Assumption, ...]:
     """The assumptions of `THEOREMS`, beside one run of GES."""
+    a, b = experiment.alpha, experiment.beta
     return (
         Assumption(
             "the value is linear in theta",
             "it is the value of an optimal control problem, which is not",
-            holds=False,
-            by=(LINEAR,),
+            False,
+            (LINEAR,),
         ),
         Assumption(
             "the value is three times differentiable in theta",
             f"it has a kink wherever an active set changes; {found.kinks:.1%} of the steps of a run"
             " of GES start exactly on one",
-            holds=found.kinks == 0,
-            by=(SMOOTH,),
+            found.kinks == 0,
+            (SMOOTH,),
         ),
-        Assumption(
-            "a finite MDP",
-            "states and actions are continuous",
-            holds=False,
-            by=THEOREMS,
-        ),
+        Assumption("a finite MDP", "states and actions are continuous", False, THEOREMS),
         Assumption(
             "transitions drawn independently from one distribution",
             "one trajectory of a policy that changes; consecutive TD errors have a correlation of"
             f" {found.memory:.2f}",
-            holds=False,
-            by=(SMOOTH,),
+            False,
+            (SMOOTH,),
         ),
         Assumption(
             "the policy that acts stays the same",
             "it is that of theta, and moves with it",
-            holds=False,
-            by=THEOREMS,
+            False,
+            THEOREMS,
         ),
         Assumption(
             "step sizes that decay, their squares summable",
-            f"constant, alpha = {experiment.alpha:g} and beta = {experiment.beta:g}",
-            holds=False,
-            by=THEOREMS,
+            f"constant, alpha = {a:g} and beta = {b:g}",
+            False,
+            THEOREMS,
         ),
         Assumption(
             "w moves faster than theta, alpha / beta to 0",
-            f"alpha / beta = {experiment.alpha / experiment.beta:g}",
-            holds=experiment.alpha < experiment.beta,
-            by=THEOREMS,
+            f"alpha / beta = {a / b:g}",
+            a < b,
+            THEOREMS,
         ),
         Assumption(
-            "theta is projected onto a compact set",
-            "there is no projection",
-            holds=False,
-            by=(SMOOTH,),
+            "theta is projected onto a compact set", "there is no projection", False, (SMOOTH,)
         ),
         Assumption(
             "the update follows the gradient of the MSPBE, curvature included",
             "the paper's (16) drops the curvature term, whose size beside the printed direction is"
             f" {found.dropped:.1e} in the median; a value that is linear has none",
-            holds=found.dropped == 0,
-            by=(SMOOTH,),
+            found.dropped == 0,
+            (SMOOTH,),
         ),
     )

@@ -28,10 +28,9 @@ from nmpcrl.claims import assumptions, thetas
 from nmpcrl.claims.assumptions import Measured
 from nmpcrl.claims.failure_modes import FAILURE_MODE, failure_mode, failure_modes, went_wrong
 from nmpcrl.claims.own_claims import OWN_CLAIMS
-from nmpcrl.claims.paper_claims import CLAIMS
+from nmpcrl.claims.paper_claims import CLAIMS, WIDER_CLAIMS, WIDER_THAN
 from nmpcrl.claims.rule import Claim, Observations
 from nmpcrl.claims.verdict import Verdict
-from nmpcrl.claims.wider_claims import WIDER_CLAIMS, WIDER_THAN
 from nmpcrl.study import design
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import Experiment, frozen_arm
@@ -156,17 +155,14 @@ def publish(
     searches: Mapping[Search, Found] = MappingProxyType({}),
     audit: Measured | None = None,
 ) -> Path:
-    """Publish the whole study anew.
+    """Publish the whole study anew, in the folder that is returned.
 
     Args:
         summaries: the runs.
-        variants: the part of the study that each belongs to.
-        timings: of `time_learners`, if any were taken.
+        variants: the part of the study of each run.
+        timings: of `time_learners`.
         searches: for the best theta.
         audit: of `AUDITED`.
-
-    Returns:
-        The folder.
     """
     labels = {e: {"variant": variants[e], "key": summary_key(e)} for e in summaries}
     runs = pd.DataFrame([row(one) | labels[e] for e, one in summaries.items()])
@@ -184,21 +180,14 @@ def publish(
 
 
 def republish(timings: pd.DataFrame) -> Path:
-    """Publish times of `time_learners` that were taken here in the place of the published ones."""
+    """Replace the published times by times of `time_learners` that were taken here."""
     path = store.write(TIMINGS, timings, batch=made_here(), anew=True)
     _load.cache_clear()
     return path.parent
 
 
 def extend(summaries: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]) -> Path:
-    """Publish further runs beside the published ones.
-
-    Args:
-        summaries: the runs.
-        variants: the part of the study that each belongs to.
-
-    Returns:
-        The folder.
+    """Publish further runs beside the published ones; arguments as for `publish`.
 
     Raises:
         Damaged: a file is missing, or is not the file that was written.
@@ -240,20 +229,15 @@ def _curves(
     summaries: Iterable[RunSummary], before: Mapping[str, Column] = MappingProxyType({})
 ) -> dict[str, Column]:
     """Columns of all runs below those of earlier runs, padded with nan; shape (runs, ...)."""
-    rows = [
-        {
-            "cost": one.episodes["cost"],
-            "judged_after": one.evaluations["episode"],
-            "judged_cost": one.evaluations["cost"],
-            "judged_theta": one.evaluations["theta"],
-            "states": one.states,
-        }
-        for one in summaries
-    ]
-    return {
-        name: _padded([*before.get(name, ()), *(columns[name] for columns in rows)])
-        for name in rows[0]
+    made = [*summaries]
+    columns = {
+        "cost": [one.episodes["cost"] for one in made],
+        "judged_after": [one.evaluations["episode"] for one in made],
+        "judged_cost": [one.evaluations["cost"] for one in made],
+        "judged_theta": [one.evaluations["theta"] for one in made],
+        "states": [one.states for one in made],
     }
+    return {name: _padded([*before.get(name, ()), *new]) for name, new in columns.items()}
 
 
 def _padded(columns: list[Column]) -> Column:
@@ -265,25 +249,16 @@ def _padded(columns: list[Column]) -> Column:
 
 
 def _outline_of(
-    row: dict[str, Any],
-    curves: Mapping[str, Column],
-    i: int,
-    followed: Mapping[int, Column],
+    row: dict[str, Any], curves: Mapping[str, Column], i: int, followed: Mapping[int, Column]
 ) -> Outline:
-    judged = np.isfinite(curves["judged_after"][i])
-    experiment = asdict(experiment_of(row))
-    episodes = {"cost": curves["cost"][i][: experiment["episodes"]]}
-    if i in followed:
-        episodes["theta"] = followed[i][: experiment["episodes"]]
-    return Outline(
-        experiment,
-        episodes,
-        {
-            "episode": curves["judged_after"][i][judged].astype(int),
-            "theta": curves["judged_theta"][i][judged],
-            "cost": curves["judged_cost"][i][judged],
-        },
-        curves["states"][i][: experiment["steps"]],
-        None,
-        {"stopped": row["stopped"], "seconds": row["seconds"]},
-    )
+    experiment, judged = asdict(experiment_of(row)), np.isfinite(curves["judged_after"][i])
+    known = {"cost": curves["cost"][i]} | ({"theta": followed[i]} if i in followed else {})
+    evaluations = {
+        "episode": curves["judged_after"][i][judged].astype(int),
+        "theta": curves["judged_theta"][i][judged],
+        "cost": curves["judged_cost"][i][judged],
+    }
+    facts = {"stopped": row["stopped"], "seconds": row["seconds"]}
+    episodes = {name: column[: experiment["episodes"]] for name, column in known.items()}
+    states = curves["states"][i][: experiment["steps"]]
+    return Outline(experiment, episodes, evaluations, states, None, facts)

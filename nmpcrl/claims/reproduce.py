@@ -23,10 +23,9 @@ from nmpcrl.analysis.rows import FIELDS, THETA, row, table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import rule
 from nmpcrl.claims.own_claims import judge_own
-from nmpcrl.claims.paper_claims import judge_runs, judge_times
+from nmpcrl.claims.paper_claims import judge_runs, judge_times, judge_wider
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.verdict import Verdict, differ
-from nmpcrl.claims.wider_claims import judge_wider
 from nmpcrl.study import design, lock, provenance
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.jobs import parallel

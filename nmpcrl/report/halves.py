@@ -5,9 +5,8 @@ from itertools import groupby
 
 import pandas as pd
 
-from nmpcrl.claims.paper_claims import BY_RUNS, kept_without_noise
+from nmpcrl.claims.paper_claims import BY_RUNS, WIDER_CLAIMS, kept_without_noise
 from nmpcrl.claims.verdict import Halves, Verdict
-from nmpcrl.claims.wider_claims import WIDER_CLAIMS
 from nmpcrl.report.text import listed
 from nmpcrl.report.verdicts import by_learner
 

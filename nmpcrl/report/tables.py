@@ -12,7 +12,7 @@ import pandas as pd
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.bench.targets import Target
 from nmpcrl.claims.assumptions import THEOREMS
-from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
+from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_THAN, kept_without_noise
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.rule import Claim, anew
 from nmpcrl.claims.verdict import (
@@ -24,7 +24,6 @@ from nmpcrl.claims.verdict import (
     Outcome,
     Verdict,
 )
-from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.report.cited import Cited, cited
 from nmpcrl.report.halves import own
 from nmpcrl.report.text import SURE, audit_place, departure_link, listed

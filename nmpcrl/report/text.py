@@ -6,13 +6,12 @@ from typing import Any
 import pandas as pd
 
 from nmpcrl.claims import prespecified
-from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
+from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_THAN, kept_without_noise
 from nmpcrl.claims.prespecified import Fixed
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.reproduce import Agreement
 from nmpcrl.claims.robustness import PARTS
 from nmpcrl.claims.verdict import PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
-from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.study import design
 from nmpcrl.study.departures import DEPARTURES
 

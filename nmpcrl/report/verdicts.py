@@ -9,10 +9,9 @@ from nmpcrl.bench.learners import REFERENCE
 from nmpcrl.bench.paired import IDLE, Ratio
 from nmpcrl.claims.assumptions import THEOREMS
 from nmpcrl.claims.own_claims import OWN_CLAIMS
-from nmpcrl.claims.paper_claims import BY_TIME
+from nmpcrl.claims.paper_claims import BY_TIME, WIDER_THAN
 from nmpcrl.claims.published import EVERY
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
-from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.report.cited import Count
 from nmpcrl.report.text import listed
 from nmpcrl.study.layouts import ARRIVED

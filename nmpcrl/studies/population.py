@@ -39,12 +39,11 @@ from nmpcrl.claims.investigation import (
     share,
 )
 from nmpcrl.claims.own_claims import OWN_CLAIMS
-from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.paper_claims import BY_RUNS, WIDER_CLAIMS
 from nmpcrl.claims.robustness import groups
 from nmpcrl.claims.rule import MAJORITY, Observations, Paths, forgiving, read
 from nmpcrl.claims.thresholds import improves, was_stopped
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
-from nmpcrl.claims.wider_claims import WIDER_CLAIMS
 from nmpcrl.studies.difficulty import DIFFICULTY, HORIZONS, MEASURES, OPEN, PILOT, RIVALS, STOPS
 from nmpcrl.studies.difficulty import SAME_CLOSING as SAME_CLOSING
 from nmpcrl.studies.predictors import predictor_scores

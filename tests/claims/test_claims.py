@@ -20,11 +20,10 @@ from nmpcrl.bench.paired import IDLE, Ratio
 from nmpcrl.claims import own_claims, paper_claims, thresholds
 from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS, Measured, audit, measured
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, halves
-from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, kept_without_noise
+from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_CLAIMS, WIDER_THAN, kept_without_noise
 from nmpcrl.claims.rule import Observations
 from nmpcrl.claims.timing import WAITED, decide
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Assumption, Verdict
-from nmpcrl.claims.wider_claims import WIDER_CLAIMS, WIDER_THAN
 from nmpcrl.study import Experiment, Records, Runs, paper, run
 from nmpcrl.study.experiment import LEARNERS, PAPER
 

@@ -13,9 +13,9 @@ from nmpcrl.analysis.search import Found, Search
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.claims import publish, published, thetas
 from nmpcrl.claims.assumptions import Measured
+from nmpcrl.claims.paper_claims import WIDER_THAN
 from nmpcrl.claims.published import Damaged, Published, Unpublishable, load
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.claims.wider_claims import WIDER_THAN
 from nmpcrl.study import Experiment, paper, run, sweep
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import frozen_arm

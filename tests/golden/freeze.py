@@ -33,7 +33,6 @@ from nmpcrl.claims import (
     robustness,
     rule,
     thresholds,
-    wider_claims,
 )
 from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.report import baselines, whole_study
@@ -117,7 +116,7 @@ def as_published() -> Any:
 
 @entry("verdicts")
 def claims() -> Any:
-    known = {**paper_claims.CLAIMS, **wider_claims.WIDER_CLAIMS, **own_claims.OWN_CLAIMS}
+    known = {**paper_claims.CLAIMS, **paper_claims.WIDER_CLAIMS, **own_claims.OWN_CLAIMS}
     names = ("learners", "threshold", "nothing", "linear_to", "unit", "implied")
     return {
         name: {field: getattr(one, field, None) for field in names} for name, one in known.items()

@@ -10,10 +10,9 @@ import pytest
 from nmpcrl.analysis.rows import FIELDS, OUTCOME, as_text
 from nmpcrl.claims import published as six
 from nmpcrl.claims.own_claims import OWN_CLAIMS
-from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.paper_claims import BY_RUNS, WIDER_CLAIMS
 from nmpcrl.claims.rule import Observations
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.claims.wider_claims import WIDER_CLAIMS
 from nmpcrl.studies import population
 from nmpcrl.studies.difficulty import MEASURES, OPEN, PILOT
 from nmpcrl.studies.population import EXPECTED, JUDGED, PARTS, PICTURE, POPULATION, seed_of
