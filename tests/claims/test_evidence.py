@@ -31,11 +31,6 @@ def known():
     return summaries
 
 
-def test_without_published_data_no_chapter_goes_on():
-    with pytest.raises(published.Damaged, match="nothing is published"):
-        needed("fresh", **ASKED)
-
-
 def test_missing_runs_are_trained_with_their_frozen_arms(known):
     both = ["ES", "frozen"]
     assert needed("published", **ASKED) == ()

@@ -76,21 +76,18 @@ def test_what_changes_a_number_changes_the_key_and_nothing_else_does():
     assert len({toy().key(one), *(each.key(one) for each in others)}) == 5
 
 
-def test_a_line_that_was_cut_off_is_made_again_and_all_others_stay():
-    toy().complete(["tune"], workers=1)
-    path = toy().log().path
-    path.write_text(path.read_text()[:-9])
-    assert len(toy().missing("tune")) == 1
-    table = toy().complete(["tune"], workers=1)
-    assert len(table) == 6
+def of_other_sources(text):
+    lines = [json.loads(line) for line in text.splitlines() if line]
+    return "\n".join(json.dumps([key, "other", row]) for key, _, row in lines)
 
 
-def test_rows_of_other_sources_are_made_again():
+@pytest.mark.parametrize(("edit", "missing"), [(lambda text: text[:-9], 1), (of_other_sources, 6)])
+def test_a_line_that_was_cut_off_or_has_other_sources_is_made_again(edit, missing):
     toy().complete(["tune"], workers=1)
     path = toy().log().path
-    lines = [json.loads(line) for line in path.read_text().splitlines() if line]
-    path.write_text("\n".join(json.dumps([key, "other", row]) for key, _, row in lines))
-    assert len(toy().missing("tune")) == 6
+    path.write_text(edit(path.read_text()))
+    assert len(toy().missing("tune")) == missing
+    assert len(toy().complete(["tune"], workers=1)) == 6
 
 
 def test_complete_arms_are_published_rounded_and_read_as_they_were_written(folders):

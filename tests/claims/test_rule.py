@@ -166,12 +166,8 @@ def test_arms_have_the_same_order_and_gaps_for_missing_short_and_stopped_runs():
     np.testing.assert_array_equal(ges.number, [2, 1, np.nan])
     np.testing.assert_array_equal(es.final_cost, [np.inf, np.nan, 9.0])
     assert [len(arm) for arm in arms(table, "ES", "GES", among=("GES",))] == [2, 2]
-
-
-def test_runs_of_several_settings_are_refused():
-    table = runs(("ES", "A", 0), ("ES", "A", 0))
     with pytest.raises(ValueError, match="ES has several runs in layout A, decay step, seed 0"):
-        arms(table, "ES")
+        arms(runs(("ES", "A", 0), ("ES", "A", 0)), "ES")
 
 
 def test_a_median_is_of_the_known_values():
