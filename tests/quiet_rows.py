@@ -3,6 +3,8 @@
 from dataclasses import asdict
 from typing import Any
 
+import pandas as pd
+
 from nmpcrl.analysis.rows import EVAL_INSIDE, INSIDE, THETA, as_text
 from nmpcrl.study import Experiment
 
@@ -26,3 +28,16 @@ def quiet_row(experiment: Experiment, **unlike: Any) -> dict[str, Any]:
     fields = {name: as_text(value) for name, value in asdict(experiment).items()}
     theta = dict(zip(THETA, experiment.theta, strict=True))
     return fields | QUIET | dict.fromkeys(NONE, 0) | theta | unlike
+
+
+def timings(rdes=0.5, ges=1.0, width=0.0, waited=0.0, solvers=("fatrop", "ipopt")) -> pd.DataFrame:
+    """Ratios of the times of a step, with intervals as wide on either side."""
+    ratios = {"ES": 1.0, "RDES": rdes, "GES": ges}
+    return pd.DataFrame(
+        [
+            {"solver": solver, "learner": learner, "waited": waited}
+            | {"ratio": ratio, "ratio_low": ratio - width, "ratio_high": ratio + width}
+            for solver in solvers
+            for learner, ratio in ratios.items()
+        ]
+    )

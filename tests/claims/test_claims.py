@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from quiet_rows import START_COST, quiet_row
+from quiet_rows import START_COST, quiet_row, timings
 
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.metrics import TOUCH
@@ -62,19 +62,6 @@ def paths(runs: pd.DataFrame, apart: float = 0.0, seeds=SEEDS) -> dict[Experimen
     named = [experiment_of(one) for one in runs.to_dict("records")]
     away = {e: apart if e.learner == "RDES" and e.seed in seeds else 0.0 for e in named}
     return {e: np.zeros((3, 3)) + [away[e], 0, 0] for e in named}
-
-
-def timings(rdes=0.5, ges=1.0, width=0.0, waited=0.0, solvers=("fatrop", "ipopt")) -> pd.DataFrame:
-    """Ratios of the times of a step, with intervals as wide on either side."""
-    ratios = {"ES": 1.0, "RDES": rdes, "GES": ges}
-    return pd.DataFrame(
-        [
-            {"solver": solver, "learner": learner, "waited": waited}
-            | {"ratio": ratio, "ratio_low": ratio - width, "ratio_high": ratio + width}
-            for solver in solvers
-            for learner, ratio in ratios.items()
-        ]
-    )
 
 
 def verdict_on(name: str, *observed: Any, **others: Any) -> Verdict:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from quiet_rows import timings
 
 from nmpcrl.analysis.rows import row
 from nmpcrl.analysis.search import Found, Search
@@ -180,23 +181,17 @@ def test_an_empty_folder_is_refused(folder):
         load()
 
 
-def timings(width: float) -> pd.DataFrame:
-    """Ratios with intervals as wide on either side."""
-    rows = [
-        {"solver": "ipopt", "learner": name, "ratio": ratio, "waited": 0.5}
-        | {"ratio_low": ratio - width, "ratio_high": ratio + width}
-        for name, ratio in {"ES": 1.0, "RDES": 0.65, "GES": 1.0}.items()
-    ]
-    return pd.DataFrame(rows)
-
-
 @pytest.mark.parametrize(
     ("width", "outcomes"), [(0.02, [PARTLY, REPRODUCED]), (0.07, [UNDECIDABLE, REPRODUCED])]
 )
 def test_times_are_published_if_they_decide_all_claims_about_time(
     known, monkeypatch, width, outcomes
 ):
-    monkeypatch.setattr(publish, "time_learners_repeatedly", lambda: timings(width))
+    monkeypatch.setattr(
+        publish,
+        "time_learners_repeatedly",
+        lambda: timings(0.65, width=width, waited=0.5, solvers=["ipopt"]),
+    )
     assert [verdict.outcome for verdict in publish.publish_timing()] == outcomes
     assert (len(load().timings) == 3) == (UNDECIDABLE not in outcomes)
     assert list(load().rows) == list(RUNS)

@@ -5,8 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 
 import numpy as np
-import pandas as pd
 import pytest
+from quiet_rows import timings
 
 from nmpcrl.analysis import summaries
 from nmpcrl.analysis.rows import cost_ratios, row
@@ -155,15 +155,6 @@ def test_two_decided_verdicts_contradict_each_other_beyond_chance_alone(here, th
     assert contradictions([there], [here]) == ((there, here),) * contradict
 
 
-def timings(ratio: float, waited: float = 0.0) -> pd.DataFrame:
-    rows = [
-        {"solver": "ipopt", "learner": name, "ratio": value, "waited": waited}
-        | {"ratio_low": value - 0.01, "ratio_high": value + 0.01}
-        for name, value in {"ES": 1.0, "RDES": ratio, "GES": 1.0}.items()
-    ]
-    return pd.DataFrame(rows)
-
-
 @pytest.mark.parametrize(
     ("ratio", "waited", "made", "contradicted"),
     [
@@ -175,8 +166,8 @@ def timings(ratio: float, waited: float = 0.0) -> pd.DataFrame:
     ],
 )
 def test_times_contradict_published_ones_of_this_machine(ratio, waited, made, contradicted):
-    known = Published(timings=timings(0.65), timed=made)
-    found = of_times(timings(ratio, waited), known)
+    known = Published(timings=timings(0.65, width=0.01), timed=made)
+    found = of_times(timings(ratio, width=0.01, waited=waited), known)
     assert [here.claim for here, _ in found] == contradicted
 
 
