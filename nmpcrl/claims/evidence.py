@@ -7,6 +7,7 @@ names the origin of its runs. `reproduce.agreement` compares runs made again wit
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -44,8 +45,7 @@ class Evidence:
     def where(self, holds: Iterable[bool]) -> "Evidence":
         """The runs with a true value in `holds`."""
         chosen = list(holds)
-        pairs = zip(self.summaries.items(), chosen, strict=True)
-        summaries = Runs(dict(pair for pair, is_chosen in pairs if is_chosen))
+        summaries = Runs(dict(compress(self.summaries.items(), chosen)))
         return Evidence(summaries, self.runs[chosen].reset_index(drop=True))
 
     @property
@@ -79,10 +79,10 @@ class Evidence:
 
 
 def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
-    """The runs of the main table that must be trained here, with their frozen arms.
+    """The runs of the main table to train here, with their frozen arms.
 
     Args:
-        source: "fresh" for all of `asked`, "published" for those that are not published.
+        source: "fresh" for all runs, "published" for the runs that are not published.
         asked: learners, layouts, seeds and episodes, as `design.main_table` takes them.
 
     Raises:
@@ -94,9 +94,7 @@ def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
 
 
 def repeatable(repeat: bool, **asked: Any) -> tuple[Experiment, ...]:
-    """The published runs of `asked` that a build trains again: those of `design.fresh`.
-
-    None unless `repeat` holds.
+    """The published runs of `design.fresh` for a build to train again, if `repeat` holds.
 
     Raises:
         ParameterError: a value is not allowed.
@@ -107,7 +105,7 @@ def repeatable(repeat: bool, **asked: Any) -> tuple[Experiment, ...]:
 
 
 def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:
-    """The runs that a chapter rests on; those of `needed` are trained if they are not stored.
+    """The runs of a chapter; runs of `needed` are trained if they are not stored.
 
     Args:
         source: "published" or "fresh".
@@ -136,19 +134,19 @@ def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:
 def with_inputs(found: Evidence) -> Evidence:
     """The finished runs with the inputs of their last rollouts, solved for from the final theta.
 
-    Published runs lack inputs, and a run that was stopped left no policy.
+    Published runs lack inputs, and stopped runs have no final policy.
     """
     finished = found.where(found.runs.stopped == Stopped.FINISHED)
     thetas = finished.runs[[*THETA]].to_numpy(float)
-    made: dict[Experiment, Outline] = {}
-    for (e, summary), theta in zip(finished.summaries.items(), thetas, strict=True):
-        known = summary.actions is not None
-        made[e] = summary if known else replace(summary, actions=_inputs(e, theta))
+    made: dict[Experiment, Outline] = {
+        e: one if one.actions is not None else replace(one, actions=_inputs(e, theta))
+        for (e, one), theta in zip(finished.summaries.items(), thetas, strict=True)
+    }
     return replace(finished, summaries=Runs(made))
 
 
 def _inputs(experiment: Experiment, theta: Vector) -> Column:
-    """Of a rollout without noise, shape (K + 1, m); nan after a failed solve."""
+    """Inputs of a rollout without noise, shape (K + 1, m); nan after a failed solve."""
     actions = evaluate(controller_of(experiment), theta, experiment.steps).actions
     missing = ((0, experiment.steps - len(actions)), (0, 0))
     return np.pad(actions, missing, constant_values=np.nan)

@@ -1,4 +1,4 @@
-"""The main finding in a few numbers: closed gaps, theta_c set by hand, and how RDES ended.
+"""The main finding in a few numbers: closed gaps, theta_c by hand, and the endings of RDES.
 
 theta_c tightens the obstacle constraint, Eq. (2f). A gap that the first rollout goes through closes
 at a theta_c that is known before training (`trajectory.closes_at`). Runs of ES and GES are sorted

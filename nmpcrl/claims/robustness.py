@@ -28,7 +28,7 @@ PARTS = {"layout": "B", "decay": "C"}  # of the main table, with the departures 
 
 
 def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
-    """The map: the complete main table, its parts (`part_changes`), and `variant_changes`.
+    """The map: rows of the main table, of its parts (`part_changes`), and of `variant_changes`.
 
     Args:
         runs: of `rows.table`, with a column `variant`.

@@ -94,7 +94,7 @@ class Claim(ABC):
 
 @dataclass(frozen=True)
 class Answers:
-    """How many runs say yes and no, and how many answers are missing."""
+    """The counts of yes, of no, and of missing answers."""
 
     yes: int
     no: int
@@ -179,7 +179,7 @@ def settle(
         claim: the claim.
         answers: True, False or missing, indexed by layout, decay, seed or by other levels.
         weaker: answers to a weaker question, which a yes to the first implies.
-        unit: the things that answered, in the plural.
+        unit: the name of what answers, in the plural.
         numbers: further fields of `Verdict`.
     """
     names = [str(name) for name in answers.index.names]

@@ -111,5 +111,5 @@ class Verdict:
         return len({*outcomes.values()} - {UNDECIDABLE}) > 1
 
     def depends_on(self, field: str) -> bool:
-        """Whether it differs by layout; or by the reading of the decay, or `turns` with it."""
+        """Whether the outcome differs by layout, or by the decay, or `turns` with the decay."""
         return self.differs_by(field) or (field == "decay" and self.turns)

@@ -293,14 +293,10 @@ def test_a_run_is_judged_from_its_records_as_from_the_table():
         [(1, 0, 1), (10, 0, 1), (10, 0, 3), (1, 3, 3)], start=2
     ):  # the frozen arm's late episodes are cut short
         for name, factor, late in (("ES", cost, lost), ("frozen", 1, lost_arm)):
-            one = Experiment(name, seed=seed, episodes=6, steps=6)
-            steps = (records := run(one)).steps
-            failed = steps["episode"] >= 6 - late
-            changes = {
-                "status": np.where(failed, 2, steps["status"]),
-                "cost": steps["cost"] * factor,
-            }
-            found[one] = replace(records, steps=steps | changes)
+            records = run(one := Experiment(name, seed=seed, episodes=6, steps=6))
+            status = np.where(records.steps["episode"] >= 6 - late, 2, records.steps["status"])
+            changes = {"status": status, "cost": records.steps["cost"] * factor}
+            found[one] = replace(records, steps=records.steps | changes)
     runs = table([summarise(records) for records in found.values()])
     for judged, expected in (
         (thresholds.diverged, thresholds.divergence(runs)),
@@ -317,14 +313,10 @@ def test_a_run_is_judged_from_its_records_as_from_the_table():
 
 
 def test_the_share_achieved_is_1_at_the_possible_cost_0_at_theta_init_and_negative_beyond():
-    runs = pd.DataFrame(
-        {
-            "layout": ["A"] * 6 + ["B", "C"],
-            "initial_cost": 100.0,
-            "final_cost": [80.0, 100.0, 90.0, 120.0, np.inf, 90.0, 90.0, 90.0],
-            "stopped": ["finished"] * 5 + ["diverged: it went"] + ["finished"] * 2,
-        }
-    )
+    costs = [80.0, 100.0, 90.0, 120.0, np.inf, 90.0, 90.0, 90.0]
+    runs = pd.DataFrame({"layout": ["A"] * 6 + ["B", "C"], "initial_cost": 100.0})
+    runs = runs.assign(final_cost=costs, stopped="finished")
+    runs.loc[5, "stopped"] = "diverged: it went"
     shares = thresholds.share_of_possible(runs, {"A": 0.2, "B": 0.0})
     worst = [-np.inf, -np.inf]
     np.testing.assert_allclose(shares, [1.0, 0.0, 0.5, -1.0, *worst, np.nan, np.nan], atol=1e-12)
