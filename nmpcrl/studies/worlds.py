@@ -282,13 +282,10 @@ def carried(table: pd.DataFrame, arm: str) -> pd.DataFrame:
 
 
 def _carries(table: pd.DataFrame) -> Answer:
-    better = {
-        arm: pd.Series(
-            [(row.drop(place) < 1).mean() for place, row in carried(table, arm).iterrows()],
-            dtype=float,
-        )
-        for arm in ("ES", "CMA-ES")
-    }
+    better = {}
+    for arm in ("ES", "CMA-ES"):
+        rows = carried(table, arm).iterrows()
+        better[arm] = pd.Series([(row.drop(place) < 1).mean() for place, row in rows], dtype=float)
     numbers = {f"median share, {arm}": float(one.median()) for arm, one in better.items()}
     return share(better["ES"] > 0.5, "layouts", numbers)
 

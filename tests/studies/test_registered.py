@@ -23,27 +23,16 @@ from nmpcrl.studies.population import POPULATION
 from nmpcrl.study import published
 
 NAMES = ("today", "investigations", "commit", "name", "questions", "parts")
+DRAWN = (POPULATION, interventions.INTERVENTIONS)
+WORLDS = ((worlds,), (worlds.WORLDS,))
 REGISTERED = [  # today's modules; commit, module and name of questions; their parts in `first`
-    (
-        (agents,), (agents.SAC_AND_TD3,),
-        "2feab64", "nmpcrl.claims.agent_questions", "AGENT_QUESTIONS", ("all",),
-    ),
-    (
-        (remedies,), (remedies.REMEDIES,),
-        "ebf53a4", "nmpcrl.claims.remedy_questions", "REMEDY_QUESTIONS", ("all",),
-    ),
-    (
-        (worlds,), (worlds.WORLDS,),
-        "cff09a0", "nmpcrl.claims.world_questions", "WORLD_QUESTIONS", ("all",),
-    ),
-    (
-        (worlds,), (worlds.WORLDS,),
-        "ff05118", "nmpcrl.claims.terminal_questions", "TERMINAL_QUESTIONS", ("terminal",),
-    ),
-    (
-        (population, difficulty, predictors), (POPULATION, interventions.INTERVENTIONS),
-        "46c248b", "nmpcrl.claims.population_questions", "QUESTIONS", tuple(population.PARTS),
-    ),
+    ((agents,), (agents.SAC_AND_TD3,), "2feab64", "agent_questions", "AGENT_QUESTIONS", ("all",)),
+    ((remedies,), (remedies.REMEDIES,), "ebf53a4", "remedy_questions", "REMEDY_QUESTIONS",
+     ("all",)),
+    (*WORLDS, "cff09a0", "world_questions", "WORLD_QUESTIONS", ("all",)),
+    (*WORLDS, "ff05118", "terminal_questions", "TERMINAL_QUESTIONS", ("terminal",)),
+    ((population, difficulty, predictors), DRAWN, "46c248b", "population_questions", "QUESTIONS",
+     tuple(population.PARTS)),
 ]  # fmt: skip
 each = pytest.mark.parametrize(NAMES, REGISTERED)
 
@@ -52,7 +41,7 @@ each = pytest.mark.parametrize(NAMES, REGISTERED)
 def test_questions_and_expectations_are_those_registered(
     today, investigations, commit, name, questions, parts
 ):
-    then = getattr(module(commit, name), questions)
+    then = getattr(module(commit, f"nmpcrl.claims.{name}"), questions)
     every = (one for each in investigations for one in each.questions)
     now = {one.name: one for one in every if one.name in then}
     assert {*now} == {*then}
@@ -66,7 +55,7 @@ def test_thresholds_are_those_registered(today, investigations, commit, name, qu
     now = {one: value for each in today for one, value in vars(each).items()}
     then = {
         one: value
-        for one, value in vars(module(commit, name)).items()
+        for one, value in vars(module(commit, f"nmpcrl.claims.{name}")).items()
         if one.isupper() and isinstance(value, int | float | tuple) and one in now
     }
     plain = {
