@@ -11,20 +11,10 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.files import Column, DamagedRecords, load_about, load_tables, save_tables
+from nmpcrl.study.files import Column as Column
+from nmpcrl.study.files import DamagedRecords as DamagedRecords
+from nmpcrl.study.files import load_about, load_tables, save_tables
 from nmpcrl.study.machine import Fingerprint
-
-__all__ = [
-    "About",
-    "Column",
-    "DamagedRecords",
-    "Facts",
-    "Records",
-    "StepStatus",
-    "Stopped",
-    "Table",
-    "final_cost",
-]
 
 LAST = 3  # rollouts that the final cost averages
 STATES = len(paper.START)  # n of the robot

@@ -52,8 +52,9 @@ def job_of(named: Experiment | Trial) -> Job:
     experiment = named.canonical
     controller = controller_of(experiment)
     options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
+    alpha = LEARNERS[experiment.learner].step_size(experiment)
     return Job(
-        asdict(experiment), controller, *prepare(experiment, controller), step_size(experiment),
+        asdict(experiment), controller, *prepare(experiment, controller), alpha,
         experiment.evaluate_every, options,
     )  # fmt: skip
 
@@ -139,8 +140,3 @@ def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, We
     weights = Weights(theta, np.full(theta.size, paper.W_INIT))
     learner = LEARNERS[experiment.learner].make(experiment, controller, generators)
     return learner, weights, explore
-
-
-def step_size(experiment: Experiment) -> float:
-    """The step size of theta, by which the recorded alpha ||phi||^2 is computed."""
-    return LEARNERS[experiment.learner].step_size(experiment)

@@ -8,7 +8,7 @@ import pytest
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.learners import LEARNERS, NETWORKS, Generators, readers
-from nmpcrl.study.setup import controller_of, prepare, step_size
+from nmpcrl.study.setup import controller_of, job_of, prepare
 
 CONTROLLER = Persistent(paper.nmpc())
 ALL = {one.name for one in fields(Experiment)}
@@ -43,7 +43,7 @@ def test_a_learner_is_what_its_entry_says_and_reads_only_what_its_entry_names(na
         read |= experiment.read & OPTIONAL
     wherever = {"constrained", "ties_active"}  # read by the experiment and its controller
     assert read <= set(entry.reads) <= read | wherever
-    assert step_size(Experiment(name)) == paper.ALPHA
+    assert job_of(Experiment(name, episodes=1)).alpha == paper.ALPHA
 
 
 @pytest.mark.parametrize("name", LEARNERS)
