@@ -204,7 +204,8 @@ def test_published_runs_made_again_are_counted_by_how_equal_they_are(study):
     found = study()
     first, second, third, *_ = (e for e in found if e.learner != "frozen")
     known = published_of(
-        found | {first: scaled(found[first], 1 + 1e-9, -1), second: scaled(found[second], 2.0)}
+        found
+        | {first: scaled(moved(found[first]), 1 + 1e-9, 0), second: scaled(found[second], 2.0)}
     )
     made = agreement(found, replace(known, variants=dict(known.variants) | {third: "N = 5"}))
     assert (made.runs, made.equal, made.close) == (len(found) - 1, len(found) - 3, 1)
