@@ -202,7 +202,7 @@ def largest_reduction(cost: Vector) -> float:
     return float(cost[0] - cost.min())
 '''),
         "nmpcrl/analysis/rows.py": both(
-            replaced('    "best_cost",', '    "largest_reduction",\n    "best_cost",'),
+            replaced('    *("stopped",', '    "largest_reduction",\n    *("stopped",'),
             replaced(
                 '        "best_cost"',
                 '        "largest_reduction": metrics.largest_reduction(cost),\n'
