@@ -4,7 +4,7 @@ A step theta + alpha delta phi changes V in s by alpha delta phi'phi, and the ta
 by alpha delta gamma psi'phi, where psi is the prediction's slope in theta. The ratio is the
 `feedback`: below 1 a step shrinks the TD error, above 1 it enlarges the TD error. A second solve
 has psi = phi+, a network without theta has psi = 0. A network with theta has learned its slope
-from the thetas seen so far, which lie along one line, and is asked at the end of this line.
+from the thetas seen so far, which lie along one line, and predicts at the end of this line.
 
 An intervention changes the prediction alone: noise, first weights, examples and fits are the same.
 """
@@ -27,7 +27,7 @@ PROBE = 1e-5  # alpha delta of the step along which a slope is measured: delta =
 
 @dataclass
 class StartTheta:
-    """Asks the network with the first theta of the episode; the network learns as before.
+    """The network predicts with the first theta of the episode; examples and fits are unchanged.
 
     With `true_slope` the change of the NMPC's own V in s+ since that theta is added.
     """
