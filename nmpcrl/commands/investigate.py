@@ -56,6 +56,8 @@ def investigate(
         made = one.complete(parts, workers)
         if publish:
             click.echo(f"{one.publish()}: published")
+            if not one.registered:
+                click.echo(f"not registered: commit {name} before its rows are made")
     say(one, made if not (judge or publish) else one.table())
 
 

@@ -287,7 +287,7 @@ def rows(table: pd.DataFrame, compared: pd.DataFrame) -> tuple[remedies.RemedyRo
 
 def agents_of(table: pd.DataFrame) -> pd.Series:
     """The agent of each run, whatever its setting."""
-    return table.arm.map(lambda arm: arm.partition("[")[0])
+    return table.arm.map(lambda arm: suite.entry(arm, AGENTS).name)
 
 
 SAC_AND_TD3 = Investigation(

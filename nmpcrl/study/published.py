@@ -28,6 +28,7 @@ from nmpcrl.study.provenance import hash_of
 from nmpcrl.study.refusal import Refusal
 
 MANIFEST = "manifest.json"
+TEXTS = dict.fromkeys(("part", "arm", "place"), str)  # names of rows, even if they are numbers
 SEAL = "hash of all the rest"
 CHECKOUT = "`git checkout -- book/published` restores it"
 ELSEWHERE = (
@@ -139,23 +140,23 @@ def _manifest(place: Path) -> dict[str, Any]:
         if entries.pop(SEAL) != hash_of(entries):
             raise ValueError("it is not the file that was written")
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-        raise Damaged(f"{path} is damaged ({error}); {_restore()}") from error
+        raise Damaged(f"{path} is damaged ({error}); {_restore(place)}") from error
     return entries
 
 
 def _content(place: Path, name: str, suffix: str) -> bytes:
     """The bytes of a published file, if they are those that were written."""
     if not (place / MANIFEST).exists():
-        raise Damaged(f"nothing is published in {place}; {_restore()}")
+        raise Damaged(f"nothing is published in {place}; {_restore(place)}")
     path = place / f"{name}{suffix}"
     known = _manifest(place).get(name, {}).get("files", {})
     try:
         content = path.read_bytes()
     except OSError as error:
         why = "nothing is published under this name" if path.name not in known else error.strerror
-        raise Damaged(f"{path} cannot be read ({why}); {_restore()}") from error
+        raise Damaged(f"{path} cannot be read ({why}); {_restore(place)}") from error
     if sha256(content).hexdigest() != known.get(path.name):
-        raise Damaged(f"{path} is not the file that was published; {_restore()}")
+        raise Damaged(f"{path} is not the file that was published; {_restore(place)}")
     return content
 
 
@@ -180,7 +181,7 @@ def _csv(table: pd.DataFrame) -> bytes:
 
 def _of_csv(content: bytes) -> pd.DataFrame:
     """The table that `_csv` was given."""
-    table = pd.read_csv(io.BytesIO(content))
+    table = pd.read_csv(io.BytesIO(content), dtype=TEXTS)
     for column in table.select_dtypes("str"):
         texts = table[column].fillna("")
         lists = len(texts) > 0 and texts.str.startswith("[").all()
@@ -188,7 +189,9 @@ def _of_csv(content: bytes) -> pd.DataFrame:
     return table
 
 
-def _restore() -> str:
-    """How to get the published data back, in a checkout of the project and elsewhere."""
+def _restore(place: Path) -> str:
+    """How to get the published data back: a reader's own, a checkout's, and elsewhere."""
+    if place != folder():
+        return "`nmpcrl investigate FILE.py --publish` writes it"
     checkout = (Path(nmpcrl.__file__).parents[1] / ".git").exists()
     return CHECKOUT if checkout else ELSEWHERE

@@ -54,14 +54,22 @@ def test_the_file_of_the_page_on_your_paper_is_run_interrupted_published_and_jud
     page = Path(__file__).parents[2] / "book" / "your_paper.ipynb"
     texts = ("".join(cell["source"]) for cell in json.loads(page.read_text())["cells"])
     (block,) = (re.findall(r"```python\n(.*?)```", text, re.S) for text in texts if "CHAIN" in text)
-    path = tmp_path / "chain.py"
+    path = tmp_path / "mine" / "chain.py"
+    path.parent.mkdir()
     path.write_text(block[0])
     made = command("investigate", str(path), "--workers", "1")
     assert "P1: confirmed (12 of 12 runs)" in made.stdout
     log = tmp_path / "runs" / "chain.jsonl"
     log.write_text(log.read_text()[:-40])
     assert "all: 59 of 60 rows are stored" in command("investigate", str(path), "--dry-run").stdout
-    assert command("investigate", str(path), "--publish", "--workers", "1").exit_code == 0
+    unpublished = command("investigate", str(path), "--judge").stderr
+    assert "nothing is published in" in unpublished
+    assert "git checkout" not in unpublished  # the project's data are others
+    said = command("investigate", str(path), "--publish", "--workers", "1")
+    assert said.exit_code == 0
+    assert "not registered: commit" in said.stdout
+    again = command("investigate", str(path), "--publish", "--workers", "1")
+    assert "no arm of chain is complete and new" in again.stderr
     log.unlink()
     assert command("investigate", str(path), "--judge").stdout == made.stdout
 

@@ -14,7 +14,7 @@
 
   const at = ([x, y, vx, vy], seconds) => [x + seconds * vx, y + seconds * vy];
 
-  // Where a robot expects the obstacles at the i-th stage of its plan, as `study.motions` has it.
+  // Where a robot expects the obstacles at the i-th stage of its plan, as `study.moving` has it.
   const EXPECTED = {
     extrapolated: (now, before, i) => now.map((place, j) => place.map((each, a) => each + i * (each - before[j][a]))),
     frozen: (now) => now,
