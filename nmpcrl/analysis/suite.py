@@ -102,7 +102,7 @@ class Robot:
             self.controller: Persistent = controller(len(self.motions))
         else:
             self.centres = LAYOUTS[place] if isinstance(place, str) else place
-            self.task = paper.task_among(self.centres)
+            self.task = paper.task(self.centres)
             self.controller = Persistent(paper.controller(self.task))
 
     @property

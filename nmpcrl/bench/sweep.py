@@ -153,7 +153,7 @@ def read(place: Path) -> SweepTable:
 def tally_of(layout: int, problems: int) -> Tally:
     """The first problems of one drawn layout."""
     rng = np.random.default_rng(np.random.SeedSequence(SEED, spawn_key=(layout,)))
-    task = paper.task_among(rng.uniform(paper.LOWER[:2], paper.UPPER[:2], (OBSTACLES, 2)).tolist())
+    task = paper.task(rng.uniform(paper.LOWER[:2], paper.UPPER[:2], (OBSTACLES, 2)).tolist())
     ours, ipopt = (paper.controller(task, solver=name) for name in (Riccati.name, "ipopt"))
     total = Tally()
     for k in range(problems):

@@ -61,7 +61,7 @@ RIVALS = tuple(name for name in MEASURES if name != PILOT)
 
 def measure(centres: Centres) -> Difficulty:
     """All measures of a layout, from two rollouts and one solve."""
-    task = paper.task_among(centres)
+    task = paper.task(centres)
     controller, theta = Persistent(paper.controller(task)), np.array(paper.THETA_INIT)
     first = evaluate(controller, theta, paper.STEPS)
     raised = theta + RAISED * np.eye(len(theta))[-1]
@@ -95,7 +95,7 @@ def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
 
     Nothing is learned. nan where it arrives on the whole grid.
     """
-    task = paper.task_among(centres)
+    task = paper.task(centres)
     controller, theta = Persistent(paper.controller(task, horizon=horizon)), [*paper.THETA_INIT]
     for theta_c in grid:
         states = evaluate(controller, np.array([*theta[:-1], theta_c]), paper.STEPS).states

@@ -5,15 +5,15 @@ open. A variant changes one other field.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
 from itertools import chain, product
 from math import prod
-from types import MappingProxyType
 from typing import Any
 
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import MAIN, PAPER, Experiment, frozen_arm
-from nmpcrl.study.geometry import Centres, are_centres
+from nmpcrl.study.geometry import Centres
 from nmpcrl.study.learners import DECAYS, LEARNERS
 from nmpcrl.study.parameters import Allowed, ParameterError, is_list, several, shown
 
@@ -51,12 +51,14 @@ def _values(name: str, given: Any) -> tuple[Any, ...]:
     """The values of an axis, or the one value of a fixed field."""
     if name not in FIELDS:
         raise ParameterError(f"{name!r} is not a parameter; there are {', '.join(FIELDS)}")
-    text = isinstance(given, str) and given.strip().startswith("[")
-    one = name in VECTORS or (name == "layout" and are_centres(given))
-    if (text or is_list(given)) and not one:
-        values: tuple[Any, ...] = AXES[f"{name}s"].check(f"{name}s", given)
-        return values
-    return (FIELDS[name].check(name, given),)
+    axis = is_list(given) or (isinstance(given, str) and given.strip().startswith("["))
+    if not axis or name in VECTORS:
+        return (FIELDS[name].check(name, given),)
+    if name == "layout":
+        with suppress(ParameterError):  # the centres of one layout
+            return (FIELDS[name].check(name, given),)
+    values: tuple[Any, ...] = AXES[f"{name}s"].check(f"{name}s", given)
+    return values
 
 
 def paper_runs(
@@ -65,13 +67,9 @@ def paper_runs(
     layout: str | Centres = "A",
     **others: Any,
 ) -> tuple[Experiment, ...]:
-    """The runs of a chapter: the paper's learners, both readings of the decay, some seeds.
+    """The runs of a chapter: the paper's learners and the frozen one, in both readings.
 
-    Args:
-        episodes: length of a run.
-        seeds: one run of each learner and reading for each.
-        layout: of the obstacles.
-        others: further fields of `Experiment`, as `sweep` takes them.
+    `others` are further fields of `Experiment`, as `sweep` takes them.
     """
     grid = {"learner": (*PAPER, "frozen"), "decay": tuple(DECAYS), "seed": seeds}
     return sweep(**grid, episodes=episodes, layout=layout, **others)
@@ -79,7 +77,6 @@ def paper_runs(
 
 Pair = tuple[Experiment, Experiment]
 PERTURBATION = 1e-12  # added to theta_x at the start
-OTHER_SOLVER = "ipopt"
 SOLVER_EPISODES = 20  # of a run with the other solver, which takes a minute
 
 
@@ -98,7 +95,7 @@ def perturbed_pairs(**fields: Any) -> tuple[Pair, ...]:
 def solver_pair(experiment: Experiment) -> Pair:
     """The same short run with the default solver and with the paper's."""
     short = replace(experiment, episodes=min(experiment.episodes, SOLVER_EPISODES))
-    return short, replace(short, solver=OTHER_SOLVER)
+    return short, replace(short, solver="ipopt")
 
 
 LAYOUTS = ("A", "B", "C", "D", "E", "F")  # of the main table; further ones may have a name, too
@@ -113,12 +110,6 @@ FRESH: tuple[dict[str, Any], ...] = (
 )
 MAIN_TABLE = "main"
 IMITATING = tuple(name for name in PAPER if LEARNERS[name].network)
-BASELINES = {  # readings of DES, in every layout and in both readings of the decay
-    "lagged": "a copy of the network, refreshed once an episode, predicts",
-    "averaged": "a copy that follows the network slowly predicts",
-    "greedy": "the next action is the network's minimiser",
-    "late": "the network is one fit late, as in parallel",
-}
 
 
 @dataclass(frozen=True)
@@ -127,7 +118,7 @@ class Variant:
 
     departure: str  # its letter in `DEPARTURES`; "" where the main table follows the paper
     changed: str  # the difference in words
-    fields: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    fields: Mapping[str, Any]
     learners: tuple[str, ...] = PAPER
 
 
@@ -158,7 +149,12 @@ def _variants() -> dict[str, Variant]:
     found["tolerance 1e-5"] = Variant("", "a looser solver", {"tolerance": 1e-5})
     theta = perturbed(Experiment()).theta
     found["perturbed"] = Variant("", "theta_init moved by 1e-12", {"theta": theta})
-    for network, changed in BASELINES.items():
+    for network, changed in {  # readings of DES
+        "lagged": "a copy of the network, refreshed once an episode, predicts",
+        "averaged": "a copy that follows the network slowly predicts",
+        "greedy": "the next action is the network's minimiser",
+        "late": "the network is one fit late, as in parallel",
+    }.items():
         fields = {"network": network, "layout": LAYOUTS, "decay": tuple(DECAYS)}
         found[network] = Variant("I", changed, fields, ("DES",))
     return found

@@ -49,7 +49,7 @@ class Screening:
 
 def screen(centres: Centres) -> Screening:
     """Apply the criteria to a layout; nothing is trained for it."""
-    task = paper.task_among(centres)
+    task = paper.task(centres)
     blocked = bool(_distances(task.start[:2], task.target[:2], centres).min() < _keep_out(task, 0))
     clear = task.collision_penalty(task.start) == 0 == task.collision_penalty(task.target)
     if not (blocked and clear):

@@ -14,7 +14,7 @@ state if a second solve with the data of t + 1 bootstraps it, and if the predict
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import sqrt
 from types import MappingProxyType
@@ -33,7 +33,7 @@ from nmpcrl.study import paper
 from nmpcrl.study.faults import NONE, Body, Fault, robot
 
 TARGET, LOWER, UPPER = map(np.array, (paper.TARGET, paper.LOWER, paper.UPPER))
-TASK: Task = paper.task_among(())  # its numbers are those of the charge
+TASK: Task = replace(paper.task(), obstacles=())  # its numbers are those of the charge
 CLEARANCE = 2.5  # d_rob + d_obs [m]
 PERIOD = 0.2  # [s] of a step
 Point = tuple[float, float]

@@ -1,17 +1,14 @@
 """The numbers of the paper, Table I and the task; `DEPARTURES` has its gaps and contradictions."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from nmpcrl.control import Nmpc, Obstacle, Task, differential_drive
-from nmpcrl.control.solvers import Solver
 from nmpcrl.study import geometry
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.parameters import one_of
-
-__all__ = ["LAYOUTS", "centres_of", "controller", "nmpc", "task", "task_among"]
 
 ALPHA = 1e-7  # step size of theta
 BETA = 1e-8  # step size of w  # departure J
@@ -63,57 +60,24 @@ def task(
     target: Sequence[float] = TARGET,
 ) -> Task:
     """The robot's task among the obstacles of a layout, in one of `BOXES`."""
-    return task_among(
-        centres_of(layout),
-        printed_box=one_of(BOXES).check("box", box) == "printed",
-        soft_box=box == "soft",
-        start=start,
-        target=target,
-    )
-
-
-def task_among(
-    centres: Iterable[tuple[float, float]],
-    *,
-    printed_box: bool = False,
-    soft_box: bool = False,
-    start: Sequence[float] = START,
-    target: Sequence[float] = TARGET,
-) -> Task:
-    """The robot's task among obstacles with these centres [m]."""
+    printed = one_of(BOXES).check("box", box) == "printed"
     return Task(
         start=np.array(start),
         target=np.array(target),
-        lower=np.array(PRINTED_LOWER if printed_box else LOWER),
-        upper=np.array(PRINTED_UPPER if printed_box else UPPER),
-        obstacles=tuple(Obstacle(x, y) for x, y in centres),
-        soft_box=soft_box,
-        target_may_lie_outside=printed_box,
+        lower=np.array(PRINTED_LOWER if printed else LOWER),
+        upper=np.array(PRINTED_UPPER if printed else UPPER),
+        obstacles=tuple(Obstacle(x, y) for x, y in centres_of(layout)),
+        soft_box=box == "soft",
+        target_may_lie_outside=printed,
     )
-
-
-def nmpc(
-    layout: str | Centres = "A",
-    *,
-    horizon: int = HORIZON,
-    solver: Solver | str = "riccati",
-    box: str = BOXES[0],
-    **options: Any,
-) -> Nmpc:
-    """The paper's controller, Eq. (2) with Table I, among the obstacles of a layout.
-
-    Args:
-        layout: a name in `LAYOUTS`, or the centres of obstacles [m].
-        horizon: N, the number of planned inputs.
-        solver: as `Nmpc` takes it.
-        box: one of `BOXES`.
-        options: further ones of `Nmpc`.
-    """
-    return controller(task(layout, box=box), horizon=horizon, solver=solver, **options)
 
 
 def controller(task: Task, **options: Any) -> Nmpc:
     """The paper's controller, Eq. (2) with Table I, for any task; `options` are those of `Nmpc`."""
-    return Nmpc(
-        differential_drive(), task, **{"gamma": GAMMA, "slack_weight": SLACK_WEIGHT} | options
-    )
+    weights = {"gamma": GAMMA, "slack_weight": SLACK_WEIGHT}
+    return Nmpc(differential_drive(), task, **weights | options)
+
+
+def nmpc(layout: str | Centres = "A", *, box: str = BOXES[0], **options: Any) -> Nmpc:
+    """The paper's controller among the obstacles of a layout; `options` are those of `Nmpc`."""
+    return controller(task(layout, box=box), **options)

@@ -1,12 +1,9 @@
 """Checks of parameters, with the allowed values in words."""
 
-import re
-from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from math import inf, nextafter
 from numbers import Integral, Real
-from reprlib import Repr
 from typing import Any
 
 import numpy as np
@@ -16,7 +13,6 @@ from nmpcrl.study.refusal import Refusal as Refusal
 
 LARGEST_SEED = 2**31 - 1  # that the generators of all libraries take
 MOST_VALUES = 10_000  # of a list
-POWER = re.compile(r"([+-]?\d*)(\.\d*)?[eE]([+-]?)(\d+)", re.ASCII)
 LONGEST = 100  # characters of a value in a message
 
 
@@ -29,8 +25,8 @@ class Allowed:
     """The values that a parameter may have."""
 
     text: str  # the values in words, as they follow "must be"
-    read: Callable[[Any], Any]  # converts a value; a ValueError or TypeError refuses it
-    choices: tuple[str, ...] | None = None  # all values, if they are words
+    read: Callable[[Any], Any]  # converts a value; ValueError and the like refuse it
+    choices: tuple[str, ...] = ()  # all values, if they are words
     ends: tuple[float, float] | None = None  # the least and the largest, if they are numbers
 
     def check(self, name: str, value: Any) -> Any:
@@ -45,7 +41,7 @@ class Allowed:
             raise
         except Unfit as error:
             raise ParameterError(f"{name} = {shown(value)} {error}") from None
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise refused(name, value, self.text) from None
 
 
@@ -53,7 +49,7 @@ def one_of(words: Collection[str]) -> Allowed:
     """One of some words."""
 
     def read(value: Any) -> str:
-        _need(isinstance(value, str) and value in words)
+        need(isinstance(value, str) and value in words)
         return str(value)
 
     return Allowed(f"one of {', '.join(words)}", read, tuple(words))
@@ -63,8 +59,8 @@ def whole(least: int, most: int) -> Allowed:
     """A whole number from `least` to `most`."""
 
     def read(value: Any) -> int:
-        _need(isinstance(value, Integral) and not isinstance(value, bool))
-        _need(least <= value <= most)
+        need(isinstance(value, Integral) and not isinstance(value, bool))
+        need(least <= value <= most)
         return int(value)
 
     return Allowed(f"a whole number from {least} to {most}", read, ends=(least, most))
@@ -74,14 +70,12 @@ def number(least: float, most: float, text: str = "") -> Allowed:
     """A number in [least, most]."""
 
     def read(value: Any) -> float:
-        found = POWER.fullmatch(value.strip()) if isinstance(value, str) else None
-        if found:  # YAML 1.1 wants a point, and a sign of the power
-            digits, part, sign, power = found.groups(default="")
-            written = f"{digits or 0}.{part.strip('.') or 0}e{sign or '+'}{power}"
+        if isinstance(value, str) and "e" in value.lower():  # YAML 1.1 reads 1e-7 as text
+            written = np.format_float_scientific(float(value), trim="0", exp_digits=1)
             raise Unfit(f"arrived as text; write {written}")
-        _need(isinstance(value, Real) and not isinstance(value, bool))
-        _need(least <= value <= most)  # which nan is not
-        return float(value)
+        need(isinstance(value, Real) and not isinstance(value, bool))
+        need(least <= value <= most)  # which nan is not
+        return float(value) + 0.0  # -0.0 would be another key
 
     return Allowed(text or f"a number in [{least:g}, {most:g}]", read, ends=(least, most))
 
@@ -95,7 +89,7 @@ def numbers(each: Sequence[Allowed], text: str) -> Allowed:
     """A list of numbers, one for each of `each`."""
 
     def read(value: Any) -> tuple[float, ...]:
-        _need(is_list(value) and len(value) == len(each))
+        need(is_list(value) and len(value) == len(each))
         return tuple(allowed.read(one) for allowed, one in zip(each, value, strict=True))
 
     return Allowed(text, read)
@@ -106,33 +100,26 @@ def several(each: Allowed, name: str) -> Allowed:
 
     def read(value: Any) -> tuple[Any, ...]:
         if isinstance(value, str) and value.strip().startswith("["):
-            line = shortened(value.strip())
-            raise Unfit(f"arrived as text, not as a list; write -y '{{{name}s: {line}}}'")
+            raise Unfit(f"arrived as text; write -y '{{{name}s: {shortened(value)}}}'")
         if not is_list(value):
-            single = isinstance(value, str | int | float)
-            raise Unfit(f"must be a list{f', such as [{shown(value)}]' if single else ''}")
-        if not len(value):
-            raise Unfit(f"must name at least one {name}")
-        if len(value) > MOST_VALUES:
-            raise Unfit(f"must name {MOST_VALUES} {name}s at most, not {len(value)}")
+            raise Unfit(f"must be a list, such as [{shown(value)}]")
+        need(1 <= len(value) <= MOST_VALUES)
         values = tuple(each.check(name, one) for one in value)
-        twice = {one for one, count in Counter(values).items() if count > 1}
-        if twice:
-            raise Unfit(f"must be a list that names {shown(min(twice))} once")
+        need(len(set(values)) == len(values))
         return values
 
-    return Allowed(f"a list in which each {name} is {each.text}", read)
+    return Allowed(f"a list of 1 to {MOST_VALUES} different {name}s", read)
 
 
 def _truth(value: Any) -> bool:
-    _need(isinstance(value, bool | np.bool_))
+    need(isinstance(value, bool | np.bool_))
     return bool(value)
 
 
 TRUTH = Allowed("true or false", _truth)
 
 
-def _need(holds: bool) -> None:
+def need(holds: bool) -> None:
     """Raise a ValueError if a condition does not hold."""
     if not holds:
         raise ValueError
@@ -140,8 +127,8 @@ def _need(holds: bool) -> None:
 
 def is_list(value: Any) -> bool:
     """Whether a value is a list, a tuple, a range or a vector."""
-    rows = isinstance(value, np.ndarray) and value.ndim == 1
-    return rows or isinstance(value, list | tuple | range)
+    vector = isinstance(value, np.ndarray) and value.ndim == 1
+    return vector or isinstance(value, list | tuple | range)
 
 
 def refused(name: str, value: Any, text: str) -> ParameterError:
@@ -149,22 +136,9 @@ def refused(name: str, value: Any, text: str) -> ParameterError:
     return ParameterError(f"{name} = {shown(value)} must be {text}")
 
 
-class _Short(Repr):
-    """`repr` on one line, however large the value is."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxlist = self.maxtuple = self.maxarray = self.maxdict = self.maxset = 10
-        self.maxstring = self.maxother = LONGEST
-
-    def repr_int(self, x: int, level: int) -> str:
-        """An integer; Python refuses to print the largest."""
-        return repr(x) if abs(x) < 10**40 else f"an integer of {x.bit_length()} bits"
-
-
 def shown(value: Any) -> str:
-    """A value as one line of a message."""
-    return shortened(_Short().repr(value))
+    """A value as one short line of a message."""
+    return shortened(repr(value))
 
 
 def shortened(text: str) -> str:

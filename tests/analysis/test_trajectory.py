@@ -13,7 +13,7 @@ FAR = 1.25 * np.sqrt(1.35)  # from a centre; the penalty begins here [m]
 @pytest.fixture(scope="module")
 def task():
     """One obstacle in the middle of the way, three at the upper wall."""
-    return paper.task_among(((3.0, 0.0), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
+    return paper.task(((3.0, 0.0), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
 
 
 def along(points: np.ndarray) -> np.ndarray:
@@ -51,7 +51,7 @@ def test_coming_close_is_charged_only_within_the_margin_and_far_from_the_target(
     assert describe(along(np.array([beside, within])), task, 0.5).penalty == pytest.approx(
         50 * 0.35
     )
-    near = paper.task_among(((8.5, 3.2), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
+    near = paper.task(((8.5, 3.2), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
     assert describe(along(np.array([[8.5, 2.1]])), near, 0.5).penalty == 0
 
 
@@ -61,6 +61,6 @@ def test_a_gap_closes_where_its_width_is_nothing():
     shut = closes_at(task, path)
     assert min(gaps(task, path, shut).values()) == pytest.approx(0, abs=1e-12)
     assert shut == pytest.approx((np.hypot(1.5, 2.5) / 2.5) ** 2 - 1)
-    beside_a_wall = paper.task_among(((7.0, -1.0),)), np.array([[7.0, -2.8], [8.0, -2.8]])
+    beside_a_wall = paper.task(((7.0, -1.0),)), np.array([[7.0, -2.8], [8.0, -2.8]])
     assert closes_at(*beside_a_wall) == pytest.approx((2 / 1.25) ** 2 - 1)
     assert closes_at(paper.task("A"), np.full((3, 2), [1.7, 1.4])) == np.inf  # through no gap

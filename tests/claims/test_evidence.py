@@ -56,7 +56,7 @@ def test_a_build_trains_the_published_runs_of_the_design_again(monkeypatch):
     [
         ({"source": "stale"}, "study = 'stale' must be one of published, fresh"),
         ({"layouts": ["Z"]}, "layout = 'Z'"),
-        ({"seeds": []}, "must name at least one seed"),
+        ({"seeds": []}, "seeds = [] must be a list of 1 to"),
         ({"seeds": "[3]"}, "arrived as text"),
         ({"learners": ["SARSA"]}, "learner = 'SARSA'"),
         ({"episodes": 0}, "episodes = 0"),

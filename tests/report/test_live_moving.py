@@ -66,7 +66,7 @@ def test_the_scene_shows_what_the_chapter_says():
 
 @pytest.fixture(scope="module")
 def modules() -> tuple[Controller, ProblemController]:
-    nmpc = paper.controller(paper.task_among(one.centre for one in SCENE))
+    nmpc = paper.controller(paper.task([one.centre for one in SCENE]))
     there = Controller(Module(browser.module(nmpc.plant, nmpc.task)), nmpc)
     return there, ProblemController(Module(alone.module(moving.problem())))
 

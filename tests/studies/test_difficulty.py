@@ -9,7 +9,7 @@ from nmpcrl.study import paper
 from nmpcrl.study.drawn import COMPARED, JUDGE
 
 ONE = ((3.0, 3.0),)  # in the middle of the box, [-3, 9]^2; its disc has a radius of 1.25
-TASK = paper.task_among(ONE)
+TASK = paper.task(ONE)
 
 
 def test_the_closest_is_the_disc_or_the_wall_and_0_within_the_disc():
@@ -40,7 +40,7 @@ def test_points_along_a_path_are_equally_far_apart_however_it_was_sampled():
 
 
 def test_a_path_beside_a_wall_has_its_distance_its_width_and_two_changes():
-    task = paper.task_among(((-2.0, 8.9),))  # far away
+    task = paper.task(((-2.0, 8.9),))  # far away
     found = barn(np.array([[3.0, -2.7], [3.0 + 1e-9, -2.7]]), task)
     assert found["closest"] == pytest.approx(0.3)
     assert found["tortuosity"] == pytest.approx(1.0)
@@ -51,7 +51,7 @@ def test_a_path_beside_a_wall_has_its_distance_its_width_and_two_changes():
 
 
 def test_the_least_width_between_two_discs_is_their_distance():
-    task = paper.task_among(((3.0, 1.0), (3.0, 5.0)))
+    task = paper.task(((3.0, 1.0), (3.0, 5.0)))
     points = np.array([[3.0, 3.0], [3.0, 3.0 + 1e-9]])
     assert barn(points, task)["dimension"] == pytest.approx(4 - 2 * 1.25)
 

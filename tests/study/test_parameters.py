@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from nmpcrl.control.solvers.charge import DISCS
 from nmpcrl.study import ParameterError, geometry, paper
-from nmpcrl.study.geometry import MOST_OBSTACLES, are_centres, centres_of, short_name
+from nmpcrl.study.geometry import MOST_OBSTACLES, centres_of, short_name
 from nmpcrl.study.parameters import (
     LONGEST,
     TRUTH,
@@ -101,7 +101,7 @@ def test_a_pose_has_no_negative_zero():  # it would be another key
 
 REFUSED = {
     "word": [["A"], None, "C"],
-    "whole": ["3", 3.0, np.float64(3), np.True_, 2**20000, 0, 301],
+    "whole": ["3", 3.0, np.float64(3), np.True_, 2**200, 0, 301],
     "positive": ["0.5", 0, 10**400, np.nan, np.True_, 1e6 + 1],
     "range": [1e7, -1e7],
     "truth": [1, "true"],
@@ -119,7 +119,7 @@ def test_a_refusal_names_the_value_and_what_is_allowed(kind):
 
 @pytest.mark.parametrize(
     ("given", "write"),
-    [("1e-7", "1.0e-7"), ("-2E5", "-2.0e+5"), (".5e3", "0.5e+3"), ("1.5e5", "1.5e+5")],
+    [("1e-7", "1.0e-7"), ("-2E5", "-2.0e+5"), (".5e3", "5.0e+2"), ("1.25e5", "1.25e+5")],
 )
 def test_a_number_that_yaml_reads_as_text_is_refused_with_what_to_write(given, write):
     assert isinstance(yaml.safe_load(given), str)
@@ -128,18 +128,19 @@ def test_a_number_that_yaml_reads_as_text_is_refused_with_what_to_write(given, w
         assert refusal(kind, value) == f"it = {shown(value)} arrived as text; write {write}"
 
 
+LIST = "must be a list of 1 to 10000 different seeds"
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
         (3, "it = 3 must be a list, such as [3]"),
-        ("A", "it = 'A' must be a list, such as ['A']"),
-        ("[3]", "it = '[3]' arrived as text, not as a list; write -y '{seeds: [3]}'"),
-        ([], "it = [] must name at least one seed"),
-        ([3, 4, 3], "it = [3, 4, 3] must be a list that names 3 once"),
+        ("[3]", "it = '[3]' arrived as text; write -y '{seeds: [3]}'"),
+        ([], f"it = [] {LIST}"),
+        ([3, 4, 3], f"it = [3, 4, 3] {LIST}"),
         ([3, "4"], "seed = '4' must be a whole number from 0 to 100"),
         ([1, True], "seed = True must be a whole number from 0 to 100"),
-        ({3: 4}, "it = {3: 4} must be a list"),
-        (range(10**5), "it = range(0, 100000) must name 10000 seeds at most, not 100000"),
+        (range(10**12), f"it = range(0, 1000000000000) {LIST}"),
     ],
     ids=shown,
 )
@@ -148,7 +149,7 @@ def test_a_list_is_refused_for_a_reason_of_its_own(given, said):
 
 
 def test_a_value_is_shown_on_one_short_line_and_a_notebook_shows_no_traceback():
-    for value in (range(10**9), [3] * 10**6, "x" * 10**6, 2**20000, np.ones((50, 50))):
+    for value in (range(10**9), [3] * 10**6, "x" * 10**6, np.ones((50, 50))):
         assert "\n" not in shown(value)
         assert len(shown(value)) <= LONGEST
     assert ParameterError("it = 3")._render_traceback_() == ["ParameterError: it = 3"]
@@ -168,18 +169,5 @@ def test_a_layout_is_one_word_that_gives_its_centres_back_to_the_last_bit(centre
     assert len(short_name(word)) == len("drawn-123456")
 
 
-def test_a_named_layout_has_its_name_its_centres_and_room_in_the_browser():
+def test_a_layout_has_room_in_the_browser():
     assert (MOST_OBSTACLES, short_name("A")) == (DISCS, "A")
-    one, other = paper.task(paper.LAYOUTS["B"]), paper.task_among(paper.centres_of("B"))
-    np.testing.assert_array_equal(one.discs, other.discs)
-
-
-@pytest.mark.parametrize(
-    ("are", "values"),
-    [
-        (True, [[(0, 1)], np.zeros((2, 2))]),
-        (False, [["A", "B"], [[(0, 1)], [(1, 2)]], ["A", [(0, 1)]], [], "A", 3]),
-    ],
-)
-def test_the_centres_of_one_layout_differ_from_several_layouts(are, values):
-    assert {are_centres(value) for value in values} == {are}

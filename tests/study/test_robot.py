@@ -103,7 +103,6 @@ def acted(action):
         (lambda: RobotEnv("Z"), "layout = 'Z' must be one of A to F and T01 to T60, or 1 to 16"),
         (lambda: RobotEnv("J001"), "layout = 'J001' must be one of A to F and T01 to T60"),
         (lambda: RobotEnv(steps=0), "steps = 0 must be"),
-        (lambda: RobotEnv(render_mode="human"), "render_mode = 'human' must be one of None, rgb"),
         (lambda: RobotEnv().reset(options={"layout": "1,1"}), "layout = '1,1' must be one of 4 ob"),
         (lambda: acted([np.nan, 0.0]), "must be two finite numbers, speed and turn rate"),
         (lambda: acted([0.1]), "must be two finite numbers, speed and turn rate"),
