@@ -17,15 +17,16 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.analysis.encounters import count
-from nmpcrl.analysis.search import LOWER, NEARBY, PERTURBED, SCALE, SEARCHES, SPREAD, STEP, UPPER
+from nmpcrl.analysis.search import LOWER, SCALE, SEARCHES, UPPER
 from nmpcrl.analysis.statistics import interquartile_mean, rate
-from nmpcrl.control import SolverError, Task
+from nmpcrl.control import Task
 from nmpcrl.learning import Diverged, Exploration, Learner, Step, Weights, policy_gradient, train
 from nmpcrl.learning.gauss_newton import TrustRegion, closed_loop, lstd_q_within
 from nmpcrl.learning.remedies import (
@@ -46,21 +47,21 @@ from nmpcrl.study.geometry import Centres
 from nmpcrl.study.jobs import Failed, parallel
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.moving import TASK, World, centres, controller, extrapolated
-from nmpcrl.study.parameters import refused, shortened, whole
+from nmpcrl.study.parameters import number, numbers, refused, shortened, whole
 from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.setup import prepare
 
 if TYPE_CHECKING:
     import pandas as pd
 
-EPISODES, SEEDS = 300, 2  # by default: budget of a judgement, seeds of a place
 MOST_EPISODES, MOST_SEEDS = 10_000, 100
 HELD_OUT = 1_000_000  # the first seed; the study's seeds are below 100
 TOLERANCE = 1e-9  # relative, of two costs that are compared
-EPOCH = 1  # raised by hand if an edit of the suite or its entries changes a number
 LAYOUTS: Mapping[str, Centres] = {**JUDGE, **TUNE, **paper.LAYOUTS}
 THETA = np.array(paper.THETA_INIT)
 BOUNDS = (LOWER, UPPER)  # of theta, for learners with a trust region
+RETURNED = numbers([number(-1e300, 1e300)] * THETA.size, f"{THETA.size} finite numbers or a policy")
+NO_ROLLOUT = Rollout(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros(0), failure="not begun")
 
 Policy = Callable[[Vector], Vector]  # observation of `nmpcrl/Robot-v0` -> action
 Change = Callable[..., Learner]  # (learner, robot, **settings)
@@ -80,8 +81,9 @@ class NoEntry(Refusal):
 class Robot:
     """The robot in one place, with a budget of episodes.
 
-    An episode of `train`, `rollout`, `cost` or `env` counts from its first step. Among moving
-    obstacles the controller extrapolates each obstacle's last movement, and `task` has no obstacle.
+    An episode of `train`, `rollout`, `cost` or `env` counts from its first step; beyond the budget
+    it raises OverBudget. Among moving obstacles the controller extrapolates each obstacle's last
+    movement, and `task` has no obstacle.
     """
 
     def __init__(self, place: str | Centres, budget: int, seed: int) -> None:
@@ -113,55 +115,46 @@ class Robot:
     def train(
         self, learner: Learner, weights: Weights, explore: Exploration, **options: Any
     ) -> Iterator[Step]:
-        """`learning.train` in this place, with its options, such as `constrained`.
-
-        Raises:
-            OverBudget: an episode is begun beyond the budget.
-            Diverged: as `learning.train`.
-        """
-        return train(learner, self.controller, weights, explore, **options, **self._world())
+        """`learning.train` in this place, with its options, such as `constrained`."""
+        return train(learner, self.controller, weights, explore, **options, **self._environment())
 
     def rollout(self, theta: Vector) -> Rollout:
-        """`learning.evaluate` in this place: an episode without noise; OverBudget as `train`."""
-        return evaluate(self.controller, theta, paper.STEPS, **self._world())
+        """`learning.evaluate` in this place: an episode without noise."""
+        return evaluate(self.controller, theta, paper.STEPS, **self._environment())
 
     def cost(self, theta: Vector) -> float:
         """The summed cost of `rollout`; infinite if a solve failed."""
         return self.rollout(theta).cost
 
     def env(self) -> Any:
-        """`nmpcrl/Robot-v0` in this place; every reset counts as an episode."""
+        """`nmpcrl/Robot-v0` in this place, whatever layout a reset asks for."""
         from nmpcrl.study.robot import RobotEnv  # imports Gymnasium, which few entries need
 
         robot = self
 
         class Counted(RobotEnv):
-            """The environment; a reset beyond the budget raises OverBudget."""
+            """The environment, whose resets count."""
 
             def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
-                robot._begin()
-                return super().reset(seed=seed, options={"layout": robot.centres})
+                robot._count()
+                return super().reset(seed=seed)
 
         return Counted(self.centres, motions=self.motions)
 
-    def _world(self) -> dict[str, Any]:
+    def _environment(self) -> dict[str, Any]:
         """The environment of one call of `train` or `evaluate`."""
-        if not self.motions:
-            return {"start": self._begin}
-        world = World(self.motions, extrapolated)
+        world = World(self.motions, extrapolated) if self.motions else None
 
-        def begin(rng: np.random.Generator) -> Vector:
-            self._begin()
-            return world.begin(rng)
+        def start(rng: np.random.Generator) -> Vector:
+            self._count()
+            return world.begin(rng) if world else self.task.start
 
-        return {**world.environment, "start": begin}
+        return {**(world.environment if world else {}), "start": start}
 
-    def _begin(self, _: Any = None) -> Vector:
-        """Count an episode and return its first state."""
+    def _count(self) -> None:
         self.begun += 1
         if self.begun > self.budget:
             raise OverBudget(f"episode {self.begun} was begun with a budget of {self.budget}")
-        return self.task.start
 
 
 # Entries.
@@ -180,27 +173,24 @@ class Entry:
     defaults: Mapping[str, float] = field(default_factory=dict)
     changed: Mapping[str, float] = field(default_factory=dict)  # settings other than the default
 
-    def with_settings(self, **settings: float) -> "Entry":
-        """The entry with other settings.
-
-        Raises:
-            ParameterError: there is no such setting, or its value is not above 0.
-        """
-        for key, value in settings.items():
-            if key not in self.defaults:
-                known = f"one of {', '.join(self.defaults)}" if self.defaults else "absent"
-                raise refused("setting", key, f"{known} for entry {self.name!r}")
-            whole = isinstance(self.defaults[key], int)
-            if not 0 < value < np.inf or (whole and value != int(value)):
-                raise refused(key, value, f"a {'whole' if whole else 'finite'} number above 0")
-        both = {**self.defaults, **self.changed, **settings}
-        other = {key: both[key] for key, value in self.defaults.items() if both[key] != value}
-        return replace(self, changed=other)
-
     @property
     def settings(self) -> dict[str, float]:
         """All settings by name."""
         return {**self.defaults, **self.changed}
+
+    def with_settings(self, **settings: float) -> "Entry":
+        """The entry with other settings; ParameterError for an unknown one, or one not above 0."""
+        for key, value in settings.items():
+            if key not in self.defaults:
+                known = f"one of {', '.join(self.defaults)}" if self.defaults else "absent"
+                raise refused("setting", key, f"{known} for entry {self.name!r}")
+            integer = isinstance(self.defaults[key], int)
+            if not 0 < value < np.inf or (integer and value != int(value)):
+                raise refused(key, value, f"a {'whole' if integer else 'finite'} number above 0")
+        both = {**self.settings, **settings}
+        return replace(
+            self, changed={key: both[key] for key in both if both[key] != self.defaults[key]}
+        )
 
     def __call__(self, robot: Robot) -> Any:
         """Theta or a policy, within the robot's budget."""
@@ -267,11 +257,13 @@ def _learned(
     return Entry(name, partial(learned, learner=learner, change=change), settings)
 
 
-def _searched(name: str, **settings: float) -> Entry:
-    def search(robot: Robot, **own: float) -> Vector:
-        return SEARCHES[name](robot.cost, THETA, robot.budget, robot.seed, **own)
-
-    return Entry(name, search, settings)
+def _searched(name: str) -> Entry:
+    search = SEARCHES[name]
+    return Entry(
+        name,
+        lambda robot, **own: search(robot.cost, THETA, robot.budget, robot.seed, **own),
+        search.__kwdefaults__ or {},
+    )
 
 
 ALPHA, RADIUS = paper.ALPHA, 0.3  # step size; radius of trust regions, in `SCALE`s
@@ -300,9 +292,7 @@ ENTRIES: Mapping[str, Entry] = {
         _learned("undone-GN-J", _undone(_gn_j), radius=RADIUS, every=1),
         _learned("DPG", lambda _, robot, radius: policy_gradient(
             robot.controller, optimiser=TrustRegion(radius, SCALE), bounds=BOUNDS), radius=RADIUS),
-        _searched("SPSA", step=STEP, perturbed=PERTURBED),
-        _searched("CMA-ES", spread=SPREAD),
-        _searched("Bayes", nearby=NEARBY),
+        *map(_searched, ("SPSA", "CMA-ES", "Bayes")),
     )
 }  # fmt: skip
 
@@ -310,11 +300,8 @@ ENTRIES: Mapping[str, Entry] = {
 def entry(name: str, known: Mapping[str, Entry] = ENTRIES) -> Entry:
     """An entry by its name: "ES", "CMA-ES[spread=0.1]", or "my_module:factory".
 
-    A factory is a function of a `Robot`; its module may lie in the working directory.
-
-    Raises:
-        ParameterError: there is no such entry or setting.
-        NoEntry: the module cannot be imported.
+    A factory is a function of a `Robot`; its module may lie in the working directory. What is no
+    such name, or cannot be imported, is refused.
     """
     base, bracket, inner = name.partition("[")
     if base in known:
@@ -368,25 +355,17 @@ def solved(judged: Any) -> Any:
 
 def judge(one: Entry | Callable[[Robot], Any], place: str | Centres, seed: int,
           episodes: int) -> Judgement:  # fmt: skip
-    """Judge an entry in one place by a rollout without noise.
+    """Judge an entry, or another function of a `Robot`, in one place by a rollout without noise.
 
-    Args:
-        one: the entry, or another function of a `Robot`.
-        place: as in `Robot`.
-        seed: as in `Robot`.
-        episodes: the budget.
-
-    Raises:
-        ParameterError: the entry returns neither theta nor a policy.
+    ParameterError if it returns neither theta nor a policy.
     """
     robot, judging = Robot(place, episodes, seed), Robot(place, 2, seed)
     initial, seconds, began = judging.cost(THETA), 0.0, time.process_time()
-    try:
+    rollout = NO_ROLLOUT
+    with suppress(OverBudget):
         found = one(robot)
         seconds = time.process_time() - began
         rollout = _rollout(judging, found)
-    except OverBudget as error:
-        rollout = _failed(error)
     arrived = not rollout.failure and judging.task.distance(rollout.states[-1]) <= ARRIVED
     inside = count(rollout.states, robot.motions).inside if robot.motions else 0
     return Judgement(
@@ -396,11 +375,7 @@ def judge(one: Entry | Callable[[Robot], Any], place: str | Centres, seed: int,
 
 
 def seed_of(place: str, k: int) -> int:
-    """The k-th seed of a place; no two places share one.
-
-    Raises:
-        KeyError: there is no such place.
-    """
+    """The k-th seed of a place; no two places share one."""
     for further, names in enumerate((JUDGE, TUNE, paper.LAYOUTS)):
         if place in names:
             return HELD_OUT * (1 + further) + MOST_SEEDS * [*names].index(place) + k
@@ -418,11 +393,10 @@ def judge_all(
     name: str,
     *,
     moving: bool = False,
-    budget: int = EPISODES,
+    budget: int = 300,
     layouts: int | None = None,
-    seeds: int = SEEDS,
+    seeds: int = 2,
     workers: int | None = None,
-    progress: bool = True,
 ) -> "pd.DataFrame":
     """Judge an entry in every place of the suite with every seed; one row a judgement.
 
@@ -433,14 +407,9 @@ def judge_all(
         layouts: number of places, from the first on; all by default.
         seeds: number of seeds in each place.
         workers: processes; by default one for each core.
-        progress: whether to show a bar.
 
     Returns:
         Columns entry, place, k and the fields of `Judgement`; repeatable except for seconds.
-
-    Raises:
-        ParameterError: an argument is out of its range.
-        NoEntry: the entry cannot be imported, or raised an error.
     """
     import pandas as pd
 
@@ -449,16 +418,21 @@ def judge_all(
     seeds = whole(1, MOST_SEEDS).check("seeds", seeds)
     if layouts is not None:
         layouts = whole(1, len(places)).check("layouts", layouts)
-    entry(name)
+    entry(name)  # refuses an unknown one before a process is begun
     jobs = [(place, k) for place in islice(places, layouts) for k in range(seeds)]
     try:
-        found = dict(parallel(partial(_judge, name, budget), jobs, workers, name * progress))
+        found = dict(parallel(partial(_judge, name, budget), jobs, workers, name))
     except Failed as error:
         (place, _), why, _ = error.failures[0]
         raise NoEntry(f"entry = {name!r} failed in {place}: {shortened(why)}") from None
     return pd.DataFrame(
         [{"entry": name, "place": job[0], "k": job[1], **asdict(found[job])} for job in jobs]
     )
+
+
+def _judge(name: str, episodes: int, job: tuple[str, int]) -> Judgement:
+    """`judge` in a worker, which imports the entry by its name."""
+    return judge(entry(name), job[0], seed_of(*job), episodes)
 
 
 def leaderboard(judged: "pd.DataFrame") -> "pd.DataFrame":
@@ -493,41 +467,17 @@ def leaderboard(judged: "pd.DataFrame") -> "pd.DataFrame":
 
 def followed(robot: Robot, policy: Policy) -> Rollout:
     """An episode of a policy in `nmpcrl/Robot-v0`."""
-    env = robot.env()
-    observation, _ = env.reset()
-    actions, costs, over = [], [], False
-    while not over:
-        try:
-            action = np.array(policy(observation.copy()), float)
-        except SolverError as error:
-            return _failed(error)
-        observation, reward, _, over, _ = env.step(action)
-        actions.append(action)
-        costs.append(-reward)
-    return Rollout(np.array(env.states[:-1]), np.array(actions), np.array(costs))
-
-
-def _judge(name: str, episodes: int, job: tuple[str, int]) -> Judgement:
-    """`judge` in a worker, which imports the entry by its name."""
-    return judge(entry(name), job[0], seed_of(*job), episodes)
+    acting = SimpleNamespace(solve=lambda seen, *_: SimpleNamespace(action=policy(seen)))
+    rollout = evaluate(acting, THETA, paper.STEPS, plant=robot.env())
+    return replace(rollout, states=rollout.states[:, : robot.task.start.size])
 
 
 def _rollout(robot: Robot, found: Any) -> Rollout:
     """An episode without noise under theta or a policy; ParameterError for anything else."""
     if callable(found):
         return followed(robot, found)
-    try:
-        theta = np.array(found, float)
-    except (TypeError, ValueError):
-        theta = np.array([np.nan])
-    if theta.shape != THETA.shape or not np.isfinite(theta).all():
-        raise refused("what the entry returned", found, f"{THETA.size} finite numbers or a policy")
+    theta = np.array(RETURNED.check("what the entry returned", found))
     try:
         return robot.rollout(theta)
-    except ValueError as error:  # too large for a solver
-        return _failed(error)
-
-
-def _failed(error: Exception) -> Rollout:
-    nothing: Vector = np.zeros((0, 3))
-    return Rollout(nothing, nothing[:, :2], nothing[:, 0], failure=str(error) or "failed")
+    except ValueError:  # too large for a solver
+        return NO_ROLLOUT

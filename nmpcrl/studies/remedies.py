@@ -29,7 +29,7 @@ import pandas as pd
 
 from nmpcrl.analysis import suite
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean, rate
-from nmpcrl.analysis.suite import ENTRIES, EPOCH, Entry, judge, seed_of
+from nmpcrl.analysis.suite import ENTRIES, Entry, judge, seed_of
 from nmpcrl.claims.investigation import (
     Answer,
     Condition,
@@ -451,7 +451,6 @@ REMEDIES = Investigation(
     questions=QUESTIONS,
     seed=seed_of,
     registered="ebf53a4",
-    epoch=EPOCH,
     libraries=("cma", "optuna"),
     digits=7,
     prepare=_compile_ahead,

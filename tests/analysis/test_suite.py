@@ -4,29 +4,14 @@ import importlib.util
 import sys
 from contextlib import suppress
 from dataclasses import asdict, replace
+from unittest.mock import ANY
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from nmpcrl.analysis.suite import (
-    ENTRIES,
-    HELD_OUT,
-    LAYOUTS,
-    MOST_SEEDS,
-    Judgement,
-    NoEntry,
-    OverBudget,
-    Robot,
-    entry,
-    gain,
-    judge,
-    judge_all,
-    leaderboard,
-    learned,
-    seed_of,
-    solved,
-)
+from nmpcrl.analysis import suite
+from nmpcrl.analysis.suite import ENTRIES, Judgement, Robot, entry, gain, judge, judge_all, solved
 from nmpcrl.learning import Exploration, Weights, evaluate, expected_sarsa, train
 from nmpcrl.study import Experiment, ParameterError, paper, published, run
 from nmpcrl.study.drawn import JUDGE, SCENARIOS
@@ -66,7 +51,7 @@ def test_a_robot_trains_and_rolls_out_as_the_library_does_and_begins_no_episode_
     assert robot.left == 0
     for more in (lambda: robot.cost(THETA), lambda: robot.env().reset(),
                  lambda: next(robot.train(learner, start, noise))):  # fmt: skip
-        with pytest.raises(OverBudget, match=r"episode \d was begun with a budget of 5"):
+        with pytest.raises(suite.OverBudget, match=r"episode \d was begun with a budget of 5"):
             more()
 
 
@@ -81,7 +66,7 @@ def test_among_moving_obstacles_the_environment_is_that_of_a_rollout():
         observation, reward, _, over, _ = env.step(action)
         assert -reward == cost
     assert over
-    with pytest.raises(OverBudget):
+    with pytest.raises(suite.OverBudget):
         robot.cost(THETA)
 
 
@@ -120,15 +105,8 @@ def test_an_entry_spends_its_budget_and_no_more_and_a_setting_makes_a_difference
 )  # fmt: skip
 def test_an_entry_is_the_run_of_the_study_and_beta_keeps_its_ratio(name, alpha, beta):
     experiment = Experiment(learner=name, episodes=2, seed=3, layout=LAYOUT, alpha=alpha, beta=beta)
-    found = learned(Robot(LAYOUT, 2, seed=3), learner=name, alpha=alpha)
+    found = suite.learned(Robot(LAYOUT, 2, seed=3), learner=name, alpha=alpha)
     np.testing.assert_allclose(found, run(experiment).steps["theta"][-1], rtol=1e-12)
-
-
-def test_an_entry_with_undo_is_no_worse_than_theta_init():
-    robot, judging = Robot(LAYOUT, 7, seed=0), Robot(LAYOUT, 2, seed=0)
-    found = ENTRIES["undone-GN-J"](robot)
-    assert robot.begun == 7  # theta_init's rollout, and three episodes with one each
-    assert judging.cost(found) <= judging.cost(THETA)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +146,6 @@ MODULES = {"number": "number = 3", "raises": "raise RuntimeError('not today')",
         ("raises:factory", {}, "cannot be imported: RuntimeError: not today"),
         ("fails:factory", {"layouts": 1}, "'fails:factory' failed in J001: KeyError: 'x'"),
         ("ES", {"budget": 0}, "budget = 0"),
-        ("ES", {"layouts": 0}, "layouts = 0"),
         ("ES", {"layouts": 121}, "layouts = 121"),
         ("ES", {"seeds": 0}, "seeds = 0"),
     ],
@@ -180,8 +157,8 @@ def test_an_unknown_entry_a_failing_one_and_a_number_out_of_range_are_refused(
         (tmp_path / f"{module}.py").write_text(text)
         monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.chdir(tmp_path)
-    with pytest.raises((ParameterError, NoEntry), match=message):
-        judge_all(name, progress=False, **options)
+    with pytest.raises((ParameterError, suite.NoEntry), match=message):
+        judge_all(name, **options)
 
 
 # Judging.
@@ -192,7 +169,7 @@ def test_theta_and_a_policy_are_judged_alike_by_the_cost_of_a_rollout():
     assert solved(found)
     assert (gain(found), found.episodes) == (0, 0)
     assert found.cost == evaluate(paper.nmpc(JUDGE["J001"]), THETA, paper.STEPS).cost
-    assert judge(lambda robot: NmpcPolicy(), "J001", 1, 3).cost == found.cost
+    assert judge(lambda robot: NmpcPolicy(), "J001", 1, 3) == replace(found, seconds=ANY)
     still = judge(lambda robot: lambda observation: np.zeros(2), "J001", 1, 3)
     assert not still.arrived
     assert gain(still) < 0
@@ -204,7 +181,7 @@ def test_theta_and_a_policy_are_judged_alike_by_the_cost_of_a_rollout():
 def spend(robot, more=0):
     """Begin as many episodes as the budget has, or more, and hide the refusal."""
     for _ in range(robot.budget + more):
-        with suppress(OverBudget):
+        with suppress(suite.OverBudget):
             robot.cost(THETA)
     return THETA
 
@@ -212,12 +189,7 @@ def spend(robot, more=0):
 def late(robot):
     """Begin episodes while the policy is judged."""
     env, policy = robot.env(), NmpcPolicy()
-
-    def act(observation):
-        env.reset()
-        return policy(observation)
-
-    return act
+    return lambda observation: (env.reset(), policy(observation))[1]
 
 
 @pytest.mark.parametrize(
@@ -237,8 +209,7 @@ def test_what_is_neither_theta_nor_a_policy_is_refused(answer):
 @pytest.mark.usefixtures("trains_here")
 def test_two_calls_give_the_same_judgements_but_for_their_time():
     first, again = (
-        judge_all("CMA-ES", budget=3, layouts=2, progress=False).drop(columns="seconds")
-        for _ in range(2)
+        judge_all("CMA-ES", budget=3, layouts=2).drop(columns="seconds") for _ in range(2)
     )
     pd.testing.assert_frame_equal(first, again, check_exact=True)
     assert first.episodes.tolist() == [3] * 4
@@ -251,19 +222,18 @@ def test_two_calls_give_the_same_judgements_but_for_their_time():
 def test_an_entry_ends_where_the_published_one_did(base):
     table = published.read("remedies")
     known = table[(table.part == "judge 50") & (table.entry == base)].iloc[0]
-    found = judge(entry(known.arm), known.place, seed_of(known.place, known.k), 50)
+    found = judge(entry(known.arm), known.place, suite.seed_of(known.place, known.k), 50)
     assert found.cost == pytest.approx(known.cost, rel=1e-4)
     assert (found.episodes, found.arrived) == (known.episodes, known.arrived)
 
 
-@pytest.mark.parametrize(("name", "policy"), [("frozen", "init"), ("grid", "grid"),
-                                              ("CMA-ES", "CMA-ES")])  # fmt: skip
+@pytest.mark.parametrize(("name", "policy"), [("frozen", "init"), ("CMA-ES", "CMA-ES")])
 @pytest.mark.parametrize("place", ["M03", "M04"])
 def test_a_search_among_moving_obstacles_ends_where_the_published_one_did(name, policy, place):
     table = published.read("worlds")
     chosen = (table.part == "moving") & (table.arm == f"extrapolated {policy}")
     known = table[chosen & (table.place == place) & (table.k == 0)].iloc[0]
-    found = judge(entry(name), place, seed_of(place, 0), 50)
+    found = judge(entry(name), place, suite.seed_of(place, 0), 50)
     assert found.cost == pytest.approx(known.cost, rel=1e-4)
     assert (found.inside, found.arrived) == (known.inside, known.arrived)
 
@@ -276,18 +246,11 @@ def test_learners_and_tuners_are_judged_among_moving_obstacles_too(name):
     assert 0 < found.episodes <= 3
 
 
-def test_gn_j_refuses_moving_obstacles():
-    with pytest.raises(ValueError, match="GN-J differentiates a task's cost and its plant"):
-        judge(entry("GN-J"), "M03", 0, 3)
-
-
 def test_seeds_are_held_out_and_no_two_places_share_one():
-    seeds = [seed_of(name, k) for name in (*LAYOUTS, *SCENARIOS) for k in (0, 9)]
+    seeds = [suite.seed_of(name, k) for name in (*suite.LAYOUTS, *SCENARIOS) for k in (0, 9)]
     assert len({*seeds}) == len(seeds)
-    assert min(seeds) >= HELD_OUT
-    assert seed_of("J004", 1) == HELD_OUT + 3 * MOST_SEEDS + 1
-    with pytest.raises(KeyError):
-        seed_of("nowhere", 0)
+    assert min(seeds) >= suite.HELD_OUT
+    assert suite.seed_of("J004", 1) == 1_000_301
 
 
 # The leaderboard.
@@ -297,7 +260,7 @@ def row(judged):
     """The row of judgements by place."""
     rows = [{"entry": "x", "place": place, **asdict(one)} for place in judged
             for one in judged[place]]  # fmt: skip
-    (found,) = leaderboard(pd.DataFrame(rows)).itertuples()
+    (found,) = suite.leaderboard(pd.DataFrame(rows)).itertuples()
     return found
 
 
