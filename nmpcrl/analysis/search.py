@@ -6,8 +6,8 @@ any learner's budget: a lower bound of the possible gain.
 """
 
 from bisect import bisect
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,11 +23,8 @@ LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # bounds 
 FAILED = 1e6  # cost of a rollout in which a solve failed
 POINTS = 11  # of the grid
 WIDEST = 0.35  # last theta_c of the grid: d_o, where the penalty vanishes  # departure N
-STEP = 0.1  # SPSA: of each component, in the first iteration and at most, in `SCALE`s
-PERTURBED = 0.05  # SPSA: distance of the two rollouts of an iteration from theta
 DECAY, FADING = 0.602, 0.101  # SPSA: exponents of the step and of the perturbation
 SPREAD = 0.3  # CMA-ES: of the first rollouts, in `SCALE`s
-NEARBY = 1.0  # Bayes: largest distance from the start, in `SCALE`s
 BUDGET = 2000  # rollouts of a published long search
 CHECK = 200  # rollouts that a build repeats of a published search
 LEAST = 40  # rollouts of the shortest search: the first one and some generations
@@ -43,6 +40,8 @@ Direct = Callable[..., Vector]  # (cost, start, budget, seed, **settings) -> the
 class Tried:
     """The rollouts of a search, at most `budget`, at points in units of `SCALE`."""
 
+    lower, upper = LOWER / SCALE, UPPER / SCALE
+
     def __init__(self, cost: Cost, start: Vector, budget: int) -> None:
         """Make the first rollout; ValueError for a budget below 1."""
         if budget < 1:
@@ -50,7 +49,6 @@ class Tried:
         self._cost, self._budget = cost, budget
         self.points: list[Vector] = []
         self.costs: list[float] = []
-        self.lower, self.upper = LOWER / SCALE, UPPER / SCALE
         self(np.asarray(start, float) / SCALE)
 
     def __call__(self, point: Vector) -> float:
@@ -104,19 +102,15 @@ def grid(cost: Cost, start: Vector, budget: int, seed: int = 0) -> Vector:
 
 
 def spsa(
-    cost: Cost,
-    start: Vector,
-    budget: int,
-    seed: int = 0,
-    *,
-    step: float = STEP,
-    perturbed: float = PERTURBED,
-) -> Vector:
-    """Simultaneous perturbation: two rollouts an iteration, on either side of theta.
+    cost: Cost, start: Vector, budget: int, seed: int = 0, *,
+    step: float = 0.1, perturbed: float = 0.05,
+) -> Vector:  # fmt: skip
+    """Simultaneous perturbation: two rollouts an iteration, `perturbed` on either side of theta.
 
     g = (y+ - y-) / (2 c_k) sign, theta <- theta - a_k g, with a_k = a / (k + 1 + A)^0.602 and
     c_k = perturbed / (k + 1)^0.101; `a` is such that the first step is `step` long in each
-    component. The last rollout of an even budget judges the last theta.  Source: Spall (1998).
+    component; no later one is longer. The last rollout of an even budget judges the last theta.
+    Source: Spall (1998).
     """
     tried, rng = Tried(cost, start, budget), np.random.default_rng(seed)
     point, delay, a, k = np.asarray(start, float) / SCALE, budget / 20, 0.0, 0
@@ -147,36 +141,33 @@ def cma_es(
 
 
 def bayesian(
-    cost: Cost, start: Vector, budget: int, seed: int = 0, *, nearby: float = NEARBY
+    cost: Cost, start: Vector, budget: int, seed: int = 0, *, nearby: float = 1.0
 ) -> Vector:
     """Bayesian optimisation by tree-structured Parzen estimators; Bergstra et al. (2011).
 
     Thetas are drawn within `nearby` of the start: few thetas of the full box bring the robot to
-    its target.
-
-    Raises:
-        ImportError: Optuna is not installed; the extra `nmpcrl[search]` has it.
+    its target. Needs Optuna, of the extra `nmpcrl[search]`.
     """
     import optuna
 
     tried = Tried(cost, start, budget)
-    names = [f"{k}: {name}" for k, name in enumerate(paper.THETA_NAMES)]
+    first = {f"{k}: {name}": one for k, (name, one) in
+             enumerate(zip(paper.THETA_NAMES, tried.best.tolist(), strict=True))}  # fmt: skip
     lower = np.maximum(tried.lower, tried.best - nearby)
     upper = np.minimum(tried.upper, tried.best + nearby)
     box: dict[str, Any] = {
         name: optuna.distributions.FloatDistribution(*ends)
-        for name, *ends in zip(names, lower, upper, strict=True)
+        for name, *ends in zip(first, lower, upper, strict=True)
     }
     shown = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.ERROR)  # a line a rollout, else
     try:
         study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
-        first = dict(zip(names, tried.best.tolist(), strict=True))
         value = min(tried.costs[0], FAILED)
         study.add_trial(optuna.trial.create_trial(params=first, distributions=box, value=value))
         while tried.left:
             trial = study.ask(box)
-            study.tell(trial, tried(np.array([trial.params[name] for name in names])))
+            study.tell(trial, tried(np.array([trial.params[name] for name in first])))
     finally:
         optuna.logging.set_verbosity(shown)
     return tried.theta
@@ -243,31 +234,7 @@ def search(wanted: Search) -> Found:
     )
 
 
-def to_make(wanted: Iterable[Search], known: Mapping[Search, Found]) -> tuple[Search, ...]:
-    """The searches that are not known, and the first `CHECK` rollouts of known ones."""
-    return tuple(replace(one, budget=CHECK) if one in known else one for one in wanted)
-
-
-def search_all(searches: Iterable[Search], workers: int | None = None) -> dict[Search, Found]:
+def search_all(searches: Collection[Search]) -> dict[Search, Found]:
     """`search` for many, in parallel."""
-    wanted = tuple(dict.fromkeys(searches))
-    found = dict(parallel(search, wanted, workers))
-    return {one: found[one] for one in wanted}
-
-
-def as_rows(found: Mapping[Search, Found]) -> list[dict[str, Any]]:
-    """One row for each search and its result, with lists in the place of tuples."""
-    return [
-        {name: [*value] if isinstance(value, tuple) else value for name, value in row.items()}
-        for row in (asdict(one) | asdict(result) for one, result in found.items())
-    ]
-
-
-def from_rows(rows: Iterable[dict[str, Any]]) -> dict[Search, Found]:
-    """The inverse of `as_rows`."""
-    return {
-        Search(one["layout"], one["seed"], one["budget"]): Found(
-            tuple(one["theta"]), one["made"], tuple(one["rollouts"]), tuple(one["best"])
-        )
-        for one in rows
-    }
+    found = dict(parallel(search, searches))
+    return {one: found[one] for one in searches}

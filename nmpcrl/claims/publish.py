@@ -25,7 +25,7 @@ def publish_study(
         runs: all of `design.whole_study`.
         variants: the part of the study that each belongs to.
     """
-    timings, searches = time_learners_repeatedly(), search_all(map(Search, LAYOUTS))
+    timings, searches = time_learners_repeatedly(), search_all([*map(Search, LAYOUTS)])
     records = fetch(published.AUDITED)
     audit = measured(published.AUDITED, records, dropped_curvature(records))
     return published.publish(runs, variants, timings=timings, searches=searches, audit=audit)

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from nmpcrl.analysis import search
 from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, cost_ratios, experiment_of, row
 from nmpcrl.analysis.search import Found, Search
 from nmpcrl.analysis.summary import Outline, RunSummary
@@ -132,13 +131,19 @@ def _load(folder: Path) -> Published:
     curves = store.arrays(RUNS, folder)
     followed = thetas.unpacked(curves)
     timed = store.about(TIMINGS, folder).get("batches", [{}])[-1]
+    searches = {
+        Search(one.layout, one.seed, one.budget): Found(
+            tuple(one.theta), one.made, tuple(one.rollouts), tuple(one.best)
+        )
+        for one in _table(SEARCHES, folder).itertuples()
+    }
     return Published(
         {e: _outline_of(one, curves, i, followed) for i, (e, one) in enumerate(rows.items())},
         {e: one["variant"] for e, one in rows.items()},
         rows,
         _table(TIMINGS, folder),
         about,
-        search.from_rows(_table(SEARCHES, folder).to_dict("records")),
+        searches,
         timed,
     )
 
@@ -173,8 +178,8 @@ def publish(
     if timings is not None:
         republish(timings)
     if searches:
-        found = search.as_rows(searches)
-        store.write(SEARCHES, pd.DataFrame(found), batch=made_here(), anew=True)
+        found = pd.DataFrame([asdict(one) | asdict(result) for one, result in searches.items()])
+        store.write(SEARCHES, found, batch=made_here(), anew=True)
     _load.cache_clear()
     return place()
 

@@ -175,7 +175,9 @@ def _csv(table: pd.DataFrame) -> bytes:
     """A table as text, with lists as JSON."""
     plain = table.copy()
     for column in (name for name, kind in plain.dtypes.items() if kind.kind == "O"):
-        plain[column] = [json.dumps(one) if isinstance(one, list) else one for one in plain[column]]
+        plain[column] = [
+            json.dumps(one) if isinstance(one, list | tuple) else one for one in plain[column]
+        ]
     return bytes(plain.to_csv(index=False), "utf-8")
 
 

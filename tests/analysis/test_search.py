@@ -1,28 +1,13 @@
 """Searches: they find a known best, every rollout counts, and a long one begins as a short one."""
 
 import importlib.util
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from nmpcrl.analysis import search as searching
-from nmpcrl.analysis.search import (
-    CHECK,
-    LEAST,
-    LOWER,
-    SCALE,
-    SEARCHES,
-    UPPER,
-    WIDEST,
-    Found,
-    Search,
-    grid,
-    search,
-    search_all,
-    to_make,
-)
+from nmpcrl.analysis.search import CHECK, LEAST, SCALE, Search, bayesian, cma_es, grid, search, spsa
 from nmpcrl.claims import published
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import ParameterError, design, paper
@@ -32,11 +17,7 @@ BEST = START + 0.4 * SCALE
 NEEDS_OPTUNA = pytest.mark.skipif(
     not importlib.util.find_spec("optuna"), reason="needs the extra nmpcrl[search]"
 )
-ALL = [
-    pytest.param(one, id=name, marks=NEEDS_OPTUNA if name == "Bayes" else ())
-    for name, one in SEARCHES.items()
-]
-EVERY = [one for one in ALL if one.id != "grid"]
+EVERY = [spsa, cma_es, pytest.param(bayesian, marks=NEEDS_OPTUNA)]
 
 
 class Bowl:
@@ -71,14 +52,15 @@ def test_the_same_seed_asks_for_the_same_thetas_within_the_box_and_another_for_o
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)
     for asked in (first, other):
-        assert ((asked >= LOWER - 1e-9) & (asked <= UPPER + 1e-9)).all()
+        assert ((asked >= searching.LOWER - 1e-9) & (asked <= searching.UPPER + 1e-9)).all()
 
 
-@pytest.mark.parametrize("direct", EVERY)
-def test_300_rollouts_leave_a_part_of_the_possible_gain(direct):
-    part = {"SPSA": 0.2, "CMA-ES": 0.05, "Bayes": 0.6}
-    (name,) = (name for name, one in SEARCHES.items() if one is direct)
-    assert Bowl()(direct(Bowl(), START, 300, 0)) - 7 <= part[name] * (Bowl()(START) - 7)
+@pytest.mark.parametrize(
+    ("direct", "part"),
+    [(spsa, 0.2), (cma_es, 0.05), pytest.param(bayesian, 0.6, marks=NEEDS_OPTUNA)],
+)
+def test_300_rollouts_leave_a_part_of_the_possible_gain(direct, part):
+    assert Bowl()(direct(Bowl(), START, 300, 0)) - 7 <= part * (Bowl()(START) - 7)
 
 
 @pytest.mark.parametrize(("budget", "made"), [(1, 1), (5, 5), (11, 11), (300, 11)])
@@ -88,16 +70,14 @@ def test_the_grid_has_eleven_points_over_theta_c_alone(budget, made):
     asked = np.array(bowl.asked)
     assert len(asked) == made
     assert (asked[:, :-1] == START[:-1]).all()
-    np.testing.assert_allclose(asked[:, -1], np.linspace(START[-1], WIDEST, 11)[:made])
+    np.testing.assert_allclose(asked[:, -1], np.linspace(START[-1], searching.WIDEST, 11)[:made])
     best = grid(lambda theta: abs(theta[-1] - 0.2), START, 11)
     assert best[-1] == pytest.approx(0.2, abs=0.02)
 
 
 @pytest.mark.parametrize("direct", EVERY)
-def test_the_start_is_returned_if_every_rollout_fails_and_a_budget_of_0_is_refused(direct):
+def test_the_start_is_returned_if_every_rollout_fails(direct):
     np.testing.assert_allclose(direct(lambda theta: np.inf, START, 12, 0), START)
-    with pytest.raises(ValueError, match="budget = 0 must be at least 1 rollout"):
-        direct(Bowl(), START, 0)
 
 
 # The long search.
@@ -107,18 +87,22 @@ def test_the_start_is_returned_if_every_rollout_fails_and_a_budget_of_0_is_refus
 def bowl(monkeypatch):
     """A `Bowl` in the place of rollouts."""
     made = Bowl()
-    monkeypatch.setattr(
-        searching, "evaluate", lambda _, theta, steps: SimpleNamespace(cost=made(theta))
-    )
+    monkeypatch.setattr(searching, "evaluate", lambda _, one, __: SimpleNamespace(cost=made(one)))
     return made
 
 
 @pytest.mark.parametrize(
-    ("name", "nonsense"), [("layout", "Z"), ("seed", -1), ("seed", 0.5), ("budget", LEAST - 1)]
+    ("call", "message"),
+    [
+        (lambda: Search("Z"), "layout = 'Z' must be"),
+        (lambda: Search(seed=-1), "seed = -1 must be"),
+        (lambda: Search(budget=LEAST - 1), f"budget = {LEAST - 1} must be"),
+        (lambda: grid(Bowl(), START, 0), "budget = 0 must be at least 1 rollout"),
+    ],
 )
-def test_a_search_refuses_nonsense_by_name(name, nonsense):
-    with pytest.raises(ParameterError, match=rf"{name} = {nonsense!r} must be"):
-        replace(Search(), **{name: nonsense})
+def test_a_search_refuses_nonsense_by_name(call, message):
+    with pytest.raises((ParameterError, ValueError), match=message):
+        call()
 
 
 def test_the_least_cost_is_found_from_theta_init_on_with_every_improvement(bowl):
@@ -139,11 +123,9 @@ def test_a_search_begins_as_one_with_a_smaller_budget_and_seeds_differ(bowl, mon
         assert short.cost == long.after(short.made) > long.cost
     assert long.after(1) == long.initial
     assert search(Search(budget=100, seed=1)).theta != search(Search(budget=100)).theta
-    known, other = Search(budget=300), Search("B", budget=300)
-    assert to_make([known, other], {known: long}) == (replace(known, budget=CHECK), other)
     monkeypatch.setattr(searching, "evaluate", lambda *_: SimpleNamespace(cost=np.inf))
     failed = search(Search(budget=LEAST))
-    assert failed == Found(paper.THETA_INIT, failed.made, (1,), (np.inf,))
+    assert failed == searching.Found(paper.THETA_INIT, failed.made, (1,), (np.inf,))
 
 
 @pytest.mark.slow
@@ -151,7 +133,7 @@ def test_the_published_searches_are_those_of_this_code_and_cost_what_a_rollout_c
     known = published.load().searches
     assert set(known) == set(map(Search, design.LAYOUTS))
     wanted = Search("D", budget=CHECK)
-    found = search_all([wanted])[wanted]
+    found = searching.search_all([wanted])[wanted]
     assert found.cost == pytest.approx(known[Search("D")].after(found.made), rel=1e-6)
     controller = Persistent(paper.nmpc("D"))
     rollouts = (evaluate(controller, np.array(one), paper.STEPS) for one in (START, found.theta))
