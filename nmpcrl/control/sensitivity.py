@@ -249,17 +249,19 @@ def _one_side(
     columns = (signed[:, None] * active).T
     columns /= np.maximum(np.abs(columns).max(axis=1, keepdims=True), np.finfo(float).tiny)
     growth = signed * (active_t @ np.linspace(1, 2, active_t.shape[1]))
-    found = linprog(
+    now = multipliers / signed
+    change = linprog(  # from these multipliers, which rounding cannot call infeasible
         -growth / max(np.abs(growth).max(), np.finfo(float).tiny),
         A_eq=columns,
-        b_eq=columns @ (multipliers / signed),
-        bounds=[(None, None) if one else (0, None) for one in free],
+        b_eq=np.zeros(len(columns)),
+        bounds=np.column_stack([np.where(free, -np.inf, -now), np.full(now.size, np.inf)]),
         method="highs-ds",
     )
-    if not found.success:
-        raise np.linalg.LinAlgError(f"no multipliers on one side: {found.message}")
-    held = free | (found.x > INACTIVE)
-    return held, np.where(held, signed * found.x, 0.0)
+    if not change.success:
+        raise np.linalg.LinAlgError(f"no multipliers on one side: {change.message}")
+    there = now + change.x
+    held = free | (there > INACTIVE)
+    return held, np.where(held, signed * there, 0.0)
 
 
 def _solved(kkt: Matrix, right: Matrix) -> Matrix:

@@ -8,6 +8,8 @@ import pytest
 
 from nmpcrl.control import Nmpc, Problem, Soft, SolverError
 from nmpcrl.control.solvers import SOLVERS
+from nmpcrl.study import paper
+from nmpcrl.study.drawn import JUDGE
 
 # min u' diag(q) u / 2 - g' u + b' P u with A u + S b + o <= 0 at a price of 100, and u <= 1
 PROBLEM = Problem(
@@ -95,3 +97,23 @@ def test_without_a_derivative_the_error_is_that_of_a_solve(solver):
             ask(one)
     nmpc, one = solved(Case([0], [], [], [], [], {"q": [0, 2]}), solver)
     np.testing.assert_allclose(nmpc.policy_jacobian(one), 0, atol=1e-6)  # nothing pulls at it
+
+
+@pytest.mark.parametrize("solver", ["fatrop", "ipopt"])
+def test_between_two_discs_the_hessian_is_the_slope_of_the_gradient_where_theta_grows(solver):
+    """Of the robot at the end of a gap, where rows of many stages depend on one another."""
+    nmpc, rng, side = paper.nmpc(JUDGE["J002"], solver=solver), np.random.default_rng(0), 1e-5
+    theta = np.array([1.5332, 0.9758, 0.0499, 0.0497, 0.05, 1.0375, 0.9992, 0.1, 0.1834])
+    grown = np.linspace(1, 2, theta.size)
+    asked = 0
+    for state in rng.normal([0.7531, 1.1584, -0.7766], [0.02, 0.02, 0.05], (30, 3)):
+        try:
+            one = nmpc.solve(state, theta)
+        except SolverError:
+            continue
+        expected = nmpc.value_hessian(one) @ grown
+        near, far = (nmpc.solve(state, theta + k * side * grown, one).features for k in (1, 2))
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose((far - near) / side, expected, rtol=0, atol=0.03 * scale)
+        asked += 1
+    assert asked > 20
