@@ -9,6 +9,7 @@ from urllib.parse import unquote, urldefrag, urlsplit
 import pytest
 from bs4 import BeautifulSoup
 from driver import project
+from driver.build.render import MOVED
 from legibility import LETTERS, SHOWN
 
 PAGES = project.pages()
@@ -166,8 +167,11 @@ def test_the_search_finds_expected_sarsa_on_a_server(site, browser):
     assert any("02_expected_sarsa.html" in link for link in links)
 
 
-def test_the_entry_opens_the_introduction(site, browser):
+@pytest.mark.parametrize(("old", "new"), [("index", f"{PAGES[0]}.html"), *MOVED.items()])
+def test_the_entry_and_old_addresses_open_a_page(old, new, site, browser):
     tab = browser.new_page()
-    tab.goto((site / "index.html").resolve().as_uri())
-    tab.wait_for_url(f"**/{PAGES[0]}.html")
+    tab.goto((site / f"{old}.html").resolve().as_uri())
+    tab.wait_for_url(f"**/{new}")
+    anchor = new.partition("#")[2]
+    assert not anchor or tab.locator(f"#{anchor}").count() == 1
     tab.close()

@@ -13,11 +13,12 @@ from driver.page import accessible, card, enrich, pictures
 from driver.project import ROOT, Failure, from_yaml, pages, shown
 from nmpcrl.course import exercises
 
-INDEX = """<!DOCTYPE html>
+MOVED = {"book/cluster": "reproduce.html#reproduce-cluster"}  # addresses of pages that are no more
+ELSEWHERE = """<!DOCTYPE html>
 <html lang="en">
 <head><meta charset="utf-8"><title>{title}</title>
-<meta http-equiv="refresh" content="0; url={page}.html"></head>
-<body><a href="{page}.html">{title}</a></body>
+<meta http-equiv="refresh" content="0; url={page}"></head>
+<body><a href="{page}">{title}</a></body>
 </html>
 """
 
@@ -49,7 +50,8 @@ def render(place: Path, strict: bool) -> None:
     card.site(work / "_build/html")
     (work / "_build/html").rename(place / "html")
     title = from_yaml("_config.yml")["title"]
-    (place / "html/index.html").write_text(INDEX.format(title=title, page=pages()[0]))
+    for old, new in {"index": f"{pages()[0]}.html", **MOVED}.items():
+        (place / f"html/{old}.html").write_text(ELSEWHERE.format(title=title, page=new))
 
 
 def warnings(log: Path, most: int = 20) -> str:
