@@ -11,7 +11,9 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple
 
+import gymnasium
 import numpy as np
+from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
 from nmpcrl import Vector
@@ -61,29 +63,21 @@ def curve(checkpoints: Sequence[int], agent: Entry, place: str, episodes: int, s
     Returns:
         initial, the cost of theta_init in each layout of `judged_in`; costs and arrived (a letter a
         layout) at each checkpoint; episodes and steps of the robot.
-
-    Raises:
-        NoAgents: stable-baselines3 is not installed.
     """
     robots = [Robot(centres, 1 + len(checkpoints), seed) for centres in judged_in(place).values()]
     initial = [robot.cost(THETA) for robot in robots]
     costs, arrived, layouts = [], [], [*trained_in(place).values()]
-    at = Checkpoint(0, 0, np.zeros_like)
     env = RobotEnv(layouts[0])
     for at in trained(agent.name, env, layouts, checkpoints, seed, **agent.settings):
-        judged = [_judged(robot, at.policy) for robot in robots]
-        costs.append([cost for cost, _ in judged])
-        arrived.append("".join(THERE if there else AWAY for _, there in judged))
+        rollouts = [followed(robot, at.policy) for robot in robots]
+        costs.append([one.cost for one in rollouts])
+        ends = zip(robots, rollouts, strict=True)
+        near = [robot.task.distance(one.states[-1]) <= ARRIVED for robot, one in ends]
+        arrived.append("".join(THERE if one else AWAY for one in near))
     return {
         "initial": initial, "costs": costs, "arrived": arrived, "episodes": at.episodes,
         "steps": at.steps,
     }  # fmt: skip
-
-
-def _judged(robot: Robot, policy: Policy) -> tuple[float, bool]:
-    """The cost of a rollout, and whether it ends at the target."""
-    rollout = followed(robot, policy)
-    return rollout.cost, bool(robot.task.distance(rollout.states[-1]) <= ARRIVED)
 
 
 def policy_of(robot: Robot, *, name: str, **settings: float) -> Policy:
@@ -106,43 +100,42 @@ def trained(
     name: str, env: Any, layouts: Sequence[Centres], checkpoints: Sequence[int], seed: int,
     **settings: float,
 ) -> Iterator[Checkpoint]:  # fmt: skip
-    """Train an agent, and yield it at each checkpoint.
+    """Train SAC or TD3 in `nmpcrl/Robot-v0`, and yield it at each checkpoint.
 
     Args:
         name: "SAC" or "TD3".
-        env: `nmpcrl/Robot-v0`, all of whose steps and resets are made here.
+        env: the environment; no other code makes steps in it.
         layouts: one is drawn for each episode.
         checkpoints: episodes, rising.
-        seed: of all that is drawn.
-        settings: those of `SAC` and `TD3`.
+        seed: of all draws.
+        settings: values for all of `_DEFAULTS`.
 
     Raises:
         NoAgents: stable-baselines3 is not installed.
-        OverBudget: as `env.reset`.
     """
     from nmpcrl.learning.network import OneThread
 
-    scaled, drawing = _scaled(env, layouts, settings), _Drawing()
-    with drawing.own():
+    scaled, state = Scaled(env, layouts, settings), list[Any]()
+    with _drawing_from(state):
         model = _model(name, scaled, settings, checkpoints[-1], seed)
 
     def policy(observation: Vector) -> Vector:
         with OneThread():
             action, _ = model.predict(seen(observation), deterministic=True)
-        return _applied(action, settings["turn"], env)
+        return scaled.applied(action)
 
     for episodes in checkpoints:
         left = (episodes - scaled.episodes) * paper.STEPS
-        with drawing.own():
+        with _drawing_from(state):
             model.learn(left, reset_num_timesteps=not scaled.episodes)
         yield Checkpoint(scaled.episodes, scaled.steps, policy)
 
 
 def seen(observation: Vector) -> Vector:
-    """The observation of an agent, of an observation of `nmpcrl/Robot-v0`, in numbers of about 1.
+    """The observation of an agent, in numbers of about 1, from one of `nmpcrl/Robot-v0`.
 
-    From the robot, and as it is turned, the target and each centre, in parts of `FAR`; then how far
-    the heading is from that at the target, in radians, its cosine and its sine.
+    The target and each centre, as seen from the turned robot [`FAR`]; then the difference between
+    the heading and the one at the target [rad], its cosine and its sine.
     """
     place, heading = observation[:2], observation[2]
     points = np.vstack([paper.TARGET[:2], observation[3:].reshape(-1, 2)]) - place
@@ -152,55 +145,46 @@ def seen(observation: Vector) -> Vector:
     return found
 
 
-def _applied(scaled: ArrayLike, turn: float, env: Any) -> Vector:
-    """The speed and turn rate of an action between -1 and 1."""
-    applied: Vector = np.asarray(scaled, float) * env.action_space.high * np.array([1.0, turn])
-    return applied
-
-
-def _scaled(env: Any, layouts: Sequence[Centres], values: Mapping[str, float]) -> Any:
-    """The robot's task in numbers of about 1, which counts episodes and steps.
+class Scaled(gymnasium.Env[Any, Any]):
+    """The robot's task in numbers of about 1, for stable-baselines3; it counts episodes and steps.
 
     An episode begins with its first step: stable-baselines3 resets once more after the last one.
     """
-    import gymnasium
 
-    box: Any = gymnasium.spaces.Box
+    def __init__(self, env: Any, layouts: Sequence[Centres], settings: Mapping[str, float]) -> None:
+        self.env, self.layouts, self.settings = env, layouts, settings
+        self.episodes, self.steps, self.begun, self.layout = 0, 0, False, layouts[0]
+        self.observation_space = Box(-np.inf, np.inf, self._first().shape)
+        self.action_space = Box(-1.0, 1.0, env.action_space.shape)
 
-    class Scaled(gymnasium.Env[Vector, Vector]):
-        """The environment that stable-baselines3 sees."""
+    def _first(self) -> Vector:
+        return seen(np.r_[paper.START, np.ravel(self.layout)])
 
-        def __init__(self) -> None:
-            self.episodes, self.steps, self.begun, self.layout = 0, 0, False, layouts[0]
-            self.observation_space = box(-np.inf, np.inf, self._first().shape)
-            self.action_space = box(-1.0, 1.0, env.action_space.shape)
+    def applied(self, action: ArrayLike) -> Vector:
+        """The speed and turn rate of an action between -1 and 1."""
+        high, share = self.env.action_space.high, np.array([1.0, self.settings["turn"]])
+        applied: Vector = np.asarray(action, float) * high * share
+        return applied
 
-        def _first(self) -> Vector:
-            return seen(np.r_[paper.START, np.ravel(self.layout)])
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Vector, Any]:
+        """Draw a layout."""
+        super().reset(seed=seed)
+        self.layout = self.layouts[int(self.np_random.integers(len(self.layouts)))]
+        self.begun = False
+        return self._first(), {}
 
-        def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[Vector, Any]:
-            super().reset(seed=seed)
-            self.layout = layouts[int(self.np_random.integers(len(layouts)))]
-            self.begun = False
-            return self._first(), {}
-
-        def step(self, action: Vector) -> tuple[Vector, float, bool, bool, Any]:
-            if not self.begun:
-                env.reset(options={"layout": self.layout})
-                self.episodes, self.begun = self.episodes + 1, True
-            self.steps += 1
-            found, reward, end, cut, info = env.step(_applied(action, values["turn"], env))
-            return seen(found), values["reward"] * reward, end, cut, info
-
-    return Scaled()
+    def step(self, action: Vector) -> tuple[Vector, float, bool, bool, Any]:
+        """Move for one period; the first time, begin the episode."""
+        if not self.begun:
+            self.env.reset(options={"layout": self.layout})
+            self.episodes, self.begun = self.episodes + 1, True
+        self.steps += 1
+        found, reward, end, cut, info = self.env.step(self.applied(action))
+        return seen(found), self.settings["reward"] * reward, end, cut, info
 
 
 def require(name: str = "an agent") -> Any:
-    """stable-baselines3.
-
-    Raises:
-        NoAgents: it is not installed.
-    """
+    """The module stable-baselines3; NoAgents where it is not installed."""
     try:
         return importlib.import_module("stable_baselines3")
     except ImportError as error:
@@ -209,11 +193,7 @@ def require(name: str = "an agent") -> Any:
 
 
 def _model(name: str, env: Any, values: Mapping[str, float], episodes: int, seed: int) -> Any:
-    """The agent of stable-baselines3; it learns after each episode and forgets no transition.
-
-    Raises:
-        NoAgents: it is not installed.
-    """
+    """The agent of stable-baselines3; it learns after each episode and forgets no transition."""
     library = require(name)
     common, size = library.common, env.action_space.shape
     noise = common.noise.NormalActionNoise(np.zeros(size), np.full(size, NOISE))
@@ -236,32 +216,29 @@ def _model(name: str, env: Any, values: Mapping[str, float], episodes: int, seed
     return model
 
 
-class _Drawing:
-    """The state of NumPy's and torch's global generators while an agent draws from them."""
+@contextmanager
+def _drawing_from(state: list[Any]) -> Iterator[None]:
+    """Draw from NumPy's and torch's global generators in this state, and then set both back.
 
-    def __init__(self) -> None:
-        self.state: Any = None
-
-    @contextmanager
-    def own(self) -> Iterator[None]:
-        """Set both generators to the agent's state, and afterwards back."""
-        import torch
-
-        from nmpcrl.learning.network import OneThread
-
-        before = np.random.get_state(), torch.get_rng_state()  # noqa: NPY002 as SB3 draws
-        if self.state:
-            _put(*self.state)
-        try:
-            with OneThread():
-                yield
-        finally:
-            self.state = np.random.get_state(), torch.get_rng_state()  # noqa: NPY002
-            _put(*before)
-
-
-def _put(numpys: Any, torchs: Any) -> None:
+    Args:
+        state: of both, updated after the draws; at first empty.
+    """
     import torch
 
-    np.random.set_state(numpys)  # noqa: NPY002
-    torch.set_rng_state(torchs)
+    from nmpcrl.learning.network import OneThread
+
+    def states() -> list[Any]:
+        return [np.random.get_state(), torch.get_rng_state()]  # noqa: NPY002 as SB3 draws
+
+    def put(numpys: Any, torchs: Any) -> None:
+        np.random.set_state(numpys)  # noqa: NPY002
+        torch.set_rng_state(torchs)
+
+    before = states()
+    put(*(state or before))
+    try:
+        with OneThread():
+            yield
+    finally:
+        state[:] = states()
+        put(*before)
