@@ -100,11 +100,11 @@ def row_table(table: pd.DataFrame, suite: pd.DataFrame) -> str:
     """
     places = PARTS["judge"].places
     there = (suite.part == SEARCHED[0]) & (suite.entry == SEARCH) & suite.place.isin(places)
-    search = remedies.row(SEARCHED[0], SEARCH, suite[there])
+    search = remedies.rows(suite[there])
     header = ("Entry", "Share of the possible gain", "Solved", "Episodes", "CPU time")
     caption = f"Agents from nothing, and a search from hand-set weights, in {len(places)} layouts."
-    rows_ = (_cells(one) for one in (*rows(table, suite), search))
-    return html_table(caption, header, rows_, headed=True)
+    cells = map(_cells, (*rows(table, suite), *search))
+    return html_table(caption, header, cells, headed=True)
 
 
 def in_short(table: pd.DataFrame, suite: pd.DataFrame) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from html import escape
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,6 @@ from nmpcrl.studies.remedies import (
     PARTS,
     REMEDIES,
     SECOND,
-    Advice,
     RemedyRow,
     rows,
     shares,
@@ -62,17 +62,13 @@ WHAT: dict[str, tuple[str, str]] = {  # what an entry is, after "Try first", and
 }  # fmt: skip
 
 
-def advice_table(advice: Iterable[Advice], caption: str) -> str:
-    """One row an entry, in HTML: whether to try it, and its evidence and price by budget.
-
-    Args:
-        advice: of `remedies.advice`, in its order.
-        caption: of the table.
-    """
+def advice_table(advised: pd.DataFrame, caption: str) -> str:
+    """The table of `remedies.advice` in HTML, a row an entry, with evidence and price by budget."""
     judged = (PARTS[part] for part in ADVISED)
     budgets = (f"With {one.episodes} episodes (seeds a layout: {one.seeds})" for one in judged)
     header = ("Entry", "Try it", *budgets)
-    return html_table(caption, header, map(_cells, advice), headed=True)
+    cells = (_cells(of_entry) for _, of_entry in advised.groupby("entry", sort=False))
+    return html_table(caption, header, cells, headed=True)
 
 
 def entry_table() -> str:
@@ -88,7 +84,8 @@ def named_table(table: pd.DataFrame, part: str) -> str:
         table: of `REMEDIES`.
         part: with the few layouts that are shown one by one.
     """
-    order = sorted(rows(table, part), key=lambda row: (-np.nan_to_num(row.gain.value), row.seconds))
+    found = rows(table[table.part == part])
+    order = sorted(found, key=lambda row: (-np.nan_to_num(row.gain.value), row.seconds))
     if not order:
         return f"<p>Nothing is published yet of the part <em>{escape(part)}</em>.</p>"
     one = PARTS[part]
@@ -117,16 +114,17 @@ def _named(row: RemedyRow, runs: pd.DataFrame) -> tuple[str, ...]:
     return (entry_named(row.name), *each, count, f"{row.seconds:.1f} s")
 
 
-def _cells(one: Advice) -> tuple[str, ...]:
-    judged = [one.rows.get(part) for part in ADVISED]
+def _cells(of_entry: pd.DataFrame) -> tuple[str, ...]:
+    first, *others = of_entry.itertuples()
+    known = {row.part: _evidence(row) for row in (first, *others)}
     return (
-        entry_named(_known(one).name),
-        f'<span class="{BADGES[COLOURS[one.word]]}">{one.word}</span>',
-        *(_evidence(row) if row else NOTHING for row in judged),
+        entry_named(first.name),
+        f'<span class="{BADGES[COLOURS[first.word]]}">{first.word}</span>',
+        *(known.get(part, NOTHING) for part in ADVISED),
     )
 
 
-def _evidence(row: RemedyRow) -> str:
+def _evidence(row: Any) -> str:
     """What it gained, and below that how many layouts it solves, and at which price."""
     price = f"{row.rollouts} rollouts, {row.seconds:.1f} s"
     return f"{_gain(row)}<br><small>{_solved(row)} layouts; {price}</small>"
@@ -139,7 +137,7 @@ def entry_named(name: str) -> str:
     return f"<code>{escape(entry)}</code>{below}"
 
 
-def _gain(row: RemedyRow) -> str:
+def _gain(row: Any) -> str:
     """The share of the possible gain with its interval."""
     what = f"share of the possible gain, {row.entry}, {row.part}: published"
     return cited(share_shown(row.gain), row.gain, what)
@@ -151,7 +149,7 @@ def share_shown(share: Estimate) -> str:
     return text.replace("-0.00", "0.00").replace("-", "−").replace("inf", "∞")
 
 
-def _solved(row: RemedyRow) -> str:
+def _solved(row: Any) -> str:
     what = f"layouts solved, {row.entry}, {row.part}: published"
     return cited(f"{row.solved.value:.0%} of {row.layouts}", row.solved, what)
 
@@ -161,37 +159,30 @@ def rule() -> str:
     return "\n".join(f"- **{word}**: {when}." for word, when in ADVICE.items())
 
 
-def in_short(advice: Iterable[Advice]) -> str:
+def in_short(advised: pd.DataFrame) -> str:
     """The advice in a few sentences: first, second, for whom no run may fail, and never."""
-    advice = [*advice]
-    by: dict[str, list[Advice]] = {}
-    for one in advice:
-        by.setdefault(one.word, []).append(one)
-    if FIRST not in by:
-        said = ["Nothing that was compared gains by an interval above 0."]
-    else:
-        row = _known(by[FIRST][0])
+    rows = {row.entry: row for row in advised.drop_duplicates("entry").itertuples()}
+    by = {word: [row for row in rows.values() if row.word == word] for word in ADVICE}
+    said = ["Nothing that was compared gains by an interval above 0."]
+    for row in by[FIRST]:
         said = [f"Try first {_tried(row)}, and solves {_solved(row)} layouts."]
-    if SECOND in by:
-        said.append(f"Second, {_tried(_known(by[SECOND][0]))}.")
-    if safe := [one for one in advice if one.rows and _solves_all(one)]:
-        row = _known(safe[0])
+    said += [f"Second, {_tried(row)}." for row in by[SECOND]]
+    if safe := safest(advised):
+        row = rows[safe[0]]
         said.append(f"If no run may fail, {_tried(row)}, and solves all {row.layouts} layouts.")
-    if NEVER in by:
-        said.append(f"Never try {listed(f'`{one.entry}`' for one in by[NEVER])}.")
+    if by[NEVER]:
+        said.append(f"Never try {listed(f'`{row.entry}`' for row in by[NEVER])}.")
     return " ".join(said)
 
 
-def _solves_all(one: Advice) -> bool:
-    return all(row.solved.value == 1 for row in one.rows.values())
+def safest(advised: pd.DataFrame) -> list[str]:
+    """The entries that solve every layout, at each budget at which they are judged."""
+    every = advised.solved.map(lambda share: share.value == 1)
+    by_entry = every.groupby(advised.entry, sort=False).all()
+    return [*by_entry.index[by_entry]]
 
 
-def _known(one: Advice) -> RemedyRow:
-    """Its row with the fewest episodes."""
-    return next(one.rows[part] for part in ADVISED if part in one.rows)
-
-
-def _tried(row: RemedyRow) -> str:
+def _tried(row: Any) -> str:
     what, _ = WHAT[row.entry]
     saves = f"saves {_gain(row)} of what a long search saves, in {row.rollouts} rollouts"
     return f"{what} (`{row.entry}`), which {saves}"

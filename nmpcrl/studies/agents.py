@@ -8,7 +8,7 @@ judged. It **matches** theta_init where its rollout without noise costs no more,
 layout where it also ends at the target. A training costs most of an hour or less of one core.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -23,8 +23,8 @@ from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, c
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.studies import remedies
 from nmpcrl.studies.agents_run import EVERY, SAC, TD3, THERE, curve, judged_in, require
+from nmpcrl.studies.remedies import NotTuned, RemedyRow
 from nmpcrl.study.drawn import JUDGE, TUNE
-from nmpcrl.study.refusal import Refusal
 
 AGENTS: Mapping[str, Entry] = {"SAC": SAC, "TD3": TD3}
 _SETTINGS: tuple[Mapping[str, float], ...] = ({}, {"turn": 0.5}, {"gradient": 0.5, "width": 128})
@@ -44,8 +44,10 @@ CHECKPOINTS: Mapping[str, tuple[int, ...]] = {  # episodes after which the polic
 }
 
 
-class NotTuned(Refusal):
-    """An agent cannot be judged before its tuning is complete."""
+def arms(name: str) -> dict[str, Entry]:
+    """An agent with each of its settings, the default first."""
+    every = (AGENTS[name].with_settings(**setting) for setting in SETTINGS[name])
+    return {str(one): one for one in every}
 
 
 def tuned(table: pd.DataFrame, name: str) -> Entry:
@@ -54,32 +56,21 @@ def tuned(table: pd.DataFrame, name: str) -> Entry:
     Raises:
         NotTuned: a row of the tuning is missing.
     """
-    known = table[table.part == "tune"]
-    costs = {}
-    for setting in SETTINGS[name]:
-        one = AGENTS[name].with_settings(**setting)
-        rows = known[known.arm == str(one)]
+    tune, costs = table[table.part == "tune"], dict[str, float]()
+    for arm in arms(name):
+        rows = tune[tune.arm == arm]
         if len(rows) < len(PARTS["tune"].places):
-            raise NotTuned(f"{one} is not tuned yet: the part 'tune' comes first")
-        each = [row.costs[-1][0] / row.initial[0] for row in rows.itertuples()]
-        costs[one] = float(np.mean(each))
-    return min(costs, key=lambda one: costs[one])
+            raise NotTuned(f"{arm} is not tuned yet: the part 'tune' comes first")
+        last = [row.costs[-1][0] / row.initial[0] for row in rows.itertuples()]
+        costs[arm] = float(np.mean(last))
+    return arms(name)[min(costs, key=lambda arm: costs[arm])]
 
 
-def _named(entries: Iterable[Entry]) -> dict[str, Entry]:
-    return {str(one): one for one in entries}
-
-
-def _tuned(most: float) -> Callable[[pd.DataFrame], dict[str, Entry]]:
+def _tuned(most: float, table: pd.DataFrame) -> dict[str, Entry]:
     """The tuned agents, with at most so many gradient steps a step of the robot."""
-
-    def arms(table: pd.DataFrame) -> dict[str, Entry]:
-        best = (tuned(table, name) for name in AGENTS)
-        return _named(
-            one.with_settings(gradient=min(one.settings["gradient"], most)) for one in best
-        )
-
-    return arms
+    best = [tuned(table, name) for name in AGENTS]
+    every = (one.with_settings(gradient=min(one.settings["gradient"], most)) for one in best)
+    return {str(one): one for one in every}
 
 
 def _part(name: str, arms: Any, places: Sequence[str], seeds: int = 1) -> Part:
@@ -87,14 +78,11 @@ def _part(name: str, arms: Any, places: Sequence[str], seeds: int = 1) -> Part:
     return Part(partial(curve, checkpoints), arms, places, checkpoints[-1], seeds, seconds=0.6)
 
 
-_EVERY_SETTING = _named(
-    AGENTS[name].with_settings(**one) for name, every in SETTINGS.items() for one in every
-)
 PARTS = {
-    "tune": _part("tune", _EVERY_SETTING, ("T01", "T02", "T03")),
-    "judge": _part("judge", _tuned(np.inf), tuple(f"J{i:03}" for i in range(1, 7))),
-    "one": _part("one", _tuned(SPARING), ("A",), 4),
-    "all": _part("all", _tuned(SPARING), (EVERY,), 2),
+    "tune": _part("tune", {**arms("SAC"), **arms("TD3")}, ("T01", "T02", "T03")),
+    "judge": _part("judge", partial(_tuned, np.inf), tuple(f"J{i:03}" for i in range(1, 7))),
+    "one": _part("one", partial(_tuned, SPARING), ("A",), 4),
+    "all": _part("all", partial(_tuned, SPARING), (EVERY,), 2),
 }
 
 
@@ -164,7 +152,7 @@ def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()
     """
     points = CHECKPOINTS[part]
     shares, there = [pd.DataFrame(index=points)], [pd.DataFrame(index=points)]
-    for run in table[(table.part == part) & (agents_of(table) == agent)].itertuples():
+    for run in table[(table.part == part) & table.arm.str.startswith(agent)].itertuples():
         units = [str(run.k)] if part == "one" else [*judged_in(run.place)]
         shares.append(pd.DataFrame(np.array(run.costs) / run.initial, points, units))
         there.append(pd.DataFrame([[*one] for one in run.arrived], points, units) == THERE)
@@ -180,77 +168,75 @@ class Known(NamedTuple):
     compared: pd.DataFrame  # the comparison of remedies
 
 
-def _matches(part: str, among: Sequence[str] = ()) -> Callable[[str, Known], Answer]:
-    def answer(agent: str, known: Known) -> Answer:
-        one = course(known.table, part, agent, among)
-        return share(one.last <= 1 + TOLERANCE, numbers=one.numbers)
-
-    return answer
+def _matches(one: Course, _: pd.Series) -> Answer:
+    return share(one.last <= 1 + TOLERANCE, numbers=one.numbers)
 
 
-def _solves(agent: str, known: Known) -> Answer:
-    one = course(known.table, "judge", agent)
+def _solves(one: Course, _: pd.Series) -> Answer:
     return share((one.last <= 1 + TOLERANCE) & one.there.iloc[-1].astype(bool))
 
 
-def _matches_once(agent: str, known: Known) -> Answer:
-    one = course(known.table, "one", agent)
+def _less(one: Course, search: pd.Series) -> Answer:
+    return cheaper((one.last / search.astype(float)).dropna())
+
+
+def _matches_once(one: Course, _: pd.Series) -> Answer:
     return share(one.shares.min() <= 1 + TOLERANCE, "seeds", one.numbers)
 
 
-def _against(part: str, among: Sequence[str] = ()) -> Callable[[str, Known], Answer]:
-    """Whether an agent costs less at the end than the search, where both are known."""
+def _less_in_one(one: Course, search: pd.Series) -> Answer:
+    """Each seed beside the mean of the search in layout A."""
+    return cheaper((one.last / search.get("A", np.nan)).dropna(), "seeds")
 
-    def answer(agent: str, known: Known) -> Answer:
-        last = course(known.table, part, agent, among).last
+
+# name, question, expected, answer of a course and the search's costs, part, some of its layouts
+_ASKED: Sequence[tuple[str, str, Outcome, Callable[..., Answer], str, Sequence[str]]] = (
+    ("matches in 300 episodes", "Does {} match theta_init with 300 episodes?",
+     PARTLY, _matches, "judge", ()),
+    ("solves in 300 episodes", "Does {} solve the layout with 300 episodes?",
+     NOT, _solves, "judge", ()),
+    ("or the best search", "Does {} with 300 episodes cost less than Bayes with 50?",
+     NOT, _less, "judge", ()),
+    ("matches in one layout", "Does {} match theta_init within 600 episodes in layout A?",
+     REPRODUCED, _matches_once, "one", ()),
+    ("or the best search in one layout",
+     "Does {} with 600 episodes cost less in A than Bayes with 50?", NOT, _less_in_one, "one", ()),
+    ("matches over the 60",
+     "Does one {} for all match theta_init in the layouts it was trained in?",
+     PARTLY, _matches, "all", [*TUNE]),
+    ("matches on the 120",
+     "Does one {} for all match theta_init in layouts that it has never seen?",
+     NOT, _matches, "all", [*JUDGE]),
+    ("or the best search on the 120",
+     "Does one {} for all cost less, in layouts never seen, than Bayes with 50 there?",
+     NOT, _less, "all", [*JUDGE]),
+)  # fmt: skip
+
+
+def _question(
+    agent: str, name: str, text: str, expected: Outcome, judge: Callable[..., Answer], part: str,
+    among: Sequence[str],
+) -> Question:  # fmt: skip
+    """A row of `_ASKED` for one agent."""
+
+    def answer(known: Known) -> Answer:
         search = searched(known.compared, SEARCHED[part == "one"])
-        if part == "one":  # each seed beside the mean of the search in this layout
-            search = pd.Series(search.get("A", np.nan), last.index)
-        both = pd.DataFrame({"agent": last, "search": search}, dtype=float).dropna()
-        return cheaper(both["agent"] / both["search"], "seeds" if part == "one" else "layouts")
+        return judge(course(known.table, part, agent, among), search)
 
-    return answer
+    return Question(f"{agent} {name}", text.format(agent), expected, answer)
 
 
 def _one_or_other(known: Known) -> Answer:
-    last = {name: course(known.table, "judge", name).last for name in AGENTS}
-    both = pd.DataFrame(last, dtype=float).dropna()
-    return cheaper(both["SAC"] / both["TD3"])
-
-
-# name, question, expected of SAC and of TD3, answer
-_ASKED: Sequence[tuple[str, str, Outcome, Outcome, Callable[[str, Known], Answer]]] = (
-    ("matches in 300 episodes", "Does {} match theta_init with 300 episodes?",
-     PARTLY, PARTLY, _matches("judge")),
-    ("solves in 300 episodes", "Does {} solve the layout with 300 episodes?", NOT, NOT, _solves),
-    ("or the best search", "Does {} with 300 episodes cost less than Bayes with 50?",
-     NOT, NOT, _against("judge")),
-    ("matches in one layout", "Does {} match theta_init within 600 episodes in layout A?",
-     REPRODUCED, REPRODUCED, _matches_once),
-    ("or the best search in one layout",
-     "Does {} with 600 episodes cost less in A than Bayes with 50?", NOT, NOT, _against("one")),
-    ("matches over the 60",
-     "Does one {} for all match theta_init in the layouts it was trained in?",
-     PARTLY, PARTLY, _matches("all", [*TUNE])),
-    ("matches on the 120",
-     "Does one {} for all match theta_init in layouts that it has never seen?",
-     NOT, NOT, _matches("all", [*JUDGE])),
-    ("or the best search on the 120",
-     "Does one {} for all cost less, in layouts never seen, than Bayes with 50 there?",
-     NOT, NOT, _against("all", [*JUDGE])),
-)  # fmt: skip
+    first, second = (course(known.table, "judge", name).last for name in AGENTS)
+    return cheaper((first / second).dropna())
 
 
 QUESTIONS = (
-    *(
-        Question(f"{agent} {name}", text.format(agent), expected[i], partial(answer, agent))
-        for i, agent in enumerate(AGENTS)
-        for name, text, *expected, answer in _ASKED
+    *(_question(agent, *one) for agent in AGENTS for one in _ASKED),
+    Question(
+        "SAC or TD3", "Does SAC cost less than TD3 with 300 episodes each?", PARTLY, _one_or_other
     ),
-    Question("SAC or TD3",
-             "Does SAC cost less than TD3 with 300 episodes each?",
-             PARTLY, _one_or_other),
-)  # fmt: skip
+)
 
 
 def answers(table: pd.DataFrame, compared: pd.DataFrame) -> dict[str, Answer]:
@@ -264,30 +250,26 @@ def searched(compared: pd.DataFrame, part: str) -> pd.Series:
     return (runs.cost / runs.initial).groupby(runs.place, sort=False).mean()
 
 
-def rows(table: pd.DataFrame, compared: pd.DataFrame) -> tuple[remedies.RemedyRow, ...]:
+def rows(table: pd.DataFrame, compared: pd.DataFrame) -> list[RemedyRow]:
     """The agents' rows of the suite with 300 episodes, in the layouts in which they are judged.
 
     Args:
         table: of `SAC_AND_TD3`.
-        compared: the published comparison, which has J_best of each layout.
+        compared: the comparison of remedies, which has J_best of each layout.
     """
     best = compared.groupby("place").best.first()
     runs = table[(table.part == "judge") & table.place.isin(best.index)]
-    last = runs.assign(
-        entry=agents_of(runs),
-        initial=[each[0] for each in runs.initial],
-        best=runs.place.map(best),
-        cost=[each[-1][0] for each in runs.costs],
-        arrived=[each[-1] == THERE for each in runs.arrived],
-        over=runs.episodes > PARTS["judge"].episodes,
+    return remedies.rows(
+        runs.assign(
+            part="judge 300",
+            entry=runs.arm.str.split("[").str[0],
+            initial=[each[0] for each in runs.initial],
+            best=runs.place.map(best),
+            cost=[each[-1][0] for each in runs.costs],
+            arrived=[each[-1] == THERE for each in runs.arrived],
+            over=runs.episodes > PARTS["judge"].episodes,
+        )
     )
-    by_agent = last.groupby("entry")
-    return tuple(remedies.row("judge 300", str(agent), each) for agent, each in by_agent)
-
-
-def agents_of(table: pd.DataFrame) -> pd.Series:
-    """The agent of each run, whatever its setting."""
-    return table.arm.map(lambda arm: suite.entry(arm, AGENTS).name)
 
 
 SAC_AND_TD3 = Investigation(

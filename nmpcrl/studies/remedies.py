@@ -1,28 +1,24 @@
 """21 learners, remedies and searches at equal interaction: what to try where learning fails.
 
 Settings, parts, questions and the rule of the advice were committed before any entry was tuned or
-judged; a test compares them with that commit, whose file says what each question measures, where
-yes ends, and which pilots were known.
+judged; the file of that commit says what each question measures, and which pilots were known.
 
-**Interaction.** Every episode counts: with noise, confirming, or of a tuner. An entry has 50 or 300
-a layout and seed, and begins from theta_init.
+An entry begins from theta_init with 50 or 300 episodes a layout and seed. Every episode counts: one
+with noise, one that confirms a step, one of a search. An entry with settings tries four of them in
+the layouts of `tune`, the default first; the one with the greatest gain is judged.
 
-**Tuning.** An entry that has settings tries four, the default first, in the layouts of `tune`. The
-best by the measure below is judged with 50 and with 300 episodes.
-
-**Measure.** The share of the possible gain, (J_init - J) / (J_init - J_best), of rollouts without
+The **gain** is the share of the possible one, (J_init - J) / (J_init - J_best), of rollouts without
 noise: the interquartile mean over layouts of the mean over seeds, with an interval of 95 % by a
 bootstrap over layouts. J_best is the lowest cost in a CMA-ES of `YARDSTICK` rollouts, so that a
-share may exceed 1. Layouts where less than `LEAST_GAIN` of J_init can be gained are counted, but
-have no share. A failed solve costs infinitely much.
+share may exceed 1. Layouts where less than `LEAST_GAIN` of J_init can be gained have no share. A
+failed solve costs infinitely much.
 
-The part `best` searches for J_best, a column of the rows of all other parts; of itself nothing was
-published.
+The part `best` searches for J_best. Its rows are not published: all others have J_best as a column.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import TypeAlias
+from dataclasses import asdict
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -90,7 +86,7 @@ class NotTuned(Refusal):
 
 
 def arms(entry: str) -> dict[str, Entry]:
-    """An entry with each of its settings, the default first."""
+    """An entry with each of its settings, by name, the default first."""
     every = (ENTRIES[entry].with_settings(**one) for one in SETTINGS[entry] or ({},))
     return {str(one): one for one in every}
 
@@ -101,27 +97,23 @@ def tuned(table: pd.DataFrame) -> list[Entry]:
     Raises:
         NotTuned: a row of its tuning is missing.
     """
-    known, found = table[table.part == "tune"], []
+    tune, found = table[table.part == "tune"], []
     for entry, settings in SETTINGS.items():
-        every, runs = arms(entry), known[known.entry == entry]
+        runs = tune[tune.entry == entry]
         if len(runs) < len(settings) * len(PARTS["tune"].places):
             raise NotTuned(f"{entry} is not tuned yet: the part 'tune' comes first")
-        found.append(every[best_setting(runs) if settings else entry])
+        found.append(arms(entry)[best_setting(runs) if settings else entry])
     return found
 
 
 def best_setting(runs: pd.DataFrame) -> str:
-    """The arm with the greatest gain, of equal ones the first.
-
-    Args:
-        runs: of an entry in the part `tune`.
-    """
-    values = {str(arm): gain(shares(each)).value for arm, each in runs.groupby("arm", sort=False)}
-    return max(values, key=lambda arm: values[arm])
+    """The arm of an entry with the greatest gain in the part `tune`, of equal ones the first."""
+    gains = {str(arm): gain(shares(each)).value for arm, each in runs.groupby("arm", sort=False)}
+    return max(gains, key=lambda arm: gains[arm])
 
 
 def run(setting: Setting, place: str, episodes: int, seed: int) -> Row:
-    """The judgement of an entry in a layout."""
+    """The judgement of an entry in a layout, beside J_best."""
     entry, best = setting
     found = asdict(judge(entry, place, seed, episodes))
     del found["inside"]  # no obstacle moves
@@ -182,30 +174,9 @@ def _compile_ahead(missing: Iterable[tuple[Condition, Setting]]) -> None:
 # The measure.
 
 
-@dataclass(frozen=True)
-class RemedyRow:
-    """The result of an entry in one part."""
-
-    part: str
-    entry: str
-    name: str  # with its settings
-    gain: Estimate  # share of the possible one: interquartile mean over layouts
-    solved: Estimate  # share of the layouts
-    layouts: int
-    left_out: int  # layouts without a share, since hardly any gain is possible there
-    rollouts: int  # of a layout and seed at most, confirming ones and a tuner's included
-    seconds: float  # of processor time, mean of a layout and seed
-    disqualified: bool  # whether it began too many somewhere
-
-
 def shares(runs: pd.DataFrame) -> pd.Series:
-    """The share of the possible gain by layout, the mean over its seeds; -inf where one failed.
-
-    Args:
-        runs: of one arm in one part.
-    """
-    possible = runs.initial - runs.best
-    there = runs[possible >= LEAST_GAIN * runs.initial]
+    """The share of the possible gain by layout, for one arm in one part; -inf where it failed."""
+    there = runs[runs.initial - runs.best >= LEAST_GAIN * runs.initial]
     each = (there.initial - there.cost) / (there.initial - there.best)
     return each.groupby(there.place, sort=False).mean()
 
@@ -222,27 +193,41 @@ def gain(by_layout: pd.Series) -> Estimate:
     return interquartile_mean(by_layout.to_numpy(), ["layouts"] * len(by_layout))
 
 
-def rows(table: pd.DataFrame, part: str) -> tuple[RemedyRow, ...]:
-    """One row an entry, in the order of `SETTINGS`."""
-    each = ((entry, _runs(table, part, entry)) for entry in SETTINGS)
-    return tuple(row(part, entry, runs) for entry, runs in each if len(runs))
+class RemedyRow(NamedTuple):
+    """The result of an entry in one part."""
+
+    part: str
+    entry: str
+    name: str  # with its settings
+    gain: Estimate
+    solved: Estimate  # share of the layouts
+    layouts: int
+    left_out: int  # layouts without a share
+    rollouts: int  # of a layout and seed at most, confirming ones and a tuner's included
+    seconds: float  # of processor time, mean of a layout and seed
+    disqualified: bool  # whether it began too many somewhere
 
 
-def row(part: str, entry: str, runs: pd.DataFrame) -> RemedyRow:
-    """The row of one entry, of its runs in a part."""
-    gained, well = shares(runs), solved(runs)
-    return RemedyRow(
-        part=part,
-        entry=entry,
-        name=str(runs.arm.iloc[0]),
-        gain=gain(gained),
-        solved=rate(int(well.sum()), len(well)),
-        layouts=len(well),
-        left_out=len(well) - len(gained),
-        rollouts=int(runs.episodes.max()),
-        seconds=float(runs.seconds.mean()),
-        disqualified=bool(runs.over.any()),
-    )
+def rows(runs: pd.DataFrame) -> list[RemedyRow]:
+    """The result of each entry in each part of a table, in the order of the table."""
+    found = []
+    for (part, entry), each in runs.groupby(["part", "entry"], sort=False):
+        gained, well = shares(each), solved(each)
+        found.append(
+            RemedyRow(
+                part=str(part),
+                entry=str(entry),
+                name=str(each.arm.iloc[0]),
+                gain=gain(gained),
+                solved=rate(int(well.sum()), len(well)),
+                layouts=len(well),
+                left_out=len(well) - len(gained),
+                rollouts=int(each.episodes.max()),
+                seconds=float(each.seconds.mean()),
+                disqualified=bool(each.over.any()),
+            )
+        )
+    return found
 
 
 def _runs(table: pd.DataFrame, part: str, entry: str) -> pd.DataFrame:
@@ -263,72 +248,50 @@ ADVICE: Mapping[str, str] = {  # in the order in which they are asked; `frozen` 
 }
 EXPECTED_FIRST: Mapping[int, str] = {50: "undone-GN-J", 300: "CMA-ES"}  # greatest lower end
 EXPECTED_NEVER = ("DPG",)
-_RANK = (LATER, OPEN, NEVER)  # before first and second are chosen
 
 
-@dataclass(frozen=True)
-class Advice:
-    """Whether to try an entry, and why."""
+def advice(table: pd.DataFrame) -> pd.DataFrame:
+    """The advice on each entry by `ADVICE`, the first to try first.
 
-    entry: str
-    word: str  # of `ADVICE`
-    rows: Mapping[str, RemedyRow] = field(default_factory=dict)  # by part
-    tuning: int = 0  # rollouts that were spent to find its setting
-
-
-def advice(table: pd.DataFrame) -> tuple[Advice, ...]:
-    """The advice on each entry by `ADVICE`, the first to try first."""
-    judged = [row for part in ADVISED for row in rows(table, part)]
-    refused = {CONTROL, *(row.entry for row in judged if row.disqualified)}
-    found: dict[str, dict[str, RemedyRow]] = {}
-    for row in judged:
-        if row.entry not in refused:
-            found.setdefault(row.entry, {})[row.part] = row
-    words = {entry: _word(list(by_part.values())) for entry, by_part in found.items()}
-    order = sorted(found, key=lambda entry: (_RANK.index(words[entry]), _order(found[entry])))
-    gaining = [entry for entry in order if words[entry] == LATER]
-    words |= dict(zip(gaining, (FIRST, SECOND), strict=False))
-    spent = table[table.part == "tune"].groupby("entry").episodes.sum()
-    return tuple(
-        Advice(entry, words[entry], found[entry], int(spent.get(entry, 0))) for entry in order
-    )
-
-
-def _word(judged: list[RemedyRow]) -> str:
-    """The advice before first and second are chosen."""
-    if all(one.gain.high < 0 or one.solved.high < HALF for one in judged):
-        return NEVER
-    return LATER if all(one.gain.low > 0 for one in judged) else OPEN
-
-
-def _order(judged: Mapping[str, RemedyRow]) -> tuple[float, ...]:
-    """The key by which entries are sorted: rounded lower ends by budget, then time."""
-    ends = [-round(judged[part].gain.low, DIGITS) if part in judged else np.inf for part in ADVISED]
-    known = next(iter(judged.values()))
-    return (*(np.inf if np.isnan(one) else one for one in ends), known.seconds)
-
-
-def greatest(table: pd.DataFrame) -> dict[int, str]:
-    """The entry whose gain has the greatest lower end, by episodes; see `EXPECTED_FIRST`."""
-    found = {}
+    Returns:
+        A row an entry and part of `ADVISED`, with the fields of `RemedyRow`, the lower end `low` of
+        the gain, the `word` of the advice, and `tuning`, the rollouts that its tuning took.
+    """
+    judged = [row for part in ADVISED for row in rows(table[table.part == part])]
+    found = pd.DataFrame(judged, columns=RemedyRow._fields)
+    found = found[~found.entry.isin([CONTROL, *found.entry[found.disqualified]])]
+    low = found.gain.map(lambda one: one.low).astype(float)
+    fails = [one.gain.high < 0 or one.solved.high < HALF for one in found.itertuples()]
+    rated = found.assign(low=low, gains=low > 0, fails=np.array(fails, bool))
+    by_entry = rated.groupby("entry", sort=False)
+    entries = by_entry.agg({"fails": "all", "gains": "all", "seconds": "first"})
     for part in ADVISED:
-        known = [one for one in rows(table, part) if not np.isnan(one.gain.low)]
-        if known:
-            found[PARTS[part].episodes] = max(known, key=lambda one: one.gain.low).entry
-    return found
+        entries[part] = rated[rated.part == part].set_index("entry").low.round(DIGITS)
+    keys = {"fails": True, "gains": False, **dict.fromkeys(ADVISED, False), "seconds": True}
+    entries = entries.sort_values([*keys], ascending=[*keys.values()])
+    place = entries.gains.cumsum()
+    asked = [entries.fails, ~entries.gains, place == 1, place == 2]
+    entries["word"] = np.select(asked, [NEVER, OPEN, FIRST, SECOND], LATER)
+    spent = table[table.part == "tune"].groupby("entry").episodes.sum()
+    entries["tuning"] = spent.reindex(entries.index, fill_value=0)
+    words = entries[["word", "tuning"]].reset_index()
+    return words.merge(rated.drop(columns=["gains", "fails"]), on="entry")
 
 
-def expectations(table: pd.DataFrame) -> dict[str, bool]:
+def greatest(advised: pd.DataFrame) -> dict[int, str]:
+    """The entry of `advice` with the greatest lower end, by episodes; see `EXPECTED_FIRST`."""
+    ends = advised.dropna(subset="low").set_index("entry").groupby("part", sort=False).low
+    return {PARTS[str(part)].episodes: str(entry) for part, entry in ends.idxmax().items()}
+
+
+def expectations(advised: pd.DataFrame) -> dict[str, bool]:
     """Whether each expectation came true, as far as rows are known."""
-    first = greatest(table)
-    said = {
+    first, words = greatest(advised), dict(zip(advised.entry, advised.word, strict=True))
+    return {
         f"{entry} is first with {budget} episodes": first[budget] == entry
         for budget, entry in EXPECTED_FIRST.items()
         if budget in first
-    }
-    words = {one.entry: one.word for one in advice(table)}
-    known = words.keys() & {*EXPECTED_NEVER}
-    return said | {f"{one} is never advised": words[one] == NEVER for one in sorted(known)}
+    } | {f"{one} is never advised": words[one] == NEVER for one in EXPECTED_NEVER if one in words}
 
 
 # Questions.

@@ -382,6 +382,11 @@ def which_runs_are_made_again() -> Any:
 # The comparison of remedies.
 
 
+def by_field(row: Any) -> dict[str, Any]:
+    """The fields of a `RemedyRow` by name."""
+    return {name: getattr(row, name) for name in remedies.RemedyRow._fields}
+
+
 @entry("remedies")
 def answers_on_remedies() -> Any:
     return by_question(remedies.REMEDIES.answers(suite()).values())
@@ -389,19 +394,28 @@ def answers_on_remedies() -> Any:
 
 @entry("remedies")
 def advice() -> Any:
-    found = remedies.advice(suite())
-    return {f"{i:02} {one.entry}": one for i, one in enumerate(found, start=1)}
+    by_entry = remedies.advice(suite()).groupby("entry", sort=False)
+    return {
+        f"{i:02} {entry}": {
+            "entry": entry,
+            "word": each.word.iloc[0],
+            "tuning": each.tuning.iloc[0],
+            "rows": {one.part: by_field(one) for one in each.itertuples()},
+        }
+        for i, (entry, each) in enumerate(by_entry, start=1)
+    }
 
 
 @entry("remedies")
 def what_was_expected() -> Any:
-    return remedies.expectations(suite()) | {"greatest": remedies.greatest(suite())}
+    advised = remedies.advice(suite())
+    return remedies.expectations(advised) | {"greatest": remedies.greatest(advised)}
 
 
 @entry("remedies")
 def rows() -> Any:
     return {
-        part: {one.entry: one for one in remedies.rows(suite(), part)}
+        part: {one.entry: by_field(one) for one in remedies.rows(suite()[suite().part == part])}
         for part in [*remedies.PARTS][1:]
     }
 
@@ -434,7 +448,7 @@ def answers_without_the_suite() -> Any:
 
 @entry("agents")
 def rows_of_the_suite() -> Any:
-    return {one.entry: one for one in agents.rows(trained(), suite())}
+    return {one.entry: by_field(one) for one in agents.rows(trained(), suite())}
 
 
 @entry("agents")

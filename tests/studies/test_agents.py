@@ -11,13 +11,13 @@ from nmpcrl.studies.agents import (
     PARTS,
     SAC_AND_TD3,
     SETTINGS,
-    NotTuned,
     answers,
     course,
     rows,
     tuned,
 )
 from nmpcrl.studies.agents_run import EVERY, judged_in, trained_in
+from nmpcrl.studies.remedies import NotTuned
 from nmpcrl.study.drawn import JUDGE, TUNE
 
 COLUMNS = [*SAC_AND_TD3.table().columns]

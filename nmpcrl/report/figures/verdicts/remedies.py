@@ -5,10 +5,12 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
+from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.analysis.suite import Judgement
 from nmpcrl.report.figures.style import (
     AT_ONE,
@@ -22,7 +24,7 @@ from nmpcrl.report.figures.style import (
     page,
     subplots,
 )
-from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, PARTS, SECOND, Advice
+from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, PARTS, SECOND
 
 COLOURS = {FIRST: TEAL, SECOND: TEAL, NEVER: WINE}  # others are in ink
 MARKS = {FIRST: "D", SECOND: "D", NEVER: "X"}  # others are round
@@ -36,19 +38,21 @@ LEAST, MOST = -1.0, 1.15  # shares that are drawn; what is lower ends in an arro
 
 
 @page
-def gains(advice: Sequence[Advice]) -> Figure:
+def gains(advised: pd.DataFrame) -> Figure:
     """One row an entry, one panel a budget: the interquartile mean over layouts, with its interval.
 
     Args:
-        advice: of `remedies.advice`, the first on top.
+        advised: of `remedies.advice`, the first on top.
     """
-    high = 0.2 * len(advice) + 0.8
+    words = dict(zip(advised.entry, advised.word, strict=True))
+    high = 0.2 * len(words) + 0.8
     options: dict[str, Any] = {"sharex": True, "sharey": "row", "squeeze": False}
     tall = len(ADVISED) * (high + 0.3) + 0.6
     figure, panels = subplots(1, len(ADVISED), high, tall=tall, **options)
     for axes, part in zip(panels.flat, ADVISED, strict=True):
-        _panel(axes, advice, part)
-    return headed(figure, _finding(advice))
+        _panel(axes, words, advised[advised.part == part])
+        axes.set_title(f"{PARTS[part].episodes} episodes", fontsize="medium", fontweight="normal")
+    return headed(figure, _finding(words))
 
 
 @page
@@ -89,33 +93,31 @@ def _cheapest(budgets: Sequence[int], returned: Mapping[str, Sequence[Judgement]
     return f"With {budgets[-1]} episodes {best} costs least: {share:.0%} of the start's cost"
 
 
-def _panel(axes: Axes, advice: Sequence[Advice], part: str) -> None:
+def _panel(axes: Axes, words: Mapping[str, str], rows: pd.DataFrame) -> None:
     axes.axvline(0, **LIMIT)
     axes.axvline(1, **AT_ONE)
-    for y, one in enumerate(advice):
-        if part in one.rows:
-            _mark(axes, y, one, part)
-    names = [f"{one.entry}: {one.word}" for one in advice]
-    axes.set_yticks(range(len(advice)), names, fontsize="small")
-    axes.set(xlim=(LEAST, MOST), ylim=(len(advice) - 0.4, -0.6))
+    for entry, word, share in zip(rows.entry, rows.word, rows.gain, strict=True):
+        _mark(axes, [*words].index(entry), word, share)
+    names = [f"{entry}: {word}" for entry, word in words.items()]
+    axes.set_yticks(range(len(words)), names, fontsize="small")
+    axes.set(xlim=(LEAST, MOST), ylim=(len(words) - 0.4, -0.6))
     axes.set(xlabel="share of the possible gain [-]")
-    axes.set_title(f"{PARTS[part].episodes} episodes", fontsize="medium", fontweight="normal")
 
 
-def _mark(axes: Axes, y: int, one: Advice, part: str) -> None:
+def _mark(axes: Axes, y: int, word: str, share: Estimate) -> None:
     """A mark with its interval; an arrow where it lies beyond the panel."""
-    share, colour = one.rows[part].gain, COLOURS.get(one.word, INK)
+    colour = COLOURS.get(word, INK)
     low, high = np.clip([share.low, share.high], LEAST, MOST)
     axes.plot([low, high], [y, y], color=colour, linewidth=1.6)
     if share.value < LEAST:
         axes.plot(LEAST, y, marker="<", color=colour, markersize=6, clip_on=False)
     else:
-        axes.plot(share.value, y, marker=MARKS.get(one.word, "o"), color=colour, markersize=5)
+        axes.plot(share.value, y, marker=MARKS.get(word, "o"), color=colour, markersize=5)
 
 
-def _finding(advice: Sequence[Advice]) -> str:
+def _finding(words: Mapping[str, str]) -> str:
     """What to try first, second and never, in a title."""
-    by = {word: [one.entry for one in advice if one.word == word] for word in MARKS}
-    said = [f"{word} {', '.join(by[word])}" for word in MARKS if by[word]]
+    by = {word: [entry for entry, one in words.items() if one == word] for word in MARKS}
+    said = [f"{word} {', '.join(entries)}" for word, entries in by.items() if entries]
     text = "; ".join(said) or "nothing surely gains"
     return f"What to try: {text}"

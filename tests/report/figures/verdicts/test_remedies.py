@@ -1,28 +1,29 @@
 """Figures of remedies: a title says what to try, and what lies beyond the axes is marked."""
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate
 from nmpcrl.analysis.suite import Judgement
 from nmpcrl.report.figures.verdicts.remedies import DEAREST, by_budget, gains
-from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, SECOND, Advice, RemedyRow
+from nmpcrl.studies.remedies import ADVISED, FIRST, NEVER, SECOND, RemedyRow
 
 
-def row(entry, part, *gain):
+def row(entry, word, part, *gain):
     solved = Estimate(0.9, 0.8, 0.95)
-    return RemedyRow(part, entry, entry, Estimate(*gain), solved, 120, 2, 49, 0.5, False)
+    made = RemedyRow(part, entry, entry, Estimate(*gain), solved, 120, 2, 49, 0.5, False)
+    return made._asdict() | {"word": word}
 
 
 def test_the_title_says_what_to_try_and_an_arrow_marks_what_is_beyond_the_panel():
     short, long = ADVISED
-    figure = gains(
-        [
-            Advice("CMA-ES", FIRST, {short: row("CMA-ES", short, 0.8, 0.7, 0.9),
-                                     long: row("CMA-ES", long, 0.99, 0.98, 1.0)}),
-            Advice("grid", SECOND, {short: row("grid", short, 0.7, 0.6, 0.8)}),
-            Advice("DPG", NEVER, {short: row("DPG", short, -np.inf, -np.inf, -0.2)}),
-        ]
-    )  # fmt: skip
+    rows = [
+        row("CMA-ES", FIRST, short, 0.8, 0.7, 0.9),
+        row("CMA-ES", FIRST, long, 0.99, 0.98, 1.0),
+        row("grid", SECOND, short, 0.7, 0.6, 0.8),
+        row("DPG", NEVER, short, -np.inf, -np.inf, -0.2),
+    ]
+    figure = gains(pd.DataFrame(rows))
     assert figure.get_suptitle() == "What to try: first CMA-ES; second grid; never DPG"
     left, right = figure.axes
     assert next(text.get_text() for text in left.get_yticklabels()) == "CMA-ES: first"
