@@ -401,11 +401,12 @@ assert found.output.startswith(f"0 of {len(design.variant('N = 8'))} runs are st
 import pandas as pd
 
 from nmpcrl.claims import own_claims, published
+from nmpcrl.claims.rule import judge
 from nmpcrl.report.tables import claim_table
 
 runs = pd.DataFrame(published.load().rows.values())
 runs = runs[runs.variant == "main"]
-(verdict,) = [one for one in own_claims.judge_own(runs) if one.claim == "B9"]
+(verdict,) = [one for one in judge(own_claims.OWN_CLAIMS, runs) if one.claim == "B9"]
 assert verdict.counts["all"][1] == 120
 assert "GES is at least as good as ES." in claim_table(own_claims.OWN_CLAIMS.values(), "")
 """,

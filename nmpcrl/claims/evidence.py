@@ -157,7 +157,7 @@ def _named(column: pd.Series) -> str:
 
 
 def paths(evidence: Evidence) -> Mapping[Experiment, Column]:
-    """States of each run's last rollout, as `paper_claims.judge_runs` takes them."""
+    """States of each run's last rollout, as `rule.Observations` takes them."""
     return {experiment: summary.states for experiment, summary in evidence.summaries.items()}
 
 

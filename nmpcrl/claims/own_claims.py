@@ -12,9 +12,9 @@ import pandas as pd
 
 from nmpcrl.analysis.statistics import Estimate, probability_of_improvement
 from nmpcrl.claims.by_runs import AtMost, RunClaim, Values
-from nmpcrl.claims.rule import Observations, Paths, arms, drawn_anew, median
+from nmpcrl.claims.rule import Paths, arms, drawn_anew, median
 from nmpcrl.claims.thresholds import BETTER, SAME_COST, cost_difference, cost_reduction
-from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Verdict
+from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED
 from nmpcrl.study.experiment import PAPER
 
 
@@ -140,8 +140,3 @@ OWN_CLAIMS: dict[str, RunClaim] = {
         ),
     )
 }
-
-
-def judge_own(runs: pd.DataFrame) -> tuple[Verdict, ...]:
-    """The verdicts on our own claims, in order; `runs` as for `paper_claims.judge_runs`."""
-    return tuple(claim.judge(Observations(runs)) for claim in OWN_CLAIMS.values())

@@ -15,7 +15,7 @@ from nmpcrl.analysis.rows import THETA, experiment_of
 from nmpcrl.analysis.summary import SIZES
 from nmpcrl.claims.assumptions import TheoremClaim
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values
-from nmpcrl.claims.rule import CELL, Claim, Observations, Paths, arms, median
+from nmpcrl.claims.rule import CELL, Claim, Paths, arms, median
 from nmpcrl.claims.thresholds import (
     BETTER,
     DIVERGED,
@@ -37,7 +37,7 @@ from nmpcrl.claims.thresholds import (
     was_stopped,
 )
 from nmpcrl.claims.timing import TimeClaim
-from nmpcrl.claims.verdict import NOT, REPRODUCED, Verdict
+from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.study.experiment import PAPER
 from nmpcrl.study.layouts import ARRIVED
 
@@ -385,28 +385,3 @@ WIDER_CLAIMS: dict[str, RunClaim] = {
     ),
 }
 WIDER_THAN = {"W7": "C7", "W9": "C9"}
-
-
-def judge_times(timings: pd.DataFrame) -> tuple[Verdict, ...]:
-    """The verdicts on the claims about times."""
-    return tuple(claim.judge(Observations(timings=timings)) for claim in BY_TIME.values())
-
-
-def judge_runs(runs: pd.DataFrame, paths: Paths) -> tuple[Verdict, ...]:
-    """The verdicts on the claims about runs, in order.
-
-    Args:
-        runs: of `rows.table`, all of one setting; a missing learner leaves its claims undecided.
-        paths: states of the last rollout without noise, of RDES and GES.
-
-    Raises:
-        ValueError: the runs are of several settings.
-    """
-    observed = Observations(runs, paths)
-    return tuple(claim.judge(observed) for claim in BY_RUNS.values())
-
-
-def judge_wider(runs: pd.DataFrame, paths: Paths) -> tuple[Verdict, ...]:
-    """The verdicts on the wider claims, in order; arguments as for `judge_runs`."""
-    observed = Observations(runs, paths)
-    return tuple(claim.judge(observed) for claim in WIDER_CLAIMS.values())

@@ -9,7 +9,8 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.processes import time_learners_repeatedly
 from nmpcrl.claims import published
 from nmpcrl.claims.assumptions import measured
-from nmpcrl.claims.paper_claims import judge_times
+from nmpcrl.claims.paper_claims import BY_TIME
+from nmpcrl.claims.rule import judge
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.study.design import LAYOUTS
 from nmpcrl.study.experiment import Experiment
@@ -41,7 +42,7 @@ def publish_timing() -> tuple[Verdict, ...]:
         The verdicts on these claims.
     """
     timings = time_learners_repeatedly()
-    judged = judge_times(timings)
+    judged = judge(BY_TIME, timings=timings)
     if UNDECIDABLE not in {verdict.outcome for verdict in judged}:
         published.republish(timings)
     return judged

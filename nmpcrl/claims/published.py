@@ -72,7 +72,7 @@ class Published:
 
     @property
     def paths(self) -> dict[Experiment, Column]:
-        """States of each run's last rollout, as `paper_claims.judge_runs` takes them."""
+        """States of each run's last rollout, as `rule.Observations` takes them."""
         return {e: one.states for e, one in self.summaries.items()}
 
     @property

@@ -22,8 +22,8 @@ from nmpcrl.analysis import summaries
 from nmpcrl.analysis.rows import FIELDS, THETA, row, table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import rule
-from nmpcrl.claims.own_claims import judge_own
-from nmpcrl.claims.paper_claims import judge_runs, judge_times, judge_wider
+from nmpcrl.claims.own_claims import OWN_CLAIMS
+from nmpcrl.claims.paper_claims import BY_RUNS, BY_TIME, WIDER_CLAIMS
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.verdict import Verdict, differ
 from nmpcrl.study import design, lock, provenance
@@ -139,7 +139,8 @@ def of_times(timings: pd.DataFrame, published: Published) -> Pairs:
     """The contradictions with times taken here; none if another machine took the published ones."""
     if published.timed.get("machine") != fingerprint():
         return ()
-    return contradictions(judge_times(timings), judge_times(published.timings))
+    here, there = (rule.judge(BY_TIME, timings=one) for one in (timings, published.timings))
+    return contradictions(here, there)
 
 
 def _verdicts(
@@ -154,11 +155,8 @@ def _verdicts(
         return (), ()
     here, there = table(mine), published.table[shared]
     paths = {e: one.states for e, one in mine.items()}
-    return _judge(here, paths), _judge(there, published.paths)
-
-
-def _judge(runs: pd.DataFrame, paths: rule.Paths) -> tuple[Verdict, ...]:
-    return (*judge_runs(runs, paths), *judge_wider(runs, paths), *judge_own(runs))
+    claims = BY_RUNS | WIDER_CLAIMS | OWN_CLAIMS
+    return rule.judge(claims, here, paths), rule.judge(claims, there, published.paths)
 
 
 @dataclass(frozen=True)

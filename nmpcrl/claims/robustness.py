@@ -14,8 +14,8 @@ import pandas as pd
 from scipy import stats
 
 from nmpcrl.claims.by_runs import RunClaim
-from nmpcrl.claims.paper_claims import BY_RUNS, judge_runs
-from nmpcrl.claims.rule import CELL, Observations, Paths
+from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.rule import CELL, Observations, Paths, judge
 from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
@@ -32,12 +32,12 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
     Args:
         runs: of `rows.table`, with a column `variant`.
-        paths: as `judge_runs` takes them.
+        paths: as `rule.Observations` takes them.
 
     Returns:
         `COLUMNS` after `departure`, a letter of `DEPARTURES` or "".
     """
-    verdicts = judge_runs(runs[runs.variant == design.MAIN_TABLE], paths)
+    verdicts = judge(BY_RUNS, runs[runs.variant == MAIN_TABLE], paths)
     overall = [(one.claim, (one.outcome, one.counts["all"])) for one in verdicts]
     unlike = {"base_share": np.nan, "p": np.nan}  # nothing is compared
     whole = pd.DataFrame([_row(WHOLE, claim, of, of) | unlike for claim, of in overall])
@@ -96,7 +96,7 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
     Args:
         runs: of `rows.table`, with a column `variant`.
-        paths: as `judge_runs` takes them, of the variants and of the main table.
+        paths: as `rule.Observations` takes them, of the variants and of the main table.
 
     Returns:
         `COLUMNS`, one row a variant and claim, in order.

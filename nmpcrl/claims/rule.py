@@ -92,6 +92,12 @@ class Claim(ABC):
         return Verdict(self.name, self.statement, outcome, self.would_change, said=said, **numbers)
 
 
+def judge(claims: Mapping[str, Claim], *observed: Any, **further: Any) -> tuple[Verdict, ...]:
+    """The verdicts on claims, in order; the other arguments are those of `Observations`."""
+    known = Observations(*observed, **further)
+    return tuple(claim.judge(known) for claim in claims.values())
+
+
 @dataclass(frozen=True)
 class Answers:
     """The counts of yes, of no, and of missing answers."""

@@ -20,7 +20,7 @@ def baselines(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
     Args:
         runs: of `rows.table`, with a column `variant`.
-        paths: as `judge_runs` takes them.
+        paths: as `rule.Observations` takes them.
 
     Returns:
         By variant, columns changed (in words), diverged (of the runs of DES that were made so) and

@@ -204,7 +204,7 @@ def dependence(verdicts: Iterable[Verdict], changed: pd.DataFrame) -> str:
     """One row a claim, in Markdown: its verdict, and what changes it, by departure.
 
     Args:
-        verdicts: of `judge_runs`.
+        verdicts: of `rule.judge`.
         changed: rows of `robustness_map`; those that chance hardly explains, by `SURE`, are bold.
     """
     rows = ["| Claim | Over all | Changed by |", "|---|---|---|"]

@@ -280,7 +280,7 @@ def held(
 
     Args:
         runs: of `rows.table`, of one setting.
-        paths: as `paper_claims.judge_runs` takes them.
+        paths: as `rule.Observations` takes them.
         claims: names in `EXPECTED`.
         called: the name of a layout, by default of a drawn one; `str` for A to F.
 
@@ -352,7 +352,7 @@ def picture(runs: pd.DataFrame, paths: Paths, setting: str) -> pd.DataFrame:
 
     Args:
         runs: of one setting, with all four of the paper's learners.
-        paths: as `paper_claims.judge_runs` takes them.
+        paths: as `rule.Observations` takes them.
         setting: its name.
 
     Returns:

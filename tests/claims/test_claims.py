@@ -17,11 +17,11 @@ from nmpcrl.analysis.metrics import TOUCH
 from nmpcrl.analysis.rows import experiment_of, row, table
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.bench.paired import IDLE, Ratio
-from nmpcrl.claims import own_claims, paper_claims, thresholds
+from nmpcrl.claims import own_claims, thresholds
 from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS, Measured, audit, measured
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, halves
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_CLAIMS, WIDER_THAN, kept_without_noise
-from nmpcrl.claims.rule import Observations
+from nmpcrl.claims.rule import Observations, judge
 from nmpcrl.claims.timing import WAITED, decide
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Assumption, Verdict
 from nmpcrl.study import Experiment, Records, Runs, paper, run
@@ -510,6 +510,4 @@ def test_other_borders_lie_on_both_sides_of_the_claim_s_own(claim):
 def test_all_claims_are_judged_in_order():
     runs = study()
     assert list(CLAIMS) == [f"C{i}" for i in range(1, 10)]
-    assert [v.claim for v in paper_claims.judge_runs(runs, paths(runs))] == list(BY_RUNS)
-    assert [v.claim for v in own_claims.judge_own(runs)] == list(own_claims.OWN_CLAIMS)
-    assert [v.claim for v in paper_claims.judge_times(timings())] == ["C3", "C4"]
+    assert [one.claim for one in judge(EVERY, runs, paths(runs), timings())] == list(EVERY)

@@ -6,7 +6,7 @@ import pytest
 from quiet_rows import quiet_row
 
 from nmpcrl.analysis.rows import experiment_of
-from nmpcrl.claims.paper_claims import judge_runs
+from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.robustness import (
     WHOLE,
     departure,
@@ -15,6 +15,7 @@ from nmpcrl.claims.robustness import (
     part_changes,
     robustness_map,
 )
+from nmpcrl.claims.rule import judge
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Verdict
 from nmpcrl.study import Experiment, design
 from nmpcrl.study.departures import DEPARTURES
@@ -65,7 +66,7 @@ def test_the_rows_are_the_main_table_its_parts_and_the_variants_in_order(runs, p
     asked = found.groupby("variant", sort=False).claim.agg(list)
     assert asked[WHOLE] == asked["layout A"] == asked[CLIPPED] == CLAIMS
     assert asked[HOT] == ["C1", "C5", "C6", "C7", "C9"]  # C2 is not about RDES
-    main = judge_runs(runs[runs.variant == design.MAIN_TABLE], paths)
+    main = judge(BY_RUNS, runs[runs.variant == design.MAIN_TABLE], paths)
     known = found[found.variant == WHOLE].set_index("claim")
     assert [known.outcome[one.claim] for one in main] == [one.outcome for one in main]
     assert [known.share[one.claim] for one in main] == [one.share for one in main]
