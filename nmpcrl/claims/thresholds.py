@@ -9,6 +9,7 @@ infinite where a solve failed or training was stopped.
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -124,15 +125,21 @@ def path_distance(first: Column | None, second: Column | None) -> float:
     return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))
 
 
-def diverged(study: Runs[Records], experiment: Experiment, records: Records) -> bool:
-    """Whether a run is known to have diverged: see `DIVERGED`, and `divergence` for many."""
-    frozen = {name: getattr(experiment, name) for name in CELL}
-    (arm,) = study.select(learner="frozen", **frozen).values()
-    ratio = metrics.cost_ratio(*(metrics.training_cost(one) for one in (records, arm)))
-    runs = pd.DataFrame({"stopped": [records.facts["stopped"]], "cost_ratio": [ratio]})
-    return bool(divergence(runs).fillna(False).iloc[0])
+def of_records(runs: Runs[Records]) -> pd.DataFrame:
+    """The columns that `divergence` and `instability` read, a row a run; runs with frozen arms."""
+    costs = {e: metrics.training_cost(one) for e, one in runs.items()}
+    frozen = {_cell(e): cost for e, cost in costs.items() if e.learner == "frozen"}
+    rows = {
+        e: {
+            "learner": e.learner,
+            "stopped": one.facts["stopped"],
+            "cost_ratio": metrics.cost_ratio(costs[e], frozen[_cell(e)]),
+            "late_cost_range": metrics.late_cost_range(one),
+        }
+        for e, one in runs.items()
+    }
+    return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def unstable(study: Runs[Records], experiment: Experiment, records: Records) -> bool:
-    """Whether a run is known to be unstable: see `UNSTABLE`, and `instability` for many."""
-    return diverged(study, experiment, records) or metrics.late_cost_range(records) > UNSTABLE
+def _cell(e: Experiment) -> tuple[Any, ...]:
+    return tuple(getattr(e, name) for name in CELL)

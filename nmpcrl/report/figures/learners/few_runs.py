@@ -4,13 +4,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
-from nmpcrl.claims.thresholds import diverged, unstable
+from nmpcrl.claims.thresholds import divergence, instability, of_records
 from nmpcrl.report.figures.axes import label_panel, one_entry_each
 from nmpcrl.report.figures.style import headed, page, subplots, thin
-from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Records
 from nmpcrl.study.store import Runs
 
@@ -21,7 +21,7 @@ CEILING = 1.3  # multiple of theta_init's noise-free cost at which the panels wi
 def figure_1(runs: Runs[Records]) -> Figure:
     """Figure 1 of the paper, DES against RDES, with the noise-free cost and the frozen arm."""
     figure = _curves(runs, ("DES", "RDES"))
-    counts = [f"{name} in {_runs_where(runs, name, diverged)}" for name in ("DES", "RDES")]
+    counts = [f"{name} in {_runs_where(runs, name, divergence)}" for name in ("DES", "RDES")]
     return headed(figure, f"Divergence: {', '.join(counts)} runs")
 
 
@@ -29,7 +29,7 @@ def figure_1(runs: Runs[Records]) -> Figure:
 def figure_2(runs: Runs[Records]) -> Figure:
     """Figure 2 of the paper, ES against GES, with the noise-free cost and the frozen arm."""
     figure = _curves(runs, ("ES", "GES"))
-    counts = [f"{name} in {_runs_where(runs, name, unstable)}" for name in ("ES", "GES")]
+    counts = [f"{name} in {_runs_where(runs, name, instability)}" for name in ("ES", "GES")]
     return headed(figure, f"Instability: {', '.join(counts)} runs")
 
 
@@ -60,8 +60,9 @@ def _curves(runs: Runs[Records], learners: tuple[str, ...]) -> Figure:
 
 
 def _runs_where(
-    runs: Runs[Records], learner: str, measure: Callable[[Runs[Records], Experiment, Records], bool]
+    runs: Runs[Records], learner: str, wrong: Callable[[pd.DataFrame], pd.Series]
 ) -> str:
-    """In how many of the learner's runs `measure` holds, in words."""
-    holds = [measure(runs, *pair) for pair in runs.select(learner=learner).items()]
-    return f"{sum(holds)} of {len(holds)}"
+    """How many of the learner's runs went wrong, in words."""
+    known = of_records(runs)
+    mine = wrong(known[known.learner == learner])
+    return f"{mine.sum()} of {len(mine)}"

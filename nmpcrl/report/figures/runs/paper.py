@@ -5,18 +5,18 @@ GES is red, ES blue. It names none for Figs. 3 and 4, in which RDES stays blue a
 Nowhere else in the book has a learner another look than `style.LOOKS` gives it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
-from nmpcrl.claims.thresholds import diverged, path_distance, unstable
+from nmpcrl.claims.thresholds import divergence, instability, of_records, path_distance
 from nmpcrl.report.figures.axes import below, label_panel
 from nmpcrl.report.figures.style import DECAY_TITLES, LIMIT, SUBTITLE, headed, page, subplots
 from nmpcrl.study import paper
-from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import Column, Records, Stopped
 from nmpcrl.study.store import Runs
 
@@ -26,7 +26,6 @@ FIGURE_2 = {"ES": (BLUE, "-"), "GES": (RED, "-")}
 LEARNED = {"RDES": (BLUE, "-"), "GES": (RED, "--")}  # its two methods, in Figs. 3 and 4
 
 Looks = dict[str, tuple[str, str]]  # colour and line style by learner
-Measure = Callable[[Runs[Records], Experiment, Records], bool]
 
 
 @page
@@ -36,14 +35,14 @@ def figure_1(runs: Runs[Records]) -> Figure:
     Args:
         runs: of both, and of the frozen arm, by which divergence is judged and which is not drawn.
     """
-    counts = _counted(runs, tuple(FIGURE_1), diverged)
+    counts = _counted(runs, divergence, FIGURE_1)
     return headed(_summed_costs(runs, FIGURE_1), f"Divergence: {counts}")
 
 
 @page
 def figure_2(runs: Runs[Records]) -> Figure:
     """The same for ES and GES."""
-    counts = _counted(runs, tuple(FIGURE_2), unstable)
+    counts = _counted(runs, instability, FIGURE_2)
     return headed(_summed_costs(runs, FIGURE_2), f"Instability: {counts}")
 
 
@@ -142,10 +141,11 @@ def _legend(figure: Figure, looks: Looks) -> None:
     below(figure, lines, list(looks))
 
 
-def _counted(runs: Runs[Records], learners: tuple[str, ...], measure: Measure) -> str:
-    """In how many runs of each learner a measure of `claims` holds: "DES in 1 of 4 runs, ..."."""
-    holds = {
-        learner: [measure(runs, *one) for one in runs.select(learner=learner).items()]
-        for learner in learners
-    }
-    return ", ".join(f"{name} in {sum(one)} of {len(one)} runs" for name, one in holds.items())
+def _counted(
+    runs: Runs[Records], wrong: Callable[[pd.DataFrame], pd.Series], learners: Iterable[str]
+) -> str:
+    """How many runs of each learner went wrong: "DES in 1 of 4 runs, ..."."""
+    known = of_records(runs)
+    each = wrong(known).groupby(known.learner)
+    counts = {name: each.get_group(name) for name in learners}
+    return ", ".join(f"{name} in {one.sum()} of {len(one)} runs" for name, one in counts.items())
