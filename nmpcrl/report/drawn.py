@@ -5,30 +5,46 @@ from html import escape
 
 import pandas as pd
 
-from nmpcrl.claims.thresholds import BETTER
+from nmpcrl.claims.investigation import counted
+from nmpcrl.claims.thresholds import BETTER, improves
 from nmpcrl.report.cited import Count
 from nmpcrl.report.prose import filled
 from nmpcrl.report.tables import BADGES, html_table
 from nmpcrl.report.text import listed
-from nmpcrl.studies.difficulty import PILOT
-from nmpcrl.studies.population import (
-    CLOSES_BEFORE,
-    EXPECTED,
-    PICTURE,
-    Drawn,
-    asked,
-    at_the_gap,
-    improve_by_gap,
-    succeeds,
-)
+from nmpcrl.studies.difficulty import OPEN, PILOT
+from nmpcrl.studies.population import CLAIMS, CLOSES_BEFORE, EXPECTED, PICTURE, Drawn, succeeds
 from nmpcrl.studies.predictors import auc
 from nmpcrl.study.design import LAYOUTS, MAIN_TABLE, VARIANTS
 from nmpcrl.study.drawn import name_of
+from nmpcrl.study.layouts import ARRIVED
+
+
+def at_the_gap(found: Drawn) -> pd.DataFrame:
+    """The end of each judged run of ES, and the first gap of its layout; no registered question.
+
+    `closed` is known when training has ended: a split by it depends on the outcome.
+
+    Returns:
+        Columns improves (as `thresholds.improves`), away (from the target, at the end), closes
+        (theta_c at which the gap does, `difficulty.OPEN` where there is none), gap (whether there
+        is one) and closed (whether theta_c ended above the value at which it closes).
+    """
+    es = found.main[found.main.learner == "ES"].reset_index(drop=True)
+    closes = found.layouts[PILOT][es.layout.map(name_of)].to_numpy()
+    ends = {"improves": improves(es), "away": es.distance > ARRIVED, "closes": closes}
+    gap = closes < OPEN
+    return pd.DataFrame(ends | {"gap": gap, "closed": gap & (es.theta_8 > closes)})
+
+
+def improve_by_gap(ends: pd.DataFrame) -> dict[str, tuple[int, int]]:
+    """Runs of `at_the_gap` that improve, and all, where a gap ended open, and where closed."""
+    ways = {"open": ends.gap & ~ends.closed, "closed": ends.closed}
+    return {way: counted(ends.improves[there]) for way, there in ways.items()}
 
 
 def in_short(found: Drawn) -> str:
     """Where ES fails in drawn layouts, by what is known before training, then by what is not."""
-    es, ends = succeeds(found.main), at_the_gap(found.main, found.layouts)
+    es, ends = succeeds(found.main), at_the_gap(found)
     closes = found.layouts.loc[es.index, PILOT]
     early = closes < CLOSES_BEFORE
     fails = {
@@ -61,7 +77,7 @@ def whole_or_nearest(tried: pd.DataFrame) -> str:
     """Where the paper's whole picture appears, or what comes nearest to it: a sentence in Markdown.
 
     Args:
-        tried: of `population.everywhere`, not empty.
+        tried: of `population.Drawn.tried`.
     """
     appears = tried[tried.whole == len(PICTURE)]
     if len(appears):
@@ -83,7 +99,7 @@ def _cell(layout: str, setting: str, decays: list[str]) -> str:
 
 def label(claim: str) -> str:
     """A claim of `EXPECTED`, and in few words what it says."""
-    short = asked()[claim].short.replace("\n", " ")
+    short = CLAIMS[claim].short.replace("\n", " ")
     return claim if claim.endswith("improves") else f"{claim}: {short}"
 
 

@@ -4,17 +4,15 @@ Parts, expected shares, thresholds and questions were committed before any run; 
 with that commit, whose file also says what each question measures and where yes ends. The question
 "extrapolation" is answered by `interventions`.
 
-A layout is the unit. Each has noise of its own: two seeds that no other layout has. A claim has
-several answers in a layout, one or two in each reading of the decay; it holds there if more than
-`MAJORITY` of them are yes. Shares of layouts are read by `rule.read`. Rows that are missing are
-left out: a layout answers what its runs can tell.
+The unit is a layout. Each has two seeds that no other layout has. A claim has several answers in a
+layout, one or two in each reading of the decay; it holds there if more than `MAJORITY` of them are
+yes. Shares of layouts are read by `rule.read`. A layout answers by the runs that are known.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from functools import cache, cached_property
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,16 +40,22 @@ from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import BY_RUNS, WIDER_CLAIMS
 from nmpcrl.claims.robustness import groups
 from nmpcrl.claims.rule import MAJORITY, Observations, Paths, forgiving, read
-from nmpcrl.claims.thresholds import improves, was_stopped
+from nmpcrl.claims.thresholds import was_stopped
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome
-from nmpcrl.studies.difficulty import DIFFICULTY, HORIZONS, MEASURES, OPEN, PILOT, RIVALS, STOPS
-from nmpcrl.studies.difficulty import SAME_CLOSING as SAME_CLOSING
+from nmpcrl.studies.difficulty import (
+    DIFFICULTY,
+    HORIZONS,
+    MEASURES,
+    PILOT,
+    RIVALS,
+    SAME_CLOSING,
+    STOPS,
+)
 from nmpcrl.studies.predictors import predictor_scores
 from nmpcrl.study import paper, published
 from nmpcrl.study.design import MAIN_TABLE
 from nmpcrl.study.drawn import COMPARED, JUDGE, LAYOUTS, TUNE, name_of
 from nmpcrl.study.experiment import PAPER, Experiment
-from nmpcrl.study.files import Column
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.learners import DECAYS
 from nmpcrl.study.setup import compile_ahead
@@ -84,9 +88,6 @@ class Share:
     high: float
     outcome: Outcome  # by `rule.read`
 
-    def __contains__(self, share: float) -> bool:
-        return self.low <= share <= self.high
-
 
 # C9, the claim on a learner's cost, is also asked of each learner alone; "C9" joins RDES and GES.
 EXPECTED: Mapping[str, Share] = {
@@ -105,9 +106,11 @@ EXPECTED: Mapping[str, Share] = {
     "RDES improves": Share(0.7, 0.95, PARTLY),
     "DES improves": Share(0.3, 0.8, PARTLY),
 }
-
-
-# The runs.
+_ASKED: Mapping[str, RunClaim] = {**BY_RUNS, **WIDER_CLAIMS, **OWN_CLAIMS}
+CLAIMS: Mapping[str, RunClaim] = {  # judged in each layout, by their names in `EXPECTED`
+    name: _ASKED.get(name) or replace(BY_RUNS["C9"], name=name, learners=(name.split()[0],))
+    for name in EXPECTED
+}
 
 
 def arms(learners: Iterable[str], decays: Iterable[str] = DECAYS, **fields: Any) -> dict[str, Any]:
@@ -119,28 +122,18 @@ def arms(learners: Iterable[str], decays: Iterable[str] = DECAYS, **fields: Any)
 
 
 def of_run(setting: Experiment, place: str, episodes: int, seed: int) -> Row:
-    """The row of a run, which is trained unless its summary is stored."""
+    """The row of a run, which is trained unless its summary is stored.
+
+    The positions of its last rollout, which C5 compares, are in whole millimetres.
+    """
     experiment = replace(setting, layout=LAYOUTS[place], episodes=episodes, seed=seed)
     summary = SUMMARIES.fetch(experiment)
-    known = row(summary) | (ending := trap.ending(summary))
-    found = {name: known[name] for name in (*OUTCOME, *ending)}
+    known = row(summary)
+    found: Row = {name: known[name] for name in OUTCOME} | trap.ending(summary)
     if experiment.learner in FOLLOWED:
-        found["positions"] = in_millimetres(summary.states[:, :2])
+        where = np.round(summary.states[:, :2] * MILLIMETRES)
+        found["positions"] = np.where(np.isfinite(where), where, NOWHERE).astype(int).tolist()
     return found
-
-
-def in_millimetres(positions: Column) -> list[list[int]]:
-    """Positions of a rollout in whole millimetres."""
-    where = np.where(np.isfinite(positions), np.round(positions * MILLIMETRES), NOWHERE)
-    found: list[list[int]] = where.astype(int).tolist()
-    return found
-
-
-def in_metres(positions: Any) -> Column:
-    """Positions of `in_millimetres` [m]; nan after a failed solve."""
-    where = np.array(positions, np.int16)
-    result: Column = np.where(where == NOWHERE, np.nan, where / MILLIMETRES)
-    return result
 
 
 def seed_of(place: str, k: int) -> int:
@@ -166,24 +159,12 @@ PARTS = {
 }
 
 
-# What questions are asked of.
-
-
 def experiments(table: pd.DataFrame) -> list[Experiment]:
     """The experiment of each row."""
     return [
-        replace(_setting(one), layout=LAYOUTS[one.place], seed=seed_of(one.place, one.k))
-        for one in _conditions(table)
+        replace(PARTS[part].settings(table)[arm], layout=LAYOUTS[place], seed=seed_of(place, k))
+        for part, arm, place, k in table[NAMES].itertuples(index=False, name=None)
     ]
-
-
-def _conditions(table: pd.DataFrame) -> list[Condition]:
-    return [Condition(*one) for one in table[NAMES].itertuples(index=False, name=None)]
-
-
-def _setting(one: Condition) -> Experiment:
-    found: Experiment = PARTS[one.part].settings(pd.DataFrame())[one.arm]
-    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,9 +192,23 @@ class Drawn:
 
     @cached_property
     def tried(self) -> pd.DataFrame:
-        """The cells of `everywhere`, with the published runs in layouts A to F."""
-        named = six.load()
-        return everywhere(self.runs, self.paths, named.table, named.paths)
+        """The cells of `picture` here and in layouts A to F, the nearest to the picture first.
+
+        A learner that a variant does not change has its runs of the main table in it.
+        """
+        study = six.load()
+        named, varied = study.table, study.table.variant != MAIN_TABLE
+        variants = named.variant[varied & named.learner.isin(PAPER)].unique()
+        settings = [
+            (self.main, self.paths, MAIN_TABLE),
+            (self.runs[self.runs.part == LARGER], self.paths, LARGER),
+            (named[~varied], study.paths, MAIN_TABLE),
+            *((groups(named, name)[0], study.paths, name) for name in variants),
+        ]
+        found = pd.concat([picture(*one) for one in settings if len(one[0])])
+        return found.sort_values(
+            ["whole", "answers"], ascending=False, kind="stable", ignore_index=True
+        )
 
 
 def of_table(table: pd.DataFrame) -> Drawn:
@@ -226,80 +221,55 @@ def of_table(table: pd.DataFrame) -> Drawn:
     }
     ratios = cost_ratios(rows)
     runs = pd.DataFrame([one | {"cost_ratio": ratios[e]} for e, one in rows.items()])
-    followed = zip(made, _positions(table), strict=True)
-    paths = {e: in_metres(one) for e, one in followed if e.learner in FOLLOWED}
     layouts = DIFFICULTY.table().set_index("place").rename_axis("layout")
-    columns = [*MEASURES, *STOPS.values()]
-    return Drawn(runs, paths, layouts[columns])
+    return Drawn(runs, _paths(table), layouts[[*MEASURES, *STOPS.values()]])
 
 
-def _positions(table: pd.DataFrame) -> list[Any]:
-    """The positions of each row: made here or published."""
+def _paths(table: pd.DataFrame) -> Paths:
+    """The positions [m] of rows that were made here, or the published ones; nan after a failure."""
     if "positions" in table:
-        return [*table.positions]
-    rows = (one for one in _conditions(POPULATION.table()) if _setting(one).learner in FOLLOWED)
-    known = dict(zip(rows, published.arrays("population")["positions"], strict=True))
-    return [known.get(one) for one in _conditions(table)]
+        where = np.array([*table.positions.dropna()])
+    else:
+        table, where = POPULATION.table(), published.arrays("population")["positions"]
+    followed = [e for e in experiments(table) if e.learner in FOLLOWED]
+    paths = np.where(where == NOWHERE, np.nan, where / MILLIMETRES)
+    return dict(zip(followed, paths, strict=True))
 
 
+@cache
 def load() -> Drawn:
     """The published runs.
 
     Raises:
         Damaged: they are missing, or are not those that were written.
     """
-    return _load(published.folder())
-
-
-@cache
-def _load(_: Path) -> Drawn:
     return of_table(POPULATION.table())
 
 
-# Claims.
-
-
-def asked() -> dict[str, RunClaim]:
-    """The claims that are judged in each layout, by their names in `EXPECTED`."""
-    known = {**BY_RUNS, **WIDER_CLAIMS, **OWN_CLAIMS}
-    alone = {name: name.partition(" ")[0] for name in EXPECTED if name not in known}
-    by_itself = {
-        name: replace(BY_RUNS["C9"], name=name, learners=(learner,))
-        for name, learner in alone.items()
-    }
-    return {name: (known | by_itself)[name] for name in EXPECTED}
-
-
-def held(
-    runs: pd.DataFrame,
-    paths: Paths,
-    claims: Iterable[str] = tuple(EXPECTED),
-    called: Callable[[Any], str] = name_of,
-) -> pd.DataFrame:
+def held(runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTED)) -> pd.DataFrame:
     """Where each claim holds, a row a claim and layout with its answers.
 
     Args:
         runs: of `rows.table`, of one setting.
         paths: as `rule.Observations` takes them.
         claims: names in `EXPECTED`.
-        called: the name of a layout, by default of a drawn one; `str` for A to F.
 
     Returns:
         Columns claim, layout (its name), yes, of (answers), holds and weaker (whether the weaker
         question holds there, if the claim has one; else as holds).
     """
-    rows, known, there = [], asked(), {*runs.learner}
+    rows, there = [], {*runs.learner}
     for name in claims:
-        if not {*known[name].learners} <= there:
+        if not {*CLAIMS[name].learners} <= there:
             continue
         strict, weaker = (
             one.dropna().astype(bool).groupby(level="layout", sort=False)
-            for one in known[name].asked(Observations(runs, paths))
+            for one in CLAIMS[name].asked(Observations(runs, paths))
         )
         counts = strict.agg(["sum", "size"]).join(weaker.mean().rename("weaker"))
         for layout, (yes, of, mild) in counts.iterrows():
-            held_there = (yes / of > MAJORITY, mild > MAJORITY)
-            rows.append((name, called(layout), int(yes), int(of), *held_there))
+            holds = (yes / of > MAJORITY, mild > MAJORITY)
+            rows.append((name, name_of(layout), int(yes), int(of), *holds))
     return pd.DataFrame(rows, columns=["claim", "layout", "yes", "of", "holds", "weaker"])
 
 
@@ -316,13 +286,12 @@ def shares(where: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     for name, group in where.groupby("claim", sort=False):
-        holding, layouts = int(group.holds.sum()), len(group)
-        found, expected = rate(holding, layouts), EXPECTED[str(name)]
-        numbers = (found.value, found.low, found.high)
-        weaker = int(group.weaker.sum())
-        outcome = forgiving(read(holding, layouts), read(weaker, layouts))
-        said = (outcome, weaker, expected.outcome, found.value in expected)
-        rows.append((name, holding, layouts, *numbers, *said))
+        of, expected = len(group), EXPECTED[str(name)]
+        holding, weaker = int(group.holds.sum()), int(group.weaker.sum())
+        found, outcome = rate(holding, of), forgiving(read(holding, of), read(weaker, of))
+        within = expected.low <= found.value <= expected.high
+        counts = name, holding, of, *astuple(found)
+        rows.append((*counts, outcome, weaker, expected.outcome, within))
     names = ["claim", "holding", "layouts", "share", "low", "high"]
     return pd.DataFrame(rows, columns=[*names, "outcome", "weaker", "expected", "within"])
 
@@ -344,11 +313,8 @@ def _holding(claim: str) -> Callable[[Drawn], Answer]:
     return answer
 
 
-# The whole picture. A cell is a layout and a reading of the decay in a setting.
-
-
 def picture(runs: pd.DataFrame, paths: Paths, setting: str) -> pd.DataFrame:
-    """The part of the paper's picture that holds in each layout and reading.
+    """The part of the paper's picture that holds in each cell of layout and reading.
 
     Args:
         runs: of one setting, with all four of the paper's learners.
@@ -359,45 +325,20 @@ def picture(runs: pd.DataFrame, paths: Paths, setting: str) -> pd.DataFrame:
         Columns layout and decay, of each of `PICTURE` the share of yes, whole (how many claims have
         nothing but yes), answers (the mean share) and setting; cells with all four answers.
     """
-    known, columns = asked(), {}
-    for name in PICTURE:
-        claim = known[name]
-        answers = claim.yes(claim.measure(runs, paths), claim.threshold).dropna().astype(float)
-        columns[name] = answers.groupby(level=["layout", "decay"]).mean()
-    found = pd.DataFrame(columns).dropna()
+    answers = {name: BY_RUNS[name].answers(BY_RUNS[name].measure(runs, paths)) for name in PICTURE}
+    cells = {name: yes.groupby(level=["layout", "decay"]).mean() for name, yes in answers.items()}
+    found = pd.DataFrame(cells).dropna()
     found["whole"] = (found[[*PICTURE]] == 1).sum(axis=1)
     found["answers"] = found[[*PICTURE]].mean(axis=1)
     return found.reset_index().assign(setting=setting)
 
 
-def everywhere(
-    drawn: pd.DataFrame, drawn_paths: Paths, named: pd.DataFrame, named_paths: Paths
-) -> pd.DataFrame:
-    """The cells of `picture` in drawn layouts and in A to F, the nearest to the picture first.
-
-    A learner that a variant does not change has its runs of the main table in it.
-    """
-    settings = {MAIN_TABLE: drawn[drawn.part.isin(JUDGED)], LARGER: drawn[drawn.part == LARGER]}
-    found = [picture(runs, drawn_paths, one) for one, runs in settings.items() if len(runs)]
-    found.append(picture(named[named.variant == MAIN_TABLE], named_paths, MAIN_TABLE))
-    varied = named.variant[named.learner.isin(PAPER) & (named.variant != MAIN_TABLE)].unique()
-    found += [picture(groups(named, name)[0], named_paths, str(name)) for name in varied]
-    return pd.concat(found).sort_values(
-        ["whole", "answers"], ascending=False, kind="stable", ignore_index=True
-    )
-
-
 def whole_picture(tried: pd.DataFrame) -> Answer:
-    """The answer of the cells of `everywhere`."""
-    if tried.empty:
-        return Answer(UNDECIDABLE)
+    """The answer of the cells of `Drawn.tried`."""
     found = int((tried.whole == len(PICTURE)).sum())
     numbers = {"tried": float(len(tried)), "most": float(tried.whole.max())}
     beside, said = {"settings": (found, len(tried))}, "found by search" if found else ""
     return Answer(REPRODUCED if found else NOT, numbers=numbers, beside=beside, said=said)
-
-
-# Other questions.
 
 
 def closing_gaps(layouts: pd.DataFrame, judged: pd.Series) -> Answer:
@@ -413,21 +354,16 @@ def closing_gaps(layouts: pd.DataFrame, judged: pd.Series) -> Answer:
     return Answer(worst[0] if worst else both, counts)
 
 
-def predictors(scores: pd.DataFrame) -> Answer:
-    """The answer of `predictor_scores`."""
-    ahead = [scores.ahead[name] for name in RIVALS]
-    lows, highs = [one.low for one in ahead], [one.high for one in ahead]
-    outcome = above(min(lows), min(highs)) if np.isfinite(lows).all() else UNDECIDABLE
-    numbers = {name: one.value for name, one in zip(RIVALS, ahead, strict=True)}
-    beside = {"other measures surely behind": (sum(low > 0 for low in lows), len(lows))}
-    return Answer(outcome, numbers=numbers, beside=beside)
-
-
-def _predictors(drawn: Drawn) -> Answer:
+def predictors(drawn: Drawn) -> Answer:
+    """The answer of `predictor_scores` of whether ES improves."""
     tuned, judged = succeeds(drawn.runs[drawn.runs.part == "tune"]), succeeds(drawn.main)
     if tuned.empty or judged.empty:
         return Answer(UNDECIDABLE)
-    return predictors(predictor_scores(drawn.layouts, tuned, judged))
+    ahead = predictor_scores(drawn.layouts, tuned, judged).ahead[[*RIVALS]]
+    lows, highs = ([getattr(one, end) for one in ahead] for end in ("low", "high"))
+    outcome = above(min(lows), min(highs)) if np.isfinite(lows).all() else UNDECIDABLE
+    beside = {"other measures surely behind": (sum(low > 0 for low in lows), len(lows))}
+    return Answer(outcome, numbers={n: one.value for n, one in ahead.items()}, beside=beside)
 
 
 def horizon(runs: pd.DataFrame) -> Answer:
@@ -448,52 +384,15 @@ def gaps_and_horizon(stops: pd.DataFrame) -> Answer:
     return share(apart <= SAME_CLOSING + 1e-9, "layouts the same")
 
 
-def _stands(away: pd.DataFrame) -> pd.Series:
-    return (away.moved < STANDING) & (away.worth < 1)
+def caught(runs: pd.DataFrame, yes: str) -> Answer:
+    """The share of layouts in which `yes`, an expression in columns, holds of all runs of ES.
 
-
-def _gets_worse(away: pd.DataFrame) -> pd.Series:
-    return (away.delta_last < away.delta_first) & (away.final_cost > away.initial_cost)
-
-
-def caught(runs: pd.DataFrame, yes: Callable[[pd.DataFrame], pd.Series]) -> Answer:
-    """The share of layouts in which all runs of ES that do not arrive say yes."""
+    Runs that arrive are not asked.
+    """
     away = runs[(runs.learner == "ES") & (runs.distance > ARRIVED)]
-    answers = yes(away)
+    answers = away.eval(yes)
     count = counted(answers.groupby(away.layout).all())
     return Answer(read(*count), {"layouts": count, "runs": counted(answers)})
-
-
-def at_the_gap(runs: pd.DataFrame, layouts: pd.DataFrame) -> pd.DataFrame:
-    """The end of each run of ES, and the first gap of its layout; no registered question.
-
-    `closed` is known when training has ended: a split by it depends on the outcome.
-
-    Args:
-        runs: of `rows.table`.
-        layouts: columns `MEASURES`, a row a layout.
-
-    Returns:
-        Columns improves (as `thresholds.improves`), away (from the target, at the end), closes
-        (theta_c at which the gap does, `difficulty.OPEN` where there is none), gap (whether there
-        is one) and closed (whether theta_c ended above the value at which it closes).
-    """
-    es = runs[runs.learner == "ES"].reset_index(drop=True)
-    closes = layouts[PILOT][es.layout.map(name_of)].to_numpy()
-    gap = closes < OPEN
-    found = {"improves": improves(es), "away": es.distance > ARRIVED, "closes": closes, "gap": gap}
-    return pd.DataFrame(found | {"closed": gap & (es.theta_8 > closes)})
-
-
-def improve_by_gap(ends: pd.DataFrame) -> dict[str, tuple[int, int]]:
-    """Runs that improve, and all runs, in layouts with a gap, by whether it ended open or closed.
-
-    Args:
-        ends: of `at_the_gap`.
-    """
-    there = ends[ends.gap]
-    ways = {"open": ~there.closed, "closed": there.closed}
-    return {way: counted(there.improves[some]) for way, some in ways.items()}
 
 
 def early_overshoot(runs: pd.DataFrame) -> Answer:
@@ -534,7 +433,7 @@ QUESTIONS: Sequence[Question] = (
              f" {CLOSES_BEFORE}."),
     Question("predictors",
              "Does the closing of the first gap tell better than each rival where ES succeeds?",
-             PARTLY, _predictors),
+             PARTLY, predictors),
     Question("horizon",
              "Does ES still fail with N = 20 and N = 40 where it fails with N = 10?",
              REPRODUCED, lambda drawn: horizon(drawn.runs),
@@ -546,12 +445,14 @@ QUESTIONS: Sequence[Question] = (
              "A gap closes at the same theta_c whatever the horizon."),
     Question("trap",
              "Is that so where ES ends without having arrived?",
-             REPRODUCED, lambda drawn: caught(drawn.main, _stands),
+             REPRODUCED, lambda drawn: caught(drawn.main, f"moved < {STANDING} and worth < 1"),
              "The robot stands, and the plan's value is below l / (1 - gamma): so delta > 0 and"
              " theta_c grows."),
     Question("accurate and worse",
              "Does |delta| fall while the noise-free cost rises?",
-             REPRODUCED, lambda drawn: caught(drawn.main, _gets_worse),
+             REPRODUCED, lambda drawn: caught(
+                 drawn.main, "delta_last < delta_first and final_cost > initial_cost"
+             ),
              "In the trap the value gets more accurate while the policy gets worse."),
     Question("cliff",
              f"Does theta_c raised by {CLIFF_RAISED:.0%} cost at least {CLIFF_COST:.0%}?",

@@ -35,16 +35,12 @@ COMPARED = tuple(f"J{i:03}" for i in sorted(CLOSING + OPEN))  # with other horiz
 
 
 def name_of(layout: str | Centres) -> str:
-    """The name of a drawn layout, given as a field of an `Experiment`.
-
-    Raises:
-        KeyError: it is none of `LAYOUTS`.
-    """
-    return _names()[layout]
+    """The name of a layout, given as a field of an `Experiment`; A to F are names."""
+    return _names().get(layout, layout)
 
 
 @cache
-def _names() -> dict[Any, str]:
+def _names() -> dict[Any, Any]:
     return {Experiment(layout=centres).layout: name for name, centres in LAYOUTS.items()}
 
 

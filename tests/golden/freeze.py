@@ -36,6 +36,7 @@ from nmpcrl.claims import (
 )
 from nmpcrl.claims.verdict import REPRODUCED
 from nmpcrl.report import baselines, whole_study
+from nmpcrl.report import drawn as drawn_report
 from nmpcrl.report import worlds as world_report
 from nmpcrl.studies import agents, interventions, other_problems, population, remedies, worlds
 from nmpcrl.studies.predictors import predictor_scores
@@ -262,7 +263,7 @@ def shares_in_A_to_F() -> Any:
     main, names = study().main, list(population.EXPECTED)
     runs = study().table[study().table.variant == design.MAIN_TABLE]
     assert len(main) == len(runs)
-    return population.shares(population.held(runs, study().paths, names, str)).set_index("claim")
+    return population.shares(population.held(runs, study().paths, names)).set_index("claim")
 
 
 @entry("population")
@@ -345,8 +346,8 @@ def successes() -> Any:
 
 @entry("population")
 def at_the_gap() -> Any:
-    ends = population.at_the_gap(drawn().main, drawn().layouts)
-    return {"runs": table(ends), "improve": population.improve_by_gap(ends)}
+    ends = drawn_report.at_the_gap(drawn())
+    return {"runs": table(ends), "improve": drawn_report.improve_by_gap(ends)}
 
 
 @entry("population")
