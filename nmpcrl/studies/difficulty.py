@@ -12,8 +12,6 @@ its shortest path, and averages over the path. Here
 - every direction ends at a wall, so that none has to be left out.
 """
 
-from dataclasses import asdict, dataclass, fields
-
 import numpy as np
 
 from nmpcrl import Matrix, Vector
@@ -38,42 +36,36 @@ RAISED_TO = 0.5  # the end of that grid
 GRID = np.arange(0, RAISED_TO + 1e-9, SAME_CLOSING)
 STOPS = {n: f"stops_{n}" for n in (paper.HORIZON, *HORIZONS)}  # columns by horizon
 
-
-@dataclass(frozen=True)
-class Difficulty:
-    """Measures of one layout: a higher one means easier, or harder where a comment says so."""
-
-    closest: float  # mean distance [m] to the closest obstacle or wall
-    visibility: float  # mean distance [m] to what is seen in `SIGHTS` directions
-    dispersion: float  # changes between blocked and free around a point; the higher, the harder
-    dimension: float  # mean of the least width [m] across a point, along 4 lines
-    tortuosity: float  # length of the path over that of its chord; the higher, the harder
-    cost: float  # without noise, of theta_init; the higher, the harder
-    slope: float  # of the cost in theta_c; the higher, the harder
-    overshoot: float  # alpha ||phi||^2 in the start; the higher, the harder
-    closes: float  # theta_c at which the first gap of the path closes, at most `OPEN`
-
-
+MEASURES = (  # a higher one means easier, or harder where a comment says so
+    "closest",  # mean distance [m] to the closest obstacle or wall
+    "visibility",  # mean distance [m] to what is seen in `SIGHTS` directions
+    "dispersion",  # changes between blocked and free around a point; the higher, the harder
+    "dimension",  # mean of the least width [m] across a point, along 4 lines
+    "tortuosity",  # length of the path over that of its chord; the higher, the harder
+    "cost",  # without noise, of theta_init; the higher, the harder
+    "slope",  # of the cost in theta_c; the higher, the harder
+    "overshoot",  # alpha ||phi||^2 in the start; the higher, the harder
+    "closes",  # theta_c at which the first gap of the path closes, at most `OPEN`
+)
 PILOT = "closes"  # predicted every failure of the pilot
-MEASURES = tuple(one.name for one in fields(Difficulty))
 RIVALS = tuple(name for name in MEASURES if name != PILOT)
 
 
-def measure(centres: Centres) -> Difficulty:
-    """All measures of a layout, from two rollouts and one solve."""
+def measure(centres: Centres) -> dict[str, float]:
+    """`MEASURES` of a layout, from two rollouts and one solve."""
     task = paper.task(centres)
     controller, theta = Persistent(paper.controller(task)), np.array(paper.THETA_INIT)
     first = evaluate(controller, theta, paper.STEPS)
-    raised = theta + RAISED * np.eye(len(theta))[-1]
+    raised = evaluate(controller, theta + RAISED * np.eye(len(theta))[-1], paper.STEPS)
     phi = controller.solve(task.start, theta).features
-    path = until_arrival(first.states, task)
-    return Difficulty(
-        **barn(path, task),
-        cost=first.cost,
-        slope=(evaluate(controller, raised, paper.STEPS).cost - first.cost) / RAISED,
-        overshoot=float(paper.ALPHA * phi @ phi),
-        closes=min(closes_at(task, path), OPEN),
-    )
+    there = np.flatnonzero(np.linalg.norm(first.states - task.target, axis=1) <= ARRIVED)
+    path = first.states[: there[0] + 1 if there.size else None, :2]
+    return barn(path, task) | {
+        "cost": first.cost,
+        "slope": (raised.cost - first.cost) / RAISED,
+        "overshoot": float(paper.ALPHA * phi @ phi),
+        "closes": min(closes_at(task, path), OPEN),
+    }
 
 
 def barn(path: Matrix, task: Task) -> dict[str, float]:
@@ -81,12 +73,13 @@ def barn(path: Matrix, task: Task) -> dict[str, float]:
     points = spaced(path)
     across = sight(points, SIGHTS, task)
     blocked = sight(points, SECTORS, task) <= REACH
+    length = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
     return {
         "closest": float(clearance(points, task).mean()),
         "visibility": float(across.mean()),
         "dispersion": float((blocked != np.roll(blocked, 1, axis=1)).sum(axis=1).mean()),
         "dimension": float((across[:, : SIGHTS // 2] + across[:, SIGHTS // 2 :]).min(1).mean()),
-        "tortuosity": _length(path) / float(np.linalg.norm(path[-1] - path[0])),
+        "tortuosity": float(length / np.linalg.norm(path[-1] - path[0])),
     }
 
 
@@ -104,12 +97,6 @@ def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
     return np.nan
 
 
-def until_arrival(states: Matrix, task: Task) -> Matrix:
-    """The positions of a trajectory up to its arrival; all without an arrival."""
-    there = np.flatnonzero(np.linalg.norm(states - task.target, axis=1) <= ARRIVED)
-    return states[: there[0] + 1 if there.size else None, :2]
-
-
 def spaced(path: Matrix) -> Matrix:
     """Points of a path that lie `SPACING` apart along it, from its first on."""
     along = np.r_[0.0, np.linalg.norm(np.diff(path, axis=0), axis=1).cumsum()]
@@ -119,7 +106,8 @@ def spaced(path: Matrix) -> Matrix:
 
 def clearance(points: Matrix, task: Task) -> Vector:
     """Distance [m] of each point, shape (k, 2), to the closest disc or wall; 0 within a disc."""
-    away = np.linalg.norm(points[:, None] - _centres(task), axis=-1) - _radius(task)
+    centres, radius = _discs(task)
+    away = np.linalg.norm(points[:, None] - centres, axis=-1) - radius
     walls = np.concatenate([points - task.lower[:2], task.upper[:2] - points], axis=1)
     result: Vector = np.concatenate([away, walls], axis=1).min(axis=1).clip(min=0)
     return result
@@ -132,46 +120,34 @@ def sight(points: Matrix, directions: int, task: Task) -> Matrix:
     """
     angle = np.arange(directions) * 2 * np.pi / directions
     ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    to = _centres(task) - points[:, None]  # (k, discs, 2)
-    along = np.einsum("kdi,ri->krd", to, ray)
-    inside = _radius(task) ** 2 - (to**2).sum(-1)[:, None] + along**2
+    centres, radius = _discs(task)
+    to = centres - points[:, None]  # (k, discs, 2)
+    away, along = (to**2).sum(-1)[:, None], np.einsum("kdi,ri->krd", to, ray)
+    inside = radius**2 - away + along**2
     hit = along - np.sqrt(inside.clip(min=0))
-    within = (to**2).sum(-1)[:, None] <= _radius(task) ** 2
-    discs = np.where(within, 0.0, np.where((inside >= 0) & (hit >= 0), hit, np.inf))
-    result: Matrix = np.minimum(discs.min(axis=-1, initial=np.inf), _to_walls(points, ray, task))
-    return result
-
-
-def _to_walls(points: Matrix, ray: Matrix, task: Task) -> Matrix:
-    """Distance [m] to the wall that each ray meets first, shape (points, rays)."""
-    limit = np.where(ray > 0, task.upper[:2], task.lower[:2])  # (rays, 2)
+    discs = np.where((inside >= 0) & (hit >= 0), hit, np.inf)
+    discs = np.where(away <= radius**2, 0.0, discs).min(axis=-1, initial=np.inf)
+    limit = np.where(ray > 0, task.upper[:2], task.lower[:2])  # the walls ahead, (directions, 2)
     with np.errstate(divide="ignore", invalid="ignore"):
         far = (limit - points[:, None]) / ray
-    result: Matrix = np.where(np.abs(ray) > 1e-12, far, np.inf).min(axis=-1).clip(min=0)
+    walls = np.where(np.abs(ray) > 1e-12, far, np.inf).min(axis=-1).clip(min=0)
+    result: Matrix = np.minimum(discs, walls)
     return result
 
 
-def _centres(task: Task) -> Matrix:
-    return np.stack(task.discs[:2], axis=1)
-
-
-def _radius(task: Task) -> float:
-    """The radius of the discs in the configuration space at theta_c = 0 [m]."""
-    return float(task.discs[2].max() / 2)
-
-
-def _length(path: Matrix) -> float:
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+def _discs(task: Task) -> tuple[Matrix, float]:
+    """Centres of the discs, shape (discs, 2), and their radius [m] at theta_c = 0."""
+    x, y, clearance = task.discs
+    return np.stack([x, y], axis=1), float(clearance.max() / 2)
 
 
 def of_layout(_: str, place: str, *unused: int) -> Row:
     """The row of a layout; theta_c at which rollouts stop arriving only in compared layouts."""
     centres, known = LAYOUTS[place], place in COMPARED
-    stops = {
+    return measure(centres) | {
         column: stops_arriving(centres, horizon, GRID) if known else np.nan
         for horizon, column in STOPS.items()
     }
-    return asdict(measure(centres)) | stops
 
 
 DIFFICULTY = Investigation(

@@ -27,7 +27,6 @@ from nmpcrl.claims.by_runs import RunClaim
 from nmpcrl.claims.investigation import (
     NAMES,
     Answer,
-    Condition,
     Investigation,
     Part,
     Question,
@@ -143,10 +142,6 @@ def seed_of(place: str, k: int) -> int:
 
 def _part(arms: Mapping[str, Any], places: Iterable[str], begin: int = 0) -> Part:
     return Part(of_run, arms, tuple(places), paper.EPISODES, begin=begin)
-
-
-def _compile_ahead(missing: Iterable[tuple[Condition, Any]]) -> None:
-    compile_ahead([replace(it, layout=LAYOUTS[one.place]) for one, it in missing])
 
 
 PARTS = {
@@ -349,9 +344,8 @@ def closing_gaps(layouts: pd.DataFrame, judged: pd.Series) -> Answer:
         "layouts succeed elsewhere": counted(judged[~closes]),
     }
     outcomes = {read(*count) for count in counts.values()}
-    worst = [one for one in (NOT, UNDECIDABLE) if one in outcomes]
-    both = REPRODUCED if outcomes == {REPRODUCED} else PARTLY
-    return Answer(worst[0] if worst else both, counts)
+    worst = next(one for one in (NOT, UNDECIDABLE, PARTLY, REPRODUCED) if one in outcomes)
+    return Answer(worst, counts)
 
 
 def predictors(drawn: Drawn) -> Answer:
@@ -368,13 +362,12 @@ def predictors(drawn: Drawn) -> Answer:
 
 def horizon(runs: pd.DataFrame) -> Answer:
     """The answer of the runs of all parts: the first seeds, with each horizon."""
-    longer = {n: runs[runs.part == f"N = {n}"] for n in HORIZONS}
-    first = {*pd.concat(longer.values()).seed}
-    base = succeeds(runs[(runs.part == "judge") & runs.seed.isin(first)])
-    ends = [succeeds(one) for one in longer.values()]
-    asked_of = [name for name in base.index[~base] if all(name in one.index for one in ends)]
-    yes = pd.Series([not any(one[name] for one in ends) for name in asked_of], dtype=bool)
-    return share(yes, "layouts still fail")
+    parts = {n: runs[runs.part == f"N = {n}"] for n in HORIZONS}
+    first = {*pd.concat(parts.values()).seed}
+    parts[paper.HORIZON] = runs[(runs.part == "judge") & runs.seed.isin(first)]
+    ends = pd.DataFrame({n: succeeds(one) for n, one in parts.items()}).dropna().astype(bool)
+    failing = ends[~ends[paper.HORIZON]]
+    return share(~failing[[*HORIZONS]].any(axis=1), "layouts still fail")
 
 
 def gaps_and_horizon(stops: pd.DataFrame) -> Answer:
@@ -400,13 +393,11 @@ def early_overshoot(runs: pd.DataFrame) -> Answer:
     rdes = runs.query("learner == 'RDES' and decay == 'episode'")
     stopped = rdes[was_stopped(rdes)]
     early = stopped.steps_done < DEAD_BY * stopped.steps
-    answers = {"layouts overshot": stopped.over > 0, "layouts early": early}
-    counts = {
-        name: counted(yes.groupby(stopped.layout).mean() > MAJORITY)
-        for name, yes in answers.items()
-    }
+    signs = pd.DataFrame({"layouts overshot": stopped.over > 0, "layouts early": early})
+    most = signs.groupby(stopped.layout).mean() > MAJORITY
+    counts = {str(name): counted(most[name]) for name in most}
     beside = {"runs stopped": (len(stopped), len(rdes))}
-    if not len(stopped):
+    if stopped.empty:
         return Answer(UNDECIDABLE, counts, beside=beside)
     rates = [rate(*count) for count in counts.values()]
     ends = min(one.low for one in rates), min(one.high for one in rates)
@@ -416,8 +407,7 @@ def early_overshoot(runs: pd.DataFrame) -> Answer:
 def raised() -> pd.Series:
     """The share by which the cost of the best theta rises with theta_c, by layout from A to F."""
     best = {search.layout: np.array(one.theta) for search, one in six.load().searches.items()}
-    each = {name: trap.raised_cost(name, best[name], CLIFF_RAISED) for name in sorted(best)}
-    return pd.Series(each, dtype=float)
+    return pd.Series({n: trap.raised_cost(n, best[n], CLIFF_RAISED) for n in sorted(best)})
 
 
 def cliff(raised: pd.Series) -> Answer:
@@ -483,5 +473,7 @@ POPULATION = Investigation(
     digits=6,
     arrays=("positions",),
     evidence=of_table,
-    prepare=_compile_ahead,
+    prepare=lambda missing: compile_ahead(
+        [replace(it, layout=LAYOUTS[one.place]) for one, it in missing]
+    ),
 )

@@ -5,7 +5,6 @@ the area under the ROC curve, which asks whether successes rank above failures, 
 score, which asks for the probabilities themselves. The bootstrap draws layouts, never runs.
 """
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -21,48 +20,33 @@ RIDGE = 1.0  # penalty of the logistic regression, of the squared slope of the s
 RESAMPLES = 2000  # of the bootstrap over layouts
 
 
-@dataclass(frozen=True)
-class Logistic:
-    """P(success) = 1 / (1 + exp(-(intercept + slope z))), z being the standardised measure."""
+def predicted(measure: Vector, success: Vector, asked: Vector) -> tuple[float, Vector]:
+    """The slope of a logistic regression, and P(success) = 1 / (1 + exp(-(intercept + slope z))).
 
-    centre: float
-    scale: float
-    intercept: float
-    slope: float
-
-    def __call__(self, measure: Vector) -> Vector:
-        """The probability of success in each layout, shape (layouts,)."""
-        z = (np.asarray(measure, float) - self.centre) / self.scale
-        result: Vector = 1 / (1 + np.exp(-(self.intercept + self.slope * z)))
-        return result
-
-
-def fit(measure: Vector, success: Vector, ridge: float = RIDGE) -> Logistic:
-    """Least log loss with `ridge` times half of the squared slope added, which keeps it finite.
+    z is the measure, standardised. The log loss is least with `RIDGE` times half of the squared
+    slope added, which keeps the slope finite where a measure separates successes from failures.
 
     Args:
-        measure: one a layout, finite.
+        measure: one a layout, for the fit.
         success: whether learning succeeded there.
-        ridge: above 0.
+        asked: the measure in the layouts of the probabilities.
 
     Raises:
         ValueError: a measure is not finite.
     """
-    x, y = np.asarray(measure, float), np.asarray(success, bool)
+    x, sign = np.asarray(measure, float), np.where(success, 1.0, -1.0)
     if not np.isfinite(x).all():
         raise ValueError(f"{(~np.isfinite(x)).sum()} of {x.size} measures are not finite")
-    centre, scale = float(x.mean()), float(x.std()) or 1.0
-    z, sign = (x - centre) / scale, np.where(y, 1.0, -1.0)
+    centre, scale = x.mean(), x.std() or 1.0
+    z = (x - centre) / scale
 
     def loss(b: Vector) -> float:
-        return float(np.logaddexp(0, -sign * (b[0] + b[1] * z)).sum() + ridge * b[1] ** 2 / 2)
+        return float(np.logaddexp(0, -sign * (b[0] + b[1] * z)).sum() + RIDGE * b[1] ** 2 / 2)
 
-    share = (y.sum() + 0.5) / (y.size + 1)  # finite where all succeed, too
+    share = ((sign > 0).sum() + 0.5) / (x.size + 1)  # finite where all succeed, too
     start = np.array([np.log(share / (1 - share)), 0.0])
-    if y.all() or not y.any():
-        return Logistic(centre, scale, float(start[0]), 0.0)
-    found = optimize.minimize(loss, start, method="BFGS").x
-    return Logistic(centre, scale, float(found[0]), float(found[1]))
+    intercept, slope = optimize.minimize(loss, start, method="BFGS").x
+    return float(slope), 1 / (1 + np.exp(-(intercept + slope * (asked - centre) / scale)))
 
 
 def auc(score: Vector, success: Vector) -> Any:
@@ -94,25 +78,19 @@ def predictor_scores(difficulty: pd.DataFrame, tuned: pd.Series, judged: pd.Seri
         A row a measure: slope (of the standardised measure), auc and brier, each an `Estimate`,
         and ahead, by how much the area of `PILOT` is larger (an `Estimate`; 0 for itself).
     """
-    y = judged.to_numpy(bool)
-    fits = {
-        name: fit(difficulty[name][tuned.index].to_numpy(float), tuned.to_numpy(bool))
+    known, asked, y = difficulty.loc[tuned.index], difficulty.loc[judged.index], judged.to_numpy()
+    drawn = partial(over_layouts, resamples=RESAMPLES)
+    found = {
+        name: predicted(known[name].to_numpy(), tuned.to_numpy(), asked[name].to_numpy())
         for name in MEASURES
     }
-    probability = {name: one(difficulty.loc[judged.index, name]) for name, one in fits.items()}
-    drawn = partial(over_layouts, resamples=RESAMPLES)
-    return pd.DataFrame(
-        {
-            name: {
-                "slope": fits[name].slope,
-                "auc": drawn(auc, probability[name], y),
-                "brier": drawn(brier, probability[name], y),
-                "ahead": drawn(_ahead, probability[PILOT], probability[name], y),
-            }
-            for name in MEASURES
+    rows = {
+        name: {
+            "slope": slope,
+            "auc": drawn(auc, p, y),
+            "brier": drawn(brier, p, y),
+            "ahead": drawn(lambda pilot, p, y: auc(pilot, y) - auc(p, y), found[PILOT][1], p, y),
         }
-    ).T
-
-
-def _ahead(first: Vector, second: Vector, success: Vector) -> Any:
-    return auc(first, success) - auc(second, success)
+        for name, (slope, p) in found.items()
+    }
+    return pd.DataFrame.from_dict(rows, orient="index")

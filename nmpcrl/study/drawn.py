@@ -36,11 +36,11 @@ COMPARED = tuple(f"J{i:03}" for i in sorted(CLOSING + OPEN))  # with other horiz
 
 def name_of(layout: str | Centres) -> str:
     """The name of a layout, given as a field of an `Experiment`; A to F are names."""
-    return _names().get(layout, layout)
+    return _names().get(layout) or str(layout)
 
 
 @cache
-def _names() -> dict[Any, Any]:
+def _names() -> dict[Any, str]:
     return {Experiment(layout=centres).layout: name for name, centres in LAYOUTS.items()}
 
 

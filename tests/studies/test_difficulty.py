@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from nmpcrl.studies.difficulty import barn, clearance, measure, sight, spaced, stops_arriving
-from nmpcrl.studies.drawing import screen
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import COMPARED, JUDGE
+from nmpcrl.study.layouts import screen
 
 ONE = ((3.0, 3.0),)  # in the middle of the box, [-3, 9]^2; its disc has a radius of 1.25
 TASK = paper.task(ONE)
@@ -64,10 +64,10 @@ def test_tortuosity_of_a_half_circle_is_half_of_pi():
 
 def test_the_first_gap_of_e_closes_before_that_of_d_as_their_rollouts_show():
     found = {name: measure(paper.LAYOUTS[name]) for name in "DE"}
-    assert 0.15 < found["E"].closes < 0.2 < found["D"].closes < 0.25
-    assert found["E"].cost == pytest.approx(4369.70, abs=0.01)
-    assert 0 < found["E"].overshoot < 2
-    assert np.isfinite([*vars(found["D"]).values()]).all()
+    assert 0.15 < found["E"]["closes"] < 0.2 < found["D"]["closes"] < 0.25
+    assert found["E"]["cost"] == pytest.approx(4369.70, abs=0.01)
+    assert 0 < found["E"]["overshoot"] < 2
+    assert np.isfinite([*found["D"].values()]).all()
     for horizon in (10, 20):
         grid = np.array([0.0, 0.15, 0.2, 0.5])
         assert stops_arriving(paper.LAYOUTS["E"], horizon, grid) == 0.2
