@@ -1,7 +1,16 @@
-"""Layouts and scenarios that `studies.drawing` drew before any run.
+"""Layouts and scenarios that were drawn and screened before any run.
 
 Step sizes and thresholds are chosen in `TUNE`, the 60 layouts T01 to T60, and judged in `JUDGE`,
-the 120 layouts J001 to J120. Scenarios with moving obstacles are M01 to M40.
+the 120 layouts J001 to J120. They are the first that a sampler drew with seed 24 and
+`layouts.screen` accepted; a test draws them again.
+
+Scenarios with moving obstacles, M01 to M40, are the first that were drawn with seed 25 and in which
+
+1. a robot that sees no obstacle gets into one;
+2. the start is clear in the first second, and the target in the last five: Upsilon = 0;
+3. without noise, the NMPC with theta_init that knows the motion is at the target at the end.
+
+`nmpcrl/studies/drawing.py` of commit 6386628 draws the scenarios again.
 """
 
 import json

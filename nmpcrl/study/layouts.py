@@ -8,8 +8,8 @@ A layout may be used if
 
 A layout is *closing* if theta_c = 0.35, which learning may approach (departure N), closes a gap of
 this first rollout, and *open* otherwise. A was the first layout tried; the others are the first
-that a seeded sampler drew and `screen` accepted (`nmpcrl.studies.drawing`), so that no layout was
-selected for its results.
+that a seeded sampler drew and `screen` accepted, so that no layout was selected for its results; a
+test draws them again.
 """
 
 from collections.abc import Sequence

@@ -38,7 +38,7 @@ BOXES = ("hard", "soft", "printed")  # departures A and M
 
 LAYOUTS: dict[str, Centres] = {  # of the four obstacles [m]; the paper shows none  # departure B
     "A": ((0.5, 2.2), (3.0, 0.5), (5.5, 2.8), (7.0, 0.3)),
-    # The others are drawn by `studies.drawing.named`; the gaps of the last three close.
+    # The others were drawn (`study.layouts`); the gaps of the last three close.
     "B": ((-0.3, 3.2), (2.9, 4.3), (3.2, 0.5), (6.9, 0.8)),
     "C": ((-1.1, 3.3), (0.9, 2.0), (2.5, 4.6), (4.0, -1.3)),
     "D": ((1.4, -0.3), (3.7, 2.4), (4.6, -0.2), (7.2, -1.0)),

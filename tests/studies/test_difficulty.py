@@ -5,8 +5,6 @@ import pytest
 
 from nmpcrl.studies.difficulty import barn, clearance, measure, sight, spaced, stops_arriving
 from nmpcrl.study import paper
-from nmpcrl.study.drawn import COMPARED, JUDGE
-from nmpcrl.study.layouts import screen
 
 ONE = ((3.0, 3.0),)  # in the middle of the box, [-3, 9]^2; its disc has a radius of 1.25
 TASK = paper.task(ONE)
@@ -72,11 +70,3 @@ def test_the_first_gap_of_e_closes_before_that_of_d_as_their_rollouts_show():
         grid = np.array([0.0, 0.15, 0.2, 0.5])
         assert stops_arriving(paper.LAYOUTS["E"], horizon, grid) == 0.2
     assert np.isnan(stops_arriving(ONE, 10, np.array([0.0, 0.2])))
-
-
-@pytest.mark.slow
-def test_the_compared_layouts_are_the_first_of_either_kind():
-    kinds = {name: screen(centres).closing for name, centres in JUDGE.items()}
-    closing = [name for name in kinds if kinds[name]][:15]
-    others = [name for name in kinds if not kinds[name]][:15]
-    assert tuple(sorted(closing + others)) == COMPARED
