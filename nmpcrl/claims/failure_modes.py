@@ -29,11 +29,8 @@ from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.layouts import ARRIVED, gaps
 from nmpcrl.study.records import Column
 
-# The network is to blame if it predicts more than the true next value, so that on average this
-# share of the TD error (its root mean square) is of the network's making.
-OVER_PREDICTED = 0.5
-# The solver is to blame if it cut short at least this share of the episodes, or the rollout itself.
-CUT_SHORT = 0.5
+OVER_PREDICTED = 0.5  # share of the TD error (root mean square) made by too high predictions
+CUT_SHORT = 0.5  # share of episodes in which solves failed; one failed rollout is enough, too
 
 
 class Mechanism(StrEnum):
@@ -64,7 +61,6 @@ class Failure(StrEnum):
     WITHOUT_NOISE = "without noise"
 
 
-MECHANISMS, ENDINGS = tuple(Mechanism), tuple(Ending)
 WELL = "went well"  # in the place of a mechanism
 NONE = {"ending": "", "wrong": "", "mechanism": "", "episode": pd.NA}  # of a frozen arm
 FAILURE_MODE = [*NONE]
@@ -80,45 +76,38 @@ def failure_modes(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
         Columns ending (of the last rollout: an `Ending`), wrong (a `Failure`, or ""), mechanism (a
         `Mechanism`, or `WELL`) and episode (after which the cost rose; missing for a run that went
         well); empty for the frozen arms.
-
-    Raises:
-        KeyError: the frozen arm of a run is not among them.
     """
-    learned = [e for e in summaries if e.learner != "frozen"]
-    first_rollouts = {e: summaries[frozen_arm(e)].states for e in learned}
+    wrong = dict(zip(summaries, went_wrong(table(summaries)), strict=True))
     rows = [
-        failure_mode(run, wrong, first_rollouts[e]) if e in first_rollouts else NONE
-        for (e, run), wrong in zip(summaries.items(), went_wrong(table(summaries)), strict=True)
+        failure_mode(run, wrong[e], summaries[frozen_arm(e)].states)
+        if e.learner != "frozen"
+        else NONE
+        for e, run in summaries.items()
     ]
     return pd.DataFrame(rows, columns=FAILURE_MODE)
 
 
-def failure_mode(run: RunSummary, wrong: Failure | None, first_rollout: Column) -> dict[str, Any]:
+def failure_mode(run: RunSummary, wrong: str, first_rollout: Column) -> dict[str, Any]:
     """The failure mode of a run that learned: `FAILURE_MODE` by name.
 
     Args:
         run: its summary.
-        wrong: where it went wrong, if it did.
+        wrong: of `went_wrong`.
         first_rollout: states of theta_init's rollout without noise, shape (K + 1, n).
     """
-    task = run.name.task
     return {
-        "ending": ending(run.states, task),
-        "wrong": wrong or "",
-        "mechanism": mechanism(run, task, first_rollout) if wrong else WELL,
+        "ending": ending(run.states, run.name.task),
+        "wrong": wrong,
+        "mechanism": mechanism(run, first_rollout) if wrong else WELL,
         "episode": rise(run).start if wrong else pd.NA,
     }
 
 
-def went_wrong(runs: pd.DataFrame) -> list[Failure | None]:
-    """Where each run went wrong, or None."""
-    signs = {
-        Failure.STOPPED: was_stopped(runs),
-        Failure.TRAINING: divergence(runs).fillna(False),
-        Failure.WITHOUT_NOISE: worsens(runs),
-    }
-    found = zip(*(sign.to_numpy(bool) for sign in signs.values()), strict=True)
-    return [next((f for f, seen in zip(signs, row, strict=True) if seen), None) for row in found]
+def went_wrong(runs: pd.DataFrame) -> list[str]:
+    """Where each run went wrong: a `Failure`, or ""."""
+    signs = was_stopped(runs), divergence(runs).fillna(False), worsens(runs)
+    found: list[str] = np.select([one.to_numpy(bool) for one in signs], [*Failure], "").tolist()
+    return found
 
 
 def rise(run: RunSummary) -> slice:
@@ -131,13 +120,13 @@ def rise(run: RunSummary) -> slice:
     return slice(max(0, reached - run.experiment["evaluate_every"]), reached)
 
 
-def mechanism(run: RunSummary, task: Task, first_rollout: Column) -> Mechanism:
+def mechanism(run: RunSummary, first_rollout: Column) -> Mechanism:
     """The mechanism by which the cost of a run rose; arguments as for `failure_mode`."""
     window = rise(run)
     signs = {
         Mechanism.STEP: (run.episodes["alpha_phi2"][window] > OVERSHOOT).any(),
         Mechanism.NETWORK: _over_predicted(run, window),
-        Mechanism.GAP: _gap_closed(run, window, task, first_rollout),
+        Mechanism.GAP: _gap_closed(run, window, first_rollout),
         Mechanism.SOLVER: _cut_short(run, window),
         Mechanism.OTHER: True,
     }
@@ -152,9 +141,9 @@ def _over_predicted(run: RunSummary, window: slice) -> bool:
     return bool(share >= OVER_PREDICTED)
 
 
-def _gap_closed(run: RunSummary, window: slice, task: Task, first_rollout: Column) -> bool:
+def _gap_closed(run: RunSummary, window: slice, first_rollout: Column) -> bool:
     """Whether theta_c grew until no plan fits through a gap that the first rollout went through."""
-    start = run.experiment["theta"][-1]
+    start, task = run.experiment["theta"][-1], run.name.task
     reached = np.fmax.reduce(run.episodes["theta"][window, -1], initial=start)
     before, after = (gaps(task, first_rollout[:, :2], theta_c) for theta_c in (start, reached))
     return any(width > 0 >= after[sides] for sides, width in before.items())
@@ -169,12 +158,7 @@ def _cut_short(run: RunSummary, window: slice) -> bool:
 
 
 def ending(states: Column, task: Task) -> Ending:
-    """How a rollout ended; the worst of several endings.
-
-    Args:
-        states: shape (K + 1, n); nan from a failed solve on.
-        task: the robot's.
-    """
+    """The worst ending of a rollout; states of shape (K + 1, n), nan from a failed solve on."""
     if np.isnan(states).any():
         return Ending.FAILED
     if task.overlap(states).max() > TOUCH:

@@ -7,22 +7,22 @@ by their final theta_c, which is known only after training.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.failure_modes import Ending, ending
+from nmpcrl.claims.investigation import counted
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.thresholds import cost_reduction, solved, was_stopped, worsens
-from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
+from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
 
 LEARNERS = ("ES", "GES")  # which fit no network
 EARLY = 20  # episodes
 THETA_C = len(paper.THETA_INIT) - 1
-
 
 Count: TypeAlias = tuple[int, int]  # yes, of
 
@@ -56,71 +56,51 @@ def finding(found: Published) -> Finding | None:
     """The finding of the published study; None if nothing is published."""
     if not found.rows:
         return None
-    runs = _with_gaps(found.main[found.main.learner.isin(LEARNERS)])
-    arrived = solved(runs)
-    hand = {layout: _by_hand(layout) for layout in dict.fromkeys(runs.layout)}
-    there = {layout: saved for layout, (saved, is_solved) in hand.items() if is_solved}
-    others = [-saved for saved, is_solved in hand.values() if not is_solved] or [np.nan]
-    most = runs.groupby("layout").saved.max()
-    mine = {name: found.main[found.main.learner == name] for name in (*LEARNERS, "TDC")}
-    stopped, early = _stopped(found.main, "episode")
-    per_step, early_per_step = _stopped(found.main, "step")
+    main = found.main.assign(saved=cost_reduction(found.main))
+    runs = main[main.learner.isin(LEARNERS)]
+    hand = pd.DataFrame.from_dict({one: _by_hand(one) for one in runs.layout.unique()}, "index")
+    closed = runs[f"theta_{THETA_C}"] >= runs.layout.map(hand.closes)
+    arrived, there, lost = solved(runs), hand[hand.solved], -hand.saved[~hand.solved]
+    most = runs.groupby("layout").saved.max()[there.index]
+    each = {name: main[main.learner == name] for name in (*LEARNERS, "TDC")}
+    stopped, early = _stopped(main, "episode")
+    per_step, early_per_step = _stopped(main, "step")
     return Finding(
-        arrived_open=_count(arrived[~runs.closed]),
-        arrived_closed=_count(arrived[runs.closed]),
-        open_in=tuple(dict.fromkeys(runs.layout[~runs.closed])),
-        closed_in=tuple(dict.fromkeys(runs.layout[runs.closed])),
-        learned=float(runs.saved[arrived & ~runs.closed].median()),
+        arrived_open=counted(arrived[~closed]),
+        arrived_closed=counted(arrived[closed]),
+        open_in=tuple(runs.layout[~closed].unique()),
+        closed_in=tuple(runs.layout[closed].unique()),
+        learned=float(runs.saved[arrived & ~closed].median()),
         by_hand=(len(there), len(hand)),
-        better=(sum(bool(saved > most[name]) for name, saved in there.items()), len(there)),
-        saved_by_hand=float(np.median(list(there.values()))),
-        lost_by_hand=(min(others), max(others)),
-        saved_there=float(runs.saved[runs.layout.isin(list(there))].median()),
+        better=counted(there.saved > most),
+        saved_by_hand=float(there.saved.median()),
+        lost_by_hand=(float(lost.min()), float(lost.max())),
+        saved_there=float(runs.saved[runs.layout.isin(there.index)].median()),
         stopped=stopped,
         stopped_early=early,
         stopped_per_step=per_step,
         early_per_step=early_per_step,
-        not_there={name: _count(one.ending != Ending.ARRIVED) for name, one in mine.items()},
-        above={name: _count(cost_reduction(one) < 0) for name, one in mine.items()},
-        worse={name: _count(worsens(one)) for name, one in mine.items()},
+        not_there={name: counted(one.ending != Ending.ARRIVED) for name, one in each.items()},
+        above={name: counted(one.saved < 0) for name, one in each.items()},
+        worse={name: counted(worsens(one)) for name, one in each.items()},
         seconds=3600 * float(found.timings.set_index(["solver", "learner"]).hours["riccati", "ES"]),
         hours=paper.EPISODES * paper.STEPS * paper.nmpc().plant.period / 3600,
     )
 
 
-def _with_gaps(runs: pd.DataFrame) -> pd.DataFrame:
-    """The runs, whether theta_c ended where a gap is closed, and the reduction of the cost."""
-    first = {layout: _rollout(layout, paper.THETA_INIT[THETA_C]) for layout in set(runs.layout)}
-    closes = {
-        layout: closes_at(paper.task(layout), one.states[:, :2]) for layout, one in first.items()
-    }
-    return runs.assign(
-        closed=runs[f"theta_{THETA_C}"] >= runs.layout.map(closes),
-        saved=1 - runs.final_cost / runs.initial_cost,
-    )
+def _by_hand(layout: str) -> dict[str, Any]:
+    """theta_c that closes a gap of the first rollout, and the result of theta_c = d_o."""
+    task, theta = paper.task(layout), np.array(paper.THETA_INIT)
+    thetas = theta, np.array([*theta[:THETA_C], task.margin])
+    first, hand = (evaluate(Persistent(paper.nmpc(layout)), one, paper.STEPS) for one in thetas)
+    saved = 1 - hand.cost / first.cost
+    arrives = ending(hand.states, task) == Ending.ARRIVED
+    closes = closes_at(task, first.states[:, :2])
+    return {"closes": closes, "saved": saved, "solved": saved >= 0 and arrives}
 
 
 def _stopped(main: pd.DataFrame, decay: str) -> tuple[Count, int]:
     """Stopped runs of RDES in one reading, and how many were stopped within `EARLY` episodes."""
     rdes = main[(main.learner == "RDES") & (main.decay == decay)]
-    stopped = rdes[was_stopped(rdes)]
-    early = int((stopped.steps_done <= EARLY * paper.STEPS).sum())
-    return (len(stopped), len(rdes)), early
-
-
-def _by_hand(layout: str) -> tuple[float, bool]:
-    """The reduction of the cost with theta_c = d_o, and whether it solves the layout."""
-    task = paper.task(layout)
-    before, after = (_rollout(layout, c) for c in (paper.THETA_INIT[THETA_C], task.margin))
-    saved = 1 - after.cost / before.cost
-    return saved, saved >= 0 and ending(after.states, task) == Ending.ARRIVED
-
-
-def _rollout(layout: str, theta_c: float) -> Rollout:
-    """A rollout without noise with theta_init and another theta_c."""
-    theta = np.array([*paper.THETA_INIT[:THETA_C], theta_c])
-    return evaluate(Persistent(paper.nmpc(layout)), theta, paper.STEPS)
-
-
-def _count(answers: pd.Series) -> Count:
-    return int(answers.sum()), len(answers)
+    stopped = was_stopped(rdes)
+    return counted(stopped), int((rdes.steps_done[stopped] <= EARLY * paper.STEPS).sum())

@@ -9,9 +9,9 @@ import pytest
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import thresholds
 from nmpcrl.claims.failure_modes import (
-    MECHANISMS,
     OVER_PREDICTED,
     WELL,
+    Mechanism,
     ending,
     failure_modes,
     mechanism,
@@ -71,7 +71,7 @@ def made(learner="RDES", cost=RISING, states=THROUGH, stopped="finished", seed=0
 
 
 def found(run: RunSummary, first_rollout=THROUGH) -> str:
-    return mechanism(run, TASK, first_rollout)
+    return mechanism(run, first_rollout)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_only_a_gap_that_the_first_rollout_used_closes_and_only_once():
 def test_the_first_mechanism_in_order_counts():
     names = [*SIGNS]
     left = [{name: (WINDOW, SIGNS[name]) for name in names[i:]} for i in range(len(names) + 1)]
-    assert tuple(found(made(**columns)) for columns in left) == MECHANISMS
+    assert tuple(found(made(**columns)) for columns in left) == (*Mechanism,)
 
 
 @pytest.mark.parametrize(

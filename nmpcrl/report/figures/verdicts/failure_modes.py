@@ -9,12 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from nmpcrl.claims.evidence import Evidence
-from nmpcrl.claims.failure_modes import (
-    ENDINGS,
-    MECHANISMS,
-    WELL,
-    Failure,
-)
+from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism
 from nmpcrl.report.figures.axes import stacked
 from nmpcrl.report.figures.style import (
     SUBTITLE,
@@ -42,7 +37,8 @@ def reasons(found: Evidence) -> Figure:
     moved = found.runs[found.runs.learner != "frozen"]
     figure, axes = subplots(1, 2, 1.5 + 0.32 * moved.learner.nunique(), sharey=True)
     ends = moved.ending.mask(moved.wrong == Failure.STOPPED, STOPPED)
-    kinds = (moved.mechanism, (*MECHANISMS, WELL)), (ends, (STOPPED, *ENDINGS[1:], ENDINGS[0]))
+    arrived, *worse = Ending
+    kinds = (moved.mechanism, (*Mechanism, WELL)), (ends, (STOPPED, *worse, arrived))
     for axis, (kind, names), patterns in zip(axes, kinds, PATTERNS, strict=True):
         counts = pd.crosstab(moved.learner, kind)
         counts = counts.reindex(moved.learner.unique(), columns=list(names), fill_value=0)
