@@ -17,6 +17,8 @@ from nmpcrl.claims.thresholds import BETTER, SAME_COST, cost_difference, cost_re
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED
 from nmpcrl.study.experiment import PAPER
 
+WORDS = {REPRODUCED: "confirmed", PARTLY: "confirmed in part", NOT: "not confirmed"}
+
 
 def compared(
     learners: tuple[str, str],
@@ -25,14 +27,15 @@ def compared(
     """The fields of a claim that compares the final noise-free costs of two learners.
 
     Args:
-        learners: the numbers are the cost of the first minus that of the second, in shares of
-            theta_init's.
+        learners: the numbers are the cost of the first minus the second's, in shares of
+            theta_init's, in the cells of the learner that is not the paper's.
         size: applied to the difference.
     """
     first, second = learners
+    ours = tuple(name for name in learners if name not in PAPER)
 
     def values(runs: pd.DataFrame, _: Paths) -> Values:
-        difference = size(cost_difference(*_pairs(learners, runs)))
+        difference = size(cost_difference(*arms(runs, first, second, among=ours)))
         return difference.astype(float).to_frame(f"{first} and {second}")
 
     return {
@@ -41,21 +44,15 @@ def compared(
         "values": values,
         "numbers": _numbers,
         "label": f"noise-free cost, {first} - {second}",
-        "words": {
-            REPRODUCED: "confirmed",
-            PARTLY: "confirmed in part",
-            NOT: "not confirmed",
-        },
+        "words": WORDS,
     }
 
 
 def _numbers(runs: pd.DataFrame, _: Paths, learners: tuple[str, ...]) -> dict[str, Any]:
     """Probability of improvement and median reductions, of complete pairs; empty without any."""
-    first, second = _complete(*_pairs(learners, runs))
-    if first.empty:
-        return {}
-    medians = [median(cost_reduction(arm)) for arm in (first, second)]
-    return {"better": _costs_less(first, second), "first": medians[0], "second": medians[1]}
+    first, second = (median(cost_reduction(arm)) for arm in _pairs(runs, *learners))
+    better = costs_less(runs, *learners)
+    return {} if np.isnan(better.value) else {"better": better, "first": first, "second": second}
 
 
 def costs_less(runs: pd.DataFrame, first: str, second: str) -> Estimate:
@@ -64,8 +61,12 @@ def costs_less(runs: pd.DataFrame, first: str, second: str) -> Estimate:
     Every pair counts alike: a run that got stuck loses once, by however much. Runs without a
     counterpart do not count; without any pair the estimate is nan.
     """
-    one, other = _complete(*arms(runs, first, second))
-    return Estimate(*[np.nan] * 3) if one.empty else _costs_less(one, other)
+    one, other = _pairs(runs, first, second)
+    if one.empty:
+        return Estimate(np.nan, np.nan, np.nan)
+    layouts = [*one.index.get_level_values("layout")]
+    costs = (arm.final_cost.to_numpy(float) for arm in (one, other))
+    return probability_of_improvement(*costs, layouts)
 
 
 def costs_less_anew(runs: pd.DataFrame, first: str, second: str) -> Estimate:
@@ -74,21 +75,11 @@ def costs_less_anew(runs: pd.DataFrame, first: str, second: str) -> Estimate:
     return drawn_anew(costs_less(one, first, second).value for one in layouts)
 
 
-def _costs_less(first: pd.DataFrame, second: pd.DataFrame) -> Estimate:
-    layouts = list(first.index.get_level_values("layout"))
-    one, other = (arm.final_cost.to_numpy(float) for arm in (first, second))
-    return probability_of_improvement(one, other, layouts)
-
-
-def _pairs(learners: tuple[str, ...], runs: pd.DataFrame) -> tuple[pd.DataFrame, ...]:
-    """The runs of both learners in the cells of the one that is not the paper's."""
-    return arms(runs, *learners, among=tuple(name for name in learners if name not in PAPER))
-
-
-def _complete(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The pairs without a missing run."""
-    known = (first.stopped.notna() & second.stopped.notna()).to_numpy(bool)
-    return first[known], second[known]
+def _pairs(runs: pd.DataFrame, first: str, second: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The runs of two learners in the cells in which both are known."""
+    one, other = arms(runs, first, second)
+    known = one.stopped.notna() & other.stopped.notna()
+    return one[known], other[known]
 
 
 OWN_CLAIMS: dict[str, RunClaim] = {

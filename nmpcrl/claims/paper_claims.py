@@ -15,7 +15,7 @@ from nmpcrl.analysis.rows import THETA, experiment_of
 from nmpcrl.analysis.summary import SIZES
 from nmpcrl.claims.assumptions import TheoremClaim
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values
-from nmpcrl.claims.rule import CELL, Claim, Paths, arms, median
+from nmpcrl.claims.rule import Claim, Paths, arms, median
 from nmpcrl.claims.thresholds import (
     BETTER,
     DIVERGED,
@@ -76,20 +76,17 @@ def policy_distances(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
         (whether RDES's did: two that failed have the same cost and are not the same), and known
         (whether both runs and both paths are known).
     """
-    rdes, ges = arms(runs, "RDES", "GES")
-    asked = runs[runs.learner.isin(("RDES", "GES"))].to_dict("records")
-    found = {
-        (row["learner"], *(row[name] for name in CELL)): paths.get(experiment_of(row))
-        for row in asked
-    }
-    pairs = [(found.get(("RDES", *cell)), found.get(("GES", *cell))) for cell in rdes.index]
-    both = np.array([one is not None and other is not None for one, other in pairs], bool)
+    asked = runs[runs.learner.isin(("RDES", "GES"))]
+    found = [paths.get(experiment_of(row)) for row in asked.to_dict("records")]
+    rdes, ges = arms(asked.assign(path=pd.Series(found, asked.index, object)), "RDES", "GES")
+    known = rdes.path.notna() & ges.path.notna()
+    apart = [path_distance(*pair) for pair in zip(rdes.path[known], ges.path[known], strict=True)]
     return pd.DataFrame(
         {
-            "path": pd.Series([path_distance(*pair) for pair in pairs], rdes.index, dtype=float),
+            "path": pd.Series(apart, rdes.index[known], dtype=float).reindex(rdes.index),
             "cost": cost_difference(rdes, ges).abs(),
             "failed": np.isinf(rdes.final_cost),
-            "known": both & rdes.stopped.notna() & ges.stopped.notna(),
+            "known": known & rdes.stopped.notna() & ges.stopped.notna(),
         }
     )
 
@@ -142,11 +139,7 @@ def _c7_numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
 
 
 def kept_without_noise(runs: pd.DataFrame, learners: Learners) -> pd.DataFrame:
-    """The answers of each run to the weaker question of C7, or of W7.
-
-    Args:
-        runs: of `rows.table`.
-        learners: of the claim.
+    """The answers of each run to the weaker question of C7, or of W7 with its learners.
 
     Returns:
         Columns kept (whether its rollouts without noise kept the constraints) and stopped (whether

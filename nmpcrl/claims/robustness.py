@@ -6,16 +6,15 @@ there beside another: a layout or a reading is compared with the complete main t
 the main table in the same cells of layout, decay and seed.
 """
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from nmpcrl.claims.by_runs import RunClaim
 from nmpcrl.claims.paper_claims import BY_RUNS
-from nmpcrl.claims.rule import CELL, Observations, Paths, judge
+from nmpcrl.claims.rule import CELL, Observations, Paths
 from nmpcrl.claims.verdict import Outcome, Verdict, differ
 from nmpcrl.study import design
 from nmpcrl.study.design import MAIN_TABLE
@@ -25,10 +24,15 @@ Judged: TypeAlias = tuple[Outcome, tuple[int, int]]  # with yes and all answers
 
 WHOLE = "main table"
 PARTS = {"layout": "B", "decay": "C"}  # of the main table, with the departures they read
+# `outcome` is compared with `base`; `changes` holds if both are decided and differ; `share` and
+# `base_share` are of yes; `pairs` is the number of answers; `p` is the probability of shares so
+# different without an effect (Fisher's exact test, as if runs were independent). A layout has no p:
+# its runs hardly differ from seed to seed, so that it is one observation.
+COLUMNS = ("variant", "claim", "outcome", "base", "changes", "share", "base_share", "pairs", "p")
 
 
 def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
-    """The map: rows of the main table, of its parts (`part_changes`), and of `variant_changes`.
+    """The map: rows of the main table and its parts (`part_changes`), and of `variant_changes`.
 
     Args:
         runs: of `rows.table`, with a column `variant`.
@@ -37,19 +41,12 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     Returns:
         `COLUMNS` after `departure`, a letter of `DEPARTURES` or "".
     """
-    verdicts = judge(BY_RUNS, runs[runs.variant == MAIN_TABLE], paths)
-    overall = [(one.claim, (one.outcome, one.counts["all"])) for one in verdicts]
-    unlike = {"base_share": np.nan, "p": np.nan}  # nothing is compared
-    whole = pd.DataFrame([_row(WHOLE, claim, of, of) | unlike for claim, of in overall])
-    rows = [whole, part_changes(verdicts), variant_changes(runs, paths)]
+    main = Observations(runs[runs.variant == MAIN_TABLE], paths)
+    verdicts = [claim.settled(main) for claim in BY_RUNS.values()]
+    rows = [part_changes(verdicts), variant_changes(runs, paths)]
     found = pd.concat(rows, ignore_index=True)
     found.insert(0, "departure", found.variant.map(departure))
     return found
-
-
-def not_run(runs: pd.DataFrame) -> tuple[str, ...]:
-    """The variants of the design without a run."""
-    return tuple(name for name in design.VARIANTS if name not in set(runs.variant))
 
 
 def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -64,8 +61,8 @@ def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame
         field, value = _part(variant)
         return main[main[field] == value], main[main[field] != value]
     before = main.merge(changed[CELL].drop_duplicates(), on=CELL)
-    kept = before[~before.learner.isin(changed.learner)]
-    return pd.concat([changed, kept], ignore_index=True), before
+    unchanged = before[~before.learner.isin(changed.learner)]
+    return pd.concat([changed, unchanged], ignore_index=True), before
 
 
 def departure(variant: str) -> str:
@@ -81,13 +78,6 @@ def _part(variant: str) -> tuple[str, str]:
     return words[0], words[-1]
 
 
-# `outcome` is compared with `base`; `changes` holds if both are decided and differ; `share` and
-# `base_share` are of yes; `pairs` is the number of answers; `p` is the probability of shares so
-# different without an effect (Fisher's exact test, as if runs were independent). A layout has no p:
-# its runs hardly differ from seed to seed, so that it is one observation.
-COLUMNS = ("variant", "claim", "outcome", "base", "changes", "share", "base_share", "pairs", "p")
-
-
 def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     """The outcome of every claim in every variant, beside the same cells of the main table.
 
@@ -101,47 +91,41 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     Returns:
         `COLUMNS`, one row a variant and claim, in order.
     """
-    paper = runs[runs.learner.isin(PAPER)]
-    rows = []
-    bases: dict[Hashable, Judged] = {}  # many variants have the same cells
-    for name in paper.variant[paper.variant != MAIN_TABLE].unique():
-        after, before = groups(paper, name)
-        asked = frozenset(before[CELL].itertuples(index=False, name=None))
-        changed = {*paper.learner[paper.variant == name]}
+    runs, rows = runs[runs.learner.isin(PAPER)], []
+    for name in runs.variant[runs.variant != MAIN_TABLE].unique():
+        changed = {*runs.learner[runs.variant == name]}
+        after, before = (Observations(one, paths) for one in groups(runs, name))
         for claim in BY_RUNS.values():
-            if not changed & {*claim.learners}:
-                continue
-            at = asked, claim.name
-            bases[at] = bases.get(at) or _settled(claim, before, paths)
-            rows.append(_row(str(name), claim.name, _settled(claim, after, paths), bases[at]))
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+            if changed & {*claim.learners}:
+                here, base = (claim.settled(one) for one in (after, before))
+                rows.append(_row(name, claim.name, _judged(here), _judged(base)))
+    return pd.DataFrame(rows, columns=[*COLUMNS])
 
 
-def part_changes(verdicts: Iterable[Verdict]) -> pd.DataFrame:
-    """The outcome of every claim in each layout and reading of the decay, beside the overall one.
+def part_changes(verdicts: Sequence[Verdict]) -> pd.DataFrame:
+    """The outcome of every claim in the main table, and in each layout and reading of the decay.
 
     A part changes a verdict only if the verdict depends on it: see `Verdict.depends_on`.
 
     Returns:
         `COLUMNS`; `base` is the overall outcome, `base_share` the share in the other parts.
     """
+    parts = [(one, "", WHOLE, "all", one.outcome) for one in verdicts]
+    for one in verdicts:
+        layouts, decays = one.by_layout.items(), one.by_decay.items()
+        parts += [(one, "layout", f"layout {name}", name, outcome) for name, outcome in layouts]
+        parts += [(one, "decay", f"decay per {name}", name, outcome) for name, outcome in decays]
     rows = []
-    for verdict in (one for one in verdicts if one.counts):
-        all_yes, all_of = verdict.counts["all"]
-        parts = [("layout", f"layout {name}", name) for name in verdict.by_layout]
-        parts += [("decay", f"decay per {name}", name) for name in verdict.by_decay]
-        for field, variant, name in parts:
-            yes, of = verdict.counts[name]
-            outcome = (verdict.by_layout | verdict.by_decay)[name]
-            rest = verdict.outcome, (all_yes - yes, all_of - of)
-            row = _row(variant, verdict.claim, (outcome, (yes, of)), rest)
-            row["changes"] = row["changes"] and verdict.depends_on(field)
-            rows.append(row | ({"p": np.nan} if field == "layout" else {}))
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    for one, field, variant, name, outcome in parts:
+        (yes, of), (all_yes, all_of) = one.counts[name], one.counts["all"]
+        rest = one.outcome, (all_yes - yes, all_of - of)
+        row = _row(variant, one.claim, (outcome, (yes, of)), rest)
+        row["changes"] = row["changes"] and one.depends_on(field)
+        rows.append(row | ({"p": np.nan} if field == "layout" else {}))
+    return pd.DataFrame(rows, columns=[*COLUMNS])
 
 
-def _settled(claim: RunClaim, runs: pd.DataFrame, paths: Paths) -> Judged:
-    verdict = claim.settled(Observations(runs, paths))
+def _judged(verdict: Verdict) -> Judged:
     return verdict.outcome, verdict.counts["all"]
 
 

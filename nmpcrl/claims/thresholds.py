@@ -44,9 +44,6 @@ NEAR_HALF = (0.0, 1.0)
 NEAR_SAME_TIME = (0.8, 1.25)
 
 
-# Numbers of runs, one a row of `rows.table`
-
-
 def was_stopped(runs: pd.DataFrame) -> pd.Series:
     """Whether training was stopped; False for a missing run."""
     return runs.stopped.notna() & (runs.stopped != Stopped.FINISHED)
@@ -99,12 +96,7 @@ def solved(runs: pd.DataFrame) -> pd.Series:
 
 
 def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
-    """The reduction of each run over the possible one in its layout; nan where that is unknown.
-
-    Args:
-        runs: of `rows.table`.
-        possible: by layout, the share of theta_init's noise-free cost that can be saved.
-    """
+    """The reduction of each run over `possible` in its layout; nan where none is possible."""
     known = {layout: share for layout, share in possible.items() if share > 0}
     return cost_reduction(runs) / runs.layout.map(known).astype(float)
 
@@ -118,10 +110,8 @@ def cost_difference(first: pd.DataFrame, second: pd.DataFrame) -> pd.Series:
     return more.where(first.final_cost != second.final_cost, 0.0)
 
 
-def path_distance(first: Column | None, second: Column | None) -> float:
-    """Largest distance [m] of two trajectories at the same time; nan if one is missing."""
-    if first is None or second is None:
-        return np.nan
+def path_distance(first: Column, second: Column) -> float:
+    """Largest distance [m] of two trajectories at the same time."""
     return float(np.max(np.linalg.norm(first[:, :2] - second[:, :2], axis=1)))
 
 
