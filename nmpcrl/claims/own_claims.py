@@ -64,9 +64,8 @@ def costs_less(runs: pd.DataFrame, first: str, second: str) -> Estimate:
     one, other = _pairs(runs, first, second)
     if one.empty:
         return Estimate(np.nan, np.nan, np.nan)
-    layouts = [*one.index.get_level_values("layout")]
-    costs = (arm.final_cost.to_numpy(float) for arm in (one, other))
-    return probability_of_improvement(*costs, layouts)
+    ours, theirs = (arm.final_cost.to_numpy(float) for arm in (one, other))
+    return probability_of_improvement(ours, theirs, [*one.index.get_level_values("layout")])
 
 
 def costs_less_anew(runs: pd.DataFrame, first: str, second: str) -> Estimate:

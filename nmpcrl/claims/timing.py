@@ -1,8 +1,5 @@
 """How a ratio of times becomes a verdict, on a machine that may be busy.
 
-The constants were fixed for the reasons below, before any ratio was judged with them. The borders
-of each claim were fixed with all thresholds, in `thresholds`.
-
 The interval of the ratio (`bench.paired`) decides, and must lie on one side of every border:
 
 - reproduced: it lies within the claimed range;
@@ -11,10 +8,9 @@ The interval of the ratio (`bench.paired`) decides, and must lie on one side of 
 - not decidable: it reaches across a border, too few steps were timed, or the process waited for
   more than `WAITED` of the time.
 
-`WAITED` = 3/4 is where four share a processor. The process then finds most of the caches filled by
-others at each of its turns. Filling them again takes up to 0.1 ms (a megabyte at 10 GB/s) in a turn
-of 1 ms or more, so that up to a tenth of what the processor's clock shows may be others' doing, as
-much as C4 leaves between its claim and its border; beyond that, pairs are not trusted to cancel it.
+All was fixed before any ratio was judged. `WAITED` = 3/4 is where four share a processor. To fill
+the caches again takes up to 0.1 ms (a megabyte at 10 GB/s) in a turn of 1 ms or more: up to a tenth
+of the time, as much as C4 leaves between its claim and its border.
 """
 
 from dataclasses import dataclass
@@ -64,13 +60,7 @@ class TimeClaim(Claim):
 
 
 def decide(ratio: Ratio, claimed: Range, near: Range) -> Outcome:
-    """The outcome of a claim about a ratio of times.
-
-    Args:
-        ratio: the measured one.
-        claimed: where the claim holds, both ends included.
-        near: where it holds in part, the lower end included.
-    """
+    """The outcome of a claim; the upper end of `near` is outside, the other ends are inside."""
     low, high = ratio.low, ratio.high
     if np.isnan([low, high]).any() or ratio.waited > WAITED:
         return UNDECIDABLE

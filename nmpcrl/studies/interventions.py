@@ -73,13 +73,9 @@ def _shuffled(table: pd.DataFrame) -> pd.DataFrame:
 def again(setting: tuple[str, float], place: str, episodes: int, seed: int) -> Row:
     """The number of complete episodes of a run with an intervention."""
     intervention, nudge = setting
-    outcome = watch(
-        Experiment(
-            "RDES", layout=LAYOUTS.get(place, place), decay="episode", seed=seed,
-            episodes=episodes, theta=tuple(one + nudge for one in paper.THETA_INIT),
-        ),
-        intervention,
-    )  # fmt: skip
+    layout, theta = LAYOUTS.get(place, place), tuple(one + nudge for one in paper.THETA_INIT)
+    run = Experiment("RDES", seed, episodes, layout, decay="episode", theta=theta)
+    outcome = watch(run, intervention)
     return {"episodes": outcome.episodes - outcome.stopped}
 
 
@@ -99,12 +95,7 @@ def ends(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def survival(runs: pd.DataFrame, arm: str = "theta held") -> Answer:
-    """The answer of layouts A to F to the question "extrapolation", for any arm.
-
-    Args:
-        runs: of `ends`.
-        arm: one of `ARMS`.
-    """
+    """The answer of layouts A to F to the question "extrapolation", for any arm; runs of `ends`."""
     there = runs[(runs.part == "six") & (runs.intervention == arm)]
     return share(~there.stopped, f"survive, {arm}")
 
@@ -117,13 +108,13 @@ def live(runs: pd.DataFrame, arm: str, than: str = "none") -> Estimate:
         arm: one of `ARMS`.
         than: another; "none", with which no run lives, leaves the share itself.
     """
-    by = runs.pivot(index=["layout", "seed"], columns="intervention", values="stopped")
-    gained = (by[than].astype(int) - by[arm].astype(int)).groupby(level="layout")
+    by = runs.pivot(index=["layout", "seed"], columns="intervention", values="stopped").astype(int)
+    gained = (by[than] - by[arm]).groupby(level="layout").agg(["sum", "size"])
 
     def mean(gains: Any, counts: Any) -> Any:
         return gains.sum(axis=-1) / counts.sum(axis=-1)
 
-    return over_layouts(mean, gained.sum().to_numpy(), gained.size().to_numpy())
+    return over_layouts(mean, *gained.to_numpy().T)
 
 
 INTERVENTIONS = Investigation(
