@@ -1,15 +1,20 @@
 """Numbers of one run, from its records."""
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
+from nmpcrl.study import records as stored
 from nmpcrl.study.records import Column, Records, StepStatus
-from nmpcrl.study.records import final_cost as records_final_cost
+
+if TYPE_CHECKING:
+    from nmpcrl.analysis.summary import Outline
 
 TOUCH = 1e-6  # largest violation that is within the solver's tolerance
 TIGHT = 0.999  # least cosine of parallel features
@@ -33,14 +38,26 @@ def noise_free_cost(records: Records) -> tuple[Column, Vector]:
     return records.evaluations["episode"], records.evaluations["cost"]
 
 
-def initial_cost(records: Records) -> float:
+def initial_cost(run: "Records | Outline") -> float:
     """Noise-free cost of theta_init."""
-    return float(records.evaluations["cost"][0])
+    return float(run.evaluations["cost"][0])
 
 
-def final_cost(records: Records) -> float:
+def final_cost(run: "Records | Outline") -> float:
     """Noise-free cost at the end: see `records.final_cost`."""
-    return records_final_cost(records.evaluations["cost"])
+    return stored.final_cost(run.evaluations["cost"])
+
+
+def late_cost_range(run: "Records | Outline") -> float:
+    """Range of the noise-free cost in the second half of training, relative to the initial cost.
+
+    Infinite if a rollout failed, or training ended earlier.
+    """
+    cost, episode = run.evaluations["cost"], run.evaluations["episode"]
+    late = cost[episode >= run.experiment["episodes"] / 2]
+    if not late.size or not np.isfinite(late).all():
+        return np.inf
+    return float((late.max() - late.min()) / cost[0])
 
 
 def final_theta(records: Records) -> Vector:
@@ -54,27 +71,6 @@ def final_rollout(records: Records) -> tuple[Column, Column]:
     return records.evaluations["states"][-1], records.evaluations["actions"][-1]
 
 
-def gain(records: Records) -> float:
-    """Relative reduction of the noise-free cost by learning."""
-    return 1 - final_cost(records) / initial_cost(records)
-
-
-def late_cost_range(records: Records) -> float:
-    """Range of the noise-free cost in the second half of training, relative to the initial cost.
-
-    Infinite if a rollout failed, or training ended earlier.
-    """
-    return late_cost_range_of(*noise_free_cost(records), records.experiment["episodes"])
-
-
-def late_cost_range_of(episode: Column, cost: Vector, episodes: int) -> float:
-    """`late_cost_range` by the rollouts' episodes and costs; the first is under theta_init."""
-    late = cost[episode >= episodes / 2]
-    if not late.size or not np.isfinite(late).all():
-        return np.inf
-    return float((late.max() - late.min()) / cost[0])
-
-
 def late_training_cost(cost: Vector) -> float:
     """Median of `training_cost` over the last `LATE` episodes, or over a shorter second half.
 
@@ -85,14 +81,11 @@ def late_training_cost(cost: Vector) -> float:
 
 
 def cost_ratio(cost: Vector, frozen: Vector) -> float:
-    """`late_training_cost` of a run over that of the frozen learner under the same noise.
+    """`late_training_cost` of a run over that of the frozen learner, from their `training_cost`.
 
-    Infinite if the run alone lost half of its late episodes, 0 if the frozen learner alone did,
-    nan (not known) if both did.
-
-    Args:
-        cost: `training_cost` of the run.
-        frozen: `training_cost` of the frozen learner with the same seed, layout and decay.
+    The frozen learner has the same seed, layout and decay, and so the same noise. The ratio is
+    infinite if the run alone lost half of its late episodes, 0 if the frozen learner alone did, nan
+    (not known) if both did.
     """
     return late_training_cost(cost) / late_training_cost(frozen)
 
@@ -102,22 +95,12 @@ def overshooting(records: Records) -> float:
     return float(np.mean(records.steps["alpha_phi2"] > OVERSHOOT))
 
 
-def theta_distance(a: Records, b: Records) -> float:
-    """Largest relative difference between the components of two final thetas."""
-    first, second = final_theta(a), final_theta(b)
-    return float(np.max(np.abs(first - second) / np.maximum(np.abs(first), np.abs(second))))
-
-
-def obstacle_violations(states: Column, task: Task) -> Vector:
-    """Xi of the worst obstacle in each state in which it is above `TOUCH`."""
-    worst = task.overlap(states).max(axis=-1)
-    result: Vector = worst[worst > TOUCH]
-    return result
-
-
-def input_violations(actions: Column, lower: Vector, upper: Vector) -> int:
-    """Number of actions that leave the action space by more than `TOUCH`."""
-    return int(((actions < lower - TOUCH) | (actions > upper + TOUCH)).any(axis=-1).sum())
+def out_of_bounds(actions: Column, lower: Vector, upper: Vector) -> npt.NDArray[np.bool_]:
+    """Whether each action, shape (..., m), leaves the action space by more than `TOUCH`."""
+    found: npt.NDArray[np.bool_] = np.any(
+        (actions < lower - TOUCH) | (actions > upper + TOUCH), axis=-1
+    )
+    return found
 
 
 def boundary_share(records: Records, task: Task) -> float:
@@ -126,13 +109,7 @@ def boundary_share(records: Records, task: Task) -> float:
     return float((np.abs(edge) <= TOUCH).any(axis=-1).mean())
 
 
-def memory(records: Records) -> float:
-    """Correlation of consecutive TD errors; 0 if transitions were drawn independently."""
-    delta = records.steps["delta"][np.isfinite(records.steps["delta"])]
-    return float(np.corrcoef(delta[:-1], delta[1:])[0, 1])
-
-
-def theta_before(records: Records) -> Vector:
+def theta_before(records: Records) -> Matrix:
     """theta of the solve of each step, shape (steps, d)."""
     return np.vstack([records.experiment["theta"], records.steps["theta"][:-1]])
 
@@ -146,8 +123,7 @@ def online_error(records: Records) -> Vector:
     steps = records.steps
     move = steps["theta"] - theta_before(records)
     solved = steps["value"][1:] - np.sum(steps["features"][1:] * move[:-1], axis=1)
-    same_episode = steps["episode"][1:] == steps["episode"][:-1]
-    error = np.where(same_episode, steps["next_value"][:-1] - solved, np.nan)
+    error = np.where(_goes_on(records), steps["next_value"][:-1] - solved, np.nan)
     return np.append(error, np.nan)
 
 
@@ -167,20 +143,26 @@ def root_mean_square(values: Vector) -> float:
 
 def next_over_this(records: Records) -> Vector:
     """gamma phi'phi+ / phi'phi of each step: above 1 a semi-gradient step enlarges delta."""
-    steps = records.steps
-    this, after = steps["features"][:-1], steps["features"][1:]
-    ratio = paper.GAMMA * np.sum(this * after, axis=1) / np.sum(this**2, axis=1)
-    same_episode = steps["episode"][1:] == steps["episode"][:-1]
-    result: Vector = ratio[same_episode & np.isfinite(ratio)]
-    return result
+    this, after = _successive_features(records)
+    ratio: Vector = paper.GAMMA * np.sum(this * after, axis=1) / np.sum(this**2, axis=1)
+    return ratio
 
 
 def parallel_share(records: Records) -> float:
     """Share of the steps whose phi and phi+ are parallel, to a cosine of `TIGHT`."""
-    steps = records.steps
-    this, after = steps["features"][:-1], steps["features"][1:]
-    cosine = np.sum(this * after, axis=1) / (
-        np.linalg.norm(this, axis=1) * np.linalg.norm(after, axis=1)
-    )
-    same_episode = steps["episode"][1:] == steps["episode"][:-1]
-    return float(np.mean(cosine[same_episode & np.isfinite(cosine)] > TIGHT))
+    this, after = _successive_features(records)
+    lengths = np.linalg.norm(this, axis=1) * np.linalg.norm(after, axis=1)
+    return float(np.mean(np.sum(this * after, axis=1) / lengths > TIGHT))
+
+
+def _successive_features(records: Records) -> tuple[Matrix, Matrix]:
+    """phi and phi+ of each step, where both are known, each of shape (pairs, d)."""
+    features = records.steps["features"]
+    known = _goes_on(records) & np.isfinite(features[:-1] + features[1:]).all(axis=1)
+    return features[:-1][known], features[1:][known]
+
+
+def _goes_on(records: Records) -> Any:
+    """Whether the step after each step but the last is of the same episode."""
+    episode = records.steps["episode"]
+    return episode[1:] == episode[:-1]

@@ -4,7 +4,7 @@ The records of a run take megabytes, and the run is trained again in seconds; a 
 hundredth of that and is enough for every figure and verdict of the study.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NotRequired, cast
@@ -15,7 +15,7 @@ from nmpcrl import Vector
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.imitation import imitate
 from nmpcrl.analysis.metrics import TOUCH
-from nmpcrl.control import Task
+from nmpcrl.control import Nmpc
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
@@ -24,16 +24,86 @@ from nmpcrl.study.records import About, Facts, Records, StepStatus, stated_in
 from nmpcrl.study.setup import controller_of
 
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
-COLUMNS = {
-    "episodes": (
-        *("steps", "failed", "restarts", "outside", "inputs", "over", "cost", "overlap"),
-        *("alpha_phi2", "delta", "loss", "bias", "error", "iterations", "seconds"),
-        *("inside", "theta", "w"),
+IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
+
+
+class _Steps:
+    """The steps of a run, and reductions of a column to one number for each episode.
+
+    The number is nan in an episode without a step, or without a known value.
+    """
+
+    def __init__(self, records: Records, nmpc: Nmpc) -> None:
+        self.records, self.columns, self.nmpc = records, records.steps, nmpc
+        state, task = self["state"], nmpc.task
+        self.overlap = task.overlap(state).max(axis=-1)
+        self.outside: Column = np.any((state < task.lower) | (state > task.upper), axis=1)
+        self.wrong = metrics.online_error(records)
+        self._episodes = records.experiment["episodes"]
+        self._reached, self._first = np.unique(self["episode"], return_index=True)
+
+    def __getitem__(self, name: str) -> Column:
+        return self.columns[name]
+
+    def sum(self, column: Column) -> Vector:
+        return np.bincount(self["episode"], column, minlength=self._episodes).astype(float)
+
+    def count(self, column: Column) -> Column:
+        return self.sum(column).astype(int)
+
+    def mean(self, column: Column) -> Vector:
+        known = np.isfinite(column)
+        with np.errstate(invalid="ignore"):  # 0 / 0
+            return self.sum(np.where(known, column, 0.0)) / self.sum(known)
+
+    def largest(self, column: Column) -> Column:
+        return self._spread(np.fmax.reduceat(column, self._first))
+
+    def last(self, column: Column) -> Column:
+        return self._spread(column[np.append(self._first[1:], len(column)) - 1])
+
+    def _spread(self, reached: Column) -> Column:
+        result = np.full((self._episodes, *reached.shape[1:]), np.nan)
+        result[self._reached] = reached
+        return result
+
+
+def _sizes(overlap: Column) -> Column:
+    """Whether overlaps are of each of `SIZES`, along a new last axis of length 3."""
+    ranges = SIZES.values()
+    return np.stack([(overlap > low) & (overlap <= high) for low, high in ranges], axis=-1)
+
+
+# columns of `RunSummary.episodes`, each of shape (episodes,) unless said
+EPISODES: Mapping[str, Callable[[_Steps], Column]] = {
+    "cost": lambda run: metrics.training_cost(run.records),  # nan: cut short, or not reached
+    "steps": lambda run: run.count(np.ones(len(run.overlap))),
+    "failed": lambda run: run.count(run["status"] == StepStatus.FAILED),  # 0 or 1
+    "restarts": lambda run: run.count(run["restarts"]),
+    "inside": lambda run: np.stack(  # states in an obstacle, by `SIZES`, shape (episodes, 3)
+        [run.count(size) for size in _sizes(run.overlap).T], axis=1
     ),
+    "overlap": lambda run: run.largest(run.overlap),  # Xi
+    "outside": lambda run: run.count(run.outside),  # states out of the box
+    "inputs": lambda run: run.count(  # actions out of bounds
+        metrics.out_of_bounds(run["action"], run.nmpc.plant.lower, run.nmpc.plant.upper)
+    ),
+    "alpha_phi2": lambda run: run.largest(run["alpha_phi2"]),  # alpha ||phi||^2
+    "over": lambda run: run.count(run["alpha_phi2"] > OVERSHOOT),
+    "delta": lambda run: np.sqrt(run.mean(run["delta"] ** 2)),  # root mean square
+    "loss": lambda run: run.mean(run["loss"]),
+    "bias": lambda run: run.mean(run.wrong),  # mean of the predicted minus the true next value
+    "error": lambda run: np.sqrt(run.mean(run.wrong**2)),  # its root mean square
+    "theta": lambda run: run.last(run["theta"]),  # at the end, shape (episodes, d)
+    "w": lambda run: run.last(run["w"]),
+    "iterations": lambda run: run.mean(run["iterations"].astype(float)),
+    "seconds": lambda run: run.sum(run["seconds"]),
+}
+COLUMNS = {
+    "episodes": tuple(EPISODES),
     "evaluations": ("episode", "theta", "cost", "inside", "overlap", "distance"),
     "rollout": ("states", "actions"),
 }
-IMITATED = "RDES"  # whose runs a network with theta and one without are fitted to: claim C6
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +128,7 @@ class Outline:
 
 
 class SummaryFacts(Facts):
-    """Those of the records, and what C6 asks for."""
+    """The facts of the records, and what C6 asks for."""
 
     imitation: NotRequired[dict[str, float]]  # the error of a network, with theta and without
 
@@ -67,50 +137,28 @@ class SummaryFacts(Facts):
 class RunSummary(Outline):
     """One run that was trained here, in short.
 
-    Columns of `episodes`, each of shape (episodes,) unless said: cost (summed RL cost; nan where
-    the episode was cut short or never reached), steps, failed (0 or 1), restarts, inside (states
-    in an obstacle, by `SIZES`, shape (episodes, 3)), overlap (largest Xi), outside (states out of
-    the box), inputs (actions out of bounds), alpha_phi2 (largest alpha ||phi||^2), over (steps with
-    that above `OVERSHOOT`), delta (root mean square), loss (mean), bias and error (mean and root
-    mean square of the predicted minus the true next value), theta and w (at the end, shape
-    (episodes, d)), iterations (mean), seconds.
-
-    Columns of `evaluations`, one row per rollout without noise: episode (so many were trained),
-    theta (d,), cost (infinite where a solve failed), inside (3 counts), overlap (largest Xi),
-    distance (to the target at the end).
+    `EPISODES` lists the columns of `episodes`. Columns of `evaluations`, one row per rollout
+    without noise: episode (so many were trained), theta (d,), cost (infinite where a solve failed),
+    inside (states in an obstacle, by `SIZES`), overlap (largest Xi), distance (to the target at the
+    end).
     """
 
     actions: Column
     facts: SummaryFacts
 
     def save(self, path: Path) -> None:
-        """Write a temporary file, then rename it to `path`.
-
-        Raises:
-            OSError: the file cannot be written; an earlier one stays.
-        """
+        """Write a temporary file, then rename it to `path`; errors as in `Records.save`."""
         rollout = {"states": self.states, "actions": self.actions}
         tables = {"episodes": self.episodes, "evaluations": self.evaluations, "rollout": rollout}
         save_tables(path, {"experiment": self.experiment, "facts": self.facts}, tables)
 
     @classmethod
     def load(cls, path: Path) -> "RunSummary":
-        """Read a file that `save` wrote.
-
-        Raises:
-            FileNotFoundError: there is none.
-            DamagedRecords: the file is damaged, or no summary.
-        """
+        """Read a file that `save` wrote; errors as in `Records.load`."""
         about, tables = load_tables(path, COLUMNS)
         experiment, facts = stated_in(about, path)
-        return cls(
-            experiment,
-            tables["episodes"],
-            tables["evaluations"],
-            tables["rollout"]["states"],
-            tables["rollout"]["actions"],
-            cast(SummaryFacts, facts),
-        )
+        episodes, evaluations, rollout = (tables[name] for name in COLUMNS)
+        return cls(experiment, episodes, evaluations, **rollout, facts=cast(SummaryFacts, facts))
 
     @staticmethod
     def about(path: Path) -> About:
@@ -119,8 +167,8 @@ class RunSummary(Outline):
 
 
 def summarise(records: Records) -> RunSummary:
-    """The summary of a run; for a whole run of RDES also how well networks imitate it."""
-    experiment = Experiment(**records.experiment)
+    """The summary of a run; of RDES trained to the end also how well networks imitate it."""
+    experiment, evaluated = Experiment(**records.experiment), records.evaluations
     nmpc = controller_of(experiment).nmpc
     facts = cast(SummaryFacts, dict(records.facts))
     if experiment.learner == IMITATED and experiment.episodes >= paper.EPISODES:
@@ -128,94 +176,16 @@ def summarise(records: Records) -> RunSummary:
         facts["imitation"] = {
             which: imitation.error(which) for which in ("with_theta", "without_theta")
         }
-    evaluated = records.evaluations
-    states, actions = metrics.final_rollout(records)
-    evaluations = {name: evaluated[name] for name in ("episode", "theta", "cost")}
     overlap = nmpc.task.overlap(evaluated["states"]).max(axis=-1)
-    evaluations["inside"] = _sizes(overlap).sum(axis=1)
-    evaluations["overlap"] = np.fmax.reduce(overlap, axis=1)
-    evaluations["distance"] = _distance(evaluated["states"], nmpc.task)
-    episodes = _episodes(records, nmpc.task, nmpc.plant.lower, nmpc.plant.upper)
-    return RunSummary(records.experiment, episodes, evaluations, states, actions, facts)
-
-
-def separation(one: Outline, other: Outline) -> Vector:
-    """The largest difference of any component of theta, after each episode that both reached."""
-    apart = np.abs(one.episodes["theta"] - other.episodes["theta"]).max(axis=1)
-    result: Vector = apart[np.isfinite(apart)]
-    return result
-
-
-def _episodes(records: Records, task: Task, lower: Vector, upper: Vector) -> dict[str, Column]:
-    """The columns of `RunSummary.episodes`."""
-    steps = records.steps
-    by = _ByEpisode(steps["episode"], records.experiment["episodes"])
-    overlap = task.overlap(steps["state"]).max(axis=-1)
-    out = np.any((steps["state"] < task.lower) | (steps["state"] > task.upper), axis=1)
-    beyond = np.any((steps["action"] < lower - TOUCH) | (steps["action"] > upper + TOUCH), axis=1)
-    wrong = metrics.online_error(records)
-    return {
-        "cost": metrics.training_cost(records),
-        "steps": by.sum(np.ones(len(overlap))).astype(int),
-        "failed": by.sum(steps["status"] == StepStatus.FAILED).astype(int),
-        "restarts": by.sum(steps["restarts"]).astype(int),
-        "inside": np.stack([by.sum(size) for size in _sizes(overlap).T], axis=1).astype(int),
-        "overlap": by.reduce(np.fmax, overlap),
-        "outside": by.sum(out).astype(int),
-        "inputs": by.sum(beyond).astype(int),
-        "alpha_phi2": by.reduce(np.fmax, steps["alpha_phi2"]),
-        "over": by.sum(steps["alpha_phi2"] > OVERSHOOT).astype(int),
-        "delta": np.sqrt(by.mean(steps["delta"] ** 2)),
-        "loss": by.mean(steps["loss"]),
-        "bias": by.mean(wrong),
-        "error": np.sqrt(by.mean(wrong**2)),
-        "theta": by.last(steps["theta"]),
-        "w": by.last(steps["w"]),
-        "iterations": by.mean(steps["iterations"].astype(float)),
-        "seconds": by.sum(steps["seconds"]),
+    away = evaluated["states"][:, -1] - nmpc.task.target
+    evaluations = {
+        **{name: evaluated[name] for name in ("episode", "theta", "cost")},
+        "inside": _sizes(overlap).sum(axis=1),
+        "overlap": np.fmax.reduce(overlap, axis=1),
+        "distance": np.linalg.norm(away, axis=-1),
     }
-
-
-class _ByEpisode:
-    """Summaries of a column in each episode; what has no step, or no known value, is nan."""
-
-    def __init__(self, episode: Column, episodes: int) -> None:
-        self._episode, self._episodes = episode, episodes
-        self._reached, self._first = np.unique(episode, return_index=True)
-
-    def sum(self, column: Column) -> Vector:
-        return np.bincount(self._episode, column, minlength=self._episodes).astype(float)
-
-    def mean(self, column: Column) -> Vector:
-        known = np.isfinite(column)
-        count = self.sum(known)
-        result: Vector = np.divide(
-            self.sum(np.where(known, column, 0.0)),
-            count,
-            np.full(count.shape, np.nan),
-            where=count > 0,
-        )
-        return result
-
-    def reduce(self, function: np.ufunc, column: Column) -> Vector:
-        return self._spread(function.reduceat(column, self._first))
-
-    def last(self, column: Column) -> Column:
-        return self._spread(column[np.append(self._first[1:], len(column)) - 1])
-
-    def _spread(self, reached: Column) -> Column:
-        result = np.full((self._episodes, *reached.shape[1:]), np.nan)
-        result[self._reached] = reached
-        return result
-
-
-def _sizes(overlap: Column) -> Column:
-    """Whether overlaps are of each of `SIZES`, along a new last axis of length 3."""
-    ranges = SIZES.values()
-    return np.stack([(overlap > low) & (overlap <= high) for low, high in ranges], axis=-1)
-
-
-def _distance(states: Column, task: Task) -> Vector:
-    """Distance to the target at the end of each rollout, shape (rollouts,)."""
-    result: Vector = np.linalg.norm(states[:, -1] - task.target, axis=-1)
-    return result
+    run = _Steps(records, nmpc)
+    episodes = {name: column(run) for name, column in EPISODES.items()}
+    return RunSummary(
+        records.experiment, episodes, evaluations, *metrics.final_rollout(records), facts
+    )

@@ -44,8 +44,10 @@ class Measured:
 
 def measured(experiment: Experiment, records: Records, curvature: Curvature) -> Measured:
     """The numbers of one run of GES."""
-    kinks = metrics.boundary_share(records, experiment.task)
-    return Measured(kinks, metrics.memory(records), float(np.median(curvature.ratio)))
+    kinks, delta = metrics.boundary_share(records, experiment.task), records.steps["delta"]
+    delta = delta[np.isfinite(delta)]
+    memory = float(np.corrcoef(delta[:-1], delta[1:])[0, 1])
+    return Measured(kinks, memory, float(np.median(curvature.ratio)))
 
 
 def audit(experiment: Experiment, found: Measured) -> tuple[Assumption, ...]:

@@ -67,8 +67,8 @@ class Published:
     @cached_property
     def table(self) -> pd.DataFrame:
         """All rows, with `cost_ratio` as `rows.table` has it."""
-        ratios = cost_ratios(self.rows)
-        return pd.DataFrame([row | {"cost_ratio": ratios[e]} for e, row in self.rows.items()])
+        ratios = [*cost_ratios(self.rows).values()]
+        return pd.DataFrame([*self.rows.values()]).assign(cost_ratio=ratios)
 
     @property
     def paths(self) -> dict[Experiment, Column]:

@@ -67,7 +67,7 @@ def study(
 
         from nmpcrl.analysis.rows import tidy
 
-        frames = [tidy([one]).assign(variant=wanted[e]) for e, one in found.items()]
+        frames = [tidy(one).assign(variant=wanted[e]) for e, one in found.items()]
         pd.concat(frames).to_csv(table, index=False, float_format="%.7g")
         click.echo(f"{table}: written")
     if publish:

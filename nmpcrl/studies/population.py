@@ -214,8 +214,7 @@ def of_table(table: pd.DataFrame) -> Drawn:
         e: {name: as_text(value) for name, value in asdict(e).items()} | one
         for e, one in zip(made, known.to_dict("records"), strict=True)
     }
-    ratios = cost_ratios(rows)
-    runs = pd.DataFrame([one | {"cost_ratio": ratios[e]} for e, one in rows.items()])
+    runs = pd.DataFrame([*rows.values()]).assign(cost_ratio=[*cost_ratios(rows).values()])
     layouts = DIFFICULTY.table().set_index("place").rename_axis("layout")
     return Drawn(runs, _paths(table), layouts[[*MEASURES, *STOPS.values()]])
 

@@ -5,45 +5,28 @@ import pytest
 
 from nmpcrl.analysis import metrics
 from nmpcrl.control import Obstacle, Task
+from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 
 D = 9  # components of theta
 
 
-def records(
-    costs,
-    *,
-    status=None,
-    judged=(100.0, 90.0),
-    at=None,
-    episodes=None,
-    theta=None,
-    states=None,
-    delta=None,
-) -> Records:
-    """A run from the costs of its steps, one row an episode, and its noise-free costs."""
+def records(costs, *, judged=(100.0, 90.0), at=None, episodes=None, **columns) -> Records:
+    """A run from the costs of its steps, one row an episode, its noise-free costs and columns."""
     costs = np.array(costs, float)
-    number, length = costs.shape
-    rows = costs.size
-    theta = np.zeros((rows, D)) if theta is None else np.array(theta, float)
+    (number, length), rows = costs.shape, costs.size
     steps = {
         "episode": np.repeat(np.arange(number), length),
         "cost": costs.ravel(),
-        "status": np.zeros(rows, int) if status is None else np.array(status),
-        "theta": theta,
-        "state": np.zeros((rows, 3)) if states is None else np.array(states, float),
+        "status": np.zeros(rows, int),
+        "theta": np.zeros((rows, D)),
         "alpha_phi2": np.linspace(0, 4, rows),
-        "delta": np.zeros(rows) if delta is None else np.array(delta, float),
+        **{name: np.array(column) for name, column in columns.items()},
     }
     judged = np.array(judged, float)
-    evaluations = {
-        "episode": np.arange(judged.size) if at is None else np.array(at),
-        "cost": judged,
-        "states": np.zeros((judged.size, 4, 3)),
-        "actions": np.zeros((judged.size, 4, 2)),
-    }
+    at = np.arange(judged.size) if at is None else np.array(at)
     asked = {"episodes": episodes or number, "steps": length, "theta": (0.0,) * D}
-    return Records(asked, steps, evaluations, {"stopped": "finished"})
+    return Records(asked, steps, {"episode": at, "cost": judged}, {"stopped": "finished"})
 
 
 @pytest.mark.parametrize(
@@ -64,17 +47,12 @@ def test_the_training_cost_is_the_sum_over_each_episode_that_went_to_its_end(
 
 
 @pytest.mark.parametrize(
-    ("judged", "final", "gain"),
-    [
-        ([100, 50, 40, 30, 20], 30, 0.7),
-        ([100, 150, 150, 150], 150, -0.5),
-        ([100, 50, np.inf, 40], np.inf, -np.inf),
-    ],
+    ("judged", "final"),
+    [([100, 50, 40, 30, 20], 30), ([100, 150, 150, 150], 150), ([100, 50, np.inf, 40], np.inf)],
 )
-def test_the_final_cost_is_the_mean_of_the_last_rollouts(judged, final, gain):
+def test_the_final_cost_is_the_mean_of_the_last_rollouts(judged, final):
     run = records([[1]], judged=judged)
-    assert metrics.initial_cost(run) == 100
-    assert (metrics.final_cost(run), metrics.gain(run)) == (final, pytest.approx(gain))
+    assert (metrics.initial_cost(run), metrics.final_cost(run)) == (100, final)
 
 
 @pytest.mark.parametrize(
@@ -118,45 +96,23 @@ def test_overshooting_counts_the_steps_strictly_above_two():
     assert metrics.overshooting(records(np.ones((1, 5)))) == pytest.approx(2 / 5)  # 0 1 2 3 4
 
 
-def test_the_distance_between_thetas_is_relative_and_symmetric():
-    a = records([[1]], theta=[[1.0] * D])
-    b = records([[1]], theta=[[1.0] * (D - 1) + [2.0]])
-    assert metrics.theta_distance(a, b) == metrics.theta_distance(b, a) == pytest.approx(0.5)
-    assert metrics.theta_distance(a, a) == 0
-
-
-def test_neither_a_boundary_nor_an_unknown_state_is_a_violation():
-    task = scene()
-    states = np.array([[1.25, 0, 0], [1.25 - 1e-3, 0, 0], [5, 5, 0], [np.nan] * 3])
-    (worst,) = metrics.obstacle_violations(states, task)
-    assert worst == pytest.approx(task.overlap(states[1]).max())
+def test_neither_a_bound_nor_an_unknown_action_is_a_violation():
     actions = np.array([[1, 2], [-1, -2], [1.1, 0], [0, -2.1], [np.nan, np.nan]])
-    assert metrics.input_violations(actions, np.array([-1.0, -2.0]), np.array([1.0, 2.0])) == 2
+    found = metrics.out_of_bounds(actions, np.array([-1.0, -2.0]), np.array([1.0, 2.0]))
+    assert found.tolist() == [False, False, True, True, False]
 
 
 def test_the_boundary_is_the_one_of_the_theta_that_the_step_was_solved_with():
-    on_boundary = [1.25, 0, 0]  # Xi = 0
-    theta = np.zeros((3, D))
+    theta, bounds = np.zeros((3, D)), np.full(3, 9.0)
     theta[0, -1] = 0.1  # moves the boundary away from the second step on
-    run = records([[1, 1, 1]], states=[on_boundary] * 3, theta=theta)
-    assert metrics.boundary_share(run, scene()) == pytest.approx(2 / 3)
+    run = records([[1, 1, 1]], state=[[1.25, 0, 0]] * 3, theta=theta)  # where Xi = 0
+    scene = Task(np.zeros(3), np.zeros(3), -bounds, bounds, obstacles=(Obstacle(0.0, 0.0),))
+    assert metrics.boundary_share(run, scene) == pytest.approx(2 / 3)
 
 
-def test_independent_errors_have_no_memory_and_alternating_ones_a_negative_one():
-    rng = np.random.default_rng(0)
-    free = records(np.ones((1, 4000)), delta=rng.normal(size=4000))
-    assert abs(metrics.memory(free)) < 0.05
-    assert metrics.memory(records(np.ones((1, 4)), delta=[1, -1, 1, -1])) == pytest.approx(-1)
-    unknown = records(np.ones((1, 6)), delta=[np.nan, np.nan, 1, 2, 3, 4])
-    assert metrics.memory(unknown) == pytest.approx(1)
-
-
-def scene() -> Task:
-    """One obstacle at the origin, which a robot of 0.5 m touches at 1.25 m."""
-    return Task(
-        start=np.array([-2.0, 0.0, 0.0]),
-        target=np.array([6.0, 0.0, 0.0]),
-        lower=np.array([-9.0, -9.0, -np.inf]),
-        upper=np.array([9.0, 9.0, np.inf]),
-        obstacles=(Obstacle(0.0, 0.0),),
-    )
+def test_features_are_compared_with_those_of_the_next_step_of_the_episode():
+    phi = np.zeros((6, D))
+    phi[:, :2] = [[1, 0], [2, 0], [0, 1], [3, 0], [np.nan, 0], [1, 1]]
+    run = records(np.ones((2, 3)), features=phi)  # three pairs are of two episodes, or unknown
+    np.testing.assert_allclose(metrics.next_over_this(run), [2 * paper.GAMMA, 0])
+    assert metrics.parallel_share(run) == 0.5

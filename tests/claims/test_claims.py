@@ -297,7 +297,7 @@ def test_a_run_is_judged_from_its_records_as_from_the_table():
             status = np.where(records.steps["episode"] >= 6 - late, 2, records.steps["status"])
             changes = {"status": status, "cost": records.steps["cost"] * factor}
             found[one] = replace(records, steps=records.steps | changes)
-    runs = table([summarise(records) for records in found.values()])
+    runs = table({e: summarise(records) for e, records in found.items()})
     short = thresholds.of_records(Runs(found))
     for wrong in (thresholds.divergence, thresholds.instability):
         assert wrong(short).tolist() == wrong(runs).tolist()

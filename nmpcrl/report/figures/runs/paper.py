@@ -57,7 +57,7 @@ def figure_3(runs: Runs[Records]) -> Figure:
             axis.axhline(low, **LIMIT)
             axis.axhline(high, **LIMIT)
     actions = [metrics.final_rollout(records)[1] for records in kept.values()]
-    outside = sum(metrics.input_violations(one, plant.lower, plant.upper) for one in actions)
+    outside = sum(metrics.out_of_bounds(one, plant.lower, plant.upper).sum() for one in actions)
     verb = f"{outside} inputs leave" if outside else "all inputs keep within"
     return headed(figure, f"In {len(actions)} rollouts of RDES and GES, {verb} their bounds")
 

@@ -18,8 +18,8 @@ from nmpcrl.study.experiment import Experiment
 def replicas(perturbed: Mapping[Experiment, Vector], solvers: Vector, start: float) -> Figure:
     """How far perturbed replicas are apart against episodes.
 
-    `perturbed` (by run) and `solvers` (riccati and Ipopt) hold `summary.separation`, a number an
-    episode; `start` is how far apart the perturbed begin.
+    `perturbed` (by run) and `solvers` (riccati and Ipopt) hold the largest difference of theta in
+    each episode; `start` is how far apart the perturbed begin.
     """
     decays = tuple(dict.fromkeys(e.decay for e in perturbed))
     figure, axes = subplots(1, len(decays), 3.4, sharex=True, sharey=True, squeeze=False)

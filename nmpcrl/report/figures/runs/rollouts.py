@@ -42,7 +42,7 @@ def controls(found: Evidence, layout: str) -> Figure:
     learned = [one.actions for one in _learned(drawn) if one.actions is not None]
     if not learned:
         return sourced(figure, "The inputs of no rollout are kept", drawn)
-    outside = sum(metrics.input_violations(one, plant.lower, plant.upper) for one in learned)
+    outside = sum(metrics.out_of_bounds(one, plant.lower, plant.upper).sum() for one in learned)
     used = np.median([np.nanmax(np.abs(one) / plant.upper, axis=0) for one in learned], axis=0)
     names = (name.partition(" [")[0] for name in plant.action_names)
     parts = " and ".join(

@@ -96,7 +96,7 @@ def _ending(records: Records) -> str:
     path = _known(states)
     if len(path) < len(states):
         return f"a solve fails after {len(path)} of {len(states)} steps"
-    inside = metrics.obstacle_violations(states, task).size
+    inside = int((task.overlap(path).max(axis=-1) > metrics.TOUCH).sum())
     away = task.distance(path[-1])
     end = "at the target" if away <= ARRIVED else f"{away:.1f} from the target"
     return f"it ends {end}, with {inside or 'no'} state{'s' * (inside > 1)} in an obstacle"

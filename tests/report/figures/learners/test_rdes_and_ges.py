@@ -77,18 +77,6 @@ def test_es_has_no_correction(study):
     assert parts.net == pytest.approx(1)
 
 
-def test_a_target_runs_ahead_where_the_next_features_are_longer(study):
-    records = one(study, "frozen")
-    features = np.ones_like(records.steps["features"])
-    features[1::2] *= 3
-    made_up = type(records)(
-        records.experiment, {**records.steps, "features": features}, records.evaluations, {}
-    )
-    ahead = metrics.next_over_this(made_up)
-    np.testing.assert_allclose(np.unique(ahead.round(9)), [0.97 / 3, 0.97 * 3], rtol=1e-6)
-    assert metrics.parallel_share(made_up) == 1
-
-
 @pytest.mark.parametrize(
     ("draw", "words"),
     [
