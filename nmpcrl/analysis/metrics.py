@@ -1,7 +1,7 @@
 """Numbers of one run, from its records."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,12 +13,10 @@ from nmpcrl.study import paper
 from nmpcrl.study import records as stored
 from nmpcrl.study.records import Column, Records, StepStatus
 
-if TYPE_CHECKING:
-    from nmpcrl.analysis.summary import Outline
-
 TOUCH = 1e-6  # largest violation that is within the solver's tolerance
 TIGHT = 0.999  # least cosine of parallel features
 LATE = 20  # episodes at the end of training; at most the second half
+Run = Any  # `Records`, or a `RunSummary`, which also has experiment and evaluations
 
 
 def training_cost(records: Records) -> Vector:
@@ -38,17 +36,17 @@ def noise_free_cost(records: Records) -> tuple[Column, Vector]:
     return records.evaluations["episode"], records.evaluations["cost"]
 
 
-def initial_cost(run: "Records | Outline") -> float:
+def initial_cost(run: Run) -> float:
     """Noise-free cost of theta_init."""
     return float(run.evaluations["cost"][0])
 
 
-def final_cost(run: "Records | Outline") -> float:
+def final_cost(run: Run) -> float:
     """Noise-free cost at the end: see `records.final_cost`."""
     return stored.final_cost(run.evaluations["cost"])
 
 
-def late_cost_range(run: "Records | Outline") -> float:
+def late_cost_range(run: Run) -> float:
     """Range of the noise-free cost in the second half of training, relative to the initial cost.
 
     Infinite if a rollout failed, or training ended earlier.
