@@ -115,7 +115,7 @@ def trained(
     """
     from nmpcrl.learning.network import OneThread
 
-    scaled, state = Scaled(env, layouts, settings), list[Any]()
+    scaled, state = _Scaled(env, layouts, settings), list[Any]()
     with _drawing_from(state):
         model = _model(name, scaled, settings, checkpoints[-1], seed)
 
@@ -145,7 +145,7 @@ def seen(observation: Vector) -> Vector:
     return found
 
 
-class Scaled(gymnasium.Env[Any, Any]):
+class _Scaled(gymnasium.Env[Any, Any]):
     """The robot's task in numbers of about 1, for stable-baselines3; it counts episodes and steps.
 
     An episode begins with its first step: stable-baselines3 resets once more after the last one.
