@@ -49,15 +49,12 @@ def targets(bench: Bench) -> list[Target]:
     ]
 
 
-def rows(bench: Bench) -> list[tuple[str, str, str, str]]:
-    """`targets` as a table of texts, its header first."""
-    return table_of(targets(bench))
-
-
-def table_of(listed: Iterable[Target]) -> list[tuple[str, str, str, str]]:
-    """Targets as a table of texts, its header first."""
+def shown(listed: Iterable[Target]) -> str:
+    """Targets as a table for a terminal."""
     texts = [(t.what, t.to_reach, t.measured, t.outcome) for t in listed]
-    return [("what", "target", "measured", "outcome"), *texts]
+    rows = [("what", "target", "measured", "outcome"), *texts]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(" | ".join(map(str.ljust, row, widths)) for row in rows)
 
 
 def _own_loop(bench: Bench) -> Iterator[Target]:

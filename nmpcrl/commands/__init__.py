@@ -20,7 +20,9 @@ from nmpcrl.commands.wasm import wasm
 __all__ = ["main"]
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "show_default": True}
+)
 @click.version_option(__version__, message="nmpcrl %(version)s")
 def main() -> None:
     """Reinforcement learning on top of nonlinear MPC: one paper, reproduced.
@@ -34,16 +36,5 @@ def main() -> None:
     os.environ["MPLBACKEND"] = "agg"  # no command opens a window, whatever is set elsewhere
 
 
-for command in (
-    train,
-    runs,
-    show,
-    study,
-    verify,
-    bench,
-    suite,
-    investigate,
-    grade,
-    wasm,
-):
+for command in (train, runs, show, study, verify, bench, suite, investigate, grade, wasm):
     main.add_command(command)

@@ -1,19 +1,12 @@
 """`nmpcrl bench`: how long solves, steps and runs take."""
 
-from typing import TYPE_CHECKING
-
 import click
-
-if TYPE_CHECKING:
-    from nmpcrl.bench.live import Live
 
 PROBLEMS = 100_000  # of a sweep
 
 
 @click.command()
-@click.option(
-    "--full", "length", flag_value="full", default=True, help="Measure for minutes; the default."
-)
+@click.option("--full", "length", flag_value="full", default=True, help="Measure for minutes.")
 @click.option("--short", "length", flag_value="short", help="Measure what the book needs.")
 @click.option("--smoke", "length", flag_value="smoke", help="Only check that it works.")
 @click.option("--again", is_flag=True, help="Measure even if a benchmark is stored.")
@@ -29,12 +22,7 @@ PROBLEMS = 100_000  # of a sweep
 )
 @click.option("--sizes", is_flag=True, help="Only time problems of many sizes, and beside mpcrl.")
 def bench(
-    length: str,
-    again: bool,
-    publish: bool,
-    live: bool,
-    sweep: int | None,
-    sizes: bool,
+    length: str, again: bool, publish: bool, live: bool, sweep: int | None, sizes: bool
 ) -> None:
     """Measure how long solves, steps and runs take.
 
@@ -60,41 +48,33 @@ def bench(
         click.echo(f"{problem_times.path()}: stored")
     elif publish:
         _publish_timing()
-    elif live:
-        from nmpcrl.bench import live as figures
-
-        _print_live(figures.measure())
     else:
-        _print_times(length, again=again)
+        if not live:
+            _print_times(length, again=again)
+        _print_live(again=live)
 
 
 def _print_times(length: str, *, again: bool) -> None:
     """Print a row for each target, and where the benchmark is stored."""
-    from nmpcrl.bench import live, suite, targets
+    from nmpcrl.bench import suite, targets
 
     measured = suite.measure(length) if again else suite.read_or_measure(length)
-    _print_table(targets.rows(measured))
     about = measured["about"]
-    took = f"{about['length']}, {about['date']}, {about['seconds']:.0f} s"
-    others = f"other programs used up to {about['others']:.0%} of the cores"
-    click.echo(f"{suite.path()}: {took}; {others}")
-    if found := live.stored():
-        _print_live(found)
+    click.echo(targets.shown(targets.targets(measured)))
+    click.echo(
+        f"{suite.path()}: {about['length']}, {about['date']}, {about['seconds']:.0f} s;"
+        f" other programs used up to {about['others']:.0%} of the cores"
+    )
 
 
-def _print_live(found: "Live") -> None:
+def _print_live(*, again: bool) -> None:
     """Print a row for each target of the live figures, and where their times are stored."""
     from nmpcrl.bench import live, targets
     from nmpcrl.bench.live_targets import live_targets
 
-    _print_table(targets.table_of(live_targets(found)))
-    click.echo(f"{live.path()}: {found.get('date', 'of an unknown date')}")
-
-
-def _print_table(rows: list[tuple[str, str, str, str]]) -> None:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        click.echo(" | ".join(map(str.ljust, row, widths)))
+    if found := live.measure() if again else live.stored():
+        click.echo(targets.shown(live_targets(found)))
+        click.echo(f"{live.path()}: {found.get('date', 'of an unknown date')}")
 
 
 def _publish_timing() -> None:

@@ -2,21 +2,18 @@
 
 import csv
 import re
-from collections.abc import Callable
+from dataclasses import astuple, fields
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 
-from nmpcrl.commands.options import FOLDER, NewFile
+from nmpcrl.commands.options import new_file, number
 
 if TYPE_CHECKING:
     from nmpcrl.course.grading import Mark
 
-Command = TypeVar("Command", bound=Callable[..., Any])
-
-FIELDS = ("student", "notebook", "exercise", "points", "of", "why")
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet computes begins so
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]")  # what a terminal obeys
 HEADER = ("student", "notebook", "points", "of", "by hand")
@@ -26,20 +23,15 @@ NO_SANDBOX = (
 )
 
 
-def number(name: str, least: int, default: int, text: str) -> Callable[[Command], Command]:
-    """An option that takes a whole number, `least` or more."""
-    kind = click.IntRange(least)
-    return click.option(name, type=kind, default=default, show_default=True, help=text)
-
-
 @click.command()
-@click.argument("folder", type=FOLDER)
-@click.option("--out", type=NewFile(), required=True, help="A CSV file, one row an exercise.")
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option(
+    "--out", metavar="FILE", type=new_file, required=True, help="A CSV file, one row an exercise."
+)
 @click.option(
     "--edition",
     type=click.Path(file_okay=False, path_type=Path),
-    default=Path("_build/course/grader"),
-    show_default=True,
+    default="_build/course/grader",
     help="What `make course` writes for graders.",
 )
 @number("--time-limit", 1, 600, "Seconds a notebook, all its runs together.")
@@ -47,14 +39,9 @@ def number(name: str, least: int, default: int, text: str) -> Callable[[Command]
 @number("--memory", 100, 2000, "Megabytes a notebook.")
 @number("--workers", 1, 1, "Notebooks at a time.")
 def grade(
-    folder: Path,
-    out: Path,
-    edition: Path,
-    time_limit: int,
-    cell_limit: int,
-    memory: int,
+    folder: Path, out: Path, edition: Path, time_limit: int, cell_limit: int, memory: int,
     workers: int,
-) -> None:
+) -> None:  # fmt: skip
     """Grade the notebooks that students hand in.
 
     FOLDER has a folder of notebooks for each student, or notebooks such as
@@ -94,18 +81,17 @@ def grade(
     first = next(graded)  # an earlier table stays until there is something to write
     with out.open("w", newline="", encoding="utf-8", errors="replace") as file:
         writer = csv.writer(file)
-        writer.writerow(FIELDS)
-        for each in chain([first], graded):
-            rows.append([cell(word) for word in total(each)])
+        writer.writerow(one.name for one in fields(first[0]))
+        for marks in chain([first], graded):
+            rows.append([cell(word) for word in total(marks)])
             student, notebook, got, of, by_hand = rows[-1]
-            writer.writerows([cell(getattr(mark, name)) for name in FIELDS] for mark in each)
+            writer.writerows(map(cell, astuple(mark)) for mark in marks)
             left = f"{by_hand} more are given by hand." if by_hand != "0" else ""
             writer.writerow((student, notebook, "total", got, of, left))
             file.flush()
             click.echo(f"{notebook}: {got} of {of}", err=True)
     click.echo(pd.DataFrame(rows, columns=HEADER).to_string(index=False))
-    click.echo(f"\n{len(rows)} notebooks in {out}")
-    click.echo(NO_SANDBOX)
+    click.echo(f"\n{len(rows)} notebooks in {out}\n{NO_SANDBOX}")
 
 
 def cell(value: object) -> object:
@@ -117,7 +103,7 @@ def cell(value: object) -> object:
 
 def total(marks: "list[Mark]") -> tuple[str, ...]:
     """Of a notebook: points, points to be had from checks, and those that a person gives."""
-    checked = [(mark.points, mark.of) for mark in marks if mark.points is not None]
-    got, of = (sum(pair[k] for pair in checked) for k in (0, 1))
+    checked = [mark for mark in marks if mark.points is not None]
     by_hand = sum(mark.of for mark in marks if mark.points is None)
+    got, of = sum(mark.points or 0 for mark in checked), sum(mark.of for mark in checked)
     return marks[0].student, marks[0].notebook, str(got), str(of), str(by_hand)

@@ -1,30 +1,33 @@
 """`nmpcrl investigate`: make, publish and judge the rows of an investigation."""
 
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 import click
+
+from nmpcrl.commands.options import WORKERS
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from nmpcrl.claims.investigation import Investigation
 
-BOOK = {  # the investigations of the book: module and name of each
-    "agents": ("agents", "SAC_AND_TD3"),
-    "interventions": ("interventions", "INTERVENTIONS"),
-    "other_problems": ("other_problems", "OTHER_PROBLEMS"),
-    "population": ("population", "POPULATION"),
-    "population_layouts": ("difficulty", "DIFFICULTY"),
-    "remedies": ("remedies", "REMEDIES"),
-    "worlds": ("worlds", "WORLDS"),
+BOOK = {  # the investigations of the book, in `nmpcrl.studies`
+    "agents": "agents:SAC_AND_TD3",
+    "interventions": "interventions:INTERVENTIONS",
+    "other_problems": "other_problems:OTHER_PROBLEMS",
+    "population": "population:POPULATION",
+    "population_layouts": "difficulty:DIFFICULTY",
+    "remedies": "remedies:REMEDIES",
+    "worlds": "worlds:WORLDS",
 }
 
 
 @click.command()
 @click.argument("name", metavar="NAME|FILE.py")
 @click.option("--part", "parts", multiple=True, help="Only this part; by default all.")
-@click.option("--workers", metavar="N", type=click.IntRange(1), help="Processes; default: cores.")
+@WORKERS
 @click.option("--dry-run", is_flag=True, help="Only report what is missing, and its price.")
 @click.option("--publish", is_flag=True, help="Add complete arms to the published table.")
 @click.option("--judge", is_flag=True, help="Only print the answers of the published table.")
@@ -45,12 +48,13 @@ def investigate(
       nmpcrl investigate worlds --part moving
       nmpcrl investigate my_study.py --publish
     """
-    one = load(name)
-    for unknown in (part for part in parts if part not in one.parts):
-        known = ", ".join(one.parts)
-        raise click.ClickException(f"part = {unknown!r} must be one of {known}")
+    from nmpcrl.study.parameters import one_of
+
+    one = _load(name)
+    for part in parts:
+        one_of(one.parts).check("part", part)
     if dry_run:
-        report(one, parts or tuple(one.parts))
+        _report(one, parts or tuple(one.parts))
         return
     if not judge:
         made = one.complete(parts, workers)
@@ -58,29 +62,22 @@ def investigate(
             click.echo(f"{one.publish()}: published")
             if not one.registered:
                 click.echo(f"not registered: commit {name} before its rows are made")
-    say(one, made if not (judge or publish) else one.table())
+    _say(one, one.table() if judge or publish else made)
 
 
-def load(name: str) -> "Investigation":
-    """An investigation by its name in `BOOK`, or of a file.
-
-    Raises:
-        ClickException: there is none, or a file defines none or several.
-    """
-    from importlib import import_module
-
+def _load(name: str) -> "Investigation":
+    """An investigation by its name in `BOOK`, or of a file."""
     from nmpcrl.claims.investigation import of_file
 
     if name in BOOK:
-        module, constant = BOOK[name]
-        found: Investigation = getattr(import_module(f"nmpcrl.studies.{module}"), constant)
+        found: Investigation = resolve_name(f"nmpcrl.studies.{BOOK[name]}")
         return found
     if not name.endswith(".py"):
         raise click.ClickException(f"{name!r} must be one of {', '.join(BOOK)}, or a .py file")
     return of_file(Path(name))
 
 
-def report(one: "Investigation", parts: tuple[str, ...]) -> None:
+def _report(one: "Investigation", parts: tuple[str, ...]) -> None:
     """How many rows of each part are stored, and what the others take."""
     from nmpcrl.study.refusal import Refusal
 
@@ -94,13 +91,11 @@ def report(one: "Investigation", parts: tuple[str, ...]) -> None:
         click.echo(f"{part}: {len(every) - len(missing)} of {len(every)} rows are stored{took}")
 
 
-def say(one: "Investigation", table: "pd.DataFrame") -> None:
+def _say(one: "Investigation", table: "pd.DataFrame") -> None:
     """The answer to each question, and the expected one where it differs."""
     from nmpcrl.claims.investigation import WORDS
 
-    answers = one.answers(table)
-    for question in one.questions:
-        answer = answers[question.name]
+    for question, answer in zip(one.questions, one.answers(table).values(), strict=True):
         counts = {**answer.counts, **answer.beside}
         said = ", ".join(f"{yes} of {of} {unit}" for unit, (yes, of) in counts.items())
         click.echo(f"{question.name}: {answer.words} ({said})")

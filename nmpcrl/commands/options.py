@@ -1,45 +1,36 @@
-"""Types of options that several commands have."""
+"""Options of several commands, and the type of a file to write."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
-WORKERS = click.option(
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def number(
+    name: str, least: int, default: int | None, text: str, **options: Any
+) -> Callable[[Command], Command]:
+    """An option that takes a whole number, `least` or more."""
+    kind = click.IntRange(least)
+    return click.option(name, metavar="N", type=kind, default=default, help=text, **options)
+
+
+WORKERS = number(
     "--workers",
-    metavar="N",
-    type=click.IntRange(1),
+    1,
+    None,
+    "Processes; by default, and at most, one per core.",
     callback=lambda ctx, param, count: count and min(count, os.cpu_count() or 1),
-    help="Processes; by default, and at most, one per core.",
 )
-FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
 
 
-class NewFile(click.Path):
-    """A file to write, in a folder that exists and takes files."""
-
-    def __init__(self) -> None:
-        super().__init__(dir_okay=False, writable=True, path_type=Path)
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """The path; refused before any work if no file can be written there."""
-        path = Path(str(super().convert(value, param, ctx)))
-        folder = path.parent
-        if not value or not folder.is_dir() or not os.access(folder, os.W_OK):
-            self.fail(f"{str(value)!r} cannot be written: {folder} is no folder to write to.")
-        return path
-
-
-def refuse_unwritable(folder: Path) -> None:
-    """Make a folder.
-
-    Raises:
-        click.ClickException: files cannot be written there.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise click.ClickException(f"{folder} cannot be made: {error.strerror}") from None
-    if not os.access(folder, os.W_OK):
-        raise click.ClickException(f"{folder} cannot be written")
+def new_file(value: str) -> Path:
+    """The path of a file to write; refused before any work if it cannot be written."""
+    path = Path(value)
+    place = path if path.is_file() else path.parent
+    if not value or path.is_dir() or not (path.parent.is_dir() and os.access(place, os.W_OK)):
+        raise click.BadParameter(f"{value!r} cannot be written: name a file in a writable folder.")
+    return path

@@ -11,16 +11,14 @@ import click
 if TYPE_CHECKING:
     from nmpcrl.study.records import About
 
-COLUMNS = (
-    *("run", "learner", "layout", "decay", "seed", "episodes"),
-    *("cost", "minutes", "kB", "stopped"),
-)
+COLUMNS = ("run", "learner", "layout", "decay", "seed", "episodes",
+           "cost", "minutes", "kB", "stopped")  # fmt: skip
 LISTED = 5  # names in a refusal
 
 
 @click.command()
 @click.argument("name", default="")
-@click.option("--sort", type=click.Choice(COLUMNS), default="run", show_default=True)
+@click.option("--sort", type=click.Choice(COLUMNS), default="run")
 @click.option("--reverse", is_flag=True, help="Largest first.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
 def runs(name: str, sort: str, reverse: bool, as_json: bool) -> None:
@@ -42,19 +40,21 @@ def runs(name: str, sort: str, reverse: bool, as_json: bool) -> None:
     from nmpcrl.study.lock import is_accepted, warn_of_changes
     from nmpcrl.study.store import folder, stored
 
-    found = [(path, about) for path, about in stored().items() if begins(path, name)]
-    rows = sorted((_row(*one) for one in found), key=lambda row: row[sort], reverse=reverse)
+    found = {path: about for path, about in stored().items() if begins(path, name)}
+    rows = {path: _row(path, about) for path, about in found.items()}
+    ordered = sorted(found, key=lambda path: rows[path][sort], reverse=reverse)
     if as_json:
-        places = {path.stem: (path, about) for path, about in found}
-        text = json.dumps([_object(*places[row["run"]]) for row in rows])
-        click.echo(json.dumps(json.loads(text, parse_constant=lambda _: None), indent=1))
-    elif rows:
+        objects = [{"run": p.stem, "path": str(p), **found[p]._asdict()} for p in ordered]
+        finite = json.loads(json.dumps(objects), parse_constant=lambda _: None)
+        click.echo(json.dumps(finite, indent=1))
+    elif found:
         import pandas as pd
 
-        click.echo(pd.DataFrame(rows).to_string(index=False, float_format="{:.1f}".format))
+        table = pd.DataFrame([rows[path] for path in ordered])
+        click.echo(table.to_string(index=False, float_format="{:.1f}".format))
     else:
         click.echo(f"no run {name!r} is stored in {folder()}; `nmpcrl train` trains one")
-    others = sum(not is_accepted(one.facts.get("sources")) for _, one in found)
+    others = sum(not is_accepted(one.facts.get("sources")) for one in found.values())
     if others:
         click.echo(f"{others} of them are of other code, whose numbers may differ", err=True)
     warn_of_changes()
@@ -87,19 +87,12 @@ def stored_run(name: str) -> Path:
 
 
 def _row(path: Path, about: "About") -> dict[str, Any]:
-    """A line of the table."""
+    """A run by column."""
     from nmpcrl.study import Experiment
     from nmpcrl.study.geometry import short_name
 
-    fields, facts = about
-    e = Experiment(**fields)
-    values = (e.learner, short_name(e.layout), e.decay, e.seed, e.episodes)
-    cost, minutes = facts["final_cost"], facts["seconds"] / 60
+    e, facts = Experiment(**about.experiment), about.facts
+    cost, minutes, size = facts["final_cost"], facts["seconds"] / 60, path.stat().st_size / 1000
     stopped = shorten(facts["stopped"], 60, placeholder=" ...")
-    measured = (cost, minutes, path.stat().st_size / 1000, stopped)
-    return dict(zip(COLUMNS, (path.stem, *values, *measured), strict=True))
-
-
-def _object(path: Path, about: "About") -> dict[str, Any]:
-    """An element of the JSON."""
-    return {"run": path.stem, "path": str(path), **about._asdict()}
+    named = (path.stem, e.learner, short_name(e.layout), e.decay, e.seed, e.episodes)
+    return dict(zip(COLUMNS, (*named, cost, minutes, size, stopped), strict=True))

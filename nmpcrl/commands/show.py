@@ -5,13 +5,13 @@ from pathlib import Path
 
 import click
 
-from nmpcrl.commands.options import NewFile
+from nmpcrl.commands.options import new_file
 from nmpcrl.commands.runs import stored_run
 
 
 @click.command()
 @click.argument("run")
-@click.option("--out", metavar="PATH", type=NewFile(), help="PATH.svg or PATH.png; by default SVG.")
+@click.option("--out", metavar="PATH", type=new_file, help="PATH.svg or PATH.png; by default SVG.")
 def show(run: str, out: Path | None) -> None:
     """Draw RUN on one page.
 

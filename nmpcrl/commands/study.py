@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from nmpcrl.commands.options import WORKERS, NewFile, refuse_unwritable
+from nmpcrl.commands.options import WORKERS, new_file
 
 
 @click.command()
@@ -13,18 +13,13 @@ from nmpcrl.commands.options import WORKERS, NewFile, refuse_unwritable
 @WORKERS
 @click.option("--scheduler", metavar="ADDRESS", help="Dask cluster that trains instead.")
 @click.option("--dry-run", is_flag=True, help="Only report what is missing.")
-@click.option("--table", metavar="PATH", type=NewFile(), help="Write a CSV row per episode.")
+@click.option("--table", metavar="PATH", type=new_file, help="Write a CSV row per episode.")
 @click.option("--publish", is_flag=True, help="Write the runs to book/published.")
 @click.option("--judge", is_flag=True, help="Only show the verdicts on the published study.")
 def study(
-    parts: tuple[str, ...],
-    workers: int | None,
-    scheduler: str | None,
-    dry_run: bool,
-    table: Path | None,
-    publish: bool,
-    judge: bool,
-) -> None:
+    parts: tuple[str, ...], workers: int | None, scheduler: str | None, dry_run: bool,
+    table: Path | None, publish: bool, judge: bool,
+) -> None:  # fmt: skip
     """Train the runs of the study that are not stored.
 
     Finished runs are stored, so the study can be interrupted and started again.
@@ -36,29 +31,26 @@ def study(
       nmpcrl study --part main --table episodes.csv.gz
     """
     from nmpcrl.analysis import summaries
-    from nmpcrl.study import cluster, design
+    from nmpcrl.study import cluster, design, published
     from nmpcrl.study.limits import seconds_of
+    from nmpcrl.study.parameters import one_of
 
     if judge:
         _judge()
         return
     every = design.whole_study()
-    if unknown := sorted(set(parts) - set(every.values())):
-        known = ", ".join(dict.fromkeys(every.values()))
-        raise click.ClickException(f"there is no part {unknown[0]!r}; the parts are {known}")
+    for part in parts:
+        one_of(dict.fromkeys(every.values())).check("part", part)
     wanted = {e: part for e, part in every.items() if not parts or part in parts}
     if publish:
-        from nmpcrl.claims import published
-
-        refuse_unwritable(published.place())
+        published.folder().mkdir(parents=True, exist_ok=True)  # where it cannot be, before any work
     missing = [e for e in wanted if not summaries.is_stored(e)]
     stored = f"{len(wanted) - len(missing):,} of {len(wanted):,} runs are stored"
     hours = sum(map(seconds_of, missing)) / 3600
     click.echo(f"{stored} in {summaries.folder()}; the others take about {hours:.1f} h of one core")
     if dry_run:
         return
-    there = cluster.executor(scheduler) if scheduler else nullcontext()
-    with there as executor:
+    with cluster.executor(scheduler) if scheduler else nullcontext() as executor:
         found = summaries.fetch_summaries(
             wanted, executor=executor, workers=workers, strict=publish
         )
@@ -82,8 +74,8 @@ def study(
 
 
 def _judge() -> None:
-    """The verdicts on the published study, a line each."""
-    from nmpcrl.claims import published
+    """Print the verdicts on the published study, a line each."""
+    from nmpcrl.claims.published import load
 
-    for verdict in published.load().verdicts:
+    for verdict in load().verdicts:
         click.echo(f"{verdict.claim} {verdict.words}")

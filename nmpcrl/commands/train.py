@@ -30,7 +30,6 @@ def _option(one: "Field[Any]") -> click.Option:
         [one.name, f"--{name}/--no-{name}" if switch else f"--{name}"],
         type=vector if kind is tuple else kind,
         default=one.default,
-        show_default=True,
         help=text if switch else f"{text.rstrip('.')}: {one.metadata['allowed'].text}.",
         metavar={str: "NAME", tuple: "NUMBERS", int: "N", float: "X"}.get(kind),
     )

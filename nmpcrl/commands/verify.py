@@ -10,9 +10,7 @@ RELOCKED = 60  # runs that are trained afresh before the code is locked anew
 
 
 @click.command()
-@click.option(
-    "--sample", type=click.IntRange(0), default=0, help="Train so many more runs and compare them."
-)
+@click.option("--sample", metavar="N", default=0, help="Train N more runs and compare them.")
 @click.option("--relock", is_flag=True, help="Check that an edit changes no bit; lock the code.")
 @WORKERS
 def verify(sample: int, relock: bool, workers: int | None) -> None:
@@ -24,20 +22,19 @@ def verify(sample: int, relock: bool, workers: int | None) -> None:
     """
     from nmpcrl.analysis import summaries
     from nmpcrl.claims import published, reproduce
+    from nmpcrl.study.parameters import whole
 
     known = published.load()
-    if sample > len(known.rows):
-        raise click.BadParameter(
-            f"{sample} is more than the {len(known.rows):,} published runs.", param_hint="--sample"
-        )
+    whole(0, len(known.rows)).check("sample", sample)
     if relock:
         done = reproduce.relock(known, sample or RELOCKED, workers=workers)
         said = f"{done.published + done.stored} runs trained again gave the same bits"
         click.echo(f"{said}, {done.published} as published, {done.stored} as stored: {done.lock}")
         return
-    stored = {e for e in known.rows if summaries.path_of(e).exists()}
-    rest = {e: part for e, part in known.variants.items() if e not in stored}
-    wanted = {*stored, *(reproduce.sample(replace(known, variants=rest), sample) if sample else ())}
+    wanted = {e for e in known.rows if summaries.path_of(e).exists()}
+    if sample:
+        rest = {e: part for e, part in known.variants.items() if e not in wanted}
+        wanted |= {*reproduce.sample(replace(known, variants=rest), sample)}
     if not wanted:
         raise click.ClickException(
             "no run of the study was trained here; --sample 5 trains five for the comparison"

@@ -1,32 +1,23 @@
 """`nmpcrl wasm`: the controller of a plant, or of a problem, as a WebAssembly module."""
 
-import importlib
 import sys
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import click
 
-from nmpcrl.commands.options import NewFile
+from nmpcrl.commands.options import new_file
 
 ROBOT = "nmpcrl.control:differential_drive"
 
 
 @click.command()
-@click.option(
-    "--plant",
-    "of_plant",
-    default=ROBOT,
-    metavar="MODULE:NAME",
-    help="Of a Plant.",
-    show_default=True,
-)
-@click.option("--task", "of_task", metavar="MODULE:NAME", help="Of a Task; by default the paper's.")
-@click.option(
-    "--problem", "of_problem", metavar="MODULE:NAME", help="Of a Problem, instead of both."
-)
-@click.option("--out", type=NewFile(), default="nmpc.wasm", show_default=True)
-def wasm(of_plant: str, of_task: str | None, of_problem: str | None, out: Path) -> None:
+@click.option("--plant", default=ROBOT, metavar="MODULE:NAME", help="Of a Plant.")
+@click.option("--task", metavar="MODULE:NAME", help="Of a Task; by default the paper's.")
+@click.option("--problem", metavar="MODULE:NAME", help="Of a Problem, instead of both.")
+@click.option("--out", metavar="FILE", type=new_file, default="nmpc.wasm")
+def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
     """Compile what solves and learns to WebAssembly.
 
     It holds the solver, the update rules and the network, and runs in any
@@ -48,19 +39,15 @@ def wasm(of_plant: str, of_task: str | None, of_problem: str | None, out: Path) 
     from nmpcrl.learning import browser
     from nmpcrl.study import paper
 
-    of: tuple[Any, ...]
-    if of_problem is not None:
-        if of_task is not None or of_plant != ROBOT:
-            raise click.ClickException("a Problem has no Plant and no Task beside it")
-        of = (named(of_problem, Problem),)
+    if problem and (task or plant != ROBOT):
+        raise click.ClickException("a Problem has no Plant and no Task beside it")
+    if problem:
+        of = [_named(problem, Problem)]
     else:
-        plant = named(of_plant, Plant)
-        task = paper.task() if of_task is None else named(of_task, Task)
-        if task.start.size != plant.n:
-            raise click.ClickException(
-                f"the task has {task.start.size} states, the plant {plant.n}"
-            )
-        of = plant, task
+        of = [_named(plant, Plant), _named(task, Task) if task else paper.task()]
+        states, start = of[0].n, of[1].start.size
+        if start != states:
+            raise click.ClickException(f"the task has {start} states, the plant {states}")
     try:
         module = browser.module(*of)
     except (CannotCompile, RuntimeError) as error:
@@ -70,21 +57,15 @@ def wasm(of_plant: str, of_task: str | None, of_problem: str | None, out: Path) 
     click.echo(f"{name}: {size:.0f} kB; its host gives it functions of JavaScript's Math.")
 
 
-def named(name: str, kind: type) -> Any:
-    """The object called MODULE:NAME, or what it returns; the working directory is searched, too.
-
-    Raises:
-        click.ClickException: there is none, or it is not of this kind.
-    """
-    module, _, attribute = name.partition(":")
+def _named(name: str, kind: type) -> Any:
+    """The object called MODULE:NAME, or what it returns; the working directory is searched, too."""
     sys.path.insert(0, str(Path.cwd()))
     try:
-        found = getattr(importlib.import_module(module), attribute)
+        found = resolve_name(name)
         found = found() if callable(found) else found
     except (ImportError, AttributeError, TypeError, ValueError) as error:
-        raise click.ClickException(
-            f"{name!r} names no {kind.__name__}, as MODULE:NAME would: {error}"
-        ) from None
+        said = f"{name!r} names no {kind.__name__}, as MODULE:NAME would: {error}"
+        raise click.ClickException(said) from None
     finally:
         sys.path.pop(0)
     if not isinstance(found, kind):

@@ -98,10 +98,3 @@ def test_a_file_that_defines_no_investigation_is_refused(tmp_path, content, said
         path.write_text(content)
     with pytest.raises(NoInvestigation, match=said):
         of_file(path)
-
-
-@pytest.mark.parametrize("asked", [("nowhere",), ("worlds", "--part", "nothing")])
-def test_unknown_names_are_refused_with_those_that_there_are(command, asked):
-    said = command("investigate", *asked)
-    assert said.exit_code == 1
-    assert "must be one of" in said.stderr

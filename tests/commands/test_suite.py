@@ -8,12 +8,6 @@ pytestmark = pytest.mark.usefixtures("trains_here")
 FROZEN = ("--policy", "frozen", "--budget", "1", "--layouts")
 
 
-def said(ended):
-    assert ended.exit_code == 1
-    (line,) = [line for line in ended.stderr.splitlines() if line.startswith("Error: ")]
-    return line
-
-
 def test_a_row_is_printed_and_says_among_moving_obstacles_how_often_none_is_entered(command):
     head, row = command("suite", *FROZEN, "2").stdout.splitlines()
     assert head.split() == ["entry", "layouts", "solved", "gain", "episodes", "CPU", "time"]
@@ -26,18 +20,6 @@ def test_a_row_is_printed_and_says_among_moving_obstacles_how_often_none_is_ente
     assert command("suite", "--list").stdout.split() == [*ENTRIES]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ((), "--policy names an entry"),
-        (("--policy", "nonsense"), "must be MODULE:FACTORY or one of frozen"),
-        ((*FROZEN, "41", "--moving"), "layouts = 41 must be a whole number from 1 to 40"),
-    ],
-)
-def test_a_mistake_ends_in_a_sentence(command, words, message):
-    assert message in said(command("suite", *words))
-
-
 def test_an_entry_that_exceeds_the_budget_is_disqualified(command, tmp_path, monkeypatch):
     (tmp_path / "greedy_entry.py").write_text(
         "from nmpcrl.study import paper\n"
@@ -48,7 +30,6 @@ def test_an_entry_that_exceeds_the_budget_is_disqualified(command, tmp_path, mon
     monkeypatch.chdir(tmp_path)
     words = ("--budget", "1", "--layouts", "1", "--seeds", "1")
     ended = command("suite", "--policy", "greedy_entry:factory", *words)
-    assert said(ended) == (
-        "Error: greedy_entry:factory is disqualified: it began more than 1 episodes in J001"
-    )
+    said = "greedy_entry:factory is disqualified: it began more than 1 episodes in J001"
+    assert ended.stderr.endswith(f"Error: {said}\n")
     assert "disqualified" in ended.stdout
