@@ -110,19 +110,11 @@ def both(*edits: Edit) -> Edit:
 
 
 ADDED_LEARNERS = """\
-    "half": Entry(
-        lambda e, nmpc, _: half_expected_sarsa(nmpc, e.alpha), step_size=lambda e: e.alpha / 2
-    ),
+    "half": Entry(lambda e, nmpc, _: half_expected_sarsa(nmpc, e.alpha)),
     "slow": Entry(
         lambda e, nmpc, _: slow_gradient_expected_sarsa(nmpc, e.alpha, e.beta), (*VALUING, "beta")
     ),
-    "shy": Entry(
-        partial(_network_learner, shy_deep_expected_sarsa, with_theta=False),
-        IMITATING,
-        network=True,
-        solves=1,
-        step_size=lambda e: e.alpha / 3,
-    ),
+    "shy": _imitating(shy_deep_expected_sarsa, with_theta=False),
 """
 
 EDITS: dict[str, dict[str, Edit]] = {  # what is added in which file, by row
@@ -325,7 +317,6 @@ half, es = run(Experiment("half", **short)), run(Experiment(alpha=Experiment().a
 assert half.facts["stopped"] == "finished"
 assert (half.steps["theta"][-1] != half.experiment["theta"]).any()
 assert (half.steps["theta"] == es.steps["theta"]).all()
-assert (half.steps["alpha_phi2"] == es.steps["alpha_phi2"]).all()
 style.line("half")
 
 from nmpcrl.study.provenance import key, versions
@@ -348,7 +339,6 @@ assert "torch" in versions(Experiment("shy")) and "torch" not in versions(Experi
 third, des = Experiment("shy", **fit), Experiment("DES", alpha=Experiment().alpha / 3, **fit)
 third, des = run(third), run(des)
 assert (third.steps["theta"] == des.steps["theta"]).all()
-assert (third.steps["alpha_phi2"] == des.steps["alpha_phi2"]).all()
 """,
     "layout": """
 from nmpcrl.study import Experiment, design, layouts, paper, run

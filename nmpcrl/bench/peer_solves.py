@@ -58,14 +58,15 @@ def gros_zanon(solver: str = "riccati") -> Peers:
     problem, rate = gz.problem(), 1e-4
     agent = csnlp.agent(csnlp.gros_zanon_plan(TIGHT), problem, GradientDescent(rate))
     ours = (Nmpc(problem, solver=solver), problem.theta, gz.START, gz.plant)
-    return Peers("Gros and Zanon", *ours, agent, csnlp.World, rate)
+    world = partial(csnlp.world, problem, gz.plant, gz.START)
+    return Peers("Gros and Zanon", *ours, agent, world, rate)
 
 
 def linear(solver: str = "riccati") -> Peers:
     """The linear plant with a quadratic cost, whose truth is known."""
     problem, rate = lqr.problem(), 3e-5
     agent = csnlp.agent(csnlp.lqr_plan(TIGHT), problem, GradientDescent(rate))
-    world = partial(csnlp.World, plant=lqr.plant, start=lqr.START, most=np.inf)
+    world = partial(csnlp.world, problem, lqr.plant, lqr.START)
     ours = (Nmpc(problem, solver=solver), problem.theta, lqr.START, lqr.plant)
     return Peers("linear-quadratic", *ours, agent, world, rate)
 

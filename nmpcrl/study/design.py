@@ -88,7 +88,7 @@ def perturbed(experiment: Experiment) -> Experiment:
 
 def perturbed_pairs(**fields: Any) -> tuple[Pair, ...]:
     """Every learner's run and its perturbed replica; `fields` as `paper_runs` takes them."""
-    moving = [e for e in paper_runs(**fields) if LEARNERS[e.learner].moves]
+    moving = [e for e in paper_runs(**fields) if e.learner != "frozen"]
     return tuple((e, perturbed(e)) for e in moving)
 
 

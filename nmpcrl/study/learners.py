@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -25,8 +24,6 @@ from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import count_episodes, count_steps
 from nmpcrl.study import paper
 
-SMALL_BUFFER = 10 * paper.STEPS  # examples
-AVERAGING = 0.005  # rate of the averaged copy: Fujimoto et al. (2018)
 LEAST_SCALE = 1e-3  # of an input of the normalised network
 
 Settings = Any  # an `Experiment`
@@ -60,55 +57,19 @@ NETWORKS = {
     "plain": Network(),
     "normalised": Network(normalised=True),
     "tanh": Network({"activation": "tanh"}),
-    "small buffer": Network({"memory": SMALL_BUFFER}),
+    "small buffer": Network({"memory": 10 * paper.STEPS}),  # examples
     "four fits": Network(fits=4),
     "lagged": Network(target=lambda e: {"every": e.steps}),  # refreshed once an episode
-    "averaged": Network(target=lambda _: {"rate": AVERAGING}),
+    "averaged": Network(target=lambda _: {"rate": 0.005}),  # Fujimoto et al. (2018)
     "greedy": Network(greedy=True),
     "late": Network(late=True),
 }
 
 
-def _network_learner(
-    make: Callable[..., Learner],
-    settings: Settings,
-    controller: Persistent,
-    generators: Generators,
-    *,
-    with_theta: bool,
-) -> Learner:
-    """A learner whose network predicts the next value."""
-    from nmpcrl.learning.network import QNetwork, Target  # and torch: not for the other learners
-
-    nmpc, read = controller.nmpc, NETWORKS[settings.network]
-    options = read.options
-    if read.normalised:
-        scales = _scales(controller, np.array(settings.theta), with_theta=with_theta)
-        options = {**options, "scales": scales}
-    network = QNetwork(
-        nmpc.n + nmpc.m + with_theta * len(settings.theta),
-        generators.network,
-        learning_rate=settings.zeta,
-        batch=paper.BATCH,
-        hidden=paper.HIDDEN,
-        **options,
-    )
-    return make(
-        controller,
-        network,
-        settings.alpha,
-        gated=settings.gated,
-        fits=read.fits,
-        target=Target(network, **read.target(settings)) if read.target else None,
-        late=read.late,
-        actions=(nmpc.lower, nmpc.upper) if read.greedy else None,
-    )
-
-
 def _scales(controller: Persistent, theta: Vector, *, with_theta: bool) -> tuple[Vector, float]:
     """The scales of the normalised network's inputs and of its target.
 
-    A state is divided by the box's half width, or by pi where it has none; an action by its bound;
+    A state is divided by the box's half width, or by pi without a box; an action by its bound;
     theta by theta_init; the value by the value of theta_init at the start.
     """
     nmpc = controller.nmpc
@@ -130,8 +91,7 @@ def _tdc(settings: Settings, controller: Persistent, _: Generators) -> Learner:
     )
 
 
-# Fields read by learners that move theta, by those that solve for V(s) or Q(s, a), and by those
-# with a network.
+# Fields read by learners that move theta, that solve for V(s) or Q(s, a), and with a network.
 MOVING = ("alpha", "ties_active")
 VALUING = (*MOVING, "constrained")
 IMITATING = (*VALUING, "zeta", "gated", "network")
@@ -139,24 +99,46 @@ IMITATING = (*VALUING, "zeta", "gated", "network")
 
 @dataclass(frozen=True)
 class Entry:
-    """A learner that experiments can name.
-
-    A field of `Experiment` that only some learners read is part of the keys of their runs alone.
-    """
+    """A learner that experiments can name."""
 
     make: Factory
     reads: tuple[str, ...] = VALUING  # fields that only some learners read
     network: bool = False  # whether a network learns: torch is part of the keys then
     solves: int = 2  # a step, without the one for Q(s, a)
-    step_size: Callable[[Settings], float] = lambda e: e.alpha  # of theta
-    moves: bool = True  # whether theta moves
     valued: bool = False  # whether Q(s, a) is always learned, with u_0 = a fixed
     curved: bool = False  # whether the Hessian of the value is used
 
 
 def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:
     """The entry of a learner whose network predicts the next value."""
-    factory = partial(_network_learner, make, with_theta=with_theta)
+
+    def factory(settings: Settings, controller: Persistent, generators: Generators) -> Learner:
+        from nmpcrl.learning.network import QNetwork, Target  # torch: not for the other learners
+
+        nmpc, read, options = controller.nmpc, NETWORKS[settings.network], {}
+        if read.normalised:
+            scales = _scales(controller, np.array(settings.theta), with_theta=with_theta)
+            options = {"scales": scales}
+        network = QNetwork(
+            nmpc.n + nmpc.m + with_theta * len(settings.theta),
+            generators.network,
+            learning_rate=settings.zeta,
+            batch=paper.BATCH,
+            hidden=paper.HIDDEN,
+            **options,
+            **read.options,
+        )
+        return make(
+            controller,
+            network,
+            settings.alpha,
+            gated=settings.gated,
+            fits=read.fits,
+            target=Target(network, **read.target(settings)) if read.target else None,
+            late=read.late,
+            actions=(nmpc.lower, nmpc.upper) if read.greedy else None,
+        )
+
     return Entry(factory, IMITATING, network=True, solves=1)
 
 
@@ -169,13 +151,7 @@ LEARNERS: dict[str, Entry] = {
     ),
     "TDC": Entry(_tdc, (*VALUING, "curvature", "projected", "beta_tdc"), curved=True),
     "QL": Entry(lambda e, nmpc, _: q_learning(nmpc, e.alpha), MOVING, valued=True),
-    "frozen": Entry(
-        lambda _, nmpc, __: frozen(nmpc),
-        reads=(),
-        solves=1,
-        step_size=lambda _: paper.ALPHA,  # of the ES that the run is compared with
-        moves=False,
-    ),
+    "frozen": Entry(lambda _, nmpc, __: frozen(nmpc), reads=(), solves=1),
     "matched": Entry(lambda e, nmpc, _: step_matched(nmpc, e.alpha, e.beta), (*VALUING, "beta")),
     "random": Entry(lambda e, nmpc, rngs: random_direction(nmpc, e.alpha, rngs.directions)),
 }

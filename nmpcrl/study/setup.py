@@ -10,7 +10,6 @@ import numpy as np
 from nmpcrl.control import SolverError
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning import Learner, Weights
-from nmpcrl.learning.environment import environment, forecasts
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Exploration
 from nmpcrl.study import paper
@@ -28,7 +27,7 @@ class Job:
     learner: Learner
     weights: Weights
     explore: Exploration
-    alpha: float  # of the column alpha ||phi||^2
+    alpha: float  # step size of theta, for the column alpha ||phi||^2
     evaluate_every: int
     options: dict[str, Any]  # of `train` alone
     environment: dict[str, Any] = field(default_factory=dict)  # of `train` and `evaluate`
@@ -52,9 +51,8 @@ def job_of(named: Experiment | Trial) -> Job:
     experiment = named.canonical
     controller = controller_of(experiment)
     options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
-    alpha = LEARNERS[experiment.learner].step_size(experiment)
     return Job(
-        asdict(experiment), controller, *prepare(experiment, controller), alpha,
+        asdict(experiment), controller, *prepare(experiment, controller), experiment.alpha,
         experiment.evaluate_every, options,
     )  # fmt: skip
 
@@ -97,7 +95,11 @@ def controller_of(experiment: Experiment) -> Persistent:
 def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
     """Compile the functions of some runs, so that their processes find them compiled."""
     named = tuple(named)
-    _compile_trials(one for one in named if isinstance(one, Trial))
+    for trial in {one.nmpc.key: one for one in named if isinstance(one, Trial)}.values():
+        theta = np.array(trial.theta)
+        with suppress(SolverError):
+            plan = trial.nmpc.solve(np.zeros(trial.nmpc.n), theta)
+            trial.nmpc.solve(plan.state, theta, plan, plan.action)
     kinds = {
         (e.layout, e.start, e.target, e.box, e.solver, LEARNERS[e.learner].curved): e
         for e in named
@@ -111,18 +113,6 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
         nmpc.task.stage_cost(solution.state, solution.action)
         if LEARNERS[experiment.learner].curved:
             nmpc.value_hessian_times(solution, theta)
-
-
-def _compile_trials(trials: Iterable[Trial]) -> None:
-    """Solve once with each controller of some trials, with and without a fixed action."""
-    for trial in {one.nmpc.key: one for one in trials}.values():
-        around = environment(trial.nmpc, trial.plant, trial.start)
-        state, theta = around.start(np.random.default_rng(trial.seed)), np.array(trial.theta)
-        ahead = forecasts(trial.data, trial.nmpc.horizon)
-        known = ahead and ahead(0)
-        with suppress(SolverError):
-            plan = trial.nmpc.solve(state, theta, data=known)
-            trial.nmpc.solve(state, theta, plan, plan.action, data=known)
 
 
 def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, Weights, Exploration]:

@@ -39,11 +39,11 @@ def test_a_learner_is_what_its_entry_says_and_reads_only_what_its_entry_names(na
         assert hasattr(learner.bootstrap, "network") == entry.network
         if entry.network:
             assert learner.bootstrap.fits == NETWORKS[network].fits
-        assert entry.step_size(experiment) == (3e-7 if entry.moves else paper.ALPHA)
         read |= experiment.read & OPTIONAL
     wherever = {"constrained", "ties_active"}  # read by the experiment and its controller
     assert read <= set(entry.reads) <= read | wherever
-    assert job_of(Experiment(name, episodes=1)).alpha == paper.ALPHA
+    expected = paper.ALPHA if name == "frozen" else 3e-7
+    assert job_of(Experiment(name, episodes=1, alpha=3e-7)).alpha == expected
 
 
 @pytest.mark.parametrize("name", LEARNERS)
@@ -51,7 +51,7 @@ def test_a_step_makes_the_solves_of_its_entry_and_theta_moves_where_it_says(name
     wanted = Experiment(name, episodes=2, steps=70)  # a network is fitted in the second
     steps = run(wanted).steps
     assert steps["solves"][-1] == LEARNERS[name].solves + wanted.values_actions
-    assert (steps["theta"][-1] != steps["theta"][0]).any() == LEARNERS[name].moves
+    assert (steps["theta"][-1] != steps["theta"][0]).any() == (name != "frozen")
 
 
 def test_each_purpose_of_a_seed_has_a_generator_of_its_own(monkeypatch):

@@ -4,41 +4,38 @@ Plan, plant and agent of `gros_zanon` are those of mpcrl's example of Q-learning
 for each transition, with the outer product of Q's gradient for a Hessian, and no exploration.
 """
 
+import operator
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
-import gymnasium
 import numpy as np
 from csnlp import Nlp
 from csnlp.wrappers import Mpc
+from gymnasium.wrappers import TransformReward
 from mpcrl import LearnableParameter, LearnableParametersDict, LstdQLearningAgent
 from mpcrl.core.errors import MpcSolverError
 from mpcrl.optim import NewtonMethod
 
 from nmpcrl import Vector
-from nmpcrl.control import Problem
+from nmpcrl.control import Nmpc, Problem
 from nmpcrl.learning.environment import StepFunction
+from nmpcrl.learning.gymnasium import as_gymnasium
 from nmpcrl.study.problems import gros_zanon as gz
 from nmpcrl.study.problems import lqr
 
 RATE = 0.05  # of mpcrl's example
 IPOPT = {"print_level": 0, "sb": "yes", "max_iter": 500}
-SOLVERS: Mapping[str, tuple[str, dict[str, Any]]] = MappingProxyType(
-    {
-        "ipopt": ("ipopt", {"ipopt": IPOPT}),
-        "ipopt, 1e-10": ("ipopt", {"ipopt": IPOPT | {"tol": 1e-10}}),
-        "ipopt, exact": ("ipopt", {"ipopt": IPOPT | {"tol": 1e-10, "bound_relax_factor": 0.0}}),
-        "fatrop": ("fatrop", {"fatrop": {"max_iter": 500, "print_level": 0}}),
-    }
-)
+SOLVERS: dict[str, dict[str, Any]] = {
+    "ipopt": {"ipopt": IPOPT},
+    "ipopt, 1e-10": {"ipopt": IPOPT | {"tol": 1e-10}},
+    "ipopt, exact": {"ipopt": IPOPT | {"tol": 1e-10, "bound_relax_factor": 0.0}},
+    "fatrop": {"fatrop": {"max_iter": 500, "print_level": 0}},
+}
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
+class Run(NamedTuple):
     """An episode of the agent; a failed solve ends it."""
 
     costs: Vector  # of each step
@@ -46,21 +43,28 @@ class Run:
 
 
 def run(solver: str, seed: int, steps: int) -> Run:
-    """Train mpcrl's agent for an episode of `gros_zanon`.
+    """Train mpcrl's agent for an episode of `gros_zanon`, whose disturbance has a seed.
 
-    Args:
-        solver: a name in `SOLVERS`.
-        seed: of the disturbance.
-        steps: of the episode.
+    `solver` is a name in `SOLVERS`.
     """
-    world = World(steps)
+    costs, disturbances = [], []
+
+    def plant(state: Vector, action: Vector, rng: np.random.Generator) -> tuple[Any, ...]:
+        later, cost, end = gz.plant(state, action, rng)
+        costs.append(cost)
+        disturbances.append(float(later[0] - (gz.TRUE_A @ state + gz.TRUE_B @ action)[0]))
+        return later, cost, end
+
     with silent(), suppress(MpcSolverError):
-        agent(gros_zanon_plan(solver)).train(world, episodes=1, seed=seed)
-    disturbances = [
-        float(later[0] - (gz.TRUE_A @ state + gz.TRUE_B @ action)[0])
-        for state, action, later in world.transitions
-    ]
-    return Run(np.array(world.costs), np.array(disturbances))
+        there = world(gz.problem(), plant, gz.START, steps)
+        agent(gros_zanon_plan(solver)).train(there, episodes=1, seed=seed)
+    return Run(np.array(costs), np.array(disturbances))
+
+
+def world(problem: Problem, plant: StepFunction, start: Vector, steps: int) -> Any:
+    """A plant as mpcrl's agent meets it: a Gymnasium environment whose reward is the cost."""
+    env = as_gymnasium(Nmpc(problem), plant=plant, start=start, steps=steps)
+    return TransformReward(env, operator.neg)
 
 
 def agent(
@@ -133,38 +137,9 @@ def _begin(problem: Problem) -> tuple[Mpc, dict[str, Any]]:
 def _end(plan: Mpc, objective: Any, solver: str) -> Mpc:
     """The plan with its objective and its solver."""
     plan.minimize(objective)
-    name, options = SOLVERS[solver]
     common = {"expand": True, "print_time": False, "bound_consistency": True, "calc_lam_p": False}
-    plan.init_solver(common | options, solver=name, type="nlp")
+    plan.init_solver(common | SOLVERS[solver], solver=next(iter(SOLVERS[solver])), type="nlp")
     return plan
-
-
-class World(gymnasium.Env):
-    """A plant as a Gymnasium environment that records its costs and transitions."""
-
-    def __init__(
-        self, steps: int, plant: StepFunction = gz.plant, start: Vector = gz.START, most: float = 1
-    ) -> None:
-        self.action_space = gymnasium.spaces.Box(-most, most, (1,), dtype=float)
-        self.costs: list[float] = []
-        self.transitions: list[tuple[Vector, Vector, Vector]] = []  # state, action, next state
-        self._steps, self._plant, self._start = steps, plant, start
-
-    def reset(
-        self, *, seed: int | None = None, options: Any = None
-    ) -> tuple[Vector, dict[str, Any]]:
-        """Return to the start."""
-        super().reset(seed=seed)
-        self._state = self._start
-        return self._state, {}
-
-    def step(self, action: Any) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
-        """Next state, cost, whether the episode is over, whether it was cut short, nothing."""
-        state, action = self._state, np.asarray(action, float).ravel()
-        self._state, cost, end = self._plant(state, action, self.np_random)
-        self.costs.append(cost)
-        self.transitions.append((state, action, self._state))
-        return self._state, cost, end, len(self.costs) >= self._steps, {}
 
 
 @contextmanager

@@ -66,10 +66,16 @@ def test_value_and_action_are_csnlps(nmpc):
 
 
 def test_the_agent_of_the_peer_meets_our_plant():
-    world = peers.World(3, plant=lqr.plant, start=lqr.START, most=np.inf)
+    calls = []
+
+    def plant(state, action, rng):
+        calls.append((state, action))
+        return lqr.plant(state, action, rng)
+
+    world = peers.world(lqr.problem(), plant, lqr.START, 3)
     with peers.silent():
-        peers.agent(peers.lqr_plan("ipopt, 1e-10"), lqr.problem()).train(world, episodes=1, seed=0)
-    first, action, later = world.transitions[0]
-    expected, cost, _ = lqr.plant(first, action, None)
-    np.testing.assert_array_equal(later, expected)
-    assert (len(world.costs), world.costs[0]) == (3, cost)
+        agent = peers.agent(peers.lqr_plan("ipopt, 1e-10"), lqr.problem())
+        (returns,) = agent.train(world, episodes=1, seed=0)
+    assert len(calls) == 3
+    np.testing.assert_array_equal(calls[1][0], lqr.plant(*calls[0], None)[0])
+    assert returns == pytest.approx(sum(lqr.plant(*one, None)[1] for one in calls))
