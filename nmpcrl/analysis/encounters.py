@@ -56,15 +56,13 @@ def crowding(motions: Sequence[Motion]) -> float:
     The points are a grid of the rectangle from start to target, enlarged by a disc to either side;
     each at the time of a robot with constant speed along x, five seconds earlier to later.
     """
-    start, target = np.array(paper.START[:2]), np.array(paper.TARGET[:2])
-    low, high = np.minimum(start, target), np.maximum(start, target)
+    low, high = np.sort([paper.START[:2], paper.TARGET[:2]], axis=0)
     xs = np.arange(low[0], high[0], GRID)
     ys = np.arange(low[1] - CLEARANCE, high[1] + CLEARANCE, GRID)
     times = (xs - low[0]) / (high[0] - low[0]) * (paper.STEPS - 1)
     late = np.arange(-25, 26, 5)
     at = centres(motions, (times[:, None] + late).ravel()).reshape(len(xs), late.size, -1, 2)
-    away = (
-        np.stack(np.broadcast_arrays(xs[:, None], ys), axis=-1)[:, None, :, None] - at[:, :, None]
-    )
+    points = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=-1)
+    away = points[:, None, :, None] - at[:, :, None]
     covered = ((away**2).sum(axis=-1) < (CLEARANCE / 2) ** 2).any(axis=-1)
     return float(covered.mean())

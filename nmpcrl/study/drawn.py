@@ -27,7 +27,6 @@ Scenario = tuple[Motion, ...]
 
 
 def _read(name: str) -> dict[str, Any]:
-    """A JSON file of the package."""
     found: dict[str, Any] = json.loads((FOLDER / name).read_text("utf-8"))
     return found
 

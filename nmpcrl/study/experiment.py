@@ -1,6 +1,6 @@
 """An `Experiment` is an immutable value that names one run."""
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -28,12 +28,10 @@ MOST_EPISODES = 100_000  # 333 times the paper's: exploration has long ended
 MOST_STEPS = 10_000  # 77 times the paper's; the robot arrives within 92
 MOST_STAGES = 500  # of a plan: four times an episode; gamma^500 is 2e-7
 
+LAYOUT = geometry.layout(paper.LAYOUTS)
 POSE = geometry.pose(paper.LOWER, paper.UPPER)
 STEP_SIZE = positive(ABSURD)  # with a larger one theta leaves the numbers in one step
-THETA = numbers(
-    [number(-ABSURD, ABSURD)] * len(paper.THETA_INIT),
-    f"{len(paper.THETA_INIT)} numbers of size at most {ABSURD:g}",
-)
+THETA = numbers([number(-ABSURD, ABSURD)] * 9, f"9 numbers of size at most {ABSURD:g}")
 
 
 def option(default: Any, allowed: Allowed, about: str) -> Any:
@@ -54,9 +52,7 @@ class Experiment:
     learner: str = option("ES", one_of(LEARNERS), "Name of the learner.")
     seed: int = option(0, whole(0, LARGEST_SEED), "Seed of the noise and of the network.")
     episodes: int = option(paper.EPISODES, whole(1, MOST_EPISODES), "Episodes of training.")
-    layout: str | tuple[tuple[float, float], ...] = option(  # centres are stored as text
-        "A", geometry.layout(paper.LAYOUTS), "Layout of the obstacles."
-    )
+    layout: str | tuple[tuple[float, float], ...] = option("A", LAYOUT, "Layout of the obstacles.")
     decay: str = option("step", one_of(DECAYS), "What k of Eq. (5) counts.")  # departure C
     decay_rate: float = option(
         paper.DECAY_RATE, positive(1), "c_epsilon, by which exploration decays."
@@ -76,9 +72,7 @@ class Experiment:
     network: str = option(  # departure H
         "plain", one_of(NETWORKS), "Reading of what the paper leaves open of the network."
     )
-    box: str = option(  # departures A and M
-        "hard", one_of(paper.BOXES), "Bounds of the state."
-    )
+    box: str = option("hard", one_of(paper.BOXES), "Bounds of the state.")  # departures A and M
     ties_active: bool = option(  # departure L
         False, TRUTH, "Whether a state on an obstacle's boundary is in the obstacle."
     )
@@ -107,14 +101,17 @@ class Experiment:
             value = one.metadata["allowed"].check(one.name, getattr(self, one.name))
             object.__setattr__(self, one.name, value)
         if self.box == "printed" and any(np.greater(self.start, paper.PRINTED_UPPER)):
-            raise ParameterError(
-                f"start = {self.start} lies outside the box as printed, box = 'printed'"
-            )
+            raise ParameterError(f"start = {self.start} lies outside the box = 'printed'")
         if self.values_actions and not self.clipped:
             raise ParameterError(
-                f"clipped = False leaves actions that {self.learner} with constrained ="
-                f" {self.constrained} cannot value: they are outside the OCP's bounds"
+                f"clipped = False leaves actions outside the OCP's bounds, which {self.learner}"
+                f" with constrained = {self.constrained} cannot value"
             )
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """The fields in the records."""
+        return asdict(self)
 
     @property
     def task(self) -> Task:

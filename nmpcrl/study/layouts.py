@@ -62,20 +62,12 @@ def screen(centres: Centres) -> Screening:
 
 
 def gaps(task: Task, path: Matrix, theta_c: float) -> dict[tuple[int, int], float]:
-    """The widths of the gaps that a path goes through, once theta_c widens the obstacles [m].
+    """The widths [m] of the gaps that a path, shape (steps, 2), goes through, by their two sides.
 
     A gap lies between two obstacles if the path crosses the line between their centres, and
-    between an obstacle and a wall if it crosses the shortest line between them. A gap of width 0 or
-    less is closed to plans that satisfy Eq. (2f).
-
-    Args:
-        task: obstacles and walls.
-        path: positions, shape (steps, 2).
-        theta_c: tightens Eq. (2f).
-
-    Returns:
-        The width of each gap, by the numbers of its two sides; walls are -1 (left), -2 (bottom),
-        -3 (right) and -4 (top).
+    between an obstacle and a wall if it crosses the shortest line between them. The walls are
+    -1 (left), -2 (bottom), -3 (right) and -4 (top). theta_c widens the obstacles: a gap of width 0
+    or less is closed to plans that satisfy Eq. (2f).
     """
     centres, keep_out = np.transpose(task.discs[:2]), _keep_out(task, theta_c)
     widths = {}

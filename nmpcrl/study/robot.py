@@ -43,9 +43,6 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
                 drawn at each reset if absent.
             motions: of moving obstacles, whose first centres are the layout.
             steps: of an episode, which is truncated then.
-
-        Raises:
-            ParameterError: an argument has a value that is not allowed.
         """
         self.plant, self._steps = robot(), STEPS.check("steps", steps)
         self._fixed, self._motions = None if layout is None else centres_of(layout), motions

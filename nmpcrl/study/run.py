@@ -56,21 +56,21 @@ def run(
 
 
 def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
-    controller, weights, explore = job.controller, job.weights, job.explore
+    named, controller, weights = job.named, job.controller, job.weights
     steps, evaluations = _tables(job)
     evaluations.append(_evaluation(job, weights, 0))
     stopped, cost, began = str(Stopped.FINISHED), 0.0, time.perf_counter()
-    named = solver = controller.nmpc.solver.name
+    own = solver = controller.nmpc.solver.name
     try:
-        how = job.options | job.environment
-        for step in train(job.learner, controller, weights, explore, **how):
+        how = {**job.options, **job.environment}
+        for step in train(job.learner, controller, weights, job.explore, **how):
             seconds = time.perf_counter() - began
             steps.append(_row(step, seconds))
             cost += step.cost
-            solver = next((one for one in _solvers(step) if one != named), solver)
+            solver = next((one for one in _solvers(step) if one != own), solver)
             if step.last:
                 done = step.episode + 1
-                due = done % job.evaluate_every == 0 or done == job.episodes
+                due = done % named.evaluate_every == 0 or done == named.episodes
                 if due and not absurd(step.weights, controller.nmpc.largest):
                     evaluations.append(_evaluation(job, step.weights, done))
                 if on_episode:
@@ -80,23 +80,24 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
     except Diverged as error:
         stopped = f"{Stopped.DIVERGED}: {error}"
     table, judged = steps.columns(), evaluations.columns()
-    table["alpha_phi2"] = job.alpha * (table["features"] ** 2).sum(axis=1)
+    alpha = named.alpha if isinstance(named, Experiment) else np.nan
+    table["alpha_phi2"] = alpha * (table["features"] ** 2).sum(axis=1)
     facts: Facts = {
         "stopped": stopped,
         "solver": solver,  # another than the run's own if it took over, if only once
         "seconds": float(table["seconds"].sum()),
         "final_cost": final_cost(judged["cost"]),
     }
-    return Records(job.stated, table, judged, facts)
+    return Records(named.stated, table, judged, facts)
 
 
 def _tables(job: Job) -> tuple[Table, Table]:
     """Empty tables for `Records.steps` and `Records.evaluations`."""
-    nmpc = job.controller.nmpc
+    named, nmpc = job.named, job.controller.nmpc
     sizes = nmpc.n, nmpc.m, job.weights.theta.size
     return (
-        Table(step_fields(*sizes), job.episodes * job.steps),
-        Table(evaluation_fields(*sizes, job.steps), job.episodes // job.evaluate_every + 2),
+        Table(step_fields(*sizes), named.episodes * named.steps),
+        Table(evaluation_fields(*sizes, named.steps), named.episodes // named.evaluate_every + 2),
     )
 
 
@@ -139,7 +140,7 @@ def _row(step: Step, seconds: float) -> StepRow:
 
 def _evaluation(job: Job, weights: Weights, episode: int) -> EvaluationRow:
     """The row of `Records.evaluations` for the policy of `weights`."""
-    steps, rng = job.steps, np.random.default_rng(job.judged)
+    steps, rng = job.named.steps, np.random.default_rng(job.judged)
     rollout = evaluate(job.controller, weights.theta, steps, rng=rng, **job.environment)
     missing = ((0, steps - len(rollout.states)), (0, 0))
     states, actions = (

@@ -1,9 +1,9 @@
 """The arguments of `train` for an experiment or a trial: controller, learner, weights, noise."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,43 +18,27 @@ from nmpcrl.study.learners import DECAYS, LEARNERS, Generators
 from nmpcrl.study.trial import Trial
 
 
-@dataclass(frozen=True, eq=False)
-class Job:
-    """Controller, learner, weights, noise and options of a run."""
+class Job(NamedTuple):
+    """The arguments of `train` and `evaluate` for a run."""
 
-    stated: dict[str, Any]  # the run's fields, as its records have them
+    named: Experiment | Trial  # canonical
     controller: Persistent
     learner: Learner
     weights: Weights
     explore: Exploration
-    alpha: float  # step size of theta, for the column alpha ||phi||^2
-    evaluate_every: int
     options: dict[str, Any]  # of `train` alone
-    environment: dict[str, Any] = field(default_factory=dict)  # of `train` and `evaluate`
+    environment: Mapping[str, Any] = MappingProxyType({})  # of `train` and `evaluate`
     judged: int | np.random.SeedSequence = 0  # seed of each evaluation
-
-    @property
-    def episodes(self) -> int:
-        """Episodes of training."""
-        return len(self.explore.scale)
-
-    @property
-    def steps(self) -> int:
-        """Steps of an episode, at most."""
-        return len(self.explore.scale[0])
 
 
 def job_of(named: Experiment | Trial) -> Job:
     """The job of a run."""
     if isinstance(named, Trial):
         return _job_of_trial(named)
-    experiment = named.canonical
-    controller = controller_of(experiment)
-    options = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
-    return Job(
-        asdict(experiment), controller, *prepare(experiment, controller), experiment.alpha,
-        experiment.evaluate_every, options,
-    )  # fmt: skip
+    named = named.canonical
+    controller = controller_of(named)
+    options = {"clipped": named.clipped, "constrained": named.values_actions}
+    return Job(named, controller, *prepare(named, controller), options)
 
 
 def _job_of_trial(trial: Trial) -> Job:
@@ -68,13 +52,11 @@ def _job_of_trial(trial: Trial) -> Job:
         decay_rate=trial.decay_rate,
     )
     return Job(
-        trial.stated,
+        trial,
         controller,
         trial.made(controller, np.random.default_rng(learner)),
         Weights(theta, np.full(theta.size, paper.W_INIT)),
         explore,
-        np.nan,
-        trial.evaluate_every,
         {"rng": np.random.default_rng(world)},
         {"plant": trial.plant, "start": trial.start, "data": trial.data},
         judged,

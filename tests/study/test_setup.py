@@ -43,7 +43,7 @@ def test_a_learner_is_what_its_entry_says_and_reads_only_what_its_entry_names(na
     wherever = {"constrained", "ties_active"}  # read by the experiment and its controller
     assert read <= set(entry.reads) <= read | wherever
     expected = paper.ALPHA if name == "frozen" else 3e-7
-    assert job_of(Experiment(name, episodes=1, alpha=3e-7)).alpha == expected
+    assert job_of(Experiment(name, episodes=1, alpha=3e-7)).named.alpha == expected
 
 
 @pytest.mark.parametrize("name", LEARNERS)

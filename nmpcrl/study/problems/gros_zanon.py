@@ -29,10 +29,7 @@ def problem(*, informed: bool = False) -> Problem:
     V0 + sum_i gamma^i (|x_i|^2 + u_i^2 / 2) / 2 + f'(x_i, u_i) + x_N' P x_N, and
     gamma^(i-1) 100/2 a unit by which x_i leaves its bounds, i = 1, ..., N: f and P are not
     discounted, and the slacks are one stage late, as in mpcrl. P solves Riccati's equation of the
-    wrong model.
-
-    Args:
-        informed: whether theta begins at the plant's A, B, bounds and mean disturbance.
+    wrong model. An `informed` theta begins at the plant's A, B, bounds and mean disturbance.
     """
     late = {"weight": PENALTY / 2 / GAMMA, "stages": slice(1, None)}
     mean = np.array([np.mean(DISTURBANCE), 0.0])

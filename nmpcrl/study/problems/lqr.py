@@ -1,4 +1,4 @@
-"""A linear plant with a quadratic cost; A, B, Q and R are learned.
+"""The plant of `gros_zanon` without disturbance, bounds and penalty; A, B, Q and R are learned.
 
 Riccati's equation gives the value and the policy of every theta, and Lyapunov's the cost of a
 policy.
@@ -12,12 +12,10 @@ from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Problem
+from nmpcrl.study.problems.gros_zanon import GAMMA, HORIZON, TRUE_A, TRUE_B, WRONG_A, WRONG_B
 
-GAMMA, HORIZON = 0.9, 10
 START = np.array([1.0, -0.5])
-A, B = np.array([[0.9, 0.35], [0.0, 1.1]]), np.array([[0.0813], [0.2]])  # of the plant
-Q, R = np.eye(2), np.array([[0.5]])  # of its cost
-WRONG_A, WRONG_B = np.array([[1.0, 0.25], [0.0, 1.0]]), np.array([[0.0312], [0.25]])
+Q, R = np.eye(2), np.array([[0.5]])  # of the plant's cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,17 +34,15 @@ class Truth:
 def problem(*, informed: bool = False) -> Problem:
     """The plan, of which A, B, Q, R, the terminal P and a constant V0 are learned.
 
-    Args:
-        informed: whether theta begins at the truth, P included.
+    An `informed` theta begins at the truth, P included.
     """
-    model = (A, B) if informed else (WRONG_A, WRONG_B)
-    best = optimal(*model)
+    a, b = (TRUE_A, TRUE_B) if informed else (WRONG_A, WRONG_B)
     return Problem(
         states=2,
         inputs=1,
         horizon=HORIZON,
         gamma=GAMMA,
-        theta={"V0": 0.0, "A": model[0], "B": model[1], "Q": Q, "R": R, "P": best.P},
+        theta={"V0": 0.0, "A": a, "B": b, "Q": Q, "R": R, "P": optimal(a, b).P},
         model=lambda x, u, th: th["A"] @ x + th["B"] @ u,
         stage=lambda x, u, th: x.T @ th["Q"] @ x + u.T @ th["R"] @ u,
         terminal=lambda x, th: x.T @ th["P"] @ x,
@@ -56,11 +52,11 @@ def problem(*, informed: bool = False) -> Problem:
 
 def plant(state: Vector, action: Vector, rng: np.random.Generator) -> tuple[Vector, float, bool]:
     """A step of the plant: next state, cost, and no end."""
-    later = A @ state + B @ action
+    later = TRUE_A @ state + TRUE_B @ action
     return later, float(state @ Q @ state + action @ R @ action), False
 
 
-def optimal(a: Matrix = A, b: Matrix = B) -> Truth:
+def optimal(a: Matrix = TRUE_A, b: Matrix = TRUE_B) -> Truth:
     """The best policy of a model and its value, by Riccati's equation of sqrt(gamma) (A, B)."""
     root = np.sqrt(GAMMA)
     p = solve_discrete_are(root * a, root * b, Q, R)
@@ -75,7 +71,7 @@ def gain(a: Matrix, b: Matrix, r: Matrix, p: Matrix) -> Matrix:
 
 def worth(k: Matrix) -> Truth:
     """The cost of u = -K x on the plant, by Lyapunov's equation; infinite where it diverges."""
-    closed = np.sqrt(GAMMA) * (A - B @ k)
+    closed = np.sqrt(GAMMA) * (TRUE_A - TRUE_B @ k)
     if np.abs(np.linalg.eigvals(closed)).max() >= 1:
         return Truth(k, np.diag([np.inf, np.inf]))
     return Truth(k, solve_discrete_lyapunov(closed.T, Q + k.T @ R @ k))
