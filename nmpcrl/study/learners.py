@@ -115,17 +115,17 @@ def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:
     def factory(settings: Settings, controller: Persistent, generators: Generators) -> Learner:
         from nmpcrl.learning.network import QNetwork, Target  # torch: not for the other learners
 
-        nmpc, read, options = controller.nmpc, NETWORKS[settings.network], {}
+        nmpc, read = controller.nmpc, NETWORKS[settings.network]
+        scales: tuple[Vector | float, float] = (1.0, 1.0)
         if read.normalised:
             scales = _scales(controller, np.array(settings.theta), with_theta=with_theta)
-            options = {"scales": scales}
         network = QNetwork(
             nmpc.n + nmpc.m + with_theta * len(settings.theta),
             generators.network,
             learning_rate=settings.zeta,
             batch=paper.BATCH,
             hidden=paper.HIDDEN,
-            **options,
+            scales=scales,
             **read.options,
         )
         return make(

@@ -4,7 +4,6 @@ Plan, plant and agent of `gros_zanon` are those of mpcrl's example of Q-learning
 for each transition, with the outer product of Q's gradient for a Hessian, and no exploration.
 """
 
-import operator
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -64,7 +63,7 @@ def run(solver: str, seed: int, steps: int) -> Run:
 def world(problem: Problem, plant: StepFunction, start: Vector, steps: int) -> Any:
     """A plant as mpcrl's agent meets it: a Gymnasium environment whose reward is the cost."""
     env = as_gymnasium(Nmpc(problem), plant=plant, start=start, steps=steps)
-    return TransformReward(env, operator.neg)
+    return TransformReward(env, lambda reward: -float(reward))
 
 
 def agent(
@@ -118,10 +117,10 @@ def lqr_plan(solver: str) -> Mpc:
     x, _ = plan.state("x", 2, bound_initial=False)
     u, _ = plan.action("u", 1)
     plan.set_affine_dynamics(th["A"], th["B"])
-    objective = th["V0"] + lqr.GAMMA**lqr.HORIZON * (x[:, -1].T @ th["P"] @ x[:, -1])
-    for i in range(lqr.HORIZON):
+    objective = th["V0"] + gz.GAMMA**gz.HORIZON * (x[:, -1].T @ th["P"] @ x[:, -1])
+    for i in range(gz.HORIZON):
         stage = x[:, i].T @ th["Q"] @ x[:, i] + u[:, i].T @ th["R"] @ u[:, i]
-        objective += lqr.GAMMA**i * stage
+        objective += gz.GAMMA**i * stage
     return _end(plan, objective, solver)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import Nmpc, Riccati
+from nmpcrl.study.problems import gros_zanon as gz
 from nmpcrl.study.problems import lqr, peers
 
 STATE = np.array([0.7, -1.1])
@@ -44,11 +45,11 @@ def test_an_informed_plan_has_the_best_policy_and_its_value_at_any_horizon(nmpc)
 
 def test_the_worth_of_a_gain_is_what_it_costs():
     best = lqr.optimal()
-    for k in (best.K, lqr.optimal(lqr.WRONG_A, lqr.WRONG_B).K):
+    for k in (best.K, lqr.optimal(gz.WRONG_A, gz.WRONG_B).K):
         state, total, rng = lqr.START, 0.0, np.random.default_rng(0)
         for t in range(400):
             state, cost, _ = lqr.plant(state, -k @ state, rng)
-            total += lqr.GAMMA**t * cost
+            total += gz.GAMMA**t * cost
         assert lqr.worth(k).cost == pytest.approx(total, rel=1e-9)
         assert lqr.worth(k).cost >= best.cost * (1 - 1e-12)
     np.testing.assert_allclose(lqr.worth(best.K).P, best.P, atol=1e-9)
