@@ -38,7 +38,7 @@ class Mechanism(StrEnum):
 
     STEP = "overshoot"
     NETWORK = "network"
-    GAP = "gap"
+    GAP = "gap"  # theta_c grew until no plan fits through a gap that the first rollout went through
     SOLVER = "solver"
     OTHER = "none of these"
 
@@ -122,39 +122,22 @@ def rise(run: RunSummary) -> slice:
 
 def mechanism(run: RunSummary, first_rollout: Column) -> Mechanism:
     """The mechanism by which the cost of a run rose; arguments as for `failure_mode`."""
-    window = rise(run)
+    window, start = rise(run), run.experiment["theta"][-1]
+    episodes = {name: column[window] for name, column in run.episodes.items()}
+    known = np.isfinite(episodes["bias"]) & np.isfinite(episodes["delta"])  # a network predicts
+    bias, delta = (episodes[name][known].sum() for name in ("bias", "delta"))
+    reached = np.fmax.reduce(episodes["theta"][:, -1], initial=start)
+    before, after = (gaps(run.name.task, first_rollout[:, :2], c) for c in (start, reached))
+    judged = run.evaluations["cost"][run.evaluations["episode"] == window.stop]
+    failed = episodes["failed"]
     signs = {
-        Mechanism.STEP: (run.episodes["alpha_phi2"][window] > OVERSHOOT).any(),
-        Mechanism.NETWORK: _over_predicted(run, window),
-        Mechanism.GAP: _gap_closed(run, window, first_rollout),
-        Mechanism.SOLVER: _cut_short(run, window),
+        Mechanism.STEP: (episodes["alpha_phi2"] > OVERSHOOT).any(),
+        Mechanism.NETWORK: known.any() and paper.GAMMA * bias / delta >= OVER_PREDICTED,
+        Mechanism.GAP: any(width > 0 >= after[sides] for sides, width in before.items()),
+        Mechanism.SOLVER: np.isinf(judged).any() or (failed.size and failed.mean() >= CUT_SHORT),
         Mechanism.OTHER: True,
     }
     return next(name for name in Mechanism if signs[name])
-
-
-def _over_predicted(run: RunSummary, window: slice) -> bool:
-    """Whether the network predicted too much: see `OVER_PREDICTED`; False without a network."""
-    bias, delta = run.episodes["bias"][window], run.episodes["delta"][window]
-    known = np.isfinite(bias) & np.isfinite(delta)
-    share = paper.GAMMA * bias[known].sum() / delta[known].sum() if known.any() else 0.0
-    return bool(share >= OVER_PREDICTED)
-
-
-def _gap_closed(run: RunSummary, window: slice, first_rollout: Column) -> bool:
-    """Whether theta_c grew until no plan fits through a gap that the first rollout went through."""
-    start, task = run.experiment["theta"][-1], run.name.task
-    reached = np.fmax.reduce(run.episodes["theta"][window, -1], initial=start)
-    before, after = (gaps(task, first_rollout[:, :2], theta_c) for theta_c in (start, reached))
-    return any(width > 0 >= after[sides] for sides, width in before.items())
-
-
-def _cut_short(run: RunSummary, window: slice) -> bool:
-    """Whether solves failed: see `CUT_SHORT`."""
-    judged = run.evaluations["episode"] == window.stop
-    failed = np.isinf(run.evaluations["cost"][judged]).any()
-    shares = run.episodes["failed"][window]
-    return bool(failed or (shares.size and shares.mean() >= CUT_SHORT))
 
 
 def ending(states: Column, task: Task) -> Ending:

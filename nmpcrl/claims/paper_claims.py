@@ -11,11 +11,10 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.metrics import TOUCH
-from nmpcrl.analysis.rows import THETA, experiment_of
-from nmpcrl.analysis.summary import SIZES
+from nmpcrl.analysis.rows import EVAL_INSIDE, INSIDE, THETA, experiment_of
 from nmpcrl.claims.assumptions import TheoremClaim
 from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, RunClaim, Values
-from nmpcrl.claims.rule import Claim, Paths, arms, median
+from nmpcrl.claims.rule import Claim, Paths, arms, counted, median
 from nmpcrl.claims.thresholds import (
     BETTER,
     DIVERGED,
@@ -61,9 +60,8 @@ def _contrasted(
 
     def numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
         found = dict(zip(learners, arms(runs, *learners), strict=True))
-        return {f"{name}_wrong": _count(wrong(arm)) for name, arm in found.items()} | {
-            f"{name}_median": median(arm[column]) for name, arm in found.items()
-        }
+        counts = {f"{n}_wrong": counted(wrong(arm))["all"].known for n, arm in found.items()}
+        return counts | {f"{n}_median": median(arm[column]) for n, arm in found.items()}
 
     return numbers
 
@@ -122,20 +120,14 @@ def _largest_overlap(arm: pd.DataFrame) -> pd.Series:
     return arm.eval_worst_overlap.clip(lower=0).mask(arm.inputs > 0, np.inf)
 
 
-def _inside(runs: pd.DataFrame, name: str = "inside") -> pd.DataFrame:
-    """How many states lay in an obstacle, one column a size."""
-    return runs[[f"{name}_{size}" for size in SIZES]]
-
-
 def _c7_numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
     """Violations of the constraints, in training and without noise (`eval_`)."""
     every = pd.concat(arms(runs, *learners), keys=learners, names=["learner"])
-    training, judged = _inside(every), _inside(every, "eval_inside")
-    by_learner = judged.sum(axis=1).groupby(level="learner", sort=False).sum()
+    judged = every[[*EVAL_INSIDE]].sum(axis=1).groupby(level="learner", sort=False).sum()
     largest = every[["worst_overlap", "eval_worst_overlap"]].max()
-    sums = every[["inputs", "steps_done", "outside"]].sum(), training.sum(), judged.sum()
-    numbers: Numbers = pd.concat([largest, *sums]).to_dict()
-    return numbers | {"eval_inside": by_learner.to_dict()}
+    sums = every[["inputs", "steps_done", "outside", *INSIDE, *EVAL_INSIDE]].sum()
+    numbers: Numbers = pd.concat([largest, sums]).to_dict()
+    return numbers | {"eval_inside": judged.to_dict()}
 
 
 def kept_without_noise(runs: pd.DataFrame, learners: Learners) -> pd.DataFrame:
@@ -160,11 +152,6 @@ def _c9_numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
         "failed": int(np.isinf(claimed.final_cost).sum()),
         "stuck": int((claimed.distance > ARRIVED).sum()),
     }
-
-
-def _count(holds: pd.Series) -> tuple[int, int]:
-    known = holds.dropna()
-    return int(known.sum()), len(known)
 
 
 CLAIMS: dict[str, Claim] = {
@@ -306,7 +293,7 @@ CLAIMS: dict[str, Claim] = {
             borders=np.geomspace(1e-8, 1.0, UP_TO),
             learners=("RDES",),
             number=_largest_overlap,
-            besides=lambda arm: _inside(arm).sum(axis=1, skipna=False),
+            besides=lambda arm: arm[[*INSIDE]].sum(axis=1, skipna=False),
             numbers=_c7_numbers,
         ),
         TheoremClaim(
@@ -319,10 +306,7 @@ CLAIMS: dict[str, Claim] = {
             measured="each assumption beside the code, with a measurement where one is possible",
             border="all of one theorem's",
             test="of each theorem, one assumption that does not hold is enough",
-            words={
-                REPRODUCED: "the guarantee applies",
-                NOT: "the guarantee does not apply",
-            },
+            words={REPRODUCED: "the guarantee applies", NOT: "the guarantee does not apply"},
             would_change="Decaying step sizes, w faster than theta, the curvature term and a"
             " projection would bring it closer.",
         ),

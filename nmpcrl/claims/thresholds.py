@@ -9,14 +9,13 @@ infinite where a solve failed or training was stopped.
 """
 
 from collections.abc import Mapping
-from typing import Any
+from operator import attrgetter
 
 import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis import metrics
 from nmpcrl.claims.rule import CELL
-from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.records import Column, Records, Stopped
 from nmpcrl.study.store import Runs
@@ -117,19 +116,15 @@ def path_distance(first: Column, second: Column) -> float:
 
 def of_records(runs: Runs[Records]) -> pd.DataFrame:
     """The columns that `divergence` and `instability` read, a row a run; runs with frozen arms."""
-    costs = {e: metrics.training_cost(one) for e, one in runs.items()}
-    frozen = {_cell(e): cost for e, cost in costs.items() if e.learner == "frozen"}
+    cell, costs = attrgetter(*CELL), {e: metrics.training_cost(one) for e, one in runs.items()}
+    frozen = {cell(e): cost for e, cost in costs.items() if e.learner == "frozen"}
     rows = {
         e: {
             "learner": e.learner,
             "stopped": one.facts["stopped"],
-            "cost_ratio": metrics.cost_ratio(costs[e], frozen[_cell(e)]),
+            "cost_ratio": metrics.cost_ratio(costs[e], frozen[cell(e)]),
             "late_cost_range": metrics.late_cost_range(one),
         }
         for e, one in runs.items()
     }
     return pd.DataFrame.from_dict(rows, orient="index")
-
-
-def _cell(e: Experiment) -> tuple[Any, ...]:
-    return tuple(getattr(e, name) for name in CELL)

@@ -9,9 +9,9 @@ layout, one or two in each reading of the decay; it holds there if more than `MA
 yes. Shares of layouts are read by `rule.read`. A layout answers by the runs that are known.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from itertools import product
 from typing import Any
 
@@ -241,12 +241,7 @@ def load() -> Drawn:
 
 
 def held(runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTED)) -> pd.DataFrame:
-    """Where each claim holds, a row a claim and layout with its answers.
-
-    Args:
-        runs: of `rows.table`, of one setting.
-        paths: as `rule.Observations` takes them.
-        claims: names in `EXPECTED`.
+    """Where each claim holds in runs of one setting, a row a claim and layout with its answers.
 
     Returns:
         Columns claim, layout (its name), yes, of (answers), holds and weaker (whether the weaker
@@ -268,10 +263,7 @@ def held(runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTE
 
 
 def shares(where: pd.DataFrame) -> pd.DataFrame:
-    """The share of the layouts in which each claim holds, beside the expected share.
-
-    Args:
-        where: of `held`.
+    """The share of the layouts in which each claim holds, beside the expected share, from `held`.
 
     Returns:
         Columns claim, holding, layouts, share, low, high (by `rate`: layouts are independent),
@@ -296,24 +288,15 @@ def succeeds(runs: pd.DataFrame, learner: str = "ES") -> pd.Series:
     return where.set_index("layout").holds.astype(bool)
 
 
-def _holding(claim: str) -> Callable[[Drawn], Answer]:
-    def answer(drawn: Drawn) -> Answer:
-        found = drawn.shares.set_index("claim")
-        if claim not in found.index:
-            return Answer(UNDECIDABLE)
-        one = found.loc[claim]
-        return Answer(one.outcome, {"layouts": (int(one.holding), int(one.layouts))})
-
-    return answer
+def _holding(claim: str, drawn: Drawn) -> Answer:
+    """The answer to the number of layouts in which a claim holds."""
+    for one in drawn.shares[drawn.shares.claim == claim].itertuples():
+        return Answer(one.outcome, {"layouts": (one.holding, one.layouts)})
+    return Answer(UNDECIDABLE)
 
 
 def picture(runs: pd.DataFrame, paths: Paths, setting: str) -> pd.DataFrame:
-    """The part of the paper's picture that holds in each cell of layout and reading.
-
-    Args:
-        runs: of one setting, with all four of the paper's learners.
-        paths: as `rule.Observations` takes them.
-        setting: its name.
+    """The part of the paper's picture that holds in each cell of runs of one setting.
 
     Returns:
         Columns layout and decay, of each of `PICTURE` the share of yes, whole (how many claims have
@@ -462,8 +445,8 @@ POPULATION = Investigation(
     parts=PARTS,
     questions=(
         *(
-            Question(name, f"In how many layouts does {name} hold?", one.outcome, _holding(name))
-            for name, one in EXPECTED.items()
+            Question(n, f"In how many layouts does {n} hold?", one.outcome, partial(_holding, n))
+            for n, one in EXPECTED.items()
         ),
         *QUESTIONS,
     ),
