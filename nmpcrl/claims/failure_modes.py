@@ -67,10 +67,7 @@ FAILURE_MODE = [*NONE]
 
 
 def failure_modes(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
-    """The failure mode of each run, one row a run, in order.
-
-    Args:
-        summaries: runs and their frozen arms.
+    """The failure mode of each run, one row a run, in order; of runs with their frozen arms.
 
     Returns:
         Columns ending (of the last rollout: an `Ending`), wrong (a `Failure`, or ""), mechanism (a
@@ -88,12 +85,9 @@ def failure_modes(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
 
 
 def failure_mode(run: RunSummary, wrong: str, first_rollout: Column) -> dict[str, Any]:
-    """The failure mode of a run that learned: `FAILURE_MODE` by name.
+    """The failure mode of a run that learned, by `FAILURE_MODE`; `wrong` is of `went_wrong`.
 
-    Args:
-        run: its summary.
-        wrong: of `went_wrong`.
-        first_rollout: states of theta_init's rollout without noise, shape (K + 1, n).
+    `first_rollout` has the states of theta_init's rollout without noise, shape (K + 1, n).
     """
     return {
         "ending": ending(run.states, run.name.task),

@@ -26,10 +26,8 @@ def compared(
 ) -> dict[str, Any]:
     """The fields of a claim that compares the final noise-free costs of two learners.
 
-    Args:
-        learners: the numbers are the cost of the first minus the second's, in shares of
-            theta_init's, in the cells of the learner that is not the paper's.
-        size: applied to the difference.
+    The numbers are the cost of the first minus the second's, in shares of theta_init's, in the
+    cells of the learner that is not the paper's; `size` is applied to them.
     """
     first, second = learners
     ours = tuple(name for name in learners if name not in PAPER)

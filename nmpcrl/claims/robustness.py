@@ -34,12 +34,7 @@ COLUMNS = ("variant", "claim", "outcome", "base", "changes", "share", "base_shar
 def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
     """The map: rows of the main table and its parts (`part_changes`), and of `variant_changes`.
 
-    Args:
-        runs: of `rows.table`, with a column `variant`.
-        paths: as `rule.Observations` takes them.
-
-    Returns:
-        `COLUMNS` after `departure`, a letter of `DEPARTURES` or "".
+    `runs` have a column `variant`. `COLUMNS` come after `departure`, its letter or "".
     """
     main = Observations(runs[runs.variant == MAIN_TABLE], paths)
     verdicts = [claim.settled(main) for claim in BY_RUNS.values()]
@@ -50,12 +45,7 @@ def robustness_map(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
 
 def groups(runs: pd.DataFrame, variant: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The runs behind a row of the map, and the runs that it is compared with.
-
-    Args:
-        runs: as `robustness_map` takes them.
-        variant: of the row.
-    """
+    """The runs behind the row of a variant in the map, and the runs that it is compared with."""
     main, changed = (runs[runs.variant == name] for name in (MAIN_TABLE, variant))
     if changed.empty:
         field, value = _part(variant)
@@ -83,10 +73,7 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
 
     A variant runs only the learners of the paper that it changes; the others' runs come from the
     main table. A claim that asks none of the changed learners has no row, nor have the controls.
-
-    Args:
-        runs: of `rows.table`, with a column `variant`.
-        paths: as `rule.Observations` takes them, of the variants and of the main table.
+    `runs` and `paths` are of the variants and of the main table.
 
     Returns:
         `COLUMNS`, one row a variant and claim, in order.

@@ -52,12 +52,13 @@ def stopped(part: str) -> list[tuple[str, int]]:
     """Layout and k of each stopped run, in the order in which they are made again."""
     if part == "six":
         six = _shuffled(_stopped(published.load().main))
-        return [(one.layout, int(one.seed)) for one in six.itertuples()]
+        return [*zip(six.layout, six.seed.tolist(), strict=True)]
     drawn = _stopped(population.load().main)
     sample = _shuffled(drawn.drop_duplicates("layout"))[:SAMPLE]
     others = _shuffled(drawn.drop(sample.index))
-    places = ((name_of(one.layout), one.seed) for one in pd.concat([sample, others]).itertuples())
-    return [(place, int(seed) - population.seed_of(place, 0)) for place, seed in places]
+    runs = pd.concat([sample, others])
+    places = zip(map(name_of, runs.layout), runs.seed.tolist(), strict=True)
+    return [(place, seed - population.seed_of(place, 0)) for place, seed in places]
 
 
 def _stopped(table: pd.DataFrame) -> pd.DataFrame:
@@ -80,11 +81,7 @@ def again(setting: tuple[str, float], place: str, episodes: int, seed: int) -> R
 
 
 def ends(table: pd.DataFrame) -> pd.DataFrame:
-    """Whether each run is stopped: without an intervention ("none"), and with each arm.
-
-    Returns:
-        Columns part, layout, seed, intervention and stopped.
-    """
+    """Columns part, layout, seed, intervention and stopped: without one ("none") and with each."""
     rows: list[Row] = []
     for (part, place, k), runs in table.groupby(["part", "place", "k"], sort=False):
         one = {"part": part, "layout": place, "seed": INTERVENTIONS.seed(place, k)}
@@ -103,10 +100,7 @@ def survival(runs: pd.DataFrame, arm: str = "theta held") -> Answer:
 def live(runs: pd.DataFrame, arm: str, than: str = "none") -> Estimate:
     """The share of runs that live with an arm, minus the share with another; interval over layouts.
 
-    Args:
-        runs: of `ends`, of one part.
-        arm: one of `ARMS`.
-        than: another; "none", with which no run lives, leaves the share itself.
+    The runs are of `ends`, of one part. No run lives with "none", which leaves the share itself.
     """
     by = runs.pivot(index=["layout", "seed"], columns="intervention", values="stopped").astype(int)
     gained = (by[than] - by[arm]).groupby(level="layout").agg(["sum", "size"])

@@ -12,7 +12,6 @@ yes. Shares of layouts are read by `rule.read`. A layout answers by the runs tha
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, astuple, dataclass, replace
 from functools import cache, cached_property, partial
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -52,7 +51,7 @@ from nmpcrl.studies.difficulty import (
 )
 from nmpcrl.studies.predictors import predictor_scores
 from nmpcrl.study import paper, published
-from nmpcrl.study.design import MAIN_TABLE
+from nmpcrl.study.design import MAIN_TABLE, sweep
 from nmpcrl.study.drawn import COMPARED, JUDGE, LAYOUTS, TUNE, name_of
 from nmpcrl.study.experiment import PAPER, Experiment
 from nmpcrl.study.layouts import ARRIVED
@@ -114,10 +113,8 @@ CLAIMS: Mapping[str, RunClaim] = {  # judged in each layout, by their names in `
 
 def arms(learners: Iterable[str], decays: Iterable[str] = DECAYS, **fields: Any) -> dict[str, Any]:
     """Each learner in each reading of the decay: "ES step"."""
-    return {
-        f"{learner} {decay}": Experiment(learner=learner, decay=decay, **fields).canonical
-        for learner, decay in product(learners, decays)
-    }
+    runs = sweep(learner=tuple(learners), decay=tuple(decays), **fields)
+    return {f"{one.learner} {one.decay}": one.canonical for one in runs}
 
 
 def of_run(setting: Experiment, place: str, episodes: int, seed: int) -> Row:

@@ -23,16 +23,10 @@ RESAMPLES = 2000  # of the bootstrap over layouts
 def predicted(measure: Vector, success: Vector, asked: Vector) -> tuple[float, Vector]:
     """The slope of a logistic regression, and P(success) = 1 / (1 + exp(-(intercept + slope z))).
 
-    z is the measure, standardised. The log loss is least with `RIDGE` times half of the squared
-    slope added, which keeps the slope finite where a measure separates successes from failures.
-
-    Args:
-        measure: one a layout, for the fit.
-        success: whether learning succeeded there.
-        asked: the measure in the layouts of the probabilities.
-
-    Raises:
-        ValueError: a measure is not finite.
+    It is fitted to `measure` and `success`, one a layout; the probabilities are those where the
+    measure is `asked`. z is the measure, standardised. The log loss is least with `RIDGE` times
+    half of the squared slope added, which keeps the slope finite where a measure separates
+    successes from failures.
     """
     x, sign = np.asarray(measure, float), np.where(success, 1.0, -1.0)
     if not np.isfinite(x).all():
