@@ -23,8 +23,9 @@ from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, c
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.studies import remedies
 from nmpcrl.studies.agents_run import EVERY, SAC, TD3, THERE, curve, judged_in, require
-from nmpcrl.studies.remedies import NotTuned, RemedyRow
+from nmpcrl.studies.remedies import RemedyRow
 from nmpcrl.study.drawn import JUDGE, TUNE
+from nmpcrl.study.refusal import Refusal
 
 AGENTS: Mapping[str, Entry] = {"SAC": SAC, "TD3": TD3}
 _SETTINGS: tuple[Mapping[str, float], ...] = ({}, {"turn": 0.5}, {"gradient": 0.5, "width": 128})
@@ -51,19 +52,15 @@ def arms(name: str) -> dict[str, Entry]:
 
 
 def tuned(table: pd.DataFrame, name: str) -> Entry:
-    """An agent with its best setting: the least mean of J / J_init; of equal ones the first.
-
-    Raises:
-        NotTuned: a row of the tuning is missing.
-    """
-    tune, costs = table[table.part == "tune"], dict[str, float]()
-    for arm in arms(name):
-        rows = tune[tune.arm == arm]
-        if len(rows) < len(PARTS["tune"].places):
-            raise NotTuned(f"{arm} is not tuned yet: the part 'tune' comes first")
-        last = [row.costs[-1][0] / row.initial[0] for row in rows.itertuples()]
-        costs[arm] = float(np.mean(last))
-    return arms(name)[min(costs, key=lambda arm: costs[arm])]
+    """An agent with its best setting: the least mean of J / J_init; of equal ones the first."""
+    tune = table[table.part == "tune"]
+    costs = {
+        arm: [run.costs[-1][0] / run.initial[0] for run in tune[tune.arm == arm].itertuples()]
+        for arm in arms(name)
+    }
+    if min(map(len, costs.values())) < len(PARTS["tune"].places):
+        raise Refusal(f"{name} is not tuned yet: the part 'tune' comes first")
+    return arms(name)[min(costs, key=lambda arm: float(np.mean(costs[arm])))]
 
 
 def _tuned(most: float, table: pd.DataFrame) -> dict[str, Entry]:
@@ -142,13 +139,9 @@ class Course:
 
 
 def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()) -> Course:
-    """The course of an agent in a part; without columns where no run is known.
+    """The course of an agent in a part of `SAC_AND_TD3`; without columns where no run is known.
 
-    Args:
-        table: of `SAC_AND_TD3`.
-        part: in which agents are judged.
-        agent: its name.
-        among: layouts to look at, of an agent for all.
+    `among` are the layouts to look at, of an agent for all.
     """
     points = CHECKPOINTS[part]
     shares, there = [pd.DataFrame(index=points)], [pd.DataFrame(index=points)]
@@ -251,12 +244,7 @@ def searched(compared: pd.DataFrame, part: str) -> pd.Series:
 
 
 def rows(table: pd.DataFrame, compared: pd.DataFrame) -> list[RemedyRow]:
-    """The agents' rows of the suite with 300 episodes, in the layouts in which they are judged.
-
-    Args:
-        table: of `SAC_AND_TD3`.
-        compared: the comparison of remedies, which has J_best of each layout.
-    """
+    """The agents' rows beside `compared`, the comparison of remedies, with 300 episodes."""
     best = compared.groupby("place").best.first()
     runs = table[(table.part == "judge") & table.place.isin(best.index)]
     return remedies.rows(

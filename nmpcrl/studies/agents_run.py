@@ -35,10 +35,6 @@ NOISE = 0.2  # standard deviation of what TD3 adds to an action between -1 and 1
 FAR = 10.0  # [m], by which distances are divided
 
 
-class NoAgents(Refusal):
-    """stable-baselines3 is not installed; the message says how to get it."""
-
-
 class Checkpoint(NamedTuple):
     """An agent after some interaction."""
 
@@ -100,18 +96,15 @@ def trained(
     name: str, env: Any, layouts: Sequence[Centres], checkpoints: Sequence[int], seed: int,
     **settings: float,
 ) -> Iterator[Checkpoint]:  # fmt: skip
-    """Train SAC or TD3 in `nmpcrl/Robot-v0`, and yield it at each checkpoint.
+    """Train SAC or TD3, and yield it at each checkpoint.
 
     Args:
         name: "SAC" or "TD3".
-        env: the environment; no other code makes steps in it.
+        env: `nmpcrl/Robot-v0`, in which no other code makes steps.
         layouts: one is drawn for each episode.
         checkpoints: episodes, rising.
         seed: of all draws.
         settings: values for all of `_DEFAULTS`.
-
-    Raises:
-        NoAgents: stable-baselines3 is not installed.
     """
     from nmpcrl.learning.network import OneThread
 
@@ -184,12 +177,12 @@ class _Scaled(gymnasium.Env[Any, Any]):
 
 
 def require(name: str = "an agent") -> Any:
-    """The module stable-baselines3; NoAgents where it is not installed."""
+    """The module stable-baselines3; a Refusal where it is not installed."""
     try:
         return importlib.import_module("stable_baselines3")
     except ImportError as error:
         needed = f"{name} needs stable-baselines3: `pip install nmpcrl[agents]` brings it"
-        raise NoAgents(needed) from error
+        raise Refusal(needed) from error
 
 
 def _model(name: str, env: Any, values: Mapping[str, float], episodes: int, seed: int) -> Any:
@@ -218,11 +211,7 @@ def _model(name: str, env: Any, values: Mapping[str, float], episodes: int, seed
 
 @contextmanager
 def _drawing_from(state: list[Any]) -> Iterator[None]:
-    """Draw from NumPy's and torch's global generators in this state, and then set both back.
-
-    Args:
-        state: of both, updated after the draws; at first empty.
-    """
+    """Draw from NumPy's and torch's global generators in `state`, update it, and set both back."""
     import torch
 
     from nmpcrl.learning.network import OneThread

@@ -18,6 +18,7 @@ The part `best` searches for J_best. Its rows are not published: all others have
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -34,6 +35,7 @@ from nmpcrl.claims.investigation import (
     Question,
     Row,
     above,
+    counted,
     share,
 )
 from nmpcrl.claims.rule import MAJORITY
@@ -81,10 +83,6 @@ DEAR = ("RDES", "DES", "GN-J", "undone-GN-J", "DPG")  # more than a second a lay
 # Parts.
 
 
-class NotTuned(Refusal):
-    """An entry cannot be judged before its tuning, or anything without J_best."""
-
-
 def arms(entry: str) -> dict[str, Entry]:
     """An entry with each of its settings, by name, the default first."""
     every = (ENTRIES[entry].with_settings(**one) for one in SETTINGS[entry] or ({},))
@@ -92,16 +90,12 @@ def arms(entry: str) -> dict[str, Entry]:
 
 
 def tuned(table: pd.DataFrame) -> list[Entry]:
-    """Every entry with its best setting.
-
-    Raises:
-        NotTuned: a row of its tuning is missing.
-    """
+    """Every entry with its best setting; a Refusal while a row of its tuning is missing."""
     tune, found = table[table.part == "tune"], []
     for entry, settings in SETTINGS.items():
         runs = tune[tune.entry == entry]
         if len(runs) < len(settings) * len(PARTS["tune"].places):
-            raise NotTuned(f"{entry} is not tuned yet: the part 'tune' comes first")
+            raise Refusal(f"{entry} is not tuned yet: the part 'tune' comes first")
         found.append(arms(entry)[best_setting(runs) if settings else entry])
     return found
 
@@ -138,7 +132,7 @@ def _part(
         best = table.groupby("place").best.first() if len(table) else {}
         for place in places:
             if place not in best:
-                raise NotTuned(f"J_best of {place} is not known yet: the part 'best' comes first")
+                raise Refusal(f"J_best of {place} is not known yet: the part 'best' comes first")
         costs = {place: float(best[place]) for place in places}
         return {str(one): (one, costs) for one in entries(table)}
 
@@ -322,12 +316,9 @@ def _nears(table: pd.DataFrame) -> Answer:
     return share(shares(_runs(table, "judge 300", "CMA-ES")) >= NEARLY)
 
 
-def _gains(entry: str) -> Callable[[pd.DataFrame], Answer]:
-    def answer(table: pd.DataFrame) -> Answer:
-        costs = _costs(table, "judge 50", entry)
-        return share(costs.cost < costs.initial)
-
-    return answer
+def _gains(entry: str, table: pd.DataFrame) -> Answer:
+    costs = _costs(table, "judge 50", entry)
+    return share(costs.cost < costs.initial)
 
 
 def _by_hand(table: pd.DataFrame) -> Answer:
@@ -351,24 +342,22 @@ def _guard(table: pd.DataFrame) -> Answer:
     return share(helps > MAJORITY)
 
 
-def _difference(first: str, second: str) -> Callable[[pd.DataFrame], Answer]:
+def _difference(first: str, second: str, table: pd.DataFrame) -> Answer:
     """Confirmed if the first has surely more of the gain, contradicted if it has surely less."""
-
-    def answer(table: pd.DataFrame) -> Answer:
-        both = _paired(table, "judge 50", first, second)
-        with np.errstate(invalid="ignore"):  # where both failed
-            more = both[first] - both[second]
-        more = more.mask(both[first] == both[second], 0.0)
-        if len(more) < 2:
-            return Answer(UNDECIDABLE, {"layouts": (0, len(more))})
-        found = gain(more)
-        outcome = above(found.low, found.high)
-        numbers = {"difference": found.value, "low": found.low, "high": found.high}
-        beside = {"layouts with more": (int((more > 0).sum()), len(more))}
-        said = NO_DIFFERENCE if outcome == PARTLY else ""
-        return Answer(outcome, numbers=numbers, beside=beside, said=said)
-
-    return answer
+    both = _paired(table, "judge 50", first, second)
+    with np.errstate(invalid="ignore"):  # where both failed
+        more = both[first] - both[second]
+    more = more.mask(both[first] == both[second], 0.0)
+    if len(more) < 2:
+        return Answer(UNDECIDABLE, {"layouts": (0, len(more))})
+    found = gain(more)
+    outcome = above(found.low, found.high)
+    return Answer(
+        outcome,
+        numbers={"difference": found.value, "low": found.low, "high": found.high},
+        beside={"layouts with more": counted(more > 0)},
+        said=NO_DIFFERENCE if outcome == PARTLY else "",
+    )
 
 
 _SEARCH_BEFORE = (
@@ -384,7 +373,7 @@ QUESTIONS = (
              PARTLY, _nears, f"{_SEARCH_BEFORE} A to F."),
     *(
         Question(f"undone steps on the {what} gain", f"Does {entry} gain?", REPRODUCED,
-                 _gains(entry), "Gauss-Newton with undo gained in 18 of 18.")
+                 partial(_gains, entry), "Gauss-Newton with undo gained in 18 of 18.")
         for what, entry in (("loop's cost", "undone-GN-J"), ("TD error", "undone-LSTD-Q"))
     ),
     Question("one number by hand",
@@ -393,19 +382,19 @@ QUESTIONS = (
              "theta_c by hand does better than GES wherever the robot still arrives."),
     Question("faster auxiliary weights",
              "Has GES with beta = 3 alpha and a normalised step more of the gain than GES?",
-             PARTLY, _difference("GES-3", "GES")),
+             PARTLY, partial(_difference, "GES-3", "GES")),
     Question("guard",
              "Does RDES with the guard solve the layout where RDES with that step size does not?",
              REPRODUCED, _guard, "The guard stops the overshoot."),
     Question("lengths or directions",
              "Has RDES with the guard more of the gain than its lengths in ES's direction?",
-             NOT, _difference("guarded-RDES", "control-RDES")),
+             NOT, partial(_difference, "guarded-RDES", "control-RDES")),
     Question("averaging",
              "Has the averaged theta of ES more of the gain than its last theta?",
-             NOT, _difference("averaged-ES", "ES")),
+             NOT, partial(_difference, "averaged-ES", "ES")),
     Question("undo",
              "Has ES with undo more of the gain than ES with as much interaction?",
-             PARTLY, _difference("undone-ES", "ES")),
+             PARTLY, partial(_difference, "undone-ES", "ES")),
 )  # fmt: skip
 
 REMEDIES = Investigation(

@@ -17,8 +17,8 @@ from nmpcrl.studies.agents import (
     tuned,
 )
 from nmpcrl.studies.agents_run import EVERY, judged_in, trained_in
-from nmpcrl.studies.remedies import NotTuned
 from nmpcrl.study.drawn import JUDGE, TUNE
+from nmpcrl.study.refusal import Refusal
 
 COLUMNS = [*SAC_AND_TD3.table().columns]
 NOTHING = pd.DataFrame(columns=["part", "entry", "place", "initial", "best", "cost"])
@@ -118,7 +118,7 @@ def test_an_agent_is_judged_with_the_setting_that_costs_least_and_not_before_it_
         for i, setting in enumerate(SETTINGS["SAC"]) for place in PARTS["tune"].places
     ]  # fmt: skip
     assert str(tuned(pd.DataFrame(tuning), "SAC")) == "SAC[gradient=0.5,width=128]"
-    with pytest.raises(NotTuned, match="the part 'tune' comes first"):
+    with pytest.raises(Refusal, match="the part 'tune' comes first"):
         tuned(pd.DataFrame(tuning[1:]), "SAC")
 
 

@@ -8,9 +8,10 @@ import pytest
 
 from nmpcrl.analysis.suite import Robot, entry, followed, judge
 from nmpcrl.studies.agents import AGENTS
-from nmpcrl.studies.agents_run import SAC, TD3, NoAgents, curve, seen, trained
+from nmpcrl.studies.agents_run import SAC, TD3, curve, seen, trained
 from nmpcrl.study import ParameterError, paper
 from nmpcrl.study.drawn import TUNE
+from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.robot import RobotEnv
 
 needs_agents = pytest.mark.skipif(
@@ -118,5 +119,5 @@ def test_a_name_is_an_agent_with_its_settings_and_unknown_ones_are_refused():
 
 def test_without_the_extra_one_sentence_says_what_is_missing(monkeypatch):
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
-    with pytest.raises(NoAgents, match=r"SAC needs stable-baselines3: .* nmpcrl\[agents\]"):
+    with pytest.raises(Refusal, match=r"SAC needs stable-baselines3: .* nmpcrl\[agents\]"):
         SAC(Robot(LAYOUT, 1, seed=0))

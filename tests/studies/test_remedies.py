@@ -21,7 +21,6 @@ from nmpcrl.studies.remedies import (
     SECOND,
     SETTINGS,
     YARDSTICK,
-    NotTuned,
     advice,
     arms,
     best_setting,
@@ -32,6 +31,7 @@ from nmpcrl.studies.remedies import (
     solved,
 )
 from nmpcrl.study.drawn import JUDGE, TUNE
+from nmpcrl.study.refusal import Refusal
 
 RUN = {
     "part": "judge 50", "entry": "ES", "arm": "ES", "place": "J001", "k": 0, "initial": 4000.0,
@@ -228,11 +228,11 @@ def judged(tmp_path, monkeypatch, trains_here):
 
 
 def test_rows_are_made_in_order_and_the_best_setting_is_judged(judged):
-    with pytest.raises(NotTuned, match=r"J_best of T01 .* 'best' comes first"):
+    with pytest.raises(Refusal, match=r"J_best of T01 .* 'best' comes first"):
         REMEDIES.complete(["tune"], workers=1)
     REMEDIES.complete(["best"], workers=1)
     assert {(one[0], *one[2:]) for one in judged[-141:]} == {("CMA-ES", 9_000_000, YARDSTICK)}
-    with pytest.raises(NotTuned, match="ES is not tuned yet: the part 'tune' comes first"):
+    with pytest.raises(Refusal, match="ES is not tuned yet: the part 'tune' comes first"):
         REMEDIES.conditions("judge 50")
     REMEDIES.complete(["tune", "judge 300"], workers=1)
     made = REMEDIES.log().table()
