@@ -5,18 +5,13 @@ import re
 from dataclasses import astuple, fields
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from nmpcrl.commands.options import new_file, number
 
-if TYPE_CHECKING:
-    from nmpcrl.course.grading import Mark
-
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet computes begins so
 CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]")  # what a terminal obeys
-HEADER = ("student", "notebook", "points", "of", "by hand")
 NO_SANDBOX = (
     "The notebooks ran with your rights: limits and a temporary folder are no sandbox."
     " See nmpcrl grade --help."
@@ -75,23 +70,26 @@ def grade(
     from nmpcrl.course import grading
     from nmpcrl.course.execution import Limits
 
-    limits = Limits(time_limit, cell_limit, memory)
-    rows = []
-    graded = grading.grade(folder, edition, limits, workers)
+    totals = []
+    graded = grading.grade(folder, edition, Limits(time_limit, cell_limit, memory), workers)
     first = next(graded)  # an earlier table stays until there is something to write
     with out.open("w", newline="", encoding="utf-8", errors="replace") as file:
         writer = csv.writer(file)
         writer.writerow(one.name for one in fields(first[0]))
         for marks in chain([first], graded):
-            rows.append([cell(word) for word in total(marks)])
-            student, notebook, got, of, by_hand = rows[-1]
+            checked = [mark for mark in marks if mark.points is not None]
+            got, of = sum(mark.points or 0 for mark in checked), sum(mark.of for mark in checked)
+            by_hand = sum(mark.of for mark in marks) - of
+            student, notebook = cell(marks[0].student), cell(marks[0].notebook)
             writer.writerows(map(cell, astuple(mark)) for mark in marks)
-            left = f"{by_hand} more are given by hand." if by_hand != "0" else ""
+            left = f"{by_hand} more are given by hand." if by_hand else ""
             writer.writerow((student, notebook, "total", got, of, left))
             file.flush()
             click.echo(f"{notebook}: {got} of {of}", err=True)
-    click.echo(pd.DataFrame(rows, columns=HEADER).to_string(index=False))
-    click.echo(f"\n{len(rows)} notebooks in {out}\n{NO_SANDBOX}")
+            totals.append((student, notebook, got, of, by_hand))
+    header = ("student", "notebook", "points", "of", "by hand")
+    click.echo(pd.DataFrame(totals, columns=header).to_string(index=False))
+    click.echo(f"\n{len(totals)} notebooks in {out}\n{NO_SANDBOX}")
 
 
 def cell(value: object) -> object:
@@ -99,11 +97,3 @@ def cell(value: object) -> object:
     if not isinstance(value, str):
         return value
     return CONTROL.sub("?", f"'{value}" if value[:1] in FORMULA else value)
-
-
-def total(marks: "list[Mark]") -> tuple[str, ...]:
-    """Of a notebook: points, points to be had from checks, and those that a person gives."""
-    checked = [mark for mark in marks if mark.points is not None]
-    by_hand = sum(mark.of for mark in marks if mark.points is None)
-    got, of = sum(mark.points or 0 for mark in checked), sum(mark.of for mark in checked)
-    return marks[0].student, marks[0].notebook, str(got), str(of), str(by_hand)

@@ -33,8 +33,6 @@ class Commands(click.Group):
         """Call the command; a known error becomes its sentence and exit code 1."""
         try:
             return super().invoke(ctx)
-        except (click.ClickException, click.exceptions.Exit, click.Abort):
-            raise
         except Exception as error:
             if message := sentence(error):
                 raise click.ClickException(message) from None

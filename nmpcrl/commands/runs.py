@@ -1,15 +1,13 @@
 """`nmpcrl runs`: the stored runs, as a table or as JSON."""
 
 import json
+from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
-
-if TYPE_CHECKING:
-    from nmpcrl.study.records import About
 
 COLUMNS = ("run", "learner", "layout", "decay", "seed", "episodes",
            "cost", "minutes", "kB", "stopped")  # fmt: skip
@@ -41,7 +39,7 @@ def runs(name: str, sort: str, reverse: bool, as_json: bool) -> None:
     from nmpcrl.study.store import folder, stored
 
     found = {path: about for path, about in stored().items() if begins(path, name)}
-    rows = {path: _row(path, about) for path, about in found.items()}
+    rows = {path: _row(path, one.experiment, one.facts) for path, one in found.items()}
     ordered = sorted(found, key=lambda path: rows[path][sort], reverse=reverse)
     if as_json:
         objects = [{"run": p.stem, "path": str(p), **found[p]._asdict()} for p in ordered]
@@ -86,12 +84,12 @@ def stored_run(name: str) -> Path:
     raise click.ClickException(f"in {folder()} {begin} with {name!r}; stored: {listed or 'none'}")
 
 
-def _row(path: Path, about: "About") -> dict[str, Any]:
+def _row(path: Path, fields: Mapping[str, Any], facts: Mapping[str, Any]) -> dict[str, Any]:
     """A run by column."""
     from nmpcrl.study import Experiment
     from nmpcrl.study.geometry import short_name
 
-    e, facts = Experiment(**about.experiment), about.facts
+    e = Experiment(**fields)
     cost, minutes, size = facts["final_cost"], facts["seconds"] / 60, path.stat().st_size / 1000
     stopped = shorten(facts["stopped"], 60, placeholder=" ...")
     named = (path.stem, e.learner, short_name(e.layout), e.decay, e.seed, e.episodes)

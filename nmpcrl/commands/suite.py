@@ -8,9 +8,9 @@ from nmpcrl.commands.options import WORKERS
 @click.command()
 @click.option("--policy", metavar="ENTRY", help="MODULE:FACTORY, or a shipped entry, such as ES.")
 @click.option("--moving", is_flag=True, help="The 40 scenarios in which obstacles move.")
-@click.option("--budget", type=int, default=300, show_default=True, help="Episodes a layout.")
+@click.option("--budget", metavar="N", default=300, help="Episodes a layout.")
 @click.option("--layouts", metavar="N", type=int, help="Only the first N of the 120, or 40.")
-@click.option("--seeds", metavar="N", type=int, default=2, show_default=True, help="A layout.")
+@click.option("--seeds", metavar="N", default=2, help="Seeds a layout.")
 @WORKERS
 @click.option("--list", "listed", is_flag=True, help="Only list the shipped entries.")
 def suite(policy: str | None, moving: bool, workers: int | None, listed: bool,
@@ -39,11 +39,11 @@ def suite(policy: str | None, moving: bool, workers: int | None, listed: bool,
         raise click.ClickException("--policy names an entry: MODULE:FACTORY, or a shipped one")
     judged = judge_all(policy, moving=moving, workers=workers, **asked)  # type: ignore[arg-type]
     (row,) = leaderboard(judged).itertuples()
-    shares = ("disqualified",) * 2 if row.over else (f"{row.solved:.0%}", f"{row.gain:.1%}")
     cells = {
         "entry": row.entry,
         "scenarios" if moving else "layouts": row.places,
-        **dict(zip(("solved", "gain"), shares, strict=True)),
+        "solved": "disqualified" if row.over else f"{row.solved:.0%}",
+        "gain": "disqualified" if row.over else f"{row.gain:.1%}",
         "episodes": row.episodes,
         "CPU time": f"{row.seconds:.0f} s",
     } | ({"never inside": f"{row.clear:.0%}"} if moving else {})
