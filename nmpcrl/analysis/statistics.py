@@ -20,6 +20,7 @@ from scipy import stats
 from nmpcrl import Vector
 
 CONFIDENCE = 0.95
+ENDS = ((1 - CONFIDENCE) / 2, 1 - (1 - CONFIDENCE) / 2)  # quantiles at the ends of an interval
 RESAMPLES = 2000  # of the bootstrap
 SEED = 0  # of the bootstrap: the same runs give the same interval
 
@@ -44,9 +45,6 @@ def rate(held: int, of: int) -> Estimate:
     For several layouts the interval is too wide rather than too narrow: a fixed number of runs in
     each varies less than as many runs drawn from the mixture (Hoeffding 1956). Runs of one seed,
     which have the same noise in every layout, are treated as independent.
-
-    Raises:
-        ValueError: `of` is 0, or `held` is not between 0 and `of`.
     """
     if not 0 <= held <= of or not of:
         raise ValueError(f"{held} of {of} runs is not a rate")
@@ -57,9 +55,7 @@ def rate(held: int, of: int) -> Estimate:
 def paired_p(gained: int, lost: int) -> float:
     """McNemar's exact two-sided p of the pairs whose answer changed; 1 if no pair changed.
 
-    Args:
-        gained: pairs that answer yes only with the change.
-        lost: pairs that answer yes only without it.
+    `gained` pairs answer yes only with the change, `lost` ones only without it.
     """
     changed = gained + lost
     return float(stats.binomtest(gained, changed).pvalue) if changed else 1.0
@@ -68,18 +64,12 @@ def paired_p(gained: int, lost: int) -> float:
 def interquartile_mean(scores: Vector, strata: Sequence[Hashable]) -> Estimate:
     """Mean of the middle half of the scores; infinite if more than a quarter of the runs failed.
 
-    Args:
-        scores: one a run, shape (runs,).
-        strata: the layout of each run.
-
-    Raises:
-        ValueError: a score is nan, or there is no score.
+    `scores` and `strata`, the layouts, have one entry a run.
     """
     known = _known(scores)
 
-    def middle(*drawn: Vector) -> Vector:
-        result: Vector = stats.trim_mean(known[np.concatenate(drawn, axis=-1)], 0.25, axis=-1)
-        return result
+    def middle(*drawn: Vector) -> Any:
+        return stats.trim_mean(known[np.concatenate(drawn, axis=-1)], 0.25, axis=-1)
 
     return _bootstrapped(middle, strata)
 
@@ -93,59 +83,37 @@ def probability_of_improvement(
     one half (Mann and Whitney's U). Layouts have equal weights. Runs of one seed have the same
     noise, so the bootstrap draws them together.
 
-    Args:
-        first: costs, shape (runs,).
-        second: costs of the runs with the same layout, decay and seed, shape (runs,).
-        strata: the layout of each pair.
-
-    Raises:
-        ValueError: a cost is nan, there is no cost, or the two differ in number.
+    `first`, `second` and `strata`, the layouts, have one entry a pair of runs with the same layout,
+    decay and seed.
     """
     ours, theirs = _known(first), _known(second)
     if len(ours) != len(theirs):
         raise ValueError(f"{len(ours)} runs cannot be paired with {len(theirs)}")
 
-    def better(*drawn: Vector) -> Vector:
+    def better(*drawn: Vector) -> Any:
         wins = []
         for pairs in drawn:
             one, other = ours[pairs][..., :, None], theirs[pairs][..., None, :]
             wins.append(((one < other) + 0.5 * (one == other)).mean(axis=(-2, -1)))
-        result: Vector = np.mean(wins, axis=0)
-        return result
+        return np.mean(wins, axis=0)
 
     return _bootstrapped(better, strata)
 
 
-def over_layouts(
-    statistic: Callable[..., Any], *columns: Vector, resamples: int = RESAMPLES
-) -> Estimate:
-    """A statistic of columns with one row a layout, and its percentile interval.
+def over_layouts(statistic: Callable[..., Any], *columns: Vector) -> Estimate:
+    """A statistic of columns, each of shape (layouts,), and its percentile interval.
 
-    A draw whose statistic is nan or infinite does not count.
-
-    Args:
-        statistic: of the columns, over their last axis.
-        columns: each of shape (layouts,).
-        resamples: of the bootstrap.
-
-    Raises:
-        ValueError: there is no layout, the columns differ in length, or the statistic is over
-            all axes.
+    The statistic is over the last axis of the columns. A draw in which it is nan or infinite does
+    not count.
     """
-    layouts = {len(one) for one in columns}
-    if len(layouts) != 1 or not min(layouts):
-        raise ValueError(f"columns of {sorted(layouts)} layouts: one length above 0 is needed")
-    (count,), rng = layouts, np.random.default_rng(SEED)
-    arrays = [np.asarray(one) for one in columns]
-    value = statistic(*arrays)
-    chosen = rng.integers(count, size=(resamples, count))
-    drawn = np.asarray(statistic(*(one[chosen] for one in arrays)))
-    if drawn.shape != (resamples,):
+    rows = np.stack(columns)
+    count, rng = rows.shape[1], np.random.default_rng(SEED)
+    drawn = np.asarray(statistic(*rows[:, rng.integers(count, size=(RESAMPLES, count))]))
+    if drawn.shape != (RESAMPLES,):
         raise ValueError(f"a statistic of shape {drawn.shape}: one over the last axis is needed")
     known = drawn[np.isfinite(drawn)]
-    tail = (1 - CONFIDENCE) / 2
-    bounds = np.quantile(known, (tail, 1 - tail)) if known.size else (np.nan, np.nan)
-    return Estimate(float(value), float(bounds[0]), float(bounds[1]))
+    low, high = np.quantile(known, ENDS) if known.size else (np.nan, np.nan)
+    return Estimate(float(statistic(*rows)), float(low), float(high))
 
 
 def _known(scores: Vector) -> Vector:
@@ -156,12 +124,11 @@ def _known(scores: Vector) -> Vector:
     return values
 
 
-def _bootstrapped(statistic: Callable[..., Vector], strata: Sequence[Hashable]) -> Estimate:
+def _bootstrapped(statistic: Callable[..., Any], strata: Sequence[Hashable]) -> Estimate:
     """The statistic of all runs, and its percentile interval under draws within each stratum.
 
-    Args:
-        statistic: of the indices of the runs drawn from each stratum, shapes (..., runs in it).
-        strata: the stratum of each run; with a single run in one of them the bounds are nan.
+    The statistic is of the indices of the runs of each stratum, each of shape (..., runs in it).
+    With a single run in a stratum the bounds are nan.
     """
     codes, names = pd.factorize(pd.Series(list(strata)))
     members = [np.flatnonzero(codes == code) for code in range(len(names))]
@@ -177,6 +144,5 @@ def _bootstrapped(statistic: Callable[..., Vector], strata: Sequence[Hashable]) 
             vectorized=True,
             rng=np.random.default_rng(SEED),
         ).bootstrap_distribution
-    tail = (1 - CONFIDENCE) / 2
-    low, high = np.quantile(drawn, (tail, 1 - tail), method="inverted_cdf")
+    low, high = np.quantile(drawn, ENDS, method="inverted_cdf")
     return Estimate(value, float(low), float(high))

@@ -5,7 +5,6 @@ the area under the ROC curve, which asks whether successes rank above failures, 
 score, which asks for the probabilities themselves. The bootstrap draws layouts, never runs.
 """
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from nmpcrl.analysis.statistics import over_layouts
 from nmpcrl.studies.difficulty import MEASURES, PILOT
 
 RIDGE = 1.0  # penalty of the logistic regression, of the squared slope of the standardised measure
-RESAMPLES = 2000  # of the bootstrap over layouts
 
 
 def predicted(measure: Vector, success: Vector, asked: Vector) -> tuple[float, Vector]:
@@ -73,7 +71,6 @@ def predictor_scores(difficulty: pd.DataFrame, tuned: pd.Series, judged: pd.Seri
         and ahead, by how much the area of `PILOT` is larger (an `Estimate`; 0 for itself).
     """
     known, asked, y = difficulty.loc[tuned.index], difficulty.loc[judged.index], judged.to_numpy()
-    drawn = partial(over_layouts, resamples=RESAMPLES)
     found = {
         name: predicted(known[name].to_numpy(), tuned.to_numpy(), asked[name].to_numpy())
         for name in MEASURES
@@ -81,9 +78,11 @@ def predictor_scores(difficulty: pd.DataFrame, tuned: pd.Series, judged: pd.Seri
     rows = {
         name: {
             "slope": slope,
-            "auc": drawn(auc, p, y),
-            "brier": drawn(brier, p, y),
-            "ahead": drawn(lambda pilot, p, y: auc(pilot, y) - auc(p, y), found[PILOT][1], p, y),
+            "auc": over_layouts(auc, p, y),
+            "brier": over_layouts(brier, p, y),
+            "ahead": over_layouts(
+                lambda pilot, p, y: auc(pilot, y) - auc(p, y), found[PILOT][1], p, y
+            ),
         }
         for name, (slope, p) in found.items()
     }

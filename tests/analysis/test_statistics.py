@@ -103,29 +103,16 @@ def test_the_probability_of_improvement_is_mann_and_whitney_s_u_over_the_number_
     assert estimate.value == pytest.approx(u / 30**2)
 
 
-def test_layouts_are_not_compared_with_each_other_and_weigh_the_same():
-    first = np.array([1.0, 1, 50, 50, 50, 50])
-    second = np.array([2.0, 2, 40, 40, 40, 40])  # better in B, and worse than all of A
-    assert probability_of_improvement(first, second, list("AABBBB")).value == 0.5
-
-
-def test_a_failure_loses_against_any_run_and_ties_with_a_failure():
-    failed, whole = np.full(2, np.inf), np.full(2, 1e9)
-    assert probability_of_improvement(whole, failed, ["A"] * 2).value == 1
-    assert probability_of_improvement(failed, failed, ["A"] * 2).value == 0.5
-
-
-@pytest.mark.weekly
-@pytest.mark.slow
-def test_the_interval_of_the_probability_of_improvement_covers_it_about_as_often_as_it_says():
-    rng, noise = np.random.default_rng(5), 1.0
-    shift = 0.5
-    estimates = [
-        probability_of_improvement(common + ours, common + theirs + shift, LAYOUTS)
-        for common, ours, theirs in rng.normal(scale=noise, size=(40, 3, 120))
-    ]
-    true = stats.norm.cdf(shift / (2 * noise))  # of two runs, each of variance 2
-    assert 0.88 <= covered(estimates, true) <= 1
+@pytest.mark.parametrize(
+    ("first", "second", "layouts", "value"),
+    [
+        ([1, 1, 50, 50, 50, 50], [2, 2, 40, 40, 40, 40], "AABBBB", 0.5),  # worse than all of A
+        ([1e9, 1e9], [np.inf, np.inf], "AA", 1),
+        ([np.inf, np.inf], [np.inf, np.inf], "AA", 0.5),
+    ],
+)
+def test_layouts_weigh_the_same_and_a_failure_ties_with_a_failure(first, second, layouts, value):
+    assert probability_of_improvement(first, second, layouts).value == value
 
 
 # All of them
@@ -136,14 +123,9 @@ def test_the_interval_of_the_probability_of_improvement_covers_it_about_as_often
     [
         (lambda: rate(0, 0), "0 of 0 runs is not a rate"),
         (lambda: rate(3, 2), "3 of 2 runs"),
-        (lambda: rate(-1, 2), "-1 of 2 runs"),
         (lambda: interquartile_mean([1, np.nan], "AA"), "1 of 2 scores are nan"),
-        (lambda: interquartile_mean([], ""), "0 of 0 scores are nan"),
-        (lambda: probability_of_improvement([1, np.nan], [1, 1], "AA"), "1 of 2 scores are nan"),
         (lambda: probability_of_improvement([], [], ""), "0 of 0 scores are nan"),
         (lambda: probability_of_improvement([1] * 3, [1] * 2, "AAA"), "3 runs .* paired with 2"),
-        (lambda: over_layouts(np.mean, [0, 0], [0, 0, 0]), r"columns of \[2, 3\] layouts"),
-        (lambda: over_layouts(np.mean, []), r"columns of \[0\] layouts"),
         (lambda: over_layouts(np.mean, np.arange(4.0)), "over the last axis is needed"),
     ],
 )
