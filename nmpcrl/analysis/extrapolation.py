@@ -14,8 +14,10 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl import Matrix, Vector
+from nmpcrl.analysis.metrics import root_mean_square
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, Successor, Transition
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Diverged, train
@@ -87,18 +89,13 @@ class Outcome:
 
 
 def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
-    """Train a learner that imitates, with one of `INTERVENTIONS`, and measure its `feedback`.
-
-    Raises:
-        KeyError: there is no such intervention.
-        TypeError: the experiment's learner has no network.
-    """
-    change, controller = INTERVENTIONS[intervention], controller_of(experiment)
+    """Train a learner that imitates, with one of `INTERVENTIONS`, and measure its `feedback`."""
+    controller = controller_of(experiment)
     learner, weights, explore = prepare(experiment, controller)
     network = learner.bootstrap
     if not isinstance(network, Imitation):
         raise TypeError(f"learner = {experiment.learner!r} has no network that is asked with theta")
-    changed = change(network, controller)
+    changed = INTERVENTIONS[intervention](network, controller)
     fed: list[float] = []
 
     def watched(transition: Transition, theta: Vector) -> Successor | None:
@@ -107,33 +104,22 @@ def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
             fed.append(feedback(network, transition, theta, learner.gamma))
         return successor
 
-    stopped, thetas = False, list[Vector]()
-    rows: list[list[tuple[float, float, float]]] = []  # by episode, of the steps with a prediction
-    steps = train(
-        replace(learner, bootstrap=watched),
-        controller,
-        weights,
-        explore,
-        clipped=experiment.clipped,
-        constrained=experiment.values_actions,
-    )
+    stopped, thetas, rows = False, list[Vector](), list[tuple[float, ...]]()
+    how = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
     try:
-        for step in steps:
-            if step.episode == len(thetas):
-                thetas.append(step.weights.theta)
-                rows.append([])
-            thetas[-1] = step.weights.theta
+        for step in train(replace(learner, bootstrap=watched), controller, weights, explore, **how):
+            thetas[step.episode :] = [step.weights.theta]  # the last one of the episode
             if step.solution and step.update and step.update.delta is not None:
                 phi = step.solution.features
                 square = experiment.alpha * float(phi @ phi)
-                rows[-1].append((step.update.delta, square, fed[-1]))
+                rows.append((step.episode, step.update.delta, square, fed[-1]))
     except Diverged:
         stopped = True
-    columns = [np.array(each or [(np.nan,) * 3]).T for each in rows]
-    return Outcome(
-        stopped,
-        np.array(thetas),
-        np.array([np.sqrt(np.mean(delta**2)) for delta, _, _ in columns]),
-        np.array([overshoot.max() for _, overshoot, _ in columns]),
-        np.array([np.median(own) for _, _, own in columns]),
+    columns = ["episode", "delta", "overshoot", "feedback"]
+    by_episode = (
+        pd.DataFrame(rows, columns=columns, dtype=float)
+        .groupby("episode")
+        .agg({"delta": root_mean_square, "overshoot": "max", "feedback": "median"})
     )
+    numbers = by_episode.reindex(range(len(thetas))).to_numpy(float)
+    return Outcome(stopped, np.array(thetas), *numbers.T)

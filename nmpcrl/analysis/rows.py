@@ -6,9 +6,10 @@
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.metrics import LATE
@@ -16,9 +17,6 @@ from nmpcrl.analysis.summary import SIZES, RunSummary
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.provenance import before
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 FIELDS = tuple(one.name for one in fields(Experiment))
 VECTORS = ("theta", "start", "target")  # fields written as text
@@ -104,10 +102,8 @@ def experiment_of(row: Mapping[str, Any]) -> Experiment:
     return Experiment(**named | vectors)
 
 
-def table(summaries: Mapping[Experiment, RunSummary]) -> "pd.DataFrame":
+def table(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
     """One `row` a run, with the column `cost_ratio` of `cost_ratios`."""
-    import pandas as pd
-
     rows = {e: row(one) for e, one in summaries.items()}
     return pd.DataFrame([*rows.values()]).assign(cost_ratio=[*cost_ratios(rows).values()])
 
@@ -119,10 +115,8 @@ def cost_ratios(rows: Mapping[Experiment, Mapping[str, Any]]) -> dict[Experiment
     return {e: one["training_cost"] / arms[e]["training_cost"] for e, one in rows.items()}
 
 
-def tidy(summary: RunSummary) -> "pd.DataFrame":
+def tidy(summary: RunSummary) -> pd.DataFrame:
     """One row an episode: learner, layout, decay, seed, the columns of numbers, and theta."""
-    import pandas as pd
-
     named = {name: summary.experiment[name] for name in ("learner", "layout", "decay", "seed")}
     columns = {name: column for name, column in summary.episodes.items() if column.ndim == 1}
     names = (f"theta_{name}" for name in paper.THETA_NAMES)

@@ -18,9 +18,10 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis.encounters import count
@@ -50,9 +51,6 @@ from nmpcrl.study.moving import TASK, World, centres, controller, extrapolated
 from nmpcrl.study.parameters import number, numbers, refused, shortened, whole
 from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.setup import prepare
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOST_EPISODES, MOST_SEEDS = 10_000, 100
 HELD_OUT = 1_000_000  # the first seed; the study's seeds are below 100
@@ -397,7 +395,7 @@ def judge_all(
     layouts: int | None = None,
     seeds: int = 2,
     workers: int | None = None,
-) -> "pd.DataFrame":
+) -> pd.DataFrame:
     """Judge an entry in every place of the suite with every seed; one row a judgement.
 
     Args:
@@ -411,8 +409,6 @@ def judge_all(
     Returns:
         Columns entry, place, k and the fields of `Judgement`; repeatable except for seconds.
     """
-    import pandas as pd
-
     places = SCENARIOS if moving else JUDGE
     budget = whole(1, MOST_EPISODES).check("budget", budget)
     seeds = whole(1, MOST_SEEDS).check("seeds", seeds)
@@ -435,7 +431,7 @@ def _judge(name: str, episodes: int, job: tuple[str, int]) -> Judgement:
     return judge(entry(name), job[0], seed_of(*job), episodes)
 
 
-def leaderboard(judged: "pd.DataFrame") -> "pd.DataFrame":
+def leaderboard(judged: pd.DataFrame) -> pd.DataFrame:
     """The rows of `judge_all`, summarised in one row for each entry.
 
     Returns:
@@ -444,8 +440,6 @@ def leaderboard(judged: "pd.DataFrame") -> "pd.DataFrame":
         the places without a state in a moving obstacle) and over (the first place in which the
         budget was exceeded, or ""); each share is an `Estimate`.
     """
-    import pandas as pd
-
     rows = []
     for name, of_entry in judged.groupby("entry", sort=False):
         places = [each for _, each in of_entry.groupby("place", sort=False)]

@@ -6,7 +6,7 @@ The approximate values are theta in the first state, 2 theta in the second and 0
 theta = 0 is exact. Tsitsiklis and Van Roy (1997); Sutton and Barto (2018), Section 11.2.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,10 +29,9 @@ class Chain:
     share: float = 1.0  # of updates made in the first state; on-policy visits give 1/2
 
     def __post_init__(self) -> None:
-        if not 0 <= self.gamma <= 1:
-            raise ValueError(f"gamma = {self.gamma} must lie in [0, 1]")
-        if not 0 <= self.share <= 1:
-            raise ValueError(f"share = {self.share} must lie in [0, 1]")
+        for name, value in vars(self).items():
+            if not 0 <= value <= 1:
+                raise ValueError(f"{name} = {value} must lie in [0, 1]")
 
     @property
     def probabilities(self) -> Vector:
@@ -47,10 +46,10 @@ class Chain:
 
 def sampled_step(chain: Chain, rule: UpdateRule, weights: Weights, state: int) -> Weights:
     """One update in `state`."""
-    delta = chain.delta(weights.theta, state)
-    here: Any = Successor(float(PHI[state] @ weights.theta), PHI[state])  # stands in for a solution
-    there = Successor(float(PHI_NEXT[state] @ weights.theta), PHI_NEXT[state])
-    return rule(weights, delta, here, there)
+    here, there = (Successor(float(phi[state] @ weights.theta), phi[state])
+                   for phi in (PHI, PHI_NEXT))  # fmt: skip
+    solution: Any = here  # which has the value and the features that the rule reads
+    return rule(weights, chain.delta(weights.theta, state), solution, there)
 
 
 def expected_step(chain: Chain, rule: UpdateRule, weights: Weights) -> Weights:
@@ -63,40 +62,29 @@ def expected_step(chain: Chain, rule: UpdateRule, weights: Weights) -> Weights:
 
 
 def follow(
-    chain: Chain,
-    rule: UpdateRule,
-    updates: int,
-    *,
-    theta: float = 1.0,
-    w: float = 0.0,
-    rng: np.random.Generator | None = None,
+    chain: Chain, rule: UpdateRule, updates: int, *, rng: np.random.Generator | None = None
 ) -> Matrix:
-    """(theta, w) before the first update and after each, shape (updates + 1, 2).
+    """(theta, w) before the first update, (1, 0), and after each, shape (updates + 1, 2).
 
     Args:
         chain: the chain.
         rule: an update rule of `nmpcrl.learning`, such as `semi_gradient(alpha)`.
         updates: number of updates.
-        theta: first theta.
-        w: first w.
         rng: draws the state of each update; expected updates if absent.
     """
-    weights = Weights(np.array([theta]), np.array([w]))
-    path = [weights]
+    path = [Weights(np.ones(1), np.zeros(1))]
     for _ in range(updates):
         if rng is None:
-            weights = expected_step(chain, rule, weights)
+            path.append(expected_step(chain, rule, path[-1]))
         else:
             state = int(rng.random() >= chain.share)
-            weights = sampled_step(chain, rule, weights, state)
-        path.append(weights)
+            path.append(sampled_step(chain, rule, path[-1], state))
     return np.array([[step.theta[0], step.w[0]] for step in path])
 
 
 def expected_matrix(chain: Chain, rule: UpdateRule) -> Matrix:
     """The expected update as a matrix on (theta, w), shape (2, 2): on this chain it is linear."""
-    zero = Weights(np.zeros(1), np.zeros(1))
-    units = replace(zero, theta=np.ones(1)), replace(zero, w=np.ones(1))
+    units = Weights(np.ones(1), np.zeros(1)), Weights(np.zeros(1), np.ones(1))
     moved = [expected_step(chain, rule, unit) for unit in units]
     return np.array([[step.theta[0], step.w[0]] for step in moved]).T
 
@@ -108,14 +96,18 @@ def spectral_radius(chain: Chain, rule: UpdateRule) -> float:
 
 def auxiliary_fixed_point(chain: Chain, theta: float) -> float:
     """The fixed point of w's expected update for one theta: E[phi phi']^-1 E[delta phi]."""
-    correlation, covariance = _moments(chain, theta)
-    return correlation / covariance
+    return _correlation(chain, theta) / float(chain.probabilities @ PHI[:, 0] ** 2)
 
 
 def mspbe(chain: Chain, theta: float) -> float:
     """The mean-square projected Bellman error as expectations: Eq. (15)."""
-    correlation, covariance = _moments(chain, theta)
-    return correlation / covariance * correlation
+    return auxiliary_fixed_point(chain, theta) * _correlation(chain, theta)
+
+
+def _correlation(chain: Chain, theta: float) -> float:
+    """E[delta phi]."""
+    delta = [chain.delta(np.array([theta]), state) for state in (FIRST, SECOND)]
+    return float(chain.probabilities @ (delta * PHI[:, 0]))
 
 
 def projected_bellman_error(chain: Chain, theta: float) -> float:
@@ -125,10 +117,3 @@ def projected_bellman_error(chain: Chain, theta: float) -> float:
     backed_up = COST + chain.gamma * PHI_NEXT[:, 0] * theta
     projected = basis * (rho @ (basis * backed_up)) / (rho @ basis**2)
     return float(rho @ (projected - values) ** 2)
-
-
-def _moments(chain: Chain, theta: float) -> tuple[float, float]:
-    """E[delta phi] and E[phi phi']."""
-    rho, basis = chain.probabilities, PHI[:, 0]
-    delta = [chain.delta(np.array([theta]), state) for state in (FIRST, SECOND)]
-    return float(rho @ (delta * basis)), float(rho @ basis**2)
