@@ -12,6 +12,7 @@ An intervention changes the prediction alone: noise, first weights, examples and
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -105,7 +106,7 @@ def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
         return successor
 
     stopped, thetas, rows = False, list[Vector](), list[tuple[float, ...]]()
-    how = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
+    how: Any = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
     try:
         for step in train(replace(learner, bootstrap=watched), controller, weights, explore, **how):
             thetas[step.episode :] = [step.weights.theta]  # the last one of the episode

@@ -24,18 +24,16 @@ class Directions:
     predicted: Vector  # w'phi, the prediction of delta
 
     @property
-    def lengths(self) -> tuple[Vector, Vector]:
-        """Norms of the semi-gradients and of the corrections."""
-        first, second = (
-            np.linalg.norm(one, axis=1) for one in (self.semi_gradient, self.correction)
-        )
-        return first, second
+    def lengths(self) -> Matrix:
+        """Norms of the semi-gradients and of the corrections, shape (2, steps)."""
+        found: Matrix = np.linalg.norm([self.semi_gradient, self.correction], axis=2)
+        return found
 
     @property
     def share(self) -> float:
-        """Summed length of the corrections over that of the semi-gradients."""
-        semi_gradient, correction = self.lengths
-        return float(correction.sum() / semi_gradient.sum())
+        """Summed length of the corrections over the summed length of the semi-gradients."""
+        semi_gradient, correction = self.lengths.sum(axis=1)
+        return float(correction / semi_gradient)
 
     @property
     def net(self) -> float:
@@ -45,9 +43,9 @@ class Directions:
 
 
 def directions(records: Records) -> Directions:
-    """The parts of the steps of a run of GES.
+    """The parts of the steps of a run of GES, without a solve.
 
-    Eq. (16) gives gamma (w'phi) phi+ = delta phi - (theta' - theta) / alpha, without a solve.
+    Eq. (16) gives gamma (w'phi) phi+ = delta phi - (theta' - theta) / alpha.
     """
     steps, alpha = records.steps, records.experiment["alpha"]
     known = np.isfinite(steps["delta"])
@@ -74,11 +72,9 @@ class Curvature:
 
 
 def dropped_curvature(records: Records, *, samples: int = 200) -> Curvature:
-    """The dropped term h of a run of GES, at steps spread evenly over training.
+    """The dropped term h of a run of GES, at so many steps spread evenly over training.
 
-    Args:
-        records: a run of GES.
-        samples: number of steps; steps without a Hessian are skipped.
+    Steps without a Hessian are skipped.
     """
     steps, gamma = records.steps, paper.GAMMA
     nmpc = controller_of(Experiment(**records.experiment)).nmpc

@@ -24,7 +24,7 @@ class Imitation:
 
     def error(self, which: str) -> float:
         """Root mean square error of `with_theta` or `without_theta`, in units of cost."""
-        return float(np.sqrt(np.mean((getattr(self, which) - self.value) ** 2)))
+        return metrics.root_mean_square(getattr(self, which) - self.value)
 
     @property
     def ratio(self) -> float:
@@ -32,27 +32,24 @@ class Imitation:
         return self.error("with_theta") / self.error("without_theta")
 
 
-def imitate(records: Records, *, fits: int = FITS, seed: int = 0) -> Imitation:
+def imitate(records: Records, *, fits: int = FITS) -> Imitation:
     """Fit the networks of DES and RDES to one run, and predict its held-out episodes with both.
 
-    Args:
-        records: a run whose theta moved; every `HELD_OUT`-th episode is held out.
-        fits: mini-batches of each network.
-        seed: of weights and batches, the same for both networks.
+    Every `HELD_OUT`-th episode is held out. Both networks have the same seed.
     """
     from nmpcrl.learning.network import QNetwork  # and with it torch
 
     steps = records.steps
-    whole = np.isfinite(steps["value"])
-    state_action = np.hstack([steps["state"], steps["action"]])[whole]
-    before = metrics.theta_before(records)[whole]
-    value, episode = steps["value"][whole], steps["episode"][whole]
+    solved = np.isfinite(steps["value"])
+    state_action = np.hstack([steps["state"], steps["action"]])[solved]
+    before = metrics.theta_before(records)[solved]
+    value, episode = steps["value"][solved], steps["episode"][solved]
     held_out = episode % HELD_OUT == HELD_OUT - 1
     if not held_out.any():
         held_out = episode == episode.max()  # fewer than five episodes: the last one
 
     def predict(inputs: Vector) -> Vector:
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(0)
         network = QNetwork(inputs.shape[1], rng, learning_rate=paper.ZETA, batch=paper.BATCH)
         for example, target in zip(inputs[~held_out], value[~held_out], strict=True):
             network.remember(example, target)

@@ -49,23 +49,28 @@ class Stand:
 
 def stands(summary: RunSummary, episodes: Iterable[int]) -> list[Stand]:
     """The rollouts of a run's theta after some of its episodes; 0 is the start."""
-    experiment = summary.name
+    experiment, found = summary.name, []
     controller: Persistent = controller_of(experiment)
     thetas = np.vstack([experiment.theta, summary.episodes["theta"]])
     deltas = np.r_[np.nan, summary.episodes["delta"]]
-    return [stand(controller, thetas[k], experiment.steps, k, deltas[k]) for k in episodes]
-
-
-def stand(
-    controller: Persistent, theta: Vector, steps: int, episode: int = 0, delta: float = np.nan
-) -> Stand:
-    """The rollout of one theta; episode and delta are copied into the result."""
-    rollout = evaluate(controller, theta, steps)
-    states, task = rollout.states, controller.nmpc.task
-    there = controller.solve(states[-1], theta)
-    away = task.distance(states[-1]) > ARRIVED
-    numbers = (_way(states), float(rollout.costs[-1]), there.value, float(there.features[-1]))
-    return Stand(episode, theta[-1], delta, states, rollout.cost, not away, *numbers)
+    for k in episodes:
+        rollout = evaluate(controller, thetas[k], experiment.steps)
+        states, plan = rollout.states, controller.solve(rollout.states[-1], thetas[k])
+        found.append(
+            Stand(
+                episode=k,
+                theta_c=thetas[k, -1],
+                delta=deltas[k],
+                states=states,
+                cost=rollout.cost,
+                arrived=experiment.task.distance(states[-1]) <= ARRIVED,
+                moved=_way(states),
+                stage_cost=float(rollout.costs[-1]),
+                value=plan.value,
+                phi_c=float(plan.features[-1]),
+            )
+        )
+    return found
 
 
 def stretch(found: Iterable[Stand], standing: float) -> list[Stand]:
@@ -77,10 +82,7 @@ def stretch(found: Iterable[Stand], standing: float) -> list[Stand]:
 def cliff(cost: Callable[[float], float], grid: Vector, costs: Vector) -> float:
     """The largest theta_c before the cost rises by `RISE` at once; nan where it never does.
 
-    Args:
-        cost: of a rollout with a theta_c.
-        grid: of theta_c, ascending.
-        costs: on the grid.
+    `cost` is of a rollout with a theta_c, and `costs` are those on the ascending `grid` of theta_c.
     """
     rises = np.flatnonzero(costs[1:] > (1 + RISE) * costs[:-1])
     if not rises.size:
@@ -116,18 +118,15 @@ def ending(summary: RunSummary) -> dict[str, float]:
         root_mean_square(part) if part.size else np.nan
         for part in (reached[:PART], reached[-PART:])
     )
-    found = {"moved": np.nan, "worth": np.nan, "delta_first": first, "delta_last": last}
-    finished = np.isfinite(summary.states).all()
-    if not finished or summary.evaluations["distance"][-1] <= ARRIVED:
-        return found | {"phi_c": np.nan}
-    state, controller = summary.states[-1], controller_of(summary.name)
-    solution = controller.solve(state, summary.evaluations["theta"][-1])
-    cost = controller.nmpc.task.stage_cost(state, summary.actions[-1])
-    found |= {
-        "moved": _way(summary.states),
-        "worth": solution.value * (1 - controller.gamma) / cost,
-    }
-    return found | {"phi_c": float(solution.features[-1])}
+    moved = worth = phi_c = np.nan
+    if np.isfinite(summary.states).all() and summary.evaluations["distance"][-1] > ARRIVED:
+        state, controller = summary.states[-1], controller_of(summary.name)
+        solution = controller.solve(state, summary.evaluations["theta"][-1])
+        cost = controller.nmpc.task.stage_cost(state, summary.actions[-1])
+        moved, phi_c = _way(summary.states), float(solution.features[-1])
+        worth = solution.value * (1 - controller.gamma) / cost
+    return {"moved": moved, "worth": worth, "delta_first": first, "delta_last": last,
+            "phi_c": phi_c}  # fmt: skip
 
 
 def _way(states: Matrix) -> float:

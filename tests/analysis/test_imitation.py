@@ -48,10 +48,9 @@ def test_every_fifth_episode_is_held_out_or_the_last_and_a_failed_solve_is_left_
     few = made_up(value, moving[:240], episodes=3, steps=80)
     assert {*imitate(few, fits=1).episode} == {2}
     records.steps["value"][-10:] = np.nan
-    first, again, other = (imitate(records, fits=20, seed=seed) for seed in (0, 0, 1))
+    first, again = (imitate(records, fits=20) for _ in range(2))
     assert first.value.size == 50
     np.testing.assert_array_equal(first.with_theta, again.with_theta)
-    assert (first.with_theta != other.with_theta).any()
 
 
 def test_a_run_of_the_robot_can_be_imitated_and_the_error_is_a_root_mean_square():
