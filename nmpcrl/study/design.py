@@ -15,7 +15,7 @@ from nmpcrl.study import paper
 from nmpcrl.study.experiment import MAIN, PAPER, Experiment, frozen_arm
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.learners import DECAYS, LEARNERS
-from nmpcrl.study.parameters import Allowed, ParameterError, is_list, several, shown
+from nmpcrl.study.parameters import Allowed, ParameterError, is_list, several
 
 VECTORS = ("theta", "start", "target")  # fields of which a list is one value
 MOST_RUNS = 10_000  # of a sweep: more than five times the whole study
@@ -28,19 +28,12 @@ def sweep(**axes: Any) -> tuple[Experiment, ...]:
 
     `sweep(learner=("ES", "GES"), seed=[0, 1], episodes=20)` names four runs. A list of
     numbers is one `theta`, `start` or `target`; a list of pairs is one `layout`, by its centres.
-
-    Raises:
-        ParameterError: a value is not allowed, an axis is empty, repeats a value or names no field,
-            or there are too many runs.
+    ParameterError refuses values, names of fields, and too many runs.
     """
     choices = {name: _values(name, given) for name, given in axes.items()}
     count = prod(map(len, choices.values()))
     if count > MOST_RUNS:
-        longest = max(choices, key=lambda name: len(choices[name]))
-        raise ParameterError(
-            f"{longest}s = {shown(axes[longest])} and the other axes make {count:,} runs;"
-            f" {MOST_RUNS:,} are allowed"
-        )
+        raise ParameterError(f"{', '.join(axes)} make {count:,} runs; {MOST_RUNS:,} are allowed")
     return tuple(
         Experiment(**dict(zip(choices, combination, strict=True)))
         for combination in product(*choices.values())
@@ -75,7 +68,6 @@ def paper_runs(
     return sweep(**grid, episodes=episodes, layout=layout, **others)
 
 
-Pair = tuple[Experiment, Experiment]
 PERTURBATION = 1e-12  # added to theta_x at the start
 SOLVER_EPISODES = 20  # of a run with the other solver, which takes a minute
 
@@ -86,13 +78,12 @@ def perturbed(experiment: Experiment) -> Experiment:
     return replace(experiment, theta=(first + PERTURBATION, *rest))
 
 
-def perturbed_pairs(**fields: Any) -> tuple[Pair, ...]:
+def perturbed_pairs(**fields: Any) -> tuple[tuple[Experiment, Experiment], ...]:
     """Every learner's run and its perturbed replica; `fields` as `paper_runs` takes them."""
-    moving = [e for e in paper_runs(**fields) if e.learner != "frozen"]
-    return tuple((e, perturbed(e)) for e in moving)
+    return tuple((e, perturbed(e)) for e in paper_runs(**fields) if e.learner != "frozen")
 
 
-def solver_pair(experiment: Experiment) -> Pair:
+def solver_pair(experiment: Experiment) -> tuple[Experiment, Experiment]:
     """The same short run with the default solver and with the paper's."""
     short = replace(experiment, episodes=min(experiment.episodes, SOLVER_EPISODES))
     return short, replace(short, solver="ipopt")

@@ -19,11 +19,8 @@ def layout(named: Mapping[str, Centres], names: str = "") -> Allowed:
     """The name of a layout, or the centres of its obstacles [m].
 
     A layout is stored as one word, its name or its centres as `0.5,2.2 3,0.5`, so that equal
-    centres are equal layouts, and fit in a table. The order of the obstacles counts.
-
-    Args:
-        named: layouts by name.
-        names: all names in words, where a list of them is too long.
+    centres are equal layouts, and fit in a table. The order of the obstacles counts. `names` are
+    all names in words, where a list of them is too long.
     """
 
     def read(value: Any) -> str:
@@ -38,11 +35,7 @@ def layout(named: Mapping[str, Centres], names: str = "") -> Allowed:
 
 
 def centres_of(given: Any, named: Mapping[str, Centres], names: str = "") -> Centres:
-    """The centres of the obstacles [m] of a layout in any form.
-
-    Raises:
-        ParameterError: it is no layout.
-    """
+    """The centres of the obstacles [m] of a layout in any form; ParameterError for no layout."""
     word = layout(named, names).check("layout", given)
     return named[word] if word in named else _centres(word)
 

@@ -86,8 +86,7 @@ def gaps(task: Task, path: Matrix, theta_c: float) -> dict[tuple[int, int], floa
 
 def _keep_out(task: Task, theta_c: float) -> float:
     """Distance [m] from an obstacle's centre at which Xi + theta_c = 0."""
-    clearance = task.discs[2].max()
-    return float(clearance / 2 * np.sqrt(1 + theta_c))
+    return float(task.discs[2].max() / 2 * np.sqrt(1 + theta_c))
 
 
 def _distances(start: Vector, end: Vector, points: Sequence[Sequence[float]]) -> Vector:

@@ -26,9 +26,8 @@ from nmpcrl.study import paper
 
 LEAST_SCALE = 1e-3  # of an input of the normalised network
 
-Settings = Any  # an `Experiment`
-
 DECAYS = {"step": count_steps, "episode": count_episodes}  # departure C
+Settings = Any  # an `Experiment`
 
 
 class Generators(NamedTuple):
@@ -78,17 +77,6 @@ def _scales(controller: Persistent, theta: Vector, *, with_theta: bool) -> tuple
     parts = [state, nmpc.plant.upper, *([np.abs(theta)] if with_theta else [])]
     value = nmpc.solve(nmpc.task.start, theta).value
     return np.maximum(np.concatenate(parts), LEAST_SCALE), max(abs(value), LEAST_SCALE)
-
-
-def _tdc(settings: Settings, controller: Persistent, _: Generators) -> Learner:
-    """Exact TDC; curvature and projection can be left out."""
-    return gradient_tdc(
-        controller,
-        settings.alpha,
-        settings.beta_tdc,
-        curvature=settings.curvature,
-        projection=paper.THETA_SET if settings.projected else None,
-    )
 
 
 # Fields read by learners that move theta, that solve for V(s) or Q(s, a), and with a network.
@@ -149,7 +137,17 @@ LEARNERS: dict[str, Entry] = {
     "GES": Entry(
         lambda e, nmpc, _: gradient_expected_sarsa(nmpc, e.alpha, e.beta), (*VALUING, "beta")
     ),
-    "TDC": Entry(_tdc, (*VALUING, "curvature", "projected", "beta_tdc"), curved=True),
+    "TDC": Entry(
+        lambda e, nmpc, _: gradient_tdc(
+            nmpc,
+            e.alpha,
+            e.beta_tdc,
+            curvature=e.curvature,
+            projection=paper.THETA_SET if e.projected else None,
+        ),
+        (*VALUING, "curvature", "projected", "beta_tdc"),
+        curved=True,
+    ),
     "QL": Entry(lambda e, nmpc, _: q_learning(nmpc, e.alpha), MOVING, valued=True),
     "frozen": Entry(lambda _, nmpc, __: frozen(nmpc), reads=(), solves=1),
     "matched": Entry(lambda e, nmpc, _: step_matched(nmpc, e.alpha, e.beta), (*VALUING, "beta")),

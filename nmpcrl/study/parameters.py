@@ -30,11 +30,7 @@ class Allowed:
     ends: tuple[float, float] | None = None  # the least and the largest, if they are numbers
 
     def check(self, name: str, value: Any) -> Any:
-        """Convert a value to a type of Python's own, such as an int for NumPy's.
-
-        Raises:
-            ParameterError: the parameter `name` may not have this value.
-        """
+        """Convert the value of a parameter to a type of Python's own, or raise ParameterError."""
         try:
             return self.read(value)
         except ParameterError:  # about one value of a list

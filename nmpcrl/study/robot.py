@@ -58,11 +58,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Vector, dict[str, Any]]:
-        """Begin an episode; `options={"layout": ...}` chooses its layout.
-
-        Raises:
-            ParameterError: the layout is unknown, or has another number of obstacles.
-        """
+        """Begin an episode; `options={"layout": ...}` chooses a layout of as many obstacles."""
         super().reset(seed=seed)
         asked = (options or {}).get("layout")
         layout = self._fixed if asked is None else centres_of(asked)
@@ -77,12 +73,7 @@ class RobotEnv(gymnasium.Env[Vector, Vector]):
         return self._observation(), {"layout": layout}
 
     def step(self, action: Vector) -> tuple[Vector, float, bool, bool, dict[str, Any]]:
-        """Move for one period; an action outside the bounds is clipped.
-
-        Raises:
-            gymnasium.error.ResetNeeded: no episode has begun, or it is over.
-            ParameterError: the action is not two finite numbers.
-        """
+        """Move for one period; an action outside the bounds is clipped."""
         if not self.states or len(self.states) > self._steps:
             raise gymnasium.error.ResetNeeded("call reset first: no episode goes on")
         given = np.asarray(action, float)

@@ -69,12 +69,10 @@ def world(problem: Problem, plant: StepFunction, start: Vector, steps: int) -> A
 def agent(
     controller: Mpc, problem: Problem | None = None, optimiser: Any = None
 ) -> LstdQLearningAgent:
-    """Q-learning after each transition.
+    """Q-learning after each transition, of a plan in csnlp.
 
-    Args:
-        controller: a plan in csnlp.
-        problem: our form of it, with theta and gamma; `gros_zanon` if absent.
-        optimiser: one of mpcrl's; a step of Newton if absent.
+    `problem` is our form of it, with theta and gamma, and `optimiser` one of mpcrl's; by default
+    `gros_zanon` and a step of Newton.
     """
     problem = problem or gz.problem()
     learnable = [LearnableParameter(name, one.shape, one) for name, one in starts(problem).items()]
