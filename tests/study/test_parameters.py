@@ -87,16 +87,11 @@ def test_any_value_is_converted_or_refused_in_one_short_sentence(kind, value):
         ("layout", [[-0.0, 1]], "0,1"),
         ("layout", paper.LAYOUTS["C"], "C"),
         ("pose", [-3, 9, -math.tau], (-3.0, 9.0, -math.tau)),
+        ("pose", [-0.0, 0, 0], (0.0, 0.0, 0.0)),  # -0.0 would be another key
     ],
 )
 def test_a_value_becomes_one_of_pythons_own_types(kind, given, taken):
-    found = ALLOWED[kind].check("it", given)
-    assert found == taken
-    assert type(found) is type(taken)
-
-
-def test_a_pose_has_no_negative_zero():  # it would be another key
-    assert math.copysign(1, ALLOWED["pose"].check("start", [-0.0, 0, 0])[0]) == 1
+    assert repr(ALLOWED[kind].check("it", given)) == repr(taken)
 
 
 REFUSED = {
@@ -106,6 +101,7 @@ REFUSED = {
     "range": [1e7, -1e7],
     "truth": [1, "true"],
     "numbers": [["1", "2"], "12", {1: 2, 3: 4}, [True, False], [[1], [2]], [10**400, 0], [1]],
+    "seeds": [[], [3, 4, 3], range(10**12)],
     "layout": [[], [(1, 2)] * 17, "", "1,2 " * 17, "1,2 3", (0, 1), [(0, 0, 0)], [(0, 101)]],
     "pose": [[-3.001, 0, 0], [0, 0, math.inf], [0, 0], None],
 }
@@ -128,19 +124,13 @@ def test_a_number_that_yaml_reads_as_text_is_refused_with_what_to_write(given, w
         assert refusal(kind, value) == f"it = {shown(value)} arrived as text; write {write}"
 
 
-LIST = "must be a list of 1 to 10000 different seeds"
-
-
 @pytest.mark.parametrize(
     ("given", "said"),
     [
         (3, "it = 3 must be a list, such as [3]"),
         ("[3]", "it = '[3]' arrived as text; write -y '{seeds: [3]}'"),
-        ([], f"it = [] {LIST}"),
-        ([3, 4, 3], f"it = [3, 4, 3] {LIST}"),
         ([3, "4"], "seed = '4' must be a whole number from 0 to 100"),
         ([1, True], "seed = True must be a whole number from 0 to 100"),
-        (range(10**12), f"it = range(0, 1000000000000) {LIST}"),
     ],
     ids=shown,
 )
