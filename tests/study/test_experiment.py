@@ -1,13 +1,14 @@
 """An experiment names one run: what it refuses, that it repeats, and what its records say."""
 
-import dataclasses
+from dataclasses import replace
 from importlib import import_module
+from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from nmpcrl.control import Nmpc, SolverError, differential_drive
+from nmpcrl.control import Nmpc, SolverError
 from nmpcrl.control.codegen import jit
 from nmpcrl.study import Experiment, ParameterError, paper, run
 from nmpcrl.study.learners import LEARNERS
@@ -17,13 +18,12 @@ from nmpcrl.study.records import Records, StepStatus
 RUN = import_module("nmpcrl.study.run")  # the module; its name in the package is the function
 CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
 DRAWN = ((0.5, 2.2), (3.0, 0.5))
-MOVED = ("layout", "start", "target")  # fields that say where things stand
 SHORT = {"episodes": 2, "steps": 70, "evaluate_every": 2}  # the networks are ready after 128 steps
 
 
-def message_of(make, *arguments, **fields):
+def message_of(**fields):
     with pytest.raises(ParameterError) as caught:
-        make(*arguments, **fields)
+        Experiment(**fields)
     message = str(caught.value)
     assert "\n" not in message
     assert len(message) < 300
@@ -63,17 +63,20 @@ REFUSED |= {name: [("must be true or false", 0, "yes")] for name in TRUTHS}
 def test_a_field_refuses_other_values_in_one_sentence(name):
     for text, *values in REFUSED[name]:
         for value in values:
-            message = message_of(Experiment, **{name: value})
+            message = message_of(**{name: value})
             assert message.startswith(f"{name} = {value!r} {text}")
 
 
-def test_numbers_of_numpy_name_the_same_run():
+def test_equal_values_name_the_same_run_and_the_defaults_are_table_is():
     fields = {"seed": np.int64(3), "alpha": np.float64(2e-7), "clipped": np.True_}
-    theta = np.array(paper.THETA_INIT)
-    same = Experiment(**fields, theta=theta, layout=np.str_("B"))
-    assert same == Experiment(seed=3, alpha=2e-7, layout="B")
-    assert key(same) == key(Experiment(seed=3, alpha=2e-7, layout="B"))
-    assert type(same.seed) is int
+    same = Experiment(**fields, theta=np.array(paper.THETA_INIT), layout=np.str_("B"))
+    plain = Experiment(seed=3, alpha=2e-7, layout="B")
+    assert (same, key(same), type(same.seed)) == (plain, key(plain), int)
+    assert len({Experiment(), Experiment(seed=1), Experiment(theta=[*paper.THETA_INIT])}) == 2
+    e = Experiment()
+    assert (e.episodes, e.steps, e.horizon) == (300, 130, 10)
+    assert (e.alpha, e.beta, e.zeta) == (1e-7, 1e-8, 1e-2)
+    assert e.theta == (1, 1, 0.05, 0.05, 0.05, 1, 1, 0.1, 0.001)
 
 
 @pytest.mark.parametrize(
@@ -85,15 +88,13 @@ def test_numbers_of_numpy_name_the_same_run():
     ],
 )
 def test_fields_that_do_not_fit_together_are_refused(fields, said):
-    assert message_of(Experiment, **fields).startswith(said)
+    assert message_of(**fields).startswith(said)
 
 
 def test_the_centres_of_a_named_layout_are_that_layout():
     for name, centres in paper.LAYOUTS.items():
         drawn = Experiment(layout=[list(centre) for centre in centres])
-        assert drawn == Experiment(layout=name)
-        assert drawn.layout == name
-        assert key(drawn) == key(Experiment(layout=name))
+        assert (drawn.layout, key(drawn)) == (name, key(Experiment(layout=name)))
     backwards = Experiment(layout=paper.LAYOUTS["A"][::-1])
     assert key(backwards) != key(Experiment())  # sums are made in their order
 
@@ -106,18 +107,6 @@ def test_a_run_among_drawn_obstacles_begins_and_ends_where_it_is_to(tmp_path):
     records.save(tmp_path / "run.npz")
     again = Records.load(tmp_path / "run.npz")
     assert Experiment(**again.experiment) == Experiment("frozen", episodes=1, **fields)
-
-
-def test_an_experiment_is_a_value():
-    assert Experiment(alpha=1) == Experiment(alpha=1.0)
-    assert Experiment(theta=list(paper.THETA_INIT)) == Experiment()
-    assert len({Experiment(), Experiment(seed=1), Experiment()}) == 2
-    e = Experiment()
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        e.seed = 2
-    assert (e.episodes, e.steps, e.horizon) == (300, 130, 10)  # Table I
-    assert (e.alpha, e.beta, e.zeta) == (1e-7, 1e-8, 1e-2)
-    assert e.theta == (1, 1, 0.05, 0.05, 0.05, 1, 1, 0.1, 0.001)
 
 
 @pytest.fixture(scope="module")
@@ -231,24 +220,25 @@ def test_progress_is_told_after_every_episode():
     np.testing.assert_allclose([cost for _, cost in told], sums, rtol=1e-12)
 
 
-def faulty(fails):
-    """What may replace `paper.controller`: a controller that fails where `fails(call)` says so."""
+@pytest.fixture
+def failing(monkeypatch):
+    """Makes solves fail where `fails(call)` says so; the calls are counted."""
 
-    class Faulty(Nmpc):
-        calls = 0
+    def fail(fails):
+        solve, calls = Nmpc.solve, count()
 
-        def solve(self, state, theta, warm_start=None, action=None):
-            self.calls += 1
-            if fails(self.calls - 1):
-                raise SolverError(f"call {self.calls - 1} failed", state, theta)
-            return super().solve(state, theta, warm_start, action)
+        def faulty(self, state, theta, *more, **options):
+            if fails(call := next(calls)):
+                raise SolverError(f"call {call} failed", state, theta)
+            return solve(self, state, theta, *more, **options)
 
-    return lambda task, **options: Faulty(differential_drive(), task, **options)
+        monkeypatch.setattr(Nmpc, "solve", faulty)
+
+    return fail
 
 
-def test_failures_and_restarts_are_recorded(monkeypatch):
-    # six calls evaluate; then the second step restarts, and the fourth fails twice
-    monkeypatch.setattr(paper, "controller", faulty(lambda call: call in (6 + 1, 6 + 4, 6 + 5)))
+def test_failures_and_restarts_are_recorded(failing):
+    failing(lambda call: call in (6 + 1, 6 + 4, 6 + 5))  # the second step, and the fourth twice
     records = run(Experiment(learner="frozen", episodes=2, steps=6))
     s = records.steps
     np.testing.assert_array_equal(s["episode"], [0] * 4 + [1] * 6)
@@ -267,24 +257,21 @@ def test_a_steps_restarts_add_up_and_its_worst_violation_counts(monkeypatch):
     restarts = [0, 0, 0] + [0, 1, 2, 2, 0, 0] + [0, 0, 0]
     violation = [0, 0, 0] + [0.3, 0.1, 0.0, 0.2, 0.0, 0.0] + [0, 0, 0]
 
-    class Reporting(Nmpc):
-        def solve(self, state, theta, warm_start=None, action=None):
-            solution = super().solve(state, theta, warm_start, action)
-            return dataclasses.replace(
-                solution, restarts=restarts.pop(0), violation=violation.pop(0)
-            )
+    solve = Nmpc.solve
 
-    monkeypatch.setattr(
-        paper, "controller", lambda task, **_: Reporting(differential_drive(), task)
-    )
+    def reporting(*given, **options):
+        said = {"restarts": restarts.pop(0), "violation": violation.pop(0)}
+        return replace(solve(*given, **options), **said)
+
+    monkeypatch.setattr(Nmpc, "solve", reporting)
     s = run(Experiment(learner="ES", episodes=1, steps=3)).steps
     np.testing.assert_array_equal(s["restarts"], [1, 4, 0])
     np.testing.assert_array_equal(s["violation"], [0.3, 0.2, 0.0])
     assert not restarts
 
 
-def test_a_run_that_fails_ten_times_in_a_row_says_why_it_stopped(monkeypatch):
-    monkeypatch.setattr(paper, "controller", faulty(lambda call: True))
+def test_a_run_that_fails_ten_times_in_a_row_says_why_it_stopped(failing):
+    failing(lambda call: True)
     records = run(Experiment(learner="ES", episodes=20, steps=6, evaluate_every=4))
     assert records.facts["stopped"].startswith("diverged: 10 episodes in a row")
     np.testing.assert_array_equal(records.steps["episode"], np.arange(10))

@@ -7,8 +7,8 @@ import pytest
 
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, paper, run
-from nmpcrl.study.learners import LEARNERS, NETWORKS, Generators, readers
-from nmpcrl.study.setup import controller_of, job_of, prepare
+from nmpcrl.study.learners import DECAYS, LEARNERS, NETWORKS, Generators, readers
+from nmpcrl.study.setup import job_of, prepare
 
 CONTROLLER = Persistent(paper.nmpc())
 ALL = {one.name for one in fields(Experiment)}
@@ -56,19 +56,16 @@ def test_a_step_makes_the_solves_of_its_entry_and_theta_moves_where_it_says(name
 
 def test_each_purpose_of_a_seed_has_a_generator_of_its_own(monkeypatch):
     seen = []
-    entry = replace(LEARNERS["ES"], make=lambda *given: seen.append(given[-1]))
+    entry = replace(LEARNERS["ES"], make=lambda *given: seen.extend(given[-1]))
     monkeypatch.setitem(LEARNERS, "ES", entry)
-    wanted = Experiment(episodes=1, seed=5)
-    prepare(wanted, controller_of(wanted))
-    children = np.random.SeedSequence(5).spawn(3)
-    for used, child in list(zip(seen[0], children, strict=True))[1:]:  # the noise was drawn
-        assert used.normal() == np.random.default_rng(child).normal()
-    assert Generators._fields == ("noise", "network", "directions")
+    prepare(Experiment(episodes=1, seed=5), CONTROLLER)
+    expected = map(np.random.default_rng, np.random.SeedSequence(5).spawn(3))
+    drawn = [one.normal() for one in expected]
+    assert [used.normal() for used in seen][1:] == drawn[1:]  # the noise was drawn before
 
 
-@pytest.mark.parametrize("varied", [{"learner": list(LEARNERS)}, {"decay": ["step", "episode"]}])
-def test_the_noise_of_a_seed_is_the_same_for_all_learners_and_readings(varied):
-    ((name, values),) = varied.items()
+@pytest.mark.parametrize(("name", "values"), [("learner", [*LEARNERS]), ("decay", [*DECAYS])])
+def test_the_noise_of_a_seed_is_the_same_for_all_learners_and_readings(name, values):
     runs = [prepare(Experiment(**{name: one}, seed=3), CONTROLLER)[2] for one in values]
     for explore in runs:
         np.testing.assert_array_equal(explore.noise, runs[0].noise)
