@@ -158,14 +158,7 @@ def runs(tmp_path, monkeypatch) -> Path:
 @pytest.fixture
 def trains_here(monkeypatch) -> None:
     """Where nobody names an executor, jobs are done in a thread: no process has to start."""
-    monkeypatch.setattr(jobs, "processes", lambda _: Thread(1))
-
-
-class Thread(ThreadPoolExecutor):
-    """Stands in for a pool of processes."""
-
-    def shutdown(self, wait=True, *, cancel_futures=False, kill_workers=False) -> None:
-        super().shutdown(wait, cancel_futures=cancel_futures)
+    monkeypatch.setattr(jobs, "processes", lambda _: ThreadPoolExecutor(1))
 
 
 @pytest.fixture(scope="session")

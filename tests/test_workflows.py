@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from nmpcrl.analysis import summaries
 from nmpcrl.bench import sweep
 from nmpcrl.commands import main
+from nmpcrl.study.files import folder
 
 ROOT = Path(__file__).resolve().parents[1]
 PATHS = sorted((ROOT / ".github/workflows").glob("*.yml"))
@@ -49,7 +49,7 @@ def test_artifacts_are_kept_from_where_they_are_written(path, monkeypatch):
     assert kept
     for place in " ".join(one["path"] for one in kept).split():
         first, _, name = place.partition("/")
-        assert first == "_build" or place in (str(summaries.folder()), str(sweep.path()))
+        assert first == "_build" or place in (str(folder() / "summaries"), str(sweep.path()))
         if place == "_build/release":
             assert f'Path("{place}")' in (ROOT / "release/make.py").read_text()
         elif first == "_build":

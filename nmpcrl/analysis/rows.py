@@ -16,7 +16,7 @@ from nmpcrl.analysis.metrics import LATE
 from nmpcrl.analysis.summary import SIZES, RunSummary
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment, frozen_arm
-from nmpcrl.study.provenance import before
+from nmpcrl.study.provenance import ORIGINAL
 
 FIELDS = tuple(one.name for one in fields(Experiment))
 VECTORS = ("theta", "start", "target")  # fields written as text
@@ -85,7 +85,7 @@ def as_text(value: Any) -> Any:
     return " ".join(map(repr, value)) if isinstance(value, tuple | list) else value
 
 
-OLDER = {name: as_text(value) for name, value in before().items()}  # fields that came later
+OLDER = {name: as_text(value) for name, value in ORIGINAL.items()}  # fields that came later
 
 
 def row(summary: RunSummary) -> dict[str, Any]:

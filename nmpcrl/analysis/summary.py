@@ -19,8 +19,7 @@ from nmpcrl.control import Nmpc
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.files import Column, load_about, load_tables, save_tables
-from nmpcrl.study.records import About, Facts, Records, StepStatus, stated_in
+from nmpcrl.study.records import Column, Facts, Records, StepStatus, load_run, save_run
 from nmpcrl.study.setup import controller_of
 
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
@@ -147,23 +146,17 @@ class RunSummary(Outline):
     facts: SummaryFacts
 
     def save(self, path: Path) -> None:
-        """Write a temporary file, then rename it to `path`; errors as in `Records.save`."""
+        """Write a file as a whole; errors as in `save_run`."""
         rollout = {"states": self.states, "actions": self.actions}
         tables = {"episodes": self.episodes, "evaluations": self.evaluations, "rollout": rollout}
-        save_tables(path, {"experiment": self.experiment, "facts": self.facts}, tables)
+        save_run(path, self.experiment, self.facts, tables)
 
     @classmethod
     def load(cls, path: Path) -> "RunSummary":
-        """Read a file that `save` wrote; errors as in `Records.load`."""
-        about, tables = load_tables(path, COLUMNS)
-        experiment, facts = stated_in(about, path)
+        """Read a file that `save` wrote; errors as in `load_run`."""
+        (experiment, facts), tables = load_run(path, COLUMNS)
         episodes, evaluations, rollout = (tables[name] for name in COLUMNS)
         return cls(experiment, episodes, evaluations, **rollout, facts=cast(SummaryFacts, facts))
-
-    @staticmethod
-    def about(path: Path) -> About:
-        """The experiment's fields and the facts, as `Records.about`."""
-        return stated_in(load_about(path), path)
 
 
 def summarise(records: Records) -> RunSummary:

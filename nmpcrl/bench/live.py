@@ -14,8 +14,8 @@ import numpy as np
 
 import nmpcrl
 from nmpcrl.bench.solves import closed_loop, watched
-from nmpcrl.study import Experiment, paper, run, store
-from nmpcrl.study.files import write_json
+from nmpcrl.study import Experiment, paper, run
+from nmpcrl.study.files import folder, write_json
 from nmpcrl.study.parameters import Refusal
 
 Live = dict[str, Any]  # numbers by what is measured; what could not be is absent
@@ -131,7 +131,7 @@ def stored() -> Live:
 
 def path() -> Path:
     """The file, in the folder of the runs."""
-    return store.folder() / "live.json"
+    return folder() / "live.json"
 
 
 def pages_of(site: Path) -> list[Path]:

@@ -15,8 +15,7 @@ from tqdm import tqdm
 from nmpcrl.bench import processes, sealed
 from nmpcrl.bench.problem_sizes import VARIED, Sizes, times
 from nmpcrl.bench.solves import columns_of
-from nmpcrl.study import store
-from nmpcrl.study.files import check_folder
+from nmpcrl.study.files import check_folder, folder
 from nmpcrl.study.limits import need_numba
 from nmpcrl.study.parameters import Refusal
 
@@ -107,7 +106,7 @@ def beside_mpcrl() -> pd.DataFrame:
 
 def path() -> Path:
     """Where the latest times are kept, beside the benchmark."""
-    return store.folder() / FILE
+    return folder() / FILE
 
 
 def read(place: Path) -> ProblemTimes:

@@ -19,8 +19,8 @@ from nmpcrl.bench.paired import IDLE
 from nmpcrl.bench.processes import PROCESSES, at_once, first_calls, time_learners_afresh, whole_runs
 from nmpcrl.bench.scaling import solve_times
 from nmpcrl.bench.solves import columns_of, interleaved, own_loop, parts
-from nmpcrl.study import limits, lock, paper, provenance, store
-from nmpcrl.study.files import write_json
+from nmpcrl.study import limits, lock, paper, provenance
+from nmpcrl.study.files import check_folder, folder, write_json
 from nmpcrl.study.machine import machine
 from nmpcrl.study.parameters import one_of
 
@@ -196,7 +196,7 @@ def _empty() -> Bench:
 def _measured(kept: Bench, stages: Iterable[Stage], length: str, progress: bool) -> Bench:
     """`kept` with these stages measured; each is stored as soon as it is."""
     limits.need_numba("what is measured is the machine code that it compiles")
-    store.check_folder()
+    check_folder()
     bar = tqdm(list(stages), "benchmark", disable=not progress, leave=False)
     for name, stage in bar:
         bar.set_description(f"benchmark ({length}): {name}")
@@ -256,7 +256,7 @@ OTHERS = tuple(name for name, _ in _stages(LENGTHS["smoke"]) if name != STEPS)
 
 def path() -> Path:
     """The file, in the folder of the runs."""
-    return store.folder() / "bench.json"
+    return folder() / "bench.json"
 
 
 def depends_on() -> str:

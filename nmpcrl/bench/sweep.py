@@ -14,9 +14,9 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.bench import sealed
 from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
-from nmpcrl.study import paper, store
+from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.files import check_folder
+from nmpcrl.study.files import check_folder, folder
 from nmpcrl.study.jobs import parallel
 from nmpcrl.study.limits import need_numba
 from nmpcrl.study.parameters import whole
@@ -133,7 +133,7 @@ def _tally(layout_and_size: tuple[int, int]) -> Tally:
 
 def path() -> Path:
     """Where the latest sweep is kept, beside the benchmark."""
-    return store.folder() / "sweep.json"
+    return folder() / "sweep.json"
 
 
 def read(place: Path) -> SweepTable:

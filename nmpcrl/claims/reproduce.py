@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from nmpcrl.analysis import summaries
 from nmpcrl.analysis.rows import FIELDS, THETA, row, table
+from nmpcrl.analysis.summaries import SUMMARIES, make
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import rule
 from nmpcrl.claims.own_claims import OWN_CLAIMS
@@ -231,7 +231,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
         )
     compile_ahead(drawn)
     ordered = sorted(drawn, key=seconds_of, reverse=True)
-    train = partial(summaries.make, afresh=True)
+    train = partial(make, afresh=True)
     fresh = dict(parallel(train, ordered, workers, "runs"))
     wrong = [found for e in drawn if (found := unequal(e, row(fresh[e]), before[e]))]
     if wrong:
@@ -241,14 +241,14 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
             f" {layout}, decay per {decay}, seed {seed}: {what} is {now!r} and was {then}; if that"
             " is intended, raise the epoch of the room in nmpcrl/study/provenance.py"
         )
-    for experiment, made in fresh.items():  # the next edit is compared with these
-        summaries.keep(experiment, made)
+    for experiment, one in fresh.items():  # the next edit is compared with these
+        SUMMARIES.keep(experiment, one)
     return Relocked(lock.relock(), len(exact), len(drawn) - len(exact))
 
 
 def _stored_by_lock(e: Experiment) -> RunSummary | None:
     """The stored summary, if locked code made it on such a machine with such versions."""
-    one, here = summaries.read(e), (fingerprint(), provenance.environment())
+    one, here = SUMMARIES.read(e), (fingerprint(), provenance.environment())
     if one is None or one.facts.get("sources") not in lock.locks():
         return None
     return one if (one.facts.get("machine"), one.facts.get("versions")) == here else None

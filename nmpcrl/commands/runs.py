@@ -35,8 +35,9 @@ def runs(name: str, sort: str, reverse: bool, as_json: bool) -> None:
       nmpcrl runs GES-A --sort cost
       nmpcrl runs "*-episode-seed0" --json
     """
+    from nmpcrl.study.files import folder
     from nmpcrl.study.lock import is_accepted, warn_of_changes
-    from nmpcrl.study.store import folder, stored
+    from nmpcrl.study.store import stored
 
     found = {path: about for path, about in stored().items() if begins(path, name)}
     rows = {path: _row(path, one.experiment, one.facts) for path, one in found.items()}
@@ -69,7 +70,7 @@ def stored_run(name: str) -> Path:
     Raises:
         click.ClickException: there are none or several such runs.
     """
-    from nmpcrl.study.store import folder
+    from nmpcrl.study.files import folder
 
     if name.endswith(".npz") and Path(name).is_file():
         return Path(name)

@@ -1,6 +1,5 @@
 """`nmpcrl show`: one page of pictures of a run."""
 
-from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -32,11 +31,11 @@ def show(run: str, out: Path | None) -> None:
         raise click.BadParameter(f"{str(out)!r} must end in .svg or .png.", param_hint="--out")
     from nmpcrl.report.figures.runs.run import run_page, write
     from nmpcrl.report.run import verdict
-    from nmpcrl.study import DamagedRecords, Experiment, Records
+    from nmpcrl.study import Experiment, Records
     from nmpcrl.study.experiment import frozen_arm
     from nmpcrl.study.files import write_file
     from nmpcrl.study.lock import is_accepted, warn_of_changes
-    from nmpcrl.study.store import read
+    from nmpcrl.study.store import RUNS
 
     records = Records.load(path)
     if "layout" not in records.experiment:
@@ -46,8 +45,7 @@ def show(run: str, out: Path | None) -> None:
     warn_of_changes()
     frozen = None
     if records.experiment["learner"] != "frozen":
-        with suppress(FileNotFoundError, DamagedRecords):
-            frozen = read(frozen_arm(Experiment(**records.experiment)))
+        frozen = RUNS.read(frozen_arm(Experiment(**records.experiment)))
     figure = run_page(records, frozen)
     write_file(out, lambda file: write(figure, file, kind))
     click.echo(f"{verdict(records)}\n{out}")

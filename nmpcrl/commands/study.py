@@ -32,6 +32,7 @@ def study(
     """
     from nmpcrl.analysis import summaries
     from nmpcrl.study import cluster, design, published
+    from nmpcrl.study.files import folder
     from nmpcrl.study.limits import seconds_of
     from nmpcrl.study.parameters import one_of
 
@@ -44,10 +45,10 @@ def study(
     wanted = {e: part for e, part in every.items() if not parts or part in parts}
     if publish:
         published.folder().mkdir(parents=True, exist_ok=True)  # where it cannot be, before any work
-    missing = [e for e in wanted if not summaries.is_stored(e)]
+    missing = [e for e in wanted if not summaries.SUMMARIES.is_stored(e)]
     stored = f"{len(wanted) - len(missing):,} of {len(wanted):,} runs are stored"
     hours = sum(map(seconds_of, missing)) / 3600
-    click.echo(f"{stored} in {summaries.folder()}; the others take about {hours:.1f} h of one core")
+    click.echo(f"{stored} in {folder()}; the others take about {hours:.1f} h of one core")
     if dry_run:
         return
     with cluster.executor(scheduler) if scheduler else nullcontext() as executor:

@@ -31,7 +31,7 @@ def verify(sample: int, relock: bool, workers: int | None) -> None:
         said = f"{done.published + done.stored} runs trained again gave the same bits"
         click.echo(f"{said}, {done.published} as published, {done.stored} as stored: {done.lock}")
         return
-    wanted = {e for e in known.rows if summaries.path_of(e).exists()}
+    wanted = {e for e in known.rows if summaries.SUMMARIES.path_of(e).exists()}
     if sample:
         rest = {e: part for e, part in known.variants.items() if e not in wanted}
         wanted |= {*reproduce.sample(replace(known, variants=rest), sample)}

@@ -3,10 +3,11 @@
 from nmpcrl.study import paper
 from nmpcrl.study.design import paper_runs, sweep
 from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.files import StoreError
 from nmpcrl.study.parameters import ParameterError
 from nmpcrl.study.records import DamagedRecords, Records
 from nmpcrl.study.run import run
-from nmpcrl.study.store import Runs, StoreError, fetch, fetch_all, stored
+from nmpcrl.study.store import Runs, fetch, fetch_all, stored
 from nmpcrl.study.trial import Trial
 
 __all__ = [

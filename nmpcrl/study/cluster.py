@@ -19,13 +19,12 @@ class NoCluster(Refusal):
 
 @contextmanager
 def executor(address: str, patience: float = 30.0) -> Iterator[Executor]:
-    """The workers of the scheduler at an address, as "tcp://host:8786".
+    """The workers of the scheduler at an address such as "tcp://host:8786".
 
-    `patience` [s] is how long the scheduler and its first worker are waited for.
+    Scheduler and first worker are waited for `patience` seconds.
 
     Raises:
-        NoCluster: Dask is not installed, no scheduler answers, it has no worker, or a worker has
-            other code or other versions of libraries.
+        NoCluster: Dask, the scheduler or a worker is missing, or a worker has other code.
     """
     try:
         from distributed import Client

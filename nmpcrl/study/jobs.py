@@ -10,10 +10,10 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence, Sized
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
-from contextlib import closing
-from itertools import chain, islice
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -31,7 +31,7 @@ WAIT = 0.5  # [s] between two looks for an interrupt, which Windows does not del
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-Outcomes = Generator[tuple[Any, Any], None, list[Any]]  # items with results or failures
+Pool = Callable[[int], AbstractContextManager[Executor]]  # of so many workers
 
 
 class Failure(NamedTuple):
@@ -58,10 +58,11 @@ class Failed(Refusal):
 
 def parallel(
     function: Callable[[Item], Result],
-    items: Iterable[Item],
+    items: Collection[Item],
     workers: int | None = None,
     label: str = "",
     executor: Executor | None = None,
+    ready: Callable[[Item], bool] = lambda item: True,
 ) -> Iterator[tuple[Item, Result]]:
     """Call a function with every item; yield each item and its result as soon as it has one.
 
@@ -70,10 +71,11 @@ def parallel(
 
     Args:
         function: called in a worker; it may be defined in a notebook.
-        items: drawn in order, each shortly before a worker is free for it.
+        items: one a job, in the order in which jobs begin.
         workers: processes with one thread each; by default `usable_workers()`.
         label: of a progress bar; without a label there is none.
         executor: makes the calls in place of new processes, `AHEAD` at a time.
+        ready: called here shortly before a worker is free for an item, which False skips.
 
     Raises:
         ParameterError: `workers` is no number of processes.
@@ -81,19 +83,15 @@ def parallel(
     """
     if workers is not None and (type(workers) is not int or workers < 1):
         raise ParameterError(f"workers = {workers!r} must be a whole number, 1 or more")
-    count = workers or usable_workers()
-    total = len(items) if isinstance(items, Sized) else None
-    count = count if total is None else min(count, max(total, 1))
-    fresh = iter(items)
-    if executor:
-        outcomes = _on_executor(executor, function, fresh)
-    else:
-        outcomes = _on_processes(count, function, fresh)
+    count = max(1, min(workers or usable_workers(), len(items)))
+    pool: Pool = processes if executor is None else lambda _: nullcontext(executor)
+    ahead = count + 1 if executor is None else AHEAD  # one job waits while results are stored
+    outcomes = _outcomes(pool, count, ahead, function, filter(ready, items))
     interval = 0.1 if sys.stderr.isatty() else 30.0  # [s]; a log keeps every state of the bar
     failures, ended = list[Failure](), 0
     with (
         closing(outcomes),
-        tqdm(total=total, desc=label, disable=not label, mininterval=interval) as bar,
+        tqdm(total=len(items), desc=label, disable=not label, mininterval=interval) as bar,
     ):
         for item, made in outcomes:
             ended += 1
@@ -107,60 +105,47 @@ def parallel(
         raise Failed(failures, ended)
 
 
-def _on_processes(count: int, function: Callable[[Item], Any], items: Iterator[Item]) -> Outcomes:
+def _outcomes(
+    pool: Pool, count: int, ahead: int, function: Callable[[Item], Any], items: Iterator[Item]
+) -> Generator[tuple[Item, Any]]:
     """Every item with its result or its `Failure`."""
-    while lost := (yield from _in_pool(count, function, items)):
+    while lost := (yield from _until_broken(pool(count), ahead, function, items)):
         for item in lost:
             for _ in range(ATTEMPTS - 1):
-                if not (yield from _in_pool(1, function, iter([item]))):
+                if not (yield from _until_broken(pool(1), 1, function, iter([item]))):
                     break
             else:
                 yield item, Failure(item, f"the loss of its process, {ATTEMPTS} times")
-    return []
-
-
-def _in_pool(count: int, function: Callable[[Item], Any], items: Iterator[Item]) -> Outcomes:
-    """As `_until_broken`, on new processes; one job waits while the results are stored."""
-    pool = processes(count)
-    try:
-        return (yield from _until_broken(pool, function, items, count + 1))
-    finally:
-        pool.shutdown(kill_workers=True)
-
-
-def _on_executor(
-    executor: Executor, function: Callable[[Item], Any], items: Iterator[Item]
-) -> Outcomes:
-    if lost := (yield from _until_broken(executor, function, items, AHEAD)):
-        for item in chain(lost, items):
-            yield item, Failure(item, "the loss of the executor")
-    return []
 
 
 def _until_broken(
-    pool: Executor, function: Callable[[Item], Any], items: Iterator[Item], ahead: int
-) -> Outcomes:
+    pool: AbstractContextManager[Executor],
+    ahead: int,
+    function: Callable[[Item], Any],
+    items: Iterator[Item],
+) -> Generator[tuple[Item, Any], None, list[Item]]:
     """Yield items with their outcomes; return the jobs that were in progress when it broke."""
-    pending, lost = dict[Future[bytes], Any](), list[Any]()
-    while True:
-        for item in islice(items, 0 if lost else ahead - len(pending)):
-            try:
-                pending[pool.submit(_call, function, item)] = item
-            except BrokenExecutor:
-                lost.append(item)
-        if not pending:
-            return lost
-        for future in wait(pending, WAIT, FIRST_COMPLETED).done:
-            item = pending.pop(future)
-            try:
-                failed, made = pickle.loads(future.result())
-            except BrokenExecutor:
-                lost.append(item)
-                continue
-            except Exception as error:  # of an executor
-                failed, made = True, (_text(error), "")
-            del future  # as long as it is referenced, Dask repeats a job whose worker is lost
-            yield item, Failure(item, *made) if failed else made
+    pending, lost = dict[Future[bytes], Item](), list[Item]()
+    with pool as executor:
+        while True:
+            for item in islice(items, 0 if lost else ahead - len(pending)):
+                try:
+                    pending[executor.submit(_call, function, item)] = item
+                except BrokenExecutor:
+                    lost.append(item)
+            if not pending:
+                return lost
+            for future in wait(pending, WAIT, FIRST_COMPLETED).done:
+                item = pending.pop(future)
+                try:
+                    failed, made = pickle.loads(future.result())
+                except BrokenExecutor:
+                    lost.append(item)
+                    continue
+                except Exception as error:  # of the executor
+                    failed, made = True, (_text(error), "")
+                del future  # as long as it is referenced, Dask repeats a job whose worker is lost
+                yield item, Failure(item, *made) if failed else made
 
 
 def _call(function: Callable[[Item], Any], item: Item) -> bytes:
@@ -175,13 +160,18 @@ def _text(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-def processes(count: int) -> Any:
-    """A pool of fresh interpreters with one thread each."""
+@contextmanager
+def processes(count: int) -> Iterator[Executor]:
+    """A pool of fresh interpreters with one thread each, which end with the context."""
     from joblib.externals.loky import ProcessPoolExecutor
 
-    return ProcessPoolExecutor(
+    pool = ProcessPoolExecutor(
         count, env=ONE_THREAD, initializer=_end_with_parent, initargs=(os.getpid(),)
     )
+    try:
+        yield pool
+    finally:
+        pool.shutdown(kill_workers=True)
 
 
 def _end_with_parent(parent: int) -> None:

@@ -35,18 +35,11 @@ def seconds_of(experiment: Experiment) -> float:
     return START + steps * each + (steps * solves + rollouts * e.steps) * (once + stage * e.horizon)
 
 
-def afford(
-    experiments: Iterable[Experiment],
-    *,
-    sure: bool | None = None,
-    lift: str = "NMPCRL_YES=1 in the environment",
-) -> None:
+def afford(experiments: Iterable[Experiment], *, sure: bool = False) -> None:
     """Refuse runs that take more than `HOURS` together, and a run of more than `STEPS` steps.
 
-    Args:
-        experiments: the runs; one that is named twice counts once.
-        sure: whether any time is allowed; by default what `SURE` in the environment says.
-        lift: how a user lifts the limit of hours, for the message.
+    An experiment that is given twice counts once. `sure`, or `SURE` in the environment, allows any
+    number of hours.
 
     Raises:
         ParameterError: in one sentence.
@@ -58,25 +51,18 @@ def afford(
                 f"episodes = {e.episodes} with steps = {e.steps} make a run of"
                 f" {e.episodes * e.steps:,} steps; {STEPS:,} are allowed, which fill 4 GB of memory"
             )
-    sure = os.environ.get(SURE, "") not in ("", "0") if sure is None else sure
     hours = sum(map(seconds_of, runs)) / 3600
-    if hours > HOURS and not sure:
+    if hours > HOURS and not sure and os.environ.get(SURE, "0") in ("", "0"):
         longest = max(runs, key=seconds_of)
         raise ParameterError(
             f"{len(runs):,} run{'s' * (len(runs) > 1)} with up to episodes = {longest.episodes},"
             f" steps = {longest.steps} and horizon = {longest.horizon} would take about"
-            f" {hours:,.0f} hours of one core; {HOURS:.0f} are allowed, and more with {lift}"
+            f" {hours:,.0f} hours of one core; {HOURS:.0f} are allowed, and more with {SURE}=1 in"
+            " the environment"
         )
 
 
 def need_numba(why: str) -> None:
-    """Refuse work that needs machine code where numba is not installed.
-
-    Args:
-        why: what needs machine code, as a clause.
-
-    Raises:
-        Refusal: numba is not installed.
-    """
+    """Refuse work that needs machine code where numba is missing; `why` is a clause."""
     if environment()["numba"] == "absent":
         raise Refusal(f"numba is not installed, and {why}: `pip install numba`")

@@ -2,12 +2,8 @@
 
 `sources.lock.json` has a hash of every file of `FILES`. Where a file differs from the lock, a test
 fails and every command that reads a run warns, until `nmpcrl verify --relock` has shown with fresh
-runs that no bit has changed, or an epoch of `provenance` is raised, so that all runs are trained
-anew.
-
-A stored run names the hash of the sources that made it. The run is read if this is the present
-hash, the one of the lock, or one of an earlier lock of the same epochs; other runs are trained
-again.
+runs that no bit has changed, or an epoch of `provenance` is raised. A stored run names the hash of
+the sources that made it; `is_accepted` says which are read.
 """
 
 import ast
@@ -68,25 +64,24 @@ def room_hash(room: str) -> str:
     return hash_of([code(path.read_text("utf-8")) for path in sorted((ROOT / room).rglob("*.py"))])
 
 
-def locked() -> dict[str, str]:
-    """The `sources` of the lock."""
-    return dict(_lock()["sources"])
-
-
-def locked_hash() -> str:
-    """The `sources_hash` of the lock."""
-    return hash_of(sorted(locked().values()))
+def locked() -> dict[str, Any]:
+    """The content of the lock: epochs, `sources`, and the hashes of earlier locks."""
+    return dict(json.loads(LOCK.read_text("utf-8")))
 
 
 def locks() -> tuple[str, ...]:
-    """The hashes of the lock and of the earlier locks of these epochs."""
-    lock = _lock()
-    return (locked_hash(), *(lock["earlier"] if lock["epochs"] == EPOCHS else ()))
+    """The `sources_hash` of the lock and of the earlier locks of these epochs."""
+    lock = locked()
+    now = hash_of(sorted(lock["sources"].values()))
+    return (now, *(lock["earlier"] if lock["epochs"] == EPOCHS else ()))
 
 
 def is_accepted(made: str | None) -> bool:
-    """Whether sources with this `sources_hash` make the present numbers; None for unstored runs."""
-    return made in (None, sources_hash(), *locks())
+    """Whether sources with this `sources_hash` make the present numbers; None for unstored runs.
+
+    They are the present sources, those of the lock, or those of an earlier lock of these epochs.
+    """
+    return made in (None, sources_hash()) or made in locks()
 
 
 def changed(now: Mapping[str, str], lock: Mapping[str, str]) -> list[str]:
@@ -98,15 +93,11 @@ def changed(now: Mapping[str, str], lock: Mapping[str, str]) -> list[str]:
 
 def relock() -> Path:
     """Write the lock; the old one becomes an earlier lock, unless an epoch was raised."""
-    same = LOCK.exists() and _lock()["epochs"] == EPOCHS
-    earlier = list(dict.fromkeys([*locks()[1:], locked_hash()])) if same else []
+    same = LOCK.exists() and locked()["epochs"] == EPOCHS
+    earlier = list(dict.fromkeys([*locks()[1:], locks()[0]])) if same else []
     lock = {"epochs": EPOCHS, "earlier": earlier, "sources": sources()}
     LOCK.write_text(json.dumps(lock, indent=1) + "\n", "utf-8")
     return LOCK
-
-
-def _lock() -> dict[str, Any]:
-    return dict(json.loads(LOCK.read_text("utf-8")))
 
 
 @cache
@@ -114,7 +105,7 @@ def warn_of_changes() -> None:
     """Warn once, in this process and its children, that stored runs may be of other code."""
     if os.environ.get(WARNED):
         return
-    if files := changed(sources(), locked()):
+    if files := changed(sources(), locked()["sources"]):
         os.environ[WARNED] = "1"
         print(
             f"{', '.join(files)}: changed since the stored runs were trained;"

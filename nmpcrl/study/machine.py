@@ -5,7 +5,7 @@ import platform
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import NotRequired, TypedDict, cast
+from typing import Any
 
 CPUINFO = Path("/proc/cpuinfo")
 SETTINGS = (  # environment variables that choose other machine code
@@ -14,25 +14,8 @@ SETTINGS = (  # environment variables that choose other machine code
 )
 
 
-class Machine(TypedDict):
-    """A machine as a page names it."""
-
-    processor: str
-    architecture: str
-    cores: int | None
-    system: str
-
-
-class Fingerprint(Machine):
-    """The properties that must be equal for the same bits, like code and versions."""
-
-    library: str  # of C: sines and cosines
-    abilities: str  # a hash of the processor's instruction sets, for which code is compiled
-    settings: NotRequired[dict[str, str]]  # those of `SETTINGS` that are set
-
-
-def machine() -> Machine:
-    """This machine, for a page."""
+def machine() -> dict[str, Any]:
+    """Processor, architecture, cores and system of this machine, for a page."""
     names = [line.partition(":")[2].strip() for line in _cpuinfo() if line.startswith("model name")]
     return {
         "processor": names[0] if names else platform.processor() or "unknown",
@@ -42,18 +25,18 @@ def machine() -> Machine:
     }
 
 
-def fingerprint() -> Fingerprint:
-    """This machine, for a comparison with the machines of stored and published runs."""
+def fingerprint() -> dict[str, Any]:
+    """What must be equal, like code and versions, for the same bits as on this machine.
+
+    Beside `machine`: the library of C, for its sines; a hash of the processor's instruction sets,
+    for which code is compiled; and those of `SETTINGS` that are set, if any.
+    """
     lines = ("flags", "Features", "cpu family", "model\t")
     found = sorted({line for line in _cpuinfo() if line.startswith(lines)})
     abilities = sha256("\n".join(found).encode()).hexdigest()[:16]
-    known = cast(
-        Fingerprint,
-        {**machine(), "library": " ".join(platform.libc_ver()), "abilities": abilities},
-    )
-    if settings := {name: os.environ[name] for name in SETTINGS if os.environ.get(name)}:
-        known["settings"] = settings
-    return known
+    known = machine() | {"library": " ".join(platform.libc_ver()), "abilities": abilities}
+    settings = {name: os.environ[name] for name in SETTINGS if os.environ.get(name)}
+    return known | ({"settings": settings} if settings else {})
 
 
 @cache

@@ -1,11 +1,4 @@
-"""What the numbers of a stored run depend on: fields, versions of libraries, and epochs.
-
-The *key* of a run is a hash of
-
-- the fields of its experiment that its learner reads and that differ from `ORIGINAL`, with the
-  centres of the obstacles for the letter of the layout;
-- the versions of the libraries that bear on its numbers;
-- the epoch of each package whose code bears on them, a number in `EPOCHS`, raised by hand.
+"""Keys of stored runs: hashes of fields, versions of libraries and epochs.
 
 A new field, layout or metric changes no key, nor does a file that is moved or renamed. Code has no
 part in a key: `lock` notices its changes.
@@ -65,11 +58,6 @@ ORIGINAL: dict[str, Any] = {
 }
 
 
-def before() -> dict[str, Any]:
-    """`ORIGINAL` without the layout: the fields of runs that were stored before a field existed."""
-    return {name: value for name, value in ORIGINAL.items() if name != "obstacles"}
-
-
 def key(experiment: Experiment | Trial) -> str:
     """A hash of all on which the numbers of a run depend."""
     epochs = {room: EPOCHS[room] for room in RUN_ROOMS}
@@ -82,17 +70,15 @@ def summary_key(experiment: Experiment) -> str:
 
 
 def identity(experiment: Experiment | Trial) -> dict[str, Any]:
-    """The fields that name a run, resolved, without those that have their `ORIGINAL` value."""
+    """The fields that name a run: those that its learner reads and that differ from `ORIGINAL`.
+
+    The centres of the obstacles take the place of the layout.
+    """
     if isinstance(experiment, Trial):
         return experiment.identity
-    fields = resolved(experiment)
-    return {name: value for name, value in fields.items() if value != ORIGINAL[name]}
-
-
-def resolved(experiment: Experiment) -> dict[str, Any]:
-    """The fields as its learner reads them, with the centres of the obstacles for the layout."""
     fields = dict(vars(experiment.canonical))
-    return {"obstacles": paper.centres_of(fields.pop("layout"))} | fields
+    fields = {"obstacles": paper.centres_of(fields.pop("layout"))} | fields
+    return {name: value for name, value in fields.items() if value != ORIGINAL[name]}
 
 
 def versions(experiment: Experiment | Trial | None = None) -> dict[str, str]:

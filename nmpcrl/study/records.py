@@ -1,27 +1,28 @@
 """The records of a run: two tables of equal-length columns, and facts, in one .npz file."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from pathlib import Path
 from typing import Any, NamedTuple, NotRequired, TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.files import Column as Column
-from nmpcrl.study.files import DamagedRecords as DamagedRecords
-from nmpcrl.study.files import load_about, load_tables, save_tables
-from nmpcrl.study.machine import Fingerprint
+from nmpcrl.study.files import write_file
+from nmpcrl.study.refusal import Refusal
+
+Column = NDArray[Any]
 
 LAST = 3  # rollouts that the final cost averages
-STATES = len(paper.START)  # n of the robot
-INPUTS = len(paper.THETA_INIT) - 2 * STATES - 1  # m of the robot
 REMOVED = {"plant": "model"}  # former fields of experiments, with the one value that is read
 
-Field = tuple[str, type] | tuple[str, type, int | tuple[int, ...]]  # name, type[, shape]
+
+class DamagedRecords(Refusal):
+    """A file is incomplete, or of another run than its name says."""
 
 
 class Stopped(StrEnum):
@@ -39,7 +40,7 @@ class Facts(TypedDict):
     seconds: float
     final_cost: float
     versions: NotRequired[dict[str, str]]
-    machine: NotRequired[Fingerprint]
+    machine: NotRequired[dict[str, Any]]
     key: NotRequired[str]
     sources: NotRequired[str]
 
@@ -57,11 +58,6 @@ class StepStatus(IntEnum):
     SOLVED = 0
     RESTARTED = 1
     FAILED = 2
-
-    @classmethod
-    def of(cls, *, failed: bool, restarts: int) -> "StepStatus":
-        """The status of a step."""
-        return cls.FAILED if failed else cls.RESTARTED if restarts else cls.SOLVED
 
 
 def final_cost(cost: Vector) -> float:
@@ -108,32 +104,22 @@ class EvaluationRow(NamedTuple):
     actions: Matrix
 
 
-def step_fields(n: int, m: int, d: int) -> list[Field]:
-    """The columns of `StepRow` for so many states, inputs and parameters."""
-    return _fields(
-        StepRow, {"state": n, "action": m} | dict.fromkeys(("features", "theta", "w"), d)
-    )
+def form_of(row: type[NamedTuple], n: int, m: int, d: int, steps: int) -> np.dtype[Any]:
+    """The columns of `StepRow` or `EvaluationRow` for n states, m inputs and d parameters.
 
-
-def evaluation_fields(n: int, m: int, d: int, steps: int) -> list[Field]:
-    """The columns of `EvaluationRow` for rollouts of so many steps."""
-    return _fields(EvaluationRow, {"theta": d, "states": (steps, n), "actions": (steps, m)})
-
-
-def _fields(row: type[NamedTuple], shapes: Mapping[str, Any]) -> list[Field]:
-    """A column for each field of a row; arrays have a shape."""
-    kinds = row.__annotations__
-    return [
-        (name, float, shapes[name]) if name in shapes else (name, kinds[name]) for name in kinds
-    ]
+    `steps` is the length of a rollout.
+    """
+    shapes: dict[str, int | tuple[int, int]] = dict.fromkeys(("features", "theta", "w"), d)
+    shapes |= {"state": n, "action": m, "states": (steps, n), "actions": (steps, m)}
+    fields = row.__annotations__.items()
+    return np.dtype([(one, float, shapes[one]) if one in shapes else (one, t) for one, t in fields])
 
 
 class Table:
     """Rows of named numbers and arrays in memory of fixed size."""
 
-    def __init__(self, fields: list[Field], capacity: int) -> None:
-        """Take memory for `capacity` rows of `fields`, in the form of `np.dtype`."""
-        self._rows = np.empty(capacity, fields)
+    def __init__(self, form: np.dtype[Any], capacity: int) -> None:
+        self._rows = np.empty(capacity, form)
         self._size = 0
 
     def append(self, row: tuple[Any, ...]) -> None:
@@ -167,55 +153,73 @@ class Records:
     facts: Facts
 
     def save(self, path: Path) -> None:
-        """Write a complete file beside `path`, then rename it.
-
-        Raises:
-            OSError: the file cannot be written; an earlier one stays.
-        """
-        about = {"experiment": self.experiment, "facts": self.facts}
-        save_tables(path, about, {"steps": self.steps, "evaluations": self.evaluations})
+        """Write a file as a whole; errors as in `write_file`."""
+        tables = {"steps": self.steps, "evaluations": self.evaluations}
+        save_run(path, self.experiment, self.facts, tables)
 
     @classmethod
     def load(cls, path: Path) -> "Records":
-        """Read a file that `save` wrote.
-
-        Raises:
-            FileNotFoundError: there is no file.
-            DamagedRecords: the file is damaged, or has other columns than a run.
-        """
-        about, tables = load_tables(path, COLUMNS)
-        experiment, facts = stated_in(about, path)
-        return cls(experiment, tables["steps"], tables["evaluations"], facts)
-
-    @staticmethod
-    def about(path: Path) -> About:
-        """The experiment's fields and the facts, without reading the tables.
-
-        Raises:
-            FileNotFoundError: there is no file.
-            DamagedRecords: the file is damaged, or names no run.
-        """
-        return stated_in(load_about(path), path)
+        """Read a file that `save` wrote; errors as in `load_run`."""
+        (experiment, facts), tables = load_run(path, COLUMNS)
+        return cls(experiment=experiment, facts=facts, **tables)
 
 
-COLUMNS = {
-    "steps": (*StepRow._fields, "alpha_phi2"),
-    "evaluations": EvaluationRow._fields,
-}
+COLUMNS = {"steps": (*StepRow._fields, "alpha_phi2"), "evaluations": EvaluationRow._fields}
 
 
-def stated_in(about: dict[str, Any], path: Path) -> About:
-    """The experiment and the facts that a file states.
+def save_run(
+    path: Path,
+    experiment: Mapping[str, Any],
+    facts: Mapping[str, Any],
+    tables: Mapping[str, Mapping[str, Column]],
+) -> None:
+    """Write an .npz with members TABLE/COLUMN, and `about`: JSON of the experiment and the facts.
 
     Raises:
-        DamagedRecords: the file names no run.
+        OSError: the file cannot be written; an earlier one stays.
     """
-    try:
-        fields = about["experiment"].items()
-        experiment = {name: value for name, value in fields if REMOVED.get(name) != value}
-        if "states" not in experiment:  # which a trial has
-            Experiment(**experiment)
-        facts: Facts = about["facts"]
-        return About(experiment, facts | {"solver": facts["solver"]})
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise DamagedRecords(f"{path} does not say which run it is") from error
+    about = np.array(json.dumps({"experiment": experiment, "facts": facts}))
+    members: dict[str, Any] = {
+        f"{table}/{name}": one for table, columns in tables.items() for name, one in columns.items()
+    }
+    write_file(path, lambda file: np.savez_compressed(file, about=about, **members))
+
+
+def load_run(
+    path: Path, columns: Mapping[str, Collection[str]]
+) -> tuple[About, dict[str, dict[str, Column]]]:
+    """The experiment and the facts of a file, and its tables with these columns.
+
+    Raises:
+        FileNotFoundError: there is no file.
+        DamagedRecords: a checksum of the zip format is wrong, the file names no run, or its columns
+            have other names or unequal lengths.
+    """
+    tables: dict[str, dict[str, Column]] = {table: {} for table in columns}
+    with path.open("rb") as raw:
+        try:
+            with np.load(raw, allow_pickle=False) as file:
+                about = _stated(json.loads(str(file["about"])))
+                for member in file.files:
+                    table, _, name = member.partition("/")
+                    if name in columns.get(table, ()):
+                        tables[table][name] = file[member]
+            for table, found in tables.items():
+                if {*found} != {*columns[table]} or len({*map(len, found.values())}) > 1:
+                    raise ValueError(table)
+        except Exception as error:
+            raise DamagedRecords(f"{path} is damaged, or not a run") from error
+    return about, tables
+
+
+def about(path: Path) -> About:
+    """The experiment and the facts of a file; errors as in `load_run`."""
+    return load_run(path, {})[0]
+
+
+def _stated(about: dict[str, Any]) -> About:
+    fields, facts = about["experiment"].items(), about["facts"]
+    experiment = {name: value for name, value in fields if REMOVED.get(name) != value}
+    if "states" not in experiment:  # which a trial has
+        Experiment(**experiment)
+    return About(experiment, facts | {"solver": facts["solver"]})

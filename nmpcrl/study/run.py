@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from nmpcrl.control import Solution
 from nmpcrl.learning import Successor, Weights
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import Diverged, Step, absurd, train
@@ -20,22 +21,14 @@ from nmpcrl.study.records import (
     StepStatus,
     Stopped,
     Table,
-    evaluation_fields,
     final_cost,
-    step_fields,
+    form_of,
 )
 from nmpcrl.study.setup import Job, job_of
 from nmpcrl.study.trial import Trial
 
 UNKNOWN = Successor(np.nan)  # of a step without a bootstrap
-UNSOLVED: Any = SimpleNamespace(  # for a solve that failed or was not needed
-    value=np.nan,
-    features=np.nan,
-    restarts=0,
-    violation=np.nan,  # max(a, nan) is a
-    iterations=0,
-    seconds=0.0,
-)
+UNSOLVED: Any = SimpleNamespace(value=np.nan, features=np.nan)  # it failed or was not needed
 
 
 def run(
@@ -57,7 +50,9 @@ def run(
 
 def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
     named, controller, weights = job.named, job.controller, job.weights
-    steps, evaluations = _tables(job)
+    sizes = controller.nmpc.n, controller.nmpc.m, weights.theta.size, named.steps
+    steps = Table(form_of(StepRow, *sizes), named.episodes * named.steps)
+    evaluations = Table(form_of(EvaluationRow, *sizes), named.episodes // named.evaluate_every + 2)
     evaluations.append(_evaluation(job, weights, 0))
     stopped, cost, began = str(Stopped.FINISHED), 0.0, time.perf_counter()
     own = solver = controller.nmpc.solver.name
@@ -67,7 +62,7 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
             seconds = time.perf_counter() - began
             steps.append(_row(step, seconds))
             cost += step.cost
-            solver = next((one for one in _solvers(step) if one != own), solver)
+            solver = next((one.solver for one in _solves(step) if one.solver != own), solver)
             if step.last:
                 done = step.episode + 1
                 due = done % named.evaluate_every == 0 or done == named.episodes
@@ -91,29 +86,19 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
     return Records(named.stated, table, judged, facts)
 
 
-def _tables(job: Job) -> tuple[Table, Table]:
-    """Empty tables for `Records.steps` and `Records.evaluations`."""
-    named, nmpc = job.named, job.controller.nmpc
-    sizes = nmpc.n, nmpc.m, job.weights.theta.size
-    return (
-        Table(step_fields(*sizes), named.episodes * named.steps),
-        Table(evaluation_fields(*sizes, named.steps), named.episodes // named.evaluate_every + 2),
-    )
-
-
-def _solvers(step: Step) -> list[str]:
-    """The solvers of a step's problems."""
+def _solves(step: Step) -> list[Solution]:
+    """The different solves of a step."""
     successor = (step.update and step.update.successor) or UNKNOWN
-    return [one.solver for one in (step.plan, step.solution, successor.solution) if one]
+    return list(dict.fromkeys(filter(None, (step.plan, step.solution, successor.solution))))
 
 
 def _row(step: Step, seconds: float) -> StepRow:
     """One step of training as a row."""
     update = step.update
     successor = (update and update.successor) or UNKNOWN
-    first = step.solution or UNSOLVED
-    solves = list(dict.fromkeys(filter(None, (step.plan, step.solution, successor.solution))))
+    first, solves = step.solution or UNSOLVED, _solves(step)
     restarts = sum(solve.restarts for solve in solves)
+    status = StepStatus.RESTARTED if restarts else StepStatus.SOLVED
     return StepRow(
         episode=step.episode,
         time=step.time,
@@ -127,7 +112,7 @@ def _row(step: Step, seconds: float) -> StepRow:
         theta=step.weights.theta,
         w=step.weights.w,
         loss=successor.loss,
-        status=StepStatus.of(failed=bool(step.failure), restarts=restarts),
+        status=StepStatus.FAILED if step.failure else status,
         restarts=restarts,
         violation=max((solve.violation for solve in solves), default=np.nan),
         iterations=sum(solve.iterations for solve in solves),

@@ -83,7 +83,7 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """The name of the run; the name of its file has the key, too."""
+        """The name of the run, without its key."""
         plain = re.sub(r"\W+", "_", self.learner)
         return f"{plain}-seed{self.seed}-{self.episodes}ep"
 
@@ -98,17 +98,5 @@ class Trial:
     def __hash__(self) -> int:
         return hash(self.name)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle functions of a notebook, too."""
-        import cloudpickle
-
-        return _unpickled, (cloudpickle.dumps(dict(vars(self))),)
-
     def __str__(self) -> str:
         return f"{self.learner}, seed {self.seed}"
-
-
-def _unpickled(fields: bytes) -> Trial:
-    import cloudpickle
-
-    return Trial(**cloudpickle.loads(fields))

@@ -7,7 +7,8 @@ from click.testing import CliRunner
 
 from nmpcrl.bench import suite
 from nmpcrl.commands import main
-from nmpcrl.study import ParameterError, StoreError, store
+from nmpcrl.study import ParameterError, StoreError
+from nmpcrl.study.files import folder
 
 
 @pytest.fixture
@@ -129,7 +130,7 @@ def test_a_benchmark_in_stages_says_of_all_together_the_least_length(counted):
 
 
 def test_without_a_folder_to_keep_it_in_nothing_is_measured(counted, monkeypatch):
-    store.folder().write_text("no folder")
+    folder().write_text("no folder")
     with pytest.raises(StoreError, match="cannot be written"):
         measured_here("short")
 

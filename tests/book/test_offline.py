@@ -47,8 +47,8 @@ def test_what_is_missing_is_trained_and_an_edition_reads_it(chapter, tmp_path, m
     place = tmp_path / "student"
     offline.copy(found, place)
     monkeypatch.setenv("NMPCRL_RUNS", str(place / "data/runs"))
-    assert store.read(Experiment("GES", episodes=1)).steps["cost"].size
-    assert summaries.load(Experiment("frozen", episodes=1)).episodes["cost"].size
+    assert store.RUNS.read(Experiment("GES", episodes=1)).steps["cost"].size
+    assert summaries.SUMMARIES.read(Experiment("frozen", episodes=1)).episodes["cost"].size
     assert len([path for path in place.rglob("*") if path.is_file()]) == len(found) == 3
 
 

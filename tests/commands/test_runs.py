@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 from nmpcrl.report.run import verdict
-from nmpcrl.study import Experiment, Records, fetch, paper, store, sweep
+from nmpcrl.study import Experiment, Records, fetch, paper, sweep
 from nmpcrl.study.experiment import frozen_arm
+from nmpcrl.study.provenance import key
+from nmpcrl.study.store import RUNS
 
 SHORT = {"episodes": 2, "steps": 4, "evaluate_every": 1}
 WORDS = ["--episodes", "2", "--steps", "4", "--evaluate-every", "1"]
@@ -89,7 +91,7 @@ def test_a_run_is_trained_once_listed_and_drawn(command, tmp_path, monkeypatch):
     one = Experiment("GES", **SHORT)
     done = command("train", "--learner", "GES", *WORDS)
     assert done.exit_code == 0, done.output
-    path = store.path_of(one)
+    path = RUNS.path_of(one)
     assert f"{path}\nNext: nmpcrl show {path.stem}\n" in done.stdout
     monkeypatch.setattr("nmpcrl.study.store.run", lambda *_, **__: pytest.fail("trained again"))
     again = command("train", "--learner", "GES", *WORDS)
@@ -111,9 +113,9 @@ def test_the_frozen_run_is_drawn_if_it_is_stored_and_is_what_its_name_says(comma
     one = Experiment(**SHORT)
     fetch(one)
     alone = page(command)
-    fetch(Experiment("GES", **SHORT)).save(store.path_of(frozen_arm(one)))
+    fetch(Experiment("GES", **SHORT)).save(RUNS.path_of(frozen_arm(one)))
     assert page(command) == alone
-    store.path_of(frozen_arm(one)).unlink()
+    RUNS.path_of(frozen_arm(one)).unlink()
     fetch(frozen_arm(one))
     assert page(command) != alone
 
@@ -128,11 +130,11 @@ def stored(command):
     wanted = sweep(seed=(0, 1), layout=("A", "B"), **SHORT)
     records = fetch(wanted[0])
     for one, cost in zip(wanted, (9.0, 8.0, 7.0, float("inf")), strict=True):
-        facts = records.facts | {"final_cost": cost, "key": store.key(one)}
+        facts = records.facts | {"final_cost": cost, "key": key(one)}
         facts |= {"sources": "other"} if cost == 7 else {}
         named = records.experiment | {"seed": one.seed, "layout": one.layout}
-        Records(named, records.steps, records.evaluations, facts).save(store.path_of(one))
-    return [store.path_of(one).stem for one in wanted]
+        Records(named, records.steps, records.evaluations, facts).save(RUNS.path_of(one))
+    return [RUNS.path_of(one).stem for one in wanted]
 
 
 @pytest.mark.parametrize(

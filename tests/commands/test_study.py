@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from raising import raising
 
-from nmpcrl.analysis import summaries
+from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries
 from nmpcrl.bench.paired import Ratio
 from nmpcrl.claims import publish, published, rule
 from nmpcrl.claims.verdict import Verdict
-from nmpcrl.study import design, store, sweep
+from nmpcrl.study import design, limits, store, sweep
 
 SHORT = {"episodes": 4, "steps": 5, "evaluate_every": 2}
 STUDY = {
@@ -44,11 +44,11 @@ def published_here(command, small, ready, tmp_path):
     """The summaries of the small study, which is stored and published in a folder of this test."""
     if not any(ready.iterdir()):
         with ThreadPoolExecutor(1) as one:
-            summaries.fetch_summaries(STUDY, executor=one, progress=False)
+            fetch_summaries(STUDY, executor=one, progress=False)
         assert command("study", "--publish").exit_code == 0
         shutil.copytree(tmp_path, ready, dirs_exist_ok=True)
     shutil.copytree(ready, tmp_path, dirs_exist_ok=True)
-    return {e: summaries.load(e) for e in STUDY}
+    return {e: SUMMARIES.read(e) for e in STUDY}
 
 
 def test_a_dry_run_says_how_much_is_to_be_done_and_does_nothing(command, tmp_path):
@@ -61,7 +61,7 @@ def test_a_dry_run_says_how_much_is_to_be_done_and_does_nothing(command, tmp_pat
 def test_study_trains_a_part_and_then_what_is_missing(command, small):
     asked = command("study", "--part", "N = 5", "--workers", "1")
     assert asked.exit_code == 0, asked.output
-    assert {STUDY[e] for e in STUDY if summaries.is_stored(e)} == {"N = 5"}
+    assert {STUDY[e] for e in STUDY if SUMMARIES.is_stored(e)} == {"N = 5"}
     assert command("study").exit_code == 0
     assert "6 of 6 runs are stored" in command("study", "--dry-run").output
 
@@ -69,7 +69,7 @@ def test_study_trains_a_part_and_then_what_is_missing(command, small):
 def test_a_run_that_fails_is_reported_and_the_others_are_stored(
     command, published_here, monkeypatch
 ):
-    next(summaries.path_of(e) for e in STUDY if e.learner == "ES" and e.seed == 1).unlink()
+    next(SUMMARIES.path_of(e) for e in STUDY if e.learner == "ES" and e.seed == 1).unlink()
     monkeypatch.setattr(store, "run", raising(ArithmeticError("a mistake")))
     ended = command("study")
     assert ended.exit_code == 1
@@ -104,7 +104,7 @@ def test_verify_names_what_contradicts_and_fails(command, published_here):
     one = published_here[wrong]
     cost = one.evaluations["cost"].copy()
     cost[-1] += 1e-9
-    replace(one, evaluations=one.evaluations | {"cost": cost}).save(summaries.path_of(wrong))
+    replace(one, evaluations=one.evaluations | {"cost": cost}).save(SUMMARIES.path_of(wrong))
     verified = command("verify")
     assert verified.exit_code == 1
     assert "contradictions: 1\n" in verified.output
@@ -116,14 +116,14 @@ def test_verify_trains_as_many_runs_as_are_asked_for_besides_the_stored_ones(
     command, published_here, stored
 ):
     for experiment in list(STUDY)[stored:]:
-        summaries.path_of(experiment).unlink()
+        SUMMARIES.path_of(experiment).unlink()
     if not stored:
         assert "--sample 5 trains five for the comparison" in command("verify").output
     verified = command("verify", "--sample", "2")
     assert verified.exit_code == 0, verified.output
     now = min(stored + 2, len(STUDY))
     assert f"{now} bit for bit, " in verified.output
-    assert sum(map(summaries.is_stored, STUDY)) == now
+    assert sum(map(SUMMARIES.is_stored, STUDY)) == now
 
 
 def test_verify_refuses_damaged_publications_and_too_large_samples(
@@ -140,11 +140,11 @@ def test_verify_refuses_damaged_publications_and_too_large_samples(
 
 
 def test_a_study_without_numba_is_refused(command, published_here, monkeypatch):
-    summaries.path_of(next(iter(STUDY))).unlink()
-    monkeypatch.setattr(summaries, "environment", lambda: {"numba": "absent"})
+    SUMMARIES.path_of(next(iter(STUDY))).unlink()
+    monkeypatch.setattr(limits, "environment", lambda: {"numba": "absent"})
     refused = command("study")
     assert refused.exit_code == 1
-    assert "OtherSolver: numba is not installed, and without it riccati" in refused.output
+    assert "Refusal: numba is not installed, and without it riccati" in refused.output
 
 
 @pytest.mark.parametrize(("outcome", "code"), [(rule.PARTLY, 0), (rule.UNDECIDABLE, 1)])

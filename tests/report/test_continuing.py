@@ -16,7 +16,7 @@ from nmpcrl.report.continuing import TEMPLATES, changed, code, command
 from nmpcrl.study import Experiment, Records, run
 from nmpcrl.study.learners import NETWORKS
 from nmpcrl.study.provenance import key
-from nmpcrl.study.store import path_of
+from nmpcrl.study.store import RUNS as STORE
 
 SHORT = {"episodes": 2, "steps": 20, "evaluate_every": 1}
 RUNS = {
@@ -46,7 +46,7 @@ def test_the_command_trains_the_run_in_a_shell(name, tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
     done = CliRunner().invoke(main, typed(command(RUNS[name])))
     assert done.exit_code == 0, done.output
-    stored = Records.load(path_of(RUNS[name]))
+    stored = Records.load(STORE.path_of(RUNS[name]))
     assert key(Experiment(**stored.experiment)) == key(RUNS[name])
     np.testing.assert_array_equal(stored.steps["theta"], run(RUNS[name]).steps["theta"])
 

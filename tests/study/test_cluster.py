@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nmpcrl.analysis import summaries
-from nmpcrl.analysis.summaries import fetch_summaries
+from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.study import cluster, run, sweep
 from nmpcrl.study.cluster import NoCluster
@@ -102,7 +101,7 @@ def test_a_killed_worker_loses_no_run_and_no_bit(address, worker, tmp_path):
         return [*tmp_path.glob("began-*")]
 
     def kill_one_at_work() -> None:
-        wait_until(lambda: len(began()) == 4 and sum(map(summaries.is_stored, SIX)) == 2)
+        wait_until(lambda: len(began()) == 4 and sum(map(SUMMARIES.is_stored, SIX)) == 2)
         os.kill(pair[0].pid, signal.SIGKILL)
         (tmp_path / "killed").touch()
 
@@ -116,7 +115,7 @@ def test_a_killed_worker_loses_no_run_and_no_bit(address, worker, tmp_path):
         ours, theirs = summarise(run(experiment)), found[experiment]
         for name in ours.episodes.keys() - {"seconds"}:
             np.testing.assert_array_equal(theirs.episodes[name], ours.episodes[name])
-        assert summaries.is_stored(experiment)
+        assert SUMMARIES.is_stored(experiment)
     assert not [*(tmp_path / "elsewhere").rglob("*.npz")]
 
 

@@ -10,12 +10,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.study import DamagedRecords, Experiment, Records
-from nmpcrl.study.records import (
-    Table,
-    evaluation_fields,
-    final_cost,
-    step_fields,
-)
+from nmpcrl.study.records import EvaluationRow, StepRow, Table, about, final_cost, form_of
 
 EXPERIMENT = Experiment("ES", seed=3, episodes=40, steps=10, evaluate_every=20)
 
@@ -24,17 +19,17 @@ def example(rows=40, experiment=EXPERIMENT):
     """A run with drawn numbers in every column."""
     rng = np.random.default_rng(0)
 
-    def drawn(fields, rows):
+    def drawn(row, rows):
         columns = {}
-        for name, (kind, _) in np.dtype(fields).fields.items():
+        for name, (kind, _) in form_of(row, 3, 2, 9, experiment.steps).fields.items():
             shape = (rows, *kind.shape)
             known = rng.random(shape) > 0.1
             number = np.where(known, rng.normal(size=shape), np.nan)
             columns[name] = number if kind.base.kind == "f" else rng.integers(0, 9, shape)
         return columns
 
-    steps = drawn([*step_fields(3, 2, 9), ("alpha_phi2", float)], rows)
-    evaluations = drawn(evaluation_fields(3, 2, 9, experiment.steps), 2)
+    steps = drawn(StepRow, rows) | {"alpha_phi2": rng.normal(size=rows)}
+    evaluations = drawn(EvaluationRow, 2)
     facts = {"stopped": "diverged: “why”", "seconds": 1.25, "solver": "riccati"}
     return Records(asdict(experiment), steps, evaluations, facts | {"final_cost": np.inf})
 
@@ -64,16 +59,16 @@ def test_the_latest_saved_run_is_loaded(path):
     for rows in (400, 40):
         example(rows).save(path)
         assert_equal(Records.load(path), example(rows))
-    assert Records.about(path) == (as_read(example().experiment), example().facts)
+    assert about(path) == (as_read(example().experiment), example().facts)
 
 
 def test_a_run_of_the_first_edition_which_named_its_plant_is_read(path):
     old = example()
     replace(old, experiment={**old.experiment, "plant": "model"}).save(path)
     assert_equal(Records.load(path), old)
-    assert "plant" not in Records.about(path).experiment
+    assert "plant" not in about(path).experiment
     replace(old, experiment={**old.experiment, "plant": "slipping"}).save(path)
-    with pytest.raises(DamagedRecords, match="does not say which run"):
+    with pytest.raises(DamagedRecords, match="damaged, or not a run"):
         Records.load(path)
 
 
@@ -94,11 +89,10 @@ def test_a_wrong_byte_is_noticed_or_changes_nothing(path):
 @pytest.mark.parametrize(
     "change",
     [
-        lambda steps: steps | {"reward": steps["cost"]},
         lambda steps: {name: one for name, one in steps.items() if name != "theta"},
         lambda steps: steps | {"cost": steps["cost"][1:]},
     ],
-    ids=["a column too many", "a column too few", "a short column"],
+    ids=["a column too few", "a short column"],
 )
 def test_a_file_with_other_columns_is_damaged(path, change):
     run = example()
@@ -129,7 +123,7 @@ def packed(**members):
 def test_a_file_of_another_kind_is_damaged(path, content):
     path.parent.mkdir()
     path.write_bytes(content)
-    for read in (Records.load, Records.about):
+    for read in (Records.load, about):
         with pytest.raises(DamagedRecords):
             read(path)
 
@@ -156,7 +150,7 @@ def test_no_code_of_a_file_is_run(path, tmp_path, name):
 
 
 def test_the_filled_rows_of_a_table_become_whole_columns():
-    table = Table([("episode", int), ("theta", float, 3)], capacity=3)
+    table = Table(np.dtype([("episode", int), ("theta", float, 3)]), capacity=3)
     table.append((7, np.ones(3)))
     table.append((8, np.nan))  # in all of the field
     columns = table.columns()

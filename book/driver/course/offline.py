@@ -19,15 +19,16 @@ LONG = 10  # of a run [s], as `limits.seconds_of` has it: those whose learner fi
 
 def stored(files: Iterable[str]) -> dict[str, Path]:
     """What the chapters in these files need stored: path in the folder of an edition -> file."""
-    from nmpcrl.analysis import summaries  # only here: a mistake elsewhere should not wait for it
-    from nmpcrl.study import store
+    from nmpcrl.analysis.summaries import SUMMARIES  # only here: it takes long to import
+    from nmpcrl.study.files import folder
+    from nmpcrl.study.store import RUNS
 
     whole, summarised = needed(files)
     train.train(whole, summarised)
-    paths = [*map(store.path_of, whole), *map(summaries.path_of, summarised)]
+    paths = [*map(RUNS.path_of, whole), *map(SUMMARIES.path_of, summarised)]
     # what another solver had to solve is not stored; a notebook does that again
     there = filter(Path.exists, paths)
-    return {f"data/runs/{path.relative_to(store.folder())}": path for path in there}
+    return {f"data/runs/{path.relative_to(folder())}": path for path in there}
 
 
 def needed(files: Iterable[str]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
