@@ -8,7 +8,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +18,12 @@ import pytest
 from filelock import FileLock
 from hypothesis import settings
 
-from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.solves import transposed
-from nmpcrl.claims.evidence import Evidence
-from nmpcrl.claims.failure_modes import failure_modes
+from nmpcrl.claims.published import Evidence
 from nmpcrl.control import differential_drive
 from nmpcrl.learning import browser as in_browser
-from nmpcrl.study import Experiment, Runs, design, jobs, paper
+from nmpcrl.study import Experiment, design, jobs, paper
 
 settings.register_profile("fixed", deadline=None, derandomize=True)  # the machine may be busy
 settings.register_profile("random", deadline=None, derandomize=False, print_blob=True)
@@ -313,10 +311,8 @@ def evidence_of(
     """A main table in which every learner saves a tenth at once; `unlike` says what is not so."""
     wanted = design.main_table(layouts=layouts, seeds=seeds, episodes=episodes)
     summaries = {one: summary_of(one, **unlike(one)) for one in wanted}
-    runs = table(summaries).join(failure_modes(summaries))
-    runs["variant"] = design.MAIN_TABLE
-    runs["source"] = [source(one) for one in wanted]
-    return Evidence(Runs(summaries), runs)
+    found = Evidence().joined(summaries, dict.fromkeys(wanted, design.MAIN_TABLE))
+    return replace(found, runs=found.runs.assign(source=[*map(source, wanted)]))
 
 
 STILL = np.empty(0)  # the inputs of a robot that is not moved

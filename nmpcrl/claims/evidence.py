@@ -4,21 +4,16 @@ The book shows the published study. A reader who asks for other runs gets those,
 names the origin of its runs. `reproduce.agreement` compares runs made again with published ones.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import compress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.analysis.rows import THETA, cost_ratios, table
+from nmpcrl.analysis.rows import THETA
 from nmpcrl.analysis.summaries import fetch_summaries
 from nmpcrl.analysis.summary import Outline
-from nmpcrl.claims.failure_modes import WELL, failure_modes
-from nmpcrl.claims.published import load
+from nmpcrl.claims.published import Evidence, load
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design
 from nmpcrl.study.experiment import Experiment, frozen_arm
@@ -28,54 +23,6 @@ from nmpcrl.study.setup import controller_of
 from nmpcrl.study.store import Runs
 
 SOURCES = ("published", "fresh")
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """Runs, their summaries, and where each comes from."""
-
-    summaries: Runs[Outline]
-    runs: pd.DataFrame  # `rows.table` with `variant` and `source`, one row a run, in that order
-
-    @cached_property
-    def main(self) -> "Evidence":
-        """The runs of the main table alone."""
-        return self.where(self.runs.variant == design.MAIN_TABLE)
-
-    def where(self, holds: Iterable[bool]) -> "Evidence":
-        """The runs with a true value in `holds`."""
-        chosen = list(holds)
-        summaries = Runs(dict(compress(self.summaries.items(), chosen)))
-        return Evidence(summaries, self.runs[chosen].reset_index(drop=True))
-
-    @property
-    def mark(self) -> str:
-        """How many runs were trained here and how many are published, for a caption."""
-        fresh = int((self.runs.source == "fresh").sum())
-        counts = {"trained for this page": fresh, "published": len(self.runs) - fresh}
-        parts = [f"{count} runs {where}" for where, count in counts.items() if count]
-        return ", ".join(parts) or "no runs"
-
-    @property
-    def origin(self) -> str:
-        """The origin, learners, layouts and readings of the runs, for numbers on pages."""
-        if self.is_published:
-            return "the published main table"
-        names = {"layouts": "layout", "noise per": "decay"}
-        parts = [f"{words} {_named(self.runs[column])}" for words, column in names.items()]
-        return f"{self.mark}, of {_named(self.runs.learner)}; {'; '.join(parts)}"
-
-    @property
-    def is_published(self) -> bool:
-        """Whether these runs are the complete published main table."""
-        main = {e for e, part in load().variants.items() if part == design.MAIN_TABLE}
-        return set(self.summaries) == main and set(self.runs.source) == {"published"}
-
-    @property
-    def wrong(self) -> pd.DataFrame:
-        """The runs that went wrong; `run` is each one's experiment."""
-        runs = self.runs.assign(run=list(self.summaries))
-        return runs[~runs.mechanism.isin(("", WELL))]
 
 
 def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
@@ -115,20 +62,11 @@ def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:
     Raises:
         ParameterError: a value is not allowed.
     """
-    here, published = fetch_summaries(needed(source, **asked)), load()
-    parts = {e: part for e, part in published.variants.items() if part != design.MAIN_TABLE}
-    asked_for = dict.fromkeys(_asked(**asked), design.MAIN_TABLE)
-    parts = parts | asked_for if variants else asked_for
-    made = table(here).join(failure_modes(here)) if here else table(here)
-    rows = {**published.rows, **dict(zip(here, made.to_dict("records"), strict=True))}
-    ratios = cost_ratios(rows)
-    runs = pd.DataFrame([rows[e] for e in parts]).assign(
-        variant=list(parts.values()),
-        source=["fresh" if e in here else "published" for e in parts],
-        cost_ratio=[ratios[e] for e in parts],
-    )
-    known: dict[Experiment, Outline] = {**published.summaries, **here}
-    return Evidence(Runs({e: known[e] for e in parts}), runs)
+    runs, known = dict.fromkeys(_asked(**asked), design.MAIN_TABLE), load()
+    parts = {e: part for e, part in known.variants.items() if part != design.MAIN_TABLE}
+    parts = (parts if variants else {}) | runs
+    found = known.joined(fetch_summaries(needed(source, **asked)), runs).among(parts)
+    return replace(found, runs=found.runs.assign(variant=[*parts.values()]))
 
 
 def with_inputs(found: Evidence) -> Evidence:
@@ -150,15 +88,6 @@ def _inputs(experiment: Experiment, theta: Vector) -> Column:
     actions = evaluate(controller_of(experiment), theta, experiment.steps).actions
     missing = ((0, experiment.steps - len(actions)), (0, 0))
     return np.pad(actions, missing, constant_values=np.nan)
-
-
-def _named(column: pd.Series) -> str:
-    return ", ".join(map(str, column.unique()))
-
-
-def paths(evidence: Evidence) -> Mapping[Experiment, Column]:
-    """States of each run's last rollout, as `rule.Observations` takes them."""
-    return {experiment: summary.states for experiment, summary in evidence.summaries.items()}
 
 
 def _asked(**asked: Any) -> tuple[Experiment, ...]:

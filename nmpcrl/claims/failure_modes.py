@@ -19,8 +19,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.metrics import TOUCH
-from nmpcrl.analysis.rows import table
-from nmpcrl.analysis.summary import RunSummary
+from nmpcrl.analysis.summary import Outline, RunSummary
 from nmpcrl.claims.thresholds import BETTER, divergence, was_stopped, worsens
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
@@ -66,20 +65,26 @@ NONE = {"ending": "", "wrong": "", "mechanism": "", "episode": pd.NA}  # of a fr
 FAILURE_MODE = [*NONE]
 
 
-def failure_modes(summaries: Mapping[Experiment, RunSummary]) -> pd.DataFrame:
-    """The failure mode of each run, one row a run, in order; of runs with their frozen arms.
+def failure_modes(
+    summaries: Mapping[Experiment, RunSummary],
+    runs: pd.DataFrame,
+    every: Mapping[Experiment, Outline],
+) -> pd.DataFrame:
+    """The failure mode of each run, one row a run, in order.
+
+    Args:
+        summaries: the runs.
+        runs: their table, of `rows.table`.
+        every: with their frozen arms, trained here or published.
 
     Returns:
         Columns ending (of the last rollout: an `Ending`), wrong (a `Failure`, or ""), mechanism (a
         `Mechanism`, or `WELL`) and episode (after which the cost rose; missing for a run that went
         well); empty for the frozen arms.
     """
-    wrong = dict(zip(summaries, went_wrong(table(summaries)), strict=True))
     rows = [
-        failure_mode(run, wrong[e], summaries[frozen_arm(e)].states)
-        if e.learner != "frozen"
-        else NONE
-        for e, run in summaries.items()
+        NONE if e.learner == "frozen" else failure_mode(run, wrong, every[frozen_arm(e)].states)
+        for (e, run), wrong in zip(summaries.items(), went_wrong(runs), strict=True)
     ]
     return pd.DataFrame(rows, columns=FAILURE_MODE)
 

@@ -56,7 +56,7 @@ def finding(found: Published) -> Finding | None:
     """The finding of the published study; None if nothing is published."""
     if not found.rows:
         return None
-    main = found.main.assign(saved=cost_reduction(found.main))
+    main = found.main.runs.assign(saved=cost_reduction(found.main.runs))
     runs = main[main.learner.isin(LEARNERS)]
     hand = pd.DataFrame.from_dict({one: _by_hand(one) for one in runs.layout.unique()}, "index")
     closed = runs[f"theta_{THETA_C}"] >= runs.layout.map(hand.closes)

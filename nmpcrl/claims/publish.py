@@ -1,26 +1,37 @@
-"""Publication of the study with times and searches made on this machine."""
+"""Publication of the study: runs, searches, and times of steps."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
 
 from nmpcrl.analysis.gradient_td import dropped_curvature
-from nmpcrl.analysis.search import Search, search_all
+from nmpcrl.analysis.search import Found, Search, search_all
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.processes import time_learners_repeatedly
 from nmpcrl.claims import published
-from nmpcrl.claims.assumptions import measured
+from nmpcrl.claims.assumptions import Measured, measured
 from nmpcrl.claims.paper_claims import BY_TIME
+from nmpcrl.claims.published import BITS, COLUMNS, FOLLOWED, Evidence, Published
 from nmpcrl.claims.rule import judge
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
+from nmpcrl.study import paper
+from nmpcrl.study import published as store
 from nmpcrl.study.design import LAYOUTS
-from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.experiment import Experiment, frozen_arm
+from nmpcrl.study.provenance import made_here
+from nmpcrl.study.published import Unpublishable
+from nmpcrl.study.records import Column
 from nmpcrl.study.store import fetch
 
 
 def publish_study(
     runs: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
 ) -> Path:
-    """Write `book/published` anew, with searches, the audit of C8 and times of steps made here.
+    """Publish the study anew, with searches, the audit of C8 and times of steps made here.
 
     Args:
         runs: all of `design.whole_study`.
@@ -29,7 +40,58 @@ def publish_study(
     timings, searches = time_learners_repeatedly(), search_all([*map(Search, LAYOUTS)])
     records = fetch(published.AUDITED)
     audit = measured(published.AUDITED, records, dropped_curvature(records))
-    return published.publish(runs, variants, timings=timings, searches=searches, audit=audit)
+    publish_times(timings)
+    publish_searches(searches)
+    return publish_runs(runs, variants, anew=True, audit=audit)
+
+
+def publish_runs(
+    runs: Mapping[Experiment, RunSummary],
+    variants: Mapping[Experiment, str],
+    *,
+    anew: bool = False,
+    audit: Measured | None = None,
+) -> Path:
+    """Publish runs beside the published ones.
+
+    Args:
+        runs: trained here.
+        variants: the part of the study that each belongs to.
+        anew: whether the published runs are forgotten.
+        audit: of `published.AUDITED`.
+
+    Returns:
+        The folder of the published data.
+
+    Raises:
+        Damaged: a file is missing, or is not the file that was written.
+        Unpublishable: a run is published already, or its frozen arm is not published.
+    """
+    earlier = Published() if anew else published.load()
+    known = {*earlier.rows, *runs}
+    for e in runs:
+        if e in earlier.rows:
+            raise Unpublishable(f"{e} is published already, in the part {earlier.variants[e]!r}")
+        if frozen_arm(e) not in known:
+            raise Unpublishable(f"the frozen arm of {e} is not published")
+    every = earlier.joined(runs, variants)
+    new = every.runs[len(earlier.runs) :]
+    counts = new.variant.value_counts(sort=False).to_dict()
+    batch = made_here() | {"runs": counts, "hours": float(new.seconds.sum() / 3600)}
+    batch |= {"audit": asdict(audit)} if audit else {}
+    table = every.runs[[*COLUMNS]]
+    return _written(published.RUNS, table, batch, anew=anew, arrays=_curves(every))
+
+
+def publish_searches(searches: Mapping[Search, Found]) -> Path:
+    """Replace the published searches."""
+    rows = [asdict(one) | asdict(result) for one, result in searches.items()]
+    return _written(published.SEARCHES, pd.DataFrame(rows), made_here())
+
+
+def publish_times(timings: pd.DataFrame) -> Path:
+    """Replace the published times by times of `time_learners` that were taken here."""
+    return _written(published.TIMINGS, timings, made_here())
 
 
 def publish_timing() -> tuple[Verdict, ...]:
@@ -44,5 +106,44 @@ def publish_timing() -> tuple[Verdict, ...]:
     timings = time_learners_repeatedly()
     judged = judge(BY_TIME, timings=timings)
     if UNDECIDABLE not in {verdict.outcome for verdict in judged}:
-        published.republish(timings)
+        publish_times(timings)
     return judged
+
+
+def _written(
+    name: str,
+    table: pd.DataFrame,
+    batch: Mapping[str, Any],
+    *,
+    anew: bool = True,
+    arrays: Mapping[str, Column] | None = None,
+) -> Path:
+    path = store.write(name, table, arrays, batch=batch, anew=anew)
+    published._load.cache_clear()
+    return path.parent
+
+
+def _curves(found: Evidence) -> dict[str, Column]:
+    """The columns of all runs, padded with nan; shape (runs, ...)."""
+    runs, parts = found.summaries.values(), found.variants.values()
+    none = np.empty((0, len(paper.THETA_INIT)))
+    thetas = [
+        one.episodes.get("theta", none) if part in FOLLOWED else none
+        for one, part in zip(runs, parts, strict=True)
+    ]
+    return {
+        "cost": _padded([one.episodes["cost"] for one in runs]),
+        "judged_after": _padded([one.evaluations["episode"] for one in runs]),
+        "judged_cost": _padded([one.evaluations["cost"] for one in runs]),
+        "judged_theta": _padded([one.evaluations["theta"] for one in runs]),
+        "states": _padded([one.states for one in runs]),
+        BITS: np.diff(_padded(thetas).view(np.int32), axis=1, prepend=np.int32(0)),
+    }
+
+
+def _padded(columns: list[Column]) -> Column:
+    longest = max(map(len, columns))
+    result = np.full((len(columns), longest, *columns[0].shape[1:]), np.nan, np.float32)
+    for into, column in zip(result, columns, strict=True):
+        into[: len(column)] = column
+    return result

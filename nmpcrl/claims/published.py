@@ -3,7 +3,7 @@
 - `runs.csv`: one row a run, `rows.row`, with its part of the study, its key and its failure mode;
 - `runs.npz`: the arrays that figures need, in the same order: training cost by episode, cost and
   theta of the rollouts without noise, the states of the last one, and theta after every episode of
-  the runs that a reader can follow (see `thetas`);
+  runs in `FOLLOWED` (the differences of its bits along the episodes, which compress better);
 - `searches.csv`: the best theta that `analysis.search` finds in each layout;
 - `timings.csv`: of `time_learners`, for the verdicts on time.
 
@@ -13,8 +13,8 @@ The verdicts are computed from these when they are read.
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache, cached_property
+from itertools import compress
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,25 +23,26 @@ import pandas as pd
 from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, cost_ratios, experiment_of, row
 from nmpcrl.analysis.search import Found, Search
 from nmpcrl.analysis.summary import Outline, RunSummary
-from nmpcrl.claims import assumptions, thetas
+from nmpcrl.claims import assumptions
 from nmpcrl.claims.assumptions import Measured
-from nmpcrl.claims.failure_modes import FAILURE_MODE, failure_mode, failure_modes, went_wrong
+from nmpcrl.claims.failure_modes import FAILURE_MODE, WELL, failure_modes
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import CLAIMS, WIDER_CLAIMS, WIDER_THAN
 from nmpcrl.claims.rule import Claim, Observations
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.study import design
 from nmpcrl.study import published as store
-from nmpcrl.study.experiment import Experiment, frozen_arm
-from nmpcrl.study.provenance import made_here, summary_key
-from nmpcrl.study.published import Damaged, Unpublishable
-from nmpcrl.study.published import folder as place
+from nmpcrl.study.experiment import Experiment
+from nmpcrl.study.provenance import summary_key
+from nmpcrl.study.published import Damaged as Damaged
+from nmpcrl.study.published import folder as folder
 from nmpcrl.study.records import Column
-
-__all__ = ["Damaged", "Published", "Unpublishable", "extend", "load", "place", "publish"]
+from nmpcrl.study.store import Runs
 
 RUNS, SEARCHES, TIMINGS = "runs", "searches", "timings"
-COLUMNS = (*FIELDS, *OUTCOME, "variant", "key", *FAILURE_MODE)
+COLUMNS = (*FIELDS, *OUTCOME, "variant", "key", *FAILURE_MODE)  # of `runs.csv`
+BITS = "theta_bits"
+FOLLOWED = (design.MAIN_TABLE, "controls")  # parts of the study; the variants change one thing
 AUDITED = Experiment("GES")  # the run in which the assumptions of C8 are measured
 
 WIDER = {narrow: wider for wider, narrow in WIDER_THAN.items()}
@@ -53,33 +54,108 @@ EVERY: dict[str, Claim] = {  # in the order of the verdicts
 
 
 @dataclass(frozen=True, eq=False)
-class Published:
-    """The published study; `thetas` says which runs have theta after every episode."""
+class Evidence:
+    """Runs and their summaries, in the same order."""
 
-    summaries: Mapping[Experiment, Outline] = field(default_factory=dict)  # single precision
-    variants: Mapping[Experiment, str] = field(default_factory=dict)  # the part each belongs to
-    rows: Mapping[Experiment, dict[str, Any]] = field(default_factory=dict)  # of `runs.csv`
-    timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
-    about: Mapping[str, Any] = field(default_factory=dict)  # the manifest's entry of the runs
-    searches: Mapping[Search, Found] = field(default_factory=dict)
-    timed: Mapping[str, Any] = field(default_factory=dict)  # date, machine and so on of `timings`
+    summaries: Runs[Outline] = field(default_factory=lambda: Runs({}))
+    runs: pd.DataFrame = field(  # `COLUMNS`, with `cost_ratio` as in `rows.table`
+        default_factory=lambda: pd.DataFrame(columns=[*COLUMNS, "source", "cost_ratio"])
+    )
 
     @cached_property
-    def table(self) -> pd.DataFrame:
-        """All rows, with `cost_ratio` as `rows.table` has it."""
-        ratios = [*cost_ratios(self.rows).values()]
-        return pd.DataFrame([*self.rows.values()]).assign(cost_ratio=ratios)
+    def rows(self) -> dict[Experiment, dict[str, Any]]:
+        """The row of each run."""
+        return dict(zip(self.summaries, self.runs.to_dict("records"), strict=True))
+
+    @property
+    def variants(self) -> dict[Experiment, str]:
+        """The part of the study that each run belongs to."""
+        return dict(zip(self.summaries, self.runs.variant, strict=True))
 
     @property
     def paths(self) -> dict[Experiment, Column]:
         """States of each run's last rollout, as `rule.Observations` takes them."""
         return {e: one.states for e, one in self.summaries.items()}
 
+    @cached_property
+    def main(self) -> "Evidence":
+        """The runs of the main table alone."""
+        return self.where(self.runs.variant == design.MAIN_TABLE)
+
+    def where(self, holds: Iterable[bool]) -> "Evidence":
+        """The runs with a true value in `holds`."""
+        return self.among(compress(self.summaries, holds))
+
+    def among(self, experiments: Iterable[Experiment]) -> "Evidence":
+        """These runs alone, in this order."""
+        at, chosen = {e: i for i, e in enumerate(self.summaries)}, [*experiments]
+        runs = self.runs.iloc[[at[e] for e in chosen]].reset_index(drop=True)
+        return Evidence(Runs({e: self.summaries[e] for e in chosen}), runs)
+
+    def joined(
+        self, fresh: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
+    ) -> "Evidence":
+        """These runs and fresh ones, whose frozen arms are among both.
+
+        Args:
+            fresh: runs that were trained here; they replace runs of the same name.
+            variants: the part of the study that each belongs to.
+        """
+        if not fresh:
+            return self
+        every: dict[Experiment, Outline] = {**self.summaries, **fresh}
+        made = {
+            e: row(one) | {"variant": variants[e], "key": summary_key(e), "source": "fresh"}
+            for e, one in fresh.items()
+        }
+        ratios = cost_ratios(self.rows | made)
+        new = pd.DataFrame([one | {"cost_ratio": ratios[e]} for e, one in made.items()])
+        new = new.join(failure_modes(fresh, new, every))
+        rows = self.rows | dict(zip(fresh, new.to_dict("records"), strict=True))
+        return Evidence(
+            Runs(every),
+            pd.DataFrame([one | {"cost_ratio": ratios[e]} for e, one in rows.items()]),
+        )
+
     @property
-    def main(self) -> pd.DataFrame:
-        """The rows of the main table."""
-        parts = self.variants.items()
-        return pd.DataFrame([self.rows[e] for e, part in parts if part == design.MAIN_TABLE])
+    def mark(self) -> str:
+        """How many runs were trained here and how many are published, for a caption."""
+        fresh = int((self.runs.source == "fresh").sum())
+        counts = {"trained for this page": fresh, "published": len(self.runs) - fresh}
+        parts = [f"{count} runs {where}" for where, count in counts.items() if count]
+        return ", ".join(parts) or "no runs"
+
+    @property
+    def origin(self) -> str:
+        """The origin, learners, layouts and readings of the runs, for numbers on pages."""
+        if self.is_published:
+            return "the published main table"
+        learners, layouts, decays = (
+            ", ".join(self.runs[name].unique()) for name in ("learner", "layout", "decay")
+        )
+        return f"{self.mark}, of {learners}; layouts {layouts}; noise per {decays}"
+
+    @property
+    def is_published(self) -> bool:
+        """Whether these runs are the complete published main table."""
+        fresh = (self.runs.source == "fresh").any()
+        return not fresh and {*self.summaries} == {*load().main.summaries}
+
+    @property
+    def wrong(self) -> pd.DataFrame:
+        """The runs that went wrong; `run` is each one's experiment."""
+        runs = self.runs.assign(run=list(self.summaries))
+        return runs[~runs.mechanism.isin(("", WELL))]
+
+
+@dataclass(frozen=True, eq=False)
+class Published(Evidence):
+    """The published study; numbers by episode are in single precision."""
+
+    timings: pd.DataFrame = field(default_factory=pd.DataFrame)  # of `time_learners`
+    about: Mapping[str, Any] = field(default_factory=dict)  # the manifest's entry of the runs
+    searches: Mapping[Search, Found] = field(default_factory=dict)
+    timed: Mapping[str, Any] = field(default_factory=dict)  # date, machine and so on of `timings`
 
     @property
     def batches(self) -> tuple[Mapping[str, Any], ...]:
@@ -94,7 +170,7 @@ class Published:
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
         """On the paper's claims, each followed by its wider one, and on our own."""
-        return tuple(map(self.verdict, EVERY)) if self.rows else ()
+        return tuple(map(self.verdict, EVERY)) if len(self.runs) else ()
 
     @cache  # noqa: B019 - one study a process
     def verdict(self, claim: str) -> Verdict:
@@ -103,13 +179,13 @@ class Published:
 
     @cached_property
     def _main(self) -> Observations:
-        runs, found = self.table, [one["audit"] for one in self.batches if "audit" in one]
+        found = [one["audit"] for one in self.batches if "audit" in one]
         made = assumptions.audit(AUDITED, Measured(**found[0])) if found else ()
-        return Observations(runs[runs.variant == design.MAIN_TABLE], self.paths, self.timings, made)
+        return Observations(self.main.runs, self.paths, self.timings, made)
 
     @cached_property
     def _added(self) -> Observations:
-        return Observations(self.table[self.table.variant.isin(thetas.FOLLOWED)])
+        return Observations(self.runs[self.runs.variant.isin(FOLLOWED)])
 
 
 def load() -> Published:
@@ -118,152 +194,48 @@ def load() -> Published:
     Raises:
         Damaged: a file is missing, or is not the file that was written.
     """
-    return _load(place())
+    return _load(folder())
 
 
 @cache
-def _load(folder: Path) -> Published:
-    about, runs = store.about(RUNS, folder), store.read(RUNS, folder).to_dict("records")
-    rows = {
-        experiment_of(one): {name: one.get(name, OLDER.get(name, np.nan)) for name in COLUMNS}
-        for one in runs
+def _load(place: Path) -> Published:
+    runs, curves = store.read(RUNS, place), store.arrays(RUNS, place)
+    runs = runs.assign(**{name: OLDER[name] for name in FIELDS if name not in runs})
+    curves["theta"] = np.cumsum(curves[BITS], axis=1, dtype=np.int32).view(np.float32)
+    rows = {experiment_of(one): one for one in runs.to_dict("records")}
+    outlines = {
+        e: _outline(e, one, {name: column[i] for name, column in curves.items()})
+        for i, (e, one) in enumerate(rows.items())
     }
-    curves = store.arrays(RUNS, folder)
-    followed = thetas.unpacked(curves)
-    timed = store.about(TIMINGS, folder).get("batches", [{}])[-1]
-    searches = {
-        Search(one.layout, one.seed, one.budget): Found(
-            tuple(one.theta), one.made, tuple(one.rollouts), tuple(one.best)
-        )
-        for one in _table(SEARCHES, folder).itertuples()
-    }
+    ratios = [*cost_ratios(rows).values()]
     return Published(
-        {e: _outline_of(one, curves, i, followed) for i, (e, one) in enumerate(rows.items())},
-        {e: one["variant"] for e, one in rows.items()},
-        rows,
-        _table(TIMINGS, folder),
-        about,
-        searches,
-        timed,
+        Runs(outlines),
+        runs.reindex(columns=COLUMNS).assign(source="published", cost_ratio=ratios),
+        _table(TIMINGS, place),
+        store.about(RUNS, place),
+        dict(map(_search, _table(SEARCHES, place).itertuples())),
+        store.about(TIMINGS, place).get("batches", [{}])[-1],
     )
 
 
-def _table(name: str, folder: Path) -> pd.DataFrame:
+def _table(name: str, place: Path) -> pd.DataFrame:
     """A published table; empty if none is published."""
-    return store.read(name, folder) if store.about(name, folder) else pd.DataFrame()
+    return store.read(name, place) if store.about(name, place) else pd.DataFrame()
 
 
-def publish(
-    summaries: Mapping[Experiment, RunSummary],
-    variants: Mapping[Experiment, str],
-    timings: pd.DataFrame | None = None,
-    searches: Mapping[Search, Found] = MappingProxyType({}),
-    audit: Measured | None = None,
-) -> Path:
-    """Publish the whole study anew, in the folder that is returned.
-
-    Args:
-        summaries: the runs.
-        variants: the part of the study of each run.
-        timings: of `time_learners`.
-        searches: for the best theta.
-        audit: of `AUDITED`.
-    """
-    labels = {e: {"variant": variants[e], "key": summary_key(e)} for e in summaries}
-    runs = pd.DataFrame([row(one) | labels[e] for e, one in summaries.items()])
-    runs = runs.join(failure_modes(summaries))
-    arrays = _curves(summaries.values()) | thetas.packed(summaries, variants)
-    measured = {"audit": asdict(audit)} if audit else {}
-    store.write(RUNS, runs, arrays, batch=_batch(runs) | measured, anew=True)
-    if timings is not None:
-        republish(timings)
-    if searches:
-        found = pd.DataFrame([asdict(one) | asdict(result) for one, result in searches.items()])
-        store.write(SEARCHES, found, batch=made_here(), anew=True)
-    _load.cache_clear()
-    return place()
+def _search(row: Any) -> tuple[Search, Found]:
+    found = Found(tuple(row.theta), row.made, tuple(row.rollouts), tuple(row.best))
+    return Search(row.layout, row.seed, row.budget), found
 
 
-def republish(timings: pd.DataFrame) -> Path:
-    """Replace the published times by times of `time_learners` that were taken here."""
-    path = store.write(TIMINGS, timings, batch=made_here(), anew=True)
-    _load.cache_clear()
-    return path.parent
-
-
-def extend(summaries: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]) -> Path:
-    """Publish further runs beside the published ones; arguments as for `publish`.
-
-    Raises:
-        Damaged: a file is missing, or is not the file that was written.
-        Unpublishable: a run is published already, or its frozen arm is not published, or its part
-            is published with the complete study only.
-    """
-    found, before = load(), store.arrays(RUNS)
-    runs = pd.DataFrame([_row_beside(found, e, one, variants[e]) for e, one in summaries.items()])
-    table = pd.DataFrame([*found.rows.values(), *runs.to_dict("records")])
-    curves = before | _curves(summaries.values(), before)
-    store.write(RUNS, table, curves, batch=_batch(runs))
-    _load.cache_clear()
-    return place()
-
-
-def _batch(runs: pd.DataFrame) -> dict[str, Any]:
-    """Where and how rows were made, how many of each part, and in how many hours of one core."""
-    counts = runs.variant.value_counts(sort=False).to_dict()
-    return made_here() | {"runs": counts, "hours": float(runs.seconds.sum() / 3600)}
-
-
-def _row_beside(found: Published, e: Experiment, one: RunSummary, part: str) -> dict[str, Any]:
-    """The row of a further run, with its failure mode beside the published frozen arm."""
-    arm = frozen_arm(e)
-    if part in thetas.FOLLOWED:
-        raise Unpublishable(f"the part {part!r} is published with the complete study only")
-    if e in found.rows:
-        raise Unpublishable(f"{e} is published already, in the part {found.variants[e]!r}")
-    if arm not in found.rows:
-        raise Unpublishable(f"the frozen arm of {e} is not published, so it has nothing beside it")
-    made = row(one)
-    ratio = made["training_cost"] / found.rows[arm]["training_cost"]
-    (wrong,) = went_wrong(pd.DataFrame([made | {"cost_ratio": ratio}]))
-    mode = failure_mode(one, wrong, found.summaries[arm].states)
-    return made | {"variant": part, "key": summary_key(e)} | mode
-
-
-def _curves(
-    summaries: Iterable[RunSummary], before: Mapping[str, Column] = MappingProxyType({})
-) -> dict[str, Column]:
-    """Columns of all runs below those of earlier runs, padded with nan; shape (runs, ...)."""
-    made = [*summaries]
-    columns = {
-        "cost": [one.episodes["cost"] for one in made],
-        "judged_after": [one.evaluations["episode"] for one in made],
-        "judged_cost": [one.evaluations["cost"] for one in made],
-        "judged_theta": [one.evaluations["theta"] for one in made],
-        "states": [one.states for one in made],
-    }
-    return {name: _padded([*before.get(name, ()), *new]) for name, new in columns.items()}
-
-
-def _padded(columns: list[Column]) -> Column:
-    longest = max(map(len, columns))
-    result = np.full((len(columns), longest, *columns[0].shape[1:]), np.nan, np.float32)
-    for into, column in zip(result, columns, strict=True):
-        into[: len(column)] = column
-    return result
-
-
-def _outline_of(
-    row: dict[str, Any], curves: Mapping[str, Column], i: int, followed: Mapping[int, Column]
-) -> Outline:
-    experiment, judged = asdict(experiment_of(row)), np.isfinite(curves["judged_after"][i])
-    known = {"cost": curves["cost"][i]} | ({"theta": followed[i]} if i in followed else {})
+def _outline(e: Experiment, row: Mapping[str, Any], curves: Mapping[str, Column]) -> Outline:
+    judged = np.isfinite(curves["judged_after"])
+    known = ["cost", "theta"] if np.isfinite(curves["theta"]).any() else ["cost"]
     evaluations = {
-        "episode": curves["judged_after"][i][judged].astype(int),
-        "theta": curves["judged_theta"][i][judged],
-        "cost": curves["judged_cost"][i][judged],
+        "episode": curves["judged_after"][judged].astype(int),
+        "theta": curves["judged_theta"][judged],
+        "cost": curves["judged_cost"][judged],
     }
     facts = {"stopped": row["stopped"], "seconds": row["seconds"]}
-    episodes = {name: column[: experiment["episodes"]] for name, column in known.items()}
-    states = curves["states"][i][: experiment["steps"]]
-    return Outline(experiment, episodes, evaluations, states, None, facts)
+    episodes = {name: curves[name][: e.episodes] for name in known}
+    return Outline(asdict(e), episodes, evaluations, curves["states"][: e.steps], None, facts)

@@ -21,10 +21,10 @@ import pandas as pd
 from nmpcrl.analysis.rows import FIELDS, THETA, row, table
 from nmpcrl.analysis.summaries import SUMMARIES, make
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.claims import rule
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import BY_RUNS, BY_TIME, WIDER_CLAIMS
 from nmpcrl.claims.published import Published
+from nmpcrl.claims.rule import judge
 from nmpcrl.claims.verdict import Verdict, differ
 from nmpcrl.study import design, lock, provenance
 from nmpcrl.study.experiment import Experiment
@@ -35,6 +35,7 @@ from nmpcrl.study.refusal import Refusal
 from nmpcrl.study.setup import compile_ahead
 
 Row = Mapping[str, Any]
+Interval = tuple[float, float] | None
 Pairs = tuple[tuple[Verdict, Verdict], ...]  # found here, published
 GROUP = [name for name in FIELDS if name != "seed"]  # fields that runs of a range have in common
 CELL = ["learner", "layout", "decay"]  # columns that name a group in the table of `compare`
@@ -57,15 +58,11 @@ def compare(fresh: Mapping[Experiment, RunSummary], published: Published) -> pd.
 
 def comparable(runs: Iterable[Experiment], published: Published) -> set[Experiment]:
     """The runs that were published with this code, these versions and on this machine."""
-    here = {"machine": fingerprint(), "versions": provenance.environment()}
-    parts = {
-        part
-        for batch in published.batches
-        for part in batch.get("runs", {})
-        if all(batch.get(name) == value for name, value in here.items())
-    }
-    found = [e for e in runs if published.variants.get(e) in parts]
-    return {e for e in found if published.rows[e]["key"] == provenance.summary_key(e)}
+    here = fingerprint(), provenance.environment()
+    batches = (one for one in published.batches if (one["machine"], one["versions"]) == here)
+    parts = {part for batch in batches for part in batch["runs"]}
+    rows = {e: one for e in runs if (one := published.rows.get(e)) and one["variant"] in parts}
+    return {e for e, one in rows.items() if one["key"] == provenance.summary_key(e)}
 
 
 def unequal(e: Experiment, here: Row, there: Row) -> tuple[Any, ...] | None:
@@ -78,11 +75,9 @@ def unequal(e: Experiment, here: Row, there: Row) -> tuple[Any, ...] | None:
 
 def _out_of_range(rows: list[dict[str, Any]], published: Published) -> list[tuple[Any, ...]]:
     """The rows of `compare` by the rule for another machine."""
-    if not rows:
-        return []
     wrong: list[tuple[Any, ...]] = []
-    known = dict(list(pd.DataFrame(list(published.rows.values())).groupby(GROUP)))
-    for name, group in pd.DataFrame(rows).groupby(GROUP):
+    known = dict(iter(published.runs.groupby(GROUP)))
+    for name, group in pd.DataFrame(rows).groupby(GROUP) if rows else ():
         there, cell = known[name], tuple(group[CELL].iloc[0])
         start = float(there.initial_cost.iloc[0])
         for seed, here in zip(group.seed, group.initial_cost, strict=True):
@@ -117,13 +112,12 @@ def contradictions(found: Iterable[Verdict], known: Iterable[Verdict]) -> Pairs:
     return tuple(
         (one, other)
         for one, other in pairs
-        if differ(one.outcome, other.outcome)
-        and not (one.interval and other.interval and _overlap(one.interval, other.interval))
+        if differ(one.outcome, other.outcome) and not _overlap(one.interval, other.interval)
     )
 
 
-def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    return one[0] <= other[1] and other[0] <= one[1]
+def _overlap(one: Interval, other: Interval) -> bool:
+    return bool(one and other and one[0] <= other[1] and other[0] <= one[1])
 
 
 def of_runs(fresh: Mapping[Experiment, RunSummary], published: Published) -> Pairs:
@@ -139,7 +133,7 @@ def of_times(timings: pd.DataFrame, published: Published) -> Pairs:
     """The contradictions with times taken here; none if another machine took the published ones."""
     if published.timed.get("machine") != fingerprint():
         return ()
-    here, there = (rule.judge(BY_TIME, timings=one) for one in (timings, published.timings))
+    here, there = (judge(BY_TIME, timings=one) for one in (timings, published.timings))
     return contradictions(here, there)
 
 
@@ -147,16 +141,18 @@ def _verdicts(
     fresh: Mapping[Experiment, RunSummary], published: Published
 ) -> tuple[tuple[Verdict, ...], tuple[Verdict, ...]]:
     """The verdicts on runs made here, and on published runs of the same layouts and readings."""
-    plain = (Experiment(e.learner, layout=e.layout, decay=e.decay, seed=e.seed) for e in fresh)
-    mine = {e: one for (e, one), other in zip(fresh.items(), plain, strict=True) if e == other}
-    cells, parts = {(e.layout, e.decay) for e in mine}, published.variants.items()
-    shared = [part == design.MAIN_TABLE and (e.layout, e.decay) in cells for e, part in parts]
-    if not any(shared):
+    mine = {
+        e: one
+        for e, one in fresh.items()
+        if e == Experiment(e.learner, layout=e.layout, decay=e.decay, seed=e.seed)
+    }
+    cells, main = {(e.layout, e.decay) for e in mine}, published.main
+    there = main.where([(e.layout, e.decay) in cells for e in main.summaries])
+    if not there.summaries:
         return (), ()
-    here, there = table(mine), published.table[shared]
     paths = {e: one.states for e, one in mine.items()}
     claims = BY_RUNS | WIDER_CLAIMS | OWN_CLAIMS
-    return rule.judge(claims, here, paths), rule.judge(claims, there, published.paths)
+    return judge(claims, table(mine), paths), judge(claims, there.runs, there.paths)
 
 
 @dataclass(frozen=True)
@@ -194,10 +190,10 @@ class Relocked(NamedTuple):
     stored: int  # runs with the bits of those that locked code stored here
 
 
-def sample(known: Published, count: int) -> tuple[Experiment, ...]:
-    """Published runs, spread over the parts of the study and in each part over its learners."""
+def sample(variants: Mapping[Experiment, str], count: int) -> tuple[Experiment, ...]:
+    """Some of these runs, spread over the parts of the study and in each part over its learners."""
     parts: dict[str, dict[str, list[Experiment]]] = {}
-    for experiment, part in known.variants.items():
+    for experiment, part in variants.items():
         parts.setdefault(part, {}).setdefault(experiment.learner, []).append(experiment)
     ordered = _interleaved([_interleaved(learners.values()) for learners in parts.values()])
     if count >= len(parts):
@@ -220,7 +216,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
         CannotRelock: a bit has changed, or a run has nothing to be compared with.
         Failed: a run failed.
     """
-    drawn = sample(known, count)
+    drawn = sample(known.variants, count)
     exact = comparable(drawn, known)
     before: dict[Experiment, Row] = {e: known.rows[e] for e in exact}
     before |= {e: row(one) for e in drawn if e not in exact and (one := _stored_by_lock(e))}

@@ -1,7 +1,5 @@
 """`nmpcrl verify`: compares the runs of this machine with the published ones."""
 
-from dataclasses import replace
-
 import click
 
 from nmpcrl.commands.options import WORKERS
@@ -34,7 +32,7 @@ def verify(sample: int, relock: bool, workers: int | None) -> None:
     wanted = {e for e in known.rows if summaries.SUMMARIES.path_of(e).exists()}
     if sample:
         rest = {e: part for e, part in known.variants.items() if e not in wanted}
-        wanted |= {*reproduce.sample(replace(known, variants=rest), sample)}
+        wanted |= {*reproduce.sample(rest, sample)}
     if not wanted:
         raise click.ClickException(
             "no run of the study was trained here; --sample 5 trains five for the comparison"

@@ -24,8 +24,6 @@ from collections.abc import Iterator
 from math import ceil, isfinite
 from typing import Any
 
-import pandas as pd
-
 from nmpcrl.analysis.rows import experiment_of
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.failure_modes import Mechanism
@@ -148,10 +146,9 @@ def _pairs(
     study: Published, wrong: str, well: str
 ) -> Iterator[tuple[Row, Row, tuple[float, float]]]:
     """Runs of one seed, of which one went wrong, where this is most common; and both shares."""
-    runs = pd.DataFrame(study.main, columns=list(study.main) or ["learner", "layout", "decay"])
     cells = {
         cell: tuple(here[here.learner == name] for name in (wrong, well))
-        for cell, here in runs.groupby(["layout", "decay"])
+        for cell, here in study.main.runs.groupby(["layout", "decay"])
     }
     shares = {cell: tuple((one.wrong != "").mean() for one in two) for cell, two in cells.items()}
     apart = {cell: bad - good for cell, (bad, good) in shares.items() if bad > good}

@@ -109,7 +109,7 @@ def asides(found: Published) -> dict[str, str]:
     """What two verdicts rest on besides: C3 with slower solves, and C7's weaker question."""
     if not found.rows:
         return {}
-    kept = kept_without_noise(found.main, BY_RUNS["C7"].learners).kept
+    kept = kept_without_noise(found.main.runs, BY_RUNS["C7"].learners).kept
     slow, slowest = ratios_at_paper_speed(found.timings)
     return {
         "C3": f", and {slow:.2f} to {slowest:.2f} at the paper's time of a solve",

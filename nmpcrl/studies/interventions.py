@@ -51,7 +51,7 @@ ARMS = {  # the intervention, and what is added to theta_init
 def stopped(part: str) -> list[tuple[str, int]]:
     """Layout and k of each stopped run, in the order in which they are made again."""
     if part == "six":
-        six = _shuffled(_stopped(published.load().main))
+        six = _shuffled(_stopped(published.load().main.runs))
         return [*zip(six.layout, six.seed.tolist(), strict=True)]
     drawn = _stopped(population.load().main)
     sample = _shuffled(drawn.drop_duplicates("layout"))[:SAMPLE]

@@ -189,7 +189,7 @@ class Drawn:
         A learner that a variant does not change has its runs of the main table in it.
         """
         study = six.load()
-        named, varied = study.table, study.table.variant != MAIN_TABLE
+        named, varied = study.runs, study.runs.variant != MAIN_TABLE
         variants = named.variant[varied & named.learner.isin(PAPER)].unique()
         settings = [
             (self.main, self.paths, MAIN_TABLE),

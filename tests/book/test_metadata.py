@@ -126,4 +126,4 @@ def test_no_placeholder_is_left():
 
 def test_the_data_are_where_the_study_is_published(monkeypatch):
     monkeypatch.delenv("NMPCRL_PUBLISHED", raising=False)
-    assert published.place() == ROOT / group("data")["url"]
+    assert published.folder() == ROOT / group("data")["url"]

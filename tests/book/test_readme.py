@@ -90,7 +90,7 @@ def test_c1_and_c3_are_said_with_both_of_their_intervals():
 
 def test_c7_is_said_with_both_of_its_questions():
     known = published.load()
-    kept = kept_without_noise(known.main, BY_RUNS["C7"].learners).kept
+    kept = kept_without_noise(known.main.runs, BY_RUNS["C7"].learners).kept
     always, of = known.verdict("C7").counts["all"]
     said = (
         f"{kept.sum()} of {of} RDES runs keep the constraints without noise; in training, too,"

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import thresholds
 from nmpcrl.claims.failure_modes import (
@@ -170,11 +171,12 @@ def test_every_run_that_learned_has_an_ending_and_one_that_went_wrong_a_mechanis
         ),
         *[(made("frozen", GOOD, seed=seed), ["", "", "", None]) for seed in range(3)],
     ]
-    frame = failure_modes({run.name: run for run, _ in rows}).astype(object)
+    runs = {run.name: run for run, _ in rows}
+    frame = failure_modes(runs, table(runs), runs).astype(object)
     assert frame.where(frame.notna(), None).to_numpy().tolist() == [mode for _, mode in rows]
     run, _ = rows[0]
     with pytest.raises(KeyError) as error:
-        failure_modes({run.name: run})
+        failure_modes({run.name: run}, table({run.name: run}), {run.name: run})
     assert error.value.args == (frozen_arm(run.name),)
 
 

@@ -1,7 +1,5 @@
 """The finding, against a second count by the geometry and the rollouts themselves."""
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -18,7 +16,7 @@ def found() -> Finding:
 
 
 def runs(*learners: str) -> pd.DataFrame:
-    main = published.load().main
+    main = published.load().main.runs
     return main[main.learner.isin(learners)].assign(
         saved=lambda r: 1 - r.final_cost / r.initial_cost
     )
@@ -73,4 +71,4 @@ def test_rdes_is_counted_in_each_reading_of_the_decay(found, decay, stopped, ear
 
 
 def test_without_published_runs_there_is_no_finding():
-    assert finding(replace(published.load(), rows={})) is None
+    assert finding(published.Published()) is None

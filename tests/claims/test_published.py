@@ -12,16 +12,17 @@ from quiet_rows import timings
 from nmpcrl.analysis.rows import row
 from nmpcrl.analysis.search import Found, Search
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.claims import publish, published, thetas
+from nmpcrl.claims import publish, published
 from nmpcrl.claims.assumptions import Measured
 from nmpcrl.claims.paper_claims import WIDER_THAN
-from nmpcrl.claims.published import Damaged, Published, Unpublishable, load
+from nmpcrl.claims.published import FOLLOWED, Damaged, Published, load
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.study import Experiment, paper, run, sweep
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import EPOCHS, environment, summary_key
+from nmpcrl.study.published import Unpublishable
 
 SMALL = {"episodes": 4, "steps": 6, "evaluate_every": 2}
 RUNS = (
@@ -56,8 +57,14 @@ def folder(tmp_path, monkeypatch) -> Path:
 
 @pytest.fixture
 def known(summaries, folder) -> Published:
-    published.publish(summaries, LABELS, TIMES, SEARCHES, AUDIT)
+    publish_all(summaries)
     return load()
+
+
+def publish_all(summaries) -> None:
+    publish.publish_runs(summaries, LABELS, anew=True, audit=AUDIT)
+    publish.publish_times(TIMES)
+    publish.publish_searches(SEARCHES)
 
 
 def forget() -> None:
@@ -73,15 +80,14 @@ def test_rows_are_read_to_the_last_digit_and_in_order(known, summaries):
             np.testing.assert_equal(known.rows[e][name], value)
         assert (known.rows[e]["key"], known.variants[e]) == (summary_key(e), LABELS[e])
         assert (known.rows[e]["ending"] == "") == (e.learner == "frozen")
-    assert known.table.equals(load().table)
-    assert len(known.main) == sum(label == "main" for label in LABELS.values())
+    assert len(known.main.runs) == sum(label == "main" for label in LABELS.values())
 
 
 def test_curves_are_read_in_single_precision_and_in_their_own_length(known, summaries):
     for e, one in summaries.items():
         found = known.summaries[e]
         assert (found.name, found.facts["stopped"]) == (e, one.facts["stopped"])
-        followed = LABELS[e] in thetas.FOLLOWED
+        followed = LABELS[e] in FOLLOWED
         assert ("theta" in found.episodes) == followed
         pairs = [(found.states, one.states)]
         pairs += [(found.evaluations[k], one.evaluations[k]) for k in found.evaluations]
@@ -104,7 +110,7 @@ def test_searches_times_and_their_origin_are_read_as_they_were(known):
 
 
 def test_a_study_without_times_searches_and_followed_runs_is_read(summaries, folder):
-    published.publish(summaries, dict.fromkeys(summaries, "N = 2"))
+    publish.publish_runs(summaries, dict.fromkeys(summaries, "N = 2"), anew=True)
     found = load()
     assert (found.searches, dict(found.timed), len(found.timings)) == ({}, {}, 0)
     assert not any("theta" in one.episodes for one in found.summaries.values())
@@ -114,19 +120,12 @@ def test_a_study_without_times_searches_and_followed_runs_is_read(summaries, fol
 def test_the_same_content_gives_the_same_bytes_and_nothing_of_the_earlier(known, summaries, folder):
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     fewer = [RUNS[0], frozen_arm(RUNS[0])]
-    published.publish({e: summaries[e] for e in fewer}, LABELS)
+    publish.publish_runs({e: summaries[e] for e in fewer}, LABELS, anew=True)
     assert list(load().rows) == fewer
     shutil.rmtree(folder)
     forget()
-    published.publish(summaries, LABELS, TIMES, SEARCHES, AUDIT)
+    publish_all(summaries)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-
-
-def test_bytes_of_any_numbers_are_unpacked_bit_for_bit():
-    numbers = np.array([0.0, -0.0, 1.0, -1e-38, 3e38, np.inf, -np.inf, np.nan, 1e-45], np.float32)
-    planes = thetas.byte_planes(numbers)
-    assert planes.shape == (4, numbers.size)
-    assert thetas.numbers_of(planes).tobytes() == numbers.tobytes()
 
 
 FURTHER = Experiment("ES", alpha=2e-7, **SMALL)
@@ -134,7 +133,7 @@ FURTHER = Experiment("ES", alpha=2e-7, **SMALL)
 
 def test_further_runs_are_added_and_the_published_ones_stay(known, folder):
     made = summarise(run(FURTHER))
-    published.extend({FURTHER: made}, {FURTHER: "alpha x 2"})
+    publish.publish_runs({FURTHER: made}, {FURTHER: "alpha x 2"})
     forget()
     found = load()
     assert list(found.rows) == [*RUNS, FURTHER]
@@ -153,13 +152,12 @@ def test_further_runs_are_added_and_the_published_ones_stay(known, folder):
     [
         (RUNS[0], "N = 2", "is published already, in the part 'main'"),
         (replace(FURTHER, seed=7), "N = 2", "the frozen arm of ES .* is not published"),
-        (FURTHER, "controls", "'controls' is published with the complete study only"),
     ],
 )
 def test_runs_that_cannot_stand_beside_the_others_are_refused(known, experiment, part, refusal):
     made = summarise(run(experiment))
     with pytest.raises(Unpublishable, match=refusal):
-        published.extend({experiment: made}, {experiment: part})
+        publish.publish_runs({experiment: made}, {experiment: part})
     assert list(load().rows) == list(RUNS)
 
 
@@ -199,7 +197,7 @@ def test_times_are_published_if_they_decide_all_claims_about_time(
 
 def test_the_projects_own_study_is_judged_in_order(monkeypatch):
     monkeypatch.setenv("NMPCRL_PUBLISHED", "")
-    assert published.place().parts[-2:] == ("book", "published")
+    assert published.folder().parts[-2:] == ("book", "published")
     verdicts = published.load().verdicts
     claims = [one.claim for one in verdicts]
     for wider, narrow in WIDER_THAN.items():

@@ -5,13 +5,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from quiet_rows import timings
 
 from nmpcrl.analysis import summaries
-from nmpcrl.analysis.rows import cost_ratios, row
 from nmpcrl.claims import published, reproduce
-from nmpcrl.claims.published import Published
+from nmpcrl.claims.published import Evidence, Published
 from nmpcrl.claims.reproduce import (
     CannotRelock,
     agreement,
@@ -25,6 +25,7 @@ from nmpcrl.claims.reproduce import (
 )
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE, Outcome, Verdict
 from nmpcrl.study import Experiment, design, lock, provenance, sweep
+from nmpcrl.study.experiment import frozen_arm
 from nmpcrl.study.machine import fingerprint
 
 HERE = {"machine": fingerprint(), "versions": provenance.environment()}
@@ -33,11 +34,15 @@ ELSEWHERE = HERE | {"machine": fingerprint() | {"processor": "another"}}
 
 def published_of(found, made=HERE) -> Published:
     """Summaries as if they had been published."""
-    rows = {e: row(one) | {"key": provenance.summary_key(e)} for e, one in found.items()}
-    ratios = cost_ratios(rows)
-    rows = {e: one | {"cost_ratio": ratios[e]} for e, one in rows.items()}
-    about = {"batches": [made | {"runs": {design.MAIN_TABLE: len(rows)}}]}
-    return Published(found, dict.fromkeys(rows, design.MAIN_TABLE), rows, about=about)
+    runs = Evidence().joined(found, dict.fromkeys(found, design.MAIN_TABLE)).runs
+    about = {"batches": [made | {"runs": {design.MAIN_TABLE: len(runs)}}]}
+    return Published(found, runs, about=about)
+
+
+def with_part(known: Published, experiment: Experiment, part: str) -> Published:
+    """The same, with one run in another part."""
+    here = known.runs.variant.where([e != experiment for e in known.summaries], part)
+    return replace(known, runs=known.runs.assign(variant=here))
 
 
 @pytest.fixture
@@ -76,7 +81,7 @@ def test_elsewhere_the_last_bit_does_not_count(study, other):
     found = study()
     known = published_of(found, HERE | ({} if other == "key" else {other: {"python": "2.7"}}))
     if other == "key":
-        known = replace(known, rows={e: one | {"key": "0"} for e, one in known.rows.items()})
+        known = replace(known, runs=known.runs.assign(key="0"))
     assert compare({e: scaled(one, 1 + 1e-9) for e, one in found.items()}, known).empty
 
 
@@ -115,7 +120,8 @@ def test_runs_are_compared_with_runs_of_the_same_fields_alone(study):
     found, other = study(), Experiment(horizon=5)
     assert compare({other: found[Experiment()]}, published_of(found)).empty
     variant = scaled(replace(found[Experiment()], experiment=asdict(other)), 2.0)
-    known = published_of(found | {other: variant}, ELSEWHERE)
+    arm = {frozen_arm(other): found[frozen_arm(Experiment())]}
+    known = published_of(found | {other: variant} | arm, ELSEWHERE)
     assert compare({other: variant}, known).empty
     as_main = replace(found[Experiment()], experiment=asdict(other))
     assert "initial_cost" in set(compare({other: as_main}, known).what)
@@ -124,7 +130,7 @@ def test_runs_are_compared_with_runs_of_the_same_fields_alone(study):
 def test_a_batch_is_comparable_where_this_machine_made_it(study):
     known = published_of(study(), ELSEWHERE)
     more, *rest = known.rows
-    known = replace(known, variants=dict(known.variants) | {more: "alpha x 3"})
+    known = with_part(known, more, "alpha x 3")
     batches = (*known.batches, HERE | {"runs": {"alpha x 3": 1}})
     added = replace(known, about={"batches": batches})
     assert comparable([more, *rest], known) == set()
@@ -207,7 +213,7 @@ def test_published_runs_made_again_are_counted_by_how_equal_they_are(study):
         found
         | {first: scaled(moved(found[first]), 1 + 1e-9, 0), second: scaled(found[second], 2.0)}
     )
-    made = agreement(found, replace(known, variants=dict(known.variants) | {third: "N = 5"}))
+    made = agreement(found, with_part(known, third, "N = 5"))
     assert (made.runs, made.equal, made.close) == (len(found) - 1, len(found) - 3, 1)
     assert [one.claim for one in made.here] == [one.claim for one in made.there]
     assert agreement({}, Published()) == reproduce.Agreement(0, 0, 0, (), ())
@@ -217,17 +223,17 @@ SHORT = {"episodes": 2, "steps": 3, "evaluate_every": 1}
 MAIN = sweep(learner=("ES", "GES"), seed=(0, 1, 2), **SHORT)
 OTHER = sweep(learner="ES", horizon=5, seed=(0, 1), **SHORT)
 PARTS = dict.fromkeys(MAIN, "main") | dict.fromkeys(OTHER, "N = 5")
-KNOWN = Published(variants=PARTS)  # published by another machine
+KNOWN = Published(dict.fromkeys(PARTS), pd.DataFrame({"variant": PARTS.values()}))
 
 
 def test_a_sample_is_spread_over_parts_and_learners():
-    assert sample(KNOWN, 2) == (MAIN[0], OTHER[0])
-    four = sample(KNOWN, 4)
+    assert sample(PARTS, 2) == (MAIN[0], OTHER[0])
+    four = sample(PARTS, 4)
     assert {PARTS[e] for e in four[:2]} == {PARTS[e] for e in four[2:]} == {"main", "N = 5"}
     assert {e.learner for e in four if PARTS[e] == "main"} == {"ES", "GES"}
-    assert set(sample(KNOWN, 99)) == set(PARTS)
+    assert set(sample(PARTS, 99)) == set(PARTS)
     real = published.load()
-    drawn = sample(real, 60)
+    drawn = sample(real.variants, 60)
     assert len(set(drawn)) == 60
     assert {real.variants[e] for e in drawn} == set(real.variants.values())
 
@@ -253,7 +259,7 @@ def edit(monkeypatch, times=1.0, code="edited"):
 
 def train_here():
     with ThreadPoolExecutor(1) as executor:
-        summaries.fetch_summaries(sample(KNOWN, 4), executor=executor, progress=False)
+        summaries.fetch_summaries(sample(PARTS, 4), executor=executor, progress=False)
 
 
 def test_the_lock_is_written_where_no_bit_has_changed(locked, monkeypatch):

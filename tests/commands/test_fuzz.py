@@ -3,6 +3,7 @@
 import random
 
 import click
+import pandas as pd
 import pytest
 from raising import raising
 
@@ -37,7 +38,8 @@ def fast(command, monkeypatch, tmp_path):
     refuse = raising(click.ClickException("not here"))
     monkeypatch.setattr("nmpcrl.study.fetch", refuse)
     monkeypatch.setattr("nmpcrl.report.figures.runs.run.run_page", refuse)
-    monkeypatch.setattr(published, "load", lambda: published.Published(rows={SHORT: {}}))
+    known = published.Published({SHORT: None}, pd.DataFrame({"variant": ["main"]}))
+    monkeypatch.setattr(published, "load", lambda: known)
     monkeypatch.setattr(published.Published, "verdicts", ())
     monkeypatch.setattr(reproduce, "sample", lambda *_: [SHORT])
     for module, name in LONG:

@@ -86,7 +86,7 @@ changing = cache(lambda: worlds.WORLDS.table())
 again = cache(lambda: interventions.ends(interventions.INTERVENTIONS.table()))
 problems = cache(lambda: other_problems.runs(other_problems.OTHER_PROBLEMS.table()))
 every = cache(lambda: evidence.gather("published", variants=True))
-six_paths = cache(lambda: evidence.paths(every()))
+six_paths = cache(lambda: every().paths)
 
 
 def by_question(answers: Iterable[Any]) -> dict[str, Any]:
@@ -133,7 +133,7 @@ def thresholds_and_rule() -> Any:
 def other_borders() -> Any:
     main, known = every().main.runs, {}
     for name, claim in {**paper_claims.BY_RUNS, **own_claims.OWN_CLAIMS}.items():
-        runs = main if name in paper_claims.BY_RUNS else study().table
+        runs = main if name in paper_claims.BY_RUNS else study().runs
         if name not in paper_claims.BY_RUNS:
             runs = runs[runs.variant.isin([design.MAIN_TABLE, "controls"])]
         values = claim.measure(runs, six_paths())
@@ -158,7 +158,7 @@ def constraints_without_noise() -> Any:
 
 @entry("verdicts")
 def costs_less_than_GES() -> Any:
-    others, main = ("ES", "DES", "RDES", "TDC"), study().main
+    others, main = ("ES", "DES", "RDES", "TDC"), study().main.runs
     functions = (own_claims.costs_less, own_claims.costs_less_anew)
     return {name: [one(main, name, "GES") for one in functions] for name in others}
 
@@ -176,7 +176,7 @@ def readings_of_DES() -> Any:
 
 @entry("study")
 def failure_modes() -> Any:
-    runs = study().table
+    runs = study().runs
     cells = ["variant", "learner", "wrong", "mechanism", "ending"]
     return runs.groupby(cells, sort=False).size()
 
@@ -189,7 +189,7 @@ def runs_that_went_wrong() -> Any:
 
 @entry("study")
 def answers_of_thresholds() -> Any:
-    runs = study().table
+    runs = study().runs
     names = ("was_stopped", "worsens", "improves", "solved", "cost_reduction", "late_cost_range")
     return table(pd.DataFrame({name: getattr(thresholds, name)(runs) for name in names}))
 
@@ -201,7 +201,7 @@ def the_finding() -> Any:
 
 @entry("study")
 def middle_of_each_learner() -> Any:
-    runs = study().main
+    runs = study().main.runs
     left = runs.final_cost.where(runs.stopped == "finished", np.inf) / runs.initial_cost
     groups = runs.groupby("learner").groups.items()
     return {name: interquartile_mean(left[i], list(runs.layout[i])) for name, i in groups}
@@ -210,8 +210,8 @@ def middle_of_each_learner() -> Any:
 @entry("study")
 def share_of_the_possible() -> Any:
     gains = {search.layout: found.gain for search, found in study().searches.items()}
-    shares = thresholds.share_of_possible(study().main, gains)
-    return shares.groupby(study().main.learner).median()
+    shares = thresholds.share_of_possible(study().main.runs, gains)
+    return shares.groupby(study().main.runs.learner).median()
 
 
 @entry("study")
@@ -260,8 +260,8 @@ def shares() -> Any:
 
 @entry("population")
 def shares_in_A_to_F() -> Any:
-    main, names = study().main, list(population.EXPECTED)
-    runs = study().table[study().table.variant == design.MAIN_TABLE]
+    main, names = study().main.runs, list(population.EXPECTED)
+    runs = study().runs[study().runs.variant == design.MAIN_TABLE]
     assert len(main) == len(runs)
     return population.shares(population.held(runs, study().paths, names)).set_index("claim")
 
@@ -291,7 +291,7 @@ def other_answers() -> Any:
         "cliff": plain(by_question([named("cliff", population.cliff(raised()))]), ROLLOUT),
         "extrapolation": by_question(interventions.INTERVENTIONS.judge(again()).values()),
         "early overshoot in A to F": by_question(
-            [named("early overshoot", population.early_overshoot(study().main))]
+            [named("early overshoot", population.early_overshoot(study().main.runs))]
         ),
     }
 
@@ -580,7 +580,7 @@ def spread_of_solvers() -> Any:
 
 @entry("problems")
 def sweep_of_drawn_problems() -> Any:
-    return sweep.read(published.place() / "sweep.json").tally
+    return sweep.read(published.folder() / "sweep.json").tally
 
 
 # What is published, as it is loaded.
@@ -596,10 +596,10 @@ def _columns(rows: pd.DataFrame, names: str) -> pd.DataFrame:
 
 @entry("tables")
 def tables() -> Any:
-    times = problem_times.read(published.place() / problem_times.FILE)
+    times = problem_times.read(published.folder() / problem_times.FILE)
     known = {
-        "runs": study().table,
-        "runs of the main table": study().main,
+        "runs": study().runs.drop(columns="source"),
+        "runs of the main table": study().main.runs.drop(columns=["source", "cost_ratio"]),
         "timings": study().timings,
         "runs of chapters": every().runs,
         "drawn runs": drawn().runs,
@@ -652,7 +652,7 @@ def keys_of_runs() -> dict[Any, tuple[str, str]]:
 
 @entry("keys")
 def keys() -> Any:
-    parts, wanted = design.whole_study(), dict.fromkeys(reproduce.sample(study(), 60))
+    parts, wanted = design.whole_study(), dict.fromkeys(reproduce.sample(study().variants, 60))
     first = {part: e for e, part in reversed(parts.items())}
     wanted |= dict.fromkeys([*design.fresh(), *first.values()])
     known = keys_of_runs()

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from nmpcrl.claims import evidence
-from nmpcrl.claims.evidence import Evidence, paths
+from nmpcrl.claims.published import Evidence
 from nmpcrl.report.baselines import READINGS, baselines, conclusion, table
 
 
@@ -34,7 +34,7 @@ def test_the_four_readings_are_those_of_departure_i():
 
 def test_a_reading_with_which_des_does_not_diverge_changes_c1(study):
     found = study("late")
-    told = baselines(found.runs, paths(found))
+    told = baselines(found.runs, found.paths)
     (row,) = told.to_dict("records")
     assert (str(row["diverged"]), str(row["main"])) == ("0 of 16", "16 of 16")
     assert row["changes"]
@@ -45,20 +45,20 @@ def test_a_reading_with_which_des_does_not_diverge_changes_c1(study):
 
 def test_a_reading_that_diverges_alike_changes_nothing(study):
     found = study("lagged", stopped)
-    told = baselines(found.runs, paths(found))
+    told = baselines(found.runs, found.paths)
     assert told.p_diverged.item() == 1
     assert "another outcome with: none." in conclusion(told)
 
 
 def test_how_often_des_diverges_is_tested_on_its_own_and_not_by_the_p_of_the_claim():
     known = evidence.gather("published", variants=True)
-    told = baselines(known.runs, paths(known)).loc["averaged"]
+    told = baselines(known.runs, known.paths).loc["averaged"]
     assert (told.diverged, told.main, told.gained, told.lost) == ((15, 60), (29, 60), 3, 17)
     assert told.p_diverged == pytest.approx(0.0026, abs=1e-4)
 
 
 def test_what_was_not_run_is_not_told(made_up):
     found = made_up(stopped)
-    told = baselines(found.runs, paths(found))
+    told = baselines(found.runs, found.paths)
     assert told.empty
     assert conclusion(told) == "No other reading of the baseline was run."

@@ -66,8 +66,9 @@ def table(*rows: tuple[str, str, bool]) -> pd.DataFrame:
 
 
 def test_the_effort_names_runs_hours_machine_and_versions():
-    rows = {Experiment(seed=s): {} for s in range(1320)}
-    found = Published(rows=rows, about={"batches": [ABOUT]})
+    seeds = pd.DataFrame({"seed": range(1320)})
+    runs = {Experiment(seed=s): None for s in seeds.seed}
+    found = Published(runs, seeds, about={"batches": [ABOUT]})
     said = text.compute_effort(found)
     for part in ("1,320 runs of 300 episodes", "1,200 in", "60 with", "60 in 2 variants"):
         assert part in said

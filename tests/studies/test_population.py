@@ -158,7 +158,7 @@ def test_the_picture_is_sought_everywhere_with_the_claims_own_answers(drawn):
     assert {*there.setting} == {MAIN_TABLE, *VARIANTS} - {"controls"}
     assert (there.setting == MAIN_TABLE).sum() == 12
     assert not tried.duplicated(["setting", "layout", "decay"]).any()
-    main = named.table[named.table.variant == MAIN_TABLE]
+    main = named.runs[named.runs.variant == MAIN_TABLE]
     by_cell = tried.set_index(["setting", "layout", "decay"])
     for name in PICTURE:
         claim = BY_RUNS[name]

@@ -31,11 +31,10 @@ from driver.paper import markup
 from driver.paper.pdf import version
 from driver.project import ROOT, Failure, from_yaml, reported, shown
 from nmpcrl.claims import evidence, prespecified, published, robustness
-from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.finding import Finding, finding
 from nmpcrl.claims.own_claims import OWN_CLAIMS
 from nmpcrl.claims.paper_claims import CLAIMS
-from nmpcrl.claims.published import Published
+from nmpcrl.claims.published import Evidence, Published
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.report import drawn, halves, tables, text
 from nmpcrl.report import finding as said
@@ -93,7 +92,7 @@ def source() -> Source:
         [verdict for verdict in found.verdicts if verdict.claim in CLAIMS],
         [verdict for verdict in found.verdicts if verdict.claim in OWN_CLAIMS],
         whole,
-        robustness.variant_changes(whole.runs, evidence.paths(whole)),
+        robustness.variant_changes(whole.runs, whole.paths),
     )
 
 
@@ -136,7 +135,7 @@ def _sentences(given: Source) -> dict[str, str]:
 
 def _tables(given: Source) -> dict[str, Any]:
 
-    scope = tables.scope(given.found.main)
+    scope = tables.scope(given.found.main.runs)
     depends = text.depends_on(given.claims, given.changed)
     numbers = re.split(r"\s+\[[^]]+\]\(\S+\)\s*(?:- |$)|^- ", said.numbers(given.seen))[1:-1]
     asked = markup.rows(tables.claim_table(CLAIMS.values(), ""))

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 from nmpcrl.analysis.statistics import rate
 from nmpcrl.claims import rule
 from nmpcrl.claims.by_runs import Values
-from nmpcrl.claims.evidence import Evidence
+from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.report.figures.axes import below, jitter, logarithmic
 from nmpcrl.report.figures.style import INK, LIMIT, LOOKS, dots, headed, line, marked

@@ -15,8 +15,7 @@ from IPython.display import HTML
 
 from nmpcrl.analysis.summary import Outline
 from nmpcrl.claims import published
-from nmpcrl.claims.published import Published
-from nmpcrl.claims.thetas import FOLLOWED, byte_planes
+from nmpcrl.claims.published import FOLLOWED, Published
 from nmpcrl.control import Nmpc
 from nmpcrl.report.figures.style import DECAY_TITLES, LOOKS
 from nmpcrl.report.live import frame
@@ -91,6 +90,13 @@ def packed(
     planes = byte_planes(list(chosen.values())).tobytes()
     numbers = b64encode(gzip.compress(planes, mtime=0)).decode()
     return {"runs": list(chosen), "numbers": numbers}
+
+
+def byte_planes(numbers: list[Column]) -> Column:
+    """Single precision as differences of bits, the lowest bytes of all first; shape (4, count)."""
+    bits = np.ravel(numbers).astype("<f4").view("<u4")
+    steps = np.diff(bits, prepend=np.uint32(0))
+    return np.ascontiguousarray(steps.view(np.uint8).reshape(-1, 4).T)
 
 
 def _name(e: Experiment) -> str:

@@ -16,7 +16,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, StrMethodF
 
 from nmpcrl import Vector
 from nmpcrl.analysis.summary import Outline
-from nmpcrl.claims.evidence import Evidence
+from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.thresholds import divergence, instability
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
 from nmpcrl.report.figures.axes import label_panel, legend

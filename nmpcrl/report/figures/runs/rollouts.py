@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
 from nmpcrl.analysis.summary import Outline
-from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import ending
+from nmpcrl.claims.published import Evidence
 from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import draw_task, legend, map_grid
 from nmpcrl.report.figures.panels import bundle, part, sourced

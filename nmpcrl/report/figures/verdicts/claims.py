@@ -20,8 +20,8 @@ from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import Estimate, interquartile_mean
 from nmpcrl.bench.learners import ratio
 from nmpcrl.claims import paper_claims, thresholds
-from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.verdict import Assumption, Verdict
 from nmpcrl.report.figures.axes import below, jitter, label_panel, logarithmic
 from nmpcrl.report.figures.panels import part, shares, strips
@@ -238,7 +238,7 @@ def _measured(
     A share by which the cost is reduced may be minus infinity; what is left of the cost is not.
     """
     claim = BY_RUNS[verdict.claim]
-    values, border, label = claim.measure(found.runs, paths(found)), claim.threshold, claim.label
+    values, border, label = claim.measure(found.runs, found.paths), claim.threshold, claim.label
     if left:
         values, border, label = 1 - values, 1 - border, "noise-free cost, end / start"
     figure, (measured, panel) = _panels()
@@ -249,7 +249,7 @@ def _measured(
 
 def _pairs(drawn: Evidence) -> pd.DataFrame:
     """How far RDES and GES are apart in path and in cost, a row a layout, decay and seed."""
-    apart = paper_claims.policy_distances(drawn.runs, paths(drawn))
+    apart = paper_claims.policy_distances(drawn.runs, drawn.paths)
     return apart.assign(cost=apart.cost.mask(apart.failed, np.inf)).reset_index()
 
 

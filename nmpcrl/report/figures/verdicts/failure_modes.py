@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.failure_modes import WELL, Ending, Failure, Mechanism
+from nmpcrl.claims.published import Evidence
 from nmpcrl.report.figures.axes import stacked
 from nmpcrl.report.figures.style import (
     SUBTITLE,

@@ -16,8 +16,8 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.summary import Outline
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.by_runs import Values
-from nmpcrl.claims.evidence import Evidence
 from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.rule import NEARLY_ALL, NEARLY_NONE
 from nmpcrl.control import Task
 from nmpcrl.report.figures.axes import below, draw_task, map_grid, over_episodes, plain

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from nmpcrl.claims.evidence import paths
 from nmpcrl.claims.paper_claims import BY_RUNS
 from nmpcrl.claims.rule import judge
 from nmpcrl.report.figures import panels
@@ -120,7 +119,7 @@ def test_the_band_holds_the_middle_half_of_the_seeds(made_up):
 @pytest.mark.slow
 def test_every_layout_has_its_column_headed_by_its_verdict(made_up):
     found = made_up(des_fails)
-    (c1, *_) = judge(BY_RUNS, found.runs, paths(found))
+    (c1, *_) = judge(BY_RUNS, found.runs, found.paths)
     figure = learning_curves.by_layout(found, ("DES", "RDES"), c1)
     assert heads(figure) == ["A: yes", "D: no"]
     assert title(figure) == "Does C1 hold? yes in A; no in D"
@@ -130,7 +129,7 @@ def test_every_layout_has_its_column_headed_by_its_verdict(made_up):
 def test_learners_that_were_not_run_leave_their_panels_empty(made_up):
     found = made_up()
     only = found.where(found.runs.learner.isin(("GES", "frozen")))
-    (c1, *_) = judge(BY_RUNS, only.runs, paths(only))
+    (c1, *_) = judge(BY_RUNS, only.runs, only.paths)
     figure = learning_curves.by_layout(only, ("DES", "RDES"), c1)
     assert heads(figure) == ["A: open", "D: open"]
     assert title(learning_curves.figure_1(only, "A")).endswith("DES in 0 of 0, RDES in 0 of 0 runs")

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.statistics import Estimate, rate
 from nmpcrl.claims import thresholds
-from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import CLAIMS
+from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.rule import Observations
 from nmpcrl.claims.verdict import Assumption, Verdict
 from nmpcrl.report.figures.verdicts import claims as figures
@@ -57,7 +57,7 @@ def as_the_paper_says(experiment: Experiment) -> dict:
 
 
 def verdict(found: Evidence, claim: str) -> Verdict:
-    return CLAIMS[claim].judge(Observations(found.runs, paths(found)))
+    return CLAIMS[claim].judge(Observations(found.runs, found.paths))
 
 
 @pytest.fixture(scope="module")

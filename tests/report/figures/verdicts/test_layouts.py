@@ -11,8 +11,8 @@ from matplotlib.patches import Rectangle
 
 from nmpcrl.analysis.rows import table
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.claims.evidence import Evidence, paths
 from nmpcrl.claims.paper_claims import BY_RUNS
+from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.robustness import robustness_map
 from nmpcrl.report.figures import sheet
 from nmpcrl.report.figures.verdicts import layouts as figures
@@ -71,7 +71,7 @@ def study(episodes: int = paper.EPISODES, gained: float = 0.1) -> Evidence:
 def changing() -> tuple[Evidence, pd.DataFrame]:
     """A study in which C9 changes in the row of the variant, and its map."""
     found = study(gained=-0.2)
-    return found, robustness_map(found.runs, paths(found))
+    return found, robustness_map(found.runs, found.paths)
 
 
 def title(figure: Figure) -> str:
@@ -148,7 +148,7 @@ def test_the_title_of_the_map_names_the_claims_that_never_change(changing):
 
 def test_a_study_that_is_too_short_has_a_map_on_which_all_is_open():
     found = study(episodes=4)
-    rows = robustness_map(found.runs, paths(found))
+    rows = robustness_map(found.runs, found.paths)
     figure = maps.verdict_map(rows, found.mark)
     assert title(figure) == "0 of 0 decided verdicts change"
     assert not frames(figure)
@@ -167,7 +167,7 @@ def test_theta_c_has_a_line_a_run_and_counts_where_they_end():
 
 
 def values(found: Evidence) -> dict[str, pd.DataFrame]:
-    return {claim: one.measure(found.runs, paths(found)) for claim, one in BY_RUNS.items()}
+    return {claim: one.measure(found.runs, found.paths) for claim, one in BY_RUNS.items()}
 
 
 @pytest.mark.slow
