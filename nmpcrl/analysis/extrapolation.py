@@ -14,10 +14,9 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
-from nmpcrl import Matrix, Vector
+from nmpcrl import Vector
 from nmpcrl.analysis.metrics import root_mean_square
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, Successor, Transition
 from nmpcrl.learning.rollout import Persistent
@@ -78,15 +77,10 @@ class Outcome:
     """One run, by episode begun; nan where the episode has no prediction."""
 
     stopped: bool
-    theta: Matrix  # at the end, shape (episodes, d)
+    episodes: int  # begun
     delta: Vector  # root mean square
     overshoot: Vector  # largest alpha ||phi||^2
     feedback: Vector  # median over the steps with a prediction
-
-    @property
-    def episodes(self) -> int:
-        """Number of episodes begun."""
-        return len(self.theta)
 
 
 def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
@@ -105,11 +99,11 @@ def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
             fed.append(feedback(network, transition, theta, learner.gamma))
         return successor
 
-    stopped, thetas, rows = False, list[Vector](), list[tuple[float, ...]]()
+    stopped, episodes, rows = False, 0, list[tuple[float, ...]]()
     how: Any = {"clipped": experiment.clipped, "constrained": experiment.values_actions}
     try:
         for step in train(replace(learner, bootstrap=watched), controller, weights, explore, **how):
-            thetas[step.episode :] = [step.weights.theta]  # the last one of the episode
+            episodes = step.episode + 1
             if step.solution and step.update and step.update.delta is not None:
                 phi = step.solution.features
                 square = experiment.alpha * float(phi @ phi)
@@ -122,5 +116,5 @@ def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
         .groupby("episode")
         .agg({"delta": root_mean_square, "overshoot": "max", "feedback": "median"})
     )
-    numbers = by_episode.reindex(range(len(thetas))).to_numpy(float)
-    return Outcome(stopped, np.array(thetas), *numbers.T)
+    numbers = by_episode.reindex(range(episodes)).to_numpy(float)
+    return Outcome(stopped, episodes, *numbers.T)

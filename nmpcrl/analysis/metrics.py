@@ -4,7 +4,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Task
@@ -58,10 +57,9 @@ def late_cost_range(run: Run) -> float:
     return float((late.max() - late.min()) / cost[0])
 
 
-def final_theta(records: Records) -> Vector:
+def final_theta(records: Records) -> Column:
     """theta when training stopped, shape (d,)."""
-    result: Vector = records.steps["theta"][-1]
-    return result
+    return np.asarray(records.steps["theta"][-1])
 
 
 def final_rollout(records: Records) -> tuple[Column, Column]:
@@ -93,12 +91,9 @@ def overshooting(records: Records) -> float:
     return float(np.mean(records.steps["alpha_phi2"] > OVERSHOOT))
 
 
-def out_of_bounds(actions: Column, lower: Vector, upper: Vector) -> npt.NDArray[np.bool_]:
+def out_of_bounds(actions: Column, lower: Vector, upper: Vector) -> Any:
     """Whether each action, shape (..., m), leaves the action space by more than `TOUCH`."""
-    found: npt.NDArray[np.bool_] = np.any(
-        (actions < lower - TOUCH) | (actions > upper + TOUCH), axis=-1
-    )
-    return found
+    return np.any((actions < lower - TOUCH) | (actions > upper + TOUCH), axis=-1)
 
 
 def boundary_share(records: Records, task: Task) -> float:

@@ -35,12 +35,8 @@ def _late(name: str, one: RunSummary) -> float:
     return float(np.nanmedian(values)) if np.isfinite(values).any() else np.nan
 
 
-def _inside(i: int, one: RunSummary) -> int:
-    return int(one.episodes["inside"][:, i].sum())
-
-
-def _eval_inside(i: int, one: RunSummary) -> int:
-    return int(one.evaluations["inside"][:, i].sum())
+def _inside(table: str, i: int, one: RunSummary) -> int:
+    return int(getattr(one, table)["inside"][:, i].sum())
 
 
 def _last_theta(i: int, one: RunSummary) -> float:
@@ -51,7 +47,7 @@ def _last_theta(i: int, one: RunSummary) -> float:
 
 
 def _imitation(which: str, one: RunSummary) -> float:
-    return one.facts.get("imitation", {}).get(which, np.nan)
+    return float(one.facts.get("imitation", {}).get(which, np.nan))
 
 
 OUTCOME: Mapping[str, Callable[[RunSummary], Any]] = {
@@ -70,8 +66,8 @@ OUTCOME: Mapping[str, Callable[[RunSummary], Any]] = {
     "distance": lambda one: float(one.evaluations["distance"][-1]),
     "iterations": lambda one: float(np.nanmean(one.episodes["iterations"])),
     "seconds": lambda one: float(one.facts["seconds"]),
-    **{name: partial(_inside, i) for i, name in enumerate(INSIDE)},
-    **{name: partial(_eval_inside, i) for i, name in enumerate(EVAL_INSIDE)},
+    **{name: partial(_inside, "episodes", i) for i, name in enumerate(INSIDE)},
+    **{name: partial(_inside, "evaluations", i) for i, name in enumerate(EVAL_INSIDE)},
     "worst_overlap": lambda one: float(np.nanmax(one.episodes["overlap"])),
     "eval_worst_overlap": lambda one: float(np.nanmax(one.evaluations["overlap"])),
     **{name: partial(_last_theta, i) for i, name in enumerate(THETA)},

@@ -6,7 +6,7 @@ any learner's budget: a lower bound of the possible gain.
 """
 
 from bisect import bisect
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,9 +16,9 @@ from nmpcrl import Vector
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.jobs import parallel
-from nmpcrl.study.parameters import LARGEST_SEED, Allowed, one_of, whole
+from nmpcrl.study.parameters import LARGEST_SEED, one_of, whole
 
-SCALE = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
+SCALE: Vector = np.array([1, 1, 0.1, 0.1, 0.1, 1, 1, 0.1, 0.3])  # of each component of theta
 LOWER, UPPER = np.r_[np.zeros(8), -0.5], np.r_[np.full(8, 10.0), 1.0]  # bounds of theta
 FAILED = 1e6  # cost of a rollout in which a solve failed
 POINTS = 11  # of the grid
@@ -28,11 +28,6 @@ SPREAD = 0.3  # CMA-ES: of the first rollouts, in `SCALE`s
 BUDGET = 2000  # rollouts of a published long search
 CHECK = 200  # rollouts that a build repeats of a published search
 LEAST = 40  # rollouts of the shortest search: the first one and some generations
-ALLOWED: Mapping[str, Allowed] = {  # by field of `Search`
-    "layout": one_of(paper.LAYOUTS),
-    "seed": whole(0, LARGEST_SEED - 1),  # CMA-ES gets seed + 1
-    "budget": whole(LEAST, 100_000),
-}
 Cost = Callable[[Vector], float]  # theta -> cost of a rollout; infinite where a solve failed
 Direct = Callable[..., Vector]  # (cost, start, budget, seed, **settings) -> theta
 
@@ -71,16 +66,12 @@ class Tried:
     @property
     def theta(self) -> Vector:
         """The best point as theta."""
-        found: Vector = self.best * SCALE
-        return found
+        return self.best * SCALE
 
     def descend(self, spread: float, seed: int, *, least: int = 1) -> None:
         """CMA-ES from the best point until it has converged; Hansen (2016).
 
-        Args:
-            spread: of the first rollouts, in units of `SCALE`.
-            seed: of the candidates.
-            least: rollouts left with which a generation may begin; 0 for a complete generation.
+        A generation begins with at least so many rollouts left; 0 stands for a complete one.
         """
         import cma  # takes a second
 
@@ -185,8 +176,9 @@ class Search:
     budget: int = BUDGET  # rollouts without noise
 
     def __post_init__(self) -> None:
-        for name, allowed in ALLOWED.items():
-            object.__setattr__(self, name, allowed.check(name, getattr(self, name)))
+        one_of(paper.LAYOUTS).check("layout", self.layout)
+        whole(0, LARGEST_SEED - 1).check("seed", self.seed)  # CMA-ES gets seed + 1
+        whole(LEAST, 100_000).check("budget", self.budget)
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,14 @@
 """The suite: judges learners, tuners and policies within a budget, in places of no tuning.
 
 An entry gets a `Robot` in one place, begins at most the budget of episodes, and returns theta or a
-policy, which a rollout without noise judges. A place is a layout of the obstacles or a scenario of
-moving obstacles. A place is *solved* if under every seed the robot ends at the target and the
-rollout costs no more than under theta_init. Intervals are over places.
+policy, which a rollout without noise judges. A place is a layout or a scenario of moving obstacles;
+it is *solved* if under every seed the robot ends at the target and the rollout costs no more than
+under theta_init. Intervals are over places.
 
     >>> judge(entry("CMA-ES[spread=0.1]"), "J001", seed_of("J001", 0), 50).cost  # doctest: +SKIP
 """
 
-import importlib
+import pkgutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -85,13 +85,7 @@ class Robot:
     """
 
     def __init__(self, place: str | Centres, budget: int, seed: int) -> None:
-        """Place the robot.
-
-        Args:
-            place: name of a layout or of a scenario (J001, T01, A, M01), or centres [m].
-            budget: largest number of episodes.
-            seed: of everything that an entry draws.
-        """
+        """`place` names a layout or a scenario (J001, T01, A, M01), or has the centres [m]."""
         self.motions: Scenario = SCENARIOS.get(place, ()) if isinstance(place, str) else ()
         self.budget, self.seed, self.begun = budget, seed, 0
         self.rng = np.random.default_rng(seed)
@@ -205,12 +199,9 @@ def learned(
 ) -> Vector:
     """The last finite theta of a learner of the study, trained as long as the budget lasts.
 
-    Args:
-        robot: where the learner trains.
-        learner: its name in the study.
-        change: (learner, robot, settings by name) -> the learner that is trained in its place.
-        settings: alpha, in proportion to which beta of GES and TDC changes; `every`, the episodes
-            between two confirming rollouts, which count; others for `change`.
+    `change` gives another learner to train in its place. Settings are alpha, in proportion to which
+    beta of GES and TDC changes; `every`, the episodes between two confirming rollouts, which count;
+    and others for `change`.
     """
     every = int(settings.get("every", 0))
     episodes = (robot.budget - 1) * every // (every + 1) if every else robot.budget
@@ -309,12 +300,11 @@ def entry(name: str, known: Mapping[str, Entry] = ENTRIES) -> Entry:
         except ValueError:
             raise refused("entry", name, "of the form ES[alpha=3e-7]") from None
         return known[base].with_settings(**settings)
-    module, _, attribute = name.partition(":")
-    if not module or not attribute:
+    if ":" not in name.strip(":"):
         raise refused("entry", name, f"MODULE:FACTORY or one of {', '.join(known)}")
     sys.path.insert(0, here := str(Path.cwd()))
     try:
-        factory = getattr(importlib.import_module(module), attribute)
+        factory = pkgutil.resolve_name(name)
     except (Exception, SystemExit) as error:  # whatever the module raises
         why = shortened(f"{type(error).__name__}: {error}")
         raise NoEntry(f"entry = {name!r} cannot be imported: {why}") from error
@@ -377,9 +367,7 @@ def seed_of(place: str, k: int) -> int:
     for further, names in enumerate((JUDGE, TUNE, paper.LAYOUTS)):
         if place in names:
             return HELD_OUT * (1 + further) + MOST_SEEDS * [*names].index(place) + k
-    if place in SCENARIOS:
-        return scenario_seed(place, k)
-    raise KeyError(place)
+    return scenario_seed(place, k)
 
 
 def scenario_seed(place: str, k: int) -> int:
@@ -396,18 +384,10 @@ def judge_all(
     seeds: int = 2,
     workers: int | None = None,
 ) -> pd.DataFrame:
-    """Judge an entry in every place of the suite with every seed; one row a judgement.
+    """Judge an entry, by its name, in every place of the suite with every seed.
 
-    Args:
-        name: as `entry` takes it.
-        moving: in the scenarios of moving obstacles instead of the layouts of `JUDGE`.
-        budget: episodes in each place with each seed.
-        layouts: number of places, from the first on; all by default.
-        seeds: number of seeds in each place.
-        workers: processes; by default one for each core.
-
-    Returns:
-        Columns entry, place, k and the fields of `Judgement`; repeatable except for seconds.
+    The places are the first `layouts` of `JUDGE`, or with `moving` of the scenarios. One row a
+    judgement: entry, place, k and the fields of `Judgement`, repeatable except for seconds.
     """
     places = SCENARIOS if moving else JUDGE
     budget = whole(1, MOST_EPISODES).check("budget", budget)
@@ -432,28 +412,24 @@ def _judge(name: str, episodes: int, job: tuple[str, int]) -> Judgement:
 
 
 def leaderboard(judged: pd.DataFrame) -> pd.DataFrame:
-    """The rows of `judge_all`, summarised in one row for each entry.
-
-    Returns:
-        Columns entry, places, solved (share of the places), gain (interquartile mean over places
-        of the mean over seeds), episodes (most in any place), seconds (in all), clear (share of
-        the places without a state in a moving obstacle) and over (the first place in which the
-        budget was exceeded, or ""); each share is an `Estimate`.
-    """
+    """One row for each entry of `judge_all`; solved, gain and clear are `Estimate`s over places."""
     rows = []
-    for name, of_entry in judged.groupby("entry", sort=False):
-        places = [each for _, each in of_entry.groupby("place", sort=False)]
-        gains = np.array([np.mean(gain(each).to_numpy()) for each in places])
+    for name, runs in judged.groupby("entry", sort=False):
+        places = [each for _, each in runs.groupby("place", sort=False)]
+        gains = np.array([np.mean(gain(each).to_numpy()) for each in places])  # over seeds
+        well = sum(bool(solved(each).all()) for each in places)
+        clear = sum(not each.inside.any() for each in places)  # of moving obstacles
+        beyond = [*runs.place[runs.over.astype(bool)], ""]  # where the budget was exceeded
         rows.append(
             {
                 "entry": name,
                 "places": len(places),
-                "solved": rate(sum(bool(solved(each).all()) for each in places), len(places)),
+                "solved": rate(well, len(places)),
                 "gain": interquartile_mean(gains, ["places"] * len(places)),
-                "episodes": int(of_entry.episodes.max()),
-                "seconds": sum(of_entry.seconds),
-                "clear": rate(sum(not each.inside.any() for each in places), len(places)),
-                "over": next(iter(of_entry.place[of_entry.over.astype(bool)]), ""),
+                "episodes": int(runs.episodes.max()),
+                "seconds": sum(runs.seconds),
+                "clear": rate(clear, len(places)),
+                "over": beyond[0],
             }
         )
     return pd.DataFrame(rows)

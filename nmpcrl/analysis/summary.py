@@ -7,7 +7,7 @@ hundredth of that and is enough for every figure and verdict of the study.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NotRequired, cast
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from nmpcrl.control import Nmpc
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.records import Column, Facts, Records, StepStatus, load_run, save_run
+from nmpcrl.study.records import Column, Records, StepStatus, load_run, save_run
 from nmpcrl.study.setup import controller_of
 
 SIZES = {"small": (TOUCH, 0.01), "medium": (0.01, 0.1), "large": (0.1, np.inf)}  # of Xi
@@ -118,18 +118,12 @@ class Outline:
     evaluations: dict[str, Column]
     states: Column  # of the last rollout without noise, shape (K + 1, n); nan after a failed solve
     actions: Column | None  # shape (K + 1, m); None where they are not known
-    facts: Mapping[str, Any]
+    facts: Mapping[str, Any]  # of the records; and imitation, the errors of two networks, for C6
 
     @property
     def name(self) -> Experiment:
         """The experiment as the value that names the run."""
         return Experiment(**self.experiment)
-
-
-class SummaryFacts(Facts):
-    """The facts of the records, and what C6 asks for."""
-
-    imitation: NotRequired[dict[str, float]]  # the error of a network, with theta and without
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +137,6 @@ class RunSummary(Outline):
     """
 
     actions: Column
-    facts: SummaryFacts
 
     def save(self, path: Path) -> None:
         """Write a file as a whole; errors as in `save_run`."""
@@ -156,14 +149,14 @@ class RunSummary(Outline):
         """Read a file that `save` wrote; errors as in `load_run`."""
         (experiment, facts), tables = load_run(path, COLUMNS)
         episodes, evaluations, rollout = (tables[name] for name in COLUMNS)
-        return cls(experiment, episodes, evaluations, **rollout, facts=cast(SummaryFacts, facts))
+        return cls(experiment, episodes, evaluations, **rollout, facts=facts)
 
 
 def summarise(records: Records) -> RunSummary:
     """The summary of a run; of RDES trained to the end also how well networks imitate it."""
     experiment, evaluated = Experiment(**records.experiment), records.evaluations
     nmpc = controller_of(experiment).nmpc
-    facts = cast(SummaryFacts, dict(records.facts))
+    facts: dict[str, Any] = dict(records.facts)
     if experiment.learner == IMITATED and experiment.episodes >= paper.EPISODES:
         imitation = imitate(records)
         facts["imitation"] = {

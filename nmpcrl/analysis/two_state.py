@@ -66,11 +66,8 @@ def follow(
 ) -> Matrix:
     """(theta, w) before the first update, (1, 0), and after each, shape (updates + 1, 2).
 
-    Args:
-        chain: the chain.
-        rule: an update rule of `nmpcrl.learning`, such as `semi_gradient(alpha)`.
-        updates: number of updates.
-        rng: draws the state of each update; expected updates if absent.
+    The rule is one of `nmpcrl.learning`, such as `semi_gradient(alpha)`. `rng` draws the state of
+    each update; without it updates are expected ones.
     """
     path = [Weights(np.ones(1), np.zeros(1))]
     for _ in range(updates):

@@ -20,7 +20,7 @@ def test_a_nudged_run_starts_a_little_beside_theta_init(monkeypatch):
 
     def watch(experiment, intervention):
         watched.append((experiment.layout, experiment.seed, experiment.theta[0], intervention))
-        return Outcome(True, *[np.array([1.0, 2.0])] * 4)
+        return Outcome(True, 2, *[np.array([1.0, 2.0])] * 3)
 
     monkeypatch.setattr(interventions, "watch", watch)
     rows = [interventions.again(setting, "D", 300, 3) for setting in ARMS.values()]

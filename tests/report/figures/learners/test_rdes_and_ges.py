@@ -165,7 +165,7 @@ def test_interventions_are_counted_in_the_title_and_a_stopped_run_ends_in_a_cros
     def outcome(stopped: bool, count: int) -> Outcome:
         numbers = np.linspace(0.1, 1.0, count)
         overshoot = np.r_[0.0, numbers[1:-1], 1e6 if stopped else 1.5]
-        return Outcome(stopped, np.zeros((count, 9)), numbers, overshoot, numbers)
+        return Outcome(stopped, count, numbers, overshoot, numbers)
 
     run = {
         "none": outcome(True, 8),
