@@ -1,77 +1,48 @@
-"""`nmpcrl investigate` with the book's investigations and with a reader's own file."""
+"""`nmpcrl investigate` with a reader's own file, and files that are none."""
 
 import json
 import re
 import subprocess
-import textwrap
 from pathlib import Path
 
 import pytest
 
 from nmpcrl.claims.investigation import NoInvestigation, of_file
 
+PAGE = Path(__file__).parents[2] / "book" / "your_paper.ipynb"
+
 pytestmark = pytest.mark.usefixtures("trains_here")
-
-OWN = """
-    from nmpcrl.claims.investigation import Investigation, Part, Question, lower
-    from nmpcrl.claims.verdict import REPRODUCED
-
-    def run(setting, place, episodes, seed):
-        return {"cost": setting * seed}
-
-    STUDY = Investigation(
-        name="mine",
-        parts={"all": Part(run, {"one": 1.0, "two": 2.0}, [f"L{i}" for i in range(12)], 5)},
-        questions=[Question("first", "Is one below two?", REPRODUCED, lower("all", "one", "two"))],
-        seed=lambda place, k: 1 + int(place[1:]) + k,
-    )
-"""
 
 
 @pytest.fixture
-def own(tmp_path, monkeypatch):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    path = tmp_path / "mine" / "my_study.py"
+def own(runs):
+    """The file of the page on a paper of one's own, in a folder of its own."""
+    texts = ("".join(cell["source"]) for cell in json.loads(PAGE.read_text())["cells"])
+    (block,) = (re.findall(r"```python\n(.*?)```", text, re.S) for text in texts if "CHAIN" in text)
+    path = runs.parent / "mine" / "chain.py"
     path.parent.mkdir()
-    path.write_text(textwrap.dedent(OWN))
+    path.write_text(block[0])
     return path
 
 
-def test_a_reader_s_own_investigation_is_one_file_and_one_verb(own, command):
-    said = command("investigate", str(own), "--dry-run")
-    assert "all: 0 of 24 rows are stored" in said.stdout
-    said = command("investigate", str(own), "--publish", "--workers", "2")
-    assert said.exit_code == 0, said.output
-    assert "first: confirmed (12 of 12 layouts)" in said.stdout
-    assert (own.parent / "published" / "mine.csv").exists()
-    assert of_file(own).registered == ""
-
-
-def test_the_file_of_the_page_on_your_paper_is_run_interrupted_published_and_judged(
-    tmp_path, monkeypatch, command
-):
-    monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path / "runs"))
-    page = Path(__file__).parents[2] / "book" / "your_paper.ipynb"
-    texts = ("".join(cell["source"]) for cell in json.loads(page.read_text())["cells"])
-    (block,) = (re.findall(r"```python\n(.*?)```", text, re.S) for text in texts if "CHAIN" in text)
-    path = tmp_path / "mine" / "chain.py"
-    path.parent.mkdir()
-    path.write_text(block[0])
-    made = command("investigate", str(path), "--workers", "1")
+def test_a_file_is_run_interrupted_published_and_judged(own, runs, command):
+    assert "all: 0 of 60 rows are stored" in command("investigate", str(own), "--dry-run").stdout
+    made = command("investigate", str(own), "--workers", "2")
     assert "P1: confirmed (12 of 12 runs)" in made.stdout
-    log = tmp_path / "runs" / "chain.jsonl"
+    log = runs / "chain.jsonl"
     log.write_text(log.read_text()[:-40])
-    assert "all: 59 of 60 rows are stored" in command("investigate", str(path), "--dry-run").stdout
-    unpublished = command("investigate", str(path), "--judge").stderr
+    assert "all: 59 of 60 rows are stored" in command("investigate", str(own), "--dry-run").stdout
+    unpublished = command("investigate", str(own), "--judge").stderr
     assert "nothing is published in" in unpublished
     assert "git checkout" not in unpublished  # the project's data are others
-    said = command("investigate", str(path), "--publish", "--workers", "1")
+    said = command("investigate", str(own), "--publish", "--workers", "1")
     assert said.exit_code == 0
+    assert (own.parent / "published" / "chain.csv").exists()
     assert "not registered: commit" in said.stdout
-    again = command("investigate", str(path), "--publish", "--workers", "1")
+    again = command("investigate", str(own), "--publish", "--workers", "1")
     assert "no arm of chain is complete and new" in again.stderr
     log.unlink()
-    assert command("investigate", str(path), "--judge").stdout == made.stdout
+    assert command("investigate", str(own), "--judge").stdout == made.stdout
 
 
 def test_a_committed_file_is_registered_by_its_commit(own):

@@ -90,16 +90,14 @@ def test_the_table_of_episodes_tells_every_run_from_every_other(command, publish
         np.testing.assert_allclose(mine.cost, one.episodes["cost"], rtol=1e-6)
 
 
-@pytest.mark.slow
-def test_what_is_published_verifies_the_runs_it_was_made_of(command, published_here):
+def test_verify_compares_with_the_published_runs_and_names_what_contradicts(
+    command, published_here
+):
     assert list(published.load().rows) == list(STUDY)
     assert [*published.load().searches] == [*SEARCHED]
     verified = command("verify")
     assert verified.exit_code == 0, verified.output
     assert "6 bit for bit, 0 by distribution; contradictions: 0" in verified.output
-
-
-def test_verify_names_what_contradicts_and_fails(command, published_here):
     wrong = next(e for e in STUDY if e.learner == "ES")
     one = published_here[wrong]
     cost = one.evaluations["cost"].copy()

@@ -1,6 +1,5 @@
 """The answers on SAC and TD3, on tables that leave no doubt."""
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -12,8 +11,6 @@ from nmpcrl.studies.agents import (
     SAC_AND_TD3,
     SETTINGS,
     answers,
-    course,
-    rows,
     tuned,
 )
 from nmpcrl.studies.agents_run import EVERY, judged_in, trained_in
@@ -88,27 +85,6 @@ def test_answers_follow_from_costs_and_arrivals(table, compared, expected):
     found = answers(table, compared)
     said = {name: (found[name].outcome, *found[name].counts.values()) for name in expected}
     assert said == {name: (outcome, (yes, of)) for name, (outcome, yes, of) in expected.items()}
-
-
-def test_an_answer_has_the_median_ratio_and_the_episodes_after_which_the_median_matches():
-    ratio = answers(runs("judge", "TD3", 0.9), suite())["TD3 or the best search"].numbers
-    assert ratio["median ratio"] == pytest.approx(0.9 / 0.95)
-    table = runs("one", "TD3", 0.9)
-    one = answers(table, NOTHING)["TD3 matches in one layout"].numbers
-    assert one["matches first"] == one["matches from"] == 500
-    table["costs"] = [[[90.0], *each[1:-1], [101.0]] for each in table.costs]
-    assert course(table, "one", "TD3").matched == (25, np.inf)
-
-
-def test_an_agent_has_a_row_of_the_suite_by_the_share_of_the_possible_gain():
-    table = pd.concat([runs("judge", "SAC", 0.95), runs("judge", "TD3", 1.2, there="-")])
-    first, second = rows(table, suite())
-    assert (first.entry, first.name, first.rollouts) == ("SAC", "SAC[turn=0.5]", 300)
-    assert first.gain.value == pytest.approx(0.5)
-    assert first.solved.value == 1
-    assert second.gain.value == pytest.approx(-2)
-    assert second.solved.value == 0
-    assert not first.disqualified
 
 
 def test_an_agent_is_judged_with_the_setting_that_costs_least_and_not_before_it_is_known():
