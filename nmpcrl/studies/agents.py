@@ -11,7 +11,7 @@ layout where it also ends at the target. A training costs most of an hour or les
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -23,7 +23,7 @@ from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, c
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.studies import remedies
 from nmpcrl.studies.agents_run import EVERY, SAC, TD3, THERE, curve, judged_in, require
-from nmpcrl.studies.remedies import RemedyRow
+from nmpcrl.studies.remedies import REMEDIES, RemedyRow
 from nmpcrl.study.drawn import JUDGE, TUNE
 from nmpcrl.study.refusal import Refusal
 
@@ -36,6 +36,7 @@ SETTINGS: Mapping[str, tuple[Mapping[str, float], ...]] = {  # the default first
 SPARING = 0.5  # gradient steps a step of the robot, at most, in "one" and "all"
 SEARCH, SEARCHED = "Bayes", ("judge 50", "named 50")  # the best search, in these published parts
 RESAMPLES = 2000  # of the bootstrap over layouts or seeds
+Known: TypeAlias = tuple[pd.DataFrame, pd.DataFrame]  # of `SAC_AND_TD3`, and of `REMEDIES`
 
 CHECKPOINTS: Mapping[str, tuple[int, ...]] = {  # episodes after which the policy is judged
     "tune": (150,),
@@ -154,13 +155,6 @@ def course(table: pd.DataFrame, part: str, agent: str, among: Sequence[str] = ()
     return Course(agent, *(one[[*among]] if among and len(one.T) else one for one in found))
 
 
-class Known(NamedTuple):
-    """The two tables that questions are asked of."""
-
-    table: pd.DataFrame  # of `SAC_AND_TD3`
-    compared: pd.DataFrame  # the comparison of remedies
-
-
 def _matches(one: Course, _: pd.Series) -> Answer:
     return share(one.last <= 1 + TOLERANCE, numbers=one.numbers)
 
@@ -213,14 +207,15 @@ def _question(
     """A row of `_ASKED` for one agent."""
 
     def answer(known: Known) -> Answer:
-        search = searched(known.compared, SEARCHED[part == "one"])
-        return judge(course(known.table, part, agent, among), search)
+        table, compared = known
+        search = searched(compared, SEARCHED[part == "one"])
+        return judge(course(table, part, agent, among), search)
 
     return Question(f"{agent} {name}", text.format(agent), expected, answer)
 
 
 def _one_or_other(known: Known) -> Answer:
-    first, second = (course(known.table, "judge", name).last for name in AGENTS)
+    first, second = (course(known[0], "judge", name).last for name in AGENTS)
     return cheaper((first / second).dropna())
 
 
@@ -234,7 +229,7 @@ QUESTIONS = (
 
 def answers(table: pd.DataFrame, compared: pd.DataFrame) -> dict[str, Answer]:
     """The answers beside a comparison of remedies, by the names of the questions."""
-    return SAC_AND_TD3.judge(Known(table, compared))
+    return SAC_AND_TD3.judge((table, compared))
 
 
 def searched(compared: pd.DataFrame, part: str) -> pd.Series:
@@ -268,6 +263,6 @@ SAC_AND_TD3 = Investigation(
     registered="2feab64",
     libraries=("cma", "optuna", "stable-baselines3"),
     digits=6,
-    evidence=lambda table: Known(table, remedies.REMEDIES.table()),
+    evidence=lambda table: (table, REMEDIES.table()),
     prepare=lambda missing: require(),
 )
