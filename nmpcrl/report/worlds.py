@@ -1,6 +1,6 @@
 """Worlds that move, change, or are not the model, as a chapter shows them."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.report.cited import cited
 from nmpcrl.report.remedies import answer_items, entry_named
 from nmpcrl.report.tables import html_table
-from nmpcrl.studies.worlds import ORACLES, PARTS, VIEWS, WITHOUT, WORLD_QUESTIONS, WORLDS
+from nmpcrl.studies import worlds
+from nmpcrl.studies.worlds import FAULTS, PARTS, VIEWS, WORLD_QUESTIONS, WORLDS
 from nmpcrl.study import paper
 from nmpcrl.study.moving import CLEARANCE, Motion, centres
 
@@ -23,29 +24,12 @@ ENTRY = {"init": "frozen", "ES": "ES", "grid": "grid", "CMA-ES": "CMA-ES"}  # by
 SEES = {  # what plans take of the obstacles, by view; the suite's robot extrapolates
     "extrapolated": "the velocity just seen", "known": "the motion", "frozen": "the place",
 }  # fmt: skip
-Saved = Mapping[str, Mapping[str, pd.Series]]
 
 
-def saved(costs: pd.DataFrame) -> Saved:
-    """By fault and policy, the share of theta_init's cost that is saved in each layout.
-
-    Args:
-        costs: of `worlds.means`, of the part "model".
-    """
-    found = {
-        fault: {
-            how: (1 - costs[f"{fault} {how}"] / costs[f"{fault} init"]).dropna()
-            for how in OWN
-            if f"{fault} {how}" in costs
-        }
-        for fault in (*ORACLES, *WITHOUT)
-    }
-    return {fault: by for fault, by in found.items() if len(by["ES"])}
-
-
-def by_policy(found: Saved) -> dict[str, dict[str, pd.Series]]:
-    """`saved` the other way round."""
-    return {how: {fault: by[how] for fault, by in found.items() if how in by} for how in OWN}
+def saved(table: pd.DataFrame) -> pd.DataFrame:
+    """The share of theta_init's cost that each policy saves, by fault and layout."""
+    found = pd.DataFrame({how: worlds.saved(table, how) for how in OWN})
+    return found.reindex(FAULTS, level=0)
 
 
 def decided(answers: Iterable[Answer]) -> dict[str, str]:

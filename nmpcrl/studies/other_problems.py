@@ -4,41 +4,24 @@ Part "learners": every arm meets the same disturbance and noise of a seed. Step 
 with three other seeds, from three to six values each; the one of "LSTD-Q, every step" is that of
 mpcrl's example. Part "references": costs of a step that the learners are compared with.
 
-Part "spread": mpcrl's Q-learning with several solvers, then ours with the same disturbances. Its
-step of Newton has the outer product of one gradient for a Hessian, and 1e-3 of the identity:
-
-    theta <- theta + 0.05 delta phi / (1e-3 + |phi|^2).
-
-mpcrl acts with what it planned before that step: the order "before". `train` plans anew: "after".
+Part "spread": mpcrl's Q-learning with several solvers, then ours with the same disturbances. mpcrl
+acts with what it planned before a step of theta: the order "before". `train` plans anew: "after".
 
 The questions were written down before the seeds were run.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from nmpcrl import Matrix, Vector
+from nmpcrl import Matrix, Vector, learning
 from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, Row
 from nmpcrl.claims.verdict import NOT, REPRODUCED
 from nmpcrl.control import Nmpc, SolverError
-from nmpcrl.learning import (
-    Diverged,
-    Exploration,
-    Learner,
-    Weights,
-    expected_sarsa,
-    frozen,
-    gradient_tdc,
-    lstd_q,
-    policy_gradient,
-    q_learning,
-    td_error,
-    train,
-)
+from nmpcrl.learning import Diverged, Exploration, Learner, Weights, td_error, train
 from nmpcrl.studies import dynamic_programming
 from nmpcrl.study.problems import gros_zanon as gz
 
@@ -56,32 +39,25 @@ NUDGE = 1e-10  # of theta as it begins
 PEERS = ("ipopt", "ipopt, 1e-10", "fatrop")
 
 ARMS: Mapping[str, Callable[[Nmpc], Learner]] = {
-    "frozen": frozen,
-    "LSTD-Q, every step": lambda nmpc: lstd_q(nmpc, 0.05, every=1),
-    "LSTD-Q, batches of 20": lambda nmpc: lstd_q(nmpc, 0.02, every=20),
-    "QL": lambda nmpc: q_learning(nmpc, 1e-4),
-    "ES": lambda nmpc: expected_sarsa(nmpc, 1e-4),
-    "TDC": lambda nmpc: gradient_tdc(nmpc, 1e-4, 1e-4),
-    "DPG": lambda nmpc: policy_gradient(nmpc, 1e-3, every=100),
+    "frozen": learning.frozen,
+    "LSTD-Q, every step": lambda nmpc: learning.lstd_q(nmpc, 0.05, every=1),
+    "LSTD-Q, batches of 20": lambda nmpc: learning.lstd_q(nmpc, 0.02, every=20),
+    "QL": lambda nmpc: learning.q_learning(nmpc, 1e-4),
+    "ES": lambda nmpc: learning.expected_sarsa(nmpc, 1e-4),
+    "TDC": lambda nmpc: learning.gradient_tdc(nmpc, 1e-4, 1e-4),
+    "DPG": lambda nmpc: learning.policy_gradient(nmpc, 1e-3, every=100),
 }
-
-
-_NUMBERS = ("test", "before", "nudged", "after")
-_LISTS = ("costs", "theta", "peers", "made", "gap")
-
-
-def row(**measured: Any) -> Row:
-    """A row; a number that a part does not measure is nan, a list empty.
-
-    Args:
-        measured: test (mean cost of a step without noise on the action, with the last theta);
-            costs (mean over each window of training, infinite after divergence); theta; peers (J
-            of mpcrl by solver) and made (steps of each); J of ours in mpcrl's order (before), from
-            theta + `NUDGE` (nudged), and with the newest theta (after); gap (largest difference of
-            theta after each step between the runs before and nudged).
-    """
-    lists = {name: np.asarray(measured.get(name, ())).tolist() for name in _LISTS}
-    return {name: float(measured.get(name, np.nan)) for name in _NUMBERS} | lists
+ROW: Row = {  # what a part does not measure
+    "test": np.nan,  # mean cost of a step without noise on the action, with the last theta
+    "before": np.nan,  # J of ours in mpcrl's order
+    "nudged": np.nan,  # the same from theta + `NUDGE`
+    "after": np.nan,  # J of ours with the newest theta
+    "costs": [],  # mean over each window of training, infinite after divergence
+    "theta": [],
+    "peers": [],  # J of mpcrl by solver
+    "made": [],  # steps of each
+    "gap": [],  # largest difference of theta after each step between the runs before and nudged
+}
 
 
 @cache
@@ -94,20 +70,19 @@ def learn(
     make: Callable[[Nmpc], Learner], _: str, __: int, seed: int, *, steps: int = STEPS
 ) -> Row:
     """Train a learner for one episode, and test the theta that it ends with."""
-    nmpc, problem = controller(), gz.problem()
     disturbance, noise = (np.random.default_rng([k, seed]) for k in (0, 1))
     explore = Exploration(DEVIATION * noise.normal(size=(1, steps, 1)), np.ones((1, steps)))
-    costs, theta = np.full(steps, np.inf), problem.theta
-    weights = Weights(theta, np.zeros(theta.size))
+    costs, theta = np.full(steps, np.inf), gz.problem().theta
+    weights, learner = Weights(theta, np.zeros(theta.size)), make(controller())
     world: dict[str, Any] = {"plant": gz.plant, "start": gz.START, "rng": disturbance}
     try:
-        for step in train(make(nmpc), nmpc, weights, explore, **world):
+        for step in train(learner, controller(), weights, explore, **world):
             costs[step.time], theta = step.cost, step.weights.theta
         test = judge(theta)
     except Diverged:
         test = np.inf
     windows = np.nan_to_num(costs, nan=np.inf).reshape(-1, min(WINDOW, steps)).mean(axis=1)
-    return row(test=test, costs=windows, theta=theta)
+    return ROW | {"test": test, "costs": windows.tolist(), "theta": theta.tolist()}
 
 
 def judge(theta: Vector, episodes: int = EPISODES, seed: int = TEST_SEED) -> float:
@@ -157,39 +132,35 @@ def searched() -> Vector:
 def refer(theta: Callable[[], Vector] | None, *_: Any) -> Row:
     """The test of the NMPC with a theta, or of the policy of dynamic programming."""
     if theta is None:
-        return row(test=mean_cost(dynamic_programming.best(POINTS, INPUTS).action))
+        best = dynamic_programming.best(POINTS, INPUTS)
+        return ROW | {"test": mean_cost(best.action)}
     found = theta()
-    return row(test=judge(found), theta=found)
+    return ROW | {"test": judge(found), "theta": found.tolist()}
 
 
 def spread(_: Any, __: str, ___: int, seed: int) -> Row:
     """Q-learning with one seed: by mpcrl with each solver, and by this library."""
     from nmpcrl.study.problems import peers  # takes seconds to import
 
-    runs = {solver: peers.run(solver, seed, PEER_STEPS) for solver in PEERS}
-    e = max((one.disturbances for one in runs.values()), key=len)
+    runs = [peers.run(solver, seed, PEER_STEPS) for solver in PEERS]
+    e = max((one.disturbances for one in runs), key=len)
     theta = gz.problem().theta
     nudge = NUDGE * np.random.default_rng(seed).normal(size=theta.size)
-    costs, path = q_learn(theta, e)
-    near, near_path = q_learn(theta + nudge, e)
-    fresh, _ = q_learn(theta, e, newest=True)
-    return row(
-        peers=[one.costs.sum() for one in runs.values()],
-        made=[len(one.costs) for one in runs.values()],
-        before=costs.sum(),
-        nudged=near.sum(),
-        after=fresh.sum(),
-        gap=np.abs(near_path - path).max(axis=1),
-    )
+    before, path = q_learn(theta, e)
+    nudged, near = q_learn(theta + nudge, e)
+    after, _ = q_learn(theta, e, newest=True)
+    return ROW | {
+        "before": before, "nudged": nudged, "after": after,
+        "peers": [float(one.costs.sum()) for one in runs],
+        "made": [len(one.costs) for one in runs],
+        "gap": np.abs(near - path).max(axis=1).tolist(),
+    }  # fmt: skip
 
 
-def q_learn(theta: Vector, e: Vector, *, newest: bool = False) -> tuple[Vector, Matrix]:
-    """Costs and thetas of Q-learning without exploration.
+def q_learn(theta: Vector, e: Vector, *, newest: bool = False) -> tuple[float, Matrix]:
+    """J and the thetas of Q-learning under some disturbances, without exploration.
 
-    Args:
-        theta: to start with.
-        e: disturbance of each step.
-        newest: whether to plan anew after theta has moved, before acting.
+    `newest`: whether to plan anew after theta has moved, before acting.
     """
     nmpc, state, costs, path = controller(), gz.START, [], []
     plan = nmpc.solve(state, theta)
@@ -204,11 +175,14 @@ def q_learn(theta: Vector, e: Vector, *, newest: bool = False) -> tuple[Vector, 
         delta = td_error(costs[-1], gz.GAMMA, solution.value, plan.value)
         theta = normalised_step(theta, delta, solution.features)
         path.append(theta)
-    return np.array(costs), np.array(path)
+    return float(np.sum(costs)), np.array(path)
 
 
 def normalised_step(theta: Vector, delta: float, phi: Vector) -> Vector:
-    """theta + 0.05 delta phi / (1e-3 + |phi|^2)."""
+    """theta + 0.05 delta phi / (1e-3 + |phi|^2).
+
+    mpcrl's step of Newton with the outer product of one gradient and 1e-3 I for a Hessian.
+    """
     moved: Vector = theta + RATE * delta * phi / (RIDGE + phi @ phi)
     return moved
 
@@ -216,23 +190,19 @@ def normalised_step(theta: Vector, delta: float, phi: Vector) -> Vector:
 class Runs(NamedTuple):
     """The rows by part, of which questions are asked and figures drawn."""
 
-    tests: dict[str, Vector]  # the last cost of each seed, by arm
     courses: pd.DataFrame  # of the learners
     references: "pd.Series[float]"  # test by arm
     spreads: pd.DataFrame  # with a column for J of each of `PEERS`, and "steps of" each
 
     @property
-    def medians(self) -> dict[str, float]:
+    def tests(self) -> pd.DataFrame:
+        """The last cost, a row a seed and a column an arm."""
+        return self.courses.set_index(["k", "arm"]).test.unstack()[[*ARMS]]
+
+    @property
+    def medians(self) -> "pd.Series[float]":
         """The median of the last costs, by arm."""
-        return {arm: float(np.median(costs)) for arm, costs in self.tests.items()}
-
-    def nearly_all(self, arms: Iterable[str], below: float, share: float) -> bool:
-        """Whether at least a share of the seeds of each arm ends below a cost."""
-        return all((self.tests[arm] < below).mean() >= share for arm in arms)
-
-    def apart(self, first: str, second: str) -> float:
-        """The relative difference of two means of J."""
-        return float(abs(self.spreads[first].mean() / self.spreads[second].mean() - 1))
+        return self.tests.median()
 
 
 def runs(table: pd.DataFrame) -> Runs:
@@ -243,13 +213,12 @@ def runs(table: pd.DataFrame) -> Runs:
     )
     spreads[[*PEERS]] = [*spreads.peers]
     spreads[[f"steps of {one}" for one in PEERS]] = [*spreads.made]
-    tests = {str(arm): each.to_numpy() for arm, each in courses.groupby("arm", sort=False).test}
-    return Runs(tests, courses, references.set_index("arm").test, spreads)
+    return Runs(courses, references.set_index("arm").test, spreads)
 
 
-def _no_optimum(found: Runs) -> bool:
-    least = min(one for arm, one in found.medians.items() if arm != "frozen")
-    return least > 1.2 * float(found.references["best_policy"])
+def _most(yes: Any) -> bool:
+    """Whether at least 45 of 50 seeds say yes, of every arm."""
+    return bool(np.min(yes.mean()) >= 0.9)
 
 
 def _single(found: Runs) -> bool:
@@ -257,30 +226,36 @@ def _single(found: Runs) -> bool:
     return bool(apart.median() > 0.005 and apart.max() > 0.03)
 
 
+def _alike(first: str, second: str, found: Runs) -> bool:
+    """Whether two means of J differ by less than 1 %."""
+    return bool(abs(found.spreads[first].mean() / found.spreads[second].mean() - 1) < 0.01)
+
+
 # name, prediction, whether it comes true
 _PREDICTED: Sequence[tuple[str, str, Callable[[Runs], bool]]] = (
     ("informed", "In at least 45 of 50 seeds QL, ES and DPG each end below the plan that begins"
      " with the plant's A, B and mean disturbance.",
-     lambda found: found.nearly_all(("QL", "ES", "DPG"), found.references["informed"], 0.9)),
+     lambda found: _most(found.tests[["QL", "ES", "DPG"]] < found.references["informed"])),
     ("every step", "The median of LSTD-Q at every step ends above that of QL.",
      lambda found: found.medians["LSTD-Q, every step"] > found.medians["QL"]),
-    ("optimum", "No arm's median ends within 20 % of the best policy.", _no_optimum),
+    ("optimum", "No arm's median ends within 20 % of the best policy.",
+     lambda found: (found.medians.drop("frozen") > 1.2 * found.references["best_policy"]).all()),
     ("alike", "The medians of QL and ES differ by less than 30 %.",
      lambda found: abs(found.medians["QL"] / found.medians["ES"] - 1) < 0.3),
     ("stable", "At least 48 of 50 seeds of QL, ES, TDC and DPG end with a finite cost.",
-     lambda found: found.nearly_all(("QL", "ES", "TDC", "DPG"), np.inf, 0.96)),
+     lambda found: np.isfinite(found.tests[["QL", "ES", "TDC", "DPG"]]).mean().min() >= 0.96),
     ("single", "Of two tolerances of Ipopt, the median seed's J differs by more than 0.5 %, and"
      " some seed's by more than 3 %.", _single),
     ("mean", "The means of J over the seeds differ by less than 1 %.",
-     lambda found: found.apart("ipopt", "ipopt, 1e-10") < 0.01),
+     partial(_alike, "ipopt", "ipopt, 1e-10")),
     ("fatrop", "With fatrop mpcrl's agent stops before its 100th step in at least 45 of 50 seeds.",
-     lambda found: (found.spreads["steps of fatrop"] < PEER_STEPS).mean() >= 0.9),
+     lambda found: _most(found.spreads["steps of fatrop"] < PEER_STEPS)),
     ("ours", "Riccati in mpcrl's order has a mean J within 1 % of mpcrl's.",
-     lambda found: found.apart("before", "ipopt, 1e-10") < 0.01),
+     partial(_alike, "before", "ipopt, 1e-10")),
     ("chaos", "1e-10 in theta becomes more than 1e-4 within 100 steps in at least 45 of 50 seeds.",
-     lambda found: (found.spreads.gap.map(max) > 1e-4).mean() >= 0.9),
+     lambda found: _most(found.spreads.gap.map(max) > 1e-4)),
     ("order", "To act with the newest theta lowers J in at least 45 of 50 seeds.",
-     lambda found: (found.spreads.after < found.spreads.before).mean() >= 0.9),
+     lambda found: _most(found.spreads.after < found.spreads.before)),
 )  # fmt: skip
 
 
@@ -288,30 +263,24 @@ def _came_true(holds: Callable[[Runs], bool], found: Runs) -> Answer:
     return Answer(REPRODUCED if holds(found) else NOT)
 
 
-QUESTIONS = tuple(
-    Question(name, text, REPRODUCED, partial(_came_true, holds)) for name, text, holds in _PREDICTED
-)
 PLACE = ("Gros and Zanon",)
-
+REFERENCES = {
+    "wrong": lambda: gz.problem().theta,
+    "informed": lambda: gz.problem(informed=True).theta,
+    "best_theta": searched,
+    "best_policy": None,
+}
 OTHER_PROBLEMS = Investigation(
     name="other_problems",
     parts={
-        "references": Part(
-            refer,
-            {
-                "wrong": lambda: gz.problem().theta,
-                "informed": lambda: gz.problem(informed=True).theta,
-                "best_theta": searched,
-                "best_policy": None,
-            },
-            PLACE,
-            1,
-            seconds=60,
-        ),
+        "references": Part(refer, REFERENCES, PLACE, 1, seconds=60),
         "spread": Part(spread, {"Q-learning": None}, PLACE, 1, SEEDS, seconds=5),
         "learners": Part(learn, ARMS, PLACE, 1, SEEDS, seconds=1),
     },
-    questions=QUESTIONS,
+    questions=[
+        Question(name, text, REPRODUCED, partial(_came_true, holds))
+        for name, text, holds in _PREDICTED
+    ],
     seed=lambda _, k: k,
     evidence=runs,
     digits=7,

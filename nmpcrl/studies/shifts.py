@@ -1,64 +1,70 @@
-"""A layout that changes between episodes: when, who notices, and what a learner does about it.
+"""Runs where the layout changes between episodes.
 
-What a controller knows is where it plans the obstacles to be. "told": the new centres from the
+A controller plans with the centres of the obstacles that it knows. "told": the new ones from the
 change on. "cost" and "delta": the old ones until a chart fires on the summed cost or the mean
 |delta| of an episode, and from the next episode on the true ones. "never": the first ones for good.
 A learner reacts to what its controller knows, and so to false alarms, too.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import cache, partial
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from functools import cache
 from statistics import fmean
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.learning import Diverged, Exploration, Learner, Weights, train
+from nmpcrl.analysis.encounters import judged
+from nmpcrl.analysis.suite import entry, judge
+from nmpcrl.claims.investigation import Row
+from nmpcrl.learning import Diverged, Exploration, Learner, Weights, expected_sarsa, train
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import absurd
-from nmpcrl.study import paper
-from nmpcrl.study.geometry import Centres
-from nmpcrl.study.moving import World, still
+from nmpcrl.studies.worlds_run import THETA, controller, explored, row
+from nmpcrl.study import Experiment, paper
+from nmpcrl.study.drawn import JUDGE
+from nmpcrl.study.learners import LEARNERS, Generators
+from nmpcrl.study.moving import Motion, World, still
 
+EVERY = 5  # episodes between two rollouts
 WINDOW = 20  # episodes that a chart looks back to
 LIMIT = 4.0  # standard deviations at which it fires
-RATES: dict[str, Callable[[int, np.random.Generator], Any]] = {  # which episodes bring a change
-    "once": lambda episodes, _: np.arange(episodes) == episodes // 2,
-    "every 50": lambda episodes, _: (np.arange(episodes) % 50 == 0) & (np.arange(episodes) > 0),
-    "random": lambda episodes, rng: (rng.random(episodes) < 1 / 50) & (np.arange(episodes) > 0),
-}
 RAISED, FOR = 10.0, 20  # times alpha after a change, and for how many episodes
+AGE = 10 * 130.0  # examples, ten episodes: the decay of the weights in recent replay
 
 
 def schedule(rate: str, episodes: int, rng: np.random.Generator) -> list[int]:
     """The number of the layout of each episode, from 0."""
-    found: list[int] = np.cumsum(RATES[rate](episodes, rng)).tolist()
-    return found
+    e = np.arange(episodes)
+    changes = {
+        "once": e == episodes // 2,
+        "every 50": e % 50 == 0,
+        "random": rng.random(episodes) < 1 / 50,
+    }
+    order: list[int] = np.cumsum(changes[rate] & (e > 0)).tolist()
+    return order
 
 
-@dataclass
-class Chart:
-    """Shewhart's chart of individual values: fires at a value far from the `WINDOW` before.
+def sequence(rate: str, place: str, episodes: int) -> tuple[list[str], list[int]]:
+    """The layouts of a sequence, and the number of the layout of each episode."""
+    rng = np.random.default_rng([25, int(place[1:])])
+    names = [str(name) for name in rng.permutation([*JUDGE])]
+    order = schedule(rate, episodes, rng)
+    return names[: order[-1] + 1], order
 
-    It fires if |x - mean| > LIMIT s, s the standard deviation of those, and then begins anew.
-    On independent normal values it does so falsely with the probability that a t of WINDOW - 1
-    degrees of freedom exceeds LIMIT / sqrt(1 + 1 / WINDOW): 0.001 an episode.
+
+def fires(values: Sequence[float]) -> bool:
+    """Shewhart's chart of individual values: the last is far from the `WINDOW` before, or nan.
+
+    |x - mean| > LIMIT s, where s is the standard deviation of those before. Independent normal
+    values fire falsely with the probability that a t of WINDOW - 1 degrees of freedom exceeds
+    LIMIT / sqrt(1 + 1 / WINDOW): 0.001 an episode.
     """
-
-    values: list[float] = field(default_factory=list)
-
-    def __call__(self, value: float) -> bool:
-        """Whether it fires on the next value."""
-        before = self.values[-WINDOW:]
-        self.values.append(value)
-        if len(before) < WINDOW:
-            return False
-        fires = not abs(value - np.mean(before)) <= LIMIT * np.std(before, ddof=1)
-        if fires:
-            self.values.clear()
-        return bool(fires)
+    *before, value = values[-WINDOW - 1 :]
+    if len(before) < WINDOW:
+        return False
+    return not abs(value - np.mean(before)) <= LIMIT * np.std(before, ddof=1)
 
 
 class Recent(np.random.Generator):
@@ -67,76 +73,79 @@ class Recent(np.random.Generator):
     Without replacement, with weights exp(-age / `AGE`), by the largest of Gumbel's keys.
     """
 
-    AGE = 10 * 130.0  # examples: ten episodes
-
     def choice(self, a: Any, size: Any = None, *args: Any, **options: Any) -> Any:
-        """Numbers of examples, of which there are `a`; the last is the latest."""
-        first = max(int(a) - int(8 * self.AGE), 0)  # weights below exp(-8) are nothing
+        """Numbers of `size` examples among `a`; the last is the latest."""
+        first = max(int(a) - int(8 * AGE), 0)  # weights below exp(-8) are nothing
         ages = np.arange(int(a) - first)[::-1]
-        keys = self.gumbel(size=ages.size) - ages / self.AGE
+        keys = self.gumbel(size=ages.size) - ages / AGE
         return first + np.argpartition(keys, -size)[-size:]
-
-
-@dataclass(frozen=True, eq=False)
-class Episode:
-    """The end of one episode of a changing world."""
-
-    layout: int  # the number of the true one
-    seen: int  # that of the one which the controller planned with
-    alarm: bool  # whether its chart fired at the end
-    theta: Vector
 
 
 def changing(
     nmpc: Persistent,
-    layouts: Sequence[Centres],
+    layouts: Sequence[Sequence[Motion]],
     order: Sequence[int],
-    make: Callable[[float], Learner],
+    learner: Learner,
     explore: Exploration,
     *,
-    knows: str = "told",
-    reaction: str = "plain",
-) -> Iterator[Episode]:
-    """Algorithm 1 from theta_init, where episode e is in `layouts[order[e]]`, by episodes.
+    knows: str,
+    reset: bool = False,
+    raised: Learner | None = None,
+) -> Iterator[tuple[World, bool, Vector]]:
+    """Algorithm 1 from theta_init: the world, an alarm of the chart, and theta after each episode.
 
     Args:
         nmpc: acts, and is what is learned.
-        layouts: in which it happens.
-        order: of `schedule`.
-        make: (factor of alpha) -> learner; called at most once for each factor.
+        layouts: the obstacles of each.
+        order: the number of the layout of each episode.
+        learner: moves theta.
         explore: the noise, of as many episodes.
         knows: "told", "cost", "delta" or "never".
-        reaction: "plain", "raised" or "reset", to what is known.
+        reset: whether theta begins anew after a change.
+        raised: the learner in the `FOR` episodes after a change, if it is another.
     """
-    make, world_of = cache(make), cache(partial(_world, layouts))
-    first = Weights(np.array(paper.THETA_INIT), np.full(len(paper.THETA_INIT), paper.W_INIT))
-    weights, seen, changed, chart = first, order[0], -FOR, Chart()
+    world_of = cache(lambda true, seen: World(layouts[true], seen=layouts[seen]))
+    first = Weights(THETA, np.full(THETA.size, paper.W_INIT))
+    weights, seen, changed, alarm, watched = first, order[0], -FOR, False, list[float]()
     for e, layout in enumerate(order):
-        if knows == "told" and layout != seen:
-            seen, changed = layout, e
-            weights = first if reaction == "reset" else weights
-        raised = reaction == "raised" and e - changed < FOR
-        one = Exploration(explore.noise[e : e + 1], explore.scale[e : e + 1])
+        if alarm or (knows == "told" and layout != seen):
+            seen, changed = layout if knows == "told" else order[e - 1], e
+            weights, watched = first if reset else weights, []
+        moves = raised if raised and e - changed < FOR else learner
+        noise = Exploration(explore.noise[e : e + 1], explore.scale[e : e + 1])
         world, costs, deltas = world_of(layout, seen), [0.0], [0.0]
-        try:
-            learner = make(RAISED if raised else 1.0)
-            for step in train(learner, nmpc, weights, one, **world.environment):
+        with suppress(Diverged):  # the last usable theta stays, and is judged
+            for step in train(moves, nmpc, weights, noise, **world.environment):
                 weights = weights if absurd(step.weights) else step.weights
                 costs.append(step.cost)
                 deltas.append(abs((step.update and step.update.delta) or 0.0))
-        except Diverged:
-            pass  # the last usable theta stays, and is judged
-        alarm = knows in STATISTICS and chart(
-            STATISTICS[knows](costs if knows == "cost" else deltas)
-        )
-        yield Episode(layout, seen, alarm, weights.theta)
-        if alarm:
-            seen, changed = layout, e + 1
-            weights = first if reaction == "reset" else weights
+        watched.append(sum(costs) if knows == "cost" else fmean(deltas))
+        alarm = knows in ("cost", "delta") and fires(watched)
+        yield world, alarm, weights.theta
 
 
-STATISTICS: dict[str, Callable[[list[float]], float]] = {"cost": sum, "delta": fmean}
+def shifting(rate: str, setting: tuple[str, ...], place: str, episodes: int, seed: int) -> Row:
+    """A learner where the layout changes; costs are shares of theta_init's in the same layout.
 
-
-def _world(layouts: Sequence[Centres], true: int, seen: int) -> World:
-    return World(still(layouts[true]), seen=still(layouts[seen]))
+    A remedy begins anew in the last layout of the sequence, with the remaining episodes.
+    """
+    names, order = sequence(rate, place, episodes)
+    if setting[0] == "remedy":
+        alone = judge(entry(setting[1]), names[-1], seed, order.count(order[-1]))
+        return row(alone.cost / alone.initial, arrived=alone.arrived)
+    kind, knows, reaction = setting
+    nmpc, layouts = controller(), [still(JUDGE[name]) for name in names]
+    initial = [judged(nmpc, THETA, World(each)).cost for each in layouts]
+    rng = (Recent if reaction == "recent" else np.random.Generator)(np.random.PCG64([seed, 3]))
+    learner = LEARNERS[kind].make(Experiment(), nmpc, Generators(rng, rng, rng))
+    raised = expected_sarsa(nmpc, RAISED * paper.ALPHA) if reaction == "raised" else None
+    series, events, arrived = [], [], False
+    followed = changing(nmpc, layouts, order, learner, explored(episodes, seed),
+                        knows=knows, reset=reaction == "reset", raised=raised)  # fmt: skip
+    for e, (world, alarm, theta) in enumerate(followed):
+        events += [e] if alarm else []
+        if e % EVERY == EVERY - 1 or e == episodes - 1:
+            made = judged(nmpc, theta, world)
+            series.append(made.cost / initial[order[e]])
+            arrived = made.arrived
+    return row(series[-1], arrived=arrived, series=series, events=events)

@@ -21,21 +21,12 @@ from scipy.stats import rankdata
 from nmpcrl.analysis.encounters import crowding
 from nmpcrl.analysis.suite import scenario_seed
 from nmpcrl.claims import investigation
-from nmpcrl.claims.investigation import (
-    Answer,
-    Investigation,
-    Part,
-    Question,
-    above,
-    cheaper,
-    lower,
-    share,
-)
+from nmpcrl.claims.investigation import Answer, Investigation, Part, Question, above, lower, share
 from nmpcrl.claims.rule import read
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.studies import worlds_run as runs
-from nmpcrl.studies.worlds_problems import TERMINALS
-from nmpcrl.studies.worlds_run import EVERY, sequence
+from nmpcrl.studies.shifts import EVERY, sequence, shifting
+from nmpcrl.studies.worlds_run import TERMINALS
 from nmpcrl.study.drawn import COMPARED, JUDGE, SCENARIOS
 
 BACK = 0.02  # of theta_init's cost: a share that exceeds the one before a change by less is back
@@ -51,7 +42,7 @@ RESAMPLES = 2000  # of the bootstrap over places
 
 VIEWS = ("known", "extrapolated", "frozen")
 ORACLES = ("speed", "turn", "drift", "slip")  # faults of which an oracle knows the model
-WITHOUT = ("lag", "noise")
+FAULTS = (*ORACLES, "lag", "noise")
 DEVIATIONS = ("0.02", "0.05", "0.1")  # [m] and [rad], of the measured state
 CHANGES = ("once", "every 50", "random")
 REMEDY = "Bayes[nearby=2]"  # the entry that the comparison of remedies says to try first
@@ -70,31 +61,20 @@ CHANGING = {
     **grid(["RDES", "DES"], ["told"], ["plain", "recent"]),
     **grid(["frozen"], ["cost", "delta", "never"], ["plain"]),
 }
-ONCE = CHANGING | grid(["remedy"], [REMEDY])
 PARTS = {
     "moving": Part(
-        runs.moving,
-        grid(VIEWS, ["init", "grid", "CMA-ES", "ES"]),
-        tuple(SCENARIOS),
-        50,
-        seeds=5,
+        runs.moving, grid(VIEWS, ["init", "grid", "CMA-ES", "ES"]), tuple(SCENARIOS), 50, seeds=5,
         deterministic=tuple(grid(VIEWS, ["init", "grid"])),
     ),
     "model": Part(
         runs.model,
-        grid([*ORACLES, *WITHOUT], ["init", "grid", "ES", "ES+model"])
-        | grid(ORACLES, ["oracle", "oracle+ES"]),
-        LAYOUTS[:12],
-        100,
-        seeds=2,
-        deterministic=(*grid([*ORACLES, *WITHOUT], ["init", "grid"]), *grid(ORACLES, ["oracle"])),
+        grid(FAULTS, ["init", "grid", "ES", "ES+model"]) | grid(ORACLES, ["oracle", "oracle+ES"]),
+        LAYOUTS[:12], 100, seeds=2,
+        deterministic=(*grid(FAULTS, ["init", "grid"]), *grid(ORACLES, ["oracle"])),
     ),
-    **{
-        rate: Part(
-            partial(runs.shifting, rate), ONCE if rate == "once" else CHANGING, SEQUENCES, 300
-        )
-        for rate in CHANGES
-    },
+    "once": Part(partial(shifting, "once"), CHANGING | grid(["remedy"], [REMEDY]), SEQUENCES, 300),
+    "every 50": Part(partial(shifting, "every 50"), CHANGING, SEQUENCES, 300),
+    "random": Part(partial(shifting, "random"), CHANGING, SEQUENCES, 300),
     "carry": Part(
         runs.carry, {one: one for one in ("frozen", "ES", "CMA-ES")}, LAYOUTS, 300,
         first={"frozen": 1},
@@ -110,26 +90,18 @@ def means(table: pd.DataFrame, part: str, column: str = "cost") -> pd.DataFrame:
     return found.reindex(columns=[*PARTS[part].settings(table)])
 
 
-def _view(view: str, yes: Callable[[pd.Series], pd.Series]) -> Callable[[pd.DataFrame], Answer]:
+def _view(view: str, yes: Callable[[pd.Series], pd.Series], table: pd.DataFrame) -> Answer:
     """Asked of theta_init's cost with a view, over its cost with the motion known."""
-
-    def answer(table: pd.DataFrame) -> Answer:
-        init = means(table, "moving")[[f"{view} init" for view in VIEWS]].dropna()
-        ratio = init[f"{view} init"] / init["known init"]
-        return share(yes(ratio), "scenarios", {"median ratio": float(ratio.median())})
-
-    return answer
+    init = means(table, "moving")[[f"{view} init" for view in VIEWS]].dropna()
+    ratio = init[f"{view} init"] / init["known init"]
+    return share(yes(ratio), "scenarios", {"median ratio": float(ratio.median())})
 
 
-def _inside(arms: list[str], yes: Callable[..., Any]) -> Callable[[pd.DataFrame], Answer]:
+def _inside(arms: list[str], yes: Callable[..., pd.Series], table: pd.DataFrame) -> Answer:
     """Asked of the states inside an obstacle, in scenarios where an arm has any."""
-
-    def answer(table: pd.DataFrame) -> Answer:
-        inside = means(table, "moving", "inside")[arms].dropna()
-        met = inside[(inside > 0).any(axis=1)]
-        return share(yes(*(met[arm] for arm in arms)), "scenarios")
-
-    return answer
+    inside = means(table, "moving", "inside")[arms].dropna()
+    met = inside[(inside > 0).any(axis=1)]
+    return share(yes(*(met[arm] for arm in arms)), "scenarios")
 
 
 def _crowded(table: pd.DataFrame) -> Answer:
@@ -140,7 +112,7 @@ def _crowded(table: pd.DataFrame) -> Answer:
     pairs = np.c_[[crowding(SCENARIOS[str(name)]) for name in inside.index], inside]
     rng = np.random.default_rng(0)
     drawn = [pairs[rng.integers(len(pairs), size=len(pairs))] for _ in range(RESAMPLES)]
-    low, high = np.nanquantile([_correlation(one) for one in drawn], [0.025, 0.975])
+    low, high = np.quantile([_correlation(one) for one in drawn], [0.025, 0.975])
     outcome = above(low, high)
     numbers = {"correlation": _correlation(pairs), "low": float(low), "high": float(high)}
     beside = {"scenarios with any": (int((inside > 0).sum()), len(inside))}
@@ -149,45 +121,46 @@ def _crowded(table: pd.DataFrame) -> Answer:
 
 
 def _correlation(pairs: np.ndarray) -> float:
-    """The correlation of ranks; nan where one column is constant."""
+    """The correlation of ranks; 0 where one column is constant."""
     ranks = rankdata(pairs, axis=0).T
-    return float(np.corrcoef(ranks)[0, 1]) if ranks.std(axis=1).all() else np.nan
+    return float(np.corrcoef(ranks)[0, 1]) if ranks.std(axis=1).all() else 0.0
 
 
-def saved(table: pd.DataFrame, faults: Iterable[str], policy: str) -> pd.Series:
+def saved(table: pd.DataFrame, policy: str) -> pd.Series:
     """The share of theta_init's cost that a policy saves, by fault and layout."""
     costs = means(table, "model")
+    faults = (fault for fault in FAULTS if f"{fault} {policy}" in costs)
     each = {one: 1 - costs[f"{one} {policy}"] / costs[f"{one} init"] for one in faults}
     return pd.concat(each).dropna()
 
 
 def _perfect(table: pd.DataFrame) -> Answer:
-    by_fault = saved(table, ORACLES, "oracle")
+    by_fault = saved(table, "oracle")
     medians = by_fault.groupby(level=0, sort=False).median()
     numbers = {f"{fault}, median": float(each) for fault, each in medians.items()}
     return share(by_fault < LITTLE, "faults and layouts", numbers)
 
 
 def _by_hand(table: pd.DataFrame) -> Answer:
-    gain = saved(table, (*ORACLES, *WITHOUT), "grid")
+    gain = saved(table, "grid")
     return share(gain >= MISFIT, "faults and layouts", {"median": float(gain.median())})
 
 
 def _recovered(table: pd.DataFrame) -> Answer:
-    both = pd.DataFrame({how: saved(table, ORACLES, how) for how in ("ES", "oracle")}).dropna()
+    both = pd.DataFrame({how: saved(table, how) for how in ("ES", "oracle")}).dropna()
     return share(both.oracle < both.ES, "faults and layouts")
 
 
 def _only_drift(table: pd.DataFrame) -> Answer:
     """Confirmed for drift; in part if confirmed for another fault that an oracle knows as well."""
-    faults = ("drift", *(one for one in (*ORACLES, *WITHOUT) if one != "drift"))
     counts = {
-        one: lower("model", f"{one} ES+model", f"{one} ES")(table).counts["layouts"]
-        for one in faults
+        fault: lower("model", f"{fault} ES+model", f"{fault} ES")(table).counts["layouts"]
+        for fault in FAULTS
     }
-    outcome = read(*counts["drift"])
-    also = any(read(*counts[one]) == REPRODUCED for one in ORACLES if one != "drift")
-    strict = PARTLY if also and outcome == REPRODUCED else outcome
+    outcomes = {fault: read(*counts[fault]) for fault in ORACLES}
+    outcome = outcomes.pop("drift")
+    others = REPRODUCED in outcomes.values()
+    strict = PARTLY if others and outcome == REPRODUCED else outcome
     return Answer(strict, {"layouts": counts.pop("drift"), **counts})
 
 
@@ -200,38 +173,29 @@ def _aligned(table: pd.DataFrame) -> Answer:
 def changes(part: str, place: str) -> list[int]:
     """The first episode of each new layout."""
     _, order = sequence(part, place, PARTS[part].episodes)
-    return [e for e, (before, after) in enumerate(pairwise(order), start=1) if after != before]
-
-
-def after(part: str, place: str, series: list[float]) -> float:
-    """The mean share over all rollouts since the first change; nan where there is none."""
-    begin = changes(part, place)
-    return float(np.mean(series[begin[0] // EVERY :])) if begin else np.nan
+    return (np.flatnonzero(np.diff(order)) + 1).tolist()
 
 
 def shares(table: pd.DataFrame, part: str) -> pd.DataFrame:
-    """`after` of each run, a row a place and a column an arm."""
-    there = table[(table.part == part) & table.arm.isin([*CHANGING])]
-    found = [after(part, row.place, row.series) for row in there.itertuples()]
-    return means(there.assign(share=found), part, "share")
+    """The mean share over all rollouts since the first change, a row a place, a column an arm."""
+    rows = table[(table.part == part) & table.arm.isin([*CHANGING])]
+    begin = {place: changes(part, place)[0] // EVERY for place in rows.place.unique()}
+    found = [np.mean(row.series[begin[row.place] :]) for row in rows.itertuples()]
+    return means(rows.assign(share=found), part, "share")
 
 
-def _since(first: str, second: str) -> Callable[[pd.DataFrame], Answer]:
-    def answer(table: pd.DataFrame) -> Answer:
-        both = shares(table, "every 50")[[first, second]].dropna()
-        medians = {one: float(both[one].median()) for one in (first, second)}
-        return share(both[first] < both[second], "sequences", medians)
-
-    return answer
+def _since(first: str, second: str, table: pd.DataFrame) -> Answer:
+    both = shares(table, "every 50")[[first, second]].dropna()
+    medians = {one: float(both[one].median()) for one in (first, second)}
+    return share(both[first] < both[second], "sequences", medians)
 
 
 def back(series: list[float], change: int) -> float:
     """Episodes from the last change until the cost is back; infinite if it is not."""
     first = change // EVERY
-    later = np.array(series[first:]) <= series[first - 1] + BACK
-    failed = np.flatnonzero(~later)
+    failed = np.flatnonzero(~(np.array(series[first:]) <= series[first - 1] + BACK))
     rollouts = failed[-1] + 1 if failed.size else 0
-    return float(np.inf if rollouts == len(later) else EVERY * (rollouts + 1))
+    return float(np.inf if rollouts == len(series) - first else EVERY * (rollouts + 1))
 
 
 def _back_soon(table: pd.DataFrame) -> Answer:
@@ -243,9 +207,8 @@ def _back_soon(table: pd.DataFrame) -> Answer:
 
 def noticing(begin: list[int], alarms: list[int]) -> tuple[float, float]:
     """The median delay of changes, in episodes, and false alarms an episode of a true map."""
-    ends = [*begin[1:], PARTS["every 50"].episodes]
     delays, false, true = [], sum(one < begin[0] for one in alarms), begin[0]
-    for first, end in zip(begin, ends, strict=True):
+    for first, end in pairwise([*begin, PARTS["every 50"].episodes]):
         there = [one for one in alarms if first <= one < end]
         delays.append(there[0] + 1 - first if there else EACH)
         false += len(there[1:])
@@ -253,16 +216,14 @@ def noticing(begin: list[int], alarms: list[int]) -> tuple[float, float]:
     return float(np.median(delays)), false / true
 
 
-def _chart(arm: str) -> Callable[[pd.DataFrame], Answer]:
-    def answer(table: pd.DataFrame) -> Answer:
-        rows = table[(table.part == "every 50") & (table.arm == arm)]
-        found = [noticing(changes("every 50", row.place), row.events) for row in rows.itertuples()]
-        yes = pd.Series([d <= PROMPT and f <= RARE for d, f in found], dtype=bool)
-        delay, false = np.median(found, axis=0) if found else (np.nan, np.nan)
-        numbers = {"median delay": float(delay), "median false alarms": float(false)}
-        return share(yes, "sequences", numbers)
-
-    return answer
+def _chart(arm: str, table: pd.DataFrame) -> Answer:
+    rows = table[(table.part == "every 50") & (table.arm == arm)]
+    found = pd.DataFrame(
+        [noticing(changes("every 50", row.place), row.events) for row in rows.itertuples()],
+        columns=["median delay", "median false alarms"], dtype=float,
+    )  # fmt: skip
+    delay, false = (found[name] for name in found)
+    return share((delay <= PROMPT) & (false <= RARE), "sequences", found.median().to_dict())
 
 
 def _pays(table: pd.DataFrame) -> Answer:
@@ -296,30 +257,27 @@ def solved_with(table: pd.DataFrame) -> pd.DataFrame:
     return means(solved, "terminal", "solved") == 1
 
 
-def _still_fails(kind: str) -> Callable[[pd.DataFrame], Answer]:
+def _still_fails(kind: str, table: pd.DataFrame) -> Answer:
     """Asked of the layouts where ES fails with the paper's terminal cost."""
-
-    def answer(table: pd.DataFrame) -> Answer:
-        known = means(table, "terminal")[[TERMINALS[0], kind]].dropna().index
-        solved = solved_with(table).loc[known]
-        return share(~solved[kind][~solved[TERMINALS[0]]])
-
-    return answer
+    known = means(table, "terminal")[[TERMINALS[0], kind]].dropna().index
+    solved = solved_with(table).loc[known]
+    return share(~solved[kind][~solved[TERMINALS[0]]])
 
 
 def _richer(table: pd.DataFrame) -> Answer:
     costs = means(table, "terminal")
-    return cheaper((costs["learned"] / costs[TERMINALS[0]]).dropna())
+    ratio = (costs["learned"] / costs[TERMINALS[0]]).dropna()
+    return share(ratio < 1, numbers={"median ratio": float(ratio.median())})
 
 
 TERMINAL_QUESTIONS = (
     Question("full terminal cost",
              "Does ES still fail with a full quadratic terminal cost where it fails with the"
              " paper's?",
-             REPRODUCED, _still_fails("full")),
+             REPRODUCED, partial(_still_fails, "full")),
     Question("learned terminal cost",
              "Does ES still fail with a learned terminal cost where it fails with the paper's?",
-             PARTLY, _still_fails("learned")),
+             PARTLY, partial(_still_fails, "learned")),
     Question("a richer terminal cost pays",
              "Does ES cost less with a learned terminal cost than with the paper's?",
              NOT, _richer),
@@ -328,19 +286,18 @@ _NOTICED = "Is a change noticed within 10 episodes, with at most one false alarm
 WORLD_QUESTIONS = (
     Question("a velocity is enough",
              "Does extrapolating cost at most 10 % more than knowing, with theta_init?",
-             REPRODUCED, _view("extrapolated", lambda ratio: ratio <= 1 + CLEARLY),
+             REPRODUCED, partial(_view, "extrapolated", lambda ratio: ratio <= 1 + CLEARLY),
              "The NMPC that extrapolates costs 6 % more than the one that knows the motion."),
     Question("a frozen view costs more",
              "Does a frozen view cost at least 10 % more than knowing, with theta_init?",
-             PARTLY, _view("frozen", lambda ratio: ratio >= 1 + CLEARLY),
+             PARTLY, partial(_view, "frozen", lambda ratio: ratio >= 1 + CLEARLY),
              "The NMPC that takes the obstacles as frozen costs 21 % more."),
-    Question("collisions",
-             "Is a frozen view alone in getting into an obstacle?",
+    Question("collisions", "Is a frozen view alone in getting into an obstacle?",
              PARTLY,
-             _inside([f"{view} init" for view in VIEWS], lambda one, two, _: one + two == 0),
+             partial(_inside, [f"{view} init" for view in VIEWS],
+                     lambda one, two, _: one + two == 0),
              "All collisions are those of the NMPC that takes the obstacles as frozen."),
-    Question("crowding",
-             "Do more crowded scenarios have more states inside an obstacle?",
+    Question("crowding", "Do more crowded scenarios have more states inside an obstacle?",
              REPRODUCED, _crowded),
     Question("learning among moving obstacles",
              "Does ES cost less than theta_init where it extrapolates?",
@@ -353,12 +310,12 @@ WORLD_QUESTIONS = (
              PARTLY, lower("moving", "extrapolated grid", "extrapolated ES", "scenarios")),
     Question("safer by learning",
              "Has ES fewer states inside an obstacle than theta_init, with extrapolation?",
-             NOT, _inside(["extrapolated ES", "extrapolated init"], lambda es, init: es < init)),
+             NOT, partial(_inside, ["extrapolated ES", "extrapolated init"],
+                          lambda es, init: es < init)),
     Question("a perfect model",
              "Does an oracle model save less than 2 % of the cost, with theta_init's weights?",
              REPRODUCED, _perfect, "A perfect model is worth about 1 %."),
-    Question("misfit of theta_c",
-             "Does the best theta_c of the grid save at least 5 %?",
+    Question("misfit of theta_c", "Does the best theta_c of the grid save at least 5 %?",
              PARTLY, _by_hand, "The misfit of theta_c is worth 5 to 12 %."),
     Question("only drift adds",
              "Does ES with the model's parameters cost less than ES, where the plant drifts?",
@@ -375,7 +332,7 @@ WORLD_QUESTIONS = (
              PARTLY, _back_soon),
     *(
         Question(name, f"Does {one} cost less than {other} after a change?", expected,
-                 _since(one, other))
+                 partial(_since, one, other))
         for name, one, other, expected in (
             ("a raised rate", "ES told raised", "ES told plain", NOT),
             ("theta reset", "ES told reset", "ES told plain", NOT),
@@ -385,16 +342,15 @@ WORLD_QUESTIONS = (
             ("detecting", "ES cost plain", "ES never plain", REPRODUCED),
         )
     ),
-    Question("a chart on the cost", _NOTICED, PARTLY, _chart("ES cost plain")),
-    Question("a chart on the TD error", _NOTICED, PARTLY, _chart("ES delta plain")),
+    Question("a chart on the cost", _NOTICED, PARTLY, partial(_chart, "ES cost plain")),
+    Question("a chart on the TD error", _NOTICED, PARTLY, partial(_chart, "ES delta plain")),
     Question("learning pays in a changing world",
              "Does ES, told and going on, cost less than replanning with theta_init?",
              REPRODUCED, _pays),
     Question("begun anew",
              "Does the remedy to try first, begun anew, end at a lower cost than ES that goes on?",
              REPRODUCED, lower("once", f"remedy {REMEDY}", "ES told plain", "sequences")),
-    Question("carried over",
-             "Does theta of ES cost less than theta_init in most other layouts?",
+    Question("carried over", "Does theta of ES cost less than theta_init in most other layouts?",
              PARTLY, _carries),
 )  # fmt: skip
 

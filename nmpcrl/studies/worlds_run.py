@@ -1,11 +1,13 @@
-"""Runs in worlds that move or change, with a wrong model, or with a richer terminal cost.
+"""Runs among obstacles that move, with a wrong model, or with a richer terminal cost.
 
 Each function takes the setting of an arm, a place, a number of episodes and a seed, and returns a
 row of `worlds.py`. A policy is "init", "grid" (over theta_c), "CMA-ES" or "ES"; and where the model
 can be learned "ES+model", "oracle" or "oracle+ES".
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,54 +15,82 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.analysis.encounters import judged
 from nmpcrl.analysis.search import cma_es, grid
-from nmpcrl.analysis.suite import Robot, entry, judge
+from nmpcrl.analysis.suite import Robot, entry
 from nmpcrl.claims.investigation import Condition, Row
-from nmpcrl.learning import (
-    Diverged,
-    Exploration,
-    Learner,
-    Weights,
-    deep_expected_sarsa,
-    expected_sarsa,
-    frozen,
-    regularized_deep_expected_sarsa,
-    train,
-)
+from nmpcrl.control import Nmpc
+from nmpcrl.control.problem import Parameter
+from nmpcrl.learning import Diverged, Exploration, Weights, expected_sarsa, train
 from nmpcrl.learning.rollout import Persistent, evaluate
 from nmpcrl.learning.training import absurd
-from nmpcrl.studies.shifts import Recent, changing, schedule
-from nmpcrl.studies.worlds_problems import controller, oracle
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import JUDGE, SCENARIOS
-from nmpcrl.study.faults import FAULTS, Fault
-from nmpcrl.study.moving import PREDICTORS, World, still
+from nmpcrl.study.faults import FAULTS, Fault, robot
+from nmpcrl.study.moving import PREDICTORS, TARGET, World, diagonal, problem, square, still
 
-EVERY = 5  # episodes between two rollouts of a changing world
-DRAWS = 5  # rollouts that judge theta where the body draws
+TERMINALS = ("diagonal", "full", "learned")  # the paper's first
+BELOW = ((1, 0), (2, 0), (2, 1))  # entries of the triangular factor of V^f that the paper leaves 0
+BUMPS = np.array([(x, y) for x in np.linspace(-1, 7, 5) for y in np.linspace(-1, 5, 5)])  # [m]
+WIDTHS = np.array([2.0, 1.5])  # of a bump, along x and y [m]: the distance to the next
+HEIGHT = 1000.0  # of a bump of weight 1: V_theta(s) itself is some thousands
+TURNS, MOVES = np.array([0.0, 1.0]), np.eye(2, 3)  # the input of the bias, the states of the drift
+MODEL = {
+    "gain": Parameter(np.eye(2), -2.0, 2.0),
+    "bias": Parameter(0.0, -1.0, 1.0),
+    "drift": Parameter(np.zeros(2), -0.5, 0.5),
+}
+DRAWS = 5  # rollouts that judge theta where the fault draws
 THETA = np.array(paper.THETA_INIT)
 
 
-def row(
-    cost: float,
-    inside: int = 0,
-    collisions: int = 0,
-    arrived: bool = False,
-    series: Sequence[float] = (),
-    events: Sequence[int] = (),
-) -> Row:
-    """A row; columns that a part does not measure have these values.
+def learned_model(x: Any, u: Any, th: Any, _: Any) -> Any:
+    """The robot's model under gain u + (0, bias), and then drift."""
+    applied = th["gain"] @ u + th["bias"] * TURNS
+    return robot().transition(x, applied) + robot().period * (th["drift"].T @ MOVES).T
 
-    Args:
-        cost: of the last theta; of `gradient` the cosine.
-        inside: states in an obstacle.
-        collisions: times that the robot enters one.
-        arrived: whether the robot is at the target at the end.
-        series: costs, every `EVERY` episodes or by layout; or theta.
-        events: episodes at whose end a chart fired.
-    """
+
+def full(x: Any, th: Any, _: Any) -> Any:
+    """Any positive semidefinite quadratic terminal cost of x - s_ref, by a triangular factor."""
+    away = x - TARGET
+    scaled = [th["f"][i] * away[i] for i in range(3)]
+    for k, (i, j) in enumerate(BELOW):
+        scaled[i] += th["below"][k] * away[j]
+    return square(scaled, 3)
+
+
+def bumps(x: Any, th: Any, _: Any) -> Any:
+    """The paper's terminal cost plus a weighted sum of `BUMPS`."""
+    cost = diagonal(x, th)
+    for k, bump in enumerate(BUMPS):
+        cost += HEIGHT * th["bumps"][k] / (1 + square((x[:2] - bump) / WIDTHS, 2)) ** 2
+    return cost
+
+
+RICHER: Mapping[str, dict[str, Any]] = {  # arguments of `moving.problem`
+    "diagonal": {},
+    "full": {"terminal": full, "further": {"below": np.zeros(len(BELOW))}},
+    "learned": {"terminal": bumps, "further": {"bumps": np.zeros(len(BUMPS))}},
+    "model": {"model": learned_model, "further": MODEL},
+}
+
+
+@cache
+def controller(kind: str = "diagonal", obstacles: int = 4) -> Persistent:
+    """The NMPC of a kind of `RICHER`, compiled once."""
+    return Persistent(Nmpc(problem(obstacles, **RICHER[kind])))
+
+
+def row(
+    cost: float,  # of the last theta; of `gradient` the cosine
+    inside: int = 0,  # states in an obstacle
+    collisions: int = 0,  # times that the robot enters one
+    arrived: bool = False,  # whether the robot is at the target at the end
+    series: Sequence[float] = (),  # costs, every `shifts.EVERY` episodes or by layout; or theta
+    events: Sequence[int] = (),  # episodes at whose end a chart fired
+) -> Row:
+    """A row; columns that a part does not measure have their defaults."""
     return {
-        "cost": float(cost), "inside": int(inside), "collisions": int(collisions),
-        "arrived": bool(arrived), "series": [*series], "events": [*events],
+        "cost": float(cost), "inside": inside, "collisions": collisions,
+        "arrived": arrived, "series": [*series], "events": [*events],
     }  # fmt: skip
 
 
@@ -70,54 +100,48 @@ def explored(episodes: int, seed: int) -> Exploration:
     return Exploration.draw(rng, shape, deviation=paper.NOISE, decay_rate=paper.DECAY_RATE)
 
 
-def learned(nmpc: Persistent, world: World, theta: Vector, episodes: int, seed: int) -> Vector:
-    """Train ES in a world; the last theta with which a solver can be called."""
-    weights = Weights(theta, np.full(theta.size, paper.W_INIT))
-    how: dict[str, Any] = {"rng": np.random.default_rng([seed, 1]), **world.environment}
-    try:
-        learner = expected_sarsa(nmpc, paper.ALPHA)
-        for step in train(learner, nmpc, weights, explored(episodes, seed), **how):
+def begin(nmpc: Persistent, **known: Any) -> Vector:
+    """Theta where learning begins, with known parameters of the model."""
+    assert nmpc.problem
+    return nmpc.problem.vector(**known)
+
+
+def found(
+    policy: str, nmpc: Persistent, world: World, start: Vector, episodes: int, seed: int
+) -> Vector:
+    """The theta of a policy in a world, from a start; of ES the last that a solver can take."""
+    if policy in ("init", "oracle"):
+        return start
+    if policy in ("grid", "CMA-ES"):
+        draws = iter(np.random.SeedSequence([seed, 2]).generate_state(episodes).tolist())
+        search = grid if policy == "grid" else cma_es
+        return search(lambda theta: judged(nmpc, theta, world, next(draws)).cost,
+                      start, episodes, seed)  # fmt: skip
+    weights = Weights(start, np.full(start.size, paper.W_INIT))
+    rng, explore = np.random.default_rng([seed, 1]), explored(episodes, seed)
+    learner = expected_sarsa(nmpc, paper.ALPHA)
+    with suppress(Diverged):
+        for step in train(learner, nmpc, weights, explore, rng=rng, **world.environment):
             weights = weights if absurd(step.weights) else step.weights
-    except Diverged:
-        pass  # the last usable theta is judged
     return weights.theta
 
 
-def found(policy: str, nmpc: Persistent, world: World, episodes: int, seed: int) -> Vector:
-    """The theta of a policy that begins with the nominal model."""
-    draws = iter(np.random.SeedSequence([seed, 2]).generate_state(episodes).tolist())
-    start = nmpc.nmpc.problem.theta  # type: ignore[union-attr]
-
-    def cost(theta: Vector) -> float:
-        return judged(nmpc, theta, world, next(draws)).cost
-
-    if policy == "grid":
-        return grid(cost, start, episodes)
-    if policy == "CMA-ES":
-        return cma_es(cost, start, episodes, seed)
-    return start if policy == "init" else learned(nmpc, world, start, episodes, seed)
-
-
 def moving(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row:
-    """The row of a view and a policy among obstacles that move."""
+    """A view and a policy among obstacles that move."""
     view, policy = setting
-    motions = SCENARIOS[place]
-    nmpc, world = controller(len(motions)), World(motions, PREDICTORS[view])
-    made = judged(nmpc, found(policy, nmpc, world, episodes, seed), world)
+    world = World(SCENARIOS[place], PREDICTORS[view])
+    nmpc = controller(obstacles=len(world.motions))
+    made = judged(nmpc, found(policy, nmpc, world, begin(nmpc), episodes, seed), world)
     return row(made.cost, *made.counted, made.arrived)
 
 
 def model(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row:
-    """The row of a policy in a robot with a fault; the mean cost where the fault is random."""
+    """A policy on a robot with a fault; the mean cost where the fault is random."""
     fault, policy = FAULTS[setting[0]], setting[1]
-    nmpc = controller(learned_model=policy not in ("init", "grid", "ES"))
+    nmpc = controller("diagonal" if policy in ("init", "grid", "ES") else "model")
     world = World(still(JUDGE[place]), fault=fault)
-    if policy.startswith("oracle"):
-        theta = oracle(fault)
-        if policy == "oracle+ES":
-            theta = learned(nmpc, world, theta, episodes, seed)
-    else:
-        theta = found(policy, nmpc, world, episodes, seed)
+    start = begin(nmpc, **(fault.model if policy.startswith("oracle") else {}))
+    theta = found(policy, nmpc, world, start, episodes, seed)
     draws = DRAWS if fault.slip or any(fault.noise) else 1
     made = [judged(nmpc, theta, world, draw) for draw in range(draws)]
     return row(
@@ -127,62 +151,6 @@ def model(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row
         all(each.arrived for each in made),
         theta.tolist(),
     )
-
-
-def sequence(rate: str, place: str, episodes: int) -> tuple[list[str], list[int]]:
-    """The layouts of a sequence, and the index of the layout of each episode."""
-    rng = np.random.default_rng([25, int(place[1:])])
-    names = [str(name) for name in rng.permutation([*JUDGE])]
-    order = schedule(rate, episodes, rng)
-    return names[: order[-1] + 1], order
-
-
-def begun_anew(rate: str, name: str, place: str, episodes: int, seed: int) -> Row:
-    """An entry of the suite in the last layout of a sequence, with the remaining episodes."""
-    names, order = sequence(rate, place, episodes)
-    alone = judge(entry(name), names[-1], seed, episodes - order.index(order[-1]))
-    return row(alone.cost / alone.initial, arrived=alone.arrived)
-
-
-def shifting(rate: str, setting: tuple[str, ...], place: str, episodes: int, seed: int) -> Row:
-    """A learner where the layout changes; costs are shares of theta_init's in the same layout."""
-    if setting[0] == "remedy":
-        return begun_anew(rate, setting[1], place, episodes, seed)
-    kind, knows, reaction = setting
-    names, order = sequence(rate, place, episodes)
-    layouts, nmpc = [JUDGE[name] for name in names], controller()
-    initial = [judged(nmpc, THETA, World(still(each))).cost for each in layouts]
-    make = _maker(kind, nmpc, seed, recent=reaction == "recent")
-    reacts = {"knows": knows, "reaction": "plain" if reaction == "recent" else reaction}
-    series, events, arrived = [], [], False
-    explore = explored(episodes, seed)
-    for e, each in enumerate(changing(nmpc, layouts, order, make, explore, **reacts)):
-        events += [e] if each.alarm else []
-        if e % EVERY == EVERY - 1 or e == episodes - 1:
-            world = World(still(layouts[each.layout]), seen=still(layouts[each.seen]))
-            made = judged(nmpc, each.theta, world)
-            series.append(made.cost / initial[each.layout])
-            arrived = made.arrived
-    return row(series[-1], arrived=arrived, series=series, events=events)
-
-
-def _maker(kind: str, nmpc: Persistent, seed: int, *, recent: bool) -> Callable[[float], Learner]:
-    """A function that makes a learner, given a factor of alpha."""
-    plain: dict[str, Callable[[float], Learner]] = {
-        "ES": lambda factor: expected_sarsa(nmpc, factor * paper.ALPHA),
-        "frozen": lambda _: frozen(nmpc),
-    }
-    if kind in plain:
-        return plain[kind]
-    from nmpcrl.learning.network import QNetwork  # and torch, which takes seconds
-
-    bits = np.random.PCG64([seed, 3])
-    rng = Recent(bits) if recent else np.random.Generator(bits)
-    size, learner = {
-        "DES": (5, deep_expected_sarsa), "RDES": (5 + THETA.size, regularized_deep_expected_sarsa),
-    }[kind]  # fmt: skip
-    network = QNetwork(size, rng, paper.ZETA, paper.BATCH, paper.HIDDEN)
-    return lambda factor: learner(nmpc, network, factor * paper.ALPHA)
 
 
 def carry(name: str, place: str, episodes: int, seed: int) -> Row:
@@ -195,15 +163,13 @@ def carry(name: str, place: str, episodes: int, seed: int) -> Row:
 
 def gradient(deviation: float, place: str, episodes: int, seed: int) -> Row:
     """The cosine of the summed steps of ES at theta_init with noise in the state and without."""
-    sums = []
+    nmpc, explore, sums = controller(), explored(episodes, seed), []
     for each in (0.0, deviation):
         world = World(still(JUDGE[place]), fault=Fault(noise=(each,) * 3))
-        nmpc, summed = controller(), np.zeros(THETA.size)
-        weights = Weights(THETA, np.zeros(THETA.size))
-        # the published draws: those of `explored`, since [seed, 0] is the stream of seed
-        how: dict[str, Any] = {"rng": np.random.default_rng(seed), **world.environment}
-        explore = explored(episodes, seed)
-        for step in train(expected_sarsa(nmpc, 0.0), nmpc, weights, explore, **how):
+        weights, summed = Weights(THETA, np.zeros(THETA.size)), np.zeros(THETA.size)
+        rng = np.random.default_rng(seed)  # the published draws: the stream [seed, 0] of `explored`
+        learner = expected_sarsa(nmpc, 0.0)
+        for step in train(learner, nmpc, weights, explore, rng=rng, **world.environment):
             if step.update and step.solution and step.update.delta is not None:
                 summed += step.update.delta * step.solution.features
         sums.append(summed)
@@ -214,20 +180,23 @@ def gradient(deviation: float, place: str, episodes: int, seed: int) -> Row:
 
 def terminal(kind: str, place: str, episodes: int, seed: int) -> Row:
     """ES with a terminal cost, in the paper's world; costs are shares of theta_init's."""
-    nmpc, world = controller(terminal=kind), World(still(JUDGE[place]))
-    start = nmpc.nmpc.problem.theta  # type: ignore[union-attr]
-    theta = learned(nmpc, world, start, episodes, seed)
+    nmpc, world = controller(kind), World(still(JUDGE[place]))
+    start = begin(nmpc)
+    theta = found("ES", nmpc, world, start, episodes, seed)
     initial, made = (judged(nmpc, each, world) for each in (start, theta))
     return row(made.cost / initial.cost, *made.counted, made.arrived, theta.tolist())
 
 
+CONTROLLERS = {  # kind and number of obstacles, by part; others have ("diagonal", 4)
+    "moving": [("diagonal", size) for size in sorted({*map(len, SCENARIOS.values())})],
+    "model": [("diagonal", 4), ("model", 4)],
+    "terminal": [(kind, 4) for kind in TERMINALS],
+}
+
+
 def compile_ahead(missing: Iterable[tuple[Condition, Any]]) -> None:
     """Compile each controller once, so that no row includes the time of a compilation."""
-    kinds: dict[tuple[int, bool, str], None] = {}
-    for one, setting in missing:
-        size = len(SCENARIOS[one.place]) if one.part == "moving" else 4
-        richer = one.part == "model" and setting[1] not in ("init", "grid", "ES")
-        kinds[size, richer, setting if one.part == "terminal" else ""] = None
-    for size, learned_model, kind in kinds:
-        nmpc = controller(size, learned_model=learned_model, **({"terminal": kind} if kind else {}))
-        nmpc.solve(np.array(paper.START), nmpc.nmpc.problem.theta)  # type: ignore[union-attr]
+    for part in {one.part for one, _ in missing}:
+        for each in CONTROLLERS.get(part, [("diagonal", 4)]):
+            nmpc = controller(*each)
+            nmpc.solve(np.array(paper.START), begin(nmpc))

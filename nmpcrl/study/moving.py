@@ -1,8 +1,5 @@
 """The robot's task among moving obstacles as a `Problem`, and the environment that has them.
 
-A motion is a function of the time in seconds, negative times included. A predictor gives the
-centres of the obstacles at the stages of a plan, by what is known at the first stage.
-
     min   sum_i gamma^i (||theta_x (x_i - s_ref)||^2 + ||theta_u u_i||^2 + omega' sigma_i) + ...
     s.t.  Xi(x_i, o_i) + theta_c <= sigma_i
 
@@ -14,9 +11,8 @@ state if a second solve with the data of t + 1 bootstraps it, and if the predict
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cache
-from math import sqrt
 from types import MappingProxyType
 from typing import Any
 
@@ -25,20 +21,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc, Problem
-from nmpcrl.control.nmpc import HORIZON
 from nmpcrl.control.problem import Soft
 from nmpcrl.control.task import Task, overlap
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import paper
-from nmpcrl.study.faults import NONE, Body, Fault, robot
+from nmpcrl.study.faults import NONE, Fault, robot
 
 TARGET, LOWER, UPPER = map(np.array, (paper.TARGET, paper.LOWER, paper.UPPER))
 TASK: Task = replace(paper.task(), obstacles=())  # its numbers are those of the charge
 CLEARANCE = 2.5  # d_rob + d_obs [m]
 PERIOD = 0.2  # [s] of a step
+STAGES = np.arange(paper.HORIZON + 1)  # of a plan
 Point = tuple[float, float]
 Motion = Callable[[Vector], Vector]  # times [s], shape (k,) -> centres [m], shape (k, 2)
-Predictor = Callable[[Sequence[Motion], int, int], Vector]
+Predictor = Callable[[Sequence[Motion], int], Vector]  # (motions, t) -> shape (N + 1, M, 2)
 
 
 @dataclass(frozen=True)
@@ -49,7 +45,6 @@ class Straight:
     velocity: Point = (0.0, 0.0)  # [m/s]
 
     def __call__(self, seconds: Vector) -> Vector:
-        """The centre at some times."""
         return np.asarray(self.centre, float) + np.multiply.outer(seconds, self.velocity)
 
 
@@ -63,7 +58,6 @@ class Sinusoidal:
     phase: float = 0.0  # at the start [rad]
 
     def __call__(self, seconds: Vector) -> Vector:
-        """The centre at some times."""
         swing = np.sin(2 * np.pi * np.asarray(seconds) / self.period + self.phase)
         return np.asarray(self.centre, float) + np.multiply.outer(swing, self.reach)
 
@@ -83,14 +77,12 @@ class Polynomial:
     phase: float = 0.0  # s at the start, on the way up
 
     def __call__(self, seconds: Vector) -> Vector:
-        """The centre at some times."""
         way = np.asarray(seconds) * self.speed / np.hypot(*self.along) + self.phase
         s = 1 - np.abs((way + 1) % 4 - 2)  # up to 1, down to -1, and up again
         height = np.polynomial.polynomial.polyval(s, self.coefficients)
         across = (-self.along[1], self.along[0])
-        turned = np.multiply.outer(s, self.along) + np.multiply.outer(height, across)
-        moved: Vector = np.asarray(self.centre, float) + turned
-        return moved
+        turned: Vector = np.multiply.outer(s, self.along) + np.multiply.outer(height, across)
+        return np.asarray(self.centre, float) + turned
 
 
 KINDS: dict[str, Callable[..., Motion]] = {
@@ -109,21 +101,21 @@ def still(layout: Sequence[Point]) -> tuple[Motion, ...]:
     return tuple(Straight((float(x), float(y))) for x, y in layout)
 
 
-def known(motions: Sequence[Motion], t: int, horizon: int = HORIZON) -> Vector:
-    """The true centres, shape (N + 1, M, 2)."""
-    return centres(motions, np.arange(t, t + horizon + 1))
+def known(motions: Sequence[Motion], t: int) -> Vector:
+    """The true centres at the stages of the plan of step t, shape (N + 1, M, 2)."""
+    return centres(motions, t + STAGES)
 
 
-def extrapolated(motions: Sequence[Motion], t: int, horizon: int = HORIZON) -> Vector:
+def extrapolated(motions: Sequence[Motion], t: int) -> Vector:
     """The velocity of the last step, continued; exact where the velocity is constant."""
     before, now = centres(motions, [t - 1, t])
-    ahead: Vector = now + np.multiply.outer(np.arange(horizon + 1), now - before)
+    ahead: Vector = now + np.multiply.outer(STAGES, now - before)
     return ahead
 
 
-def frozen(motions: Sequence[Motion], t: int, horizon: int = HORIZON) -> Vector:
+def frozen(motions: Sequence[Motion], t: int) -> Vector:
     """The present centres, at all stages."""
-    return np.repeat(centres(motions, [t]), horizon + 1, axis=0)
+    return np.repeat(centres(motions, [t]), len(STAGES), axis=0)
 
 
 PREDICTORS: dict[str, Predictor] = {
@@ -143,8 +135,7 @@ def transition(x: Any, u: Any, *_: Any) -> Any:
 
 def diagonal(x: Any, th: Any, *_: Any) -> Any:
     """The paper's terminal cost."""
-    away = x - TARGET
-    return square([th["f"][i] * away[i] for i in range(3)], 3)
+    return square(th["f"] * (x - TARGET), 3)
 
 
 def problem(
@@ -156,11 +147,7 @@ def problem(
 ) -> Problem:
     """Eq. (2) among obstacles whose centres are data.
 
-    Args:
-        obstacles: M.
-        model: (x, u, theta, data) -> next x.
-        terminal: (x, theta, data) -> cost.
-        further: parameters of these two, behind the paper's in theta.
+    Parameters of the model or the terminal cost, `further`, follow the paper's in theta.
     """
     first = np.array(paper.THETA_INIT)
     theta: dict[str, Any] = {"x": first[:3], "u": first[3:5], "f": first[5:8], "c": first[8]}
@@ -173,7 +160,7 @@ def problem(
         return [overlap(x[0], x[1], at[j, 0], at[j, 1], CLEARANCE) + th["c"]
                 for j in range(obstacles)]  # fmt: skip
 
-    def walls(x: Any, _: Any, __: Any, ___: Any) -> Any:
+    def walls(x: Any, *_: Any) -> Any:
         return [side for i in (0, 1) for side in (x[i] - UPPER[i], LOWER[i] - x[i])]
 
     return Problem(
@@ -192,15 +179,12 @@ def controller(obstacles: int = 4) -> Persistent:
 
 def charge(state: Vector, action: Vector, at: Matrix) -> float:
     """Eq. (20) among obstacles at some centres, shape (M, 2), to the last bit of `stage_cost`."""
-    away, weights = (state - TARGET).tolist(), TASK.weights.tolist()
-    cost: float = sum(w * (a * a) for w, a in zip(weights, away, strict=True))
-    if sqrt(sum(a * a for a in away)) < TASK.near:
-        return cost + sqrt(sum(a * a for a in action.tolist()))
+    cost = TASK.stage_cost(state, action)
+    if TASK.distance(state) < TASK.near:
+        return cost
     x, y = state[:2].tolist()
-    entered = sum(
-        max(0.0, overlap(x, y, cx, cy, CLEARANCE) + TASK.margin) for cx, cy in at.tolist()
-    )
-    return float(cost + TASK.penalty * entered)
+    entered = (overlap(x, y, cx, cy, CLEARANCE) + TASK.margin for cx, cy in at.tolist())
+    return cost + float(TASK.penalty * sum(max(0.0, one) for one in entered))
 
 
 def inside(states: Matrix, motions: Sequence[Motion]) -> NDArray[np.bool_]:
@@ -211,31 +195,20 @@ def inside(states: Matrix, motions: Sequence[Motion]) -> NDArray[np.bool_]:
     return found
 
 
+@dataclass(eq=False)
 class World:
     """Plant, start and data of `train` and `evaluate`, with a clock, for one run at a time."""
 
-    def __init__(
-        self,
-        motions: Sequence[Motion],
-        predict: Predictor = known,
-        *,
-        fault: Fault = NONE,
-        seen: Sequence[Motion] | None = None,
-    ) -> None:
-        """Set up the environment.
+    motions: Sequence[Motion]  # of the obstacles
+    predict: Predictor = known  # one of `PREDICTORS`
+    _: KW_ONLY
+    fault: Fault = NONE  # the difference between plant and model
+    seen: Sequence[Motion] = ()  # motions that the controller predicts, by default `motions`
 
-        Args:
-            motions: of the obstacles.
-            predict: one of `PREDICTORS`.
-            fault: difference between body and model.
-            seen: motions that the controller predicts; `motions` if absent.
-        """
-        self.motions, self.predict, self.fault = tuple(motions), predict, fault
-        self.seen = self.motions if seen is None else tuple(seen)
+    def __post_init__(self) -> None:
         self.states: list[Vector] = []  # of the episode so far, without noise
-        self._body = Body(NONE, np.eye(2))
         self._at = centres(self.motions, np.arange(paper.STEPS + 1))
-        self._predicted: dict[int, Matrix] = {}
+        self._data: dict[int, dict[str, Matrix]] = {}
 
     @property
     def environment(self) -> dict[str, Any]:
@@ -243,21 +216,22 @@ class World:
         return {"plant": self.step, "start": self.begin, "data": self.data}
 
     def begin(self, rng: np.random.Generator) -> Vector:
-        """Set the clock to 0, draw the body of the episode, and return the measured start."""
-        self._body, self.states = self.fault.draw(rng), [np.array(paper.START)]
-        return self._body.measure(self.states[0], rng)
+        """Set the clock to 0, draw the fault of the episode, and return the measured start."""
+        self._gain, self._inputs = self.fault.gain(rng), np.zeros(2)
+        self.states = [np.array(paper.START)]
+        return self.fault.measure(self.states[0], rng)
 
     def step(
         self, _: Vector, action: Vector, rng: np.random.Generator
     ) -> tuple[Vector, float, bool]:
         """The next state as measured, and the charge of the true state."""
-        state = self.states[-1]
-        at = self._at[len(self.states) - 1]
-        self.states.append(self._body.step(state, action))
-        return self._body.measure(self.states[-1], rng), charge(state, action, at), False
+        state, at = self.states[-1], self._at[len(self.states) - 1]
+        self._inputs = self.fault.follow(self._inputs, action)
+        self.states.append(self.fault.step(state, self._gain @ self._inputs))
+        return self.fault.measure(self.states[-1], rng), charge(state, action, at), False
 
     def data(self, t: int) -> dict[str, Matrix]:
         """The predicted centres at the stages of a plan that begins at t."""
-        if t not in self._predicted:
-            self._predicted[t] = self.predict(self.seen, t, paper.HORIZON)
-        return {"centres": self._predicted[t]}
+        if t not in self._data:
+            self._data[t] = {"centres": self.predict(self.seen or self.motions, t)}
+        return self._data[t]

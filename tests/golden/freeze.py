@@ -519,8 +519,8 @@ def solved_with_a_terminal_cost() -> Any:
 
 @entry("worlds")
 def saved_with_a_wrong_model() -> Any:
-    found = world_report.saved(worlds.means(changing(), "model"))
-    return {f: {how: one.median() for how, one in by.items()} for f, by in found.items()}
+    found = world_report.saved(changing()).groupby(level=0, sort=False)
+    return {fault: each.median().dropna().to_dict() for fault, each in found}
 
 
 @entry("worlds")

@@ -14,17 +14,17 @@ from nmpcrl.study.moving import still
 
 
 def test_what_is_saved_is_a_share_of_the_same_layout_and_there_is_no_oracle_of_a_lag():
-    costs = pd.DataFrame(index=["J001", "J002"])
-    for fault in (*ORACLES, "lag"):
-        costs[f"{fault} init"] = [100.0, 200.0]
-        for how in worlds.OWN if fault in ORACLES else worlds.OWN[1:]:
-            costs[f"{fault} {how}"] = [90.0, np.nan] if how == "grid" else [95.0, 190.0]
-    costs["noise init"] = costs["noise ES"] = costs["noise ES+model"] = costs["noise grid"] = np.nan
-    found = worlds.saved(costs)
-    assert [*found] == [*ORACLES, "lag"]  # noise has no runs
-    assert "oracle" not in found["lag"]
-    assert found["speed"]["grid"].to_dict() == pytest.approx({"J001": 0.1})
-    assert worlds.by_policy(found)["ES"]["lag"].tolist() == pytest.approx([0.05, 0.05])
+    costs = {f"{fault} {how}": cost for fault in (*ORACLES, "lag")
+             for how, cost in {"init": 100.0, "oracle": 95.0, "ES": 95.0, "grid": 90.0}.items()
+             if (fault, how) != ("lag", "oracle")}  # fmt: skip
+    rows = [{"part": "model", "arm": arm, "place": place, "cost": cost * size}
+            for arm, cost in costs.items() for place, size in (("J001", 1), ("J002", 2))
+            if "grid" not in arm or place == "J001"]  # fmt: skip
+    found = worlds.saved(pd.DataFrame(rows))
+    assert [*found.index.unique(0)] == [*ORACLES, "lag"]  # noise has no rows
+    assert found.oracle["lag"].isna().all()
+    assert found.grid["speed"].dropna().to_dict() == pytest.approx({"J001": 0.1})
+    assert found.ES["lag"].tolist() == pytest.approx([0.05, 0.05])
 
 
 def test_what_is_not_decided_is_not_listed():

@@ -27,7 +27,9 @@ def test_mpcrls_step_of_newton_is_a_normalised_semi_gradient():
 def decided(tests, informed, best, spread):
     """Which predictions come true of given costs of arms, references and one seed's spread."""
     references = pd.Series({"informed": informed, "best_policy": best})
-    given = Runs(tests, pd.DataFrame(), references, pd.DataFrame([spread]))
+    courses = [(k, arm, costs[k]) for arm, costs in tests.items() for k in range(50)]
+    courses = pd.DataFrame(courses, columns=["k", "arm", "test"])
+    given = Runs(courses, references, pd.DataFrame([spread]))
     answers = OTHER_PROBLEMS.judge(given).values()
     return "".join({REPRODUCED: "1", NOT: "0"}[one.outcome] for one in answers)
 
@@ -56,6 +58,6 @@ def test_a_published_run_is_made_again_and_ours_learns_as_mpcrl_does():
     assert again["costs"][0] == pytest.approx(known.costs[0], rel=0.05)
     nmpc, theta = study.controller(), gz.problem().theta
     assert lstd_q(nmpc, 0.05, every=1).name == "LSTD-Q"
-    costs, path = study.q_learn(theta, np.full(3, -0.05))
-    assert costs.shape == (3,)
+    cost, path = study.q_learn(theta, np.full(3, -0.05))
+    assert cost > 0
     assert path.shape == (3, theta.size)

@@ -1,4 +1,4 @@
-"""A layout that changes: when, what a chart notices, and what a learner then does."""
+"""Layouts that change: when, what a chart notices, and what a learner then does."""
 
 import numpy as np
 import pytest
@@ -7,11 +7,26 @@ from scipy.stats import t
 from nmpcrl.learning import Diverged, Exploration
 from nmpcrl.learning.training import Step
 from nmpcrl.studies import shifts
-from nmpcrl.studies.shifts import FOR, LIMIT, RAISED, WINDOW, Chart, Recent, changing, schedule
+from nmpcrl.studies.shifts import (
+    AGE,
+    EVERY,
+    FOR,
+    LIMIT,
+    RAISED,
+    WINDOW,
+    Recent,
+    changing,
+    fires,
+    schedule,
+    sequence,
+    shifting,
+)
 from nmpcrl.study import paper
+from nmpcrl.study.moving import still
 
-TWO = (paper.LAYOUTS["A"], paper.LAYOUTS["D"])
+TWO = [still(paper.LAYOUTS[name]) for name in "AD"]
 RNG = np.random.default_rng
+STEADY = RNG(0).normal(4000.0, 30.0, 30).tolist()
 
 
 def test_a_layout_changes_once_every_fifty_episodes_or_by_chance():
@@ -22,76 +37,69 @@ def test_a_layout_changes_once_every_fifty_episodes_or_by_chance():
     assert {one[0] for one in drawn} == {0}
 
 
+def test_a_sequence_brings_another_layout_with_each_change_and_is_the_same_for_all_arms():
+    names, order = sequence("every 50", "S01", 300)
+    assert len({*names}) == 6 == order[-1] + 1
+    assert sequence("every 50", "S01", 300) == (names, order)
+    assert sequence("every 50", "S02", 300)[0] != names
+    assert sequence("once", "S01", 300)[0] == names[:2]
+
+
 def test_the_false_alarms_of_stationary_costs_are_as_many_as_the_law_of_t_says():
-    rng, values = RNG(0), 60_000
-    chart = Chart()
-    fired = sum(chart(one) for one in rng.normal(4000.0, 30.0, values))
-    falsely = 2 * t.sf(LIMIT / np.sqrt(1 + 1 / WINDOW), WINDOW - 1)  # each, as its class says
-    assert fired == pytest.approx(falsely * (values - WINDOW), rel=0.35)
-    assert 20 < fired < 100
+    drawn = RNG(0).normal(4000.0, 30.0, 60_000)
+    fired = sum(fires(drawn[: e + 1][-WINDOW - 1 :]) for e in range(len(drawn)))
+    falsely = 2 * t.sf(LIMIT / np.sqrt(1 + 1 / WINDOW), WINDOW - 1)  # each, as `fires` says
+    assert fired == pytest.approx(falsely * (len(drawn) - WINDOW), rel=0.35)
 
 
-def test_a_chart_fires_on_a_jump_at_once_either_way_and_then_begins_anew():
-    for jump in (500.0, -500.0):
-        rng, chart = RNG(0), Chart()
-        before = [chart(one) for one in rng.normal(4000.0, 30.0, 40)]
-        assert not any(before)
-        assert chart(4000.0 + jump)
-        assert not any(chart(4000.0 + jump * k) for k in range(WINDOW))
-
-
-def test_what_is_not_finite_is_an_alarm():
-    chart = Chart()
-    for one in RNG(2).normal(size=WINDOW):
-        chart(one)
-    assert chart(np.nan)
+@pytest.mark.parametrize("last", [4500.0, 3500.0, np.nan])
+def test_a_chart_fires_on_a_jump_either_way_and_on_nan_once_its_window_is_full(last):
+    assert not fires(STEADY)
+    assert fires([*STEADY, last])
+    assert fires([*STEADY[:WINDOW], last])
+    assert not fires([*STEADY[: WINDOW - 1], last])
 
 
 def test_a_replay_that_prefers_what_is_late_draws_no_example_twice():
     rng = Recent(np.random.PCG64(0))
     drawn = np.array([rng.choice(20_000, 128, replace=False) for _ in range(200)])
     assert all(len({*row}) == 128 for row in drawn.tolist())
-    ages = 19_999 - drawn
-    assert ages.mean() == pytest.approx(Recent.AGE, rel=0.15)
+    assert (19_999 - drawn).mean() == pytest.approx(AGE, rel=0.15)
     assert {*rng.choice(128, 128, replace=False).tolist()} == {*range(128)}
 
 
 @pytest.fixture
 def trained(monkeypatch):
-    """Nothing is trained: each episode adds the factor of alpha to theta."""
-    monkeypatch.setattr(shifts, "train", _train)
+    """Nothing is trained: each episode adds the number that is the learner to theta."""
 
-    def follow(order, costs=None, **reacts):
-        _train.costs = iter(costs if costs is not None else [1.0] * len(order))
+    def follow(order, costs=(), **reacts):
+        each = iter([*costs, *[1.0] * (len(order) - len(costs))])
+
+        def train(learner, _, weights, explore, **world):
+            assert explore.scale.shape == (1, 1)
+            moved, cost = weights.__class__(weights.theta + learner, weights.w), next(each)
+            if cost is None:
+                raise Diverged("so be it")
+            yield Step(0, 0, None, moved, None, cost=cost)
+
+        monkeypatch.setattr(shifts, "train", train)
         noise = Exploration(np.zeros((len(order), 1, 2)), np.zeros((len(order), 1)))
-        return [*changing(None, TWO, order, lambda factor: factor, noise, **reacts)]
+        return [*changing(None, TWO, order, 1.0, noise, **reacts)]
 
     return follow
 
 
-def _train(factor, _, weights, explore, **world):
-    assert explore.scale.shape == (1, 1)
-    moved = weights.__class__(weights.theta + factor, weights.w)
-    cost = next(_train.costs)
-    if cost is None:
-        raise Diverged("so be it")
-    yield Step(0, 0, None, moved, None, cost=cost)
-
-
 def moved(episodes):
-    return [float(one.theta[0] - paper.THETA_INIT[0]) for one in episodes]
+    return [float(theta[0] - paper.THETA_INIT[0]) for _, _, theta in episodes]
 
 
 def test_a_change_that_is_told_resets_theta_or_raises_the_rate_for_a_while(trained):
     order = [0] * 3 + [1] * (FOR + 2)
-    assert moved(trained(order))[-1] == pytest.approx(FOR + 5)
-    assert moved(trained(order, reaction="reset"))[2:5] == pytest.approx([3, 1, 2])
-    raised = moved(trained(order, reaction="raised"))
+    assert moved(trained(order, knows="told"))[-1] == pytest.approx(FOR + 5)
+    assert moved(trained(order, knows="told", reset=True))[2:5] == pytest.approx([3, 1, 2])
+    raised = moved(trained(order, knows="told", raised=RAISED))
     assert raised[2:4] == pytest.approx([3, 3 + RAISED])
     assert raised[-1] == pytest.approx(3 + FOR * RAISED + 2)
-
-
-STEADY = RNG(0).normal(4000.0, 30.0, 30).tolist()
 
 
 @pytest.mark.parametrize(
@@ -99,15 +107,33 @@ STEADY = RNG(0).normal(4000.0, 30.0, 30).tolist()
     [
         ([0, 1, 1], [1.0] * 3, "never", [0, 0, 0], [], [1, 2, 3]),
         ([0] * 30 + [1] * 2, [*STEADY, 5000.0, 5000.0], "cost", [*[0] * 31, 1], [30], [31, 1]),
-        ([0] * 32, [*STEADY, 5000.0, 4000.0], "cost", [0] * 32, [30], [31, 1]),  # a false alarm
+        ([0] * 32, [*STEADY, 5000.0, 9000.0], "cost", [0] * 32, [30], [31, 1]),  # a false alarm
         ([0, 0, 0], [1.0, None, 1.0], "told", [0, 0, 0], [], [1, 1, 2]),  # diverges, keeps theta
     ],
 )
 def test_a_learner_reacts_to_what_its_controller_knows(
     trained, order, costs, knows, seen, alarms, theta
 ):
-    found = trained(order, costs, knows=knows, reaction="reset")
-    assert [one.layout for one in found] == order
-    assert [one.seen for one in found] == seen
-    assert [e for e, one in enumerate(found) if one.alarm] == alarms
+    found = trained(order, costs, knows=knows, reset=True)
+    assert [TWO.index(world.motions) for world, _, _ in found] == order
+    assert [TWO.index(world.seen) for world, _, _ in found] == seen
+    assert [e for e, (_, alarm, _) in enumerate(found) if alarm] == alarms
     assert moved(found)[-len(theta) :] == pytest.approx(theta)
+
+
+@pytest.mark.parametrize(
+    "setting", [("ES", "told", "raised"), ("RDES", "told", "recent"), ("frozen", "never", "plain")]
+)
+def test_a_changing_layout_is_judged_every_few_episodes_beside_theta_init(setting):
+    row = shifting("once", setting, "S01", 2 * EVERY, 0)
+    assert len(row["series"]) == 2
+    assert row["cost"] == row["series"][-1]
+    assert row["events"] == []
+    if setting[0] == "frozen":
+        assert row["series"][0] == 1.0  # theta_init with a true map
+        assert row["series"][1] > 1.0  # and with the map of the first layout
+
+
+def test_a_remedy_begins_anew_in_the_second_layout_with_the_episodes_that_are_left():
+    row = shifting("once", ("remedy", "grid"), "S01", 22, 7)
+    assert 0 < row["cost"] <= 1

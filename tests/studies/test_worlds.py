@@ -6,7 +6,7 @@ import pytest
 
 from nmpcrl.analysis.encounters import crowding
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.studies.worlds import CHANGES, PARTS, REMEDY, WORLDS, after, back, changes, noticing
+from nmpcrl.studies.worlds import CHANGES, PARTS, REMEDY, WORLDS, back, changes, noticing, shares
 from nmpcrl.study.drawn import SCENARIOS
 
 COLUMNS = [*WORLDS.table().columns]
@@ -44,7 +44,9 @@ def test_a_cost_is_back_at_the_rollout_after_which_it_stays():
 
 def test_a_share_is_averaged_from_the_first_change_on():
     assert changes("every 50", "S01") == [50, 100, 150, 200, 250]
-    assert after("every 50", "S01", [*[1.0] * 10, *[0.8] * 50]) == pytest.approx(0.8)
+    some = rows("every 50", "ES told plain", series=[*[1.0] * 10, *[0.8] * 50])
+    found = shares(pd.DataFrame(some), "every 50")["ES told plain"]
+    assert found.to_dict() == pytest.approx(dict.fromkeys(PARTS["every 50"].places, 0.8))
 
 
 def test_an_alarm_where_the_map_is_true_is_false_and_a_change_unnoticed_counts_whole():
@@ -120,12 +122,18 @@ def test_an_answer_has_its_numbers():
     assert found["back soon"].numbers == {"median episodes": 5.0}
 
 
-@pytest.mark.parametrize(("sign", "outcome"), [(1, REPRODUCED), (-1, NOT)])
-def test_states_inside_rise_or_fall_with_crowding(sign, outcome):
-    rank = {
-        name: i for i, name in enumerate(sorted(SCENARIOS, key=lambda m: crowding(SCENARIOS[m])))
-    }
-    order = [*PARTS["moving"].places]
-    found = answered(rows("moving", "extrapolated init", inside=lambda i: sign * rank[order[i]]))
+@pytest.mark.parametrize(
+    ("inside", "outcome", "correlation"),
+    [
+        (lambda rank: rank, REPRODUCED, 1),
+        (lambda rank: -rank, NOT, -1),
+        (lambda rank: 0, PARTLY, 0),
+        (lambda rank: rank == 39, PARTLY, 0.27),  # one scenario alone shows nothing
+    ],
+)
+def test_states_inside_rise_or_fall_with_crowding(inside, outcome, correlation):
+    order = sorted(SCENARIOS, key=lambda name: crowding(SCENARIOS[name]))
+    ranks = [order.index(place) for place in PARTS["moving"].places]
+    found = answered(rows("moving", "extrapolated init", inside=lambda i: inside(ranks[i])))
     assert found["crowding"].outcome == outcome
-    assert found["crowding"].numbers["correlation"] == pytest.approx(sign)
+    assert found["crowding"].numbers["correlation"] == pytest.approx(correlation, abs=0.01)

@@ -1,4 +1,4 @@
-"""Runs in worlds that change: each kind once and short, and the same again by its seed."""
+"""Runs in worlds that move or are not the model: each kind once, short, and again by its seed."""
 
 import numpy as np
 import pytest
@@ -6,12 +6,12 @@ import pytest
 from nmpcrl.analysis.encounters import judged
 from nmpcrl.studies import worlds_run
 from nmpcrl.studies.worlds import PARTS, WORLDS
-from nmpcrl.studies.worlds_problems import controller
-from nmpcrl.studies.worlds_run import EVERY, begun_anew, sequence
+from nmpcrl.studies.worlds_run import RICHER, TERMINALS, begin, controller
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import JUDGE, SCENARIOS
 from nmpcrl.study.moving import World, frozen, still
 
+THETA = np.array(paper.THETA_INIT)
 FOUR = next(name for name, one in SCENARIOS.items() if len(one) == 4)  # compiled for most tests
 
 
@@ -43,7 +43,7 @@ def test_the_same_run_has_the_same_numbers_and_another_seed_others(part, arm, pl
 
 def test_a_frozen_view_fares_as_its_world_says():
     row = ran("moving", "frozen init", FOUR)
-    made = judged(controller(4), np.array(paper.THETA_INIT), World(SCENARIOS[FOUR], frozen))
+    made = judged(controller(), THETA, World(SCENARIOS[FOUR], frozen))
     assert (row["cost"], row["inside"], row["collisions"]) == (made.cost, *made.counted)
 
 
@@ -62,30 +62,6 @@ def test_the_parameters_of_the_model_are_learned_and_the_oracle_knows_them():
     assert oracle["series"][9:] == pytest.approx([1, 0, 0, 1, 0, 0, 0.08])
 
 
-def test_a_sequence_brings_another_layout_with_each_change_and_is_the_same_for_all_arms():
-    names, order = sequence("every 50", "S01", 300)
-    assert len({*names}) == 6 == order[-1] + 1
-    assert sequence("every 50", "S01", 300) == (names, order)
-    assert sequence("every 50", "S02", 300)[0] != names
-    assert sequence("once", "S01", 300)[0] == names[:2]
-
-
-@pytest.mark.parametrize("arm", ["ES told raised", "RDES told recent", "frozen never plain"])
-def test_a_changing_layout_is_judged_every_few_episodes_beside_theta_init(arm):
-    row = ran("once", arm, "S01", 2 * EVERY)
-    assert len(row["series"]) == 2
-    assert row["cost"] == row["series"][-1]
-    assert row["events"] == []
-    if arm.startswith("frozen"):
-        assert row["series"][0] == 1.0  # theta_init with a true map
-        assert row["series"][1] > 1.0  # and with the map of the first layout
-
-
-def test_a_remedy_begins_anew_in_the_second_layout_with_the_episodes_that_are_left():
-    row = begun_anew("once", "grid", "S01", 22, 7)
-    assert 0 < row["cost"] <= 1
-
-
 @pytest.mark.slow
 def test_theta_is_carried_to_every_layout_and_theta_init_costs_what_it_costs_at_home():
     row = ran("carry", "frozen", "J002", 1)
@@ -97,6 +73,29 @@ def test_the_cost_with_a_terminal_cost_is_a_share_of_theta_init_s_in_the_same_la
     row = ran("terminal", "diagonal", "J002", 1)
     costs = [
         judged(controller(), theta, World(still(JUDGE["J002"]))).cost
-        for theta in (np.array(row["series"]), np.array(paper.THETA_INIT))
+        for theta in (np.array(row["series"]), THETA)
     ]
     assert row["cost"] == costs[0] / costs[1] != 1
+
+
+@pytest.mark.parametrize("kind", RICHER)
+def test_theta_begins_with_the_papers(kind):
+    np.testing.assert_array_equal(begin(controller(kind))[:9], THETA)
+
+
+@pytest.mark.weekly
+@pytest.mark.slow
+@pytest.mark.parametrize("terminal", TERMINALS[1:])
+def test_a_richer_terminal_cost_begins_as_the_papers_and_can_become_another(terminal):
+    richer, data = controller(terminal), {"centres": np.array(paper.LAYOUTS["A"])}
+    theta, state = begin(richer), np.array([4.0, 1.4, -0.3])
+    printed, same = (one.solve(state, each, data=data)
+                     for one, each in ((controller(), THETA), (richer, theta)))  # fmt: skip
+    assert same.value == pytest.approx(printed.value, rel=1e-9)
+    for k in range(9, theta.size):
+        step = 1e-5 * np.eye(theta.size)[k]
+        ahead, behind = (
+            richer.solve(state, one, data=data).value for one in (theta + step, theta - step)
+        )
+        assert same.features[k] == pytest.approx((ahead - behind) / 2e-5, rel=1e-3, abs=1e-4)
+        assert same.features[k] != 0

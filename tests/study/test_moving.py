@@ -69,10 +69,9 @@ def test_extrapolation_is_exact_where_the_velocity_is_constant_and_nowhere_else(
 @pytest.mark.parametrize("name", PREDICTORS)
 def test_every_predictor_knows_the_present_and_obstacles_that_stand_still(name):
     now = SWINGING[0](np.array([9 * PERIOD]))
-    np.testing.assert_array_equal(PREDICTORS[name](SWINGING, 9, 4)[0], now)
-    layout = ((0.5, 2.2), (3.0, 0.5))
-    found = PREDICTORS[name](still(layout), 5, 3)
-    np.testing.assert_array_equal(found, np.broadcast_to(layout, (4, 2, 2)))
+    np.testing.assert_array_equal(PREDICTORS[name](SWINGING, 9)[0], now)
+    found = PREDICTORS[name](still(LAYOUT), 5)
+    np.testing.assert_array_equal(found, np.broadcast_to(LAYOUT, (paper.HORIZON + 1, 4, 2)))
 
 
 def test_the_charge_among_standing_obstacles_is_the_papers_to_the_last_bit():

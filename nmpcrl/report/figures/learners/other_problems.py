@@ -54,7 +54,7 @@ def ends(found: Runs) -> Figure:
     """Cost without noise on the action of each seed's last theta, beside what is possible."""
     figure, axes = subplots(height=3.4, tall=3.4)
     for place, (arm, costs) in enumerate(found.tests.items()):
-        look, shown = ARM_LOOKS[arm], np.minimum(np.sort(costs), MOST)
+        look, shown = ARM_LOOKS[str(arm)], np.minimum(np.sort(costs.to_numpy()), MOST)
         where = place + jitter(len(costs), 0.3)
         axes.plot(shown, where, look.marker, color=look.color, markersize=3)
         axes.plot(np.median(shown), place, "|", color="black", markersize=20)
@@ -66,7 +66,7 @@ def ends(found: Runs) -> Figure:
     axes.set(xscale="log", xlabel="cost of a step [-]")
     axes.set_xlim(0.8 * found.references["best_policy"], 1.3 * MOST)
     below(figure, axes.get_legend_handles_labels()[0])
-    lost = sum(int((costs >= MOST).sum()) for costs in found.tests.values())
+    lost = int((found.tests >= MOST).sum(axis=None))
     return headed(figure, f"{lost} of {len(found.courses)} runs end at {MOST:g} or more")
 
 
@@ -83,9 +83,8 @@ def _lines(axes: Axes, references: "pd.Series[float]") -> None:
 
 def _first(found: Runs) -> str:
     """The title: which arm ends lowest, and at how much of what was possible."""
-    medians = found.medians
-    least = min(medians, key=medians.__getitem__)
-    times = medians[least] / found.references["best_policy"]
+    least = found.medians.idxmin()
+    times = found.medians[least] / found.references["best_policy"]
     return f"{least} ends lowest, at {times:.1f} times the cost of the best policy"
 
 

@@ -25,8 +25,8 @@ from nmpcrl.report.figures.style import (
     subplots,
 )
 from nmpcrl.report.worlds import signed
+from nmpcrl.studies.shifts import EVERY
 from nmpcrl.studies.worlds import VIEWS
-from nmpcrl.studies.worlds_run import EVERY
 
 POLICIES = {  # by arm
     "init": r"$\theta_\mathrm{init}$", "ES": "ES", "grid": r"grid over $\theta_c$",
@@ -131,27 +131,25 @@ def survival(crowding: pd.Series, met: pd.DataFrame, correlation: float) -> Figu
 
 
 @page
-def models(saved: Mapping[str, Mapping[str, pd.Series]]) -> Figure:
+def models(saved: pd.DataFrame) -> Figure:
     """Which share of theta_init's cost is saved where the model is wrong.
 
     Args:
-        saved: by fault and by policy of `OWN`, the share in each layout.
+        saved: by policy of `OWN`, a row a fault and layout.
     """
-    figure, axes = subplots(height=ROW * len(saved) + 1.5)
+    faults = [*saved.index.unique(0)]
+    figure, axes = subplots(height=ROW * len(faults) + 1.5)
     for k, (how, (label, colour, mark)) in enumerate(OWN.items()):
-        rows = [y for y, fault in enumerate(saved) if how in saved[fault]]
-        estimates = [_middle(by[how]) for by in saved.values() if how in by]
+        known = saved[how].dropna().groupby(level=0, sort=False)
+        rows = np.array([faults.index(fault) for fault, _ in known])
         look = {"color": colour, "marker": mark, "label": label}
-        _marks(axes, np.array(rows) + 0.18 * (k - 1.5), estimates, look)
+        _marks(axes, rows + 0.18 * (k - 1.5), [_middle(each) for _, each in known], look)
     axes.axvline(0, **LIMIT)
-    axes.set_yticks(range(len(saved)), [FAULTS[fault] for fault in saved])
-    axes.set(xlabel=r"saved of the cost of $\theta_\mathrm{init}$", ylim=(len(saved) - 0.5, -0.5))
+    axes.set_yticks(range(len(faults)), [FAULTS[fault] for fault in faults])
+    axes.set(xlabel=r"saved of the cost of $\theta_\mathrm{init}$", ylim=(len(faults) - 0.5, -0.5))
     axes.xaxis.set_major_formatter(PercentFormatter(1, 0))
     below(figure, axes.get_legend_handles_labels()[0])
-    perfect, by_grid = (
-        pd.concat([by[how] for by in saved.values() if how in by]).median()
-        for how in ("oracle", "grid")
-    )
+    perfect, by_grid = saved[["oracle", "grid"]].median()
     changed = rf"The true model changes the cost by {signed(-perfect)}, a grid over $\theta_c$ by"
     return headed(figure, f"{changed} {signed(-by_grid)}")
 
