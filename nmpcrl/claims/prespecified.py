@@ -6,7 +6,6 @@ later definitions. The manifest also names the commit of the questions of each i
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,33 +23,17 @@ MODULES = {  # with the thresholds, and the numbers of the rule for shares
 NUMBERS = {name: getattr(home, name) for home, names in MODULES.items() for name in names.split()}
 
 
-@dataclass(frozen=True)
-class Commit:
-    """One state of the code, and when it was committed."""
+def fixed(about: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Hash and date (UTC) of two commits: "thresholds" fixed, and first runs "published".
 
-    hash: str
-    date: str  # "2026-11-21 13:21", UTC
-
-
-@dataclass(frozen=True)
-class Fixed:
-    """The commit that fixed the thresholds, and the one that published the first runs."""
-
-    thresholds: Commit
-    published: Commit  # a descendant of the other
-
-
-def fixed(about: Mapping[str, Any]) -> Fixed | None:
-    """The two commits; None if the manifest has other numbers than the code.
+    Empty if the manifest has other numbers than the code.
 
     Args:
         about: of `published.load()`.
     """
-    known = about.get("fixed")
+    known = {**about.get("fixed", {})}
     today = {name: list(one) if isinstance(one, tuple) else one for name, one in NUMBERS.items()}
-    if not known or known["numbers"] != today:
-        return None
-    return Fixed(Commit(**known["thresholds"]), Commit(**known["published"]))
+    return known if known.pop("numbers", {}) == today else {}
 
 
 def decided_since() -> pd.DataFrame:

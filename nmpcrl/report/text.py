@@ -7,7 +7,6 @@ import pandas as pd
 
 from nmpcrl.claims import prespecified
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_THAN, kept_without_noise
-from nmpcrl.claims.prespecified import Fixed
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.reproduce import Agreement
 from nmpcrl.claims.robustness import PARTS
@@ -111,21 +110,23 @@ def legend(verdicts: Iterable[Verdict], runs: pd.DataFrame) -> str:
     )
 
 
-def fixed(found: Fixed | None) -> str:
+def fixed(found: Mapping[str, Mapping[str, str]]) -> str:
     """In which commit the thresholds were fixed, and how to check it."""
-    if found is None:
+    if not found:
         return (
             "In which commit the thresholds were fixed cannot be said here: they are not those of"
             " the published study, or nothing is published."
         )
-    first, then = found.thresholds, found.published
+    (first, date), (then, later) = (
+        (found[name]["hash"][:SHOWN], found[name]["date"]) for name in ("thresholds", "published")
+    )
     return (
-        f"The thresholds and the rule were fixed in commit `{first.hash[:SHOWN]}` ({first.date}"
+        f"The thresholds and the rule were fixed in commit `{first}` ({date}"
         f" UTC), and none of their numbers has changed since; [what they are applied"
         f" to](reproducibility.ipynb#reproducibility-since) has. The runs of the study were"
-        f" published after it, in commit `{then.hash[:SHOWN]}` ({then.date} UTC). In the"
-        f" repository, `git show {first.hash[:SHOWN]}` shows the thresholds, and"
-        f" `git log {first.hash[:SHOWN]}..{then.hash[:SHOWN]}` what came between."
+        f" published after it, in commit `{then}` ({later} UTC). In the"
+        f" repository, `git show {first}` shows the thresholds, and"
+        f" `git log {first}..{then}` what came between."
     )
 
 

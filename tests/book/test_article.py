@@ -65,7 +65,7 @@ def test_it_has_what_the_finding_counts_and_the_commit_that_fixed_the_thresholds
     assert given.seen
     for yes, of in (given.seen.arrived_open, given.seen.arrived_closed, given.seen.stopped):
         assert f"{yes} of {of} runs of" in text
-    assert fixed(given.found.about).thresholds.hash[:10] in text
+    assert fixed(given.found.about)["thresholds"]["hash"][:10] in text
 
 
 @pytest.mark.slow

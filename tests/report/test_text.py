@@ -8,7 +8,6 @@ import pytest
 
 from nmpcrl.claims import published
 from nmpcrl.claims.own_claims import OWN_CLAIMS
-from nmpcrl.claims.prespecified import Commit, Fixed
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.reproduce import Agreement
 from nmpcrl.claims.robustness import COLUMNS
@@ -127,12 +126,13 @@ def test_the_legend_says_what_c7s_percentage_leaves_out_where_c7_is_shown(some_s
 
 
 def test_the_commit_that_fixed_the_thresholds_is_named_with_its_date_and_how_to_see_it():
-    found = Fixed(Commit("a" * 40, "2026-01-01 10:00"), Commit("b" * 40, "2026-01-02 11:00"))
-    said = text.fixed(found)
+    first = {"hash": "a" * 40, "date": "2026-01-01 10:00"}
+    then = {"hash": "b" * 40, "date": "2026-01-02 11:00"}
+    said = text.fixed({"thresholds": first, "published": then})
     for part in ("`aaaaaaaaaa` (2026-01-01 10:00 UTC)", "`bbbbbbbbbb` (2026-01-02 11:00 UTC)"):
         assert part in said
     assert "`git show aaaaaaaaaa`" in said
-    assert "cannot be said" in text.fixed(None)
+    assert "cannot be said" in text.fixed({})
 
 
 def test_a_page_says_for_which_claims_its_own_runs_agree():
