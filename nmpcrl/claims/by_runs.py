@@ -4,10 +4,10 @@ Three classes ask three questions of the numbers. The number of a missing run, o
 is nan, and then the answer is missing, too.
 """
 
-from abc import abstractmethod
+import operator
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import astuple, dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -38,10 +38,12 @@ class RunClaim(Claim):
     label: str = ""  # of the axis with the numbers
     linear_to: float = 0.0  # the axis is linear up to this size, and logarithmic above
     borders: Vector = field(default_factory=lambda: np.empty(0))  # others, for `at_borders`
+    holds: ClassVar[Callable[..., Any]] = operator.le  # of a number and a border: is it yes?
 
-    @abstractmethod
     def yes(self, values: Values, border: float) -> pd.Series:
         """The answers to these numbers at a border: True, False or missing."""
+        numbers = _long(values)
+        return _known(self.holds(numbers, border), numbers)
 
     def measure(self, runs: pd.DataFrame, paths: Paths) -> Values:
         """The numbers that the claim asks about."""
@@ -102,17 +104,11 @@ class RunClaim(Claim):
 class AtMost(RunClaim):
     """Is each number at most the border?"""
 
-    def yes(self, values: Values, border: float) -> pd.Series:
-        """See `RunClaim.yes`."""
-        return _known((numbers := _long(values)) <= border, numbers)
-
 
 class AtLeast(RunClaim):
     """Is each number at least the border?"""
 
-    def yes(self, values: Values, border: float) -> pd.Series:
-        """See `RunClaim.yes`."""
-        return _known((numbers := _long(values)) >= border, numbers)
+    holds = operator.ge
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,16 +141,13 @@ def halves(
         values: a number of each run, a column a learner.
         borders: by the way to go wrong, the number above which a run does; the claim's own first.
     """
-    known = values.dropna()
-    readings = known.index.get_level_values("decay")
     found = []
     for wrong, border in borders.items():
-        for decay in readings.unique():
-            bad = known[readings == decay] > border
-            first, second = (bad[name].astype(bool) for name in learners)
+        for decay, known in values.dropna().groupby(level="decay", sort=False):
+            first, second = (known[name] > border for name in learners)
             counts = int(first.sum()), int(second.sum())
             against, apart = int((second & ~first).sum()), int((first != second).sum())
-            found.append(Halves(learners, wrong, str(decay), len(bad), counts, against, apart))
+            found.append(Halves(learners, wrong, str(decay), len(known), counts, against, apart))
     return tuple(found)
 
 

@@ -16,11 +16,10 @@ the study, and stays as it is:
 
 The interval alone is not enough: of 1000 runs, 55 % are surely more than half, and surely not what
 "DES diverges" says. Nor is the share alone: two of two runs are all runs. The interval is Wilson's,
-over all layouts too: it is for other seeds in the same layouts, where it is not too narrow (see
-`statistics.rate`). For other layouts see `drawn_anew`.
+for other seeds in the same layouts (see `statistics.rate`); for other layouts see `drawn_anew`.
 
-A missing answer (a run that was not made, is shorter than the paper's, or has no frozen arm for
-comparison) is excluded; if it could change the verdict, the claim is undecidable.
+An answer is missing if the run was not made, is shorter than the paper's, or has no frozen arm for
+comparison. If missing answers could change the verdict, the claim is undecidable.
 """
 
 from abc import ABC, abstractmethod
@@ -148,36 +147,20 @@ def forgiving(strict: Outcome, weaker: Outcome) -> Outcome:
 
 
 def counted(answers: pd.Series, level: str = "") -> dict[str, Answers]:
-    """The answers by value of a level of their index, in order of appearance, or as "all".
-
-    Args:
-        answers: True, False or missing.
-        level: of the index; without one all are counted together.
-    """
+    """The answers by value of a level of their index, in order of appearance, or as "all"."""
     known = answers.astype("boolean")
     missing, yes = known.isna().to_numpy(), known.to_numpy(bool, na_value=False)
     if level:
         place, names = pd.factorize(answers.index.get_level_values(level))
     else:
         place, names = np.zeros(len(answers), int), pd.Index(["all"])
-    by_name = np.arange(len(names))[:, None] == place
-    return {
-        name: Answers(
-            int((yes & here).sum()),
-            int((~yes & ~missing & here).sum()),
-            int((missing & here).sum()),
-        )
-        for name, here in zip(names, by_name, strict=True)
-    }
+    counts = (np.bincount(place, one, len(names)) for one in (yes, ~yes & ~missing, missing))
+    found = zip(names, *counts, strict=True)
+    return {name: Answers(*map(int, of)) for name, *of in found}
 
 
 def settle(
-    claim: Claim,
-    answers: pd.Series,
-    *,
-    weaker: pd.Series | None = None,
-    unit: str = "pairs",
-    **numbers: Any,
+    claim: Claim, answers: pd.Series, weaker: pd.Series | None = None, unit: str = "pairs"
 ) -> Verdict:
     """The verdict on a claim, overall, in each layout and in each reading of the decay.
 
@@ -186,34 +169,33 @@ def settle(
         answers: True, False or missing, indexed by layout, decay, seed or by other levels.
         weaker: answers to a weaker question, which a yes to the first implies.
         unit: the name of what answers, in the plural.
-        numbers: further fields of `Verdict`.
     """
-    names = [str(name) for name in answers.index.names]
-    levels = ["", *(level for level in ("layout", "decay", "learner") if level in names)]
+    names = [*map(str, answers.index.names)]
     lenient = answers if weaker is None else weaker
-    strict, weak = ({level: counted(one, level) for level in levels} for one in (answers, lenient))
-    outcomes = {
-        level: {name: forgiving(one.outcome, weak[level][name].outcome) for name, one in of.items()}
-        for level, of in strict.items()
-    }
-    by_learner = strict.pop("learner", {}) and weak["learner"]
-    share = strict[""]["all"].share
+    counts, outcomes = dict[str, Answers](), dict[str, dict[str, Outcome]]()
+    for level in ("", *(name for name in ("layout", "decay") if name in names)):
+        counts |= (strict := counted(answers, level))
+        outcomes[level] = {
+            name: forgiving(strict[name].outcome, one.outcome)
+            for name, one in counted(lenient, level).items()
+        }
+    share = counts["all"].share
+    by_learner = counted(lenient, "learner") if "learner" in names else {}
     return claim.verdict(
         outcomes[""]["all"],
         share=share.value if share else None,
         interval=(share.low, share.high) if share else None,
         by_layout=outcomes.get("layout", {}),
         by_decay=outcomes.get("decay", {}),
-        counts={name: one.known for of in strict.values() for name, one in of.items()},
+        counts={name: one.known for name, one in counts.items()},
         by_learner={name: one.known for name, one in by_learner.items() if one.known[1]},
-        missing=strict[""]["all"].missing,
+        missing=counts["all"].missing,
         unit=unit,
         levels={
             name: answers.index.unique(name).size
             for name in (CELL if {*CELL} <= {*names} else names)
             if name != "learner"
         },
-        **numbers,
     )
 
 
@@ -248,12 +230,9 @@ def arms(
     no policy, so its final cost is infinite, whatever the last rollout cost.
 
     Args:
-        runs: of `rows.table`, all of one setting.
+        runs: of `rows.table`, all of one setting; a ValueError says if not.
         learners: whose runs are returned.
         among: the learners whose cells are covered; by default `learners`.
-
-    Raises:
-        ValueError: a learner has two runs in one cell, so that the runs are of several settings.
     """
     asked = runs[runs.learner.isin(among or learners)]
     cells = pd.MultiIndex.from_frame(asked[CELL].drop_duplicates())

@@ -95,13 +95,13 @@ def test_answers_are_counted_by_level_in_order_of_appearance(drawn):
 
 def test_a_verdict_is_given_overall_in_each_layout_and_in_each_reading():
     asked = pd.concat([answers(A=[True] * 10, B=[False] * 10), answers("episode", A=[True] * 10)])
-    verdict = settle(CLAIM, asked, ratio=2.0)
+    verdict = settle(CLAIM, asked)
     assert verdict.outcome == PARTLY
     assert verdict.by_layout == {"A": REPRODUCED, "B": NOT}
     assert verdict.by_decay == {"step": PARTLY, "episode": REPRODUCED}
     by_layout, by_decay = {"A": (20, 20), "B": (0, 10)}, {"step": (10, 20), "episode": (10, 10)}
     assert verdict.counts == {"all": (20, 30)} | by_layout | by_decay
-    assert (verdict.share, verdict.ratio) == (20 / 30, 2.0)
+    assert verdict.share == 20 / 30
     assert verdict.interval == (rate(20, 30).low, rate(20, 30).high)
     assert verdict.levels == {"layout": 2, "decay": 2, "seed": 10}
 
