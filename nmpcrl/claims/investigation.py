@@ -2,9 +2,9 @@
 
     parts (arms x places x seeds) -> conditions -> run -> rows -> questions -> answers
 
-Rows are stored one by one in `runs/NAME.jsonl`, so that an interruption loses only the rows in
-progress. Complete arms are published as `NAME.csv`. `nmpcrl investigate` runs, resumes, publishes
-and judges; `nmpcrl.studies` has the investigations of the book, and a reader's own is one file.
+Rows are stored one by one in `runs/NAME.jsonl`; complete arms are published as `NAME.csv`.
+`nmpcrl investigate` runs, resumes, publishes and judges. `nmpcrl.studies` has the investigations of
+the book, and a reader's own is one file.
 """
 
 import json
@@ -146,31 +146,26 @@ class Investigation:
         return hash_of([self.name, self.epoch, EPOCHS, made_with, episodes, *one])
 
     def table(self) -> pd.DataFrame:
-        """The published rows.
-
-        Raises:
-            Damaged: they are missing, or are not those that were written.
-        """
+        """The published rows; a `Damaged` says what is wrong with them."""
         return published.read(self.name, self.where)
+
+    def _published(self) -> pd.DataFrame:
+        """The same, with no row where nothing is published."""
+        known = published.about(self.name, self.where)
+        return self.table() if known else pd.DataFrame(columns=NAMES)
 
     def known(self) -> pd.DataFrame:
         """The published rows, then the rows stored here that are not published."""
-        there = [published.about(self.name, self.where) and self.table(), self.log().table()]
-        tables = [one for one in there if len(one)]
-        if not tables:
-            return pd.DataFrame(columns=NAMES)
-        return pd.concat(tables, ignore_index=True).drop_duplicates(NAMES, ignore_index=True)
+        tables = [one for one in (self._published(), self.log().table()) if len(one)]
+        every = pd.concat(tables) if tables else self._published()
+        return every.drop_duplicates(NAMES, ignore_index=True)
 
     def log(self) -> "RowLog":
         """The rows that were made here."""
         return RowLog(folder() / f"{self.name}.jsonl")
 
     def conditions(self, part: str) -> dict[Condition, Any]:
-        """The setting of each row of a part.
-
-        Raises:
-            Refusal: an arm depends on rows that are not known.
-        """
+        """The setting of each row of a part; a `Refusal` if an arm depends on unknown rows."""
         one = self.parts[part]
         return {
             Condition(part, arm, *at): setting
@@ -184,14 +179,11 @@ class Investigation:
         return {one: it for one, it in self.conditions(part).items() if self.key(one) not in rows}
 
     def complete(self, parts: Iterable[str] = (), workers: int | None = None) -> pd.DataFrame:
-        """Make every missing row, part by part.
+        """Make every missing row, part by part; the table of all rows that were made here.
 
         Args:
             parts: by default all.
             workers: processes; by default one per core.
-
-        Returns:
-            The table of the rows that were made here.
         """
         log, chosen = self.log(), [*parts] or [*self.parts]
         for part in filter(chosen.__contains__, self.parts):
@@ -231,41 +223,33 @@ class Investigation:
             Unpublishable: an arm is published already with other numbers, or none is complete and
                 new.
         """
-        there = self.table() if published.about(self.name, self.where) else pd.DataFrame()
-        made, new = self.log().table(), []
+        there, made, new = self._published(), self.log().table(), []
         for (part, arm), rows in made.groupby(["part", "arm"], sort=False) if len(made) else ():
-            block = self._block(part, arm, rows)
-            old = there[(there.part == part) & (there.arm == arm)] if len(there) else there
-            if block is None:
+            by, order = rows.set_index(["place", "k"], drop=False), self.parts[part].order(arm)
+            if {*by.index} < {*order}:
                 continue
-            if not len(old):
+            block = by.loc[order].reset_index(drop=True).map(partial(rounded, digits=self.digits))
+            old = there[(there.part == part) & (there.arm == arm)].reset_index(drop=True)
+            same = [name for name in old if name != "seconds"]
+            if old.empty:
                 new.append(block)
-            elif not _same(old, block):
+            elif not old[same].equals(block[same]):
                 raise Unpublishable(f"{arm} of the part {part!r} is published with other numbers")
         if not new:
             raise Unpublishable(f"no arm of {self.name} is complete and new")
         added = pd.concat(new)
         arrays = published.arrays(self.name, self.where) if self.arrays and len(there) else {}
         for name in {*self.arrays} & {*added}:
-            lists = [arrays[name]] if name in arrays else []
-            arrays[name] = np.concatenate([*lists, np.array([*added[name].dropna()])])
-        added = added.drop(columns=[*self.arrays], errors="ignore")
-        batch = made_here() | {"rows": added.groupby("part", sort=False).size().to_dict()}
+            lists = added.pop(name).dropna()
+            arrays[name] = np.array([*arrays.get(name, ()), *lists])
         return published.write(
             self.name,
-            pd.concat([there, added], ignore_index=True),
+            pd.concat([there, added], ignore_index=True) if len(there) else added,
             arrays,
-            batch=batch,
+            batch=made_here() | {"rows": added.groupby("part", sort=False).size().to_dict()},
             registered=self.registered,
             where=self.where,
         )
-
-    def _block(self, part: str, arm: str, rows: pd.DataFrame) -> pd.DataFrame | None:
-        """The rows of an arm in order, rounded; None while some are missing."""
-        by, order = rows.set_index(["place", "k"], drop=False), self.parts[part].order(arm)
-        if {*by.index} < {*order}:
-            return None
-        return by.loc[order].reset_index(drop=True).map(partial(rounded, digits=self.digits))
 
 
 def _timed(investigation: Investigation, job: tuple[Condition, Any]) -> Row:
@@ -273,13 +257,6 @@ def _timed(investigation: Investigation, job: tuple[Condition, Any]) -> Row:
     began = time.process_time()
     row = investigation.make(*job)
     return {"seconds": time.process_time() - began} | row
-
-
-def _same(first: pd.DataFrame, second: pd.DataFrame) -> bool:
-    """Whether two blocks have the same numbers, the time that they took apart."""
-    names = [name for name in first.columns if name != "seconds"]
-    one, other = (block[names].reset_index(drop=True) for block in (first, second))
-    return bool(one.equals(other))
 
 
 def rounded(value: Any, digits: int | None) -> Any:
@@ -295,9 +272,6 @@ def of_file(path: Path) -> Investigation:
     """The investigation that a Python file defines; published beside it, in `published`.
 
     Its `registered` is the commit of the file, if Git knows the file as it is.
-
-    Raises:
-        NoInvestigation: there is no such file, it fails, or defines none or several.
     """
     spec = spec_from_file_location(path.stem, path)
     if not path.is_file() or spec is None or spec.loader is None:
@@ -326,9 +300,9 @@ def _commit(path: Path) -> str:
 
 
 class RowLog:
-    """Rows by key in a file of JSON lines; an incomplete line is ignored, and its row made again.
+    """Rows by key in a file of JSON lines.
 
-    Rows of sources that are neither these nor the locked ones are ignored, too.
+    Incomplete lines are ignored, and rows of sources that are neither these nor the locked ones.
     """
 
     def __init__(self, path: Path) -> None:

@@ -54,29 +54,17 @@ def folder() -> Path:
 
 
 def read(name: str, where: Path | None = None) -> pd.DataFrame:
-    """A published table.
-
-    Raises:
-        Damaged: a file is missing, or is not the file that was written.
-    """
+    """A published table; `Damaged` if its file is missing, or is not the one that was written."""
     return _table(where or folder(), name).copy()
 
 
 def arrays(name: str, where: Path | None = None) -> Arrays:
-    """The published arrays of a name.
-
-    Raises:
-        Damaged: a file is missing, or is not the file that was written.
-    """
+    """The published arrays of a name; `Damaged` as for `read`."""
     return dict(_arrays(where or folder(), name))
 
 
 def about(name: str, where: Path | None = None) -> dict[str, Any]:
-    """What the manifest says of a name; nothing where nothing is published.
-
-    Raises:
-        Damaged: the manifest is not the file that was written.
-    """
+    """What the manifest says of a name; nothing where nothing is published."""
     return dict(_manifest(where or folder()).get(name, {}))
 
 
@@ -90,7 +78,7 @@ def write(
     anew: bool = False,
     where: Path | None = None,
 ) -> Path:
-    """Write a table, and its arrays if there are any, and note them in the manifest.
+    """Write a table, and its arrays if there are any, note them in the manifest; the table's path.
 
     Args:
         name: of the files, without a suffix.
@@ -100,34 +88,27 @@ def write(
         registered: the commit that fixed what would be made, before anything was.
         anew: whether all rows were made now, so that earlier batches are forgotten.
         where: the folder, by default the project's.
-
-    Returns:
-        The path of the table.
     """
     place = where or folder()
     place.mkdir(parents=True, exist_ok=True)
     with FileLock(place / ".lock"):
-        known = _manifest(place)
-        content = {f"{name}.csv": _csv(table)}
-        write_file(place / f"{name}.csv", lambda file: file.write(content[f"{name}.csv"]))
+        known, files = _manifest(place), [place / f"{name}.csv"]
+        write_file(files[0], lambda file: file.write(_csv(table)))
         if arrays:
-            path = place / f"{name}.npz"
-            write_file(path, lambda file: np.savez_compressed(file, **dict(arrays)))  # type: ignore[arg-type]
-            content[path.name] = path.read_bytes()
-        files = {file: sha256(found).hexdigest() for file, found in content.items()}
+            files.append(place / f"{name}.npz")
+            write_file(files[1], lambda file: np.savez_compressed(file, **dict(arrays)))  # type: ignore[arg-type]
         earlier = known.get(name, {})
-        batches = [*([] if anew else earlier.get("batches", ())), dict(batch)]
-        entry = {**earlier, "files": files, "batches": batches}
-        entry["registered"] = registered or earlier.get("registered", "")
-        write_manifest(place, {**known, name: entry})
-    return place / f"{name}.csv"
-
-
-def write_manifest(place: Path, entries: Mapping[str, Any]) -> None:
-    """Write the manifest of a folder, and forget what was read there."""
-    write_json(place / MANIFEST, {**entries, SEAL: hash_of(entries)}, indent=1)
-    for each in (_manifest, _table, _arrays):
-        each.cache_clear()
+        entry = {
+            **earlier,
+            "files": {file.name: sha256(file.read_bytes()).hexdigest() for file in files},
+            "batches": [*([] if anew else earlier.get("batches", ())), dict(batch)],
+            "registered": registered or earlier.get("registered", ""),
+        }
+        entries = {**known, name: entry}
+        write_json(place / MANIFEST, {**entries, SEAL: hash_of(entries)}, indent=1)
+        for each in (_manifest, _table, _arrays):
+            each.cache_clear()
+    return files[0]
 
 
 @cache
