@@ -31,9 +31,6 @@ def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
     Args:
         source: "fresh" for all runs, "published" for the runs that are not published.
         asked: learners, layouts, seeds and episodes, as `design.main_table` takes them.
-
-    Raises:
-        ParameterError: a value is not allowed.
     """
     one_of(SOURCES).check("study", source)
     runs, known = _asked(**asked), load().summaries
@@ -41,11 +38,7 @@ def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
 
 
 def repeatable(repeat: bool, **asked: Any) -> tuple[Experiment, ...]:
-    """The published runs of `design.fresh` for a build to train again, if `repeat` holds.
-
-    Raises:
-        ParameterError: a value is not allowed.
-    """
+    """The published runs of `design.fresh` for a build to train again, if `repeat` holds."""
     again = set(design.fresh()) if TRUTH.check("repeat", repeat) else set()
     known = load().summaries
     return tuple(e for e in _asked(**asked) if e in again and e in known)
@@ -58,9 +51,6 @@ def gather(source: str, *, variants: bool = False, **asked: Any) -> Evidence:
         source: "published" or "fresh".
         variants: whether to add the published controls and variants.
         asked: as for `needed`.
-
-    Raises:
-        ParameterError: a value is not allowed.
     """
     runs, known = dict.fromkeys(_asked(**asked), design.MAIN_TABLE), load()
     parts = {e: part for e, part in known.variants.items() if part != design.MAIN_TABLE}

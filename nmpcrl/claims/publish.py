@@ -52,20 +52,13 @@ def publish_runs(
     anew: bool = False,
     audit: Measured | None = None,
 ) -> Path:
-    """Publish runs beside the published ones.
+    """Publish runs that were trained here beside the published ones, in the folder returned.
 
     Args:
-        runs: trained here.
+        runs: with their frozen arms, unless these are published.
         variants: the part of the study that each belongs to.
         anew: whether the published runs are forgotten.
         audit: of `published.AUDITED`.
-
-    Returns:
-        The folder of the published data.
-
-    Raises:
-        Damaged: a file is missing, or is not the file that was written.
-        Unpublishable: a run is published already, or its frozen arm is not published.
     """
     earlier = Published() if anew else published.load()
     known = {*earlier.rows, *runs}

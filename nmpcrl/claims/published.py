@@ -27,7 +27,7 @@ from nmpcrl.claims import assumptions
 from nmpcrl.claims.assumptions import Measured
 from nmpcrl.claims.failure_modes import FAILURE_MODE, WELL, failure_modes
 from nmpcrl.claims.own_claims import OWN_CLAIMS
-from nmpcrl.claims.paper_claims import CLAIMS, WIDER_CLAIMS, WIDER_THAN
+from nmpcrl.claims.paper_claims import CLAIMS, WIDER_CLAIMS
 from nmpcrl.claims.rule import Claim, Observations
 from nmpcrl.claims.verdict import Verdict
 from nmpcrl.study import design
@@ -45,10 +45,8 @@ BITS = "theta_bits"
 FOLLOWED = (design.MAIN_TABLE, "controls")  # parts of the study; the variants change one thing
 AUDITED = Experiment("GES")  # the run in which the assumptions of C8 are measured
 
-WIDER = {narrow: wider for wider, narrow in WIDER_THAN.items()}
-ORDER = [one for claim in CLAIMS for one in (claim, WIDER.get(claim)) if one]
-EVERY: dict[str, Claim] = {  # in the order of the verdicts
-    **{one: {**CLAIMS, **WIDER_CLAIMS}[one] for one in ORDER},
+EVERY: dict[str, Claim] = {  # in the order of the verdicts: C7 before W7
+    **dict(sorted({**CLAIMS, **WIDER_CLAIMS}.items(), key=lambda one: one[0][::-1])),
     **OWN_CLAIMS,
 }
 
@@ -112,10 +110,8 @@ class Evidence:
         new = pd.DataFrame([one | {"cost_ratio": ratios[e]} for e, one in made.items()])
         new = new.join(failure_modes(fresh, new, every))
         rows = self.rows | dict(zip(fresh, new.to_dict("records"), strict=True))
-        return Evidence(
-            Runs(every),
-            pd.DataFrame([one | {"cost_ratio": ratios[e]} for e, one in rows.items()]),
-        )
+        runs = pd.DataFrame([one | {"cost_ratio": ratios[e]} for e, one in rows.items()])
+        return Evidence(Runs(every), runs)
 
     @property
     def mark(self) -> str:
@@ -189,11 +185,7 @@ class Published(Evidence):
 
 
 def load() -> Published:
-    """The published study.
-
-    Raises:
-        Damaged: a file is missing, or is not the file that was written.
-    """
+    """The published study; `Damaged` if a file is missing, or is not the one that was written."""
     return _load(folder())
 
 
