@@ -14,12 +14,12 @@ from quiet_rows import START_COST, quiet_row, timings
 
 from nmpcrl.analysis.gradient_td import Curvature
 from nmpcrl.analysis.metrics import TOUCH
-from nmpcrl.analysis.rows import experiment_of, row, table
+from nmpcrl.analysis.rows import experiment_of, table
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.bench.paired import IDLE, Ratio
 from nmpcrl.claims import own_claims, thresholds
 from nmpcrl.claims.assumptions import LINEAR, SMOOTH, THEOREMS, Measured, audit, measured
-from nmpcrl.claims.by_runs import AtLeast, AtMost, Contrast, halves
+from nmpcrl.claims.by_runs import AtLeast, AtMost, halves
 from nmpcrl.claims.paper_claims import BY_RUNS, CLAIMS, WIDER_CLAIMS, WIDER_THAN, kept_without_noise
 from nmpcrl.claims.rule import Observations, judge
 from nmpcrl.claims.timing import WAITED, decide
@@ -28,6 +28,7 @@ from nmpcrl.study import Experiment, Records, Runs, paper, run
 from nmpcrl.study.experiment import LEARNERS, PAPER
 
 SEEDS, SOME = range(5), range(2)
+ASKED = BY_RUNS | own_claims.OWN_CLAIMS
 EVERY = {**CLAIMS, **WIDER_CLAIMS, **own_claims.OWN_CLAIMS}
 BAD, SWAYING = {"cost_ratio": 1.6}, {"late_cost_range": 0.06}
 LOST = {"final_cost": 500.0, "stopped": "diverged: theta"}
@@ -70,25 +71,17 @@ def verdict_on(name: str, *observed: Any, **others: Any) -> Verdict:
 
 
 def outcomes(runs: pd.DataFrame, rollouts=None) -> dict[str, str]:
-    observed = Observations(runs, paths(runs) if rollouts is None else rollouts)
-    asked = {**BY_RUNS, **own_claims.OWN_CLAIMS}
-    return {name: claim.judge(observed).outcome for name, claim in asked.items()}
-
-
-# Outcomes, at the borders and at either side
+    observed = runs, paths(runs) if rollouts is None else rollouts
+    return {one.claim: one.outcome for one in judge(ASKED, *observed)}
 
 
 @pytest.mark.parametrize(
     ("first", "second", "outcome"),
     [
-        (SEEDS, (), REPRODUCED),
-        (SOME, (), PARTLY),
-        (SEEDS, SOME, PARTLY),
-        ((), (), NOT),
-        (SEEDS, SEEDS, NOT),
-        ((), SEEDS, NOT),
+        (SEEDS, (), REPRODUCED), (SOME, (), PARTLY), (SEEDS, SOME, PARTLY),
+        ((), (), NOT), (SEEDS, SEEDS, NOT), ((), SEEDS, NOT),
     ],
-)
+)  # fmt: skip
 @pytest.mark.parametrize(
     ("name", "why"), [("C1", BAD), ("C1", GONE), ("C2", SWAYING), ("C2", BAD), ("C2", GONE)]
 )
@@ -102,39 +95,36 @@ def test_a_contrast_asks_in_how_many_pairs_only_the_first_went_wrong(
     assert [half.counts for half in verdict.own_halves] == [(len(first), len(second))] * 2
 
 
+def ends(share: float, beyond: float = 0.0) -> dict[str, float]:
+    """A final cost that is higher than theta_init's by a share."""
+    return {"final_cost": START_COST * (1 + share) + beyond}
+
+
+BETTER, SAME = thresholds.BETTER, thresholds.SAME_COST
+COSTS = [  # the border, and the direction of no
+    *(("C5", -SAME, -1), ("C9", -BETTER, 1), ("B1", SAME, 1), ("B2", -BETTER, 1)),
+    *(("B3", SAME, 1), ("B3", -SAME, -1), ("B4", SAME, 1)),
+]
+
+
 @pytest.mark.parametrize(
     ("name", "changes", "apart", "outcome"),
     [
-        ("C5", {}, 0.0, REPRODUCED),
-        ("C5", {"theta_0": 2.0}, 0.0, REPRODUCED),  # theta is compared, and not judged
-        ("C5", {"final_cost": START_COST * (1 - thresholds.SAME_COST)}, 0.25, REPRODUCED),
+        *((name, ends(share), 0.0, REPRODUCED) for name, share, _ in COSTS),
+        *((name, ends(share, 1e-9 * no), 0.0, NOT) for name, share, no in COSTS),
+        *((name, LOST, 0.0, NOT) for name in ("C5", "C9", "B1")),
+        ("C5", {"theta_0": 2.0}, thresholds.SAME_PATH, REPRODUCED),  # theta is not judged
         ("C5", {}, thresholds.SAME_PATH + 1e-9, NOT),
-        ("C5", {"final_cost": START_COST * (1 - thresholds.SAME_COST) - 1e-9}, 0.0, NOT),
         ("C5", FAILED, np.nan, NOT),
-        ("C5", LOST, 0.0, NOT),
         ("C6", {"imitation_with": thresholds.MORE_ACCURATE}, 0.0, REPRODUCED),
         ("C6", {"imitation_with": np.nextafter(thresholds.MORE_ACCURATE, 1)}, 0.0, NOT),
         ("C6", {"imitation_with": np.nan}, 0.0, UNDECIDABLE),
-        ("C7", {}, 0.0, REPRODUCED),
         ("C7", {"inside_small": 1}, 0.0, PARTLY),  # in training only
         ("C7", {"eval_inside_small": 1, "eval_worst_overlap": 0.005}, 0.0, NOT),
         ("C7", {"eval_worst_overlap": TOUCH}, 0.0, REPRODUCED),
         ("C7", {"inputs": 1}, 0.0, NOT),
         ("C7", {"outside": 1}, 0.0, REPRODUCED),  # the box is another constraint
-        ("C9", {"final_cost": START_COST * (1 - thresholds.BETTER)}, 0.0, REPRODUCED),
-        ("C9", {"final_cost": START_COST * (1 - thresholds.BETTER) + 1e-9}, 0.0, NOT),
         ("C9", FAILED, 0.0, NOT),
-        ("C9", LOST, 0.0, NOT),
-        ("B1", {"final_cost": START_COST * (1 + thresholds.SAME_COST)}, 0.0, REPRODUCED),
-        ("B1", {"final_cost": START_COST * (1 + thresholds.SAME_COST) + 1e-9}, 0.0, NOT),
-        ("B1", LOST, 0.0, NOT),
-        ("B2", {"final_cost": START_COST * (1 - thresholds.BETTER)}, 0.0, REPRODUCED),
-        ("B2", {"final_cost": START_COST * (1 - thresholds.BETTER) + 1e-9}, 0.0, NOT),
-        ("B3", {"final_cost": START_COST * (1 + thresholds.SAME_COST)}, 0.0, REPRODUCED),
-        ("B3", {"final_cost": START_COST * (1 + thresholds.SAME_COST) + 1e-9}, 0.0, NOT),
-        ("B3", {"final_cost": START_COST * (1 - thresholds.SAME_COST) - 1e-9}, 0.0, NOT),
-        ("B4", {"final_cost": START_COST * (1 + thresholds.SAME_COST)}, 0.0, REPRODUCED),
-        ("B4", {"final_cost": START_COST * (1 + thresholds.SAME_COST) + 1e-9}, 0.0, NOT),
     ],
 )
 def test_each_border_belongs_to_yes(name, changes, apart, outcome):
@@ -172,12 +162,6 @@ def test_the_wider_claim_asks_all_four_learners_what_the_paper_says_of_some(lear
         assert {*EVERY[WIDER_THAN[name]].learners} < {*one.learners} == {*PAPER}
         assert not one.quotation
         assert not one.implied
-
-
-# Which learners answer
-
-
-ASKED = {**BY_RUNS, **own_claims.OWN_CLAIMS}
 
 
 @pytest.mark.parametrize("name", ASKED)
@@ -220,9 +204,6 @@ def test_layouts_are_judged_one_by_one_and_only_where_the_learner_was_run():
     assert verdict_on("B2", some).by_layout == {"B": NOT}
 
 
-# The numbers of a verdict
-
-
 def test_a_verdict_has_the_numbers_behind_it():
     sizes = {"inside_small": 7, "inside_medium": 2, "inside_large": 1, "eval_inside_large": 3}
     runs = study(both(of("RDES", **sizes, inputs=4, outside=6), of("DES", SOME, **BAD)))
@@ -259,9 +240,6 @@ def test_runs_that_kept_the_constraints_are_counted_with_those_that_were_stopped
     }
 
 
-# Divergence and instability of a run
-
-
 @pytest.mark.parametrize(
     ("columns", "diverged", "unstable"),
     [
@@ -284,29 +262,23 @@ def test_stopped_runs_and_costs_above_a_border_are_divergence_and_instability(
     assert thresholds.instability(runs).unique().tolist() == [unstable]
 
 
-def test_a_run_is_judged_from_its_records_as_from_the_table():
-    named = [Experiment(name, episodes=6, steps=6) for name in (*PAPER, "frozen")]
-    named += [Experiment("ES", alpha=1e5, seed=1, episodes=6, steps=6)]
-    named += [Experiment("frozen", seed=1, episodes=6, steps=6)]
-    found = {one: run(one) for one in named}
-    for seed, (cost, lost, lost_arm) in enumerate(
-        [(1, 0, 1), (10, 0, 1), (10, 0, 3), (1, 3, 3)], start=2
-    ):  # the frozen arm's late episodes are cut short
-        for name, factor, late in (("ES", cost, lost), ("frozen", 1, lost_arm)):
+def test_records_are_judged_as_the_rows_of_their_summaries():
+    found, done, lost = {}, "finished", "diverged: w"
+    cases = [(1, 0, 1, done), (10, 0, 1, done), (10, 0, 3, done), (1, 3, 3, done), (1, 0, 0, lost)]
+    for seed, (factor, late, late_arm, end) in enumerate(cases):  # late episodes are cut short
+        for name, *changes in (("ES", factor, late, end), ("frozen", 1, late_arm, done)):
+            times, cut, stopped = changes
             records = run(one := Experiment(name, seed=seed, episodes=6, steps=6))
-            status = np.where(records.steps["episode"] >= 6 - late, 2, records.steps["status"])
-            changes = {"status": status, "cost": records.steps["cost"] * factor}
-            found[one] = replace(records, steps=records.steps | changes)
-    runs = table({e: summarise(records) for e, records in found.items()})
+            status = np.where(records.steps["episode"] >= 6 - cut, 2, records.steps["status"])
+            steps = records.steps | {"status": status, "cost": records.steps["cost"] * times}
+            found[one] = replace(records, steps=steps, facts=records.facts | {"stopped": stopped})
+    rows = table({e: summarise(records) for e, records in found.items()})
     short = thresholds.of_records(Runs(found))
     for wrong in (thresholds.divergence, thresholds.instability):
-        assert wrong(short).tolist() == wrong(runs).tolist()
+        assert wrong(short).tolist() == wrong(rows).tolist()
         assert {True, False} <= {*wrong(short)}
-    es = runs[(runs.learner == "ES") & (runs.seed > 1)]
-    assert thresholds.divergence(es).tolist() == [False, True, False, pd.NA]
-    for experiment, records in found.items():
-        (one,) = pd.DataFrame([row(summarise(records))]).to_dict("records")
-        assert experiment_of(one) == experiment
+    es = thresholds.divergence(short[short.learner == "ES"])
+    assert es.tolist() == [False, True, False, pd.NA, True]
 
 
 def test_the_share_achieved_is_1_at_the_possible_cost_0_at_theta_init_and_negative_beyond():
@@ -319,12 +291,9 @@ def test_the_share_achieved_is_1_at_the_possible_cost_0_at_theta_init_and_negati
     np.testing.assert_allclose(shares, [1.0, 0.0, 0.5, -1.0, *worst, np.nan, np.nan], atol=1e-12)
 
 
-# Other borders, and halves
-
 FIELDS = dict.fromkeys(("name", "statement", "question", "measured", "border", "would_change"), "X")
 FIELDS |= {"threshold": 0.5}
 GAINS, LOSSES = AtLeast(**FIELDS), AtMost(**FIELDS)
-CONTRAST = Contrast(wrong="fell", worst="broke", **FIELDS)
 VALUES = pd.DataFrame({"one": np.linspace(0.1, 1.0, 10)})
 
 
@@ -345,11 +314,6 @@ def test_other_borders_give_other_outcomes_and_steady_ones_do_not():
     assert GAINS.steady(unknown)
 
 
-def test_a_contrast_asks_the_first_arm_to_be_above_and_the_second_not():
-    values = pd.DataFrame({"one": [0.6, 0.6, 0.5, np.nan], "other": [0.5, 0.6, 0.5, 0.5]})
-    assert CONTRAST.answers(values).tolist() == [True, False, False]
-
-
 @pytest.mark.parametrize(
     ("pairs", "counts", "as_claimed", "against", "p"),
     [
@@ -364,17 +328,14 @@ def test_only_pairs_that_differ_tell_the_learners_apart(pairs, counts, as_claime
     index = pd.MultiIndex.from_tuples(cells, names=["layout", "decay", "seed"])
     values = pd.DataFrame(pairs * 2, index, columns=["DES", "RDES"])
     found = halves(("DES", "RDES"), values, {"diverged": 1.5, "lost": np.finfo(float).max})
-    assert [(one.wrong, one.decay) for one in found] == [
-        *product(("diverged", "lost"), ("step", "episode"))
-    ]
+    ways = [*product(("diverged", "lost"), ("step", "episode"))]
+    assert [(one.wrong, one.decay) for one in found] == ways
     for one in found[:2]:
         assert (one.counts, one.pairs) == (counts, len(values.dropna()) / 2)
         assert (one.as_claimed, one.against) == (as_claimed, against)
         assert one.p == pytest.approx(p)
     assert sum(found[2].counts) == np.isinf(values).to_numpy().sum() / 2
 
-
-# Time
 
 CLAIMED, NEAR = (0.9, 1.1), (0.8, 1.25)
 
@@ -385,16 +346,11 @@ CLAIMED, NEAR = (0.9, 1.1), (0.8, 1.25)
         (0.9, 1.1, 0, REPRODUCED),
         (0.9, 1.1, WAITED, REPRODUCED),
         (0.9, 1.1, WAITED + 0.01, UNDECIDABLE),
-        (0.89, 1.0, 0, UNDECIDABLE),
-        (1.0, 1.11, 0, UNDECIDABLE),
         (0.8, 0.89, 0, PARTLY),
         (1.11, 1.249, IDLE + 0.01, PARTLY),
-        (0.79, 0.85, 0, UNDECIDABLE),
-        (1.2, 1.25, 0, UNDECIDABLE),
         (0.85, 1.2, 0, UNDECIDABLE),  # near on both sides, and as claimed between them
         (0.5, 0.79, 0, NOT),
         (1.25, 2.0, 0, NOT),
-        (0.5, 2.0, 0, UNDECIDABLE),
         (np.nan, np.nan, 0, UNDECIDABLE),
     ],
 )
@@ -413,21 +369,15 @@ def test_the_outcome_of_an_interval_is_that_of_every_number_in_it(ends, at):
 @pytest.mark.parametrize(
     ("name", "given_", "outcome"),
     [
-        ("C3", {"rdes": 0.39}, PARTLY),
-        ("C3", {"rdes": 0.4}, REPRODUCED),
-        ("C3", {"rdes": 0.6}, REPRODUCED),
+        ("C3", {"rdes": 0.39}, PARTLY), ("C3", {"rdes": 0.4}, REPRODUCED),
+        ("C3", {"rdes": 0.6}, REPRODUCED), ("C3", {"rdes": 1.0}, NOT),
         ("C3", {"rdes": 0.62, "width": 0.01}, PARTLY),
         ("C3", {"rdes": 0.62, "width": 0.03}, UNDECIDABLE),
-        ("C3", {"rdes": 1.0}, NOT),
-        ("C3", {"solvers": ("fatrop",)}, UNDECIDABLE),
-        ("C3", {"solvers": ()}, UNDECIDABLE),
-        ("C4", {"ges": 0.79}, NOT),
-        ("C4", {"ges": 0.9}, REPRODUCED),
-        ("C4", {"ges": 1.1}, REPRODUCED),
-        ("C4", {"ges": 1.2}, PARTLY),
-        ("C4", {"ges": 1.25}, NOT),
+        ("C3", {"solvers": ("fatrop",)}, UNDECIDABLE), ("C3", {"solvers": ()}, UNDECIDABLE),
+        ("C4", {"ges": 0.79}, NOT), ("C4", {"ges": 0.9}, REPRODUCED),
+        ("C4", {"ges": 1.1}, REPRODUCED), ("C4", {"ges": 1.2}, PARTLY), ("C4", {"ges": 1.25}, NOT),
     ],
-)
+)  # fmt: skip
 def test_claims_about_time_are_decided_with_the_paper_s_solver(name, given_, outcome):
     taken = timings(**given_)
     verdict = verdict_on(name, timings=taken)
@@ -436,9 +386,6 @@ def test_claims_about_time_are_decided_with_the_paper_s_solver(name, given_, out
         assert list(verdict.numbers) == ["ipopt", "fatrop"]
         assert verdict.ratio == verdict.numbers["ipopt"].value
     assert verdict_on(name, timings=taken[:1]).outcome == UNDECIDABLE  # ES alone
-
-
-# The theorem
 
 
 @pytest.mark.parametrize(
@@ -466,19 +413,16 @@ GRADIENT = "the update follows the gradient of the MSPBE, curvature included"
 @pytest.mark.parametrize(
     ("beta", "found", "holding"),
     [
-        (1e-8, Measured(0.1, 0.5, 0.1), set()),
-        (1e-7, Measured(0.1, 0.5, 0.1), set()),
-        (2e-7, Measured(0.1, 0.5, 0.1), {FASTER}),
-        (1e-8, Measured(0.0, 0.5, 0.1), {SMOOTH_VALUE}),
-        (1e-8, Measured(0.1, 0.5, 0.0), {GRADIENT}),
+        (1e-7, Measured(0.1, 0.5, 0.1), {}),
+        (2e-7, Measured(0.1, 0.5, 0.1), {FASTER: THEOREMS}),
+        (1e-8, Measured(0.0, 0.5, 0.1), {SMOOTH_VALUE: (SMOOTH,)}),
+        (1e-8, Measured(0.1, 0.5, 0.0), {GRADIENT: (SMOOTH,)}),
     ],
 )
 def test_settings_and_measurements_can_meet_three_assumptions_of_nine(beta, found, holding):
     made = audit(Experiment("GES", beta=beta), found)
-    assert {a.theorem for a in made if a.holds} == holding
-    by = {a.theorem: a.by for a in made}
-    assert (len(made), by["the value is linear in theta"]) == (9, (LINEAR,))
-    assert (by[SMOOTH_VALUE], by[FASTER]) == ((SMOOTH,), THEOREMS)
+    assert {one.theorem: one.by for one in made if one.holds} == holding
+    assert len(made) == 9
 
 
 @pytest.mark.parametrize("on_boundary", [False, True])
@@ -493,9 +437,6 @@ def test_the_audit_measures_kinks_memory_and_the_dropped_term(on_boundary):
     found = measured(Experiment("GES"), records, Curvature(size, size, size / 4))
     assert (found.kinks, found.dropped) == (on_boundary, 0.25)
     assert found.memory == pytest.approx(1)
-
-
-# All claims
 
 
 @pytest.mark.parametrize("claim", BY_RUNS.values(), ids=BY_RUNS)
