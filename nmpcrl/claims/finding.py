@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import pandas as pd
 
+from nmpcrl.analysis.rows import THETA
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.failure_modes import Ending, ending
 from nmpcrl.claims.investigation import counted
@@ -22,7 +23,6 @@ from nmpcrl.study import paper
 
 LEARNERS = ("ES", "GES")  # which fit no network
 EARLY = 20  # episodes
-THETA_C = len(paper.THETA_INIT) - 1
 
 Count: TypeAlias = tuple[int, int]  # yes, of
 
@@ -59,7 +59,7 @@ def finding(found: Published) -> Finding | None:
     main = found.main.runs.assign(saved=cost_reduction(found.main.runs))
     runs = main[main.learner.isin(LEARNERS)]
     hand = pd.DataFrame.from_dict({one: _by_hand(one) for one in runs.layout.unique()}, "index")
-    closed = runs[f"theta_{THETA_C}"] >= runs.layout.map(hand.closes)
+    closed = runs[THETA[-1]] >= runs.layout.map(hand.closes)
     arrived, there, lost = solved(runs), hand[hand.solved], -hand.saved[~hand.solved]
     most = runs.groupby("layout").saved.max()[there.index]
     each = {name: main[main.learner == name] for name in (*LEARNERS, "TDC")}
@@ -91,7 +91,7 @@ def finding(found: Published) -> Finding | None:
 def _by_hand(layout: str) -> dict[str, Any]:
     """theta_c that closes a gap of the first rollout, and the result of theta_c = d_o."""
     task, theta = paper.task(layout), np.array(paper.THETA_INIT)
-    thetas = theta, np.array([*theta[:THETA_C], task.margin])
+    thetas = theta, np.array([*theta[:-1], task.margin])
     first, hand = (evaluate(Persistent(paper.nmpc(layout)), one, paper.STEPS) for one in thetas)
     saved = 1 - hand.cost / first.cost
     arrives = ending(hand.states, task) == Ending.ARRIVED

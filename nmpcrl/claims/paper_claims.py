@@ -105,11 +105,6 @@ def _c5_numbers(runs: pd.DataFrame, paths: Paths, learners: Learners) -> Numbers
     return {"path": median(apart.path), "cost": median(apart.cost), "theta": median(theta)}
 
 
-def _relative_error(rdes: pd.DataFrame) -> pd.Series:
-    """Held-out error of the network that has theta as an input over that of the one without."""
-    return rdes.imitation_with / rdes.imitation_without
-
-
 def _c6_numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
     (rdes,) = arms(runs, *learners, among=PAPER)
     return {"told": median(rdes.imitation_with), "alone": median(rdes.imitation_without)}
@@ -264,7 +259,7 @@ CLAIMS: dict[str, Claim] = {
             would_change="How far theta moves: where it hardly does, the network gains nothing from"
             " it.",
             learners=("RDES",),
-            number=_relative_error,
+            number=lambda rdes: rdes.imitation_with / rdes.imitation_without,
             among=PAPER,
             threshold=MORE_ACCURATE,
             numbers=_c6_numbers,

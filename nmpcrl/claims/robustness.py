@@ -84,8 +84,8 @@ def variant_changes(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
         after, before = (Observations(one, paths) for one in groups(runs, name))
         for claim in BY_RUNS.values():
             if changed & {*claim.learners}:
-                here, base = (claim.settled(one) for one in (after, before))
-                rows.append(_row(name, claim.name, _judged(here), _judged(base)))
+                both = (claim.settled(one) for one in (after, before))
+                rows.append(_row(name, claim.name, *((v.outcome, v.counts["all"]) for v in both)))
     return pd.DataFrame(rows, columns=[*COLUMNS])
 
 
@@ -110,10 +110,6 @@ def part_changes(verdicts: Sequence[Verdict]) -> pd.DataFrame:
         row["changes"] = row["changes"] and one.depends_on(field)
         rows.append(row | ({"p": np.nan} if field == "layout" else {}))
     return pd.DataFrame(rows, columns=[*COLUMNS])
-
-
-def _judged(verdict: Verdict) -> Judged:
-    return verdict.outcome, verdict.counts["all"]
 
 
 def _row(variant: str, claim: str, judged: Judged, base: Judged) -> dict[str, Any]:

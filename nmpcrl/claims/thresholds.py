@@ -72,10 +72,7 @@ def instability(runs: pd.DataFrame) -> pd.Series:
 
 
 def cost_reduction(runs: pd.DataFrame) -> pd.Series:
-    """Share of theta_init's noise-free cost that each run saves in the end.
-
-    Minus infinity where a rollout failed or training was stopped.
-    """
+    """Share of theta_init's noise-free cost that a run saves; -inf if it failed or was stopped."""
     return (1 - runs.final_cost / runs.initial_cost).mask(was_stopped(runs), -np.inf)
 
 
@@ -101,10 +98,7 @@ def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.S
 
 
 def cost_difference(first: pd.DataFrame, second: pd.DataFrame) -> pd.Series:
-    """Final noise-free cost of the first arm minus the second's, in shares of theta_init's.
-
-    Two failed runs cost the same.
-    """
+    """Final noise-free cost of one arm minus another's, over theta_init's; 0 where both failed."""
     more = (first.final_cost - second.final_cost) / first.initial_cost
     return more.where(first.final_cost != second.final_cost, 0.0)
 

@@ -22,7 +22,6 @@ held and all with the true slope.
 """
 
 from functools import cache, partial
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -103,12 +102,8 @@ def live(runs: pd.DataFrame, arm: str, than: str = "none") -> Estimate:
     The runs are of `ends`, of one part. No run lives with "none", which leaves the share itself.
     """
     by = runs.pivot(index=["layout", "seed"], columns="intervention", values="stopped").astype(int)
-    gained = (by[than] - by[arm]).groupby(level="layout").agg(["sum", "size"])
-
-    def mean(gains: Any, counts: Any) -> Any:
-        return gains.sum(axis=-1) / counts.sum(axis=-1)
-
-    return over_layouts(mean, *gained.to_numpy().T)
+    gained = (by[than] - by[arm]).groupby(level="layout").agg(["sum", "size"]).to_numpy().T
+    return over_layouts(lambda gains, counts: gains.sum(axis=-1) / counts.sum(axis=-1), *gained)
 
 
 INTERVENTIONS = Investigation(

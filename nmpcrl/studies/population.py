@@ -229,11 +229,7 @@ def _paths(table: pd.DataFrame) -> Paths:
 
 @cache
 def load() -> Drawn:
-    """The published runs.
-
-    Raises:
-        Damaged: they are missing, or are not those that were written.
-    """
+    """The published runs."""
     return of_table(POPULATION.table())
 
 
