@@ -13,7 +13,6 @@ these columns in five short runs. They sort runs, and decide no claim.
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -61,8 +60,7 @@ class Failure(StrEnum):
 
 
 WELL = "went well"  # in the place of a mechanism
-NONE = {"ending": "", "wrong": "", "mechanism": "", "episode": pd.NA}  # of a frozen arm
-FAILURE_MODE = [*NONE]
+FAILURE_MODE = ["ending", "wrong", "mechanism", "episode"]
 
 
 def failure_modes(
@@ -75,31 +73,22 @@ def failure_modes(
     Args:
         summaries: the runs.
         runs: their table, of `rows.table`.
-        every: with their frozen arms, trained here or published.
+        every: runs that include the `frozen_arm` of each, trained here or published.
 
     Returns:
         Columns ending (of the last rollout: an `Ending`), wrong (a `Failure`, or ""), mechanism (a
         `Mechanism`, or `WELL`) and episode (after which the cost rose; missing for a run that went
-        well); empty for the frozen arms.
+        well); empty where theta is frozen.
     """
-    rows = [
-        NONE if e.learner == "frozen" else failure_mode(run, wrong, every[frozen_arm(e)].states)
-        for (e, run), wrong in zip(summaries.items(), went_wrong(runs), strict=True)
-    ]
+    rows = []
+    for (e, run), wrong in zip(summaries.items(), went_wrong(runs), strict=True):
+        if e.learner == "frozen":
+            rows.append(("", "", "", pd.NA))
+            continue
+        found = mechanism(run, every[frozen_arm(e)].states) if wrong else WELL
+        began = rise(run).start if wrong else pd.NA
+        rows.append((ending(run.states, e.task), wrong, found, began))
     return pd.DataFrame(rows, columns=FAILURE_MODE)
-
-
-def failure_mode(run: RunSummary, wrong: str, first_rollout: Column) -> dict[str, Any]:
-    """The failure mode of a run that learned, by `FAILURE_MODE`; `wrong` is of `went_wrong`.
-
-    `first_rollout` has the states of theta_init's rollout without noise, shape (K + 1, n).
-    """
-    return {
-        "ending": ending(run.states, run.name.task),
-        "wrong": wrong,
-        "mechanism": mechanism(run, first_rollout) if wrong else WELL,
-        "episode": rise(run).start if wrong else pd.NA,
-    }
 
 
 def went_wrong(runs: pd.DataFrame) -> list[str]:
@@ -120,7 +109,7 @@ def rise(run: RunSummary) -> slice:
 
 
 def mechanism(run: RunSummary, first_rollout: Column) -> Mechanism:
-    """The mechanism by which the cost of a run rose; arguments as for `failure_mode`."""
+    """The mechanism by which the cost of a run rose; `first_rollout` has theta_init's states."""
     window, start = rise(run), run.experiment["theta"][-1]
     episodes = {name: column[window] for name, column in run.episodes.items()}
     known = np.isfinite(episodes["bias"]) & np.isfinite(episodes["delta"])  # a network predicts

@@ -49,12 +49,12 @@ def was_stopped(runs: pd.DataFrame) -> pd.Series:
 
 
 def training_cost_ratio(runs: pd.DataFrame) -> pd.Series:
-    """Training cost over the frozen arm's; infinite where the run was stopped."""
+    """Training cost over the cost with theta frozen; infinite where the run was stopped."""
     return runs.cost_ratio.mask(was_stopped(runs), np.inf)
 
 
 def divergence(runs: pd.DataFrame) -> pd.Series:
-    """Which runs diverged (see `DIVERGED`); missing without a frozen arm for comparison."""
+    """Which runs diverged (see `DIVERGED`); missing without a run with theta frozen."""
     ratio = training_cost_ratio(runs)
     return (ratio > DIVERGED).astype("boolean").where(ratio.notna())
 
@@ -109,7 +109,7 @@ def path_distance(first: Column, second: Column) -> float:
 
 
 def of_records(runs: Runs[Records]) -> pd.DataFrame:
-    """The columns that `divergence` and `instability` read, a row a run; runs with frozen arms."""
+    """A row a run, for `divergence` and `instability`; `runs` include the learner "frozen"."""
     cell, costs = attrgetter(*CELL), {e: metrics.training_cost(one) for e, one in runs.items()}
     frozen = {cell(e): cost for e, cost in costs.items() if e.learner == "frozen"}
     rows = {

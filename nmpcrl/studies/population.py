@@ -180,7 +180,7 @@ class Drawn:
     @cached_property
     def shares(self) -> pd.DataFrame:
         """The shares of layouts in which claims hold, as `shares` gives them."""
-        return shares(held(self.main, self.paths))
+        return shares(by_layout(self.main, self.paths))
 
     @cached_property
     def tried(self) -> pd.DataFrame:
@@ -233,7 +233,9 @@ def load() -> Drawn:
     return of_table(POPULATION.table())
 
 
-def held(runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTED)) -> pd.DataFrame:
+def by_layout(
+    runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTED)
+) -> pd.DataFrame:
     """Where each claim holds in runs of one setting, a row a claim and layout with its answers.
 
     Returns:
@@ -256,7 +258,7 @@ def held(runs: pd.DataFrame, paths: Paths, claims: Iterable[str] = tuple(EXPECTE
 
 
 def shares(where: pd.DataFrame) -> pd.DataFrame:
-    """The share of the layouts in which each claim holds, beside the expected share, from `held`.
+    """The share of the layouts of `by_layout` in which each claim holds, beside the expected share.
 
     Returns:
         Columns claim, holding, layouts, share, low, high (by `rate`: layouts are independent),
@@ -277,7 +279,7 @@ def shares(where: pd.DataFrame) -> pd.DataFrame:
 
 def succeeds(runs: pd.DataFrame, learner: str = "ES") -> pd.Series:
     """Whether a learner improves in each layout, by its name."""
-    where = held(runs, {}, [f"{learner} improves"])
+    where = by_layout(runs, {}, [f"{learner} improves"])
     return where.set_index("layout").holds.astype(bool)
 
 

@@ -263,12 +263,12 @@ def shares_in_A_to_F() -> Any:
     main, names = study().main.runs, list(population.EXPECTED)
     runs = study().runs[study().runs.variant == design.MAIN_TABLE]
     assert len(main) == len(runs)
-    return population.shares(population.held(runs, study().paths, names)).set_index("claim")
+    return population.shares(population.by_layout(runs, study().paths, names)).set_index("claim")
 
 
 @entry("population")
 def where_each_claim_holds() -> Any:
-    return table(population.held(drawn().main, drawn().paths))
+    return table(population.by_layout(drawn().main, drawn().paths))
 
 
 @entry("population")

@@ -47,7 +47,7 @@ def judged(**numbers):
 def shares(runs):
     names = runs[["learner", "layout", "decay", "seed"]].to_dict("records")
     paths = {Experiment(**one): np.zeros((130, 3)) for one in names}
-    return population.shares(population.held(runs, paths)).set_index("claim")
+    return population.shares(population.by_layout(runs, paths)).set_index("claim")
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,7 @@ def test_a_claim_holds_in_a_layout_where_more_than_half_of_its_answers_are_yes()
     cells = [("J001", "step", True), ("J001", "episode", False)]
     cells += [("J002", "step", True), ("J002", "episode", True)]
     rows = [made("judge", "ES", name, decay=decay, better=yes) for name, decay, yes in cells]
-    where = population.held(pd.DataFrame(rows), {})
+    where = population.by_layout(pd.DataFrame(rows), {})
     assert where[["claim", "layout", "yes", "of", "holds"]].to_numpy().tolist() == [
         ["ES improves", "J001", 1, 2, False], ["ES improves", "J002", 2, 2, True],
     ]  # fmt: skip
