@@ -7,11 +7,11 @@ import pytest
 
 from nmpcrl.analysis import metrics, rows
 from nmpcrl.analysis.rows import experiment_of, row, table, tidy
-from nmpcrl.analysis.summary import RunSummary, summarise
+from nmpcrl.analysis.summary import summarise
 from nmpcrl.learning.updates import OVERSHOOT
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.experiment import frozen_arm
-from nmpcrl.study.records import DamagedRecords, Records
+from nmpcrl.study.records import Records
 
 SHORT = Experiment("RDES", episodes=4, steps=40, decay="episode", evaluate_every=2)
 
@@ -93,21 +93,6 @@ def test_what_was_never_reached_is_not_known():
     assert row(found)["training_cost"] == np.inf
     assert row(found)["cut_short"] == 3
     np.testing.assert_array_equal(found.episodes["theta"][0], exploding.steps["theta"][-1])
-
-
-def test_a_summary_is_stored_and_read_and_other_files_are_refused(short, records, tmp_path):
-    path, other = tmp_path / "one.npz", tmp_path / "run.npz"
-    short.save(path)
-    read = RunSummary.load(path)
-    assert (read.name, read.facts) == (SHORT, short.facts)
-    for name, column in short.episodes.items():
-        np.testing.assert_array_equal(read.episodes[name], column)
-    np.testing.assert_array_equal(read.states, short.states)
-    path.write_bytes(path.read_bytes()[:-100])
-    records.save(other)
-    for wrong in (path, other):
-        with pytest.raises(DamagedRecords, match="damaged, or not a run"):
-            RunSummary.load(wrong)
 
 
 def test_a_row_measures_as_the_metrics_do_and_a_tidy_table_has_a_row_an_episode(records, short):

@@ -50,9 +50,8 @@ def test_a_stand_is_the_end_of_a_rollout_and_agrees_with_the_summary(standing):
 
 
 def test_a_stretch_is_the_first_unbroken_part_in_which_the_robot_stands():
-    kinds = {"arrives": (True, 0.0), "stands": (False, 0.01), "moves": (False, 1.2)}
-    course = ["arrives", "moves", "stands", "stands", "arrives", "stands"]
-    found = [SimpleNamespace(arrived=kinds[one][0], moved=kinds[one][1]) for one in course]
+    course = [(True, 0.0), (False, 1.2), (False, 0.01), (False, 0.01), (True, 0.0), (False, 0.01)]
+    found = [SimpleNamespace(arrived=arrived, moved=moved) for arrived, moved in course]
     assert stretch(found, 0.05) == found[2:4]
     assert stretch(found[:2], 0.05) == []
 
