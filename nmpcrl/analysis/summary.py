@@ -156,7 +156,7 @@ def summarise(records: Records) -> RunSummary:
     """The summary of a run; of RDES trained to the end also how well networks imitate it."""
     experiment, evaluated = Experiment(**records.experiment), records.evaluations
     nmpc = controller_of(experiment).nmpc
-    facts: dict[str, Any] = dict(records.facts)
+    facts = dict(records.facts)
     if experiment.learner == IMITATED and experiment.episodes >= paper.EPISODES:
         imitation = imitate(records)
         facts["imitation"] = {

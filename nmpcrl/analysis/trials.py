@@ -18,19 +18,15 @@ def evaluations(runs: Iterable[Records]) -> pd.DataFrame:
     Returns:
         Columns learner, seed, episode, cost (summed, without noise) and theta.
     """
-    return pd.DataFrame([row for run in runs for row in _rows(run)])
-
-
-def _rows(run: Records) -> list[dict[str, Any]]:
-    named = {name: run.experiment[name] for name in ("learner", "seed")}
-    columns = (run.evaluations[name] for name in ("episode", "cost", "theta"))
-    rows = [
-        {**named, "episode": int(episode), "cost": float(cost), "theta": theta}
-        for episode, cost, theta in zip(*columns, strict=True)
-    ]
-    if run.facts["stopped"] != Stopped.FINISHED:
-        rows.append({**rows[-1], "episode": run.experiment["episodes"], "cost": np.inf})
-    return rows
+    rows = list[dict[str, Any]]()
+    for run in runs:
+        named = {name: run.experiment[name] for name in ("learner", "seed")}
+        columns = (run.evaluations[name] for name in ("episode", "cost", "theta"))
+        for episode, cost, theta in zip(*columns, strict=True):
+            rows.append({**named, "episode": int(episode), "cost": float(cost), "theta": theta})
+        if run.facts["stopped"] != Stopped.FINISHED:
+            rows.append({**rows[-1], "episode": run.experiment["episodes"], "cost": np.inf})
+    return pd.DataFrame(rows)
 
 
 def final_costs(rows: pd.DataFrame) -> pd.DataFrame:

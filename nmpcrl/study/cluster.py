@@ -13,10 +13,6 @@ from nmpcrl.study.lock import signature
 from nmpcrl.study.refusal import Refusal
 
 
-class NoCluster(Refusal):
-    """There is no cluster that could be used."""
-
-
 @contextmanager
 def executor(address: str, patience: float = 30.0) -> Iterator[Executor]:
     """The workers of the scheduler at an address such as "tcp://host:8786".
@@ -24,25 +20,25 @@ def executor(address: str, patience: float = 30.0) -> Iterator[Executor]:
     Scheduler and first worker are waited for `patience` seconds.
 
     Raises:
-        NoCluster: Dask, the scheduler or a worker is missing, or a worker has other code.
+        Refusal: Dask, the scheduler or a worker is missing, or a worker has other code.
     """
     try:
         from distributed import Client
     except ImportError:
-        raise NoCluster("Dask is not installed: pip install 'nmpcrl[cluster]'") from None
+        raise Refusal("Dask is not installed: pip install 'nmpcrl[cluster]'") from None
     try:
         parts = urlsplit(address if "://" in address else f"tcp://{address}")
         place = (parts.hostname or "", parts.port or 0)
         socket.create_connection(place, patience).close()  # Dask tries unknown hosts for ever
         client = Client(address, timeout=patience, set_as_default=False)
     except (OSError, TypeError, ValueError) as error:  # TypeError without certificates for TLS
-        raise NoCluster(f"no scheduler answers at {address!r}: {error}") from None
+        raise Refusal(f"no scheduler answers at {address!r}: {error}") from None
     with client:
         try:
             client.wait_for_workers(1, timeout=patience)
         except TimeoutError:
-            raise NoCluster(f"the scheduler at {address} has no worker") from None
+            raise Refusal(f"the scheduler at {address} has no worker") from None
         for worker, theirs in client.run(signature).items():
             if theirs != signature():
-                raise NoCluster(f"{worker} has other code or other versions of libraries")
+                raise Refusal(f"{worker} has other code or other versions of libraries")
         yield client.get_executor(pure=False)

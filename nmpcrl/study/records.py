@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple, NotRequired, TypedDict
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,24 +32,11 @@ class Stopped(StrEnum):
     DIVERGED = "diverged"
 
 
-class Facts(TypedDict):
-    """Facts about a run; a stored run has the last four."""
-
-    stopped: str  # the end of training, as `Stopped` says
-    solver: str  # that found the plans
-    seconds: float
-    final_cost: float
-    versions: NotRequired[dict[str, str]]
-    machine: NotRequired[dict[str, Any]]
-    key: NotRequired[str]
-    sources: NotRequired[str]
-
-
 class About(NamedTuple):
     """The experiment and the facts of a file."""
 
     experiment: dict[str, Any]  # the fields when the file was written
-    facts: Facts
+    facts: dict[str, Any]
 
 
 class StepStatus(IntEnum):
@@ -145,12 +132,15 @@ class Records:
 
     Columns of `evaluations`, one row per rollout without noise: episode (number of trained ones),
     theta (d,), cost (infinite where a solve failed), states (K + 1, n), actions (K + 1, m).
+
+    Facts: stopped (how training ended, as `Stopped` says), solver (that found the plans), seconds,
+    final_cost; of a stored run also versions, machine, key and sources, a hash of the code.
     """
 
     experiment: dict[str, Any]  # the fields of the Experiment, or `Trial.stated`
     steps: dict[str, Column]
     evaluations: dict[str, Column]
-    facts: Facts
+    facts: dict[str, Any]
 
     def save(self, path: Path) -> None:
         """Write a file as a whole; errors as in `write_file`."""

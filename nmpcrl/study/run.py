@@ -15,7 +15,6 @@ from nmpcrl.learning.training import Diverged, Step, absurd, train
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import (
     EvaluationRow,
-    Facts,
     Records,
     StepRow,
     StepStatus,
@@ -77,7 +76,7 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
     table, judged = steps.columns(), evaluations.columns()
     alpha = named.alpha if isinstance(named, Experiment) else np.nan
     table["alpha_phi2"] = alpha * (table["features"] ** 2).sum(axis=1)
-    facts: Facts = {
+    facts = {
         "stopped": stopped,
         "solver": solver,  # another than the run's own if it took over, if only once
         "seconds": float(table["seconds"].sum()),

@@ -4,7 +4,7 @@ A file is named by its experiment or trial and by the key of `provenance`. The l
 lets one process at a time train a run; the system frees it when the process ends.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -21,7 +21,7 @@ from nmpcrl.study.jobs import Failed, Failure, parallel
 from nmpcrl.study.limits import seconds_of
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.provenance import environment, key
-from nmpcrl.study.records import About, DamagedRecords, Facts, Records, about
+from nmpcrl.study.records import About, DamagedRecords, Records, about
 from nmpcrl.study.run import run
 from nmpcrl.study.setup import compile_ahead
 from nmpcrl.study.trial import Trial
@@ -227,7 +227,7 @@ def _seconds(named: Named) -> float:
 def train(named: Named, **options: Any) -> Records:
     """The records of a run; their facts name versions, machine, key and sources."""
     records = run(named, **options)
-    facts: Facts = records.facts | {
+    facts = records.facts | {
         "versions": environment(),
         "machine": fingerprint(),
         "key": key(named),
@@ -240,7 +240,7 @@ RUNS = Store(Records, train, key)
 fetch, fetch_all = RUNS.fetch, RUNS.fetch_all
 
 
-def refused(named: Named, facts: Facts) -> str:
+def refused(named: Named, facts: Mapping[str, Any]) -> str:
     """Why a run with these facts is not the named one, or not one of this code; empty if it is."""
     if facts.get("key") != key(named):
         return "another run, or one of other versions of libraries"

@@ -16,7 +16,7 @@ import pytest
 from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries
 from nmpcrl.analysis.summary import summarise
 from nmpcrl.study import cluster, run, sweep
-from nmpcrl.study.cluster import NoCluster
+from nmpcrl.study.refusal import Refusal
 
 pytest.importorskip("distributed", reason="needs the extra nmpcrl[cluster]")
 
@@ -119,29 +119,23 @@ def test_a_killed_worker_loses_no_run_and_no_bit(address, worker, tmp_path):
     assert not [*(tmp_path / "elsewhere").rglob("*.npz")]
 
 
+def refused(address: str, patience: float, sentence: str) -> None:
+    with pytest.raises(Refusal, match=sentence), cluster.executor(address, patience):
+        pass
+
+
 @pytest.mark.slow
-def test_a_worker_with_other_versions_is_refused(address, worker):
+def test_no_worker_and_one_with_other_versions_are_refused(address, worker):
+    refused(address, 0.1, "has no worker")
     worker(OTHER_VERSIONS)
-    refused = pytest.raises(NoCluster, match="has other code or other versions of libraries")
-    with refused, cluster.executor(address, 240.0):
-        pass
-
-
-@pytest.mark.slow
-def test_a_scheduler_without_workers_is_refused(address):
-    with pytest.raises(NoCluster, match="has no worker"), cluster.executor(address, 0.1):
-        pass
+    refused(address, 240.0, "has other code or other versions of libraries")
 
 
 @pytest.mark.parametrize("nobody", ["", "foo", "tcp://nowhere:1", "127.0.0.1:9", "x://y:1", "1,1"])
 def test_where_no_scheduler_answers_nobody_is_waited_for(nobody):
-    refused = pytest.raises(NoCluster, match=f"no scheduler answers at '{nobody}'")
-    with refused, cluster.executor(nobody, 1.0):
-        pass
+    refused(nobody, 1.0, f"no scheduler answers at '{nobody}'")
 
 
 def test_without_dask_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    refused = pytest.raises(NoCluster, match=r"pip install 'nmpcrl\[cluster\]'")
-    with refused, cluster.executor("127.0.0.1:8786"):
-        pass
+    refused("127.0.0.1:8786", 1.0, r"pip install 'nmpcrl\[cluster\]'")

@@ -78,16 +78,15 @@ def test_a_raised_epoch_makes_other_runs(monkeypatch, room):
 
 
 @pytest.mark.parametrize("library", ["casadi", "numba", "numpy", "torch"])
-def test_a_version_counts_where_the_library_bears_on_the_numbers(monkeypatch, library):
-    for learner in ("ES", "RDES"):
-        with monkeypatch.context() as patch:
-            keys = {}
-            for number in ("1.2", "1.2+cpu", "1.3"):
-                other = {library: number}
-                patch.setattr(provenance, "installed", lambda name, n=other: n.get(name, "1"))
-                keys[number] = key(Experiment(learner))
-        assert keys["1.2"] == keys["1.2+cpu"]
-        assert (keys["1.2"] != keys["1.3"]) == (library != "torch" or learner == "RDES")
+@pytest.mark.parametrize("learner", ["ES", "RDES"])
+def test_a_version_counts_where_the_library_bears_on_the_numbers(monkeypatch, library, learner):
+    keys = []
+    for number in ("1.2", "1.2+cpu", "1.3"):
+        other = {library: number}
+        monkeypatch.setattr(provenance, "installed", lambda name, n=other: n.get(name, "1"))
+        keys.append(key(Experiment(learner)))
+    assert keys[0] == keys[1]
+    assert (keys[0] != keys[2]) == (library != "torch" or learner == "RDES")
 
 
 def test_the_machine_is_known_by_what_changes_last_digits(monkeypatch):

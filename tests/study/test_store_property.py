@@ -15,7 +15,6 @@ import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +22,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+from made_records import made_records
 
 from nmpcrl.study import (
     DamagedRecords,
@@ -35,7 +35,6 @@ from nmpcrl.study import (
     store,
     stored,
 )
-from nmpcrl.study.records import EvaluationRow, StepRow, form_of
 from nmpcrl.study.store import RUNS
 
 EXPERIMENTS = tuple(
@@ -47,16 +46,6 @@ MEMORY = Path("/dev/shm")  # where nobody waits for a disk
 each = st.sampled_from(EXPERIMENTS)
 
 
-def drawn(row: type, rows: int, seed: int) -> dict[str, np.ndarray]:
-    """A table of such rows, always the same for a seed."""
-    rng = np.random.default_rng(seed)
-    columns = {}
-    for name, (kind, _) in form_of(row, 3, 2, 9, 3).fields.items():
-        numbers = rng.integers(0, 10**6, (rows, *kind.shape))
-        columns[name] = numbers if kind.base.kind == "i" else numbers / 7
-    return columns
-
-
 def trained(experiment: Experiment, **_) -> Records:
     """What training gives; it is noted in a file, for it may be another process that trains."""
     with (Path(os.environ["NMPCRL_RUNS"]).parent / "trained").open("a") as log:
@@ -65,10 +54,7 @@ def trained(experiment: Experiment, **_) -> Records:
 
 
 def truth(experiment: Experiment) -> Records:
-    seed = EXPERIMENTS.index(experiment)
-    steps = drawn(StepRow, 6, seed) | {"alpha_phi2": np.arange(6.0)}
-    facts = {"stopped": "finished", "solver": "riccati", "seconds": 1.0, "final_cost": seed / 7}
-    return Records(asdict(experiment), steps, drawn(EvaluationRow, 3, seed), facts)
+    return made_records(experiment, 6, EXPERIMENTS.index(experiment) + 1)
 
 
 def same(one: Records, other: Records) -> bool:

@@ -126,12 +126,9 @@ def test_every_field_of_a_trial_is_part_of_its_key(change):
     assert trial(**change) != trial() == pickle.loads(pickle.dumps(trial()))
 
 
-def test_three_seeds_of_a_random_start_are_three_runs():
+def test_three_seeds_of_a_random_start_are_three_runs(trains_here):
     found = fetch_all([trial(seed=seed) for seed in range(3)], workers=1, progress=False)
-    finals = {records.facts["final_cost"] for records in found.values()}
-    assert len(finals) == 3
-    lengths = [np.bincount(records.steps["episode"]).tolist() for records in found.values()]
-    assert any(min(length) < 6 for length in lengths)  # an episode ended early
+    assert len({records.facts["final_cost"] for records in found.values()}) == 3
     assert [one.seed for one in found.select(seed=1)] == [1]
 
 
@@ -156,9 +153,8 @@ def test_trials_of_a_notebook_are_done_in_other_processes(runs):
 
 
 def test_a_learner_that_draws_is_given_a_generator_of_the_seed():
-    make = partial(random_direction, alpha=1e-3)
-    one, same = (run(trial(make=make)) for _ in range(2))
-    assert_same_numbers(one, same)
+    one = trial(make=partial(random_direction, alpha=1e-3))
+    assert_same_numbers(run(one), run(one))
 
 
 @pytest.mark.parametrize(
