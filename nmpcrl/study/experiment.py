@@ -31,6 +31,7 @@ MOST_STAGES = 500  # of a plan: four times an episode; gamma^500 is 2e-7
 LAYOUT = geometry.layout(paper.LAYOUTS)
 POSE = geometry.pose(paper.LOWER, paper.UPPER)
 STEP_SIZE = positive(ABSURD)  # with a larger one theta leaves the numbers in one step
+TOLERANCE = number(solvers.LEAST_TOLERANCE, solvers.LARGEST_TOLERANCE)
 THETA = numbers([number(-ABSURD, ABSURD)] * 9, f"9 numbers of size at most {ABSURD:g}")
 
 
@@ -44,9 +45,7 @@ class Experiment:
     """One run; the defaults are the paper's.
 
     A field that `LEARNERS` names in `reads` is part of the keys of those learners' runs alone.
-
-    Raises:
-        ParameterError: a field has a value that is not allowed.
+    ParameterError refuses other values.
     """
 
     learner: str = option("ES", one_of(LEARNERS), "Name of the learner.")
@@ -87,11 +86,7 @@ class Experiment:
     target: tuple[float, ...] = option(paper.TARGET, POSE, "Pose that the robot is to reach.")
     horizon: int = option(paper.HORIZON, whole(1, MOST_STAGES), "N, the inputs of a plan.")
     solver: str = option("riccati", one_of(solvers.SOLVERS), "Solver of Eq. (2).")
-    tolerance: float = option(
-        solvers.TOLERANCE,
-        number(solvers.LEAST_TOLERANCE, solvers.LARGEST_TOLERANCE),
-        "Tolerance of the solver.",
-    )
+    tolerance: float = option(solvers.TOLERANCE, TOLERANCE, "Tolerance of the solver.")
     evaluate_every: int = option(
         10, whole(1, MOST_EPISODES), "Episodes between rollouts without noise."
     )

@@ -8,25 +8,21 @@ from nmpcrl.study import paper
 from nmpcrl.study.layouts import gaps
 
 FAR = 1.25 * np.sqrt(1.35)  # from a centre; the penalty begins here [m]
+# One obstacle in the middle of the way, three at the upper wall.
+TASK = paper.task(((3.0, 0.0), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
+NEAR = paper.task(((8.5, 3.2), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
 
 
-@pytest.fixture(scope="module")
-def task():
-    """One obstacle in the middle of the way, three at the upper wall."""
-    return paper.task(((3.0, 0.0), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
+def along(*points, heading=np.pi / 2):
+    """States with a heading, by default the target's, at these positions."""
+    return np.column_stack([np.array(points), np.full(len(points), heading)])
 
 
-def along(points: np.ndarray) -> np.ndarray:
-    """States with the target's heading at these positions, shape (k, 3)."""
-    return np.column_stack([points, np.full(len(points), np.pi / 2)])
-
-
-def test_a_straight_trajectory_is_as_long_as_its_ends_are_apart(task):
-    states = along(np.linspace([-2.5, 2.0], [8.5, 2.0], 12))
-    found = describe(states, task, 0.5)
+def test_a_straight_trajectory_is_as_long_as_its_ends_are_apart():
+    found = describe(along(*np.linspace([-2.5, 2.0], [8.5, 2.0], 12)), TASK, 0.5)
     assert found.length == pytest.approx(11.0)
     assert found.clearance == pytest.approx(np.hypot(0.5, 2.0) - 1.25)
-    assert describe(along(np.array([[3.0, 1.0]])), task, 0.5).clearance == pytest.approx(-0.25)
+    assert describe(along([3.0, 1.0]), TASK, 0.5).clearance == pytest.approx(-0.25)
 
 
 @pytest.mark.parametrize(
@@ -38,29 +34,23 @@ def test_a_straight_trajectory_is_as_long_as_its_ends_are_apart(task):
         ([0.0, 0.0, np.nan, np.nan], np.pi / 2, np.inf),  # a solve failed
     ],
 )
-def test_the_robot_has_arrived_when_it_is_at_the_target_to_stay(task, away, heading, arrival):
-    states = along(np.column_stack([8.5 - np.array(away), np.full(len(away), 2.0)]))
-    states[:, 2] = heading
-    states[np.isnan(away)] = np.nan
-    assert describe(states, task, 0.5).arrival == pytest.approx(arrival)
+def test_the_robot_has_arrived_when_it_is_at_the_target_to_stay(away, heading, arrival):
+    states = along(*([8.5 - one, 2.0] for one in away), heading=heading)
+    assert describe(states, TASK, 0.5).arrival == pytest.approx(arrival)
 
 
-def test_coming_close_is_charged_only_within_the_margin_and_far_from_the_target(task):
+def test_coming_close_is_charged_only_within_the_margin_and_far_from_the_target():
     beside, within = [3.0, FAR + 0.01], [3.0, 1.25]
-    assert describe(along(np.array([beside])), task, 0.5).penalty == 0
-    assert describe(along(np.array([beside, within])), task, 0.5).penalty == pytest.approx(
-        50 * 0.35
-    )
-    near = paper.task(((8.5, 3.2), (0.0, 7.5), (3.0, 7.5), (6.0, 7.5)))
-    assert describe(along(np.array([[8.5, 2.1]])), near, 0.5).penalty == 0
+    assert describe(along(beside), TASK, 0.5).penalty == 0
+    assert describe(along(beside, within), TASK, 0.5).penalty == pytest.approx(50 * 0.35)
+    assert describe(along([8.5, 2.1]), NEAR, 0.5).penalty == 0
 
 
 def test_a_gap_closes_where_its_width_is_nothing():
-    task = paper.task("A")
-    path = np.array([[5.5, 0.5], [7.5, 2.5]])
+    task, path = paper.task("A"), np.array([[5.5, 0.5], [7.5, 2.5]])
     shut = closes_at(task, path)
     assert min(gaps(task, path, shut).values()) == pytest.approx(0, abs=1e-12)
     assert shut == pytest.approx((np.hypot(1.5, 2.5) / 2.5) ** 2 - 1)
     beside_a_wall = paper.task(((7.0, -1.0),)), np.array([[7.0, -2.8], [8.0, -2.8]])
     assert closes_at(*beside_a_wall) == pytest.approx((2 / 1.25) ** 2 - 1)
-    assert closes_at(paper.task("A"), np.full((3, 2), [1.7, 1.4])) == np.inf  # through no gap
+    assert closes_at(task, np.full((3, 2), [1.7, 1.4])) == np.inf  # through no gap

@@ -56,8 +56,12 @@ def test_the_worth_of_a_gain_is_what_it_costs():
     assert lqr.worth(np.array([[9.0, 9.0]])).cost == np.inf
 
 
-def test_value_and_action_are_csnlps(nmpc):
-    agent = peers.agent(peers.lqr_plan("ipopt, 1e-10"), lqr.problem())
+@pytest.fixture
+def agent():
+    return peers.agent(peers.lqr_plan("ipopt, 1e-10"), lqr.problem())
+
+
+def test_value_and_action_are_csnlps(nmpc, agent):
     for state in np.random.default_rng(3).normal(size=(5, 2)):
         solution = nmpc.solve(state, lqr.problem().theta)
         with peers.silent():
@@ -66,7 +70,7 @@ def test_value_and_action_are_csnlps(nmpc):
         assert float(action) == pytest.approx(solution.action[0], rel=1e-5, abs=1e-7)
 
 
-def test_the_agent_of_the_peer_meets_our_plant():
+def test_the_agent_of_the_peer_meets_our_plant(agent):
     calls = []
 
     def plant(state, action, rng):
@@ -75,7 +79,6 @@ def test_the_agent_of_the_peer_meets_our_plant():
 
     world = peers.world(lqr.problem(), plant, lqr.START, 3)
     with peers.silent():
-        agent = peers.agent(peers.lqr_plan("ipopt, 1e-10"), lqr.problem())
         (returns,) = agent.train(world, episodes=1, seed=0)
     assert len(calls) == 3
     np.testing.assert_array_equal(calls[1][0], lqr.plant(*calls[0], None)[0])
