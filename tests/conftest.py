@@ -326,7 +326,7 @@ def summary_of(
     training: float = 1.0,
     reached: int | None = None,
     states: np.ndarray = TRAJECTORY,
-    actions: np.ndarray | None = STILL,
+    actions: np.ndarray = STILL,
     inside: tuple[int, int, int] = (0, 0, 0),
     imitation: tuple[float, float] = (0.5, 1.0),
     **columns: Any,
@@ -340,7 +340,7 @@ def summary_of(
         training: cost of its training episodes, over the start's.
         reached: after how many episodes it was stopped.
         states: of its last rollout without noise.
-        actions: likewise; zeros by default, and None if they are not known.
+        actions: likewise; zeros by default.
         inside: states in an obstacle by size, in its first episode.
         imitation: held-out errors with and without theta.
         columns: further columns of `RunSummary.episodes`, or the value of all their rows.

@@ -106,37 +106,27 @@ COLUMNS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
-    """What is known of every run, trained here or published: what pages draw.
+class RunSummary:
+    """One run in short.
 
-    `episodes` has the column cost, and of some runs theta; `evaluations` has episode, theta and
-    cost; `facts` has stopped and seconds. `RunSummary` says what these are.
+    `EPISODES` lists the columns of `episodes`. Columns of `evaluations`, one row per rollout
+    without noise: episode (so many were trained), theta (d,), cost (infinite where a solve failed),
+    inside (states in an obstacle, by `SIZES`), overlap (largest Xi), distance (to the target at the
+    end). Of a published run are known the cost of episodes and, of some runs, theta; the first
+    three columns of `evaluations`; the facts stopped and seconds; and no actions.
     """
 
     experiment: dict[str, Any]  # the fields of the Experiment
     episodes: dict[str, Column]
     evaluations: dict[str, Column]
     states: Column  # of the last rollout without noise, shape (K + 1, n); nan after a failed solve
-    actions: Column | None  # shape (K + 1, m); None where they are not known
+    actions: Column  # shape (K + 1, m); (0, m) where they are not known
     facts: Mapping[str, Any]  # of the records; and imitation, the errors of two networks, for C6
 
     @property
     def name(self) -> Experiment:
         """The experiment as the value that names the run."""
         return Experiment(**self.experiment)
-
-
-@dataclass(frozen=True, eq=False)
-class RunSummary(Outline):
-    """One run that was trained here, in short.
-
-    `EPISODES` lists the columns of `episodes`. Columns of `evaluations`, one row per rollout
-    without noise: episode (so many were trained), theta (d,), cost (infinite where a solve failed),
-    inside (states in an obstacle, by `SIZES`), overlap (largest Xi), distance (to the target at the
-    end).
-    """
-
-    actions: Column
 
     def save(self, path: Path) -> None:
         """Write a file as a whole; errors as in `save_run`."""

@@ -12,7 +12,7 @@ import numpy as np
 from nmpcrl import Vector
 from nmpcrl.analysis.rows import THETA
 from nmpcrl.analysis.summaries import fetch_summaries
-from nmpcrl.analysis.summary import Outline
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.published import Evidence, load
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import design
@@ -66,8 +66,8 @@ def with_inputs(found: Evidence) -> Evidence:
     """
     finished = found.where(found.runs.stopped == Stopped.FINISHED)
     thetas = finished.runs[[*THETA]].to_numpy(float)
-    made: dict[Experiment, Outline] = {
-        e: one if one.actions is not None else replace(one, actions=_inputs(e, theta))
+    made: dict[Experiment, RunSummary] = {
+        e: one if len(one.actions) else replace(one, actions=_inputs(e, theta))
         for (e, one), theta in zip(finished.summaries.items(), thetas, strict=True)
     }
     return replace(finished, summaries=Runs(made))

@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl.analysis.metrics import TOUCH
-from nmpcrl.analysis.summary import Outline, RunSummary
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.thresholds import BETTER, divergence, was_stopped, worsens
 from nmpcrl.control import Task
 from nmpcrl.learning.updates import OVERSHOOT
@@ -66,7 +66,7 @@ FAILURE_MODE = ["ending", "wrong", "mechanism", "episode"]
 def failure_modes(
     summaries: Mapping[Experiment, RunSummary],
     runs: pd.DataFrame,
-    every: Mapping[Experiment, Outline],
+    every: Mapping[Experiment, RunSummary],
 ) -> pd.DataFrame:
     """The failure mode of each run, one row a run, in order.
 

@@ -22,7 +22,7 @@ import pandas as pd
 
 from nmpcrl.analysis.rows import FIELDS, OLDER, OUTCOME, cost_ratios, experiment_of, row
 from nmpcrl.analysis.search import Found, Search
-from nmpcrl.analysis.summary import Outline, RunSummary
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import assumptions
 from nmpcrl.claims.assumptions import Measured
 from nmpcrl.claims.failure_modes import FAILURE_MODE, WELL, failure_modes
@@ -55,7 +55,7 @@ EVERY: dict[str, Claim] = {  # in the order of the verdicts: C7 before W7
 class Evidence:
     """Runs and their summaries, in the same order."""
 
-    summaries: Runs[Outline] = field(default_factory=lambda: Runs({}))
+    summaries: Runs[RunSummary] = field(default_factory=lambda: Runs({}))
     runs: pd.DataFrame = field(  # `COLUMNS`, with `cost_ratio` as in `rows.table`
         default_factory=lambda: pd.DataFrame(columns=[*COLUMNS, "source", "cost_ratio"])
     )
@@ -101,7 +101,7 @@ class Evidence:
         """
         if not fresh:
             return self
-        every: dict[Experiment, Outline] = {**self.summaries, **fresh}
+        every: dict[Experiment, RunSummary] = {**self.summaries, **fresh}
         made = {
             e: row(one) | {"variant": variants[e], "key": summary_key(e), "source": "fresh"}
             for e, one in fresh.items()
@@ -220,7 +220,7 @@ def _search(row: Any) -> tuple[Search, Found]:
     return Search(row.layout, row.seed, row.budget), found
 
 
-def _outline(e: Experiment, row: Mapping[str, Any], curves: Mapping[str, Column]) -> Outline:
+def _outline(e: Experiment, row: Mapping[str, Any], curves: Mapping[str, Column]) -> RunSummary:
     judged = np.isfinite(curves["judged_after"])
     known = ["cost", "theta"] if np.isfinite(curves["theta"]).any() else ["cost"]
     evaluations = {
@@ -230,4 +230,5 @@ def _outline(e: Experiment, row: Mapping[str, Any], curves: Mapping[str, Column]
     }
     facts = {"stopped": row["stopped"], "seconds": row["seconds"]}
     episodes = {name: curves[name][: e.episodes] for name in known}
-    return Outline(asdict(e), episodes, evaluations, curves["states"][: e.steps], None, facts)
+    states, no_actions = curves["states"][: e.steps], np.empty((0, 2))
+    return RunSummary(asdict(e), episodes, evaluations, states, no_actions, facts)

@@ -78,7 +78,7 @@ def test_published_runs_have_the_numbers_of_their_training_wherever_else_they_ar
         mine = found.summaries[experiment]
         np.testing.assert_allclose(mine.episodes["cost"], summary.episodes["cost"], rtol=1e-6)
         np.testing.assert_allclose(mine.states, summary.states, atol=1e-5)
-    assert {summary.actions for summary in found.summaries.values()} == {None}
+    assert not any(len(summary.actions) for summary in found.summaries.values())
     for experiment, one in evidence.with_inputs(found).summaries.items():
         np.testing.assert_allclose(one.actions, known[experiment].actions, atol=1e-6)
 

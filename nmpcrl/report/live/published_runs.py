@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from IPython.display import HTML
 
-from nmpcrl.analysis.summary import Outline
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims import published
 from nmpcrl.claims.published import FOLLOWED, Published
 from nmpcrl.control import Nmpc
@@ -103,7 +103,7 @@ def _name(e: Experiment) -> str:
     return f"{e.learner} {e.decay} {e.seed}"
 
 
-def _numbers(summary: Outline, evaluated: list[int]) -> Column:
+def _numbers(summary: RunSummary, evaluated: list[int]) -> Column:
     """One row; nan where a run was stopped before, and for a theta that is not known."""
     found, training = summary.evaluations, summary.episodes["cost"]
     judged = np.full(len(evaluated), np.nan)

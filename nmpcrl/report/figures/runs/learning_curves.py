@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
 from nmpcrl import Vector
-from nmpcrl.analysis.summary import Outline
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.published import Evidence
 from nmpcrl.claims.thresholds import divergence, instability
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
@@ -28,7 +28,7 @@ from nmpcrl.study.store import Runs
 
 CEILING = 4.0  # times theta_init's cost without noise, where the scale ends
 STRIP = CEILING * np.array([1.06, 1.18, 1.3])  # of what costs more: its ends and its middle
-Curve = Callable[[Outline], tuple[Vector, Vector]]  # episodes and costs
+Curve = Callable[[RunSummary], tuple[Vector, Vector]]  # episodes and costs
 
 
 def figure_1(found: Evidence, layout: str) -> Figure:
@@ -68,13 +68,13 @@ def by_layout(found: Evidence, learners: tuple[str, ...], verdict: Verdict) -> F
     return sourced(figure, f"Does {verdict.claim} hold? {_spelled(verdict)}", drawn)
 
 
-def trained(summary: Outline) -> tuple[Vector, Vector]:
+def trained(summary: RunSummary) -> tuple[Vector, Vector]:
     """Cost of each episode of training, noise included, in units of the start's without noise."""
     cost = np.nan_to_num(summary.episodes["cost"], nan=np.inf)
     return np.arange(1.0, cost.size + 1), cost / summary.evaluations["cost"][0]
 
 
-def judged(summary: Outline) -> tuple[Vector, Vector]:
+def judged(summary: RunSummary) -> tuple[Vector, Vector]:
     """Cost of each rollout without noise, in units of the first; infinite where training ended."""
     episodes, every = summary.experiment["episodes"], summary.experiment["evaluate_every"]
     due = np.unique([*range(0, episodes + 1, every), episodes]).astype(float)
@@ -104,7 +104,7 @@ def _learning_curves(drawn: Evidence, title: str) -> Figure:
     return sourced(figure, title, drawn)
 
 
-def _costs(axis: Axes, runs: Runs[Outline], learners: Iterable[str], curve: Curve) -> None:
+def _costs(axis: Axes, runs: Runs[RunSummary], learners: Iterable[str], curve: Curve) -> None:
     """Every learner's runs on a logarithmic axis of cost, what is beyond `CEILING` in its strip."""
     for learner in learners:
         curves = [curve(summary) for summary in runs.select(learner=learner).values()]

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from nmpcrl.analysis import metrics
-from nmpcrl.analysis.summary import Outline
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.claims.failure_modes import ending
 from nmpcrl.claims.published import Evidence
 from nmpcrl.control import Task
@@ -33,13 +33,13 @@ def controls(found: Evidence, layout: str) -> Figure:
     Rollouts whose inputs are not kept, as those of published runs, are left out.
     """
     drawn = _finished(part(found, SHOWN, layout))
-    drawn = drawn.where([summary.actions is not None for summary in drawn.summaries.values()])
+    drawn = drawn.where([len(summary.actions) > 0 for summary in drawn.summaries.values()])
     plant = paper.nmpc(layout).plant
     figure, axes = _against_time(drawn, "actions", plant.action_names, 3.6)
     for i, axis in enumerate(axes):
         axis.axhline(plant.lower[i], **LIMIT)
         axis.axhline(plant.upper[i], **LIMIT)
-    learned = [one.actions for one in _learned(drawn) if one.actions is not None]
+    learned = [one.actions for one in _learned(drawn)]
     if not learned:
         return sourced(figure, "The inputs of no rollout are kept", drawn)
     outside = sum(metrics.out_of_bounds(one, plant.lower, plant.upper).sum() for one in learned)
@@ -102,7 +102,7 @@ def _against_time(
     return figure, axes
 
 
-def _map(axis: Axes, task: Task, runs: Runs[Outline]) -> None:
+def _map(axis: Axes, task: Task, runs: Runs[RunSummary]) -> None:
     """Obstacles, start, target and trajectories, a line a run; a mark where each ended."""
     draw_task(axis, task, labels=False)
     for learner in SHOWN:
@@ -114,7 +114,7 @@ def _map(axis: Axes, task: Task, runs: Runs[Outline]) -> None:
     axis.set(xlim=(task.lower[0], task.upper[0]), ylim=(-3, 6))
 
 
-def _learned(drawn: Evidence) -> list[Outline]:
+def _learned(drawn: Evidence) -> list[RunSummary]:
     """Every run of the paper's two methods."""
     return [summary for e, summary in drawn.summaries.items() if e.learner in LEARNED]
 
@@ -124,7 +124,7 @@ def _finished(found: Evidence) -> Evidence:
     return found.where(found.runs.stopped == Stopped.FINISHED)
 
 
-def _endings(summaries: list[Outline]) -> str:
+def _endings(summaries: list[RunSummary]) -> str:
     """How many rollouts end in which way, the most common first."""
     ends = Counter(
         ending(one.states, one.name.task)

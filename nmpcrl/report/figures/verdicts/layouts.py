@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.analysis.summary import Outline
+from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.by_runs import Values
 from nmpcrl.claims.paper_claims import BY_RUNS
@@ -159,7 +159,7 @@ def same_verdict(curve: pd.DataFrame, border: float) -> tuple[float, float]:
     return float(curve.border.iloc[first]), float(curve.border.iloc[last])
 
 
-def _ways_of_theta_c(axes: Axes, runs: Mapping[Any, Outline]) -> list[float]:
+def _ways_of_theta_c(axes: Axes, runs: Mapping[Any, RunSummary]) -> list[float]:
     """Draw theta_c of every run that is shown; return where each ends."""
     ends = []
     for run in runs.values():

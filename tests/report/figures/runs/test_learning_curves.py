@@ -158,7 +158,7 @@ def test_inputs_that_leave_their_bounds_are_counted(made_up):
 
 
 def test_rollouts_whose_inputs_are_not_kept_are_left_out_and_not_counted(made_up):
-    published = {"actions": None}
+    published = {"actions": FAST[:0]}
     found = made_up(lambda e: published if e.seed else {})
     figure = rollouts.controls(found, "A")
     assert all(len(thin(axis)) == 2 * 3 for axis in figure.axes)
