@@ -261,7 +261,10 @@ def path() -> Path:
 
 def depends_on() -> str:
     """A hash of all that the times depend on, but for what else the machine does."""
-    return provenance.hash_of([lock.sources_hash(), lock.room_hash("bench"), versions(), machine()])
+    bench = [
+        lock.code(one.read_text("utf-8")) for one in sorted(Path(__file__).parent.glob("*.py"))
+    ]
+    return provenance.hash_of([lock.sources_hash(), bench, versions(), machine()])
 
 
 def versions() -> dict[str, str | None]:

@@ -5,6 +5,8 @@ import sys
 from difflib import get_close_matches
 from typing import Any
 
+import numpy as np
+
 from nmpcrl.study import paper
 from nmpcrl.study.design import AXES, FIELDS
 from nmpcrl.study.limits import afford as afford
@@ -44,20 +46,16 @@ def check(**declared: Any) -> None:
 
 def _refuse_place(layout: Any) -> None:
     """Refuse an obstacle on the robot's start or target, or outside the robot's box."""
-    task, given = paper.task(layout), f"layout = {shown(layout)} has an obstacle"
-    for end, place in (("start", task.start), ("target", task.target)):
-        if task.overlap(place).max() > 0:
-            raise ParameterError(
-                f"{given} on the robot's {end}, ({place[0]:g}, {place[1]:g}): each centre must be"
-                f" {max(task.discs[2]) / 2:g} m or more away from it in a chapter"
-            )
+    task, centres = paper.task(layout), np.array(paper.centres_of(layout))
     (left, bottom, _), (right, top, _) = task.lower, task.upper
-    for x, y in paper.centres_of(layout):
-        if not (left <= x <= right and bottom <= y <= top):
-            raise ParameterError(
-                f"{given} where the robot never comes, ({x:g}, {y:g}): each centre must be in its"
-                f" box, [{left:g}, {right:g}] x [{bottom:g}, {top:g}], in a chapter"
-            )
+    outside = np.any((centres < (left, bottom)) | (centres > (right, top)))
+    if outside or task.overlap(np.array([task.start, task.target])).max() > 0:
+        start, target = (f"({x:g}, {y:g})" for x, y, _ in (task.start, task.target))
+        raise ParameterError(
+            f"layout = {shown(layout)} must, in a chapter, have each centre in the robot's box,"
+            f" [{left:g}, {right:g}] x [{bottom:g}, {top:g}], and {max(task.discs[2]) / 2:g} m or"
+            f" more away from the robot's start, {start}, and target, {target}"
+        )
 
 
 def _injected() -> set[str]:

@@ -59,11 +59,6 @@ def sources_hash() -> str:
     return hash_of(sorted(sources().values()))
 
 
-def room_hash(room: str) -> str:
-    """One hash of the code of a package."""
-    return hash_of([code(path.read_text("utf-8")) for path in sorted((ROOT / room).rglob("*.py"))])
-
-
 def locked() -> dict[str, Any]:
     """The content of the lock: epochs, `sources`, and the hashes of earlier locks."""
     return dict(json.loads(LOCK.read_text("utf-8")))

@@ -64,7 +64,7 @@ def test_other_versions_or_another_machine_measure_again(counted, monkeypatch, c
     assert counted == ["short", "short"]
 
 
-@pytest.mark.parametrize("what", ["sources_hash", "room_hash"])
+@pytest.mark.parametrize("what", ["sources_hash", "code"])
 def test_another_source_measures_again(counted, monkeypatch, what):
     measured_here("short")
     monkeypatch.setattr(suite.lock, what, lambda *_: "other")

@@ -30,14 +30,9 @@ def refusal(**declared) -> str:
     return str(caught.value)
 
 
-ON_START = (
-    "has an obstacle on the robot's start, (-2.5, 1.5): each centre must be 1.25 m or more away"
-    " from it in a chapter"
-)
-ON_TARGET = ON_START.replace("start, (-2.5, 1.5)", "target, (8.5, 2)")
-NEVER = (
-    "has an obstacle where the robot never comes, (3, 9.5): each centre must be in its box,"
-    " [-3, 9] x [-3, 9], in a chapter"
+PLACE = (
+    "must, in a chapter, have each centre in the robot's box, [-3, 9] x [-3, 9], and 1.25 m or more"
+    " away from the robot's start, (-2.5, 1.5), and target, (8.5, 2)"
 )
 AT_ONCE = "with larger ones a run ends before there is anything to show"
 
@@ -48,10 +43,10 @@ AT_ONCE = "with larger ones a run ends before there is anything to show"
         ("episodes", 10**8, "episodes = 100000000 must be a whole number from 1 to 100000"),
         ("episodes", "300", "episodes = '300' must be a whole number from 1 to 100000"),
         ("layout", ["A"], f"layout = ['A'] must be {FIELDS['layout'].text}"),
-        ("layout", [[3, 4], [-2.5, 0.5]], f"layout = [[3, 4], [-2.5, 0.5]] {ON_START}"),
-        ("layout", [[8, 2]], f"layout = [[8, 2]] {ON_TARGET}"),
+        ("layout", [[3, 4], [-2.5, 0.5]], f"layout = [[3, 4], [-2.5, 0.5]] {PLACE}"),
+        ("layout", [[8, 2]], f"layout = [[8, 2]] {PLACE}"),
         ("layouts", ["A", [[3, 4]]], "layout = [[3, 4]] must be one of A, B, C, D, E, F"),
-        ("layout", [[3, 4], [3, 9.5]], f"layout = [[3, 4], [3, 9.5]] {NEVER}"),
+        ("layout", [[3, 4], [3, 9.5]], f"layout = [[3, 4], [3, 9.5]] {PLACE}"),
         ("seeds", 3, "seeds = 3 must be a list, such as [3]"),
         ("seeds", [-1], "seed = -1 must be a whole number from 0 to 2147483647"),
         ("alpha", 1e3, f"alpha = 1000 must be at most 1e-05 in a chapter: {AT_ONCE}"),
