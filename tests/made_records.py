@@ -1,4 +1,4 @@
-"""Records with drawn numbers in every column, which take no training."""
+"""Records with drawn numbers, which take no training, and the comparison of two runs."""
 
 from dataclasses import asdict
 
@@ -6,6 +6,8 @@ import numpy as np
 
 from nmpcrl.study import Experiment, Records
 from nmpcrl.study.records import EvaluationRow, StepRow, form_of
+
+CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
 
 
 def made_records(experiment: Experiment, rows: int, seed: int = 0) -> Records:
@@ -23,3 +25,13 @@ def made_records(experiment: Experiment, rows: int, seed: int = 0) -> Records:
     facts = {"stopped": "diverged: “why”", "solver": "riccati", "seconds": 1.25}
     facts["final_cost"] = seed / 7 or np.inf
     return Records(asdict(experiment), steps, drawn(EvaluationRow, 3), facts)
+
+
+def assert_same_numbers(one, other, but: frozenset[str] = frozenset()) -> None:
+    """Two Records, or two summaries, have the same numbers, times and `but` apart."""
+    for name in vars(one).keys() - {"experiment", "facts"}:
+        table, beside = getattr(one, name), getattr(other, name)
+        if not isinstance(table, dict):
+            table, beside = {name: table}, {name: beside}
+        for column in table.keys() - CLOCKS - but:
+            np.testing.assert_array_equal(table[column], beside[column])

@@ -4,11 +4,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
+from made_records import assert_same_numbers
 
 from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries, make
-from nmpcrl.analysis.summary import RunSummary, summarise
+from nmpcrl.analysis.summary import summarise
 from nmpcrl.study import Experiment, fetch, limits, lock, provenance, run, store, sweep
 from nmpcrl.study.jobs import Failed
 
@@ -35,14 +35,6 @@ def here(experiments, **options):
         return fetch_summaries(experiments, executor=one, progress=False, **options)
 
 
-def assert_same_summary(one: RunSummary, other: RunSummary) -> None:
-    for columns, others in ((one.episodes, other.episodes), (one.evaluations, other.evaluations)):
-        for name in columns.keys() - {"seconds"}:
-            np.testing.assert_array_equal(columns[name], others[name])
-    np.testing.assert_array_equal(one.states, other.states)
-    np.testing.assert_array_equal(one.actions, other.actions)
-
-
 def test_threads_of_one_process_make_what_one_makes(monkeypatch, tmp_path):
     """Torch's generator, from which networks are drawn, is one for the whole process."""
     networks = sweep(learner=("DES", "RDES"), seed=tuple(range(4)), episodes=3, steps=40)
@@ -51,7 +43,7 @@ def test_threads_of_one_process_make_what_one_makes(monkeypatch, tmp_path):
     with ThreadPoolExecutor(4) as threads:
         together = fetch_summaries(networks, executor=threads, progress=False)
     for one in networks:
-        assert_same_summary(alone[one], together[one])
+        assert_same_numbers(alone[one], together[one])
 
 
 def test_a_stored_summary_is_read(folder, trained):
@@ -59,11 +51,11 @@ def test_a_stored_summary_is_read(folder, trained):
     (path,) = folder.iterdir()
     assert path == SUMMARIES.path_of(QUICK)
     assert path.name.startswith("frozen-A-step-seed0-2ep-")
-    assert_same_summary(found, summarise(run(QUICK)))
+    assert_same_numbers(found, summarise(run(QUICK)))
     assert found.facts["key"] == provenance.key(QUICK)
     assert store.stored() == {}  # the run itself is not stored
-    assert_same_summary(here([QUICK, QUICK])[QUICK], found)
-    assert_same_summary(SUMMARIES.read(QUICK), found)
+    assert_same_numbers(here([QUICK, QUICK])[QUICK], found)
+    assert_same_numbers(SUMMARIES.read(QUICK), found)
     assert trained == [QUICK]
     assert SUMMARIES.read(THREE[0]) is None
 
@@ -75,11 +67,11 @@ def test_a_stored_run_is_summarised_and_trained_only_afresh(trained, monkeypatch
     monkeypatch.setattr(lock, "locks", lambda: (then,))
     monkeypatch.setattr(lock, "sources_hash", lambda: "edited since")
     found = here([QUICK])[QUICK]
-    assert_same_summary(found, summarise(records))
+    assert_same_numbers(found, summarise(records))
     assert found.facts["seconds"] == records.facts["seconds"]
     assert found.facts["sources"] == then
     assert trained == [QUICK]
-    assert_same_summary(make(QUICK, afresh=True), found)
+    assert_same_numbers(make(QUICK, afresh=True), found)
     assert trained == [QUICK, QUICK]
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_records import assert_same_numbers
 from raising import raising
 
 from nmpcrl.control import Nmpc
@@ -32,7 +33,6 @@ from nmpcrl.study.store import RUNS
 
 QUICK = Experiment(learner="frozen", episodes=1, steps=3)
 LEARNING = Experiment(learner="ES", episodes=1, steps=3)
-CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
 
 pytestmark = pytest.mark.usefixtures("runs", "unwarned")
 
@@ -55,11 +55,6 @@ def one_of_all(experiment: Experiment) -> Records:
 
 
 both_ways = pytest.mark.parametrize("ask", [fetch, one_of_all])
-
-
-def assert_same_numbers(one: Records, other: Records) -> None:
-    for name in set(one.steps) - CLOCKS:
-        np.testing.assert_array_equal(one.steps[name], other.steps[name])
 
 
 def test_a_stored_run_is_read_and_says_what_it_depends_on(runs, no_run):

@@ -8,9 +8,9 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import psutil
 import pytest
+from made_records import assert_same_numbers
 
 from nmpcrl.analysis.summaries import SUMMARIES
 from nmpcrl.analysis.summary import RunSummary, summarise
@@ -59,17 +59,9 @@ def test_forty_kills_at_random_moments_lose_nothing_and_nothing_wrong_is_believe
         found = stored(folder)
         assert found.items() >= believed.items()  # neither lost nor made again
         for path in found.keys() - believed.keys():
-            assert_same_summary(RunSummary.load(path), truth[path])
+            assert_same_numbers(RunSummary.load(path), truth[path])
         believed = found
         assert time.monotonic() < end
     assert program.wait(120) == 0
     for path, one in truth.items():
-        assert_same_summary(RunSummary.load(path), one)
-
-
-def assert_same_summary(one: RunSummary, other: RunSummary) -> None:
-    for columns, others in ((one.episodes, other.episodes), (one.evaluations, other.evaluations)):
-        for name in columns.keys() - {"seconds"}:
-            np.testing.assert_array_equal(columns[name], others[name])
-    np.testing.assert_array_equal(one.states, other.states)
-    np.testing.assert_array_equal(one.actions, other.actions)
+        assert_same_numbers(RunSummary.load(path), one)
