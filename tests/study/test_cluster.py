@@ -1,14 +1,11 @@
 """A study on a Dask scheduler and two workers of this machine, which share no folder with it."""
 
-import json
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from made_records import assert_same_numbers
@@ -18,7 +15,7 @@ from nmpcrl.analysis.summary import summarise
 from nmpcrl.study import cluster, run, sweep
 from nmpcrl.study.refusal import Refusal
 
-pytest.importorskip("distributed", reason="needs the extra nmpcrl[cluster]")
+distributed = pytest.importorskip("distributed", reason="needs the extra nmpcrl[cluster]")
 
 SIX = sweep(learner=("ES", "RDES"), seed=(0, 1, 2), episodes=1, steps=20)
 NOTING = """
@@ -47,62 +44,44 @@ pytestmark = pytest.mark.usefixtures("runs")
 
 
 @pytest.fixture
-def dask(tmp_path) -> Iterator[Callable[..., subprocess.Popen]]:
-    """Start a part of Dask, which ends with the test."""
+def dask(tmp_path) -> Iterator[Callable[[int, str], str]]:
+    """Start a scheduler, and workers that first execute a text; its address is returned."""
     started = []
 
-    def start(*arguments: str) -> subprocess.Popen:
-        command = [sys.executable, "-m", "dask", *arguments, "--no-dashboard"]
-        environment = os.environ | {"NMPCRL_RUNS": str(tmp_path / "elsewhere")}
-        with (tmp_path / f"{len(started)}.log").open("w") as log:
-            started.append(subprocess.Popen(command, env=environment, stdout=log, stderr=log))
-        return started[-1]
-
-    yield start
-    for process in reversed(started):
-        process.kill()
-        process.wait()
-
-
-@pytest.fixture
-def address(dask, tmp_path) -> str:
-    """The address of a scheduler without workers."""
-    file = tmp_path / "scheduler.json"
-    dask("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
-    wait_until(file.exists)
-    return json.loads(file.read_text())["address"]
-
-
-@pytest.fixture
-def worker(dask, address, tmp_path) -> Callable[[str], subprocess.Popen]:
-    """Start a worker that first executes a text."""
-
-    def start(text: str) -> subprocess.Popen:
+    def start(workers: int, text: str = "") -> str:
         preload = tmp_path / "preload.py"
         preload.write_text(text)
-        options = ("--nthreads", "1", "--no-nanny", "--preload", str(preload))
-        return dask("worker", address, *options)
+        started.append(
+            distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                dashboard_address=None,
+                preload=str(preload),
+                env={"NMPCRL_RUNS": str(tmp_path / "elsewhere")},
+            )
+        )
+        return started[-1].scheduler_address
 
-    return start
-
-
-def wait_until(holds: Callable[[], object], seconds: float = 240.0) -> None:
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "this was waited for in vain"
-        time.sleep(0.02)
+    yield start
+    for one in started:
+        one.close()
 
 
 @pytest.mark.slow
-def test_a_killed_worker_loses_no_run_and_no_bit(address, worker, tmp_path):
-    pair = [worker(NOTING.format(folder=str(tmp_path))) for _ in range(2)]
+def test_a_killed_worker_loses_no_run_and_no_bit(dask, tmp_path):
+    address = dask(2, NOTING.format(folder=str(tmp_path)))
 
-    def began() -> list[Path]:
-        return [*tmp_path.glob("began-*")]
+    def began() -> list[int]:
+        """The processes that began a run, the latest last."""
+        paths = sorted(tmp_path.glob("began-*"), key=lambda path: path.stat().st_mtime_ns)
+        return [int(path.name.rpartition("-")[2]) for path in paths]
 
     def kill_one_at_work() -> None:
-        wait_until(lambda: len(began()) == 4 and sum(map(SUMMARIES.is_stored, SIX)) == 2)
-        os.kill(pair[0].pid, signal.SIGKILL)
+        end = time.monotonic() + 240
+        while len(began()) < 4 or sum(map(SUMMARIES.is_stored, SIX)) < 2:
+            assert time.monotonic() < end, "this was waited for in vain"
+            time.sleep(0.02)
+        os.kill(began()[-1], signal.SIGKILL)
         (tmp_path / "killed").touch()
 
     killer = threading.Thread(target=kill_one_at_work)
@@ -123,10 +102,12 @@ def refused(address: str, patience: float, sentence: str) -> None:
 
 
 @pytest.mark.slow
-def test_no_worker_and_one_with_other_versions_are_refused(address, worker):
-    refused(address, 0.1, "has no worker")
-    worker(OTHER_VERSIONS)
-    refused(address, 240.0, "has other code or other versions of libraries")
+@pytest.mark.parametrize(
+    ("workers", "patience", "sentence"),
+    [(0, 0.1, "has no worker"), (1, 240.0, "has other code or other versions of libraries")],
+)
+def test_no_worker_and_one_with_other_versions_are_refused(dask, workers, patience, sentence):
+    refused(dask(workers, OTHER_VERSIONS), patience, sentence)
 
 
 @pytest.mark.parametrize("nobody", ["", "foo", "tcp://nowhere:1", "127.0.0.1:9", "x://y:1", "1,1"])
