@@ -216,18 +216,13 @@ def _drawing_from(state: list[Any]) -> Iterator[None]:
 
     from nmpcrl.learning.network import OneThread
 
-    def states() -> list[Any]:
-        return [np.random.get_state(), torch.get_rng_state()]  # noqa: NPY002 as SB3 draws
-
-    def put(numpys: Any, torchs: Any) -> None:
-        np.random.set_state(numpys)  # noqa: NPY002
-        torch.set_rng_state(torchs)
-
-    before = states()
-    put(*(state or before))
-    try:
-        with OneThread():
+    before = np.random.get_state()  # noqa: NPY002 as stable-baselines3 draws
+    with torch.random.fork_rng(devices=[]), OneThread():
+        if state:
+            np.random.set_state(state[0])  # noqa: NPY002
+            torch.set_rng_state(state[1])
+        try:
             yield
-    finally:
-        state[:] = states()
-        put(*before)
+        finally:
+            state[:] = np.random.get_state(), torch.get_rng_state()  # noqa: NPY002
+            np.random.set_state(before)  # noqa: NPY002
