@@ -31,7 +31,7 @@ def made(*parts, agents=AGENTS, there="a", meanwhile=()):
             costs = np.full((len(points), count), 200.0)
             costs[-1] = 100 * SHARES[agent]
             costs[[points.index(episodes) for episodes in meanwhile]] = 90
-            arrived = [there * count] * len(points)
+            arrived = [*["-" * count] * (len(points) - 1), there * count]
             row = (part, agent, place, k, [100.0] * count, costs.tolist(), arrived, points[-1])
             found.append((*row, 130 * points[-1], 60.0))
     return pd.DataFrame(found, columns=[*COLUMNS])

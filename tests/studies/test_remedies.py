@@ -105,8 +105,8 @@ def test_the_best_setting_has_the_greatest_gain_and_is_the_first_of_equal_ones()
         ([block("DPG", gains=-0.5), block("DPG", "judge 300", -0.2), block("ES", gains=-0.5),
           block("ES", "judge 300", 0.2)], [("ES", OPEN), ("DPG", NEVER)]),
         # the interval counts, and not the value
-        ([block("ES", gains=np.tile([-0.5, 1.0], 10)), block("GES", gains=0.01)],
-         [("GES", FIRST), ("ES", OPEN)]),
+        ([block("ES", gains=np.tile([-0.5, 1.0], 10)), block("grid", gains=0.0),
+          block("GES", gains=0.01)], [("GES", FIRST), ("grid", OPEN), ("ES", OPEN)]),
         # fewer than half of the layouts solved
         ([block("CMA-ES", gains=0.9, arrived=False), block("SPSA", gains=0.1)],
          [("SPSA", FIRST), ("CMA-ES", NEVER)]),
