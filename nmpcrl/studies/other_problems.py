@@ -120,13 +120,8 @@ def searched() -> Vector:
     def cost(theta: Any) -> float:
         return min(judge(np.asarray(theta), SEARCH_EPISODES, SEARCH_SEED), 1e6)
 
-    start = gz.problem(informed=True).theta
-    strategy, tried = cma.CMAEvolutionStrategy(start, SPREAD, {"seed": 1, "verbose": -9}), 0
-    while not strategy.stop() and tried < BUDGET:
-        asked = strategy.ask()
-        strategy.tell(asked, [cost(one) for one in asked])
-        tried += len(asked)
-    return np.asarray(strategy.result.xbest)
+    options = {"seed": 1, "verbose": -9, "maxfevals": BUDGET}
+    return np.asarray(cma.fmin2(cost, gz.problem(informed=True).theta, SPREAD, options)[0])
 
 
 def refer(theta: Callable[[], Vector] | None, *_: Any) -> Row:
@@ -190,14 +185,10 @@ def normalised_step(theta: Vector, delta: float, phi: Vector) -> Vector:
 class Runs(NamedTuple):
     """The rows by part, of which questions are asked and figures drawn."""
 
+    tests: pd.DataFrame  # the last cost, a row a seed and a column an arm
     courses: pd.DataFrame  # of the learners
     references: "pd.Series[float]"  # test by arm
     spreads: pd.DataFrame  # with a column for J of each of `PEERS`, and "steps of" each
-
-    @property
-    def tests(self) -> pd.DataFrame:
-        """The last cost, a row a seed and a column an arm."""
-        return self.courses.set_index(["k", "arm"]).test.unstack()[[*ARMS]]
 
     @property
     def medians(self) -> "pd.Series[float]":
@@ -213,7 +204,8 @@ def runs(table: pd.DataFrame) -> Runs:
     )
     spreads[[*PEERS]] = [*spreads.peers]
     spreads[[f"steps of {one}" for one in PEERS]] = [*spreads.made]
-    return Runs(courses, references.set_index("arm").test, spreads)
+    tests = courses.set_index(["k", "arm"]).test.unstack()[[*ARMS]]
+    return Runs(tests, courses, references.set_index("arm").test, spreads)
 
 
 def _most(yes: Any) -> bool:

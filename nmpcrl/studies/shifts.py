@@ -95,11 +95,8 @@ def changing(
     """Algorithm 1 from theta_init: the world, an alarm of the chart, and theta after each episode.
 
     Args:
-        nmpc: acts, and is what is learned.
         layouts: the obstacles of each.
         order: the number of the layout of each episode.
-        learner: moves theta.
-        explore: the noise, of as many episodes.
         knows: "told", "cost", "delta" or "never".
         reset: whether theta begins anew after a change.
         raised: the learner in the `FOR` episodes after a change, if it is another.

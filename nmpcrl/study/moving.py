@@ -118,9 +118,7 @@ def frozen(motions: Sequence[Motion], t: int) -> Vector:
     return np.repeat(centres(motions, [t]), len(STAGES), axis=0)
 
 
-PREDICTORS: dict[str, Predictor] = {
-    "known": known, "extrapolated": extrapolated, "frozen": frozen,
-}  # fmt: skip
+PREDICTORS: dict[str, Predictor] = {"known": known, "extrapolated": extrapolated, "frozen": frozen}
 
 
 def square(terms: Any, size: int) -> Any:
@@ -152,9 +150,6 @@ def problem(
     first = np.array(paper.THETA_INIT)
     theta: dict[str, Any] = {"x": first[:3], "u": first[3:5], "f": first[5:8], "c": first[8]}
 
-    def stage(x: Any, u: Any, th: Any, _: Any) -> Any:
-        return square(th["x"] * (x - TARGET), 3) + square(th["u"] * u, 2)
-
     def discs(x: Any, _: Any, th: Any, d: Any) -> Any:
         at = d["centres"]
         return [overlap(x[0], x[1], at[j, 0], at[j, 1], CLEARANCE) + th["c"]
@@ -165,7 +160,8 @@ def problem(
 
     return Problem(
         states=3, inputs=2, horizon=paper.HORIZON, gamma=paper.GAMMA, theta=theta | dict(further),
-        model=model, stage=stage, terminal=terminal,
+        model=model, terminal=terminal,
+        stage=lambda x, u, th, _: square(th["x"] * (x - TARGET), 3) + square(th["u"] * u, 2),
         soft=[Soft(discs, paper.SLACK_WEIGHT), Soft(walls, paper.SLACK_WEIGHT, slice(1, None))],
         lower=robot().lower, upper=robot().upper, data={"centres": np.zeros((obstacles, 2))},
     )  # fmt: skip
@@ -209,11 +205,9 @@ class World:
         self.states: list[Vector] = []  # of the episode so far, without noise
         self._at = centres(self.motions, np.arange(paper.STEPS + 1))
         self._data: dict[int, dict[str, Matrix]] = {}
-
-    @property
-    def environment(self) -> dict[str, Any]:
-        """Keyword arguments of `train` and `evaluate`."""
-        return {"plant": self.step, "start": self.begin, "data": self.data}
+        self.environment: dict[str, Any] = {  # keyword arguments of `train` and `evaluate`
+            "plant": self.step, "start": self.begin, "data": self.data,
+        }  # fmt: skip
 
     def begin(self, rng: np.random.Generator) -> Vector:
         """Set the clock to 0, draw the fault of the episode, and return the measured start."""

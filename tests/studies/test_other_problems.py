@@ -27,9 +27,7 @@ def test_mpcrls_step_of_newton_is_a_normalised_semi_gradient():
 def decided(tests, informed, best, spread):
     """Which predictions come true of given costs of arms, references and one seed's spread."""
     references = pd.Series({"informed": informed, "best_policy": best})
-    courses = [(k, arm, costs[k]) for arm, costs in tests.items() for k in range(50)]
-    courses = pd.DataFrame(courses, columns=["k", "arm", "test"])
-    given = Runs(courses, references, pd.DataFrame([spread]))
+    given = Runs(pd.DataFrame(tests), pd.DataFrame(), references, pd.DataFrame([spread]))
     answers = OTHER_PROBLEMS.judge(given).values()
     return "".join({REPRODUCED: "1", NOT: "0"}[one.outcome] for one in answers)
 
