@@ -34,23 +34,16 @@ RAISED, FOR = 10.0, 20  # times alpha after a change, and for how many episodes
 AGE = 10 * 130.0  # examples, ten episodes: the decay of the weights in recent replay
 
 
-def schedule(rate: str, episodes: int, rng: np.random.Generator) -> list[int]:
-    """The number of the layout of each episode, from 0."""
-    e = np.arange(episodes)
+def sequence(rate: str, place: str, episodes: int) -> tuple[list[str], list[int]]:
+    """The layouts of a sequence, and the number of the layout of each episode, from 0."""
+    rng, e = np.random.default_rng([25, int(place[1:])]), np.arange(episodes)
+    names = rng.permutation([*JUDGE]).tolist()
     changes = {
         "once": e == episodes // 2,
         "every 50": e % 50 == 0,
         "random": rng.random(episodes) < 1 / 50,
     }
-    order: list[int] = np.cumsum(changes[rate] & (e > 0)).tolist()
-    return order
-
-
-def sequence(rate: str, place: str, episodes: int) -> tuple[list[str], list[int]]:
-    """The layouts of a sequence, and the number of the layout of each episode."""
-    rng = np.random.default_rng([25, int(place[1:])])
-    names = [str(name) for name in rng.permutation([*JUDGE])]
-    order = schedule(rate, episodes, rng)
+    order = np.cumsum(changes[rate] & (e > 0)).tolist()
     return names[: order[-1] + 1], order
 
 

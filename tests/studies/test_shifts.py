@@ -7,7 +7,7 @@ from scipy.stats import t
 from nmpcrl.learning import Diverged, Exploration
 from nmpcrl.learning.training import Step
 from nmpcrl.studies import shifts
-from nmpcrl.studies.shifts import AGE, EVERY, FOR, LIMIT, RAISED, WINDOW, fires, shifting
+from nmpcrl.studies.shifts import EVERY, FOR, LIMIT, RAISED, WINDOW, fires, sequence, shifting
 from nmpcrl.study import paper
 from nmpcrl.study.moving import still
 
@@ -16,19 +16,15 @@ RNG = np.random.default_rng
 STEADY = RNG(0).normal(4000.0, 30.0, 30).tolist()
 
 
-def test_a_layout_changes_once_every_fifty_episodes_or_by_chance():
-    assert shifts.schedule("once", 300, RNG(0)) == [0] * 150 + [1] * 150
-    drawn = [shifts.schedule("random", 300, RNG(seed)) for seed in range(400)]
-    assert np.mean([one[-1] for one in drawn]) == pytest.approx(299 / 50, abs=0.4)
-    assert {one[0] for one in drawn} == {0}
-
-
-def test_a_sequence_brings_another_layout_with_each_change_and_is_the_same_for_all_arms():
-    names, order = shifts.sequence("every 50", "S01", 120)
+def test_a_layout_changes_once_every_fifty_episodes_or_by_chance_the_same_for_all_arms():
+    names, order = sequence("every 50", "S01", 120)
     assert order == [0] * 50 + [1] * 50 + [2] * 20
     assert len({*names}) == 3
-    assert shifts.sequence("once", "S01", 300)[0] == names[:2]
-    assert shifts.sequence("every 50", "S02", 120)[0] != names
+    assert sequence("once", "S01", 300) == (names[:2], [0] * 150 + [1] * 150)
+    assert sequence("every 50", "S02", 120)[0] != names
+    drawn = [sequence("random", f"S{i}", 300)[1] for i in range(400)]
+    assert np.mean([one[-1] for one in drawn]) == pytest.approx(299 / 50, abs=0.4)
+    assert {one[0] for one in drawn} == {0}
 
 
 def test_the_false_alarms_of_stationary_costs_are_as_many_as_the_law_of_t_says():
@@ -50,7 +46,7 @@ def test_a_replay_that_prefers_what_is_late_draws_no_example_twice():
     rng = shifts.Recent(np.random.PCG64(0))
     drawn = np.array([rng.choice(20_000, 128, replace=False) for _ in range(200)])
     assert all(len({*row}) == 128 for row in drawn.tolist())
-    assert (19_999 - drawn).mean() == pytest.approx(AGE, rel=0.15)
+    assert (19_999 - drawn).mean() == pytest.approx(shifts.AGE, rel=0.15)
     assert {*rng.choice(128, 128, replace=False).tolist()} == {*range(128)}
 
 

@@ -20,21 +20,11 @@ def ran(part, arm, place="J001", episodes=2, k=0):
     return PARTS[part].run(setting, place, episodes, seed)
 
 
-def test_no_two_places_share_a_seed():
-    places = [*JUDGE, *SCENARIOS, *(f"S{i:02}" for i in range(1, 11))]
-    seeds = [WORLDS.seed(place, k) for place in places for k in (0, 4)]
-    assert len({*seeds}) == len(seeds)
-
-
 @pytest.mark.parametrize(
     ("part", "arm", "place"),
-    [
-        ("moving", "frozen ES", FOUR),
-        ("moving", "known CMA-ES", FOUR),
-        ("model", "noise ES", "J001"),
-        ("gradient", "0.05", "J001"),
-    ],
-)
+    [("moving", "frozen ES", FOUR), ("moving", "known CMA-ES", FOUR), ("model", "noise ES", "J001"),
+     ("gradient", "0.05", "J001")],
+)  # fmt: skip
 def test_the_same_run_has_the_same_numbers_and_another_seed_others(part, arm, place):
     one, again, other = (ran(part, arm, place, 3, k) for k in (0, 0, 1))
     assert one == again

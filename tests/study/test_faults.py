@@ -29,13 +29,11 @@ def test_without_a_fault_a_plant_moves_as_the_robot_to_the_last_bit():
 
 @pytest.mark.parametrize(
     ("fault", "moved"),
-    [
-        (Fault(grip=0.8), [0.08, 0.0, 0.0]),
-        (Fault(drift=(0.0, 0.1)), [0.1, 0.02, 0.0]),
-        (Fault(bias=0.1), [*(robot().step(STATE, [0.5, 0.1]) - STATE)[:2], 0.02]),
-        (Fault(noise=(0.1, 0.2, 0.0)), [0.1, 0.0, 0.0]),
-    ],
-)
+    [(Fault(grip=0.8), [0.08, 0.0, 0.0]),
+     (Fault(drift=(0.0, 0.1)), [0.1, 0.02, 0.0]),
+     (Fault(bias=0.1), [*(robot().step(STATE, [0.5, 0.1]) - STATE)[:2], 0.02]),
+     (Fault(noise=(0.1, 0.2, 0.0)), [0.1, 0.0, 0.0])],
+)  # fmt: skip
 def test_a_step_straight_ahead(fault, moved):
     np.testing.assert_allclose(stepped(fault) - STATE, moved, atol=1e-12)
 
