@@ -1,4 +1,4 @@
-"""Rows of `rows.table` for runs in which nothing happened, but for what a test says."""
+"""Rows of `rows.table` for runs in which nothing happened, with the values of a test."""
 
 from dataclasses import asdict
 from typing import Any
@@ -24,7 +24,7 @@ NONE = ("inputs", "outside", "worst_overlap", "eval_worst_overlap", *INSIDE, *EV
 
 
 def quiet_row(experiment: Experiment, **unlike: Any) -> dict[str, Any]:
-    """The row of a run in which nothing happened but what is said."""
+    """The row of a run in which nothing happened, with other values where `unlike` has them."""
     fields = {name: as_text(value) for name, value in asdict(experiment).items()}
     theta = dict(zip(THETA, experiment.theta, strict=True))
     return fields | QUIET | dict.fromkeys(NONE, 0) | theta | unlike
@@ -33,11 +33,10 @@ def quiet_row(experiment: Experiment, **unlike: Any) -> dict[str, Any]:
 def timings(rdes=0.5, ges=1.0, width=0.0, waited=0.0, solvers=("fatrop", "ipopt")) -> pd.DataFrame:
     """Ratios of the times of a step, with intervals as wide on either side."""
     ratios = {"ES": 1.0, "RDES": rdes, "GES": ges}
-    return pd.DataFrame(
-        [
-            {"solver": solver, "learner": learner, "waited": waited}
-            | {"ratio": ratio, "ratio_low": ratio - width, "ratio_high": ratio + width}
-            for solver in solvers
-            for learner, ratio in ratios.items()
-        ]
-    )
+    rows = [
+        (solver, learner, waited, ratio, ratio - width, ratio + width)
+        for solver in solvers
+        for learner, ratio in ratios.items()
+    ]
+    columns = ["solver", "learner", "waited", "ratio", "ratio_low", "ratio_high"]
+    return pd.DataFrame(rows, columns=columns)
