@@ -162,12 +162,15 @@ def test_read_literally_they_move_from_the_first_step():
     assert s["theta"][-1, 0] < 0.7
 
 
-def test_evaluations_come_first_every_so_often_and_last():
-    records = run(Experiment(learner="frozen", episodes=5, steps=6, evaluate_every=2))
+def test_evaluations_come_first_every_so_often_and_last_and_each_episode_is_reported():
+    reported, e = [], Experiment(learner="frozen", episodes=5, steps=6, evaluate_every=2)
+    records = run(e, on_episode=lambda *report: reported.append(report))
     np.testing.assert_array_equal(records.evaluations["episode"], [0, 2, 4, 5])
     cost = records.evaluations["cost"]
     assert (cost == cost[0]).all()  # theta does not move, and there is no noise
     assert records.evaluations["states"].shape == (4, 6, 3)
+    sums = np.bincount(records.steps["episode"], records.steps["cost"])
+    np.testing.assert_allclose(reported, np.column_stack([range(1, 6), sums]), rtol=1e-12)
 
 
 def test_evaluations_do_not_count_as_training_time(monkeypatch):
@@ -182,15 +185,6 @@ def test_evaluations_do_not_count_as_training_time(monkeypatch):
     records = run(Experiment(learner="ES", episodes=3, steps=2, evaluate_every=1))
     assert now == [4000.0]
     assert records.facts["seconds"] == records.steps["seconds"].max() == 0
-
-
-def test_progress_is_told_after_every_episode():
-    told = []
-    short = Experiment(learner="ES", episodes=3, steps=4)
-    records = run(short, on_episode=lambda *report: told.append(report))
-    sums = np.bincount(records.steps["episode"], records.steps["cost"])
-    assert [done for done, _ in told] == [1, 2, 3]
-    np.testing.assert_allclose([cost for _, cost in told], sums, rtol=1e-12)
 
 
 @pytest.fixture
