@@ -5,6 +5,7 @@ The borders are in `thresholds`, and the rule by which answers become a verdict 
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -54,16 +55,13 @@ Numbers: TypeAlias = dict[str, Any]
 
 
 def _contrasted(
-    wrong: Callable[[pd.DataFrame], pd.Series], column: str
-) -> Callable[[pd.DataFrame, Paths, Learners], Numbers]:
+    wrong: Callable[[pd.DataFrame], pd.Series], column: str, runs: pd.DataFrame, _: Paths,
+    learners: Learners,
+) -> Numbers:  # fmt: skip
     """How many runs of each learner went wrong, and the median of a column."""
-
-    def numbers(runs: pd.DataFrame, _: Paths, learners: Learners) -> Numbers:
-        found = dict(zip(learners, arms(runs, *learners), strict=True))
-        counts = {f"{n}_wrong": counted(wrong(arm))["all"].known for n, arm in found.items()}
-        return counts | {f"{n}_median": median(arm[column]) for n, arm in found.items()}
-
-    return numbers
+    found = dict(zip(learners, arms(runs, *learners), strict=True))
+    counts = {f"{name}_wrong": counted(wrong(arm))["all"].known for name, arm in found.items()}
+    return counts | {f"{name}_median": median(arm[column]) for name, arm in found.items()}
 
 
 def policy_distances(runs: pd.DataFrame, paths: Paths) -> pd.DataFrame:
@@ -169,7 +167,7 @@ CLAIMS: dict[str, Claim] = {
             threshold=DIVERGED,
             wrong="diverged",
             worst="had to be stopped",
-            numbers=_contrasted(divergence, "cost_ratio"),
+            numbers=partial(_contrasted, divergence, "cost_ratio"),
             nothing=1.0,
             label="training cost / frozen arm's",
             borders=np.geomspace(1.02, 15, UP_TO),
@@ -191,7 +189,7 @@ CLAIMS: dict[str, Claim] = {
             threshold=UNSTABLE,
             wrong="was unstable",
             worst="diverged",
-            numbers=_contrasted(instability, "late_cost_range"),
+            numbers=partial(_contrasted, instability, "late_cost_range"),
             label="range of noise-free cost",
             borders=np.geomspace(0.005, 1.5, UP_TO),
         ),
