@@ -29,7 +29,6 @@ BUDGET = 2000  # rollouts of a published long search
 CHECK = 200  # rollouts that a build repeats of a published search
 LEAST = 40  # rollouts of the shortest search: the first one and some generations
 Cost = Callable[[Vector], float]  # theta -> cost of a rollout; infinite where a solve failed
-Direct = Callable[..., Vector]  # (cost, start, budget, seed, **settings) -> theta
 
 
 class Tried:
@@ -164,7 +163,9 @@ def bayesian(
     return tried.theta
 
 
-SEARCHES: dict[str, Direct] = {"grid": grid, "SPSA": spsa, "CMA-ES": cma_es, "Bayes": bayesian}
+SEARCHES: dict[str, Callable[..., Vector]] = {  # (cost, start, budget, seed, settings) -> theta
+    "grid": grid, "SPSA": spsa, "CMA-ES": cma_es, "Bayes": bayesian,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ Scores have the interquartile mean and the probability of improvement of Agarwal
 a percentile bootstrap that draws within each stratum, here a layout: the interval is one over runs
 in these layouts. Rates have Wilson's (1927) interval, which has a width even if all runs agree.
 
-A failed rollout has infinite cost: it is worse than any arrival and ties with another failure.
-Scores that are nan are refused.
+A failed rollout has infinite cost: it is worse than any arrival and ties with another failure. A
+score that is nan is refused.
 """
 
 from collections.abc import Callable, Hashable, Sequence
@@ -39,17 +39,17 @@ class Estimate:
 
 
 @cache
-def rate(held: int, of: int) -> Estimate:
-    """Share `held` of `of` independent runs, with Wilson's interval.
+def rate(yes: int, of: int) -> Estimate:
+    """The share of independent runs that answer yes, with Wilson's interval.
 
     For several layouts the interval is too wide rather than too narrow: a fixed number of runs in
     each varies less than as many runs drawn from the mixture (Hoeffding 1956). Runs of one seed,
     which have the same noise in every layout, are treated as independent.
     """
-    if not 0 <= held <= of or not of:
-        raise ValueError(f"{held} of {of} runs is not a rate")
-    interval = stats.binomtest(held, of).proportion_ci(CONFIDENCE, method="wilson")
-    return Estimate(held / of, float(interval.low), float(interval.high))
+    if not 0 <= yes <= of or not of:
+        raise ValueError(f"{yes} of {of} runs is not a rate")
+    interval = stats.binomtest(yes, of).proportion_ci(CONFIDENCE, method="wilson")
+    return Estimate(yes / of, float(interval.low), float(interval.high))
 
 
 def paired_p(gained: int, lost: int) -> float:

@@ -7,15 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from nmpcrl.analysis.statistics import (
-    CONFIDENCE,
-    Estimate,
-    interquartile_mean,
-    over_layouts,
-    paired_p,
-    probability_of_improvement,
-    rate,
-)
+from nmpcrl.analysis import statistics
+from nmpcrl.analysis.statistics import CONFIDENCE, Estimate, interquartile_mean, over_layouts, rate
 
 LAYOUTS = np.repeat(list("ABCDEF"), 20)  # the strata of the main table
 
@@ -45,7 +38,7 @@ def test_the_interval_of_a_rate_covers_the_mean_over_layouts_that_differ():
 def test_pairs_that_change_go_either_way_with_the_same_chance(gained, lost):
     changed, fewer = gained + lost, min(gained, lost)
     tail = sum(comb(changed, i) for i in range(fewer + 1)) / 2**changed
-    assert paired_p(gained, lost) == pytest.approx(min(1.0, 2 * tail))
+    assert statistics.paired_p(gained, lost) == pytest.approx(min(1.0, 2 * tail))
 
 
 # The interquartile mean
@@ -83,7 +76,7 @@ def test_the_probability_of_improvement_is_mann_and_whitney_s_u_over_the_number_
     rng = np.random.default_rng(4)
     first, second = rng.integers(0, 5, (2, 30)).astype(float)
     u = stats.mannwhitneyu(second, first).statistic
-    estimate = probability_of_improvement(first, second, ["A"] * 30)
+    estimate = statistics.probability_of_improvement(first, second, ["A"] * 30)
     assert estimate.value == pytest.approx(u / 30**2)
 
 
@@ -96,7 +89,7 @@ def test_the_probability_of_improvement_is_mann_and_whitney_s_u_over_the_number_
     ],
 )
 def test_layouts_weigh_the_same_and_a_failure_ties_with_a_failure(first, second, layouts, value):
-    assert probability_of_improvement(first, second, layouts).value == value
+    assert statistics.probability_of_improvement(first, second, layouts).value == value
 
 
 # All of them
@@ -108,8 +101,11 @@ def test_layouts_weigh_the_same_and_a_failure_ties_with_a_failure(first, second,
         (lambda: rate(0, 0), "0 of 0 runs is not a rate"),
         (lambda: rate(3, 2), "3 of 2 runs"),
         (lambda: interquartile_mean([1, np.nan], "AA"), "1 of 2 scores are nan"),
-        (lambda: probability_of_improvement([], [], ""), "0 of 0 scores are nan"),
-        (lambda: probability_of_improvement([1] * 3, [1] * 2, "AAA"), "3 runs .* paired with 2"),
+        (lambda: statistics.probability_of_improvement([], [], ""), "0 of 0 scores are nan"),
+        (
+            lambda: statistics.probability_of_improvement([1] * 3, [1] * 2, "AAA"),
+            "3 runs .* paired with 2",
+        ),
         (lambda: over_layouts(np.mean, np.arange(4.0)), "over the last axis is needed"),
     ],
 )

@@ -5,19 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nmpcrl.analysis.two_state import (
-    FIRST,
-    SECOND,
-    Chain,
-    auxiliary_fixed_point,
-    expected_matrix,
-    expected_step,
-    follow,
-    mspbe,
-    projected_bellman_error,
-    sampled_step,
-    spectral_radius,
-)
+from nmpcrl.analysis import two_state
+from nmpcrl.analysis.two_state import FIRST, SECOND, Chain, expected_matrix, follow, mspbe
 from nmpcrl.learning import Weights
 from nmpcrl.learning.learners import gradient_td, semi_gradient
 
@@ -56,7 +45,7 @@ def test_gradient_td_converges_just_when_w_is_fast_enough(gamma, alpha, ratio):
     bound = slope / (1 - alpha * slope**2)
     if np.isclose(ratio, bound, rtol=1e-3):
         return
-    radius = spectral_radius(Chain(gamma), gradient_td(alpha, ratio * alpha, gamma))
+    radius = two_state.spectral_radius(Chain(gamma), gradient_td(alpha, ratio * alpha, gamma))
     assert (radius < 1) == (ratio > bound)
 
 
@@ -69,12 +58,12 @@ def test_the_semi_gradient_turns_where_the_share_of_the_first_state_passes_its_b
 @given(gamma=discounts, share=shares, theta=numbers)
 def test_with_w_at_its_fixed_point_theta_descends_the_mspbe_of_either_form(gamma, share, theta):
     chain, h = Chain(gamma, share), 1e-4
-    weights = Weights(np.array([theta]), np.array([auxiliary_fixed_point(chain, theta)]))
-    moved = expected_step(chain, gradient_td(1.0, 1.0, gamma), weights).theta[0] - theta
+    weights = Weights(np.array([theta]), np.array([two_state.auxiliary_fixed_point(chain, theta)]))
+    moved = two_state.expected_step(chain, gradient_td(1.0, 1.0, gamma), weights).theta[0] - theta
     slope = (mspbe(chain, theta + h) - mspbe(chain, theta - h)) / (2 * h)
     np.testing.assert_allclose(moved, -slope / 2, atol=1e-6)
     np.testing.assert_allclose(
-        projected_bellman_error(chain, theta), mspbe(chain, theta), atol=1e-9
+        two_state.projected_bellman_error(chain, theta), mspbe(chain, theta), atol=1e-9
     )
 
 
@@ -82,8 +71,10 @@ def test_with_w_at_its_fixed_point_theta_descends_the_mspbe_of_either_form(gamma
 def test_an_expected_step_is_the_mean_of_the_sampled_ones_and_linear(gamma, share, theta, w):
     chain, weights = Chain(gamma, share), Weights(np.array([theta]), np.array([w]))
     rule = gradient_td(0.1, 0.2, gamma)
-    mean = expected_step(chain, rule, weights)
-    first, second = (sampled_step(chain, rule, weights, state) for state in (FIRST, SECOND))
+    mean = two_state.expected_step(chain, rule, weights)
+    first, second = (
+        two_state.sampled_step(chain, rule, weights, state) for state in (FIRST, SECOND)
+    )
     np.testing.assert_allclose(mean.theta, share * first.theta + (1 - share) * second.theta)
     np.testing.assert_allclose(mean.w, share * first.w + (1 - share) * second.w, atol=1e-12)
     linear = expected_matrix(chain, rule) @ [theta, w]
