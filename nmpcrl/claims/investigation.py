@@ -190,15 +190,16 @@ class Investigation:
             missing = self.missing(part)
             if missing and self.prepare:
                 self.prepare(missing.items())
-            made = parallel(partial(_timed, self), [*missing.items()], workers, part)
+            made = parallel(lambda job: self.make(*job), [*missing.items()], workers, part)
             for (one, _), row in made:
                 log.append(self.key(one), one._asdict() | row)
         return log.table()
 
     def make(self, one: Condition, setting: Any) -> Row:
-        """Run one condition."""
-        part = self.parts[one.part]
-        return part.run(setting, one.place, part.episodes, self.seed(one.place, one.k))
+        """A row, with the seconds of processor time that it took unless it has its own."""
+        part, began = self.parts[one.part], time.process_time()
+        row = part.run(setting, one.place, part.episodes, self.seed(one.place, one.k))
+        return {"seconds": time.process_time() - began} | row
 
     def price(self, part: str) -> float:
         """Seconds of processor time that the missing rows of a part take."""
@@ -250,13 +251,6 @@ class Investigation:
             registered=self.registered,
             where=self.where,
         )
-
-
-def _timed(investigation: Investigation, job: tuple[Condition, Any]) -> Row:
-    """A row with the seconds of processor time that it took, unless it has its own."""
-    began = time.process_time()
-    row = investigation.make(*job)
-    return {"seconds": time.process_time() - began} | row
 
 
 def rounded(value: Any, digits: int | None) -> Any:

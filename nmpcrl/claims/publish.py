@@ -55,7 +55,7 @@ def publish_runs(
     """Publish runs that were trained here beside the published ones, in the folder returned.
 
     Args:
-        runs: with their frozen arms, unless these are published.
+        runs: with those with theta frozen, unless these are published.
         variants: the part of the study that each belongs to.
         anew: whether the published runs are forgotten.
         audit: of `published.AUDITED`.
@@ -66,7 +66,7 @@ def publish_runs(
         if e in earlier.rows:
             raise Unpublishable(f"{e} is published already, in the part {earlier.variants[e]!r}")
         if frozen_arm(e) not in known:
-            raise Unpublishable(f"the frozen arm of {e} is not published")
+            raise Unpublishable(f"{frozen_arm(e)}, with which {e} is compared, is not published")
     every = earlier.joined(runs, variants)
     new = every.runs[len(earlier.runs) :]
     counts = new.variant.value_counts(sort=False).to_dict()

@@ -93,10 +93,11 @@ class Evidence:
     def joined(
         self, fresh: Mapping[Experiment, RunSummary], variants: Mapping[Experiment, str]
     ) -> "Evidence":
-        """These runs and fresh ones, whose frozen arms are among both.
+        """These runs and fresh ones.
 
         Args:
-            fresh: runs that were trained here; they replace runs of the same name.
+            fresh: runs that were trained here; they replace runs of the same name. Each has its
+                run with theta frozen among both.
             variants: the part of the study that each belongs to.
         """
         if not fresh:

@@ -210,11 +210,7 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
     """Train `count` runs afresh, and write the lock if all have the bits that locked code made.
 
     A fresh run is compared with the published run, if such a machine made it, else with the run
-    that is stored here.
-
-    Raises:
-        CannotRelock: a bit has changed, or a run has nothing to be compared with.
-        Failed: a run failed.
+    that is stored here. `CannotRelock` says which bit has changed, or what lacks a comparison.
     """
     drawn = sample(known.variants, count)
     exact = comparable(drawn, known)
@@ -227,15 +223,14 @@ def relock(known: Published, count: int, *, workers: int | None = None) -> Reloc
         )
     compile_ahead(drawn)
     ordered = sorted(drawn, key=seconds_of, reverse=True)
-    train = partial(make, afresh=True)
-    fresh = dict(parallel(train, ordered, workers, "runs"))
+    fresh = dict(parallel(partial(make, afresh=True), ordered, workers, "runs"))
     wrong = [found for e in drawn if (found := unequal(e, row(fresh[e]), before[e]))]
     if wrong:
         learner, layout, decay, seed, what, now, then = wrong[0]
         raise CannotRelock(
             f"{len(wrong)} of {len(drawn)} runs have other bits, first {learner} in layout"
             f" {layout}, decay per {decay}, seed {seed}: {what} is {now!r} and was {then}; if that"
-            " is intended, raise the epoch of the room in nmpcrl/study/provenance.py"
+            " is intended, raise the epoch of the package in nmpcrl/study/provenance.py"
         )
     for experiment, one in fresh.items():  # the next edit is compared with these
         SUMMARIES.keep(experiment, one)

@@ -18,8 +18,8 @@ The interval alone is not enough: of 1000 runs, 55 % are surely more than half, 
 "DES diverges" says. Nor is the share alone: two of two runs are all runs. The interval is Wilson's,
 for other seeds in the same layouts (see `statistics.rate`); for other layouts see `drawn_anew`.
 
-An answer is missing if the run was not made, is shorter than the paper's, or has no frozen arm for
-comparison. If missing answers could change the verdict, the claim is undecidable.
+An answer is missing if the run was not made, is shorter than the paper's, or has no run with theta
+frozen for comparison. If missing answers could change the verdict, the claim is undecidable.
 """
 
 from abc import ABC, abstractmethod

@@ -146,7 +146,7 @@ def test_further_runs_are_added_and_the_published_ones_stay(known, folder):
     ("experiment", "part", "refusal"),
     [
         (RUNS[0], "N = 2", "is published already, in the part 'main'"),
-        (replace(FURTHER, seed=7), "N = 2", "the frozen arm of ES .* is not published"),
+        (replace(FURTHER, seed=7), "N = 2", "frozen in layout A, .* seed 7 is compared, is not"),
     ],
 )
 def test_runs_that_cannot_stand_beside_the_others_are_refused(known, experiment, part, refusal):
