@@ -10,8 +10,8 @@ import click
 
 from nmpcrl.commands.options import new_file, number
 
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a spreadsheet computes begins so
-CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]")  # what a terminal obeys
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of a spreadsheet's formulas
+CONTROL = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]")  # characters that control a terminal
 NO_SANDBOX = (
     "The notebooks ran with your rights: limits and a temporary folder are no sandbox."
     " See nmpcrl grade --help."
@@ -93,7 +93,7 @@ def grade(
 
 
 def cell(value: object) -> object:
-    """What a table shows and never computes, nor a terminal obeys: formulas are quoted."""
+    """A cell that no spreadsheet computes and no terminal obeys: formulas are quoted."""
     if not isinstance(value, str):
         return value
     return CONTROL.sub("?", f"'{value}" if value[:1] in FORMULA else value)

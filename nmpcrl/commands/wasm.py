@@ -18,12 +18,13 @@ ROBOT = "nmpcrl.control:differential_drive"
 @click.option("--problem", metavar="MODULE:NAME", help="Of a Problem, instead of both.")
 @click.option("--out", metavar="FILE", type=new_file, default="nmpc.wasm")
 def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
-    """Compile what solves and learns to WebAssembly.
+    """Compile the solver and the learners to WebAssembly.
 
-    It holds the solver, the update rules and the network, and runs in any
-    browser, in Node and in engines such as wasmtime; target, obstacles, horizon
-    and discount are arguments of its functions; of a Problem, data and theta. It
-    takes a minute or two, once. MODULE:NAME may be a function that returns it.
+    The module has the solver, the update rules and the network, and runs in any
+    browser, in Node and in engines such as wasmtime. Target, obstacles, horizon
+    and discount are arguments of its functions; of a Problem, data and theta.
+    Compilation takes a minute or two, once. MODULE:NAME may be a function that
+    returns a Plant, a Task or a Problem.
 
     \b
     Example:
@@ -39,12 +40,12 @@ def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
     from nmpcrl.learning import browser
     from nmpcrl.study import paper
 
-    if problem and (task or plant != ROBOT):
-        raise click.ClickException("a Problem has no Plant and no Task beside it")
-    if problem:
+    if problem is not None:
+        if task is not None or plant != ROBOT:
+            raise click.ClickException("a Problem has no Plant and no Task beside it")
         of = [_named(problem, Problem)]
     else:
-        of = [_named(plant, Plant), _named(task, Task) if task else paper.task()]
+        of = [_named(plant, Plant), paper.task() if task is None else _named(task, Task)]
         states, start = of[0].n, of[1].start.size
         if start != states:
             raise click.ClickException(f"the task has {start} states, the plant {states}")
@@ -58,7 +59,7 @@ def wasm(plant: str, task: str | None, problem: str | None, out: Path) -> None:
 
 
 def _named(name: str, kind: type) -> Any:
-    """The object called MODULE:NAME, or what it returns; the working directory is searched, too."""
+    """The object MODULE:NAME, or its value if it is a function; searches the working directory."""
     sys.path.insert(0, str(Path.cwd()))
     try:
         found = resolve_name(name)

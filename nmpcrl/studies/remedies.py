@@ -50,9 +50,8 @@ LEAST_GAIN = 0.005  # of J_init; where less is possible, the share would be nois
 HALF = 0.5  # of the layouts; an entry that surely solves fewer is never advised
 DIGITS = 2  # of the ends of intervals that are compared
 NEARLY = 0.9  # of the possible gain, in "search nears the best"
-CONTROL = "frozen"  # on which nothing is advised
+CONTROL = "frozen"  # the entry without advice
 NO_DIFFERENCE = "no difference shown"  # an interval that holds 0 confirms nothing in part
-
 SECONDS = 0.013  # of processor time an episode, as long as no row of the entry is known
 
 _STEP_SIZES = tuple({"alpha": alpha} for alpha in (1e-7, 3e-8, 3e-7, 1e-6))
