@@ -396,19 +396,18 @@ def judge_all(
         layouts = whole(1, len(places)).check("layouts", layouts)
     entry(name)  # refuses an unknown one before a process is begun
     jobs = [(place, k) for place in islice(places, layouts) for k in range(seeds)]
+
+    def judged(job: tuple[str, int]) -> Judgement:  # in a worker, which imports the entry
+        return judge(entry(name), job[0], seed_of(*job), budget)
+
     try:
-        found = dict(parallel(partial(_judge, name, budget), jobs, workers, name))
+        found = dict(parallel(judged, jobs, workers, name))
     except Failed as error:
         (place, _), why, _ = error.failures[0]
         raise NoEntry(f"entry = {name!r} failed in {place}: {shortened(why)}") from None
     return pd.DataFrame(
         [{"entry": name, "place": job[0], "k": job[1], **asdict(found[job])} for job in jobs]
     )
-
-
-def _judge(name: str, episodes: int, job: tuple[str, int]) -> Judgement:
-    """`judge` in a worker, which imports the entry by its name."""
-    return judge(entry(name), job[0], seed_of(*job), episodes)
 
 
 def leaderboard(judged: pd.DataFrame) -> pd.DataFrame:
