@@ -26,7 +26,7 @@ SOURCES = ("published", "fresh")
 
 
 def needed(source: str, **asked: Any) -> tuple[Experiment, ...]:
-    """The runs of the main table to train here, with their runs with theta frozen.
+    """The runs of the main table to train here, and the run with theta frozen beside each.
 
     Args:
         source: "fresh" for all runs, "published" for the runs that are not published.

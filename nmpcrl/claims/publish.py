@@ -55,7 +55,7 @@ def publish_runs(
     """Publish runs that were trained here beside the published ones, in the folder returned.
 
     Args:
-        runs: with those with theta frozen, unless these are published.
+        runs: with the run with theta frozen beside each, unless that is published.
         variants: the part of the study that each belongs to.
         anew: whether the published runs are forgotten.
         audit: of `published.AUDITED`.
@@ -72,8 +72,8 @@ def publish_runs(
     counts = new.variant.value_counts(sort=False).to_dict()
     batch = made_here() | {"runs": counts, "hours": float(new.seconds.sum() / 3600)}
     batch |= {"audit": asdict(audit)} if audit else {}
-    table = every.runs[[*COLUMNS]]
-    return _written(published.RUNS, table, batch, anew=anew, arrays=_curves(every))
+    rows, arrays = every.runs[[*COLUMNS]], _curves(every)
+    return _written(published.RUNS, rows, batch, anew=anew, arrays=arrays)
 
 
 def publish_searches(searches: Mapping[Search, Found]) -> Path:
@@ -91,10 +91,7 @@ def publish_timing() -> tuple[Verdict, ...]:
     """Time the learners here, in ten rounds of fresh processes, and publish the times.
 
     Nothing is published unless the times decide all claims about time, since the machine may be
-    busy.
-
-    Returns:
-        The verdicts on these claims.
+    busy. The verdicts on these claims are returned.
     """
     timings = time_learners_repeatedly()
     judged = judge(BY_TIME, timings=timings)

@@ -96,8 +96,8 @@ class Evidence:
         """These runs and fresh ones.
 
         Args:
-            fresh: runs that were trained here; they replace runs of the same name. Each has its
-                run with theta frozen among both.
+            fresh: runs that were trained here; they replace runs of the same name. The run with
+                theta frozen beside each must be among these or those.
             variants: the part of the study that each belongs to.
         """
         if not fresh:
