@@ -27,7 +27,7 @@ AHEAD = 128  # jobs given to an executor of the caller's at a time
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 MEMORY = 0.45e9  # [bytes] of a worker at the end of a full run of RDES
 LIMIT = Path("/sys/fs/cgroup/memory.max")  # of a Linux container
-WAIT = 0.5  # [s] between two looks for an interrupt, which Windows does not deliver to who waits
+WAIT = 0.5  # [s] between two looks for an interrupt, which Windows keeps from a waiting thread
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -175,7 +175,7 @@ def processes(count: int) -> Iterator[Executor]:
 
 
 def _end_with_parent(parent: int) -> None:
-    """End this worker when its parent ends, however that is; the parent handles Ctrl-C."""
+    """End this worker when its parent has ended in any way; the parent handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:

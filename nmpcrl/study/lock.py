@@ -18,7 +18,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from nmpcrl.study.provenance import EPOCHS, hash_of, versions
+from nmpcrl.study.provenance import EPOCHS, hash_of
 
 FILES = (  # whose code bears on numbers of runs, summaries and searches
     *("control/**/*.py", "learning/**/*.py"),
@@ -34,11 +34,6 @@ ROOT = Path(__file__).parent.parent
 LOCK = Path(__file__).with_name("sources.lock.json")
 WARNED = "NMPCRL_WARNED"  # set in the environment once the warning has been given
 PARSING = threading.Lock()  # Python 3.11 fails where two threads parse at once
-
-
-def signature() -> str:
-    """A hash of versions, epochs and sources: equal in processes that make the same numbers."""
-    return hash_of([versions(), EPOCHS, sources_hash()])
 
 
 def sources(root: Path = ROOT) -> dict[str, str]:

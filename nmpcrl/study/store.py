@@ -71,10 +71,10 @@ class Store(Generic[Value]):
             name = f"{e.learner}-{short_name(e.layout)}-{e.decay}-seed{e.seed}-{e.episodes}ep"
         return folder() / place / f"{name}-{self.key(named)[:10]}.npz"
 
-    def read(self, named: Named, *, tell: bool = False) -> Value | None:
+    def read(self, named: Named, *, report: bool = False) -> Value | None:
         """The stored value; None if there is none, or if the file is damaged or of another run.
 
-        With `tell`, the reason is printed why a file is of no use.
+        `report` prints why a file is of no use.
         """
         lock.warn_of_changes()
         path = self.path_of(named)
@@ -85,7 +85,7 @@ class Store(Generic[Value]):
         except FileNotFoundError:
             return None
         except DamagedRecords as error:
-            if tell:
+            if report:
                 say(f"{error}; the run is made again")
             return None
         return value  # type: ignore[no-any-return]
@@ -113,7 +113,7 @@ class Store(Generic[Value]):
         if value is None:
             check_folder()
             with self._wait_for(named):
-                value = self.read(named, tell=True)
+                value = self.read(named, report=True)
                 if value is None:
                     value = self.make(named, **options)
                     self.keep(named, value)
@@ -132,7 +132,7 @@ class Store(Generic[Value]):
 
         Args:
             names: experiments and trials.
-            executor: makes the runs, such as that of a Dask client; by default new processes.
+            executor: makes the runs, such as a Dask client's; by default new processes.
             workers: how many processes; by default as many as there are cores.
             progress: whether to show a bar.
             strict: whether an error is raised where a run failed, or only printed.
@@ -178,7 +178,7 @@ class Store(Generic[Value]):
             StoreError: a worker with other code made it, or the file cannot be written.
         """
         if why := refused(named, value.facts):
-            sentence = f"{named} is not stored: it is {why}"
+            sentence = f"{named} is not stored: the worker made {why}"
             if value.facts["solver"] == named.solver:
                 raise StoreError(sentence)
             say(sentence)
@@ -211,7 +211,7 @@ class Store(Generic[Value]):
             lock.acquire(timeout=0)
         except Timeout:
             return False
-        value = self.read(named, tell=True)
+        value = self.read(named, report=True)
         if value is None:
             locks[named] = lock
         else:

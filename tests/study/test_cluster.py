@@ -12,7 +12,7 @@ from made_records import assert_same_numbers
 
 from nmpcrl.analysis.summaries import SUMMARIES, fetch_summaries
 from nmpcrl.analysis.summary import summarise
-from nmpcrl.study import cluster, run, sweep
+from nmpcrl.study import StoreError, cluster, run, sweep
 from nmpcrl.study.refusal import Refusal
 
 distributed = pytest.importorskip("distributed", reason="needs the extra nmpcrl[cluster]")
@@ -38,7 +38,7 @@ store.run = noting
 OTHER_VERSIONS = """
 from nmpcrl.study import provenance
 
-provenance.LIBRARIES = provenance.LIBRARIES[1:]
+provenance.installed = lambda library: "0.1"
 """
 pytestmark = pytest.mark.usefixtures("runs")
 
@@ -102,12 +102,18 @@ def refused(address: str, patience: float, sentence: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("workers", "patience", "sentence"),
-    [(0, 0.1, "has no worker"), (1, 240.0, "has other code or other versions of libraries")],
-)
-def test_no_worker_and_one_with_other_versions_are_refused(dask, workers, patience, sentence):
-    refused(dask(workers, OTHER_VERSIONS), patience, sentence)
+def test_a_run_of_a_worker_with_other_versions_is_not_stored(dask):
+    refused = pytest.raises(
+        StoreError, match="the worker made another run, or one of other versions"
+    )
+    with cluster.executor(dask(1, OTHER_VERSIONS), 240.0) as executor, refused:
+        fetch_summaries(SIX[:1], executor=executor, progress=False)
+    assert not SUMMARIES.is_stored(SIX[0])
+
+
+@pytest.mark.slow
+def test_a_scheduler_without_workers_is_refused(dask):
+    refused(dask(0), 0.1, "has no worker")
 
 
 @pytest.mark.parametrize("nobody", ["", "foo", "tcp://nowhere:1", "127.0.0.1:9", "x://y:1", "1,1"])

@@ -152,10 +152,10 @@ def test_a_run_of_a_worker_with_other_code_or_another_solver_is_not_stored(
     )
     if "solver" in other:  # it is returned
         assert ask(QUICK).facts["solver"] == "fatrop"
-        said = f"{QUICK} is not stored: it is a run solved by fatrop and not by riccati\n"
+        said = f"{QUICK} is not stored: the worker made a run solved by fatrop and not by riccati\n"
         assert capsys.readouterr().err == said
     else:
-        with pytest.raises(StoreError, match="is not stored: it is a"):
+        with pytest.raises(StoreError, match="is not stored: the worker made a"):
             ask(QUICK)
     assert not RUNS.path_of(QUICK).exists()
 
