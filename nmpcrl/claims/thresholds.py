@@ -93,8 +93,8 @@ def solved(runs: pd.DataFrame) -> pd.Series:
 
 def share_of_possible(runs: pd.DataFrame, possible: Mapping[str, float]) -> pd.Series:
     """The reduction of each run over `possible` in its layout; nan where none is possible."""
-    known = {layout: share for layout, share in possible.items() if share > 0}
-    return cost_reduction(runs) / runs.layout.map(known).astype(float)
+    known = runs.layout.map(possible).astype(float)
+    return cost_reduction(runs) / known.where(known > 0)
 
 
 def cost_difference(first: pd.DataFrame, second: pd.DataFrame) -> pd.Series:
