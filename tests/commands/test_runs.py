@@ -136,15 +136,13 @@ def stored(command):
         ("ES-A", [0, 2]),
         ("*-seed1", [2, 3]),
         ("--sort cost", [2, 1, 0, 3]),
-        ("--sort layout --reverse", [3, 1, 2, 0]),
+        ("--sort layout --reverse", [1, 3, 0, 2]),
         ("GES", []),
     ],
 )
 def test_runs_are_picked_by_name_and_sorted_by_a_column(command, stored, line, found):
     rows = json.loads(command("runs", "--json", *line.split()).stdout, parse_constant=pytest.fail)
-    if "layout" not in line:
-        assert [row["run"] for row in rows] == [stored[k] for k in found]
-    assert {row["run"] for row in rows} == {stored[k] for k in found}
+    assert [row["run"] for row in rows] == [stored[k] for k in found]
     table = command("runs", *line.split()).stdout.splitlines()[1:]
     assert [one.split()[0] for one in table] == [row["run"] for row in rows]
 
