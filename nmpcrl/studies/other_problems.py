@@ -28,11 +28,11 @@ from nmpcrl.study.problems import gros_zanon as gz
 STEPS, WINDOW = 1000, 50  # of a run, and those whose costs are averaged
 DEVIATION = 0.05  # of the normal noise that is added to the action
 SEEDS = 50
-EPISODES, EPISODE = 20, 100  # of a test: no noise on the action
-TEST_SEED = 10**6  # its disturbances, the same for all
+EPISODE = 100  # steps of an episode without noise on the action
+TEST = (20, 10**6)  # episodes, and the seed of their disturbances
+SEARCH = (10, 2 * 10**6)  # of the cost that the search sees
 POINTS, INPUTS = 161, 121  # of the grid on which the best policy is found
 BUDGET, SPREAD = 400, 0.05  # thetas that the search tries, and how far from the start it begins
-SEARCH_EPISODES, SEARCH_SEED = 10, 2 * 10**6  # of the cost that the search sees
 PEER_STEPS = 100  # of mpcrl's own test, whose seed is 69
 RATE, RIDGE = 0.05, 1e-3
 NUDGE = 1e-10  # of theta as it begins
@@ -66,13 +66,11 @@ def controller() -> Nmpc:
     return Nmpc(gz.problem())
 
 
-def learn(
-    make: Callable[[Nmpc], Learner], _: str, __: int, seed: int, *, steps: int = STEPS
-) -> Row:
+def learn(make: Callable[[Nmpc], Learner], _: str, __: int, seed: int) -> Row:
     """Train a learner for one episode, and test the theta that it ends with."""
     disturbance, noise = (np.random.default_rng([k, seed]) for k in (0, 1))
-    explore = Exploration(DEVIATION * noise.normal(size=(1, steps, 1)), np.ones((1, steps)))
-    costs, theta = np.full(steps, np.inf), gz.problem().theta
+    explore = Exploration(DEVIATION * noise.normal(size=(1, STEPS, 1)), np.ones((1, STEPS)))
+    costs, theta = np.full(STEPS, np.inf), gz.problem().theta
     weights, learner = Weights(theta, np.zeros(theta.size)), make(controller())
     world: dict[str, Any] = {"plant": gz.plant, "start": gz.START, "rng": disturbance}
     try:
@@ -81,11 +79,11 @@ def learn(
         test = judge(theta)
     except Diverged:
         test = np.inf
-    windows = np.nan_to_num(costs, nan=np.inf).reshape(-1, min(WINDOW, steps)).mean(axis=1)
+    windows = np.nan_to_num(costs, nan=np.inf).reshape(-1, WINDOW).mean(axis=1)
     return ROW | {"test": test, "costs": windows.tolist(), "theta": theta.tolist()}
 
 
-def judge(theta: Vector, episodes: int = EPISODES, seed: int = TEST_SEED) -> float:
+def judge(theta: Vector, test: tuple[int, int] = TEST) -> float:
     """Mean cost of a step of the plan's policy; infinite where a solve failed."""
     plan = None
 
@@ -95,16 +93,15 @@ def judge(theta: Vector, episodes: int = EPISODES, seed: int = TEST_SEED) -> flo
         return plan.action
 
     try:
-        return mean_cost(act, episodes, seed)
+        return mean_cost(act, test)
     except (SolverError, ValueError):
         return np.inf
 
 
-def mean_cost(
-    act: Callable[[Vector], Vector], episodes: int = EPISODES, seed: int = TEST_SEED
-) -> float:
-    """Mean cost of a step of any policy, over episodes of `EPISODE` steps from the start."""
-    rng, total = np.random.default_rng(seed), 0.0
+def mean_cost(act: Callable[[Vector], Vector], test: tuple[int, int] = TEST) -> float:
+    """Mean cost of a step of any policy, over episodes from the start."""
+    (episodes, seed), total = test, 0.0
+    rng = np.random.default_rng(seed)
     for _ in range(episodes):
         state = gz.START
         for _ in range(EPISODE):
@@ -118,7 +115,7 @@ def searched() -> Vector:
     import cma  # takes a second
 
     def cost(theta: Any) -> float:
-        return min(judge(np.asarray(theta), SEARCH_EPISODES, SEARCH_SEED), 1e6)
+        return min(judge(np.asarray(theta), SEARCH), 1e6)
 
     options = {"seed": 1, "verbose": -9, "maxfevals": BUDGET}
     return np.asarray(cma.fmin2(cost, gz.problem(informed=True).theta, SPREAD, options)[0])

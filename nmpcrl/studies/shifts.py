@@ -21,7 +21,7 @@ from nmpcrl.claims.investigation import Row
 from nmpcrl.learning import Diverged, Exploration, Learner, Weights, expected_sarsa, train
 from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import absurd
-from nmpcrl.studies.worlds_run import THETA, controller, explored, row
+from nmpcrl.studies.worlds_run import THETA, controller, exploration, row
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.drawn import JUDGE
 from nmpcrl.study.learners import LEARNERS, Generators
@@ -48,10 +48,10 @@ def sequence(rate: str, place: str, episodes: int) -> tuple[list[str], list[int]
 
 
 def fires(values: Sequence[float]) -> bool:
-    """Shewhart's chart of individual values: the last is far from the `WINDOW` before, or nan.
+    """Whether Shewhart's chart fires on the last value: |x - mean| > LIMIT s, or x is nan.
 
-    |x - mean| > LIMIT s, where s is the standard deviation of those before. Independent normal
-    values fire falsely with the probability that a t of WINDOW - 1 degrees of freedom exceeds
+    Mean and standard deviation s are those of the `WINDOW` values before. Independent normal values
+    fire falsely with the probability that a t of WINDOW - 1 degrees of freedom exceeds
     LIMIT / sqrt(1 + 1 / WINDOW): 0.001 an episode.
     """
     *before, value = values[-WINDOW - 1 :]
@@ -85,7 +85,7 @@ def changing(
     reset: bool = False,
     raised: Learner | None = None,
 ) -> Iterator[tuple[World, bool, Vector]]:
-    """Algorithm 1 from theta_init: the world, an alarm of the chart, and theta after each episode.
+    """Algorithm 1 from theta_init: after each episode its world, whether a chart fires, and theta.
 
     Args:
         layouts: the obstacles of each.
@@ -130,7 +130,7 @@ def shifting(rate: str, setting: tuple[str, ...], place: str, episodes: int, see
     learner = LEARNERS[kind].make(Experiment(), nmpc, Generators(rng, rng, rng))
     raised = expected_sarsa(nmpc, RAISED * paper.ALPHA) if reaction == "raised" else None
     series, events, arrived = [], [], False
-    followed = changing(nmpc, layouts, order, learner, explored(episodes, seed),
+    followed = changing(nmpc, layouts, order, learner, exploration(episodes, seed),
                         knows=knows, reset=reaction == "reset", raised=raised)  # fmt: skip
     for e, (world, alarm, theta) in enumerate(followed):
         events += [e] if alarm else []

@@ -94,7 +94,7 @@ def row(
     }  # fmt: skip
 
 
-def explored(episodes: int, seed: int) -> Exploration:
+def exploration(episodes: int, seed: int) -> Exploration:
     """The paper's noise on the action."""
     rng, shape = np.random.default_rng([seed, 0]), (episodes, paper.STEPS, 2)
     return Exploration.draw(rng, shape, deviation=paper.NOISE, decay_rate=paper.DECAY_RATE)
@@ -106,7 +106,7 @@ def begin(nmpc: Persistent, **known: Any) -> Vector:
     return nmpc.problem.vector(**known)
 
 
-def found(
+def theta_of(
     policy: str, nmpc: Persistent, world: World, start: Vector, episodes: int, seed: int
 ) -> Vector:
     """The theta of a policy in a world, from a start; of ES the last that a solver can take."""
@@ -118,7 +118,7 @@ def found(
         return search(lambda theta: judged(nmpc, theta, world, next(draws)).cost,
                       start, episodes, seed)  # fmt: skip
     weights = Weights(start, np.full(start.size, paper.W_INIT))
-    rng, explore = np.random.default_rng([seed, 1]), explored(episodes, seed)
+    rng, explore = np.random.default_rng([seed, 1]), exploration(episodes, seed)
     learner = expected_sarsa(nmpc, paper.ALPHA)
     with suppress(Diverged):
         for step in train(learner, nmpc, weights, explore, rng=rng, **world.environment):
@@ -131,7 +131,7 @@ def moving(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Ro
     view, policy = setting
     world = World(SCENARIOS[place], PREDICTORS[view])
     nmpc = controller(obstacles=len(world.motions))
-    made = judged(nmpc, found(policy, nmpc, world, begin(nmpc), episodes, seed), world)
+    made = judged(nmpc, theta_of(policy, nmpc, world, begin(nmpc), episodes, seed), world)
     return row(made.cost, *made.counted, made.arrived)
 
 
@@ -141,16 +141,12 @@ def model(setting: tuple[str, str], place: str, episodes: int, seed: int) -> Row
     nmpc = controller("diagonal" if policy in ("init", "grid", "ES") else "model")
     world = World(still(JUDGE[place]), fault=fault)
     start = begin(nmpc, **(fault.model if policy.startswith("oracle") else {}))
-    theta = found(policy, nmpc, world, start, episodes, seed)
+    theta = theta_of(policy, nmpc, world, start, episodes, seed)
     draws = DRAWS if fault.slip or any(fault.noise) else 1
     made = [judged(nmpc, theta, world, draw) for draw in range(draws)]
-    return row(
-        float(np.mean([each.cost for each in made])),
-        sum(each.counted.inside for each in made),
-        sum(each.counted.collisions for each in made),
-        all(each.arrived for each in made),
-        theta.tolist(),
-    )
+    cost = float(np.mean([each.cost for each in made]))
+    inside, collisions = np.sum([each.counted for each in made], axis=0).tolist()
+    return row(cost, inside, collisions, all(each.arrived for each in made), theta.tolist())
 
 
 def carry(name: str, place: str, episodes: int, seed: int) -> Row:
@@ -163,11 +159,11 @@ def carry(name: str, place: str, episodes: int, seed: int) -> Row:
 
 def gradient(deviation: float, place: str, episodes: int, seed: int) -> Row:
     """The cosine of the summed steps of ES at theta_init with noise in the state and without."""
-    nmpc, explore, sums = controller(), explored(episodes, seed), []
+    nmpc, explore, sums = controller(), exploration(episodes, seed), []
     for each in (0.0, deviation):
         world = World(still(JUDGE[place]), fault=Fault(noise=(each,) * 3))
         weights, summed = Weights(THETA, np.zeros(THETA.size)), np.zeros(THETA.size)
-        rng = np.random.default_rng(seed)  # the published draws: the stream [seed, 0] of `explored`
+        rng = np.random.default_rng(seed)  # the published draws: the stream of `exploration`
         learner = expected_sarsa(nmpc, 0.0)
         for step in train(learner, nmpc, weights, explore, rng=rng, **world.environment):
             if step.update and step.solution and step.update.delta is not None:
@@ -182,7 +178,7 @@ def terminal(kind: str, place: str, episodes: int, seed: int) -> Row:
     """ES with a terminal cost, in the paper's world; costs are shares of theta_init's."""
     nmpc, world = controller(kind), World(still(JUDGE[place]))
     start = begin(nmpc)
-    theta = found("ES", nmpc, world, start, episodes, seed)
+    theta = theta_of("ES", nmpc, world, start, episodes, seed)
     initial, made = (judged(nmpc, each, world) for each in (start, theta))
     return row(made.cost / initial.cost, *made.counted, made.arrived, theta.tolist())
 

@@ -42,7 +42,7 @@ class Fault:
         return wheels @ np.diag([self.grip, 1.0])
 
     def follow(self, before: Vector, action: Vector) -> Vector:
-        """The inputs that follow an action after one period, by those before."""
+        """The inputs that lag behind an action, one period after `before`."""
         if not self.lag:
             return action
         share = float(1 - np.exp(-robot().period / self.lag))

@@ -42,7 +42,8 @@ def test_published_runs_are_made_again(monkeypatch):
     """Their beginning, before differences between processors have grown."""
     found = study.runs(OTHER_PROBLEMS.table())
     known = found.courses[(found.courses.arm == "ES") & (found.courses.k == 0)].iloc[0]
-    again = study.learn(ARMS["ES"], "", 1, 0, steps=100)
+    for name, short in (("STEPS", 100), ("PEER_STEPS", 3)):
+        monkeypatch.setattr(study, name, short)
+    again = study.learn(ARMS["ES"], "", 1, 0)
     assert again["costs"][0] == pytest.approx(known.costs[0], rel=0.05)
-    monkeypatch.setattr(study, "PEER_STEPS", 3)
     assert study.spread(None, "", 1, 0)["gap"] == pytest.approx(found.spreads.gap[0][:3], rel=0.05)
