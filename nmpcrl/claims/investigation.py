@@ -150,19 +150,37 @@ class Investigation:
         return published.read(self.name, self.where)
 
     def _published(self) -> pd.DataFrame:
-        """The same, with no row where nothing is published."""
+        """The published rows; none where nothing is published."""
         known = published.about(self.name, self.where)
         return self.table() if known else pd.DataFrame(columns=NAMES)
 
     def known(self) -> pd.DataFrame:
         """The published rows, then the rows stored here that are not published."""
-        tables = [one for one in (self._published(), self.log().table()) if len(one)]
+        tables = [one for one in (self._published(), self.made()) if len(one)]
         every = pd.concat(tables) if tables else self._published()
         return every.drop_duplicates(NAMES, ignore_index=True)
 
-    def log(self) -> "RowLog":
-        """The rows that were made here."""
-        return RowLog(folder() / f"{self.name}.jsonl")
+    @property
+    def log(self) -> Path:
+        """The file of the rows that were made here: key, sources and row as JSON, a line each."""
+        return folder() / f"{self.name}.jsonl"
+
+    def rows(self) -> dict[str, Row]:
+        """The rows that were made here, by key.
+
+        Incomplete lines are ignored, and rows of sources that are neither these nor locked ones.
+        """
+        rows = {}
+        for line in self.log.read_text("utf-8").splitlines() if self.log.exists() else ():
+            with suppress(ValueError):
+                key, sources, row = json.loads(line)
+                if is_accepted(sources):
+                    rows[key] = row
+        return rows
+
+    def made(self) -> pd.DataFrame:
+        """The table of the rows that were made here."""
+        return pd.DataFrame([*self.rows().values()])
 
     def conditions(self, part: str) -> dict[Condition, Any]:
         """The setting of each row of a part; a `Refusal` if an arm depends on unknown rows."""
@@ -174,8 +192,8 @@ class Investigation:
         }
 
     def missing(self, part: str) -> dict[Condition, Any]:
-        """The conditions of a part without a row in `log`."""
-        rows = self.log().rows
+        """The conditions of a part without a row that was made here."""
+        rows = self.rows()
         return {one: it for one, it in self.conditions(part).items() if self.key(one) not in rows}
 
     def complete(self, parts: Iterable[str] = (), workers: int | None = None) -> pd.DataFrame:
@@ -185,15 +203,18 @@ class Investigation:
             parts: by default all.
             workers: processes; by default one per core.
         """
-        log, chosen = self.log(), [*parts] or [*self.parts]
+        chosen = [*parts] or [*self.parts]
+        self.log.parent.mkdir(parents=True, exist_ok=True)
         for part in filter(chosen.__contains__, self.parts):
             missing = self.missing(part)
             if missing and self.prepare:
                 self.prepare(missing.items())
             made = parallel(lambda job: self.make(*job), [*missing.items()], workers, part)
             for (one, _), row in made:
-                log.append(self.key(one), one._asdict() | row)
-        return log.table()
+                line = json.dumps([self.key(one), sources_hash(), one._asdict() | row])
+                with FileLock(f"{self.log}.lock"), self.log.open("a", encoding="utf-8") as file:
+                    file.write(f"\n{line}")  # begins a line, whatever was cut off before
+        return self.made()
 
     def make(self, one: Condition, setting: Any) -> Row:
         """A row, with the seconds of processor time that it took unless it has its own."""
@@ -224,7 +245,7 @@ class Investigation:
             Unpublishable: an arm is published already with other numbers, or none is complete and
                 new.
         """
-        there, made, new = self._published(), self.log().table(), []
+        there, made, new = self._published(), self.made(), []
         for (part, arm), rows in made.groupby(["part", "arm"], sort=False) if len(made) else ():
             by, order = rows.set_index(["place", "k"], drop=False), self.parts[part].order(arm)
             if {*by.index} < {*order}:
@@ -291,33 +312,6 @@ def _commit(path: Path) -> str:
         return subprocess.run(asked, capture_output=True, text=True, check=False).stdout.strip()
 
     return "" if git("status", "--porcelain") else git("log", "-1", "--format=%H")
-
-
-class RowLog:
-    """Rows by key in a file of JSON lines.
-
-    Incomplete lines are ignored, and rows of sources that are neither these nor the locked ones.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path, self.rows = path, dict[str, Row]()
-        for line in path.read_text("utf-8").splitlines() if path.exists() else ():
-            with suppress(ValueError):
-                key, sources, row = json.loads(line)
-                if is_accepted(sources):
-                    self.rows[key] = row
-
-    def append(self, key: str, row: Row) -> None:
-        """Store a row."""
-        self.rows[key] = row
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        line = json.dumps([key, sources_hash(), row])
-        with FileLock(f"{self.path}.lock"), self.path.open("a", encoding="utf-8") as file:
-            file.write(f"\n{line}")  # begins a line, whatever was cut off before
-
-    def table(self) -> pd.DataFrame:
-        """All rows."""
-        return pd.DataFrame([*self.rows.values()])
 
 
 def counted(yes: pd.Series) -> tuple[int, int]:

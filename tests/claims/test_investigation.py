@@ -84,7 +84,7 @@ def of_other_sources(text):
 @pytest.mark.parametrize(("edit", "missing"), [(lambda text: text[:-9], 1), (of_other_sources, 6)])
 def test_a_line_that_was_cut_off_or_has_other_sources_is_made_again(edit, missing):
     toy().complete(["tune"], workers=1)
-    path = toy().log().path
+    path = toy().log
     path.write_text(edit(path.read_text()))
     assert len(toy().missing("tune")) == missing
     assert len(toy().complete(["tune"], workers=1)) == 6
@@ -136,7 +136,7 @@ def test_what_is_published_is_neither_changed_nor_published_twice_nor_in_part():
     toy().publish()
     with pytest.raises(Unpublishable, match="no arm of toy is complete and new"):
         toy().publish()
-    path = toy().log().path
+    path = toy().log
     path.write_text(path.read_text().replace('"cost": ', '"cost": 9'))
     with pytest.raises(Unpublishable, match="low of the part 'tune' is published with other"):
         toy().publish()
@@ -160,7 +160,7 @@ def test_every_changed_byte_is_noticed_before_a_number_is_shown(folders, suffix)
 
 def test_answers_come_with_their_question_and_places_without_a_row_are_skipped():
     toy().complete(["tune"], workers=1)
-    answer = toy().answers(toy().log().table())["low is low"]
+    answer = toy().answers(toy().made())["low is low"]
     assert answer == Answer(UNDECIDABLE, {"layouts": (2, 2)}, question="low is low")
     rows = [
         ("p", arm, f"{i}", 0, i + (arm == "b")) for arm in "ab" for i in range(10 + (arm == "a"))

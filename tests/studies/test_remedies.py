@@ -198,7 +198,7 @@ def test_rows_are_made_in_order_and_the_best_setting_is_judged(judged):
     with pytest.raises(Refusal, match="ES is not tuned yet: the part 'tune' comes first"):
         REMEDIES.conditions("judge 50")
     REMEDIES.complete(["tune", "judge 300"], workers=1)
-    made = REMEDIES.log().table()
+    made = REMEDIES.made()
     assert {*made[made.part == "judge 300"].arm} == {"grid", "ES[alpha=3e-08]"}
     assert {*made.best} == {3000.0}
     assert {*made[made.part == "tune"].seconds} == {2.0}  # of the entry, not of its judge
