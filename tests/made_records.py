@@ -29,6 +29,7 @@ def made_records(experiment: Experiment, rows: int, seed: int = 0) -> Records:
 
 def assert_same_numbers(one, other, but: frozenset[str] = frozenset()) -> None:
     """Two Records, or two summaries, have the same numbers, times and `but` apart."""
+    assert one.facts["final_cost"] == other.facts["final_cost"]
     for name in vars(one).keys() - {"experiment", "facts"}:
         table, beside = getattr(one, name), getattr(other, name)
         if not isinstance(table, dict):

@@ -10,7 +10,6 @@ import ast
 import hashlib
 import json
 import os
-import sys
 import threading
 from collections import Counter
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from nmpcrl.study.files import say
 from nmpcrl.study.provenance import EPOCHS, hash_of
 
 FILES = (  # whose code bears on numbers of runs, summaries and searches
@@ -97,11 +97,10 @@ def warn_of_changes() -> None:
         return
     if files := changed(sources(), locked()["sources"]):
         os.environ[WARNED] = "1"
-        print(
+        say(
             f"{', '.join(files)}: changed since the stored runs were trained;"
             " `nmpcrl verify --relock` shows whether the numbers stay the same; if not, raise the"
-            " epoch of the room in nmpcrl/study/provenance.py",
-            file=sys.stderr,
+            " epoch of the room in nmpcrl/study/provenance.py"
         )
 
 

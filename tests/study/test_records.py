@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_records import made_records
+from made_records import assert_same_numbers, made_records
 
 from nmpcrl.study import DamagedRecords, Experiment, Records
 from nmpcrl.study.records import Table, about, final_cost
@@ -15,18 +15,11 @@ from nmpcrl.study.records import Table, about, final_cost
 RUN = made_records(Experiment("ES", seed=3, episodes=40, steps=10, evaluate_every=20), 40)
 
 
-def as_read(content):
-    return json.loads(json.dumps(content))
-
-
 def assert_equal(one, other):
-    assert as_read(one.experiment) == as_read(other.experiment)
+    assert json.dumps(one.experiment) == json.dumps(other.experiment)
     assert one.facts == other.facts
-    for table, beside in ((one.steps, other.steps), (one.evaluations, other.evaluations)):
-        assert list(table) == list(beside)
-        for name in table:
-            assert table[name].dtype == beside[name].dtype
-            np.testing.assert_array_equal(table[name], beside[name])
+    assert list(one.steps) == list(other.steps)
+    assert_same_numbers(one, other)
 
 
 @pytest.fixture
@@ -40,7 +33,7 @@ def test_the_latest_saved_run_is_loaded(path):
     replace(RUN, facts=RUN.facts | {"seconds": 1.5}).save(path)
     RUN.save(path)
     assert_equal(Records.load(path), RUN)
-    assert about(path) == (as_read(RUN.experiment), RUN.facts)
+    assert about(path).facts == RUN.facts
 
 
 def test_a_run_of_the_first_edition_which_named_its_plant_is_read(path):

@@ -17,12 +17,11 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
-from made_records import made_records
+from made_records import assert_same_numbers, made_records
 
 from nmpcrl.study import (
     DamagedRecords,
@@ -55,14 +54,6 @@ def trained(experiment: Experiment, **_) -> Records:
 
 def truth(experiment: Experiment) -> Records:
     return made_records(experiment, 6, EXPERIMENTS.index(experiment) + 1)
-
-
-def same(one: Records, other: Records) -> bool:
-    """Whether two runs have the same numbers."""
-    return one.facts["final_cost"] == other.facts["final_cost"] and all(
-        a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
-        for a, b in ((one.steps, other.steps), (one.evaluations, other.evaluations))
-    )
 
 
 def in_a_fork(do: Callable[[], object]) -> Callable[[], int]:
@@ -105,7 +96,8 @@ def ask(*experiments: Experiment) -> None:
         with ThreadPoolExecutor(2) as two:
             found = fetch_all(experiments, executor=two, progress=False)
     assert list(found) == list(experiments)
-    assert all(same(found[e], truth(e)) for e in experiments)
+    for e in experiments:
+        assert_same_numbers(found[e], truth(e))
 
 
 class Machine(RuleBasedStateMachine):
@@ -217,7 +209,7 @@ class Machine(RuleBasedStateMachine):
             except (FileNotFoundError, DamagedRecords):
                 assert experiment not in self.whole
                 continue
-            assert same(found, truth(Experiment(**found.experiment)))
+            assert_same_numbers(found, truth(Experiment(**found.experiment)))
 
     @invariant()
     def the_list_of_runs_is_the_truth(self) -> None:
