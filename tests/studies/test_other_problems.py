@@ -9,11 +9,6 @@ from nmpcrl.studies import other_problems as study
 from nmpcrl.studies.other_problems import ARMS, OTHER_PROBLEMS, Runs
 
 
-def test_the_references_are_ordered_as_what_they_know():
-    known = study.runs(OTHER_PROBLEMS.table()).references
-    assert known.best_policy <= known.best_theta < known.informed < known.wrong
-
-
 def decided(tests, informed, best, spread):
     """Which predictions come true of given costs of arms, references and one seed's spread."""
     references = pd.Series({"informed": informed, "best_policy": best})

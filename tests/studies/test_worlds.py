@@ -6,7 +6,7 @@ import pytest
 
 from nmpcrl.analysis.encounters import crowding
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
-from nmpcrl.studies.worlds import CHANGES, PARTS, REMEDY, WORLDS, back, changes, noticing, shares
+from nmpcrl.studies.worlds import CHANGES, PARTS, REMEDY, WORLDS, back, noticing
 from nmpcrl.study.drawn import SCENARIOS
 
 COLUMNS = [*WORLDS.table().columns]
@@ -40,13 +40,6 @@ def test_a_cost_is_back_at_the_rollout_after_which_it_stays():
     assert back([*before, 0.91, *[0.9] * 29], 150) == 5
     assert back([*before, 1.2, 0.9, 1.2, *[0.9] * 27], 150) == 20
     assert back([*before, *[1.2] * 30], 150) == np.inf
-
-
-def test_a_share_is_averaged_from_the_first_change_on():
-    assert changes("every 50", "S01") == [50, 100, 150, 200, 250]
-    some = rows("every 50", "ES told plain", series=[*[1.0] * 10, *[0.8] * 50])
-    found = shares(pd.DataFrame(some), "every 50")["ES told plain"]
-    assert found.to_dict() == pytest.approx(dict.fromkeys(PARTS["every 50"].places, 0.8))
 
 
 def test_an_alarm_where_the_map_is_true_is_false_and_a_change_unnoticed_counts_whole():

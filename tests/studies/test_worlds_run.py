@@ -62,11 +62,9 @@ def test_theta_is_carried_to_every_layout_and_theta_init_costs_what_it_costs_at_
 
 def test_the_cost_with_a_terminal_cost_is_a_share_of_theta_init_s_in_the_same_layout():
     row = ran("terminal", "diagonal", "J002", 1)
-    costs = [
-        judged(controller(), theta, World(still(JUDGE["J002"]))).cost
-        for theta in (np.array(row["series"]), THETA)
-    ]
-    assert row["cost"] == costs[0] / costs[1] != 1
+    costs = (judged(controller(), theta, World(still(JUDGE["J002"]))).cost
+             for theta in (np.array(row["series"]), THETA))  # fmt: skip
+    assert row["cost"] == next(costs) / next(costs) != 1
 
 
 @pytest.mark.weekly
