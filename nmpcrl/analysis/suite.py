@@ -59,6 +59,7 @@ LAYOUTS: Mapping[str, Centres] = {**JUDGE, **TUNE, **paper.LAYOUTS}
 THETA = np.array(paper.THETA_INIT)
 BOUNDS = (LOWER, UPPER)  # of theta, for learners with a trust region
 RETURNED = numbers([number(-1e300, 1e300)] * THETA.size, f"{THETA.size} finite numbers or a policy")
+ACTION = numbers([number(-1e300, 1e300)] * 2, "2 finite numbers")
 NO_ROLLOUT = Rollout(np.zeros((0, 3)), np.zeros((0, 2)), np.zeros(0), failure="not begun")
 
 Policy = Callable[[Vector], Vector]  # observation of `nmpcrl/Robot-v0` -> action
@@ -436,7 +437,11 @@ def leaderboard(judged: pd.DataFrame) -> pd.DataFrame:
 
 def followed(robot: Robot, policy: Policy) -> Rollout:
     """An episode of a policy in `nmpcrl/Robot-v0`."""
-    acting = SimpleNamespace(solve=lambda seen, *_: SimpleNamespace(action=policy(seen)))
+
+    def solve(seen: Vector, *_: Any) -> SimpleNamespace:
+        return SimpleNamespace(action=np.array(ACTION.check("what the policy chose", policy(seen))))
+
+    acting = SimpleNamespace(solve=solve)
     rollout = evaluate(acting, THETA, paper.STEPS, plant=robot.env())
     return replace(rollout, states=rollout.states[:, : robot.task.start.size])
 

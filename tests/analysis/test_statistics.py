@@ -95,6 +95,23 @@ def test_layouts_weigh_the_same_and_a_failure_ties_with_a_failure(first, second,
 # All of them
 
 
+@pytest.mark.weekly
+@pytest.mark.slow
+@pytest.mark.parametrize("of", [interquartile_mean, statistics.probability_of_improvement])
+def test_intervals_cover_the_truth_about_as_often_as_they_say(of):
+    """Costs that differ by layout, common to the pairs that are compared."""
+    rng, scale = np.random.default_rng(2), np.repeat([1.0, 1.1, 1.2, 1.3, 1.4, 1.5], 20)
+    if of is interquartile_mean:
+        drawn = [(one * scale,) for one in rng.lognormal(0, 0.5, (20_060, 120))]
+        true = float(np.median(stats.trim_mean(drawn[60:], 0.25, axis=2)))
+    else:
+        common, ours, theirs = rng.normal(size=(3, 60, 120))
+        drawn = [*zip(common + ours, common + theirs + 0.5, strict=True)]
+        true = stats.norm.cdf(0.5 / 2)  # of two runs, each of variance 2
+    found = [of(*one, LAYOUTS) for one in drawn[:60]]
+    assert 0.88 <= np.mean([one.low <= true <= one.high for one in found]) <= 1
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [

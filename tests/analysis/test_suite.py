@@ -205,6 +205,12 @@ def test_what_is_neither_theta_nor_a_policy_is_refused(answer):
         judge(lambda robot: answer, "J001", 1, 3)
 
 
+@pytest.mark.parametrize("action", [[0.1], [0.1, 0.2, 0.3], [np.nan, 0.0], "north"])
+def test_an_action_that_is_none_is_refused(action):
+    with pytest.raises(ParameterError, match=r"what the policy chose = .* must be 2 finite num"):
+        judge(lambda robot: lambda observation: action, "J001", 0, 2)
+
+
 @pytest.mark.usefixtures("trains_here")
 def test_two_calls_give_the_same_judgements_but_for_their_time():
     first, again = (
