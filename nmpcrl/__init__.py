@@ -1,8 +1,9 @@
 """Reinforcement learning on top of nonlinear model predictive control: one paper, reproduced.
 
-Eight rooms, imported one way: `commands` (the command `nmpcrl`) -> `report` (what pages show) ->
-`claims` (verdicts) -> `analysis` (numbers) and `bench` (times) -> `study` (what is run, and where
-it is kept) -> `learning` (how the parameters move) -> `control` (what the controller is).
+Ten packages, imported one way: `commands` (the command `nmpcrl`) -> `report` (what pages show) and
+`course` (exercises) -> `studies` (investigations) -> `claims` (verdicts) -> `analysis` (numbers)
+and `bench` (times) -> `study` (what is run, and where it is kept) -> `learning` (how the parameters
+move) -> `control` (what the controller is).
 """
 
 import numpy as np

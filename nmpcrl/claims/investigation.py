@@ -162,7 +162,7 @@ class Investigation:
 
     @property
     def log(self) -> Path:
-        """The file of the rows that were made here: key, sources and row as JSON, a line each."""
+        """The file of the rows that were made here, a line of JSON each, with key and sources."""
         return folder() / f"{self.name}.jsonl"
 
     def rows(self) -> dict[str, Row]:

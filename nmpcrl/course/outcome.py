@@ -1,6 +1,6 @@
 """What a check says of an answer: it is right, or it is not, and then why.
 
-The functions of this room return an `Outcome` for a right answer and raise `Unsolved` for any
+The functions of this package return an `Outcome` for a right answer and raise `Unsolved` for any
 other. An `exercise` of a chapter raises only in an edition for students and in a build of the book,
 where NMPCRL_STRICT is set when this is imported; elsewhere it says the same, in an `Outcome` that
 is not right, and the chapter runs to its end.

@@ -100,7 +100,7 @@ def warn_of_changes() -> None:
         say(
             f"{', '.join(files)}: changed since the stored runs were trained;"
             " `nmpcrl verify --relock` shows whether the numbers stay the same; if not, raise the"
-            " epoch of the room in nmpcrl/study/provenance.py"
+            " epoch of its package in nmpcrl/study/provenance.py"
         )
 
 

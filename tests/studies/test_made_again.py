@@ -1,4 +1,9 @@
-"""Drawn rows of each published investigation, made afresh, are the published ones."""
+"""Drawn rows of each published investigation, made afresh, are the published ones.
+
+Not every row would be: learning is chaotic, and published rows were made on several machines. Of
+21 further rows of `worlds`, 6 differed on another one; the code that had made three of these gave
+other numbers there, too.
+"""
 
 import numpy as np
 import pandas as pd

@@ -111,7 +111,7 @@ def test_every_file_that_a_run_its_summary_and_a_search_import_is_in_the_lock():
 
 
 def test_the_code_is_what_the_lock_has():
-    """If this fails: `nmpcrl verify --relock`, or raise the epoch of the room and relock."""
+    """If this fails: `nmpcrl verify --relock`, or raise the epoch of the package and relock."""
     assert changed(sources(), lock.locked()["sources"]) == []
     assert lock.locked()["epochs"] == provenance.EPOCHS
 
