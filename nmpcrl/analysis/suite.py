@@ -412,7 +412,12 @@ def judge_all(
 
 
 def leaderboard(judged: pd.DataFrame) -> pd.DataFrame:
-    """One row for each entry of `judge_all`; solved, gain and clear are `Estimate`s over places."""
+    """One row for each entry of `judge_all`.
+
+    Columns entry, places (how many), solved and clear (of moving obstacles; shares of the places),
+    gain (interquartile mean over places), episodes (most in a place), seconds, and over (the first
+    place in which the budget was exceeded, or ""); solved, gain and clear are of type `Estimate`.
+    """
     rows = []
     for name, runs in judged.groupby("entry", sort=False):
         places = [each for _, each in runs.groupby("place", sort=False)]
