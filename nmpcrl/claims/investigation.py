@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -29,7 +29,7 @@ from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, Outcome
 from nmpcrl.study import published
 from nmpcrl.study.files import folder
 from nmpcrl.study.jobs import parallel
-from nmpcrl.study.lock import is_accepted, sources_hash
+from nmpcrl.study.lock import code, is_accepted, sources_hash
 from nmpcrl.study.provenance import EPOCHS, hash_of, installed, made_here, versions
 from nmpcrl.study.published import Unpublishable
 from nmpcrl.study.refusal import Refusal
@@ -133,6 +133,7 @@ class Investigation:
     evidence: Callable[[pd.DataFrame], Any] = lambda table: table  # that questions are asked of
     prepare: Callable[[Iterable[tuple[Condition, Any]]], None] | None = None  # compiles ahead
     where: Path | None = None  # of the published table; by default the project's folder
+    source: str = ""  # what of a reader's file rows depend on, as `lock.code` reads it
 
     @property
     def asked(self) -> dict[str, Question]:
@@ -143,7 +144,8 @@ class Investigation:
         """A hash of all that a row depends on."""
         episodes = self.parts[one.part].episodes
         made_with = {**versions(), **{name: installed(name) for name in self.libraries}}
-        return hash_of([self.name, self.epoch, EPOCHS, made_with, episodes, *one])
+        of_file = [self.source] if self.source else []
+        return hash_of([self.name, self.epoch, EPOCHS, made_with, episodes, *one, *of_file])
 
     def table(self) -> pd.DataFrame:
         """The published rows; a `Damaged` says what is wrong with them."""
@@ -165,22 +167,37 @@ class Investigation:
         """The file of the rows that were made here, a line of JSON each, with key and sources."""
         return folder() / f"{self.name}.jsonl"
 
-    def rows(self) -> dict[str, Row]:
-        """The rows that were made here, by key.
+    def _lines(self) -> dict[str, tuple[Row, str]]:
+        """Rows by key, and the commit that had registered each when it was made.
 
-        Incomplete lines are ignored, and rows of sources that are neither these nor locked ones.
+        Incomplete lines are ignored, and rows of sources that are neither these nor locked ones;
+        so are rows that are asked no more: of other keys, arms, places or seeds.
         """
-        rows = {}
+        found, order = {}, cache(lambda part, arm: {*self.parts[part].order(arm)})
         for line in self.log.read_text("utf-8").splitlines() if self.log.exists() else ():
             with suppress(ValueError):
-                key, sources, row = json.loads(line)
-                if is_accepted(sources):
-                    rows[key] = row
-        return rows
+                key, sources, row, *commit = json.loads(line)
+                one = Condition(*(row[name] for name in NAMES))
+                part = self.parts.get(one.part)
+                if part is None or not is_accepted(sources) or key != self.key(one):
+                    continue
+                there = callable(part.arms) or one.arm in part.arms
+                if there and (one.place, one.k) in order(one.part, one.arm):
+                    found[key] = row, commit[0] if commit else ""
+        return found
+
+    def rows(self) -> dict[str, Row]:
+        """The rows that were made here, by key."""
+        return {key: row for key, (row, _) in self._lines().items()}
 
     def made(self) -> pd.DataFrame:
         """The table of the rows that were made here."""
         return pd.DataFrame([*self.rows().values()])
+
+    @property
+    def unregistered(self) -> int:
+        """How many rows were made here before parts and questions were registered as they are."""
+        return sum(commit != self.registered for _, commit in self._lines().values())
 
     def conditions(self, part: str) -> dict[Condition, Any]:
         """The setting of each row of a part; a `Refusal` if an arm depends on unknown rows."""
@@ -211,7 +228,8 @@ class Investigation:
                 self.prepare(missing.items())
             made = parallel(lambda job: self.make(*job), [*missing.items()], workers, part)
             for (one, _), row in made:
-                line = json.dumps([self.key(one), sources_hash(), one._asdict() | row])
+                named = one._asdict() | row
+                line = json.dumps([self.key(one), sources_hash(), named, self.registered])
                 with FileLock(f"{self.log}.lock"), self.log.open("a", encoding="utf-8") as file:
                     file.write(f"\n{line}")  # begins a line, whatever was cut off before
         return self.made()
@@ -220,6 +238,8 @@ class Investigation:
         """A row, with the seconds of processor time that it took unless it has its own."""
         part, began = self.parts[one.part], time.process_time()
         row = part.run(setting, one.place, part.episodes, self.seed(one.place, one.k))
+        if not isinstance(row, dict):
+            raise TypeError(f"{row!r} is no row: the function of part {one.part!r} returns a dict")
         return {"seconds": time.process_time() - began} | row
 
     def price(self, part: str) -> float:
@@ -236,7 +256,7 @@ class Investigation:
 
     def judge(self, known: Any) -> dict[str, Answer]:
         """The answers of `evidence` to all questions, by name."""
-        return {one.name: replace(one.answer(known), question=one.name) for one in self.questions}
+        return {one.name: replace(_asked(one, known), question=one.name) for one in self.questions}
 
     def publish(self) -> Path:
         """Add the complete arms that were made here to the published table.
@@ -248,7 +268,7 @@ class Investigation:
         there, made, new = self._published(), self.made(), []
         for (part, arm), rows in made.groupby(["part", "arm"], sort=False) if len(made) else ():
             by, order = rows.set_index(["place", "k"], drop=False), self.parts[part].order(arm)
-            if {*by.index} < {*order}:
+            if not {*order} <= {*by.index}:
                 continue
             block = by.loc[order].reset_index(drop=True).map(partial(rounded, digits=self.digits))
             old = there[(there.part == part) & (there.arm == arm)].reset_index(drop=True)
@@ -269,9 +289,21 @@ class Investigation:
             pd.concat([there, added], ignore_index=True) if len(there) else added,
             arrays,
             batch=made_here() | {"rows": added.groupby("part", sort=False).size().to_dict()},
-            registered=self.registered,
+            registered="" if self.unregistered else self.registered,
             where=self.where,
         )
+
+
+def _asked(question: Question, known: Any) -> Answer:
+    """The answer to a question; a `Refusal` where its function fails."""
+    try:
+        found = question.answer(known)
+    except Exception as error:
+        why = f"{type(error).__name__}: {error}"
+        raise NoInvestigation(f"the question {question.name!r} fails: {why}") from error
+    if not isinstance(found, Answer):
+        raise NoInvestigation(f"the question {question.name!r} gives {found!r} and no `Answer`")
+    return found
 
 
 def rounded(value: Any, digits: int | None) -> Any:
@@ -286,12 +318,13 @@ def rounded(value: Any, digits: int | None) -> Any:
 def of_file(path: Path) -> Investigation:
     """The investigation that a Python file defines; published beside it, in `published`.
 
-    Its `registered` is the commit of the file, if Git knows the file as it is.
+    Its `registered` is the commit of the file, if Git knows the file as it is. Rows are made again
+    after an edit of the file, unless it is one of comments or docstrings.
     """
-    spec = spec_from_file_location(path.stem, path)
+    spec = spec_from_file_location(f"investigation_{path.stem}", path)
     if not path.is_file() or spec is None or spec.loader is None:
         raise NoInvestigation(f"{path} is no Python file")
-    module = sys.modules[path.stem] = module_from_spec(spec)
+    module = sys.modules[spec.name] = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except Exception as error:
@@ -301,7 +334,8 @@ def of_file(path: Path) -> Investigation:
     if len(found) != 1:
         raise NoInvestigation(f"{path} must define one Investigation, and defines {len(found)}")
     where = found[0].where or path.parent / "published"
-    return replace(found[0], where=where, registered=found[0].registered or _commit(path))
+    registered, source = found[0].registered or _commit(path), code(path.read_text("utf-8"))
+    return replace(found[0], where=where, registered=registered, source=source)
 
 
 def _commit(path: Path) -> str:

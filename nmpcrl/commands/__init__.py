@@ -1,6 +1,7 @@
 """The command `nmpcrl`, a module a command; what a command needs is imported when it is called."""
 
 import os
+from pathlib import Path
 
 import click
 
@@ -34,6 +35,8 @@ def main() -> None:
       nmpcrl show GES
     """
     os.environ["MPLBACKEND"] = "agg"  # no command opens a window, whatever is set elsewhere
+    if Path(runs := os.environ.get("NMPCRL_RUNS", "")).is_file():
+        raise click.ClickException(f"NMPCRL_RUNS = {runs!r} must be a folder")
 
 
 for command in (train, runs, show, study, verify, bench, suite, investigate, grade, wasm):

@@ -60,8 +60,11 @@ def investigate(
         made = one.complete(parts, workers)
         if publish:
             click.echo(f"{one.publish()}: published")
-            if not one.registered:
-                click.echo(f"not registered: commit {name} before its rows are made")
+            if one.unregistered or not one.registered:
+                click.echo(
+                    f"not registered: commit {name} before its rows are made (delete {one.log} to"
+                    " make them again)"
+                )
     _say(one, one.table() if judge or publish else made)
 
 

@@ -93,6 +93,8 @@ def write(
     place.mkdir(parents=True, exist_ok=True)
     with FileLock(place / ".lock"):
         known, files = _manifest(place), [place / f"{name}.csv"]
+        if name not in known and files[0].exists():
+            raise Unpublishable(f"{files[0]} is there, and not in {MANIFEST}: restore that")
         write_file(files[0], lambda file: file.write(_csv(table)))
         if arrays:
             files.append(place / f"{name}.npz")
@@ -102,7 +104,7 @@ def write(
             **earlier,
             "files": {file.name: sha256(file.read_bytes()).hexdigest() for file in files},
             "batches": [*([] if anew else earlier.get("batches", ())), dict(batch)],
-            "registered": registered or earlier.get("registered", ""),
+            "registered": earlier.get("registered", registered),
         }
         entries = {**known, name: entry}
         write_json(place / MANIFEST, {**entries, SEAL: hash_of(entries)}, indent=1)
@@ -128,7 +130,8 @@ def _manifest(place: Path) -> dict[str, Any]:
 def _content(place: Path, name: str, suffix: str) -> bytes:
     """The bytes of a published file, if they are those that were written."""
     if not (place / MANIFEST).exists():
-        raise Damaged(f"nothing is published in {place}; {_restore(place)}")
+        write = "`nmpcrl investigate FILE.py --publish` writes it"
+        raise Damaged(f"nothing is published in {place}; {_restore(place, write)}")
     path = place / f"{name}{suffix}"
     known = _manifest(place).get(name, {}).get("files", {})
     try:
@@ -172,9 +175,9 @@ def _of_csv(content: bytes) -> pd.DataFrame:
     return table
 
 
-def _restore(place: Path) -> str:
-    """How to get the published data back: a reader's own, a checkout's, and elsewhere."""
+def _restore(place: Path, own: str = "restore it") -> str:
+    """How to get the published data back: a reader's `own`, a checkout's, and elsewhere."""
     if place != folder():
-        return "`nmpcrl investigate FILE.py --publish` writes it"
+        return own
     checkout = (Path(nmpcrl.__file__).parents[1] / ".git").exists()
     return CHECKOUT if checkout else ELSEWHERE

@@ -1,11 +1,13 @@
 """An investigation makes each row once, loses none, and publishes what is complete."""
 
 import json
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from nmpcrl.claims.investigation import (
+    NAMES,
     Answer,
     Investigation,
     Part,
@@ -78,7 +80,7 @@ def test_what_changes_a_number_changes_the_key_and_nothing_else_does():
 
 def of_other_sources(text):
     lines = [json.loads(line) for line in text.splitlines() if line]
-    return "\n".join(json.dumps([key, "other", row]) for key, _, row in lines)
+    return "\n".join(json.dumps([key, "other", *row]) for key, _, *row in lines)
 
 
 @pytest.mark.parametrize(("edit", "missing"), [(lambda text: text[:-9], 1), (of_other_sources, 6)])
@@ -98,11 +100,70 @@ def test_complete_arms_are_published_rounded_and_read_as_they_were_written(folde
     assert table.cost[0] == float(f"{1 + 970 / 3 + 1:.3g}")
     assert table.series[0] == [1.0, float("inf")]
     toy().complete(workers=1)
+    assert toy().unregistered == 0  # for none says when it was
     toy(registered="abc").publish()
     pd.testing.assert_frame_equal(toy().table()[:6], table)
     about = published.about("toy")
     assert [one["rows"] for one in about["batches"]] == [{"tune": 6}, {"judge": 3}]
-    assert about["registered"] == "abc"
+    assert about["registered"] == ""  # the first rows were made before
+
+
+def changed(**fields):
+    """The parts with another field of the first one."""
+    return PARTS | {"tune": replace(PARTS["tune"], **fields)}
+
+
+@pytest.mark.parametrize(
+    ("now", "left"),
+    [
+        ({"epoch": 2}, 0),
+        ({"source": "an edited file"}, 0),
+        ({"parts": changed(episodes=11)}, 0),
+        ({"parts": changed(places=("b", "c"))}, 3),
+        ({"parts": changed(arms={"other": 1.0, "high": 2.0})}, 4),
+        ({"parts": {"renamed": PARTS["tune"]}}, 0),
+    ],
+)
+def test_rows_that_are_asked_no_more_are_neither_judged_nor_published(now, left):
+    toy().complete(["tune"], workers=1)
+    one = toy(**now)
+    assert len(one.made()) == left
+    part = next(iter(one.parts))
+    one.complete([part], workers=1)
+    one.publish()
+    rows = one.table()[NAMES].itertuples(index=False, name=None)
+    assert sorted(rows) == sorted(one.conditions(part))
+
+
+def test_a_table_is_registered_by_the_commit_before_its_first_row():
+    toy().complete(["tune"], workers=1)
+    late = toy(registered="abc")
+    assert late.unregistered == 6
+    late.publish()
+    assert published.about("toy")["registered"] == ""
+    early = toy(name="early", registered="abc")
+    early.complete(["tune"], workers=1)
+    early.publish()
+    toy(name="early", registered="later").complete(workers=1)
+    toy(name="early", registered="later").publish()
+    assert published.about("early")["registered"] == "abc"
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"), [(lambda _: True, "gives True and no"), (lambda _: 1 / 0, "division by")]
+)
+def test_a_question_that_fails_is_named(answer, said):
+    with pytest.raises(Refusal, match=f"the question 'odd' .*{said}"):
+        toy(questions=(Question("odd", "?", NOT, answer),)).answers(pd.DataFrame())
+
+
+def test_a_table_that_the_manifest_does_not_know_is_not_overwritten(folders):
+    toy().complete(["tune"], workers=1)
+    toy().publish()
+    (published.folder() / "manifest.json").unlink()
+    published._manifest.cache_clear()
+    with pytest.raises(Unpublishable, match=r"toy\.csv is there, and not in manifest\.json"):
+        toy().publish()
 
 
 def with_paths(setting, place, episodes, seed):

@@ -94,10 +94,11 @@ def refused(ended) -> str:
     return said
 
 
-@pytest.mark.parametrize("line", ["study --dry-run", "train --episodes 1", "show x"])
+@pytest.mark.parametrize("line", ["study --dry-run", "runs", "investigate worlds --dry-run"])
 def test_a_file_in_the_place_of_the_folder_of_runs(command, tmp_path, line):
     (tmp_path / "runs").write_text("")
-    assert str(tmp_path / "runs") in refused(command(*line.split()))
+    said = refused(command(*line.split()))
+    assert f"NMPCRL_RUNS = {str(tmp_path / 'runs')!r} must be a folder" in said
 
 
 def test_a_place_that_cannot_be_published_to(command, monkeypatch, tmp_path):
