@@ -156,6 +156,11 @@ class Investigation:
         known = published.about(self.name, self.where)
         return self.table() if known else pd.DataFrame(columns=NAMES)
 
+    @property
+    def registration(self) -> str:
+        """The commit that the published table is registered by; empty if it is by none."""
+        return str(published.about(self.name, self.where).get("registered", ""))
+
     def known(self) -> pd.DataFrame:
         """The published rows, then the rows stored here that are not published."""
         tables = [one for one in (self._published(), self.made()) if len(one)]

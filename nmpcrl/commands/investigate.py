@@ -66,6 +66,8 @@ def investigate(
                     " make them again)"
                 )
     _say(one, one.table() if judge or publish else made)
+    if judge and one.source and one.registered != one.registration:
+        click.echo(f"not registered: the table is older than {name} as it is")
 
 
 def _load(name: str) -> "Investigation":

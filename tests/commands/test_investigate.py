@@ -45,7 +45,7 @@ def test_a_file_is_run_interrupted_published_and_judged(own, runs, command):
     assert command("investigate", str(own), "--judge").stdout == made.stdout
 
 
-def test_a_committed_file_is_registered_by_its_commit(own):
+def test_a_committed_file_is_registered_by_its_commit(own, command):
     def git(*arguments):
         who = ("-c", "user.name=n", "-c", "user.email=e@example.org")
         asked = ["git", "-C", str(own.parent), *who, *arguments]
@@ -55,8 +55,13 @@ def test_a_committed_file_is_registered_by_its_commit(own):
     git("add", own.name)
     git("commit", "-qm", "Ask")
     assert of_file(own).registered == git("rev-parse", "HEAD")
+    said = command("investigate", str(own), "--publish", "--workers", "1").stdout
+    assert of_file(own).registration == git("rev-parse", "HEAD")
+    assert "not registered" not in said + command("investigate", str(own), "--judge").stdout
     own.write_text(own.read_text() + "\n# changed\n")
     assert of_file(own).registered == ""
+    said = command("investigate", str(own), "--judge").stdout
+    assert "not registered: the table is older than" in said
 
 
 @pytest.mark.parametrize(
