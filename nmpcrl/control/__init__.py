@@ -3,7 +3,7 @@
 from nmpcrl.control.lookup import lookup
 from nmpcrl.control.nmpc import Nmpc, PlanJacobian
 from nmpcrl.control.plant import Plant, differential_drive, rk4, unicycle
-from nmpcrl.control.problem import Parameter, Problem, Series, Soft
+from nmpcrl.control.problem import Hard, Parameter, Problem, Series, Soft
 from nmpcrl.control.solution import DerivativeError, Solution, SolverError, Status
 from nmpcrl.control.solvers import Fatrop, Ipopt, Riccati
 from nmpcrl.control.task import Obstacle, Task
@@ -11,6 +11,7 @@ from nmpcrl.control.task import Obstacle, Task
 __all__ = [
     "DerivativeError",
     "Fatrop",
+    "Hard",
     "Ipopt",
     "Nmpc",
     "Obstacle",

@@ -82,6 +82,12 @@ class Symbols(Mapping[str, ca.SX]):
     def __init__(self, blocks: Blocks, vector: ca.SX) -> None:
         self._blocks, self._vector = blocks, vector
 
+    @staticmethod
+    def joined(one: "Symbols", other: "Symbols") -> "Symbols":
+        """The names of both."""
+        shapes = {**one._blocks, **other._blocks}
+        return Symbols(Blocks(one._blocks._what, shapes), ca.vertcat(one._vector, other._vector))
+
     def __getitem__(self, name: str) -> ca.SX:
         shape = self._blocks[name]
         part = self._vector[self._blocks._places[name]]
@@ -94,8 +100,8 @@ class Symbols(Mapping[str, ca.SX]):
         return len(self._blocks)
 
 
-def numbers(name: str, value: Any) -> Matrix:
-    """An array of at most two axes.
+def numbers(name: str, value: Any, *, empty: bool = False) -> Matrix:
+    """An array of at most two axes, and not `empty` unless that is allowed.
 
     Raises:
         ValueError: it holds something else than finite numbers.
@@ -104,6 +110,6 @@ def numbers(name: str, value: Any) -> Matrix:
         array = np.array(value, float)
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {value!r} must be a number or an array of numbers") from None
-    if array.size == 0 or not np.isfinite(array).all():
+    if not (array.size or empty) or not np.isfinite(array).all():
         raise ValueError(f"{name} = {value!r} must hold finite numbers")
     return array

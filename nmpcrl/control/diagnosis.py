@@ -8,7 +8,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.expression import place
-from nmpcrl.control.ocp import Ocp, ProblemOcp, TaskOcp
+from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.solution import short
 
 FASTEST = 10.0  # what one step of a model may multiply a small deviation by
@@ -36,20 +36,12 @@ class Diagnosis:
 
     def __init__(self, ocp: Ocp) -> None:
         self._ocp = ocp
-        of: Any
-        if isinstance(ocp, ProblemOcp):
-            of, e = ocp.problem, ocp.problem.expressions
-            z = ca.vertcat(e.x, e.u)
-            given, self._model = [e.x, e.u, e.theta, e.d], "model"
-            parts = {"model": e.next_x, "stage": e.stage, "soft": e.rows, "initial": e.initial}
-            sharp = {"model": e.next_x, "stage": e.stage, "terminal": e.terminal, "soft": e.rows}
-        else:
-            assert isinstance(ocp, TaskOcp)
-            of = ocp.plant
-            x, u = of.transition.sx_in()
-            z = ca.vertcat(x, u)
-            given, self._model = [x, u, ocp.theta, ca.SX(0, 1)], "dynamics"
-            parts = sharp = {"dynamics": of.transition(x, u)}
+        of, e = ocp.problem, ocp.problem.expressions
+        z = ca.vertcat(e.x, e.u)
+        given = [e.x, e.u, e.theta, e.d, e.line]
+        rows = ca.vertcat(e.fixed, e.each)
+        parts = {"model": e.next_x, "stage": e.stage, "rows": rows, "initial": e.initial}
+        sharp = {"model": e.next_x, "stage": e.stage, "terminal": e.terminal, "rows": rows}
         self._kinks = {name: kinks_in(written, z) for name, written in sharp.items()}
         self._still = np.clip(np.zeros(of.lower.size), of.lower, of.upper)
         self._orders: dict[str, dict[str, Callable[..., Any]]] = {order: {} for order in ORDERS}
@@ -59,20 +51,26 @@ class Diagnosis:
             for order, values in zip(self._orders, (written, slope, bend), strict=True):
                 self._orders[order][name] = ca.Function("part", given, [ca.densify(values)])
 
-    def why(self, state: Vector, theta: Vector, data: Matrix | None) -> str:
+    def why(self, state: Vector, theta: Vector, data: Matrix) -> str:
         """What is wrong on the way that no input leads to, in one sentence; "" if nothing is."""
         N = len(self._ocp.inputs)
-        known = np.zeros((N, 0)) if data is None else data
         for i in range(N):
-            given = state, self._still, theta, known[i]
+            own = self._ocp.problem.own_size
+            given = state, self._still, theta, data[i][:own], self._line(data[i])
             said = self._not_finite(*given) or self._too_fast(i + 1, *given)
             if said:
                 return said.format(f"at x = {short(state)}, u = {short(self._still)}")
-            state = self._orders[""][self._model](*given).full().ravel()
+            state = self._orders[""]["model"](*given).full().ravel()
         for name, kinks in self._kinks.items():
             if kinks:
                 return f"{name} has a kink ({', '.join(kinks)}); {ROUND}"
         return ""
+
+    def _line(self, data: Vector) -> Vector:
+        """The first line of data, or zeros."""
+        of = self._ocp.problem
+        width = of.line_names.size
+        return data[of.own_size :][:width] if of.lines else np.zeros(width)
 
     def _not_finite(self, *given: Vector) -> str:
         for order, functions in self._orders.items():
@@ -85,14 +83,14 @@ class Diagnosis:
         return ""
 
     def _too_fast(self, steps: int, *given: Vector) -> str:
-        value, slope, _ = (functions[self._model] for functions in self._orders.values())
+        value, slope, _ = (functions["model"] for functions in self._orders.values())
         speed = slope(*given).full()[:, : self._ocp.states.shape[1]]
         growth, largest = np.abs(np.linalg.eigvals(speed)).max(), np.abs(value(*given).full()).max()
         if growth > FASTEST:
             does = f"makes {growth:.1g} times as much of a small deviation in one step"
-            return f"{self._model} {does}, {{}}: {SUBSTEPS}"
+            return f"model {does}, {{}}: {SUBSTEPS}"
         if largest > FARTHEST:
-            return f"{self._model} leads to {largest:.1g} in {steps} steps at rest: {UNSTABLE}"
+            return f"model leads to {largest:.1g} in {steps} steps at rest: {UNSTABLE}"
         return ""
 
 

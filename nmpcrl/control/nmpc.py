@@ -18,14 +18,13 @@ from nmpcrl.control.bending import Bending
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.description import Described
 from nmpcrl.control.diagnosis import FARTHEST
-from nmpcrl.control.ocp import Ocp, transcribe, transcribe_problem
+from nmpcrl.control.ocp import Ocp, transcribe
 from nmpcrl.control.plant import Plant
-from nmpcrl.control.problem import Problem, discount
+from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError, short
 from nmpcrl.control.solvers import Fatrop, Prepared, Riccati, Solver, solver_of
 from nmpcrl.control.task import Task
 from nmpcrl.control.variant import Variant
-from nmpcrl.control.vectors import whole
 
 ABSURD = 1e6  # no theta or action beyond this reaches a solver: fatrop never returns from some
 FAR = 1e3  # nor does a state: from 1e4 outside the box fatrop never returns either
@@ -76,7 +75,6 @@ class Nmpc(Described):
             ties_active: whether a state exactly on an obstacle's boundary counts as in it: the
                 other side of a kink in theta_c.  # departure L
         """
-        self.problem = plant if isinstance(plant, Problem) else None
         self.solver = solver_of(solver)
         if isinstance(plant, Problem):
             if task is not None or (horizon, gamma, slack_weight) != (HORIZON, GAMMA, SLACK_WEIGHT):
@@ -84,26 +82,25 @@ class Nmpc(Described):
                     "a Problem has its own costs, horizon, gamma and weights: write"
                     " Nmpc(problem, solver=...)"
                 )
-            self.horizon, self.gamma = plant.horizon, plant.gamma
-            self.n, self.m, self._theta_size = plant.states, plant.inputs, plant.names.size
-            self.farthest = FARTHEST * max(1.0, *plant.sizes[0])  # number in a state
-            self.largest = max(ABSURD, 1e3 * float(np.abs(plant.theta).max()))  # number in theta
+            self.problem = plant
         else:
             if task is None:
                 raise ValueError("a plant needs a task: write Nmpc(plant, task)")
-            self.horizon, self.gamma = whole("horizon", horizon), discount(gamma)
             if not 0 < slack_weight < np.inf:
                 raise ValueError(f"slack_weight = {slack_weight} must be a positive number")
             if task.start.size != plant.n:
                 raise ValueError(f"the task has {task.start.size} states and the plant {plant.n}")
             self._plant, self._task, self._slack_weight = plant, task, float(slack_weight)
-            self.solver.check(task)
-            self.n, self.m, self._theta_size = plant.n, plant.m, 2 * plant.n + plant.m + 1
-            self.largest = ABSURD
-            box = np.abs([task.lower, task.upper])
-            self.farthest = max(FAR, 100 * box[np.isfinite(box)].max(initial=0))
-        self.lower, self.upper = plant.lower, plant.upper
-        bounds = np.abs([plant.lower, plant.upper])
+            self.problem = task.problem(plant, horizon, gamma, float(slack_weight))
+        of = self.problem
+        self.horizon, self.gamma, self.n, self.m = of.horizon, of.gamma, of.states, of.inputs
+        self.largest = max(ABSURD, 1e3 * float(np.abs(of.theta).max()))  # number in theta
+        box = np.abs([of.state_lower, of.state_upper])
+        reach = 100 * box[np.isfinite(box)].max(initial=0)
+        far = max(FAR, reach) if reach else FARTHEST * max(1.0, *of.sizes[0])
+        self.farthest = far  # number in a state
+        self.lower, self.upper = of.lower, of.upper
+        bounds = np.abs([of.lower, of.upper])
         self._strong = max(self.farthest, bounds[np.isfinite(bounds)].max(initial=0))
         self.ties_active = ties_active
 
@@ -132,14 +129,10 @@ class Nmpc(Described):
         """
         began = time.perf_counter()
         state = _checked("state", state, self.n, self.farthest)
-        theta = _checked("theta", theta, self._theta_size, self.largest)
-        known = None
-        if self.problem is not None:
-            known = self.problem.stage_data(data)
-            if (theta < self._bending.least).any():
-                self._bending.judge(state, theta, known)
-        elif data is not None:
-            raise ValueError("data belong to a Problem: a task's target and obstacles stand still")
+        theta = _checked("theta", theta, self.problem.theta.size, self.largest)
+        known = self.problem.stage_data(data)
+        if (theta < self._bending.least).any():
+            self._bending.judge(state, theta, known)
         given: tuple[Vector, ...] = ()
         if action is not None:
             action = _checked("action", action, self.m, self._strong)
@@ -213,7 +206,7 @@ class Nmpc(Described):
         """Without numba, riccati's key is that of fatrop, which then solves."""
         solver = self.solver if self.solver.available else Fatrop(self.solver.tolerance)
         how = (solver.name, solver.tolerance, self.ties_active, *solver.described)
-        if self.problem is not None:
+        if self.is_problem:
             return "nmpc", self.problem.key, *how
         said = (self.horizon, self.gamma, self._slack_weight)
         return "nmpc", self._plant.key, self._task.key, *said, *how
@@ -241,15 +234,20 @@ class Nmpc(Described):
         return self._slack_weight
 
     def _refuse_problem(self, name: str) -> None:
-        if self.problem is not None:
+        if self.is_problem:
             raise AttributeError(
                 f"an Nmpc of a Problem has no {name}: its model plans, and the environment, from"
                 " where, and at which cost is said to train and evaluate"
             )
 
     @property
+    def is_problem(self) -> bool:
+        """Whether it was given a `Problem`, and so no plant and task."""
+        return not hasattr(self, "_task")
+
+    @property
     def ocp(self) -> Any:
-        """The problem with u_0 free, in symbols, a `TaskOcp` or a `ProblemOcp`."""
+        """The problem with u_0 free, in symbols, an `Ocp`."""
         return self._free.ocp
 
     def _prepared(self, ocp: Ocp) -> Prepared:
@@ -258,11 +256,6 @@ class Nmpc(Described):
             return self._solves.prepare(ocp)
         except CannotCompile as error:
             instead = Fatrop(self.solver.tolerance)
-            if self.problem is None:
-                try:
-                    instead.check(self.task)
-                except ValueError as refusal:
-                    raise ValueError(f"{error}, and {refusal}") from error
             warnings.warn(
                 f"{error}: {instead.name} solves instead of {self.solver.name}", stacklevel=2
             )
@@ -271,11 +264,9 @@ class Nmpc(Described):
 
     def _otherwise(self, why: str) -> str:
         """What else to try where a solve failed, for that reason."""
-        if self._solves.name == Riccati.name:  # which asked fatrop itself, if it is a problem
-            task = self.problem is None and not self.task.soft_box
-            return f"or try solver={Fatrop.name!r}" if why and task else ""
-        known = self.problem is not None or why
-        return f"try solver={Riccati.name!r}, which begins in more ways" if known else ""
+        if self._solves.name == Riccati.name:  # which asked fatrop itself
+            return ""
+        return f"try solver={Riccati.name!r}, which begins in more ways"
 
     def _variant(self, solution: Solution) -> Variant:
         return self._fixed if solution.ocp.fixed_action.size else self._free
@@ -283,7 +274,6 @@ class Nmpc(Described):
     @cached_property
     def _bending(self) -> Bending:
         """Of a problem's costs."""
-        assert self.problem is not None
         return Bending(self.problem)
 
     @cached_property
@@ -301,11 +291,8 @@ class Nmpc(Described):
 
     def _with(self, *, fix_action: bool) -> Variant:
         """The problem transcribed, with u_0 free or fixed."""
-        options: Any = {"fix_action": fix_action, "ties_active": self.ties_active}
-        if self.problem is not None:
-            return Variant(transcribe_problem(self.problem, **options), self._prepared)
-        problem = (self._plant, self._task, self.horizon, self.gamma, self._slack_weight)
-        return Variant(transcribe(*problem, **options), self._prepared)
+        ocp = transcribe(self.problem, fix_action=fix_action, ties_active=self.ties_active)
+        return Variant(ocp, self._prepared)
 
 
 def _checked(name: str, vector: Vector, size: int, largest: float = ABSURD) -> Vector:

@@ -3,12 +3,12 @@
     min   V0(s, theta) + sum_i gamma^i l(x_i, u_i, theta, d_i) + gamma^N V_f(x_N, theta, d_N)
           + sum_i gamma^i W' sigma_i
     s.t.  x_0 = s,  x_{i+1} = f(x_i, u_i, theta, d_i),  lower <= u_i <= upper,
-          h(x_i, u_i, theta, d_i) <= sigma_i,  sigma_i >= 0
+          h(x_i, u_i, theta, d_i) <= sigma_i,  sigma_i >= 0,  g(x_i, u_i, theta, d_i) <= 0
 
-f, l, V_f, V0 and h are written once, in CasADi's SX; all their derivatives follow from that.
+f, l, V_f, V0, h and g are written once, in CasADi's SX; all their derivatives follow from that.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -47,6 +47,15 @@ class Soft:
     row: Callable[..., Any]  # (x, u, th) -> h, a number or a column; with d where there are data
     weight: Any = 1.0  # W > 0, a number, or one a row
     stages: Any = None  # among 0, ..., N: an index, a slice or a list; all possible ones if None
+    each: str | None = None  # data of which every line has rows of its own: d[each] is then one
+
+
+@dataclass(frozen=True, eq=False)
+class Hard:
+    """Rows h <= 0; where no plan keeps to all of them, the plan is one that violates them least."""
+
+    row: Callable[..., Any]  # as of `Soft`
+    stages: Any = None  # as of `Soft`
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +76,9 @@ class Expressions(NamedTuple):
     stage: ca.SX
     terminal: ca.SX
     initial: ca.SX
-    rows: ca.SX  # h, shape (M,)
+    fixed: ca.SX  # h and then g, but for the rows of lines of data
+    line: ca.SX  # of data, as of `Soft.each`
+    each: ca.SX  # the rows of a line
 
 
 class Problem(Described):
@@ -88,8 +99,11 @@ class Problem(Described):
         terminal: Callable[..., Any] | None = None,
         initial: Callable[..., Any] | None = None,
         soft: Soft | Sequence[Soft] = (),
+        hard: Hard | Sequence[Hard] = (),
         lower: Any = -np.inf,
         upper: Any = np.inf,
+        state_lower: Any = -np.inf,
+        state_upper: Any = np.inf,
         gamma: float = 1.0,
         data: Mapping[str, Any] | None = None,
         scale: Any = None,
@@ -111,8 +125,11 @@ class Problem(Described):
             initial: (x, th) -> V0 of the state in which the plan begins, 0 if absent.
             soft: rows that may be violated at a price, a `Soft` or several. A kink in a cost is
                 written as rows: w |h| is Soft(lambda x, u, th: ca.vertcat(h, -h), weight=w).
+            hard: rows that must not be violated, a `Hard` or several.
             lower: least input, a number or one an input.
             upper: largest input.
+            state_lower: least state of the stages 1, ..., N, as of `hard`; a number or one a state.
+            state_upper: largest state.
             gamma: discount factor, 0 < gamma <= 1.
             data: what is known of every stage and not learned: by name, the array of one stage, or
                 a `Series` of all, that is taken where `Nmpc.solve` is given none.
@@ -128,7 +145,10 @@ class Problem(Described):
             for name, number in (("states", states), ("inputs", inputs), ("horizon", horizon))
         )
         self.gamma = discount(gamma)
-        self.lower, self.upper = _bounds(lower, upper, self.inputs)
+        self.lower, self.upper = _bounds("", lower, upper, self.inputs)
+        self.state_lower, self.state_upper = _bounds(
+            "state_", state_lower, state_upper, self.states
+        )
         parameters = {
             name: one if isinstance(one, Parameter) else Parameter(one)
             for name, one in theta.items()
@@ -144,53 +164,103 @@ class Problem(Described):
             for side in ("lower", "upper")
         )  # fmt: skip
         self._refuse_outside()
+        soft, hard = _rows("soft", soft, Soft), _rows("hard", hard, Hard)
+        self.family = _family(soft, data or {})
         defaults = {
-            name: numbers(f"data {name}", one.values if isinstance(one, Series) else one)
+            name: numbers(f"data {name}", one.values if isinstance(one, Series) else one,
+                          empty=name == self.family)
             for name, one in (data or {}).items()
-        }
+        }  # fmt: skip
         shapes = {
             name: one.shape[isinstance((data or {})[name], Series) :]
-            for name, one in defaults.items()
+            for name, one in sorted(defaults.items(), key=lambda one: one[0] == self.family)
         }
-        self.data_names = Blocks("data", shapes)
+        if self.family and len(shapes[self.family]) != 2:
+            raise ValueError(f"data {self.family!r} must be a table: its rows are of each line")
+        self.lines, width = shapes.pop(self.family, (0, 0))
+        self.own_names = Blocks("data", shapes)
+        self.line_names = Blocks("line", {self.family: (width,)} if self.family else {})
+        table = {self.family: (self.lines, width)} if self.family else {}
+        self.data_names = Blocks("data", shapes | table)
         empty: Matrix = np.zeros((self.horizon + 1, self.data_names.size))
         self.data = kept(self.data_names.filled(empty, defaults))
-        soft = _rows(soft)
-        self._function, sizes = self._written(model, stage, terminal, initial, soft)
-        self.weights = kept(_weights(soft, sizes))
-        self.on_inputs = _depends(self.expressions.rows, self.expressions.u)
-        self.active = self._active(soft, sizes)
+        self._function, sizes = self._written(model, stage, terminal, initial, soft, hard)
+        self.weights, self.active = self._spread(soft, hard, sizes)
+        e = self.expressions
+        self.on_inputs = self._every(*(_depends(rows, e.u) for rows in (e.fixed, e.each)))
         self.sizes = _sizes(scale, self)
 
     @cached_property
     def expressions(self) -> Expressions:
         """The problem in symbols."""
-        arguments = self._function.sx_in()
-        return Expressions(*arguments, *self._function.call(arguments))
+        *given, line = self._function.sx_in()
+        *costs, fixed, each = self._function.call([*given, line])
+        return Expressions(*given, *costs, fixed, line, each)
+
+    @property
+    def soft(self) -> NDArray[np.bool_]:
+        """Which rows have a slack."""
+        found: NDArray[np.bool_] = np.isfinite(self.weights)
+        return found
+
+    @property
+    def own_size(self) -> int:
+        """How many data of a stage belong to no line."""
+        return self.own_names.size
+
+    def own(self, data: Any) -> Any:
+        """Those of a stage, or of all, that belong to no line."""
+        return data[..., : self.own_size]
+
+    def rows(self, x: Any, u: Any, theta: Any, data: Any) -> ca.SX:
+        """h and g of a stage, those of lines last, shape (M,); `data` are all of the stage."""
+        own, width = data[: self.own_size], self.expressions.line.numel()
+        *_, fixed, _ = self._function(x, u, theta, own, ca.DM.zeros(width))
+        lines = [data[self.own_size + j * width : self.own_size + (j + 1) * width]
+                 for j in range(self.lines)]  # fmt: skip
+        each = [self._function(x, u, theta, own, line)[-1] for line in lines]
+        return ca.vertcat(ca.SX(0, 1), fixed, *each)
+
+    def _every(self, fixed: Any, each: Any) -> NDArray[Any]:
+        """Values of all rows, of values of the fixed ones and of those of a line."""
+        return np.concatenate([fixed, np.tile(each, self.lines)])
 
     def _described(self) -> tuple[Any, ...]:
         return (
             "problem", self._function, self.horizon, self.gamma, self.lower, self.upper,
+            self.state_lower, self.state_upper,
             self.names, self.theta, self.theta_lower, self.theta_upper,
             self.weights, self.active, self.data_names, self.data, self.sizes,
         )  # fmt: skip
 
     @cached_property
     def cost_scale(self) -> float:
-        """What riccati divides the objective by, half of the largest curvature or a slope."""
+        """The size of the costs at rest, half of their largest curvature or a slope."""
         curvature, slope = _bends(self, self.gamma**self.horizon)
         found = max(np.abs(curvature).max() / 2, np.abs(slope).max())
         return float(found) if 0 < found < np.inf else 1.0
 
-    @cached_property
-    def row_sizes(self) -> ca.SX:
+    def row_sizes(self, rows: ca.SX) -> ca.SX:
         """The size of each row, its slope along `sizes`, or 1 between `SMALL` and `LARGE`."""
         e = self.expressions
-        slopes = ca.jacobian(e.rows, ca.vertcat(e.x, e.u))
+        slopes = ca.jacobian(rows, ca.vertcat(e.x, e.u))
         found = ca.densify(ca.mtimes(ca.fabs(slopes), ca.DM(np.concatenate(self.sizes))))
         usual = ca.logic_and(found > SMALL, found < LARGE)
         unknown = ca.logic_not(found < 1 / LEAST)  # or nan
         return ca.if_else(ca.logic_or(usual, unknown), 1, found + LEAST)
+
+    def all_row_sizes(self, x: Any, u: Any, theta: Any, data: Any) -> ca.SX:
+        """`row_sizes` of all rows, in the order of `rows`."""
+        e = self.expressions
+        given = [e.x, e.u, e.theta, e.d, e.line]
+        sizes = ca.Function("sizes", given, [self.row_sizes(e.fixed), self.row_sizes(e.each)])
+        own, width = data[: self.own_size], e.line.numel()
+        lines = [data[self.own_size + j * width : self.own_size + (j + 1) * width]
+                 for j in range(self.lines)]  # fmt: skip
+        fixed, _ = sizes(x, u, theta, own, ca.DM.zeros(width))
+        return ca.vertcat(
+            ca.SX(0, 1), fixed, *(sizes(x, u, theta, own, line)[1] for line in lines)
+        )
 
     @cached_property
     def typical_row_sizes(self) -> Vector:
@@ -198,9 +268,12 @@ class Problem(Described):
 
         A row that nothing moves there, as where its data are zeros, has no size to be read.
         """
-        e, still = self.expressions, np.clip(np.zeros(self.inputs), self.lower, self.upper)
-        sizes = ca.Function("sizes", [e.x, e.u, e.theta, e.d], [self.row_sizes])
-        at = [sizes(k * self.sizes[0], still, self.theta, self.data[0]) for k in (-1, 0, 1)]
+        still = np.clip(np.zeros(self.inputs), self.lower, self.upper)
+        at = [
+            ca.evalf(self.all_row_sizes(ca.DM(k * self.sizes[0]), ca.DM(still), ca.DM(self.theta),
+                                        ca.DM(self.data[0])))
+            for k in (-1, 0, 1)
+        ]  # fmt: skip
         found: Vector = np.max([one.full().ravel() for one in at], axis=0, initial=0.0)
         return np.where(found > LEAST, found, 1.0)
 
@@ -210,10 +283,12 @@ class Problem(Described):
         if all((size == 1).all() for size in self.sizes):
             return self
         (states, inputs), other = self.sizes, copy(self)
-        x, u, theta, d = given = self._function.sx_in()
-        next_x, *costs = self._function(ca.DM(states) * x, ca.DM(inputs) * u, theta, d)
+        x, u, *rest = given = self._function.sx_in()
+        next_x, *costs = self._function(ca.DM(states) * x, ca.DM(inputs) * u, *rest)
         function = ca.Function("problem", given, [next_x / ca.DM(states), *costs])
-        bounds = {"lower": kept(self.lower / inputs), "upper": kept(self.upper / inputs)}
+        bounds = {"lower": kept(self.lower / inputs), "upper": kept(self.upper / inputs),
+                  "state_lower": kept(self.state_lower / states),
+                  "state_upper": kept(self.state_upper / states)}  # fmt: skip
         vars(other).update(_function=function, sizes=_ones(self), **bounds)
         return other
 
@@ -245,53 +320,66 @@ class Problem(Described):
         terminal: Callable[..., Any] | None,
         initial: Callable[..., Any] | None,
         soft: tuple[Soft, ...],
+        hard: tuple[Hard, ...],
     ) -> tuple[ca.Function, list[int]]:
         """The problem as a function that can be pickled, and how many rows each `Soft` has."""
         x, u = ca.SX.sym("x", self.states), ca.SX.sym("u", self.inputs)
-        theta, d = ca.SX.sym("theta", self.names.size), ca.SX.sym("d", self.data_names.size)
-        last: tuple[Symbols, ...] = (self.names.symbols(theta),)
-        if self.data_names:
-            last += (self.data_names.symbols(d),)
+        theta, d = ca.SX.sym("theta", self.names.size), ca.SX.sym("d", self.own_names.size)
+        line = ca.SX.sym("line", self.line_names.size)
+        th, known = self.names.symbols(theta), self.own_names.symbols(d)
+        last: tuple[Symbols, ...] = (th, known) if self.own_names else (th,)
+        in_line = (th, Symbols.joined(known, self.line_names.symbols(line)))
         arguments = {"x": x, "u": u, "theta": theta, "d": d}
         both, alone = ((x, u, *last), arguments), ((x, *last), {**arguments, "u": None})
+        of_line = ((x, u, *in_line), {**arguments, "line": line})
         next_x = expression("model", model, *both, self.states, "state")
         cost = expression("stage", stage, *both, 1, "cost")
         final = expression("terminal", terminal, *alone, 1, "cost")
         first = expression("initial", initial, *alone, 1, "cost")
-        rows = [expression(f"soft[{k}]", one.row, *both, 0, "row") for k, one in enumerate(soft)]
-        together = ca.vertcat(ca.SX(0, 1), *rows)
-        idle = ~_depends(together, ca.vertcat(x, u))
-        for k, place in _each(rows):
-            if idle[place]:
+        rows = [
+            expression(f"{kind}[{k}]", one.row, *(of_line if _each_of(one) else both), 0, "row")
+            for kind, given in (("soft", soft), ("hard", hard))
+            for k, one in enumerate(given)
+        ]
+        z = ca.vertcat(x, u)
+        for k, (one, row) in enumerate(zip((*soft, *hard), rows, strict=True)):
+            if not _depends(row, z).all():
+                kind, k = ("soft", k) if isinstance(one, Soft) else ("hard", k - len(soft))
                 raise ValueError(
-                    f"soft[{k}] has a row that depends on neither x nor u: no plan can change it"
+                    f"{kind}[{k}] has a row that depends on neither x nor u: no plan can change it"
                 )
-        results = [next_x, cost, final, first, together]
-        function = ca.Function("problem", [x, u, theta, d], results)
+        lines = [bool(_each_of(one)) for one in (*soft, *hard)]
+        fixed, each = (
+            ca.vertcat(ca.SX(0, 1), *(row for row, of in zip(rows, lines, strict=True) if of == it))
+            for it in (False, True)
+        )
+        results = [next_x, cost, final, first, fixed, each]
+        function = ca.Function("problem", [x, u, theta, d, line], results)
         return function, [row.numel() for row in rows]
 
-    def _active(self, soft: tuple[Soft, ...], sizes: list[int]) -> NDArray[np.bool_]:
-        """Which row holds at which stage, shape (N + 1, M)."""
+    def _spread(
+        self, soft: tuple[Soft, ...], hard: tuple[Hard, ...], sizes: list[int]
+    ) -> tuple[Vector, NDArray[np.bool_]]:
+        """W of every row, infinite where it is hard, and whether it holds at each stage."""
         stages = np.arange(self.horizon + 1)
-        active = np.zeros((stages.size, sum(sizes)), bool)
-        ends = np.cumsum([0, *sizes])
-        for k, (one, place) in enumerate(zip(soft, map(slice, ends[:-1], ends[1:]), strict=True)):
-            on_inputs = self.on_inputs[place].any()
-            try:
-                chosen = stages if one.stages is None else np.atleast_1d(stages[one.stages])
-            except (IndexError, TypeError) as error:
-                raise ValueError(
-                    f"soft[{k}].stages = {one.stages!r} must lie among 0, ..., {self.horizon}"
-                ) from error
-            if on_inputs and one.stages is None:
-                chosen = stages[:-1]
-            if on_inputs and self.horizon in chosen:
-                raise ValueError(
-                    f"soft[{k}] depends on u, and there is no input at stage {self.horizon}:"
-                    " leave that stage out"
-                )
-            active[chosen, place] = True
-        return active
+        e = self.expressions
+        weights, active = ([np.zeros(0)], [np.zeros(0)]), ([], [])
+        u = {False: _depends(e.fixed, e.u), True: _depends(e.each, e.u)}
+        begin = {False: 0, True: 0}
+        for k, (one, size) in enumerate(zip((*soft, *hard), sizes, strict=True)):
+            of_line = bool(_each_of(one))
+            name = f"soft[{k}]" if k < len(soft) else f"hard[{k - len(soft)}]"
+            place = slice(begin[of_line], begin[of_line] + size)
+            begin[of_line] += size
+            chosen = _stages(name, one.stages, stages, bool(u[of_line][place].any()))
+            weights[of_line].append(_weights(name, one, size))
+            active[of_line].append(np.tile(chosen[:, None], size))
+        nothing = np.zeros((stages.size, 0), bool)
+        fixed, each = (np.hstack([nothing, *part]) for part in active)
+        return (
+            kept(self._every(*map(np.concatenate, weights))),
+            np.hstack([fixed, *[each] * self.lines]),
+        )
 
     def _refuse_outside(self) -> None:
         for name in self.names:
@@ -319,7 +407,7 @@ def _bends(problem: Problem, share: float) -> tuple[Matrix, Matrix]:
     z, costs = ca.vertcat(e.x, e.u), e.stage + share * e.terminal
     both = ca.Function("bends", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
     still = np.clip(np.zeros(problem.inputs), problem.lower, problem.upper)
-    curvature, slope = both(np.zeros(problem.states), still, problem.theta, problem.data[0])
+    curvature, slope = both(np.zeros(problem.states), still, problem.theta, problem.own(problem.data[0]))
     return curvature.full(), slope.full()
 
 
@@ -363,40 +451,73 @@ def _spread(name: str, bound: Any, start: Matrix) -> Vector:
         ) from None
 
 
-def _bounds(lower: Any, upper: Any, inputs: int) -> tuple[Vector, Vector]:
-    sides = []
-    for name, value in (("lower", lower), ("upper", upper)):
+def _bounds(of: str, lower: Any, upper: Any, count: int) -> tuple[Vector, Vector]:
+    sides, one = [], "state" if of else "input"
+    for name, value in ((f"{of}lower", lower), (f"{of}upper", upper)):
         side = np.array(value, float)
-        if side.shape not in ((), (1,), (inputs,)) or np.isnan(side).any():
-            raise ValueError(f"{name} = {value!r} must hold {inputs} numbers, one an input")
-        sides.append(kept(np.broadcast_to(side, inputs)))
+        if side.shape not in ((), (1,), (count,)) or np.isnan(side).any():
+            raise ValueError(f"{name} = {value!r} must hold {count} numbers, one an {one}")
+        sides.append(kept(np.broadcast_to(side, count)))
     if not (sides[0] < sides[1]).all():
         raise ValueError(
-            f"lower = {sides[0]} must lie below upper = {sides[1]}, or no input is allowed"
+            f"{of}lower = {sides[0]} must lie below {of}upper = {sides[1]}, or no {one} is allowed"
         )
     return sides[0], sides[1]
 
 
-def _rows(soft: Any) -> tuple[Soft, ...]:
-    found = tuple(soft) if isinstance(soft, Iterable) else (soft,)
+def _rows(name: str, given: Any, kind: Any) -> tuple[Any, ...]:
+    found = tuple(given) if isinstance(given, Iterable) else (given,)
     for k, one in enumerate(found):
-        if not isinstance(one, Soft):
+        if not isinstance(one, kind):
+            example = "Soft(row, weight=10.0)" if kind is Soft else "Hard(row)"
             raise ValueError(
-                f"soft[{k}] = {one!r} must be a Soft: write soft=[Soft(row, weight=10.0)]"
+                f"{name}[{k}] = {one!r} must be a {kind.__name__}: write {name}=[{example}]"
             )
     return found
 
 
-def _weights(soft: tuple[Soft, ...], sizes: list[int]) -> Vector:
-    found = [np.zeros(0)]
-    for k, (one, size) in enumerate(zip(soft, sizes, strict=True)):
-        weight = np.array(one.weight, float)
-        if weight.shape not in ((), (1,), (size,)):
-            raise ValueError(f"soft[{k}] has {size} rows and {weight.size} weights")
-        if not ((weight > 0) & np.isfinite(weight)).all():
-            raise ValueError(f"soft[{k}].weight = {one.weight} must be positive")
-        found.append(np.broadcast_to(weight, size))
-    return np.concatenate(found)
+def _each_of(row: Soft | Hard) -> str | None:
+    return row.each if isinstance(row, Soft) else None
+
+
+def _family(soft: tuple[Soft, ...], data: Mapping[str, Any]) -> str | None:
+    """The data that `Soft.each` names."""
+    for k, one in enumerate(soft):
+        if one.each is not None and one.each not in data:
+            raise ValueError(f"soft[{k}].each = {one.each!r} must be the name of data")
+    names = {one.each for one in soft if one.each is not None}
+    if len(names) > 1:
+        raise ValueError(f"only one of the data may have rows of its lines, not {sorted(names)}")
+    return next(iter(names), None)
+
+
+def _stages(name: str, asked: Any, stages: NDArray[Any], on_inputs: bool) -> NDArray[np.bool_]:
+    """Whether rows hold at each stage."""
+    try:
+        chosen = stages if asked is None else np.atleast_1d(stages[asked])
+    except (IndexError, TypeError) as error:
+        raise ValueError(
+            f"{name}.stages = {asked!r} must lie among 0, ..., {stages[-1]}"
+        ) from error
+    if on_inputs and asked is None:
+        chosen = stages[:-1]
+    if on_inputs and stages[-1] in chosen:
+        raise ValueError(
+            f"{name} depends on u, and there is no input at stage {stages[-1]}: leave that"
+            " stage out"
+        )
+    return np.isin(stages, chosen)
+
+
+def _weights(name: str, row: Soft | Hard, size: int) -> Vector:
+    if isinstance(row, Hard):
+        return np.full(size, np.inf)
+    weight = np.array(row.weight, float)
+    if weight.shape not in ((), (1,), (size,)):
+        raise ValueError(f"{name} has {size} rows and {weight.size} weights")
+    if not ((weight > 0) & np.isfinite(weight)).all():
+        raise ValueError(f"{name}.weight = {row.weight} must be positive")
+    return np.broadcast_to(weight, size)
 
 
 def _depends(rows: ca.SX, variables: ca.SX) -> NDArray[np.bool_]:
@@ -404,9 +525,3 @@ def _depends(rows: ca.SX, variables: ca.SX) -> NDArray[np.bool_]:
     if not rows.numel() or not variables.numel():
         return np.zeros(rows.numel(), bool)
     return np.array(ca.which_depends(rows, variables, 1, True), bool)
-
-
-def _each(parts: list[ca.SX]) -> Iterator[tuple[int, int]]:
-    """(part, place) of every row."""
-    owners = [k for k, part in enumerate(parts) for _ in range(part.numel())]
-    return ((k, place) for place, k in enumerate(owners))

@@ -62,8 +62,7 @@ class Sensitivity:
 
         With A the rows of the active constraints and bounds, the KKT conditions give (dz, dlam) as
         -K^-1 (L_z theta, A_theta) with K = [[L_zz, A'], [A, 0]]; the chain rule does the rest. A
-        constraint is active where its multiplier exceeds its distance (Nocedal and Wright 2006);
-        a bound that may be left at a price, where what is left of the price does so as well.
+        constraint is active where its multiplier exceeds its distance (Nocedal and Wright 2006).
 
         Raises:
             numpy.linalg.LinAlgError: K is singular on every side: a direction in which theta pulls
@@ -104,8 +103,7 @@ class Sensitivity:
         row: Flags = ocp.equality | (lam * of_g / size > np.abs(g) / of_g)
         bound: Flags = np.full(z.size, False)
         for multiplier, distance in ((-nu, np.abs(z - ocp.lower)), (nu, np.abs(ocp.upper - z))):
-            left = ocp.bound_prices - multiplier
-            bound |= np.minimum(multiplier, left) * of_z / size > distance / of_z
+            bound |= multiplier * of_z / size > distance / of_z
         return row, bound
 
     def is_minimum(self, z: Vector, p: Vector, lam: Vector, nu: Vector) -> bool:
@@ -120,7 +118,7 @@ class Sensitivity:
         if not 0 < size < np.inf:
             return bool(size)  # inf: true
         active, bounds = self._active(z, g.full().ravel(), lam, nu)
-        rows = active[ocp.obstacles] & bounds[ocp.slacks]
+        rows = np.hstack([active[ocp.obstacles] & bounds[ocp.slacks], active[ocp.hard]])
         bounds[ocp.inputs[: int(ocp.fixed_action.size > 0)]] = True
         springs = STIFF * size * np.hstack([bounds[ocp.inputs], bounds[ocp.states[:N]], rows[:N]])
         final = STIFF * size * np.append(bounds[ocp.states[N]], rows[N])
@@ -133,8 +131,7 @@ class Sensitivity:
         """The largest violation of the KKT conditions, 0 at an optimum.
 
         Stationarity counts relative to the largest multiplier; complementarity as the smaller of a
-        multiplier and its constraint's distance, or where a bound is left at a price, as what is
-        left of the price; each in its unit of `Ocp.sizes`. Where it is to be `relative`,
+        multiplier and its constraint's distance, each in its unit of `Ocp.sizes`. Where it is to be `relative`,
         multipliers are taken in parts of the largest, and distances in parts of the largest
         variable.
         """
@@ -142,22 +139,21 @@ class Sensitivity:
         g, slope = (part.full().ravel() for part in self._conditions(z, p, lam))
         of_z, of_g = ocp.sizes
         z, lower, upper = z / of_z, ocp.lower / of_z, ocp.upper / of_z
-        nu, prices, slope = nu * of_z, ocp.bound_prices * of_z, slope * of_z
+        nu, slope = nu * of_z, slope * of_z
         g, lam = g / of_g, lam * of_g
         inequality = ~ocp.equality
         largest = max(ocp.cost_size, np.abs(lam).max(), np.abs(nu).max())
         slope = (slope + nu) / largest
         if relative:
             lam, nu, size = lam / largest, nu / largest, max(1.0, np.abs(z).max())
-            prices = prices / largest
             z, g, lower, upper = z / size, g / size, lower / size, upper / size
         below, above = np.maximum(-nu, 0), np.maximum(nu, 0)
         violations = (
             slope,
             g[ocp.equality],
             np.minimum(-g, lam)[inequality],
-            np.maximum(np.minimum(z - lower, below), below - prices),
-            np.maximum(np.minimum(upper - z, above), above - prices),
+            np.minimum(z - lower, below),
+            np.minimum(upper - z, above),
         )
         return float(max(np.abs(violation).max(initial=0) for violation in violations))
 
@@ -191,7 +187,8 @@ class Sensitivity:
         slopes = ca.jacobian(ocp.constraints, ocp.variables)
         y = [[*ocp.inputs[i].tolist(), *ocp.states[i].tolist()] for i in range(N)]
         y.append(ocp.states[N].tolist())
-        rows, to = ocp.obstacles.tolist(), ocp.dynamics.tolist()
+        rows = np.hstack([ocp.obstacles, ocp.hard]).tolist()
+        to = ocp.dynamics.tolist()
         back = range(N - 1, -1, -1)
         blocks = [
             ca.horzcat(*(bends[y[i], y[i]] for i in back)),
@@ -207,7 +204,8 @@ class Sensitivity:
     def _recursion(self) -> ca.Function:
         """The least pivot of any stage's Q_uu, from `_stages` and the stiffness of the springs."""
         ocp, N = self._ocp, len(self._ocp.inputs)
-        n, m, M = (part.shape[1] for part in (ocp.states, ocp.inputs, ocp.slacks))
+        n, m = ocp.states.shape[1], ocp.inputs.shape[1]
+        M = ocp.slacks.shape[1] + ocp.hard.shape[1]
         V, H = ca.SX.sym("V", n, n), ca.SX.sym("H", m + n, m + n)
         F, C, k = (ca.SX.sym("F", n, m + n), ca.SX.sym("C", M, m + n), ca.SX.sym("k", m + n + M))
         K = H + F.T @ V @ F + C.T @ ca.diag(k[m + n :]) @ C + ca.diag(k[: m + n])

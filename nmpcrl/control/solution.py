@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.ocp import Ocp, ProblemOcp
+from nmpcrl.control.ocp import Ocp
 
 
 class SolverError(RuntimeError):
@@ -89,14 +89,12 @@ class Solution:
     def parameters(self) -> Vector:
         """p of `ocp`."""
         action = self.action[: self.ocp.fixed_action.size]
-        data = np.zeros(0) if self.data is None else self.data.ravel()
-        return np.concatenate([self.state, self.theta, action, data])
+        data = self.ocp.problem.data if self.data is None else self.data
+        return np.concatenate([self.state, self.theta, action, data.ravel()])
 
     @property
     def features_by_name(self) -> dict[str, Any]:
-        """The gradient in each parameter of a `Problem`, in its shape."""
-        if not isinstance(self.ocp, ProblemOcp):
-            raise ValueError("only the parameters of a `Problem` have names")
+        """The gradient in each parameter, in its shape."""
         return self.ocp.problem.split(self.features)
 
     @property

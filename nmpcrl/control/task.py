@@ -8,9 +8,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
 from nmpcrl.control.codegen.jit import callable_of
 from nmpcrl.control.description import Described
+from nmpcrl.control.plant import Plant
+from nmpcrl.control.problem import Problem, Soft
 from nmpcrl.control.vectors import kept
 
 
@@ -85,6 +87,47 @@ class Task(Described):
         for i in np.flatnonzero((point < self.lower) | (point > self.upper)):
             box = f"[{self.lower[i]:g}, {self.upper[i]:g}]"
             raise ValueError(f"{name} {np.round(point, 2)} is outside the box {box} in state {i}")
+
+    def problem(self, plant: Plant, horizon: int, gamma: float, slack_weight: float) -> Problem:
+        """Eq. (2): theta holds x, u and f, the square roots of the weights, and c of Eq. (2f).
+
+        One compilation serves all targets, boxes, layouts and horizons of a plant.
+        """
+        sides = [
+            (k, sign, float(limit[k]))
+            for sign, limit in ((-1, self.lower), (1, self.upper))
+            for k in np.flatnonzero(np.isfinite(limit)).tolist()
+        ]
+        box = Soft(lambda x, *_: [s * (x[k] - at) for k, s, at in sides], slack_weight,
+                   slice(1, None))  # fmt: skip
+        discs = Soft(
+            lambda x, u, th, d: overlap(x[0], x[1], *ca.vertsplit(d["discs"])) + th["c"],
+            slack_weight,
+            each="discs",
+        )
+        hard = {} if self.soft_box else {"state_lower": self.lower, "state_upper": self.upper}
+        return Problem(
+            states=plant.n,
+            inputs=plant.m,
+            horizon=horizon,
+            gamma=gamma,
+            theta={"x": np.ones(plant.n), "u": np.ones(plant.m), "f": np.ones(plant.n), "c": 0.0},
+            model=lambda x, u, *_: plant.transition(x, u),
+            stage=lambda x, u, th, d: (
+                ca.sumsqr(th["x"] * (x - d["target"])) + ca.sumsqr(th["u"] * u)
+            ),
+            terminal=lambda x, th, d: ca.sumsqr(th["f"] * (x - d["target"])),
+            soft=[*([box] if self.soft_box and sides else []), *([discs] if plant.n > 1 else [])],
+            lower=plant.lower,
+            upper=plant.upper,
+            data={"target": self.target} | ({"discs": self._lines} if plant.n > 1 else {}),
+            **hard,
+        )
+
+    @property
+    def _lines(self) -> Matrix:
+        """Centre and d_rob + d_obs of each obstacle, shape (M, 3)."""
+        return np.reshape(np.transpose(self.discs), (-1, 3))
 
     def overlap(self, state: Any) -> Any:
         """Xi of Eq. (19), one value an obstacle: positive inside, 1 at the centre.

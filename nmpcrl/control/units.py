@@ -9,17 +9,17 @@ from functools import cached_property
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.control.ocp import Ocp, ProblemOcp, transcribe_problem
+from nmpcrl.control.ocp import Ocp, transcribe
 from nmpcrl.control.solution import Solution
 
 
 class Units:
     """The way from an OCP to the one that is solved, and back."""
 
-    def __init__(self, ocp: ProblemOcp) -> None:
+    def __init__(self, ocp: Ocp) -> None:
         self._outer, self._problem = ocp, ocp.problem
         self.states, self.inputs = ocp.problem.sizes
-        self.ocp = transcribe_problem(
+        self.ocp = transcribe(
             ocp.problem.solved, fix_action=ocp.fixed_action.size > 0, ties_active=ocp.ties_active
         )
 
@@ -57,6 +57,4 @@ def sizes_in(ocp: Ocp, states: Vector, inputs: Vector) -> Vector:
 
 def units_of(ocp: Ocp) -> Units | None:
     """None where a problem is solved in its own units."""
-    if not isinstance(ocp, ProblemOcp):
-        return None
     return None if ocp.problem.solved is ocp.problem else Units(ocp)

@@ -5,7 +5,9 @@ common subexpressions eliminated first, so numba compiles what a careful hand wo
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -71,7 +73,12 @@ class CannotCompile(Exception):
 
 
 def source(
-    function: ca.Function, *, returned: bool | None = None, matrices: Collection[str] = ()
+    function: ca.Function,
+    *,
+    returned: bool | None = None,
+    matrices: Collection[str] = (),
+    sparse: Collection[str] = (),
+    shifted: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """The Python function of the same name, as text; needs `math` and NumPy as `np`.
 
@@ -81,7 +88,11 @@ def source(
     Args:
         function: an SX function.
         returned: whether the result is returned, if not as above.
-        matrices: results that are matrices even where they have a single column.
+        matrices: arguments and results that are matrices even where they have a single column.
+        sparse: results of which the nonzeros are written and nothing else; a result with the name
+            of an argument, which it takes the place of, is one.
+        shifted: arguments and results that begin at a row of an array, by the name of a further
+            argument, a number, that says at which.
 
     Raises:
         CannotCompile: an operation is not known here, or the function is no expression of scalars.
@@ -89,11 +100,15 @@ def source(
     if not function.is_a("SXFunction"):
         raise CannotCompile(f"{function.name()} is not an SX function")
     names = [function.name_in(i) for i in range(function.n_in())]
-    out = ca.Function(function.name(), *_expressions(function), names, function.name_out())
+    given, results = _expressions(function, {*sparse, *names})
+    same = {"allow_duplicate_io_names": True}
+    out = ca.Function(function.name(), given, results, names, function.name_out(), same)
     returned = returns(function) if returned is None else returned
-    lines = [_line(out, k, returned, matrices) for k in range(out.n_instructions())] or ["pass"]
-    results = [] if returned else [f"{name}_" for name in out.name_out()]
-    return "\n    ".join([f"def {out.name()}({', '.join(names + results)}):", *lines]) + "\n"
+    way = _Way(matrices, shifted)
+    lines = [_line(out, k, returned, way) for k in range(out.n_instructions())] or ["pass"]
+    written = [] if returned else [f"{name}_" for name in out.name_out()]
+    arguments = ", ".join([*names, *written, *dict.fromkeys(shifted.values())])
+    return "\n    ".join([f"def {out.name()}({arguments}):", *lines]) + "\n"
 
 
 def returns(function: ca.Function) -> bool:
@@ -101,26 +116,45 @@ def returns(function: ca.Function) -> bool:
     return function.n_out() == 1 and function.size_out(0) == (1, 1)
 
 
-def _expressions(function: ca.Function) -> tuple[list[ca.SX], list[ca.SX]]:
-    """Arguments and dense results, common subexpressions eliminated."""
+def _expressions(
+    function: ca.Function, sparse: Collection[str]
+) -> tuple[list[ca.SX], list[ca.SX]]:
+    """Arguments and results, dense unless `sparse`, common subexpressions eliminated."""
     arguments = function.sx_in()
-    return arguments, ca.cse([ca.densify(result) for result in function.call(arguments)])
+    named = zip(function.name_out(), function.call(arguments), strict=True)
+    return arguments, ca.cse([one if name in sparse else ca.densify(one) for name, one in named])
 
 
-def _line(function: ca.Function, k: int, returned: bool, matrices: Collection[str]) -> str:
+class _Way(NamedTuple):
+    """How entries are written."""
+
+    matrices: Collection[str]
+    shifted: Mapping[str, str]
+
+    def entry(self, name: str, sparsity: ca.Sparsity, nonzero: int) -> str:
+        """The index of a nonzero in the dense argument or result."""
+        rows, columns = sparsity.get_triplet()
+        shift = self.shifted.get(name)
+        row = f"{shift} + {rows[nonzero]}" if shift else str(rows[nonzero])
+        vector = sparsity.size2() == 1 and name not in self.matrices
+        return row if vector else f"{row}, {columns[nonzero]}"
+
+
+def _line(function: ca.Function, k: int, returned: bool, way: _Way) -> str:
     """Instruction k; work variables are called w0, w1, ..."""
     operation, into = function.instruction_id(k), function.instruction_output(k)
     of = function.instruction_input(k)
     if operation == ca.OP_CONST:
         return f"w{into[0]} = {_number(function.instruction_constant(k))}"
     if operation == ca.OP_INPUT:
-        entry = _entry(function.sparsity_in(of[0]), of[1])
-        return f"w{into[0]} = {function.name_in(of[0])}[{entry}]"
+        name = function.name_in(of[0])
+        entry = way.entry(name, function.sparsity_in(of[0]), of[1])
+        return f"w{into[0]} = {name}[{entry}]"
     if operation == ca.OP_OUTPUT:
         if returned:
             return f"return w{of[0]}"
         name = function.name_out(into[0])
-        entry = _entry(function.sparsity_out(into[0]), into[1], matrix=name in matrices)
+        entry = way.entry(name, function.sparsity_out(into[0]), into[1])
         return f"{name}_[{entry}] = w{of[0]}"
     template = UNARY.get(operation) or BINARY.get(operation)
     if operation == ca.OP_CALL:
@@ -137,13 +171,6 @@ def _line(function: ca.Function, k: int, returned: bool, matrices: Collection[st
 
 def _number(value: float) -> str:
     return repr(value) if math.isfinite(value) else f"math.{value}".replace("math.-", "-math.")
-
-
-def _entry(sparsity: ca.Sparsity, nonzero: int, *, matrix: bool = False) -> str:
-    """The index of a nonzero in the dense argument or result."""
-    rows, columns = sparsity.get_triplet()
-    vector = sparsity.size2() == 1 and not matrix
-    return str(rows[nonzero]) if vector else f"{rows[nonzero]}, {columns[nonzero]}"
 
 
 def _name(operation: int) -> str:

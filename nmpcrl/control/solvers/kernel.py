@@ -1,11 +1,15 @@
-"""A primal-dual interior point for Eq. (2) whose cost is linear in stages and constraints.
+"""A primal-dual interior point for a `Problem` whose work is linear in stages and rows.
 
 The inputs are the variables and the states follow from them (single shooting). Each constraint
-h(x) <= sigma of a stage, an obstacle or a side of the box, is a *row*: with slack s = sigma - h it
-adds W sigma - mu log sigma - mu log s to the objective, and its multiplier lam lies in (0, W). From
-a warm start, one solve repeats the following while the barrier parameter mu falls:
+h(x, u) <= sigma of a stage is a *row*: with slack s = sigma - h it adds W sigma - mu log sigma - mu
+log s to the objective, and its multiplier lam lies in (0, W). A hard row, or a bound of a state, is
+one whose W exceeds what its multiplier can be, and is no part of the value. Rows come in the order
+fixed ones, those of lines of data, sides of the states' box. A row of a stage is *planned* where
+the plan can change it, *settled* at stage 0 where it cannot, and else absent; what is not planned
+stands in the barrier as h = -1 and counts for nothing. From a start, one solve repeats the
+following while the barrier parameter mu falls:
 
-1. `evaluate`: roll the inputs out; measure h, and for it the best sigma and s in closed form;
+1. `measure` a plan: h, and for it the best sigma and s in closed form;
 2. `linearise`: from the last stage to the first, the costates p = L_x + A' p+ and the Hessian of
    the Lagrangian, exact, with the curvature of the dynamics;
 3. `residuals`: how far KKT is from holding; stop if hardly, let mu fall if little beside mu;
@@ -13,13 +17,15 @@ a warm start, one solve repeats the following while the barrier parameter mu fal
 5. `factorise`: the Riccati recursion. Where some Q_uu is not positive definite, delta I is added
    to all of them and the recursion repeated;
 6. `newton_step`: sweep forwards for the step, and find how far every variable stays inside bounds;
-7. `search`: backtrack until the barrier function has fallen enough (Armijo).
+7. `search`: roll out along the feedback of 5, which holds an unstable model to its plan, and
+   backtrack until the barrier function has fallen enough (Armijo).
 
 Sources: the recursion, Rawlings, Mayne and Diehl (2017), section 8.8; barrier, fraction to the
-boundary and inertia, Wächter and Biegler (2006); stage-wise elimination, Frison and Diehl (2020).
+boundary and inertia, Wächter and Biegler (2006); stage-wise elimination, Frison and Diehl (2020);
+the feedback, Tassa, Mansard and Todorov (2014).
 
-numba compiles this file beside a `model` generated from a plant's CasADi expressions, whose sizes
-are constants there. Everything is inlined and every buffer allocated inside `solve`: only then does
+numba compiles this file beside a `model` generated from CasADi expressions, whose sizes are
+constants there. Everything is inlined and every buffer allocated inside `solve`: only then does
 the compiler know that no two of them overlap, which is worth 30 % of the time.
 """
 
@@ -31,18 +37,46 @@ from numba import float64, int64, njit
 
 from .codes import End, Start
 from .model import (
+    FIXED,
     NTHETA,
     NU,
     NX,
-    constraint,
-    constraint_gradient,
-    expand_constraint,
+    OWN,
+    PER,
+    SOFT,
+    WIDTH,
+    along_fixed,
+    along_fixed_end,
+    along_line,
+    along_line_end,
+    condense_fixed,
+    condense_fixed_end,
+    condense_line,
+    condense_line_end,
+    expand_fixed,
+    expand_fixed_end,
+    expand_line,
+    expand_line_end,
     expand_stage,
     expand_terminal,
+    fixed_end_rows,
+    fixed_rows,
+    fixed_sizes,
+    initial_cost,
+    initial_theta,
+    line_end_rows,
+    line_rows,
+    line_sizes,
     stage_cost,
-    stage_gradient,
+    stage_size,
+    stage_theta,
     terminal_cost,
-    terminal_gradient,
+    terminal_size,
+    terminal_theta,
+    theta_fixed,
+    theta_fixed_end,
+    theta_line,
+    theta_line_end,
     transition,
 )
 
@@ -52,8 +86,13 @@ SOLVED, STALLED, LIMIT, BROKEN, SADDLE = map(int, End)
 START_MU = (10.0, 1e-3, 1e-3, 1e-9)  # the barrier parameter
 PUSH = (1e-2, 1e-3, 1e-3, 1e-9)  # inside its bounds an input starts, in parts of their distance
 
-BOX_WEIGHT = 1e4  # W of the box, scaled: an exact penalty, so that no state is infeasible
-BOX_TO_SLACK = 100.0  # so many times an obstacle's W it is at least
+PLANNED, SETTLED = 1, 2  # kinds of rows, else absent
+STRICT = 1e4  # W of hard rows, scaled: an exact penalty, so that no state is infeasible
+STRICT_TO_SOFT = 100.0  # so many times the largest other W it is at least
+ABSURD = 1e9  # no plan goes through such a state
+GROWS = 30.0  # times the first state's distance from a plan: inputs leave it by more
+NOTICED = 0.1  # and by more than this part of its largest state
+WITHIN = 1.0 - 1e-5  # the most of its way to a bound that an input may go along the feedback
 
 # The barrier's fall, Eqs. (7) and (8), and inertia, Algorithm IC, of Wächter and Biegler (2006);
 # their values in brackets. On 2,200 drawn problems a solve takes 11.5 iterations on average, 11.9
@@ -88,25 +127,27 @@ inlined = njit(**inner, **options)
 
 
 class Task(NamedTuple):
-    """The problem of one solve, scaled so that no weight exceeds 1."""
+    """The problem of one solve, scaled."""
 
     theta: np.ndarray  # (NTHETA,)
-    target: np.ndarray  # (NX,)
+    data: np.ndarray  # (N + 1, OWN + lines WIDTH)
     lower: np.ndarray  # of an input, (NU,)
     upper: np.ndarray  # (NU,)
-    discs: np.ndarray  # centre x, centre y and clearance, (M, 3)
-    sides: np.ndarray  # state, sign and limit: sign (x - limit) <= 0, (B, 3)
+    sides: np.ndarray  # of the states' box: state, sign and limit, sign (x - limit) <= 0, (B, 3)
+    kind: np.ndarray  # of each row at each stage, (N + 1, rows)
+    begin: int  # the first stage with a planned row, 0 or 1
+    lines: int
     rate: np.ndarray  # scaled gamma^i, (N + 1,)
-    weights: np.ndarray  # W of the rows of stages 1, ..., N, (N, M + B)
+    weights: np.ndarray  # W, (N + 1, rows)
     first: int  # the first stage with a free input: 1 if u_0 is given, else 0
 
 
 class Point(NamedTuple):
-    """An iterate; row arrays are those of the stages 1, ..., N."""
+    """An iterate."""
 
     x: np.ndarray  # (N + 1, NX)
     u: np.ndarray  # (N, NU)
-    h: np.ndarray  # (N, M + B), as all that follows
+    h: np.ndarray  # (N + 1, rows), as all that follows
     sigma: np.ndarray
     slack: np.ndarray
 
@@ -114,27 +155,32 @@ class Point(NamedTuple):
 class Duals(NamedTuple):
     """The multipliers of an iterate."""
 
-    lam: np.ndarray  # of the rows, in (0, W)
+    lam: np.ndarray  # of the rows, in (0, W), (N + 1, rows)
     below: np.ndarray  # of the inputs' lower bounds, (N, NU)
     above: np.ndarray  # (N, NU)
 
 
 class Stages(NamedTuple):
-    """Derivatives at an iterate, and their condensed form."""
+    """Derivatives at an iterate, and their condensed form; what has u at stage N is not used."""
 
     A: np.ndarray  # d x+ / d x, (N, NX, NX)
     B: np.ndarray  # d x+ / d u, (N, NX, NU)
-    hx: np.ndarray  # gradients of the obstacles, (N, M, NX)
+    hx: np.ndarray  # gradients of the rows but the sides, (N + 1, rows, NX)
+    hu: np.ndarray  # (N + 1, rows, NU)
     lx: np.ndarray  # of the objective, (N + 1, NX)
-    lu: np.ndarray  # (N, NU)
+    cu: np.ndarray  # (N + 1, NU)
+    lu: np.ndarray  # of the objective and lam' h, (N + 1, NU)
     p: np.ndarray  # costates, (N + 1, NX)
     Q: np.ndarray  # Hessian of the Lagrangian, (N + 1, NX, NX)
-    S: np.ndarray  # (N, NU, NX)
-    R: np.ndarray  # (N, NU, NU)
+    S: np.ndarray  # (N + 1, NU, NX)
+    R: np.ndarray  # (N + 1, NU, NU)
     q: np.ndarray  # Newton's right-hand side, (N + 1, NX)
-    r: np.ndarray  # (N, NU)
-    off: np.ndarray  # dlam = stiff (off + h_x dx), shape of the rows
+    r: np.ndarray  # (N + 1, NU)
+    off: np.ndarray  # dlam = stiff (off + dh), (N + 1, rows)
     stiff: np.ndarray
+    held: np.ndarray  # of one stage: lam of what is planned, (rows,)
+    firm: np.ndarray  # stiff
+    pull: np.ndarray  # lam + off stiff
 
 
 class Step(NamedTuple):
@@ -144,36 +190,65 @@ class Step(NamedTuple):
     k: np.ndarray  # (N, NU)
     x: np.ndarray  # (N + 1, NX)
     u: np.ndarray  # (N, NU)
-    lam: np.ndarray
+    lam: np.ndarray  # (N + 1, rows)
     below: np.ndarray
     above: np.ndarray
 
 
 @inlined
-def evaluate(task, point, mu):
-    """Step 1 for point.x[0] and point.u; the objective and the barrier function."""
-    x, u = point.x, point.u
-    for i in range(len(u)):
-        transition(x[i], u[i], x[i + 1])
-    measure(task, x, point.h)
-    centre(point.h.ravel(), task.weights.ravel(), mu, point.sigma.ravel(), point.slack.ravel())
-    last = len(u)
-    objective = task.rate[last] * terminal_cost(x[last], task.theta, task.target)
+def roll(task, point):
+    """The states that the inputs lead to from point.x[0]."""
+    for i in range(len(point.u)):
+        transition(point.x[i], point.u[i], task.theta, task.data[i], point.x[i + 1])
+
+
+@inlined
+def measure(task, point, mu):
+    """Step 1: the objective and the barrier function of a plan."""
+    x, u, last, begin = point.x, point.u, len(point.u), task.begin
+    objective = 0.0
     for i in range(last):
-        objective += task.rate[i] * stage_cost(x[i], u[i], task.theta, task.target)
+        objective += task.rate[i] * stage_cost(x[i], u[i], task.theta, task.data[i])
+    objective += task.rate[last] * terminal_cost(x[last], task.theta, task.data[last])
+    for i in range(begin, last):
+        fixed_rows(x[i], u[i], task.theta, task.data[i], point.h[i])
+        for line in range(task.lines):
+            line_rows(
+                x[i], u[i], task.theta, task.data[i], task.data[i], point.h[i],
+                OWN + WIDTH * line, FIXED + PER * line,
+            )  # fmt: skip
+        sides_of(task, x[i], point.h[i])
+    rows_of_end(task, point, point.h[last])
+    for i in range(begin, last + 1):
+        for j in range(point.h.shape[1]):
+            if task.kind[i, j] != PLANNED:
+                point.h[i, j] = -1.0
+    centre(
+        point.h[begin:].ravel(), task.weights[begin:].ravel(), mu,
+        point.sigma[begin:].ravel(), point.slack[begin:].ravel(),
+    )  # fmt: skip
     return objective, objective + barrier(task, point, mu)
 
 
 @inlined
-def measure(task, x, h):
-    """h of every row: the obstacles, then the sides of the box."""
-    obstacles = len(task.discs)
-    for i in range(len(h)):
-        for j in range(obstacles):
-            h[i, j] = constraint(x[i + 1], task.theta, task.discs[j])
-        for j in range(len(task.sides)):
-            state, sign, limit = int(task.sides[j, 0]), task.sides[j, 1], task.sides[j, 2]
-            h[i, obstacles + j] = sign * (x[i + 1, state] - limit)
+def rows_of_end(task, point, h):
+    """h of every row of stage N, planned or not."""
+    last = len(point.u)
+    fixed_end_rows(point.x[last], point.u[last - 1], task.theta, task.data[last], h)
+    for line in range(task.lines):
+        line_end_rows(
+            point.x[last], point.u[last - 1], task.theta, task.data[last], task.data[last], h,
+            OWN + WIDTH * line, FIXED + PER * line,
+        )  # fmt: skip
+    sides_of(task, point.x[last], h)
+
+
+@inlined
+def sides_of(task, x, h):
+    """h of the sides of the states' box."""
+    first = FIXED + PER * task.lines
+    for j in range(len(task.sides)):
+        h[first + j] = task.sides[j, 1] * (x[int(task.sides[j, 0])] - task.sides[j, 2])
 
 
 @inlined
@@ -196,7 +271,7 @@ def barrier(task, point, mu):
     """What the rows and the inputs' bounds add to the objective."""
     u, sigma, slack = point.u, point.sigma, point.slack
     total, logs = 0.0, 0.0
-    for i in range(len(sigma)):
+    for i in range(task.begin, len(sigma)):
         product = 1.0  # one logarithm serves eight rows, in units in which it cannot overflow
         for j in range(sigma.shape[1]):
             total += task.weights[i, j] * sigma[i, j]
@@ -213,38 +288,72 @@ def barrier(task, point, mu):
 
 
 @inlined
+def hold(task, duals, i, held):
+    """The multipliers of the planned rows of a stage, 0 for the others."""
+    for j in range(len(held)):
+        held[j] = duals.lam[i, j] if task.kind[i, j] == PLANNED else 0.0
+
+
+@inlined
 def linearise(task, point, duals, stages):
     """Step 2: derivatives of every stage, from the last to the first."""
-    x, u, p, Q, A = point.x, point.u, stages.p, stages.Q, stages.A
-    last, obstacles = len(u), len(task.discs)
-    curved = np.empty((NX, NX))
-    for i in range(last, -1, -1):
-        rate = task.rate[i : i + 1]
-        if i == last:
-            expand_terminal(x[i], task.theta, task.target, rate, stages.lx[i], Q[i])
-            for a in range(NX):
-                p[i, a] = stages.lx[i, a]
-        else:
-            expand_stage(
-                x[i], u[i], task.theta, task.target, rate, p[i + 1],
-                A[i], stages.B[i], stages.lx[i], stages.lu[i], Q[i], stages.S[i], stages.R[i],
+    x, u, p, last = point.x, point.u, stages.p, len(point.u)
+    held, px, pu = stages.held, np.zeros(NX), np.zeros(NU)
+    first = FIXED + PER * task.lines
+    expand_terminal(
+        x[last], task.theta, task.data[last], task.rate[last:], stages.lx[last], stages.Q[last]
+    )
+    hold(task, duals, last, held)
+    expand_fixed_end(
+        x[last], u[last - 1], task.theta, task.data[last], held,
+        px, pu, stages.Q[last], stages.S[last], stages.R[last], stages.hx[last], stages.hu[last],
+        px, pu, stages.Q[last], stages.S[last], stages.R[last],
+    )  # fmt: skip
+    for line in range(task.lines):
+        expand_line_end(
+            x[last], u[last - 1], task.theta, task.data[last], task.data[last], held,
+            px, pu, stages.Q[last], stages.S[last], stages.R[last],
+            stages.hx[last], stages.hu[last],
+            px, pu, stages.Q[last], stages.S[last], stages.R[last],
+            OWN + WIDTH * line, FIXED + PER * line,
+        )  # fmt: skip
+    for j in range(len(task.sides)):
+        px[int(task.sides[j, 0])] += held[first + j] * task.sides[j, 1]
+    for a in range(NX):
+        p[last, a] = stages.lx[last, a] + px[a]
+    for i in range(last - 1, -1, -1):
+        expand_stage(
+            x[i], u[i], task.theta, task.data[i], task.rate[i : i + 1], p[i + 1],
+            stages.A[i], stages.B[i], stages.lx[i], stages.cu[i],
+            stages.Q[i], stages.S[i], stages.R[i],
+        )  # fmt: skip
+        for a in range(NX):
+            px[a] = 0.0
+        for a in range(NU):
+            pu[a] = 0.0
+        if i >= task.begin:
+            hold(task, duals, i, held)
+            expand_fixed(
+                x[i], u[i], task.theta, task.data[i], held,
+                px, pu, stages.Q[i], stages.S[i], stages.R[i], stages.hx[i], stages.hu[i],
+                px, pu, stages.Q[i], stages.S[i], stages.R[i],
             )  # fmt: skip
-            for a in range(NX):
-                total = stages.lx[i, a]
-                for b in range(NX):
-                    total += A[i, b, a] * p[i + 1, b]
-                p[i, a] = total
-        if i == 0:
-            return
-        for j in range(obstacles):
-            lam, hx = duals.lam[i - 1, j], stages.hx[i - 1, j]
-            expand_constraint(x[i], task.theta, task.discs[j], hx, curved)
-            for a in range(NX):
-                p[i, a] += lam * hx[a]
-                for b in range(NX):
-                    Q[i, a, b] += lam * curved[a, b]
-        for j in range(len(task.sides)):
-            p[i, int(task.sides[j, 0])] += duals.lam[i - 1, obstacles + j] * task.sides[j, 1]
+            for line in range(task.lines):
+                expand_line(
+                    x[i], u[i], task.theta, task.data[i], task.data[i], held,
+                    px, pu, stages.Q[i], stages.S[i], stages.R[i], stages.hx[i], stages.hu[i],
+                    px, pu, stages.Q[i], stages.S[i], stages.R[i],
+                    OWN + WIDTH * line, FIXED + PER * line,
+                )  # fmt: skip
+            for j in range(len(task.sides)):
+                px[int(task.sides[j, 0])] += held[first + j] * task.sides[j, 1]
+        for a in range(NX):
+            total = stages.lx[i, a] + (px[a] if i > 0 else 0.0)  # x_0 is given
+            for b in range(NX):
+                total += stages.A[i, b, a] * p[i + 1, b]
+            p[i, a] = total
+        for a in range(NU):
+            stages.lu[i, a] = stages.cu[i, a] + pu[a]
 
 
 @inlined
@@ -266,7 +375,8 @@ def residuals(task, point, duals, stages, mu):
             stationarity += gradient * gradient
             complementarity += low * low + high * high
     complementarity += row_residuals(
-        duals.lam.ravel(), task.weights.ravel(), point.sigma.ravel(), point.slack.ravel(), mu
+        duals.lam[task.begin :].ravel(), task.weights[task.begin :].ravel(),
+        point.sigma[task.begin :].ravel(), point.slack[task.begin :].ravel(), mu,
     )
     return math.sqrt(stationarity), math.sqrt(complementarity), largest
 
@@ -294,32 +404,55 @@ def row_residuals(lam, weights, sigma, slack, mu):
 
 @inlined
 def condense(task, point, duals, stages, mu):
-    """Step 4: Newton's system without rows and bounds: q and r, and Q and R in place."""
+    """Step 4: Newton's system without rows and bounds: q and r, and Q, S and R in place."""
+    begin, last, first = task.begin, len(point.u), FIXED + PER * task.lines
     soften(
-        point.h.ravel(), point.sigma.ravel(), point.slack.ravel(), duals.lam.ravel(),
-        task.weights.ravel(), mu, stages.off.ravel(), stages.stiff.ravel(),
+        point.h[begin:].ravel(), point.sigma[begin:].ravel(), point.slack[begin:].ravel(),
+        duals.lam[begin:].ravel(), task.weights[begin:].ravel(), mu,
+        stages.off[begin:].ravel(), stages.stiff[begin:].ravel(),
     )  # fmt: skip
-    q, Q, obstacles = stages.q, stages.Q, len(task.discs)
-    for i in range(1, len(q)):
+    stiff, pull, hx, hu = stages.firm, stages.pull, stages.hx, stages.hu
+    q, r, Q, S, R = stages.q, stages.r, stages.Q, stages.S, stages.R
+    for i in range(last):
         for a in range(NX):
             q[i, a] = stages.lx[i, a]
-        for j in range(obstacles):
-            hx, stiff = stages.hx[i - 1, j], stages.stiff[i - 1, j]
-            pull = duals.lam[i - 1, j] + stages.off[i - 1, j] * stiff
-            for a in range(NX):
-                q[i, a] += pull * hx[a]
-                for b in range(NX):
-                    Q[i, a, b] += stiff * hx[a] * hx[b]
+        for a in range(NU):
+            r[i, a] = stages.cu[i, a]
+    for a in range(NX):
+        q[last, a] = stages.lx[last, a]
+    for i in range(begin, last + 1):
+        for j in range(len(stiff)):
+            planned = task.kind[i, j] == PLANNED
+            stiff[j] = stages.stiff[i, j] if planned else 0.0
+            pull[j] = duals.lam[i, j] + stages.off[i, j] * stiff[j] if planned else 0.0
         for j in range(len(task.sides)):
-            a, t = int(task.sides[j, 0]), obstacles + j
-            pull = duals.lam[i - 1, t] + stages.off[i - 1, t] * stages.stiff[i - 1, t]
-            q[i, a] += pull * task.sides[j, 1]
-            Q[i, a, a] += stages.stiff[i - 1, t]
-    for i in range(task.first, len(point.u)):
+            a = int(task.sides[j, 0])
+            q[i, a] += pull[first + j] * task.sides[j, 1]
+            Q[i, a, a] += stiff[first + j]
+        if i == last:
+            break
+        condense_fixed(
+            stiff, pull, hx[i], hu[i], q[i], r[i], Q[i], S[i], R[i], q[i], r[i], Q[i], S[i], R[i]
+        )
+        for line in range(task.lines):
+            condense_line(
+                stiff, pull, hx[i], hu[i], q[i], r[i], Q[i], S[i], R[i],
+                q[i], r[i], Q[i], S[i], R[i], 0, FIXED + PER * line,
+            )  # fmt: skip
+    condense_fixed_end(
+        stiff, pull, hx[last], hu[last], q[last], r[last], Q[last], S[last], R[last],
+        q[last], r[last], Q[last], S[last], R[last],
+    )  # fmt: skip
+    for line in range(task.lines):
+        condense_line_end(
+            stiff, pull, hx[last], hu[last], q[last], r[last], Q[last], S[last], R[last],
+            q[last], r[last], Q[last], S[last], R[last], 0, FIXED + PER * line,
+        )  # fmt: skip
+    for i in range(task.first, last):
         for a in range(NU):
             low, high = 1.0 / (point.u[i, a] - task.lower[a]), 1.0 / (task.upper[a] - point.u[i, a])
-            stages.r[i, a] = stages.lu[i, a] - mu * low + mu * high
-            stages.R[i, a, a] += duals.below[i, a] * low + duals.above[i, a] * high
+            r[i, a] += mu * high - mu * low
+            R[i, a, a] += duals.below[i, a] * low + duals.above[i, a] * high
 
 
 @inlined
@@ -435,10 +568,13 @@ def newton_step(task, point, duals, stages, mu, step):
     sweep(task, stages, step)
     rows_along(task, stages, step)
     derivative = descent(task, point, stages, mu, step)
-    scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
+    scale_rows(task, stages, step)
     tau = max(TAU_MIN, 1.0 - max(mu, TAU_REST))
     primal, dual = bounds_along(task, point, duals, mu, step, tau)
-    inside = inside_rows(duals.lam.ravel(), step.lam.ravel(), task.weights.ravel(), tau)
+    inside = inside_rows(
+        duals.lam[task.begin :].ravel(), step.lam[task.begin :].ravel(),
+        task.weights[task.begin :].ravel(), tau,
+    )  # fmt: skip
     return primal, min(dual, inside), derivative
 
 
@@ -465,21 +601,36 @@ def sweep(task, stages, step):
 
 @inlined
 def rows_along(task, stages, step):
-    """h_x dx of every row, in the place of its multiplier's step."""
-    dx, hx_dx, obstacles = step.x, step.lam, len(task.discs)
-    for i in range(len(hx_dx)):
-        for j in range(obstacles):
-            total = 0.0
-            for a in range(NX):
-                total += stages.hx[i, j, a] * dx[i + 1, a]
-            hx_dx[i, j] = total
+    """dh of every planned row, in the place of its multiplier's step."""
+    last, first, dh = len(step.u), FIXED + PER * task.lines, step.lam
+    for i in range(task.begin, last):
+        along_fixed(stages.hx[i], stages.hu[i], step.x[i], step.u[i], dh[i])
+        for line in range(task.lines):
+            along_line(
+                stages.hx[i], stages.hu[i], step.x[i], step.u[i], dh[i], 0, FIXED + PER * line
+            )
+    along_fixed_end(stages.hx[last], stages.hu[last], step.x[last], step.u[last - 1], dh[last])
+    for line in range(task.lines):
+        along_line_end(
+            stages.hx[last], stages.hu[last], step.x[last], step.u[last - 1], dh[last], 0,
+            FIXED + PER * line,
+        )  # fmt: skip
+    for i in range(task.begin, last + 1):
         for j in range(len(task.sides)):
-            hx_dx[i, obstacles + j] = task.sides[j, 1] * dx[i + 1, int(task.sides[j, 0])]
+            dh[i, first + j] = task.sides[j, 1] * step.x[i, int(task.sides[j, 0])]
+        for j in range(dh.shape[1]):
+            if task.kind[i, j] != PLANNED:
+                dh[i, j] = 0.0
 
 
 @inlined
-def scale_rows(dlam, off, stiff):
-    """dlam of every row, in the place of h_x dx."""
+def scale_rows(task, stages, step):
+    """dlam of every row, in the place of dh."""
+    dlam, off, stiff = (
+        step.lam[task.begin :].ravel(),
+        stages.off[task.begin :].ravel(),
+        stages.stiff[task.begin :].ravel(),
+    )
     for t in range(dlam.size):
         dlam[t] = stiff[t] * (off[t] + dlam[t])
 
@@ -520,28 +671,42 @@ def bounds_along(task, point, duals, mu, step, tau):
 
 @inlined
 def descent(task, point, stages, mu, step):
-    """The barrier function's derivative along the step, while step.lam holds h_x dx."""
+    """The barrier function's derivative along the step, while step.lam holds dh."""
     total = 0.0
     for i in range(len(step.x)):
         for a in range(NX):
             total += stages.lx[i, a] * step.x[i, a]
     for i in range(task.first, len(step.u)):
         for a in range(NU):
-            total += stages.r[i, a] * step.u[i, a]
-    for i in range(len(step.lam)):
+            low, high = point.u[i, a] - task.lower[a], task.upper[a] - point.u[i, a]
+            total += (stages.cu[i, a] - mu / low + mu / high) * step.u[i, a]
+    for i in range(task.begin, len(step.lam)):
         for j in range(step.lam.shape[1]):
             total += mu / point.slack[i, j] * step.lam[i, j]
     return total
 
 
 @inlined
+def follow(task, plan, step, length, point):
+    """Roll out u + length k + K (x - plan) from point.x[0], inside the inputs' bounds."""
+    for i in range(len(plan.u)):
+        for a in range(NU):
+            move = 0.0
+            if i >= task.first:
+                move = length * step.k[i, a]
+                for b in range(NX):
+                    move += step.K[i, a, b] * (point.x[i, b] - plan.x[i, b])
+            low, high = plan.u[i, a] - task.lower[a], task.upper[a] - plan.u[i, a]
+            point.u[i, a] = plan.u[i, a] + min(max(move, -WITHIN * low), WITHIN * high)
+        transition(point.x[i], point.u[i], task.theta, task.data[i], point.x[i + 1])
+
+
+@inlined
 def search(task, point, trial, mu, step, length, total, derivative):
     """Step 7: put into `trial` what lowers the barrier function; it and the objective, or nan."""
     while length > SHORTEST:
-        for i in range(len(step.u)):
-            for a in range(NU):
-                trial.u[i, a] = point.u[i, a] + length * step.u[i, a]
-        objective, reached = evaluate(task, trial, mu)
+        follow(task, point, step, length, trial)
+        objective, reached = measure(task, trial, mu)
         if reached <= total + ARMIJO * length * derivative + ROUNDING * abs(total):
             return objective, reached
         length *= BACKTRACKS
@@ -555,52 +720,45 @@ def advance(task, duals, step, length):
         for a in range(NU):
             duals.below[i, a] += length * step.below[i, a]
             duals.above[i, a] += length * step.above[i, a]
-    for i in range(len(duals.lam)):
+    for i in range(task.begin, len(duals.lam)):
         for j in range(duals.lam.shape[1]):
             most = ALMOST * task.weights[i, j]
             duals.lam[i, j] = min(duals.lam[i, j] + length * step.lam[i, j], most)
 
 
 @inlined
-def scaled(theta, target, lower, upper, discs, sides, discount, slack_weight, soft_box, first):
-    """The task divided by max(1, theta^2), and that factor."""
-    factor = 1.0
-    for a in range(NTHETA):
-        factor = max(factor, theta[a] * theta[a])
-    rate = np.empty(len(discount))
-    weights = np.empty((len(discount) - 1, len(discs) + len(sides)))
-    strict = max(BOX_WEIGHT, BOX_TO_SLACK * slack_weight / factor)
-    for i in range(len(discount)):
-        rate[i] = discount[i] / factor
-        for j in range(weights.shape[1]):
-            if i > 0:
-                slack = soft_box or j < len(discs)
-                weights[i - 1, j] = slack_weight * rate[i] if slack else strict
-    return Task(theta, target, lower, upper, discs, sides, rate, weights, first), factor
-
-
-@inlined
 def slacks_of(task):
-    """The number of slacks of a stage."""
-    return len(task.discs)
+    """The number of slacks of a stage, one for each row that is not hard."""
+    return SOFT + PER * task.lines
 
 
 @inlined
 def offsets(task, stage):
     """Where the variables and the constraints of a stage begin in the vectors of `Ocp`."""
-    obstacles, later = slacks_of(task), min(stage, 1)
-    constraints = stage * (NX + obstacles) + later * (NX + task.first * NU)
-    return stage * (NX + NU + obstacles), constraints
+    slacks, later = slacks_of(task), min(stage, 1)
+    constraints = stage * (NX + slacks + FIXED - SOFT) + later * (NX + task.first * NU)
+    return stage * (NX + NU + slacks), constraints
 
 
 @inlined
-def initialise(task, point, duals, state, action, start, mu, factor, warm_start):
-    """The inputs of the warm start, inside their bounds, and the bounds' multipliers."""
-    last = len(point.u)
-    ahead = 1 if start == SHIFTED else 0
-    gain = task.rate[0] / task.rate[ahead] / factor
-    variables, constraints = offsets(task, last)
-    nu = variables + NX + constraints + 2 * slacks_of(task)
+def place_of_rows(task, stage, last):
+    """Where the rows of a stage begin among the constraints of `Ocp`."""
+    constraints = offsets(task, stage)[1] + (NX if stage < last else 0)
+    return constraints + (NX + task.first * NU if stage == 0 else 0)
+
+
+@inlined
+def place_of_row(task, j):
+    """Where row j is among those of its stage in `Ocp`: soft ones first, then hard ones."""
+    if j < SOFT:
+        return j
+    return slacks_of(task) + j - SOFT if j < FIXED else SOFT + j - FIXED
+
+
+@inlined
+def begin_inputs(task, point, state, action, start, warm_start):
+    """The inputs of the warm start, inside their bounds."""
+    last, ahead = len(point.u), 1 if start == SHIFTED else 0
     for a in range(NX):
         point.x[0, a] = state[a]
     for i in range(last):
@@ -609,34 +767,107 @@ def initialise(task, point, duals, state, action, start, mu, factor, warm_start)
             low, high = task.lower[a], task.upper[a]
             push = PUSH[start] * min(1.0, high - low)
             point.u[i, a] = min(max(warm_start[at + a], low + push), high - push)
-            duals.below[i, a] = max(-gain * warm_start[nu + at + a], mu / (point.u[i, a] - low))
-            duals.above[i, a] = max(gain * warm_start[nu + at + a], mu / (high - point.u[i, a]))
             if i < task.first:
                 point.u[i, a] = action[a]
+
+
+@inlined
+def recall(task, start, warm_start, point, plan):
+    """The states of a warm start beside the inputs of `point`; how far this leaves them.
+
+    Returns whether a deviation of the first state grows: then the inputs alone lead nowhere.
+    """
+    last, ahead = len(point.u), 1 if start == SHIFTED else 0
+    apart, farthest, largest = 0.0, 0.0, 0.0
+    for i in range(last + 1):
+        at = offsets(task, min(i + ahead, last))[0]
+        for a in range(NX):
+            plan.x[i, a] = warm_start[at + a]
+            largest = max(largest, abs(plan.x[i, a]))
+            away = abs(point.x[i, a] - plan.x[i, a])
+            if i == 0:
+                apart = max(apart, away)
+            if not away <= farthest and i + ahead <= last:
+                farthest = away
+        for a in range(NU if i < last else 0):
+            plan.u[i, a] = point.u[i, a]
+    return not farthest <= max(GROWS * apart, NOTICED * largest)
+
+
+@inlined
+def scaled(
+    theta, data, lower, upper, sides, kind, discount, weights, first, point, state, action, start,
+    warm_start,
+):  # fmt: skip
+    """The problem divided by the size of its costs along the plan of a start, and that size."""
+    last, rows = len(discount) - 1, len(weights) + len(sides)
+    lines = (data.shape[1] - OWN) // WIDTH if WIDTH > 0 else 0
+    scaled_weights, begin = np.empty((last + 1, rows)), 1
+    for j in range(rows):
+        if kind[0, j] == PLANNED:
+            begin = 0
+    rate = discount.copy()
+    task = Task(
+        theta, data, lower, upper, sides, kind, begin, lines, rate, scaled_weights, first
+    )
+    begin_inputs(task, point, state, action, start, warm_start)
+    roll(task, point)
+    factor = discount[last] * terminal_size(point.x[last], theta, data[last])
+    for i in range(last):
+        factor = max(factor, discount[i] * stage_size(point.x[i], point.u[i], theta, data[i]))
+    if not 0.0 < factor < np.inf:
+        factor = 1.0
+    strict = STRICT
+    for j in range(len(weights)):
+        if weights[j] < np.inf:
+            strict = max(strict, STRICT_TO_SOFT * weights[j] / factor)
+    for i in range(last + 1):
+        rate[i] = discount[i] / factor
+        for j in range(rows):
+            soft = j < len(weights) and weights[j] < np.inf
+            scaled_weights[i, j] = weights[j] * rate[i] if soft else strict
+    return task, factor
+
+
+@inlined
+def begin_multipliers(task, point, duals, start, mu, factor, warm_start):
+    """The bounds' multipliers: the warm start's, or central ones where these are larger."""
+    last, ahead = len(point.u), 1 if start == SHIFTED else 0
+    gain = task.rate[0] / task.rate[ahead] / factor
+    nu = offsets(task, last)[0] + NX + slacks_of(task) + place_of_rows(task, last, last)
+    nu += slacks_of(task) + FIXED - SOFT
+    for i in range(last):
+        at = nu + offsets(task, min(i + ahead, last - 1))[0] + NX
+        for a in range(NU):
+            below, above = mu / (point.u[i, a] - task.lower[a]), mu / (task.upper[a] - point.u[i, a])
+            duals.below[i, a] = max(-gain * warm_start[at + a], below)
+            duals.above[i, a] = max(gain * warm_start[at + a], above)
+            if i < task.first:
                 duals.below[i, a] = duals.above[i, a] = 0.0
 
 
 @inlined
-def initialise_rows(task, point, duals, start, mu, factor, warm_start):
+def begin_rows(task, point, duals, start, mu, factor, warm_start):
     """The rows' multipliers: central, or the warm start's unless these are nearer to 0 or W."""
-    last, obstacles = len(point.u), len(task.discs)
-    ahead = 1 if start == SHIFTED else 0
+    last, ahead, slacks = len(point.u), 1 if start == SHIFTED else 0, slacks_of(task)
     gain = task.rate[0] / task.rate[ahead] / factor
-    variables, constraints = offsets(task, last)
-    lam = variables + NX + obstacles
-    nu = lam + constraints + obstacles
-    for i in range(last):
-        source = min(i + 1 + ahead, last)
-        variables, constraints = offsets(task, source)
-        dynamics = NX if source < last else 0
+    lam = offsets(task, last)[0] + NX + slacks
+    nu = lam + place_of_rows(task, last, last) + slacks + FIXED - SOFT
+    first = FIXED + PER * task.lines
+    for i in range(task.begin, last + 1):
         for j in range(duals.lam.shape[1]):
-            middle, old = mu / point.slack[i, j], 0.0
-            if j < obstacles:
-                old = gain * warm_start[lam + constraints + dynamics + j]
-            else:
-                side = task.sides[j - obstacles]
-                old = gain * side[1] * warm_start[nu + variables + int(side[0])]
-            if start != COLD:
+            source = min(i + ahead, last)
+            if task.kind[source, j] != PLANNED:
+                source = i
+            middle = mu / point.slack[i, j]
+            if start != COLD and task.kind[source, j] == PLANNED:
+                if j < first:
+                    at = lam + place_of_rows(task, source, last) + place_of_row(task, j)
+                    old = gain * warm_start[at]
+                else:
+                    side = task.sides[j - first]
+                    at = nu + offsets(task, source)[0] + int(side[0])
+                    old = gain * side[1] * warm_start[at]
                 middle = max(old, middle) if point.h[i, j] < 0.0 else min(old, middle)
             weight = task.weights[i, j]
             duals.lam[i, j] = min(max(middle, INSIDE * weight), (1.0 - INSIDE) * weight)
@@ -650,7 +881,7 @@ def recentre(task, point, duals, mu):
             if i >= task.first:
                 duals.below[i, a] = mu / (point.u[i, a] - task.lower[a])
                 duals.above[i, a] = mu / (task.upper[a] - point.u[i, a])
-    for i in range(len(duals.lam)):
+    for i in range(task.begin, len(duals.lam)):
         for j in range(duals.lam.shape[1]):
             duals.lam[i, j] = min(mu / point.slack[i, j], ALMOST * task.weights[i, j])
 
@@ -677,8 +908,9 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
         if max(stationarity, complementarity) <= KAPPA_EPSILON * mu and mu > MU_FLOOR * goal:
             mu = max(MU_FLOOR * goal, min(KAPPA_MU * mu, mu**THETA_MU))
             centre(
-                point.h.ravel(), task.weights.ravel(), mu, point.sigma.ravel(), point.slack.ravel()
-            )
+                point.h[task.begin :].ravel(), task.weights[task.begin :].ravel(), mu,
+                point.sigma[task.begin :].ravel(), point.slack[task.begin :].ravel(),
+            )  # fmt: skip
             total = objective + barrier(task, point, mu)
         iteration += 1
         condense(task, point, duals, stages, mu)
@@ -709,63 +941,103 @@ def iterate(task, point, trial, duals, stages, step, mu, objective, total, limit
 
 
 @inlined
-def write_solution(task, point, duals, stages, objective, factor, slack_weight, soft_box, tie, out):
-    """Write the solution in the order of `Ocp`, and the value's gradient; see `Sensitivity`."""
-    last, obstacles = len(point.u), len(task.discs)
-    variables, constraints = offsets(task, last)
-    lam = variables + NX + obstacles
-    nu = lam + constraints + obstacles
-    phi = nu + lam
-    value, violation = factor * objective, 0.0
-    gradient = np.empty(NTHETA)
+def settle(task, point, tie, h, held):
+    """h of the rows of stage 0, and the multipliers of the soft ones that no plan can change."""
+    size = np.empty(len(h))
+    x, u, theta, d = point.x[0], point.u[0], task.theta, task.data[0]
+    fixed_rows(x, u, theta, d, h)
+    fixed_sizes(x, u, theta, d, size)
+    for line in range(task.lines):
+        of, at = OWN + WIDTH * line, FIXED + PER * line
+        line_rows(x, u, theta, d, d, h, of, at)
+        line_sizes(x, u, theta, d, d, size, of, at)
+    for j in range(FIXED + PER * task.lines):
+        if task.kind[0, j] == SETTLED:
+            soft = j < SOFT or j >= FIXED
+            held[j] = task.weights[0, j] if soft and h[j] > tie * size[j] else 0.0
+
+
+@inlined
+def theta_of_rows(task, x, u, i, last, held, gradient):
+    """Add the gradient of held' h in theta."""
+    theta, d = task.theta, task.data[i]
+    if i < last:
+        theta_fixed(x, u, theta, d, held, gradient, gradient)
+    else:
+        theta_fixed_end(x, u, theta, d, held, gradient, gradient)
+    for line in range(task.lines):
+        of, at = OWN + WIDTH * line, FIXED + PER * line
+        if i < last:
+            theta_line(x, u, theta, d, d, held, gradient, gradient, of, at)
+        else:
+            theta_line_end(x, u, theta, d, d, held, gradient, gradient, of, at)
+
+
+@inlined
+def write_solution(task, point, duals, stages, objective, factor, tie, out):
+    """Write the solution in the order of `Ocp`, and the value's gradient: the kernel's Lagrangian.
+
+    Returns the value, the largest violation of a hard row and the largest number in the plan.
+    """
+    last, slacks, rows = len(point.u), slacks_of(task), duals.lam.shape[1]
+    variables = offsets(task, last)[0] + NX + slacks
+    nu = variables + place_of_rows(task, last, last) + slacks + FIXED - SOFT
+    phi, first = nu + variables, FIXED + PER * task.lines
+    violation, largest = 0.0, 0.0
+    gradient, held, h = np.empty(NTHETA), np.empty(rows), np.empty(rows)
+    initial_theta(point.x[0], task.theta, task.data[0], gradient)
     for a in range(NTHETA):
-        out[phi + a] = 0.0
+        out[phi + a] = gradient[a]
+    value = factor * objective + initial_cost(point.x[0], task.theta, task.data[0])
     for i in range(last + 1):
-        rate = factor * task.rate[i]
         at, row = offsets(task, i)
+        u = point.u[min(i, last - 1)]
+        for j in range(rows):
+            held[j] = duals.lam[i, j] if i >= task.begin and task.kind[i, j] == PLANNED else 0.0
+            h[j] = point.h[i, j]
+        if i == 0:
+            settle(task, point, tie, h, held)
+        rate, data = task.rate[i : i + 1], task.data[i]
+        if i < last:
+            p = stages.p[i + 1]
+            stage_theta(point.x[i], u, task.theta, data, rate, p, gradient)
+            for a in range(NX):
+                out[variables + row + a] = -factor * p[a]
+            for a in range(NU):
+                out[at + NX + a] = u[a]
+                out[nu + at + NX + a] = factor * (duals.above[i, a] - duals.below[i, a])
+        else:
+            terminal_theta(point.x[i], task.theta, data, rate, gradient)
+        theta_of_rows(task, point.x[i], u, i, last, held, gradient)
+        add(out, phi, factor, gradient)
+        if i == 0:
+            row = variables + NX  # behind the dynamics
+            for a in range(NX):
+                out[row + a] = -factor * stages.p[0, a]
+            for a in range(task.first * NU):
+                out[row + NX + a] = -factor * input_gradient(stages, 0, a)
         for a in range(NX):
             out[at + a] = point.x[i, a]
             out[nu + at + a] = 0.0
-        if i < last:
-            stage_gradient(point.x[i], point.u[i], task.theta, task.target, gradient)
-            for a in range(NX):
-                out[lam + row + a] = -factor * stages.p[i + 1, a]
-            row += NX
-        else:
-            terminal_gradient(point.x[i], task.theta, task.target, gradient)
-        add(out, phi, rate, gradient)
-        if i == 0:
-            for a in range(NX):
-                out[lam + row + a] = -factor * stages.p[0, a]
-            for a in range(task.first * NU):
-                out[lam + row + NX + a] = -factor * input_gradient(stages, 0, a)
-            row += NX + task.first * NU
-        else:
-            for j in range(len(task.sides)):
-                a, sign = int(task.sides[j, 0]), task.sides[j, 1]
-                out[nu + at + a] += sign * factor * duals.lam[i - 1, obstacles + j]
-                beyond = max(0.0, point.h[i - 1, obstacles + j])
-                violation = max(violation, beyond)
-                value += rate * slack_weight * beyond if soft_box else 0.0
-        at += NX
-        if i < last:
-            for a in range(NU):
-                out[at + a] = point.u[i, a]
-                out[nu + at + a] = factor * (duals.above[i, a] - duals.below[i, a])
-            at += NU
-        for j in range(obstacles):
-            weight = rate * slack_weight
-            h = constraint(point.x[i], task.theta, task.discs[j])
-            multiplier = weight if h > tie else 0.0
-            if i > 0:
-                multiplier = factor * duals.lam[i - 1, j]
-            value += weight * max(0.0, h)
-            constraint_gradient(point.x[i], task.theta, task.discs[j], gradient)
-            add(out, phi, multiplier, gradient)
-            out[at + j] = max(0.0, h)
-            out[lam + row + j] = multiplier
-            out[nu + at + j] = multiplier - weight
-    return value, violation
+            largest = max(largest, abs(point.x[i, a]))
+        row = variables + place_of_rows(task, i, last)
+        sigma = at + NX + (NU if i < last else 0)
+        for j in range(rows):
+            there = task.kind[i, j] == PLANNED or (task.kind[i, j] == SETTLED and j < first)
+            beyond = max(0.0, h[j]) if there else 0.0
+            if j >= first:
+                side = task.sides[j - first]
+                out[nu + at + int(side[0])] += side[1] * factor * held[j]
+            else:
+                out[row + place_of_row(task, j)] = factor * held[j]
+            if j >= SOFT and (j < FIXED or j >= first):
+                violation = max(violation, beyond if task.kind[i, j] == PLANNED else 0.0)
+                continue
+            weight, k = factor * task.weights[i, j], place_of_row(task, j)
+            value += weight * beyond
+            out[sigma + k] = beyond
+            out[nu + sigma + k] = factor * held[j] - weight
+    return value, violation, largest
 
 
 @inlined
@@ -776,32 +1048,35 @@ def add(out, at, times, vector):
 
 
 @inlined
-def allocate(N, M, rows):
+def allocate(N, rows):
     """Space for an iterate, a trial of the next one, multipliers, derivatives and a step."""
     point = Point(
         np.empty((N + 1, NX)), np.empty((N, NU)),
-        np.empty((N, rows)), np.empty((N, rows)), np.empty((N, rows)),
+        np.empty((N + 1, rows)), np.empty((N + 1, rows)), np.empty((N + 1, rows)),
     )  # fmt: skip
     trial = Point(
         np.empty((N + 1, NX)), np.empty((N, NU)),
-        np.empty((N, rows)), np.empty((N, rows)), np.empty((N, rows)),
+        np.empty((N + 1, rows)), np.empty((N + 1, rows)), np.empty((N + 1, rows)),
     )  # fmt: skip
-    duals = Duals(np.empty((N, rows)), np.empty((N, NU)), np.empty((N, NU)))
-    stages = Stages(
-        np.empty((N, NX, NX)), np.empty((N, NX, NU)), np.empty((N, M, NX)),
-        np.empty((N + 1, NX)), np.empty((N, NU)), np.empty((N + 1, NX)),
-        np.empty((N + 1, NX, NX)), np.empty((N, NU, NX)), np.empty((N, NU, NU)),
-        np.empty((N + 1, NX)), np.empty((N, NU)), np.empty((N, rows)), np.empty((N, rows)),
+    duals = Duals(np.empty((N + 1, rows)), np.empty((N, NU)), np.empty((N, NU)))
+    stages = Stages(  # what is written at its nonzeros begins as zeros
+        np.zeros((N, NX, NX)), np.zeros((N, NX, NU)),
+        np.zeros((N + 1, rows, NX)), np.zeros((N + 1, rows, NU)),
+        np.empty((N + 1, NX)), np.empty((N + 1, NU)), np.empty((N + 1, NU)), np.empty((N + 1, NX)),
+        np.empty((N + 1, NX, NX)), np.empty((N + 1, NU, NX)), np.empty((N + 1, NU, NU)),
+        np.empty((N + 1, NX)), np.empty((N + 1, NU)),
+        np.empty((N + 1, rows)), np.empty((N + 1, rows)),
+        np.empty(rows), np.empty(rows), np.empty(rows),
     )  # fmt: skip
     step = Step(
         np.empty((N, NU, NX)), np.empty((N, NU)), np.empty((N + 1, NX)), np.empty((N, NU)),
-        np.empty((N, rows)), np.empty((N, NU)), np.empty((N, NU)),
+        np.empty((N + 1, rows)), np.empty((N, NU)), np.empty((N, NU)),
     )  # fmt: skip
     return point, trial, duals, stages, step
 
 
 vector, matrix = float64[::1], float64[:, ::1]
 PROBLEM = (
-    vector, vector, vector, matrix, matrix, vector, float64, int64, float64,  # see InteriorPoint
+    matrix, vector, vector, matrix, int64[:, ::1], vector, vector, float64,  # see `Arguments`
     vector, vector, vector, int64,  # state, theta, action, whether u_0 is the action
 )  # fmt: skip

@@ -1,117 +1,46 @@
-"""What the solver in `kernel` needs to know of a plant, a stage at a time.
+"""What `kernel` asks of a `Problem`, a stage at a time: names of functions and their arguments.
 
-These are the signatures. `stages.write` generates a module of the same name from CasADi's
-expressions, and the solver is compiled beside that one, so none of the bodies below ever runs.
-Names that end in an underscore are results, written in place.
+`stages.write` generates a module of the same name, and the solver is compiled beside that one, so
+that nothing here ever runs. Names that end in an underscore are results, written in place; an
+argument that comes back as one is added to. A stage's Lagrangian is discount l + costate' f + lam'
+h. Of `fixed` rows and those of a `line` of data there are the same functions, each also for stage N
+(`_end`), where rows that depend on u are 0; the arguments of a line follow d.
 """
 
 from typing import Any
 
-NX = 0  # states
-NU = 0  # inputs
-NTHETA = 0  # parameters
+NX = NU = NTHETA = 0
+SOFT, FIXED = 0, 0  # rows that belong to no line: soft ones, and with hard ones behind them
+PER, WIDTH = 0, 0  # rows of a line of data, and numbers in it
+OWN = 0  # data of a stage that belong to no line
 
 
-def transition(x: Any, u: Any, next_x_: Any) -> None:
-    """The plant, Eq. (18)."""
+def _generated(*_: Any) -> Any:
     raise NotImplementedError
 
 
-def stage_cost(x: Any, u: Any, theta: Any, target: Any) -> float:
-    """L(x, u, theta) of Eq. (2a)."""
-    raise NotImplementedError
+transition = _generated  # x, u, theta, d, f_
+stage_cost = terminal_cost = initial_cost = _generated  # x, (u,) theta, d -> l, V_f or V0
+stage_size = terminal_size = _generated  # x, (u,) theta, d -> the size of l or V_f
+expand_stage = _generated  # x, u, theta, d, discount, costate, A_, B_, lx_, lu_, Q_, S_, R_
+expand_terminal = _generated  # x, theta, d, discount, lx_, Q_
+stage_theta = _generated  # x, u, theta, d, discount, costate, gradient_: in theta
+terminal_theta = initial_theta = _generated  # x, theta, d, (discount,) gradient_
+stage_mixed = _generated  # x, u, theta, d, discount, costate, w, lx_, lu_, f_: along w in theta
+terminal_mixed = _generated  # x, theta, d, discount, w, lx_
+stage_along = _generated  # x, u, theta, d, discount, costate, dx, du, dcostate, w, gradient_
+terminal_along = initial_along = _generated  # x, theta, d, (discount, dx,) w, gradient_
 
-
-def terminal_cost(x: Any, theta: Any, target: Any) -> float:
-    """Gamma(x, theta) of Eq. (2a)."""
-    raise NotImplementedError
-
-
-def constraint(x: Any, theta: Any, disc: Any) -> float:
-    """Xi + theta_c of Eq. (2f) for one obstacle, (centre x, centre y, clearance)."""
-    raise NotImplementedError
-
-
-def expand_stage(
-    x: Any,
-    u: Any,
-    theta: Any,
-    target: Any,
-    discount: Any,
-    costate: Any,
-    A_: Any,
-    B_: Any,
-    lx_: Any,
-    lu_: Any,
-    Q_: Any,
-    S_: Any,
-    R_: Any,
-) -> None:
-    """Jacobians of `transition`; gradient of discount `stage_cost`; Hessian of the Lagrangian.
-
-    That is discount `stage_cost` + costate' `transition`.
-    """
-    raise NotImplementedError
-
-
-def expand_terminal(x: Any, theta: Any, target: Any, discount: Any, lx_: Any, Q_: Any) -> None:
-    """Gradient and Hessian of discount `terminal_cost`."""
-    raise NotImplementedError
-
-
-def expand_constraint(x: Any, theta: Any, disc: Any, hx_: Any, hxx_: Any) -> None:
-    """Gradient and Hessian of `constraint`."""
-    raise NotImplementedError
-
-
-def stage_gradient(x: Any, u: Any, theta: Any, target: Any, gradient_: Any) -> None:
-    """Gradient of `stage_cost` in theta."""
-    raise NotImplementedError
-
-
-def terminal_gradient(x: Any, theta: Any, target: Any, gradient_: Any) -> None:
-    """Gradient of `terminal_cost` in theta."""
-    raise NotImplementedError
-
-
-def constraint_gradient(x: Any, theta: Any, disc: Any, gradient_: Any) -> None:
-    """Gradient of `constraint` in theta."""
-    raise NotImplementedError
-
-
-def stage_mixed_hessian(
-    x: Any, u: Any, theta: Any, target: Any, w: Any, lx_: Any, lu_: Any
-) -> None:
-    """The mixed second derivative of `stage_cost` in (x, u) and theta, times w."""
-    raise NotImplementedError
-
-
-def terminal_mixed_hessian(x: Any, theta: Any, target: Any, w: Any, lx_: Any) -> None:
-    """The mixed second derivative of `terminal_cost` in x and theta, times w."""
-    raise NotImplementedError
-
-
-def constraint_mixed_hessian(x: Any, theta: Any, disc: Any, w: Any, hx_: Any) -> None:
-    """The mixed second derivative of `constraint` in x and theta, times w."""
-    raise NotImplementedError
-
-
-def stage_gradient_along(
-    x: Any, u: Any, theta: Any, target: Any, dx: Any, du: Any, w: Any, gradient_: Any
-) -> None:
-    """How `stage_gradient` changes while x, u and theta move along dx, du and w."""
-    raise NotImplementedError
-
-
-def terminal_gradient_along(
-    x: Any, theta: Any, target: Any, dx: Any, w: Any, gradient_: Any
-) -> None:
-    """How `terminal_gradient` changes while x and theta move along dx and w."""
-    raise NotImplementedError
-
-
-def constraint_gradient_along(
-    x: Any, theta: Any, disc: Any, dx: Any, w: Any, gradient_: Any
-) -> None:
-    """How `constraint_gradient` changes while x and theta move along dx and w."""
-    raise NotImplementedError
+fixed_sizes = line_sizes = _generated  # x, u, theta, d, size_
+fixed_rows = fixed_end_rows = line_rows = line_end_rows = _generated  # x, u, theta, d, h_
+expand_fixed = expand_fixed_end = expand_line = expand_line_end = _generated  # x, u, theta, d, lam,
+#   px, pu, Q, S, R, hx_, hu_, px_, pu_, Q_, S_, R_
+condense_fixed = condense_fixed_end = condense_line = condense_line_end = _generated  # stiff, pull,
+#   hx, hu, q, r, Q, S, R, q_, r_, Q_, S_, R_
+along_fixed = along_fixed_end = along_line = along_line_end = _generated  # hx, hu, dx, du, h_
+theta_fixed = theta_fixed_end = theta_line = theta_line_end = _generated  # x, u, theta, d, lam,
+#   gradient, gradient_
+mixed_fixed = mixed_fixed_end = mixed_line = mixed_line_end = _generated  # x, u, theta, d, lam, w,
+#   lx, lu, h_, lx_, lu_
+along_theta_fixed = along_theta_fixed_end = _generated  # x, u, theta, d, lam, dx, du, dlam, w,
+along_theta_line = along_theta_line_end = _generated  # gradient, gradient_

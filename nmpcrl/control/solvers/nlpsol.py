@@ -19,7 +19,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control.diagnosis import FARTHEST, FASTEST
-from nmpcrl.control.ocp import Ocp, ProblemOcp
+from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import NoStartLeft, Solution, SolverError, check_shape
 from nmpcrl.control.solvers.codes import Start
@@ -138,10 +138,10 @@ class Program:
 
     def __init__(self, ocp: Ocp, solver: Nlpsol) -> None:
         self._ocp, self._solver = ocp, solver
-        self._problem = ocp.problem if isinstance(ocp, ProblemOcp) else None
+        self._problem = ocp.problem
         self._sensitivity = Sensitivity(ocp)
         self._factor, self._units, self._rows = _scales(ocp)
-        self._at_start = None if self._problem is None else _start_of(ocp)
+        self._at_start = _start_of(ocp)
         self._bounds = {
             "lbx": ca.DM(ocp.lower / self._units),
             "ubx": ca.DM(ocp.upper / self._units),
@@ -159,10 +159,10 @@ class Program:
         warm_start: Solution | None,
         *action: Vector,
         began: float,
-        data: Matrix | None = None,
+        data: Matrix,
     ) -> Solution:
         """Solve for p = (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
-        p = np.concatenate([state, theta, *action, *([] if data is None else [data.ravel()])])
+        p = np.concatenate([state, theta, *action, data.ravel()])
         failed: list[str] = []
         for solver, start, point in self._starts(warm_start, state, theta, data, *action):
             found = self._attempt(solver, start, point, p)
@@ -170,13 +170,10 @@ class Program:
                 break
             failed.append(found)
         else:
-            kind = SolverError if self._problem is None else NoStartLeft
-            raise kind("; ".join(failed), state, theta)
+            raise NoStartLeft("; ".join(failed), state, theta)
         restarts, best = len(failed), found
-        if self._problem is not None:
-            strict = self._sensitivity.is_minimum(found.z, p, found.lam, found.nu)
-            if not strict:
-                restarts, best = self._elsewhere(found, state, p, restarts)
+        if not self._sensitivity.is_minimum(found.z, p, found.lam, found.nu):
+            restarts, best = self._elsewhere(found, state, p, restarts)
         return Solution(
             state=state,
             theta=theta,
@@ -200,10 +197,7 @@ class Program:
             same = np.array_equal(warm_start.state, state)
             start = Start.SAME if same else Start.SHIFTED
             yield self._solver, start, self._from(warm_start, state, same=same)
-        if warm_start is None or self._problem is not None:
-            yield self._solver, Start.COLD, self._standing(state)
-        if self._problem is None:
-            return
+        yield self._solver, Start.COLD, self._standing(state)
         for other in self._solver.others:
             yield other, Start.COLD, self._standing(state)
         for point in self._regulated(state, *given):
@@ -214,7 +208,7 @@ class Program:
         """An optimum, or why there is none."""
         ocp, factor, units, rows = self._ocp, self._factor, self._units, self._rows
         z, lam, nu = point
-        if self._at_start is not None and not np.isfinite(self._at_start(z, p).full()).all():
+        if not np.isfinite(self._at_start(z, p).full()).all():
             return f"{solver.name} cannot begin where a number is not finite"
         function = self._function(solver, start)
         result = function(
@@ -276,9 +270,8 @@ class Program:
         ocp, problem = self._ocp, self._problem
         z = np.zeros(ocp.lower.size)
         z[ocp.states] = state
-        if problem is not None:
-            rest = np.clip(0.0, problem.lower, problem.upper)
-            z[ocp.inputs] = rest + share * (random_inputs(problem, seed, len(ocp.inputs)) - rest)
+        rest = np.clip(0.0, problem.lower, problem.upper)
+        z[ocp.inputs] = rest + share * (random_inputs(problem, seed, len(ocp.inputs)) - rest)
         return z, np.zeros(ocp.equality.size), np.zeros(ocp.lower.size)
 
     def _regulated(
@@ -301,7 +294,6 @@ class Program:
 
     @cached_property
     def _regulator(self) -> Regulator:
-        assert self._problem is not None
         return Regulator(self._problem)
 
     def _from(self, warm_start: Solution, state: Vector, *, same: bool) -> PrimalDual:
@@ -317,7 +309,7 @@ class Program:
         for part in ("states", "inputs", "slacks"):
             here, there = getattr(ocp, part), _shift(getattr(old, part), same)
             z[here], nu[here] = warm_start.primal[there], scale * warm_start.bound_duals[there]
-        for part in ("dynamics", "obstacles"):
+        for part in ("dynamics", "obstacles", "hard"):
             here, there = getattr(ocp, part), _shift(getattr(old, part), same)
             lam[here] = scale * warm_start.constraint_duals[there]
         incoming = old.initial if same else old.dynamics[0]
@@ -334,7 +326,7 @@ class Program:
         satisfies KKT and each solver returns another; here it is 0.  # departure L
         """
         which, beyond, ties = self._ocp.settled(p)
-        weights = np.broadcast_to(self._ocp.slack_weights, self._ocp.slacks.shape[1:])[which]
+        weights = self._ocp.slack_weights[which]
         inside = beyond > ties
         lam[self._ocp.obstacles[0][which]] = np.where(inside, weights, 0.0)
         nu[self._ocp.slacks[0][which]] = np.where(inside, 0.0, -weights)
@@ -350,7 +342,7 @@ def _start_of(ocp: Ocp) -> ca.Function:
 
 def _scales(ocp: Ocp) -> tuple[float, Vector, Vector]:
     """What the objective is divided by, the units of z, and those of the constraints."""
-    factor = min(1.0, ocp.problem.cost_scale) if isinstance(ocp, ProblemOcp) else 1.0
+    factor = min(1.0, ocp.problem.cost_scale)
     units = np.ones(ocp.lower.size)
     units[ocp.slacks] = np.minimum(1.0, HIGHEST_PRICE * factor / ocp.slack_weights)
     return factor, units, ocp.sizes[1]

@@ -9,7 +9,6 @@ from nmpcrl.control.content import content, is_ours
 from nmpcrl.control.diagnosis import SUBSTEPS
 from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.solution import Solution
-from nmpcrl.control.task import Task
 
 TOLERANCE = 1e-8  # what is taken where none is said
 LED_ASTRAY = f"led through numbers that are absurd: {SUBSTEPS}"
@@ -26,7 +25,7 @@ class Prepared(Protocol):
         warm_start: Solution | None,
         *action: Vector,
         began: float,
-        data: Matrix | None = None,
+        data: Matrix,
     ) -> Solution:
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
 
@@ -42,7 +41,6 @@ class Solver(ABC):
     """A way to solve Eq. (2), identified by `name`."""
 
     name: ClassVar[str]
-    prices_box: ClassVar[bool] = False  # whether it can do a task's `soft_box`
 
     tolerance: float = TOLERANCE  # of the KKT conditions, as the solver scales them
 
@@ -63,15 +61,6 @@ class Solver(ABC):
         kind, fields = type(self), {n: v for n, v in vars(self).items() if n != "tolerance"}
         changed = {n: v for n, v in fields.items() if v is not getattr(kind, n, fields)}
         return (repr(content([kind, changed])),) if changed or not is_ours(kind) else ()
-
-    def check(self, task: Task) -> None:
-        """Refuse a task that this solver cannot do.
-
-        Raises:
-            ValueError: it is one.
-        """
-        if task.soft_box and not self.prices_box:
-            raise ValueError(f"{self.name} can only forbid to leave the box: soft_box = True")
 
     @abstractmethod
     def prepare(self, ocp: Ocp) -> Prepared:

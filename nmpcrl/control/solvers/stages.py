@@ -1,17 +1,19 @@
-"""The stages of Eq. (2) in symbols, differentiated: what `model` promises, for one plant.
+"""The stages of a `Problem` in symbols, differentiated: the module `model` that `kernel` asks.
 
-Target, obstacles and discount are arguments, so that one compilation serves every task, horizon
-and layout of a plant.
+Horizon, discount, weights, bounds, data and the number of lines are arguments, so that one
+compilation serves them all. Rows are *fixed*, or of each *line* of some data (`Soft.each`); their
+derivatives are written at their nonzeros, and so are the products that fold them into a stage.
 """
 
+from collections.abc import Iterator
+
 import casadi as ca
+import numpy as np
 
 from nmpcrl.control.codegen.source import INNER, source
-from nmpcrl.control.ocp import Theta, stage_cost, terminal_cost
-from nmpcrl.control.plant import Plant
-from nmpcrl.control.task import overlap
+from nmpcrl.control.problem import Problem
 
-HEADER = '''"""{about}"""
+HEADER = '''"""A problem's functions."""
 
 import math
 
@@ -19,113 +21,192 @@ import numpy as np
 from numba import njit
 
 NX, NU, NTHETA = {sizes}
+SOFT, FIXED, PER, OWN, WIDTH = {rows}
 '''
+MATRICES = ("A", "B", "Q", "S", "R", "hx", "hu")
+SPARSE = ("A", "B", "hx", "hu")
+SHIFTED = {"line": "of", **dict.fromkeys(  # what the rows of a line are a part of
+    ("h", "size", "lam", "dlam", "hx", "hu", "stiff", "pull"), "at")}  # fmt: skip
+STEEP = 100.0  # slope of a stage that counts as much as a curvature of 2, as of Ipopt
 
 
-RETURNED = ("stage_cost", "terminal_cost", "constraint")
-MATRICES = ("A", "B", "Q", "S", "R", "hxx")
-
-
-def write(plant: Plant) -> str:
-    """The text of the module `model` for `plant`.
+def write(problem: Problem) -> str:
+    """The text of the module `model` for a problem.
 
     Raises:
-        CannotCompile: the plant's dynamics hold an operation that `codegen` does not know.
+        CannotCompile: an expression holds an operation that `codegen` does not know.
     """
-    sizes = (plant.n, plant.m, 2 * plant.n + plant.m + 1)
-    header = HEADER.format(about=", ".join(plant.state_names), sizes=sizes)
+    of = problem.expressions
+    sizes = of.x.numel(), of.u.numel(), of.theta.numel()
+    fixed = of.fixed.numel()
+    soft = int(np.isfinite(problem.weights[:fixed]).sum())
+    rows = soft, fixed, of.each.numel(), of.d.numel(), of.line.numel()
     bodies = [
-        INNER + source(f, returned=f.name() in RETURNED, matrices=MATRICES)
-        for f in functions(plant)
+        INNER
+        + source(
+            f,
+            returned=f.name_out() == ["cost"],
+            matrices=MATRICES,
+            sparse=SPARSE,
+            shifted=SHIFTED if "line" in f.name() else {},
+        )
+        for f in functions(problem)
     ]
-    return "\n\n".join([header, *bodies])
+    return "\n\n".join([HEADER.format(sizes=sizes, rows=rows), *bodies])
 
 
-def functions(plant: Plant) -> list[ca.Function]:
-    """Every function of `model`, as CasADi functions with the names of their arguments."""
-    n, m = plant.n, plant.m
-    x, u, theta = ca.SX.sym("x", n), ca.SX.sym("u", m), ca.SX.sym("theta", 2 * n + m + 1)
-    target, disc = ca.SX.sym("target", n), ca.SX.sym("disc", 3)
+def functions(problem: Problem) -> Iterator[ca.Function]:
+    """Every function of `model`, with the names of its arguments."""
+    e = problem.expressions
+    x, u, theta, d, n = e.x, e.u, e.theta, e.d, e.x.numel()
+    z = ca.vertcat(x, u)
     discount, costate = ca.SX.sym("discount"), ca.SX.sym("costate", n)
-    dx, du = ca.SX.sym("dx", n), ca.SX.sym("du", m)
-    w = ca.SX.sym("w", 2 * n + m + 1)
-    weights = Theta.split(theta, n, m)
-
-    next_x = plant.transition(x, u)
-    cost = stage_cost(x, u, weights, target)
-    terminal = terminal_cost(x, weights, target)
-    plane = x if n > 1 else ca.vertcat(x, 0)  # where no obstacle stands
-    constraint = overlap(plane[0], plane[1], disc[0], disc[1], disc[2]) + weights.constraint
-    lagrangian = discount * cost + ca.dot(costate, next_x)
-    hessian, _ = ca.hessian(lagrangian, ca.vertcat(x, u))
-    expand = {
-        "A": ca.jacobian(next_x, x),
-        "B": ca.jacobian(next_x, u),
-        "lx": ca.gradient(discount * cost, x),
-        "lu": ca.gradient(discount * cost, u),
-        "Q": hessian[:n, :n],
-        "S": hessian[n:, :n],
-        "R": hessian[n:, n:],
-    }
-    terminal_hessian, lx = ca.hessian(discount * terminal, x)
-    constraint_hessian, hx = ca.hessian(constraint, x)
-
-    def along(gradient: ca.SX, *moved: tuple[ca.SX, ca.SX]) -> ca.SX:
-        """The derivative of a gradient while each variable moves along its direction."""
-        variables, directions = (ca.vertcat(*part) for part in zip(*moved, strict=True))
-        return ca.jtimes(gradient, variables, directions)
-
-    stage_gradient, terminal_gradient, constraint_gradient = (
-        ca.gradient(f, theta) for f in (cost, terminal, constraint)
+    dx, du, w = (ca.SX.sym(name, of.numel()) for name, of in (("dx", x), ("du", u), ("w", theta)))
+    dcostate = ca.SX.sym("dcostate", n)
+    point = {"x": x, "u": u, "theta": theta, "d": d}
+    end = {"x": x, "theta": theta, "d": d}
+    weighed = {**point, "discount": discount, "costate": costate}
+    path, last = discount * e.stage + ca.dot(costate, e.next_x), discount * e.terminal
+    hessian, slope = ca.hessian(path, z)
+    bend_end, slope_end = ca.hessian(last, x)
+    moved = ((x, dx), (u, du), (costate, dcostate), (theta, w))
+    path_theta, last_theta, first_theta = (
+        ca.gradient(f, theta) for f in (path, last, e.initial)
     )
-    stage = {"x": x, "u": u, "theta": theta, "target": target}
-    last = {"x": x, "theta": theta, "target": target}
-    obstacle = {"x": x, "theta": theta, "disc": disc}
-    weighted = {**stage, "discount": discount, "costate": costate}
-    return [
-        _function("transition", {"x": x, "u": u}, {"next_x": next_x}),
-        _function("stage_cost", stage, {"cost": cost}),
-        _function("terminal_cost", last, {"cost": terminal}),
-        _function("constraint", obstacle, {"h": constraint}),
-        _function("expand_stage", weighted, expand),
-        _function(
-            "expand_terminal", {**last, "discount": discount}, {"lx": lx, "Q": terminal_hessian}
-        ),
-        _function("expand_constraint", obstacle, {"hx": hx, "hxx": constraint_hessian}),
-        _function("stage_gradient", stage, {"gradient": stage_gradient}),
-        _function("terminal_gradient", last, {"gradient": terminal_gradient}),
-        _function("constraint_gradient", obstacle, {"gradient": constraint_gradient}),
-        _function(
-            "stage_mixed_hessian",
-            {**stage, "w": w},
-            {
-                "lx": along(ca.gradient(cost, x), (theta, w)),
-                "lu": along(ca.gradient(cost, u), (theta, w)),
-            },
-        ),
-        _function(
-            "terminal_mixed_hessian",
-            {**last, "w": w},
-            {"lx": along(ca.gradient(terminal, x), (theta, w))},
-        ),
-        _function("constraint_mixed_hessian", {**obstacle, "w": w}, {"hx": along(hx, (theta, w))}),
-        _function(
-            "stage_gradient_along",
-            {**stage, "dx": dx, "du": du, "w": w},
-            {"gradient": along(stage_gradient, (x, dx), (u, du), (theta, w))},
-        ),
-        _function(
-            "terminal_gradient_along",
-            {**last, "dx": dx, "w": w},
-            {"gradient": along(terminal_gradient, (x, dx), (theta, w))},
-        ),
-        _function(
-            "constraint_gradient_along",
-            {**obstacle, "dx": dx, "w": w},
-            {"gradient": along(constraint_gradient, (x, dx), (theta, w))},
-        ),
-    ]
+
+    yield _function("transition", point, {"next_x": e.next_x})
+    yield _function("stage_cost", point, {"cost": e.stage})
+    yield _function("terminal_cost", end, {"cost": e.terminal})
+    yield _function("initial_cost", end, {"cost": e.initial})
+    yield _function("stage_size", point, {"cost": _size(e.stage, z)})
+    yield _function("terminal_size", end, {"cost": _size(e.terminal, x)})
+    of_stage = ca.gradient(discount * e.stage, z)
+    expand = {
+        "A": ca.jacobian(e.next_x, x), "B": ca.jacobian(e.next_x, u),
+        "lx": of_stage[:n], "lu": of_stage[n:],
+        "Q": hessian[:n, :n], "S": hessian[n:, :n], "R": hessian[n:, n:],
+    }  # fmt: skip
+    yield _function("expand_stage", weighed, expand)
+    yield _function(
+        "expand_terminal", {**end, "discount": discount}, {"lx": slope_end, "Q": bend_end}
+    )
+    yield _function("stage_theta", weighed, {"gradient": path_theta})
+    yield _function("terminal_theta", {**end, "discount": discount}, {"gradient": last_theta})
+    yield _function("initial_theta", end, {"gradient": first_theta})
+    mixed = ca.jtimes(slope, theta, w)
+    of_theta = {"lx": mixed[:n], "lu": mixed[n:], "f": ca.jtimes(e.next_x, theta, w)}
+    yield _function("stage_mixed", {**weighed, "w": w}, of_theta)
+    yield _function(
+        "terminal_mixed",
+        {**end, "discount": discount, "w": w},
+        {"lx": ca.jtimes(slope_end, theta, w)},
+    )
+    steps = {"dx": dx, "du": du, "dcostate": dcostate, "w": w}
+    yield _function("stage_along", {**weighed, **steps}, {"gradient": _along(path_theta, *moved)})
+    yield _function(
+        "terminal_along",
+        {**end, "discount": discount, "dx": dx, "w": w},
+        {"gradient": _along(last_theta, (x, dx), (theta, w))},
+    )
+    yield _function(
+        "initial_along", {**end, "w": w}, {"gradient": ca.jtimes(first_theta, theta, w)}
+    )
+    line = {"line": e.line}
+    for name, rows, sizes, more in (
+        ("fixed", e.fixed, problem.row_sizes(e.fixed), {}),
+        ("line", e.each, problem.row_sizes(e.each), line),
+    ):
+        yield _function(f"{name}_sizes", {**point, **more}, {"size": sizes})
+        yield from _of_rows(name, rows, {**point, **more}, (dx, du, w))
+        at_end = ca.vertcat(
+            ca.SX(0, 1),
+            *(0 if ca.depends_on(row, u) else row for row in ca.vertsplit(rows)),
+        )
+        yield from _of_rows(f"{name}_end", at_end, {**point, **more}, (dx, du, w))
 
 
-def _function(name: str, of: dict[str, ca.SX], results: dict[str, ca.SX]) -> ca.Function:
-    return ca.Function(name, [*of.values()], [*results.values()], [*of], [*results])
+def _of_rows(
+    name: str, rows: ca.SX, point: dict[str, ca.SX], steps: tuple[ca.SX, ca.SX, ca.SX]
+) -> Iterator[ca.Function]:
+    """What is asked of rows h, all results but h, hx and hu being added to what is there."""
+    x, u, theta, n = point["x"], point["u"], point["theta"], point["x"].numel()
+    dx, du, w = steps
+    z = ca.vertcat(x, u)
+    lam, dlam = ca.SX.sym("lam", rows.numel()), ca.SX.sym("dlam", rows.numel())
+    held = ca.dot(lam, rows)
+    hessian, slope = ca.hessian(held, z)
+    slopes = ca.jacobian(rows, z)
+    of_theta = ca.gradient(held, theta)
+    parts = {"Q": hessian[:n, :n], "S": hessian[n:, :n], "R": hessian[n:, n:]}
+    yield _function(f"{name}_rows", point, {"h": rows})
+    yield _function(
+        f"expand_{name}",
+        {**point, "lam": lam},
+        {"hx": slopes[:, :n], "hu": slopes[:, n:]},
+        {"px": slope[:n], "pu": slope[n:], **parts},
+    )
+    hx, Hx = _nonzeros("hx", slopes[:, :n])
+    hu, Hu = _nonzeros("hu", slopes[:, n:])
+    stiff, pull = ca.SX.sym("stiff", rows.numel()), ca.SX.sym("pull", rows.numel())
+    D = ca.diag(stiff)
+    yield _function(
+        f"condense_{name}",
+        {"stiff": stiff, "pull": pull, "hx": hx, "hu": hu},
+        {},
+        {"q": Hx.T @ pull, "r": Hu.T @ pull,
+         "Q": Hx.T @ D @ Hx, "S": Hu.T @ D @ Hx, "R": Hu.T @ D @ Hu},
+    )  # fmt: skip
+    yield _function(
+        f"along_{name}", {"hx": hx, "hu": hu, "dx": dx, "du": du}, {"h": Hx @ dx + Hu @ du}
+    )
+    yield _function(f"theta_{name}", {**point, "lam": lam}, {}, {"gradient": of_theta})
+    mixed = ca.jtimes(slope, theta, w)
+    yield _function(
+        f"mixed_{name}",
+        {**point, "lam": lam, "w": w},
+        {"h": ca.jtimes(rows, theta, w)},
+        {"lx": mixed[:n], "lu": mixed[n:]},
+    )
+    yield _function(
+        f"along_theta_{name}",
+        {**point, "lam": lam, "dx": dx, "du": du, "dlam": dlam, "w": w},
+        {},
+        {"gradient": _along(of_theta, (x, dx), (u, du), (lam, dlam), (theta, w))},
+    )
+
+
+def _along(of: ca.SX, *moved: tuple[ca.SX, ca.SX]) -> ca.SX:
+    """The derivative while each variable moves along its direction."""
+    variables, directions = (ca.vertcat(*part) for part in zip(*moved, strict=True))
+    return ca.jtimes(of, variables, directions)
+
+
+def _size(cost: ca.SX, z: ca.SX) -> ca.SX:
+    """Half of the largest curvature of a cost along an axis, or a share of its slope."""
+    hessian, slope = ca.hessian(cost, z)
+    return ca.fmax(ca.norm_inf(ca.diag(hessian)) / 2, ca.norm_inf(slope) / STEEP)
+
+
+def _nonzeros(name: str, slopes: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """An argument for slopes, and these slopes: its entries where they are no constants."""
+    argument = ca.SX.sym(name, *slopes.shape)
+    found = ca.SX(slopes.sparsity())
+    for i, j in zip(*slopes.sparsity().get_triplet(), strict=True):
+        entry = slopes[i, j]
+        found[i, j] = entry if entry.is_constant() else argument[i, j]
+    return argument, found
+
+
+def _function(
+    name: str,
+    of: dict[str, ca.SX],
+    results: dict[str, ca.SX],
+    added: dict[str, ca.SX] | None = None,
+) -> ca.Function:
+    """A function that writes results in place, and adds others to what is there."""
+    for what, value in (added or {}).items():
+        there = ca.SX.sym(what, *value.shape)
+        of = {**of, what: there}
+        results = {**results, what: ca.project(there, value.sparsity()) + value}
+    options = {"allow_duplicate_io_names": True}
+    return ca.Function(name, [*of.values()], [*results.values()], [*of], [*results], options)

@@ -7,7 +7,6 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
 
 SHARES = (0.4, 1.0)  # of the bounds near which inputs are held
@@ -18,12 +17,12 @@ PUSH = 1.01e-2  # inside its bounds an input stays, that of `kernel`, so that it
 MOST = 64  # cold starts that can be asked for
 
 
-def cold_inputs(of: Plant | Problem, horizon: int, count: int) -> list[Matrix]:
+def cold_inputs(of: Problem, horizon: int, count: int) -> list[Matrix]:
     """The inputs of the cold starts that follow the one at rest, each of shape (horizon, m)."""
     return list(islice(_inputs(of, horizon), count))
 
 
-def random_inputs(of: Plant | Problem, seed: int, horizon: int) -> Matrix:
+def random_inputs(of: Problem, seed: int, horizon: int) -> Matrix:
     """Inputs drawn within their bounds, and near 0 where these are wide, shape (horizon, m)."""
     lower, upper = _sides(of)
     return np.random.default_rng(seed).uniform(lower, upper, (horizon, lower.size))
@@ -66,28 +65,28 @@ class Regulator:
             inputs[i] = np.clip(still + k + K @ (x - state), self._lower, self._upper)
             if i == 0 and action:
                 inputs[0] = action[0]
-            x = self._step(x, inputs[i], theta, data[i]).full().ravel()
+            x = self._step(x, inputs[i], theta, self._problem.own(data[i])).full().ravel()
         return inputs if np.isfinite(inputs).all() else None
 
     def slopes(self, state: Vector, theta: Vector, data: Matrix) -> Matrix:
         """The model's derivative in the state at rest, shape (n, n)."""
-        of_state_and_input: Matrix = self._stage(state, self._still, theta, data[0])[1].full()
+        of_state_and_input: Matrix = self._stage(state, self._still, theta, self._problem.own(data[0]))[1].full()
         return of_state_and_input[:, : state.size]
 
     def states(self, state: Vector, inputs: Matrix, theta: Vector, data: Matrix) -> Matrix:
         """Where inputs lead from a state, shape (N + 1, n)."""
         found = [state]
         for u, d in zip(inputs, data, strict=False):
-            found.append(self._step(found[-1], u, theta, d).full().ravel())
+            found.append(self._step(found[-1], u, theta, self._problem.own(d)).full().ravel())
         return np.array(found)
 
     def _gains(self, state: Vector, theta: Vector, data: Matrix) -> list[tuple[Vector, Matrix]]:
         """k and K of every stage, from the last to the first and turned around."""
         n, gamma, found = state.size, self._problem.gamma, []
-        P, p = (value.full() for value in self._end(state, theta, data[-1]))
+        P, p = (value.full() for value in self._end(state, theta, self._problem.own(data[-1])))
         P, p = _convex(P), p.ravel()
         for i in range(self._problem.horizon - 1, -1, -1):
-            values = self._stage(state, self._still, theta, data[i])
+            values = self._stage(state, self._still, theta, self._problem.own(data[i]))
             after, slopes, bend, slope = (value.full() for value in values)
             bend, to_go = _convex(bend), gamma * P  # discounted as seen from this stage
             ahead = gamma * p + to_go @ (after.ravel() - state)
@@ -106,7 +105,7 @@ def _convex(bend: Matrix) -> Matrix:
     return np.asarray((vectors * np.maximum(values, LEAST * max(1.0, *values))) @ vectors.T)
 
 
-def _inputs(of: Plant | Problem, horizon: int) -> Iterator[Matrix]:
+def _inputs(of: Problem, horizon: int) -> Iterator[Matrix]:
     """Each input held near a bound, gently and then fully; then drawn ones."""
     lower, upper = _sides(of)
     signs = product((True, False), repeat=lower.size)
@@ -118,7 +117,7 @@ def _inputs(of: Plant | Problem, horizon: int) -> Iterator[Matrix]:
         yield random_inputs(of, seed, horizon)
 
 
-def _sides(of: Plant | Problem) -> tuple[Vector, Vector]:
+def _sides(of: Problem) -> tuple[Vector, Vector]:
     """Bounds at most 1 from the input that is nearest to 0."""
     nearest = np.clip(0.0, of.lower, of.upper)
     return np.maximum(of.lower, nearest - 1.0), np.minimum(of.upper, nearest + 1.0)
