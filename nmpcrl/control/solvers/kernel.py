@@ -847,13 +847,22 @@ def begin_multipliers(task, point, duals, start, mu, factor, warm_start):
 
 
 @inlined
+def old_row(task, last, i, j, solution):
+    """The multiplier of row j of a stage in a solution."""
+    slacks, first = slacks_of(task), FIXED + PER * task.lines
+    lam = offsets(task, last)[0] + NX + slacks
+    if j < first:
+        return solution[lam + place_of_rows(task, i, last) + place_of_row(task, j)]
+    nu = lam + place_of_rows(task, last, last) + slacks + FIXED - SOFT
+    state, sign = int(task.sides[j - first, 0]), task.sides[j - first, 1]
+    return sign * solution[nu + offsets(task, i)[0] + state]
+
+
+@inlined
 def begin_rows(task, point, duals, start, mu, factor, warm_start):
     """The rows' multipliers: central, or the warm start's unless these are nearer to 0 or W."""
-    last, ahead, slacks = len(point.u), 1 if start == SHIFTED else 0, slacks_of(task)
+    last, ahead = len(point.u), 1 if start == SHIFTED else 0
     gain = task.rate[0] / task.rate[ahead] / factor
-    lam = offsets(task, last)[0] + NX + slacks
-    nu = lam + place_of_rows(task, last, last) + slacks + FIXED - SOFT
-    first = FIXED + PER * task.lines
     for i in range(task.begin, last + 1):
         for j in range(duals.lam.shape[1]):
             source = min(i + ahead, last)
@@ -861,13 +870,7 @@ def begin_rows(task, point, duals, start, mu, factor, warm_start):
                 source = i
             middle = mu / point.slack[i, j]
             if start != COLD and task.kind[source, j] == PLANNED:
-                if j < first:
-                    at = lam + place_of_rows(task, source, last) + place_of_row(task, j)
-                    old = gain * warm_start[at]
-                else:
-                    side = task.sides[j - first]
-                    at = nu + offsets(task, source)[0] + int(side[0])
-                    old = gain * side[1] * warm_start[at]
+                old = gain * old_row(task, last, source, j, warm_start)
                 middle = max(old, middle) if point.h[i, j] < 0.0 else min(old, middle)
             weight = task.weights[i, j]
             duals.lam[i, j] = min(max(middle, INSIDE * weight), (1.0 - INSIDE) * weight)

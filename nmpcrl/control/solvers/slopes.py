@@ -17,42 +17,53 @@ model carry it away.
 import numpy as np
 from numba import njit, types
 
-from .expressions import (
-    NROWS,
-    initial_along,
-    last_along,
-    last_mixed,
-    stage_along,
-    stage_mixed,
-)
 from .kernel import (
     INSIDE,
+    PLANNED,
+    PROBLEM,
     RIGID,
     SAME,
     add,
+    allocate,
+    begin_multipliers,
+    condense,
     factorise,
-    initialise,
+    hold,
     inlined,
+    linearise,
     matrix,
+    measure,
     offsets,
+    old_row,
     options,
+    rows_along,
     scale_rows,
+    scaled,
+    settle,
     sweep,
     vector,
 )
-from .model import NTHETA, NU, NX
-from .rows import (
-    PLANNED,
-    PROBLEM,
-    allocate,
-    condense,
-    hold,
-    linearise,
-    measure,
-    place_of_rows,
-    rows_along,
-    scaled,
-    settle,
+from .model import (
+    FIXED,
+    NTHETA,
+    NU,
+    NX,
+    OWN,
+    PER,
+    WIDTH,
+    along_theta_fixed,
+    along_theta_fixed_end,
+    along_theta_line,
+    along_theta_line_end,
+    initial_along,
+    mixed_fixed,
+    mixed_fixed_end,
+    mixed_line,
+    mixed_line_end,
+    stage_along,
+    stage_mixed,
+    terminal_along,
+    terminal_mixed,
 )
 
 STIFF = 1e4  # at least, where a row is active
@@ -65,67 +76,91 @@ ROWS = 1e-10  # barrier parameter of the rows: of RIGID they lose digits, where 
 @inlined
 def restore_rows(task, duals, factor, solved):
     """The rows' multipliers as they were solved for, upon which the costates depend."""
-    last = len(duals.lam) - 1
-    lam = offsets(task, last)[0] + NX + NROWS
-    for i in range(last + 1):
-        row = lam + place_of_rows(task, i, last)
-        for j in range(NROWS):
-            weight = task.weights[i, j]
-            old = solved[row + j] / factor if task.kind[i, j] == PLANNED else 0.0
+    for i in range(task.begin, len(duals.lam)):
+        for j in range(duals.lam.shape[1]):
+            weight, old = task.weights[i, j], 0.0
+            if task.kind[i, j] == PLANNED:
+                old = old_row(task, len(duals.lam) - 1, i, j, solved) / factor
             duals.lam[i, j] = min(max(old, INSIDE * weight), (1.0 - INSIDE) * weight)
 
 
 @inlined
-def independent(task, point, duals, stages, step):
+def independent(task, stages, step):
     """Whether all active rows can move as they like, and bounds stay; `factorise` after `condense`.
 
     Each active row is asked to move by another amount, and all have to.
     """
-    last, rows = len(point.u), 0
-    for i in range(last + 1):
-        for a in range(NX):
-            stages.q[i, a] = 0.0
-        for a in range(NU if i < last else 0):
-            stages.r[i, a] = 0.0
-        for j in range(NROWS):
-            stages.off[i, j] = 0.0
+    last, rows = len(step.u), 0
+    stages.q[:] = 0.0
+    stages.r[:] = 0.0
+    stages.off[:] = 0.0
+    for i in range(task.begin, last + 1):
+        for j in range(stages.off.shape[1]):
             if task.kind[i, j] == PLANNED and stages.stiff[i, j] > STIFF:
                 rows += 1
-                apart = 1.0 + (GOLDEN * rows) % 1.0
-                stages.off[i, j] = apart
-                pull = stages.stiff[i, j] * apart
-                for a in range(NX):
-                    stages.q[i, a] += pull * stages.hx[i, j, a]
-                for a in range(NU if i < last else 0):
-                    stages.r[i, a] += pull * stages.hu[i, j, a]
+                stages.off[i, j] = 1.0 + (GOLDEN * rows) % 1.0
+        pull_of_rows(task, stages, i)
     if not factorise(stages, 0.0, task.first, step):
         return False
     if rows == 0:
         return True
     sweep(task, stages, step)
     rows_along(task, stages, step)
-    for i in range(last + 1):
-        for j in range(NROWS):
+    for i in range(task.begin, last + 1):
+        for j in range(stages.off.shape[1]):
             if stages.off[i, j] > 0.0 and abs(stages.off[i, j] + step.lam[i, j]) > LEFT:
                 return False
     return True
 
 
 @inlined
+def pull_of_rows(task, stages, i):
+    """Add h' stiff off of a stage to q and r."""
+    first = FIXED + PER * task.lines
+    for j in range(stages.off.shape[1]):
+        pull = stages.stiff[i, j] * stages.off[i, j]
+        if j >= first:
+            side = task.sides[j - first]
+            stages.q[i, int(side[0])] += pull * side[1]
+            continue
+        for a in range(NX):
+            stages.q[i, a] += pull * stages.hx[i, j, a]
+        for a in range(NU if i < len(stages.A) else 0):
+            stages.r[i, a] += pull * stages.hu[i, j, a]
+
+
+@inlined
 def right_hand_side(task, point, duals, stages, step, w, drift, steer):
     """G w as q, r and `off`, and as the drift, after `condense` and `factorise`."""
-    last = len(point.u)
-    held, h, f = np.empty(NROWS), np.empty(NROWS), np.empty(NX)
+    last, theta = len(point.u), task.theta
+    held, f, off = stages.held, np.empty(NX), stages.off
     for a in range(NX):
         drift[0, a] = 0.0
     for i in range(last + 1):
-        hold(task, duals, i, held)
-        q, rate, data = stages.q[i], task.rate[i : i + 1], task.data[i]
+        q, r, d, rate = stages.q[i], stages.r[i], task.data[i], task.rate[i : i + 1]
+        x, u = point.x[i], point.u[min(i, last - 1)]
         if i < last:
-            stage_mixed(
-                point.x[i], point.u[i], task.theta, data, rate, stages.p[i + 1], held, w,
-                q, stages.r[i], f, h,
-            )  # fmt: skip
+            stage_mixed(x, u, theta, d, rate, stages.p[i + 1], w, q, r, f)
+        else:
+            terminal_mixed(x, theta, d, rate, w, q)
+        if i >= task.begin:
+            hold(task, duals, i, held)
+            for j in range(off.shape[1]):
+                off[i, j] = 0.0
+            if i < last:
+                mixed_fixed(x, u, theta, d, held, w, q, r, off[i], q, r)
+            else:
+                mixed_fixed_end(x, u, theta, d, held, w, q, r, off[i], q, r)
+            for line in range(task.lines):
+                of, at = OWN + WIDTH * line, FIXED + PER * line
+                if i < last:
+                    mixed_line(x, u, theta, d, d, held, w, q, r, off[i], q, r, of, at)
+                else:
+                    mixed_line_end(x, u, theta, d, d, held, w, q, r, off[i], q, r, of, at)
+            for j in range(off.shape[1]):
+                off[i, j] = off[i, j] if task.kind[i, j] == PLANNED else 0.0
+            pull_of_rows(task, stages, i)
+        if i < last:
             for a in range(NU):
                 steer[i, a] = 0.0
                 for b in range(NX if i >= task.first else 0):
@@ -136,28 +171,17 @@ def right_hand_side(task, point, duals, stages, step, w, drift, steer):
                     drift[i + 1, a] += stages.A[i, a, b] * drift[i, b]
                 for b in range(NU):
                     drift[i + 1, a] += stages.B[i, a, b] * steer[i, b]
-        else:
-            last_mixed(point.x[i], task.theta, data, rate, held, w, q, h)
-        for j in range(NROWS):
-            off = h[j] if task.kind[i, j] == PLANNED else 0.0
-            stages.off[i, j] = off
-            pull = stages.stiff[i, j] * off
-            for a in range(NX):
-                q[a] += pull * stages.hx[i, j, a]
-            if i < last:
-                for a in range(NU):
-                    stages.r[i, a] += pull * stages.hu[i, j, a]
         for b in range(NX):
             for a in range(NX):
                 q[a] += stages.Q[i, a, b] * drift[i, b]
             if i < last:
                 for a in range(NU):
-                    stages.r[i, a] += stages.S[i, a, b] * drift[i, b]
+                    r[a] += stages.S[i, a, b] * drift[i, b]
         for b in range(NU if i < last else 0):
             for a in range(NX):
                 q[a] += stages.S[i, b, a] * steer[i, b]
             for a in range(NU):
-                stages.r[i, a] += stages.R[i, a, b] * steer[i, b]
+                r[a] += stages.R[i, a, b] * steer[i, b]
 
 
 @inlined
@@ -180,23 +204,36 @@ def costates_along(stages, step, dp):
 @inlined
 def gradient_along(task, point, duals, stages, step, dp, factor, tie, w, out):
     """The derivative of the value's gradient along the step and w."""
-    last = len(point.u)
-    gradient, held, h = np.empty(NTHETA), np.empty(NROWS), np.empty(NROWS)
-    initial_along(point.x[0], task.theta, task.data[0], w, gradient)
+    last, theta, rows = len(point.u), task.theta, duals.lam.shape[1]
+    gradient, held, h = np.empty(NTHETA), stages.held, np.empty(rows)
+    initial_along(point.x[0], theta, task.data[0], w, gradient)
     for a in range(NTHETA):
         out[a] = gradient[a]
     for i in range(last + 1):
-        hold(task, duals, i, held)
+        for j in range(rows):
+            held[j] = 0.0
+        if i >= task.begin:
+            hold(task, duals, i, held)
         if i == 0:
             settle(task, point, tie, h, held)
-        rate, data, dlam = task.rate[i : i + 1], task.data[i], step.lam[i]
+        rate, d, dlam, dx = task.rate[i : i + 1], task.data[i], step.lam[i], step.x[i]
+        x, u, du = point.x[i], point.u[min(i, last - 1)], step.u[min(i, last - 1)]
         if i < last:
-            stage_along(
-                point.x[i], point.u[i], task.theta, data, rate, stages.p[i + 1], held,
-                step.x[i], step.u[i], dp[i + 1], dlam, w, gradient,
-            )  # fmt: skip
+            stage_along(x, u, theta, d, rate, stages.p[i + 1], dx, du, dp[i + 1], w, gradient)
+            along_theta_fixed(x, u, theta, d, held, dx, du, dlam, w, gradient, gradient)
         else:
-            last_along(point.x[i], task.theta, data, rate, held, step.x[i], dlam, w, gradient)
+            terminal_along(x, theta, d, rate, dx, w, gradient)
+            along_theta_fixed_end(x, u, theta, d, held, dx, du, dlam, w, gradient, gradient)
+        for line in range(task.lines):
+            of, at = OWN + WIDTH * line, FIXED + PER * line
+            if i < last:
+                along_theta_line(
+                    x, u, theta, d, d, held, dx, du, dlam, w, gradient, gradient, of, at
+                )
+            else:
+                along_theta_line_end(
+                    x, u, theta, d, d, held, dx, du, dlam, w, gradient, gradient, of, at
+                )
         add(out, 0, factor, gradient)
 
 
@@ -205,7 +242,7 @@ SIGNATURE = types.boolean(*PROBLEM, vector, vector, matrix, matrix, vector)
 
 @njit(SIGNATURE, cache=True, **options)
 def slopes(
-    data, lower, upper, kind, discount, weights, factor, tie,
+    data, lower, upper, sides, kind, discount, weights, tie,
     state, theta, action, fixed, solved, w, of_states, of_inputs, out,
 ):  # fmt: skip
     """The Hessian times w, plus the gradient of a weighted sum of the plan, shape (NTHETA,).
@@ -213,11 +250,14 @@ def slopes(
     `of_states` (N + 1, NX) and `of_inputs` (N, NU) are the sum's weights. Returns whether it could
     be formed: not where the solution is no strict minimum, or inputs cannot follow what is active.
     """
-    task, factor = scaled(theta, data, lower, upper, kind, discount, weights, factor, fixed, state)
     N, mu = len(discount) - 1, RIGID
-    point, _, duals, stages, step = allocate(N)
+    point, _, duals, stages, step = allocate(N, len(weights) + len(sides))
     drift, dp, steer = np.empty((N + 1, NX)), np.empty((N + 1, NX)), np.empty((N, NU))
-    initialise(task, point, duals, state, action, SAME, mu, factor, solved)
+    task, factor = scaled(
+        theta, data, lower, upper, sides, kind, discount, weights, fixed, point, state, action,
+        SAME, solved,
+    )  # fmt: skip
+    begin_multipliers(task, point, duals, SAME, mu, factor, solved)
     for i in range(N + 1):  # the plan itself: rolled out, an unstable model would leave it
         at = offsets(task, i)[0]
         for a in range(NX):
@@ -226,7 +266,8 @@ def slopes(
     restore_rows(task, duals, factor, solved)
     linearise(task, point, duals, stages)
     condense(task, point, duals, stages, mu)
-    if not independent(task, point, duals, stages, step):
+    step.lam[:] = 0.0
+    if not independent(task, stages, step):
         return False
     right_hand_side(task, point, duals, stages, step, w, drift, steer)
     for i in range(N + 1):
@@ -247,6 +288,6 @@ def slopes(
         for a in range(NU if i < N else 0):
             step.u[i, a] += steer[i, a]
     rows_along(task, stages, step)
-    scale_rows(step.lam.ravel(), stages.off.ravel(), stages.stiff.ravel())
+    scale_rows(task, stages, step)
     gradient_along(task, point, duals, stages, step, dp, factor, tie, w, out)
     return True
