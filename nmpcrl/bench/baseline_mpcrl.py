@@ -26,8 +26,7 @@ from mpcrl import (
 
 from nmpcrl import Vector
 from nmpcrl.control import Ipopt, Nmpc
-from nmpcrl.control.ocp import Theta, stage_cost, terminal_cost
-from nmpcrl.control.task import overlap
+from nmpcrl.control.task import Theta, overlap, stage_cost, terminal_cost
 from nmpcrl.study import paper
 
 
@@ -82,7 +81,7 @@ def _mpc(nmpc: Nmpc) -> Mpc:
     for i in range(horizon):
         objective += discount[i] * stage_cost(x[:, i], u[:, i], weights, task.target)
     for number, disc in enumerate(zip(*task.discs, strict=True)):
-        tightened = overlap(x[0, :], x[1, :], *disc) + weights.constraint
+        tightened = overlap(x[0, :], x[1, :], *disc) + weights.c
         _, _, sigma = mpc.constraint(f"obstacle_{number}", tightened, "<=", 0, soft=True)
         objective += nmpc.slack_weight * (sigma @ discount)
     mpc.minimize(objective)

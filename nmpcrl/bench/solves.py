@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Plant, Riccati, Solution, SolverError
+from nmpcrl.control import Nmpc, Problem, Riccati, Solution, SolverError
 from nmpcrl.control.solvers import baselines
-from nmpcrl.control.solvers.riccati import Code, machine_code
+from nmpcrl.control.solvers.riccati import machine_code
 from nmpcrl.study import paper
 
 if TYPE_CHECKING:
@@ -44,8 +44,8 @@ def solvers() -> dict[str, Solve]:
     named: dict[str, Solve] = {
         name: paper.nmpc(solver=name).solve for name in ("riccati", "fatrop", "ipopt")
     }
-    ocp = paper.nmpc().ocp
-    return named | {"ipopt MX": baselines.mx(ocp), "rebuilt": baselines.rebuilt(ocp)}
+    nmpc = paper.nmpc()
+    return named | {"ipopt MX": baselines.mx(nmpc), "rebuilt": baselines.rebuilt(nmpc)}
 
 
 def interleaved(episodes: int, steps: int) -> Columns:
@@ -151,16 +151,16 @@ def watched() -> tuple[Nmpc, list[float]]:
     """A controller that has solved once, and a list to which it adds its machine code's times."""
     seconds: list[float] = []
 
-    def timing(plant: Plant) -> Code:
-        code = machine_code(plant)
+    def timing(problem: Problem) -> Any:
+        code = machine_code(problem)
 
         def timed(*arguments: Any) -> Any:
             began = time.perf_counter()
-            result = code.solve(*arguments)
+            result = code(*arguments)
             seconds.append(time.perf_counter() - began)
             return result
 
-        return code._replace(solve=timed)
+        return timed
 
     nmpc = paper.nmpc(solver=Riccati(code=timing))
     nmpc.solve(nmpc.task.start, THETA)

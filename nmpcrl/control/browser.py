@@ -7,10 +7,10 @@ import numpy as np
 
 from nmpcrl.control.codegen import browser
 from nmpcrl.control.codegen.source import source
-from nmpcrl.control.ocp import transcribe_problem
+from nmpcrl.control.ocp import transcribe as transcribe_problem
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
-from nmpcrl.control.solvers import problem_stages, riccati, stages
+from nmpcrl.control.solvers import riccati, stages
 from nmpcrl.control.solvers.charge import DISCS, LONGEST
 from nmpcrl.control.solvers.starts import cold_inputs, random_inputs
 from nmpcrl.control.task import Task

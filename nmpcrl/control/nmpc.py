@@ -76,6 +76,9 @@ class Nmpc(Described):
                 other side of a kink in theta_c.  # departure L
         """
         self.solver = solver_of(solver)
+        self.plant: Plant | None = None  # what predicts and what is asked of it, where there is a
+        self.task: Task | None = None  # task
+        self.slack_weight: float | None = None
         if isinstance(plant, Problem):
             if task is not None or (horizon, gamma, slack_weight) != (HORIZON, GAMMA, SLACK_WEIGHT):
                 raise ValueError(
@@ -90,8 +93,8 @@ class Nmpc(Described):
                 raise ValueError(f"slack_weight = {slack_weight} must be a positive number")
             if task.start.size != plant.n:
                 raise ValueError(f"the task has {task.start.size} states and the plant {plant.n}")
-            self._plant, self._task, self._slack_weight = plant, task, float(slack_weight)
-            self.problem = task.problem(plant, horizon, gamma, float(slack_weight))
+            self.plant, self.task, self.slack_weight = plant, task, float(slack_weight)
+            self.problem = task.problem(plant, horizon, gamma, self.slack_weight)
         of = self.problem
         self.horizon, self.gamma, self.n, self.m = of.horizon, of.gamma, of.states, of.inputs
         self.largest = max(ABSURD, 1e3 * float(np.abs(of.theta).max()))  # number in theta
@@ -206,44 +209,14 @@ class Nmpc(Described):
         """Without numba, riccati's key is that of fatrop, which then solves."""
         solver = self.solver if self.solver.available else Fatrop(self.solver.tolerance)
         how = (solver.name, solver.tolerance, self.ties_active, *solver.described)
-        if self.is_problem:
+        if self.task is None:
             return "nmpc", self.problem.key, *how
-        said = (self.horizon, self.gamma, self._slack_weight)
-        return "nmpc", self._plant.key, self._task.key, *said, *how
+        said = (self.horizon, self.gamma, self.slack_weight)
+        return "nmpc", self.plant.key, self.task.key, *said, *how
 
     def clip(self, action: Vector) -> Vector:
         """The nearest action within the bounds, shape (m,)."""
         return np.minimum(np.maximum(action, self.lower), self.upper)
-
-    @property
-    def plant(self) -> Plant:
-        """What predicts, where there is a task."""
-        self._refuse_problem("plant")
-        return self._plant
-
-    @property
-    def task(self) -> Task:
-        """Target, box and obstacles."""
-        self._refuse_problem("task")
-        return self._task
-
-    @property
-    def slack_weight(self) -> float:
-        """The price omega of a unit of each slack."""
-        self._refuse_problem("slack_weight")
-        return self._slack_weight
-
-    def _refuse_problem(self, name: str) -> None:
-        if self.is_problem:
-            raise AttributeError(
-                f"an Nmpc of a Problem has no {name}: its model plans, and the environment, from"
-                " where, and at which cost is said to train and evaluate"
-            )
-
-    @property
-    def is_problem(self) -> bool:
-        """Whether it was given a `Problem`, and so no plant and task."""
-        return not hasattr(self, "_task")
 
     @property
     def ocp(self) -> Any:

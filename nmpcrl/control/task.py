@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -14,6 +14,32 @@ from nmpcrl.control.description import Described
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem, Soft
 from nmpcrl.control.vectors import kept
+
+
+class Theta(NamedTuple):
+    """The blocks of theta, in the paper's order: (stage, inputs, terminal, constraint)."""
+
+    x: Any  # vartheta_x, square roots of the state weights, shape (n,)
+    u: Any  # vartheta_u, square roots of the input weights, shape (m,)
+    f: Any  # vartheta_f, square roots of the terminal weights, shape (n,)
+    c: Any  # theta_c, tightens the obstacle constraint, shape (1,)
+
+    @classmethod
+    def split(cls, theta: Any, n: int, m: int) -> "Theta":
+        """Cut a vector of 2n + m + 1 numbers or symbols into its blocks."""
+        return cls(theta[:n], theta[n : n + m], theta[n + m : 2 * n + m], theta[2 * n + m :])
+
+
+def stage_cost(state: ca.SX, action: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
+    """L(s, u, theta) of Eq. (2a): ||s - s_ref||^2 and ||u||^2, weighted by theta squared."""
+    result: ca.SX = ca.sumsqr(theta.x * (state - target)) + ca.sumsqr(theta.u * action)
+    return result
+
+
+def terminal_cost(state: ca.SX, theta: Theta, target: Vector | ca.SX) -> ca.SX:
+    """Gamma(s, theta) of Eq. (2a): ||s - s_ref||^2, weighted by theta squared."""
+    result: ca.SX = ca.sumsqr(theta.f * (state - target))
+    return result
 
 
 @dataclass(frozen=True)
@@ -113,10 +139,8 @@ class Task(Described):
             gamma=gamma,
             theta={"x": np.ones(plant.n), "u": np.ones(plant.m), "f": np.ones(plant.n), "c": 0.0},
             model=lambda x, u, *_: plant.transition(x, u),
-            stage=lambda x, u, th, d: (
-                ca.sumsqr(th["x"] * (x - d["target"])) + ca.sumsqr(th["u"] * u)
-            ),
-            terminal=lambda x, th, d: ca.sumsqr(th["f"] * (x - d["target"])),
+            stage=lambda x, u, th, d: stage_cost(x, u, Theta(**th), d["target"]),
+            terminal=lambda x, th, d: terminal_cost(x, Theta(**th), d["target"]),
             soft=[*([box] if self.soft_box and sides else []), *([discs] if plant.n > 1 else [])],
             lower=plant.lower,
             upper=plant.upper,

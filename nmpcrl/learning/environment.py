@@ -77,7 +77,7 @@ def environment(
         return of_gymnasium(cast(GymnasiumEnv, plant), nmpc, start)
     states = None if nmpc is None else nmpc.n
     planned = plant is None or isinstance(plant, Plant)
-    if (nmpc is None or nmpc.problem is not None) and (planned or start is None):
+    if (nmpc is None or nmpc.task is None) and (planned or start is None):
         raise ValueError(
             "a Problem plans, and says nothing of the environment, its start and its cost; nor does"
             " a controller without an Nmpc:"

@@ -172,7 +172,7 @@ def closed_loop(controller: Any, optimiser: Optimiser, bounds: Bounds | None = N
         ValueError: the controller has no task, whose cost and plant are differentiated.
     """
     nmpc = controller if isinstance(controller, Nmpc) else controller.nmpc
-    if nmpc.problem is not None:
+    if nmpc.task is None:
         raise ValueError("GN-J differentiates a task's cost and its plant: a Problem has neither")
     rule = ClosedLoop(nmpc, controller, optimiser)
     return Learner("GN-J", no_successor, rule, nmpc.gamma, bounds)

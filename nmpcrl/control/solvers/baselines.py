@@ -14,10 +14,10 @@ import casadi as ca
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.ocp import TaskOcp, Theta, stage_cost, terminal_cost
+from nmpcrl.control.nmpc import Nmpc
 from nmpcrl.control.solution import SolverError
 from nmpcrl.control.solvers.nlpsol import Ipopt
-from nmpcrl.control.task import overlap
+from nmpcrl.control.task import Theta, overlap, stage_cost, terminal_cost
 
 OPTIONS: dict[str, Any] = {"print_time": False, "ipopt": Ipopt().options}
 
@@ -34,25 +34,25 @@ class Plan(NamedTuple):
 Solve = Callable[[Vector, Vector, Plan | None], Plan]
 
 
-def mx(ocp: TaskOcp) -> Solve:
+def mx(nmpc: Nmpc) -> Solve:
     """A function of state, theta and the last plan that solves one NLP of matrix expressions."""
-    variables = [ca.MX.sym(name, *shape) for name, shape in _shapes(ocp).items()]
-    n, m = ocp.plant.n, ocp.plant.m
+    variables = [ca.MX.sym(name, *shape) for name, shape in _shapes(nmpc).items()]
+    n, m = nmpc.plant.n, nmpc.plant.m
     state, theta = ca.MX.sym("s", n), ca.MX.sym("theta", 2 * n + m + 1)
-    objective, equal, below = _written(ocp, variables, state, theta)
+    objective, equal, below = _written(nmpc, variables, state, theta)
     z, p, g = ca.veccat(*variables), ca.vertcat(state, theta), ca.vertcat(equal, below)
     solver = ca.nlpsol("mx", "ipopt", {"x": z, "p": p, "f": objective, "g": g}, OPTIONS)
     lam = ca.MX.sym("lam", g.numel())
     slope = ca.gradient(objective + ca.dot(lam, g), theta)
     gradient = ca.Function("gradient", [z, p, lam], [slope])
     split = ca.Function("split", [z], variables)
-    lower, upper = (ca.veccat(*side) for side in _bounds(ocp))
+    lower, upper = (ca.veccat(*side) for side in _bounds(nmpc))
     least = ca.vertcat(ca.DM.zeros(equal.numel()), -ca.inf * ca.DM.ones(below.numel()))
     bounds: dict[str, Any] = {"lbx": lower, "ubx": upper, "lbg": least, "ubg": 0}
 
     def solve(state: Vector, theta: Vector, last: Plan | None = None) -> Plan:
         p = np.concatenate([state, theta])
-        result = solver(x0=ca.veccat(*_start(ocp, state, last)), p=p, **bounds)
+        result = solver(x0=ca.veccat(*_start(nmpc, state, last)), p=p, **bounds)
         stats = solver.stats()
         if not stats["success"]:
             raise SolverError(stats["return_status"], state, theta)
@@ -66,22 +66,22 @@ def mx(ocp: TaskOcp) -> Solve:
     return solve
 
 
-def rebuilt(ocp: TaskOcp) -> Solve:
+def rebuilt(nmpc: Nmpc) -> Solve:
     """A function of state, theta and the last plan that writes the problem anew at every call."""
-    return partial(_solve_rebuilt, ocp)
+    return partial(_solve_rebuilt, nmpc)
 
 
-def _solve_rebuilt(ocp: TaskOcp, state: Vector, theta: Vector, last: Plan | None = None) -> Plan:
+def _solve_rebuilt(nmpc: Nmpc, state: Vector, theta: Vector, last: Plan | None = None) -> Plan:
     opti = ca.Opti()
-    variables = [opti.variable(*shape) for shape in _shapes(ocp).values()]
+    variables = [opti.variable(*shape) for shape in _shapes(nmpc).values()]
     weights = opti.parameter(theta.size)
-    objective, equal, below = _written(ocp, variables, state, weights)
+    objective, equal, below = _written(nmpc, variables, state, weights)
     opti.minimize(objective)
     opti.subject_to(equal == 0)
     opti.subject_to(below <= 0)
     opti.set_value(weights, theta)
     for variable, start, *sides in zip(
-        variables, _start(ocp, state, last), *_bounds(ocp), strict=True
+        variables, _start(nmpc, state, last), *_bounds(nmpc), strict=True
     ):
         bounded = np.flatnonzero(np.isfinite(sides).any(axis=0).T)
         lower, upper = (side.T.ravel()[bounded] for side in sides)
@@ -101,48 +101,48 @@ def _solve_rebuilt(ocp: TaskOcp, state: Vector, theta: Vector, last: Plan | None
     )
 
 
-def _shapes(ocp: TaskOcp) -> dict[str, tuple[int, int]]:
+def _shapes(nmpc: Nmpc) -> dict[str, tuple[int, int]]:
     """Rows and columns of the variables; a column a stage."""
-    plant, N = ocp.plant, len(ocp.inputs)
-    return {"x": (plant.n, N + 1), "u": (plant.m, N), "sigma": (len(ocp.task.obstacles), N + 1)}
+    plant, N = nmpc.plant, nmpc.horizon
+    return {"x": (plant.n, N + 1), "u": (plant.m, N), "sigma": (len(nmpc.task.obstacles), N + 1)}
 
 
 def _written(
-    ocp: TaskOcp, variables: list[Any], state: Any, theta: Any
+    nmpc: Nmpc, variables: list[Any], state: Any, theta: Any
 ) -> tuple[ca.MX, ca.MX, ca.MX]:
     """The objective, what is to be 0, and what is to be at most 0."""
     x, u, sigma = variables
-    plant, task, N = ocp.plant, ocp.task, len(ocp.inputs)
+    plant, task, N = nmpc.plant, nmpc.task, nmpc.horizon
     weights = Theta.split(theta, plant.n, plant.m)
     equal, below = [x[:, 0] - state], []
-    discount = ocp.gamma ** np.arange(N + 1)
+    discount = nmpc.gamma ** np.arange(N + 1)
     objective = discount[N] * terminal_cost(x[:, N], weights, task.target)
     for i in range(N):
         objective += discount[i] * stage_cost(x[:, i], u[:, i], weights, task.target)
         equal.append(x[:, i + 1] - plant.transition(x[:, i], u[:, i]))
     for j, disc in enumerate(zip(*task.discs, strict=True)):
-        below.append(overlap(x[0, :], x[1, :], *disc) + weights.constraint - sigma[j, :])
-        objective += ocp.slack_weight * (sigma[j, :] @ discount)
+        below.append(overlap(x[0, :], x[1, :], *disc) + weights.c - sigma[j, :])
+        objective += nmpc.slack_weight * (sigma[j, :] @ discount)
     return objective, ca.vertcat(*equal), ca.veccat(*below)
 
 
-def _bounds(ocp: TaskOcp) -> tuple[tuple[Matrix, ...], tuple[Matrix, ...]]:
+def _bounds(nmpc: Nmpc) -> tuple[tuple[Matrix, ...], tuple[Matrix, ...]]:
     """The least and the largest values of the variables; x_0 is free."""
     sides = []
     for box, inputs, slack, sign in (
-        (ocp.task.lower, ocp.plant.lower, 0.0, -1),
-        (ocp.task.upper, ocp.plant.upper, np.inf, 1),
+        (nmpc.task.lower, nmpc.plant.lower, 0.0, -1),
+        (nmpc.task.upper, nmpc.plant.upper, np.inf, 1),
     ):
-        states, actions, slacks = _shapes(ocp).values()
+        states, actions, slacks = _shapes(nmpc).values()
         x = np.broadcast_to(box[:, None], states).copy()
         x[:, 0] = sign * np.inf
         sides.append((x, np.broadcast_to(inputs[:, None], actions), np.full(slacks, slack)))
     return sides[0], sides[1]
 
 
-def _start(ocp: TaskOcp, state: Vector, last: Plan | None) -> tuple[Matrix, ...]:
+def _start(nmpc: Nmpc, state: Vector, last: Plan | None) -> tuple[Matrix, ...]:
     """The last plan a stage later, its end twice; or standing still."""
     if last is not None:
         return tuple(np.hstack([part[:, 1:], part[:, -1:]]) for part in last.variables)
-    x, u, sigma = _shapes(ocp).values()
+    x, u, sigma = _shapes(nmpc).values()
     return np.broadcast_to(state[:, None], x), np.zeros(u), np.zeros(sigma)

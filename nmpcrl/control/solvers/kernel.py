@@ -90,7 +90,7 @@ PLANNED, SETTLED = 1, 2  # kinds of rows, else absent
 STRICT = 1e4  # W of hard rows, scaled: an exact penalty, so that no state is infeasible
 STRICT_TO_SOFT = 100.0  # so many times the largest other W it is at least
 ABSURD = 1e9  # no plan goes through such a state
-GROWS = 30.0  # times the first state's distance from a plan: inputs leave it by more
+GROWS = 3.0  # times the first state's distance from a plan: inputs leave it by more
 NOTICED = 0.1  # and by more than this part of its largest state
 WITHIN = 1.0 - 1e-5  # the most of its way to a bound that an input may go along the feedback
 

@@ -13,24 +13,15 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control.ocp import ProblemOcp, TaskOcp
-from nmpcrl.control.plant import Plant
+from nmpcrl.control.ocp import Ocp
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution
 from nmpcrl.control.solvers.codes import End
-from nmpcrl.control.solvers.riccati import (
-    Code,
-    Compiled,
-    InteriorPoint,
-    ProblemPoint,
-    Riccati,
-    machine_code,
-    problem_code,
-)
+from nmpcrl.control.solvers.riccati import Compiled, Riccati, machine_code
 from nmpcrl.control.units import units_of
 
 
-def interpreted(of: Plant | Problem) -> ModuleType:
+def interpreted(of: Problem) -> ModuleType:
     """The solver's functions, and those of its model, as plain Python.
 
     Replace one of them, `plain.factorise = mine`, and the others call yours.
@@ -40,9 +31,8 @@ def interpreted(of: Plant | Problem) -> ModuleType:
     """
     plain = ModuleType("riccati")
     names = vars(plain)
-    solve = (problem_code(of) if isinstance(of, Problem) else machine_code(of).solve).py_func
-    for one in ("iterate", "evaluate"):  # of the kernel, and of a problem's rows
-        names.update(solve.__globals__[one].py_func.__globals__)
+    solve = machine_code(of).py_func
+    names.update(solve.__globals__["iterate"].py_func.__globals__)
     names.update(solve.__globals__)
     for name, found in list(names.items()):
         if hasattr(found, "py_func"):
@@ -51,7 +41,7 @@ def interpreted(of: Plant | Problem) -> ModuleType:
 
 
 def trace(
-    ocp: TaskOcp | ProblemOcp,
+    ocp: Ocp,
     state: Vector,
     theta: Vector,
     warm_start: Solution | None = None,
@@ -78,17 +68,18 @@ def trace(
     if units is not None:
         ocp, state = units.ocp, state / units.states
         warm_start = None if warm_start is None else units.inside(warm_start)
-    of = ocp.plant if isinstance(ocp, TaskOcp) else ocp.problem
-    plain = interpreted(of)
+    plain = interpreted(ocp.problem)
+    known = ocp.problem.data if data is None else data
     rows: list[dict[str, float]] = []
     factor: list[float] = []
 
     def judged(norms: Any, task: Any, point: Any, _duals: Any, _stages: Any, mu: float) -> None:
         stationarity, complementarity, largest = norms
-        objective, _ = plain.evaluate(task, point, mu)
-        priced = plain.slacks_of(task)
-        slacks = task.weights[:, :priced] * np.maximum(0, point.h[:, :priced])
-        error, value = max(stationarity / largest, complementarity, mu), objective + slacks.sum()
+        objective, _ = plain.measure(task, point, mu)
+        priced = np.flatnonzero(ocp.problem.soft)
+        beyond = np.maximum(0, point.h[task.begin :, priced])
+        slacks = (task.weights[task.begin :, priced] * beyond).sum()
+        error, value = max(stationarity / largest, complementarity, mu), objective + slacks
         rows.append({"error": error, "mu": mu, "value": value, "delta": np.nan})
 
     def factorised(_done: bool, _stages: Any, delta: float, *_: Any) -> None:
@@ -98,34 +89,30 @@ def trace(
     _watch(plain, "residuals", judged)
     _watch(plain, "factorise", factorised)
     if not curvature:
-        _straighten(plain, of)
+        _straighten(plain)
     with np.errstate(all="ignore"):
-        _point(ocp, plain).solve(state, theta, warm_start, began=0.0, data=data)
+        _point(ocp, plain).solve(state, theta, warm_start, began=0.0, data=known)
     iterates = pd.DataFrame(rows).rename_axis("iteration").astype(float)
-    iterates["value"] = factor[-1] * iterates["value"] + _settled(ocp, state, theta, data)
+    iterates["value"] = factor[-1] * iterates["value"] + _settled(ocp, state, theta, known)
     return iterates
 
 
-def _point(ocp: TaskOcp | ProblemOcp, plain: ModuleType) -> Compiled:
+def _point(ocp: Ocp, plain: ModuleType) -> Compiled:
     """The OCP with plain Python for its machine code, and its first start taken as it ends."""
 
     def solve(*arguments: Any) -> tuple[Any, ...]:
         return (*plain.solve(*arguments)[:2], End.SOLVED, 0.0, 0.0)
 
-    if isinstance(ocp, ProblemOcp):
-        return ProblemPoint(ocp, solve, Riccati(starts=1))
-    return InteriorPoint(ocp, Code(solve, machine_code(ocp.plant).hessian_times))
+    return Compiled(ocp, solve, Riccati(starts=1))
 
 
-def _settled(ocp: TaskOcp | ProblemOcp, state: Vector, theta: Vector, data: Matrix | None) -> float:
+def _settled(ocp: Ocp, state: Vector, theta: Vector, data: Matrix) -> float:
     """What the value has of the state alone."""
-    if isinstance(ocp, TaskOcp):
-        beyond = np.maximum(0, ocp.task.overlap(state) + theta[-1]).sum()
-        return float(ocp.slack_weight * beyond)
-    e, known = ocp.problem.expressions, ocp.problem.data if data is None else data
-    initial = ca.Function("initial", [e.x, e.theta, e.d], [e.initial])(state, theta, known[0])
-    which, rows, _ = ocp.settled(np.concatenate([state, theta, known.ravel()]))
-    return float(initial) + float(ocp.slack_weights[which] @ np.maximum(0, rows))
+    of, e = ocp.problem, ocp.problem.expressions
+    initial = ca.Function("initial", [e.x, e.theta, e.d], [e.initial])
+    which, rows, _ = ocp.settled(np.concatenate([state, theta, data.ravel()]))
+    beyond = ocp.slack_weights[which] @ np.maximum(0, rows)
+    return float(initial(state, theta, of.own(data[0]))) + float(beyond)
 
 
 def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
@@ -140,25 +127,25 @@ def _watch(plain: ModuleType, name: str, note: Callable[..., None]) -> None:
     setattr(plain, name, watched)
 
 
-def _straighten(plain: ModuleType, of: Plant | Problem) -> None:
-    """Differentiate as if dynamics, obstacles and rows were straight lines."""
-    if isinstance(of, Problem):
-        vars(plain).update(
-            expand_stage=_without(plain.expand_stage, 5, 6),  # costate and lam
-            expand_last=_without(plain.expand_last, 4),
-        )
-        return
-    expand, expand_path = plain.expand_stage, plain.expand_constraint
+def _straighten(plain: ModuleType) -> None:
+    """Differentiate as if dynamics and rows were straight lines."""
+    names = vars(plain)
+    names["expand_stage"] = _without(plain.expand_stage, 5)  # costate
+    for name in ("expand_fixed", "expand_fixed_end", "expand_line", "expand_line_end"):
+        names[name] = _straight(names[name])
 
-    def without_costate(*arguments: Any) -> None:
-        *point, costate = arguments[:6]
-        expand(*point, np.zeros_like(costate), *arguments[6:])
 
-    def without_hessian(x: Any, theta: Any, disc: Any, hx: Any, hxx: Any) -> None:
-        expand_path(x, theta, disc, hx, hxx)
-        hxx[:] = 0.0
+def _straight(expand: Callable[..., None]) -> Callable[..., None]:
+    """What rows add to a stage but for their curvature."""
 
-    vars(plain).update(expand_stage=without_costate, expand_constraint=without_hessian)
+    def called(*arguments: Any) -> None:
+        *point, Q, S, R = arguments[:-2] if "line" in expand.__name__ else arguments
+        before = [one.copy() for one in (Q, S, R)]
+        expand(*arguments)
+        for one, old in zip((Q, S, R), before, strict=True):
+            one[:] = old
+
+    return called
 
 
 def _without(function: Callable[..., None], *places: int) -> Callable[..., None]:
