@@ -222,7 +222,7 @@ def test_the_relative_residual_of_a_bicycle_is_small_whatever_its_cost_is_worth(
     dense = plain.value_hessian(solution)
     product = plain.value_hessian_times(solution, along)
     np.testing.assert_allclose(product, dense @ along, atol=1e-4 * np.abs(dense).max())
-    at = ca.Function("at", [e.x, e.u, e.theta], [e.next_x, e.stage, e.terminal, e.rows])
+    at = ca.Function("at", [e.x, e.u, e.theta], [e.next_x, e.stage, e.terminal, e.fixed])
     dear = Problem(
         states=4,
         inputs=2,
