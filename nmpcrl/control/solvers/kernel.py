@@ -727,6 +727,12 @@ def advance(task, duals, step, length):
 
 
 @inlined
+def lines_of(data):
+    """The number of lines of data that have rows of their own."""
+    return (data.shape[1] - OWN) // WIDTH if WIDTH > 0 else 0
+
+
+@inlined
 def slacks_of(task):
     """The number of slacks of a stage, one for each row that is not hard."""
     return SOFT + PER * task.lines
@@ -801,14 +807,13 @@ def scaled(
 ):  # fmt: skip
     """The problem divided by the size of its costs along the plan of a start, and that size."""
     last, rows = len(discount) - 1, len(weights) + len(sides)
-    lines = (data.shape[1] - OWN) // WIDTH if WIDTH > 0 else 0
     scaled_weights, begin = np.empty((last + 1, rows)), 1
     for j in range(rows):
         if kind[0, j] == PLANNED:
             begin = 0
     rate = discount.copy()
     task = Task(
-        theta, data, lower, upper, sides, kind, begin, lines, rate, scaled_weights, first
+        theta, data, lower, upper, sides, kind, begin, lines_of(data), rate, scaled_weights, first
     )
     begin_inputs(task, point, state, action, start, warm_start)
     roll(task, point)
@@ -1078,7 +1083,7 @@ def allocate(N, rows):
     return point, trial, duals, stages, step
 
 
-vector, matrix = float64[::1], float64[:, ::1]
+vector, matrix, tensor = float64[::1], float64[:, ::1], float64[:, :, ::1]
 PROBLEM = (
     matrix, vector, vector, matrix, int64[:, ::1], vector, vector, float64,  # see `Arguments`
     vector, vector, vector, int64,  # state, theta, action, whether u_0 is the action

@@ -1,11 +1,10 @@
 """The solver of `kernel` compiled for a plant and called for one OCP: starts and second tries."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib.resources import files
-from itertools import chain
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -25,15 +24,11 @@ from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
 from nmpcrl.control.solvers.starts import MOST, Regulator, cold_inputs, random_inputs
 from nmpcrl.control.vectors import whole
 
-WARM_LIMIT = 40  # iterations from a warm start
-COLD_LIMIT = 200  # iterations from standing still
 PERTURBED = 4  # starts from random inputs, after everything else
 SEVERAL, FEW = 9, 2  # cold starts of a `Problem` with rows, and without
-CLEARLY = 1e-6  # a plan is better if its value is less by this share
-LEAVES = 1e-9  # and it leaves the box by no more than this
 NOTICE = "Compiling the NMPC solver for this plant (once on this machine, about half a minute) ..."
 PLAN_NOTICE = "Compiling the derivatives of the plan (once on this machine) ..."
-COLD, SHIFTED, NEAR, SAME = map(int, Start)  # plain numbers, as machine code takes them
+COLD, SHIFTED, _, SAME = map(int, Start)  # plain numbers, as machine code takes them
 SOLVED = float(End.SOLVED)  # as it returns them
 ENDS = {
     End.SOLVED: LED_ASTRAY,
@@ -44,7 +39,11 @@ ENDS = {
 }
 TEXTS = {  # compiled beside `model`; read with the other modules, so that an edit mixes nothing
     name: files(__package__).joinpath(f"{name}.py").read_text("utf-8")
-    for name in ("codes", "kernel", "solve", "slopes")
+    for name in ("codes", "kernel", "solve", "find", "slopes")
+}
+PARTS = {  # the modules of each entry, beside `model`
+    "find": ("codes", "kernel", "solve", "find"),
+    "slopes": ("codes", "kernel", "slopes"),
 }
 NAME = "riccati"
 ABSURD = 1e24  # no value is larger
@@ -64,26 +63,14 @@ class Arguments(NamedTuple):
     tie: float
 
 
-Attempt = tuple[int, Vector, int]  # which `Start`, with which (z, lam, nu), iterations allowed
-
-
-class Found(NamedTuple):
-    """What one start led to."""
-
-    value: float
-    iterations: float
-    violation: float
-    point: Vector  # z, lam and nu, and then the gradient
-
-
 @remembered
 def machine_code(problem: Problem) -> Any:
-    """`solve.solve` compiled for a problem.
+    """`find.find` compiled for a problem.
 
     Raises:
         CannotCompile: numba is missing, or the problem holds an operation that is not known.
     """
-    return _loaded("solve", problem, NOTICE)
+    return _loaded("find", problem, NOTICE)
 
 
 @remembered
@@ -97,7 +84,7 @@ def _loaded(entry: str, problem: Problem, notice: str) -> Any:
     texts = {
         "__init__": f"from .{entry} import {entry}\n",
         "model": stages.write(problem),
-        **{name: TEXTS[name] for name in ("codes", "kernel", entry)},
+        **{name: TEXTS[name] for name in PARTS[entry]},
     }
     return getattr(load("riccati", texts, notice), entry)
 
@@ -153,7 +140,11 @@ class Compiled:
         self._no_action = np.zeros(problem.inputs)
         self._tolerance = solver.tolerance
         count = solver.starts_of(problem) - 1
-        self._others = cold_inputs(problem, problem.horizon, count)
+        N = problem.horizon
+        self._none = np.zeros((0, N, problem.inputs))
+        others = cold_inputs(problem, N, count)
+        self._others = np.reshape(np.array(others), (-1, N, problem.inputs))
+        self._drawn = np.array([random_inputs(problem, k, N) for k in range(PERTURBED)])
         sides = [
             (state, sign, limit[state])
             for sign, limit in ((-1.0, problem.state_lower), (1.0, problem.state_upper))
@@ -184,41 +175,45 @@ class Compiled:
     ) -> Solution:
         """Solve for (state, theta[, action]); arguments as in `Nmpc.solve`, already checked."""
         given = action[0] if action else self._no_action
-        problem = (data, *self.arguments[1:])
-        code, fixed, tolerance, split = self._code, self._fixed, self._tolerance, self._split
-        for restarts, (start, point, limit) in enumerate(
-            self._starts(warm_start, problem, state, theta, given)
-        ):
-            out = np.empty(self._size)
-            value, iterations, end, violation, error = code(
-                *problem, state, theta, given, fixed, start, limit, tolerance, point, out
-            )
+        problem, fixed = (data, *self.arguments[1:]), self._fixed
+        start, point = COLD, self._standing
+        if warm_start is not None:
+            same = warm_start.state.tolist() == state.tolist()  # faster than np.array_equal
+            start, point = SAME if same else SHIFTED, self._from(warm_start)
+        out, restarts = np.empty(self._size), 0
+        while True:
+            others, drawn = self._none, self._drawn
+            if start == COLD:
+                held = self._regulated(problem, state, theta, given)
+                others, drawn = np.concatenate([self._others, held]), np.concatenate([held, drawn])
+            value, iterations, end, violation, error, failed = self._code(
+                *problem, state, theta, given, fixed, others, drawn,
+                start, self._tolerance, point, out,
+            )  # fmt: skip
+            restarts += int(failed)
             if end == SOLVED and value < ABSURD:
-                if start == COLD:
-                    first = Found(value, iterations, violation, out)
-                    others = self._others if warm_start is None else []
-                    value, iterations, violation, out = self._best(
-                        first, others, problem, state, theta, given
-                    )
                 return Solution(
                     state,
                     theta,
                     value,
-                    out[split:],
+                    out[self._split :],
                     int(iterations),
                     time.perf_counter() - began,
-                    out[:split],
+                    out[: self._split],
                     self._ocp,
                     NAME,
                     restarts,
                     violation,
                     data,
                 )
+            if start == COLD:
+                break
+            start = COLD
         try:
             found = self._fatrop.solve(state, theta, None, *action, began=began, data=data)
         except SolverError:
             raise NoStartLeft(
-                f"{Riccati.name} found no optimum from {restarts + 1} starts (the last"
+                f"{Riccati.name} found no optimum from {restarts} starts (the last"
                 f" {ENDS[End(int(end))]} after {iterations:.0f} iterations with a relative error of"
                 f" {error:.1e})",
                 state,
@@ -234,30 +229,14 @@ class Compiled:
     def _regulator(self) -> Regulator:
         return Regulator(self._problem)
 
-    def _best(
-        self, first: Found, others: list[Matrix], problem: tuple[Any, ...], *given: Vector
-    ) -> Found:
-        """The best plan of the cold starts; the earlier one where they are as good."""
-        best = first
-        for inputs in chain(others, self._regulated(problem, *given)):
-            out, point = np.empty(self._size), self._standing.copy()
-            point[self._ocp.inputs] = inputs
-            value, iterations, end, violation, _ = self._code(
-                *problem, *given, self._fixed, COLD, COLD_LIMIT, self._tolerance, point, out
-            )
-            less = value < best.value - CLEARLY * abs(best.value)
-            if end == SOLVED and less and violation <= best.violation + LEAVES:
-                best = Found(value, iterations, violation, out)
-        return best
-
-    def _regulated(self, problem: tuple[Any, ...], *given: Vector) -> list[Matrix]:
-        """The inputs of a start that is held by feedback, if there is one."""
+    def _regulated(self, problem: tuple[Any, ...], *given: Vector) -> Matrix:
+        """The inputs of a start that is held by feedback, if there is one, (0 or 1, N, m)."""
         if self._solver.starts is not None:
-            return []
+            return self._none
         state, theta, action = given
         fixed = (action,) if self._fixed else ()
         inputs = self._regulator.inputs(state, theta, problem[0], *fixed)
-        return [] if inputs is None else [inputs]
+        return self._none if inputs is None else inputs[None]
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None where dense algebra must."""
@@ -279,26 +258,6 @@ class Compiled:
         out = np.empty(solution.theta.size)
         formed = slopes_code(self._problem)(data, *self.arguments[1:], *given, *directions, out)
         return out if formed else None
-
-    def _starts(
-        self, warm_start: Solution | None, problem: tuple[Any, ...], *given: Vector
-    ) -> Iterator[Attempt]:
-        """The warm start, standing still, held by feedback, and random inputs."""
-        if warm_start is not None:
-            point = self._from(warm_start)
-            if (
-                warm_start.state.tolist() == given[0].tolist()
-            ):  # a tenth of the time of np.array_equal
-                yield SAME, point, WARM_LIMIT
-                yield NEAR, point, WARM_LIMIT
-            else:
-                yield SHIFTED, point, WARM_LIMIT
-        yield COLD, self._standing, COLD_LIMIT
-        drawn = (random_inputs(self._problem, k, len(self._ocp.inputs)) for k in range(PERTURBED))
-        for inputs in chain(self._regulated(problem, *given), drawn):
-            point = self._standing.copy()
-            point[self._ocp.inputs] = inputs
-            yield COLD, point, COLD_LIMIT
 
     def _from(self, warm_start: Solution) -> Vector:
         """The warm start's z, lam and nu in the order of this OCP."""
