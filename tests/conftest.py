@@ -22,7 +22,6 @@ from nmpcrl.analysis.summary import RunSummary
 from nmpcrl.bench.solves import transposed
 from nmpcrl.claims.published import Evidence
 from nmpcrl.control import differential_drive
-from nmpcrl.learning import browser as in_browser
 from nmpcrl.study import Experiment, design, jobs, paper
 
 settings.register_profile("fixed", deadline=None, derandomize=True)  # the machine may be busy
@@ -214,8 +213,10 @@ def jupyter_lab() -> str:
 @pytest.fixture(scope="session")
 def robot_module(shared) -> bytes:
     """The robot's controller and the update rules as WebAssembly; a minute to make, once."""
+    from nmpcrl.learning import browser
+
     with FileLock(shared / "robot_module.lock"):  # the others find it where modules are kept
-        return in_browser.module(differential_drive(), paper.task("A"))
+        return browser.module(differential_drive(), paper.task("A"))
 
 
 LOOPS = ("without noise", "with noise")
