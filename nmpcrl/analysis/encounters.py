@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.control import Nmpc
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.layouts import ARRIVED
 from nmpcrl.study.moving import CLEARANCE, TASK, Motion, World, centres, inside
@@ -39,7 +40,7 @@ def count(states: Matrix, motions: Sequence[Motion]) -> Counted:
     return Counted(int(there.any(axis=1).sum()), int(entered.sum() + there[:1].sum()))
 
 
-def judged(nmpc: Persistent, theta: Vector, world: World, seed: int = 0) -> Encounters:
+def judged(nmpc: Nmpc, theta: Vector, world: World, seed: int = 0) -> Encounters:
     """An episode of the policy of theta in a world; the seed is of the world's noise."""
     rng = np.random.default_rng(seed)  # the published draws
     rollout = evaluate(nmpc, theta, paper.STEPS, rng=rng, **world.environment)

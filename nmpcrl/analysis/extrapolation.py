@@ -18,8 +18,8 @@ import pandas as pd
 
 from nmpcrl import Vector
 from nmpcrl.analysis.metrics import root_mean_square
+from nmpcrl.control import Nmpc
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, Successor, Transition
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Diverged, train
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.setup import controller_of, prepare
@@ -35,7 +35,7 @@ class StartTheta:
     """
 
     network: Imitation
-    controller: Persistent
+    controller: Nmpc
     true_slope: bool = False
     theta: Vector | None = field(default=None, init=False)  # None before an episode
 
@@ -53,7 +53,7 @@ class StartTheta:
         return replace(successor, value=successor.value + now - then)
 
 
-INTERVENTIONS: Mapping[str, Callable[[Imitation, Persistent], Bootstrap]] = {
+INTERVENTIONS: Mapping[str, Callable[[Imitation, Nmpc], Bootstrap]] = {
     "none": lambda network, _: network,
     "theta held": StartTheta,
     "true slope": partial(StartTheta, true_slope=True),

@@ -77,7 +77,7 @@ def dropped_curvature(records: Records, *, samples: int = 200) -> Curvature:
     Steps without a Hessian are skipped.
     """
     steps, gamma = records.steps, paper.GAMMA
-    nmpc = controller_of(Experiment(**records.experiment)).nmpc
+    nmpc = controller_of(Experiment(**records.experiment))
     known = np.flatnonzero(np.isfinite(steps["delta"]))[1:]
     rows = []
     for k in known[np.linspace(0, len(known) - 1, min(samples, len(known)), dtype=int)]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Vector
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.jobs import parallel
 from nmpcrl.study.parameters import LARGEST_SEED, one_of, whole
@@ -213,7 +213,7 @@ class Found:
 
 def search(wanted: Search) -> Found:
     """The theta of least noise-free cost in a layout that one CMA-ES finds from theta_init."""
-    controller = Persistent(paper.nmpc(wanted.layout))
+    controller = paper.nmpc(wanted.layout)
     start = np.array(paper.THETA_INIT)
     tried = Tried(lambda theta: evaluate(controller, theta, paper.STEPS).cost, start, wanted.budget)
     tried.descend(SPREAD, wanted.seed + 1, least=0)

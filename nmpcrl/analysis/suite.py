@@ -27,7 +27,7 @@ from nmpcrl import Vector
 from nmpcrl.analysis.encounters import count
 from nmpcrl.analysis.search import LOWER, SCALE, SEARCHES, UPPER
 from nmpcrl.analysis.statistics import interquartile_mean, rate
-from nmpcrl.control import Task
+from nmpcrl.control import Nmpc, Task
 from nmpcrl.learning import Diverged, Exploration, Learner, Step, Weights, policy_gradient, train
 from nmpcrl.learning.gauss_newton import TrustRegion, closed_loop, lstd_q_within
 from nmpcrl.learning.remedies import (
@@ -40,7 +40,7 @@ from nmpcrl.learning.remedies import (
     tdrc,
     undo,
 )
-from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
+from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.learning.training import absurd
 from nmpcrl.study import Experiment, paper
 from nmpcrl.study.drawn import JUDGE, SCENARIOS, TUNE, Scenario
@@ -94,11 +94,11 @@ class Robot:
             first = centres(self.motions, 0)[0].tolist()
             self.centres: Centres = tuple((x, y) for x, y in first)
             self.task: Task = TASK
-            self.controller: Persistent = controller(len(self.motions))
+            self.controller: Nmpc = controller(len(self.motions))
         else:
             self.centres = LAYOUTS[place] if isinstance(place, str) else place
             self.task = paper.task(self.centres)
-            self.controller = Persistent(paper.controller(self.task))
+            self.controller = paper.controller(self.task)
 
     @property
     def left(self) -> int:

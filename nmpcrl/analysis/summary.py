@@ -145,7 +145,7 @@ class RunSummary:
 def summarise(records: Records) -> RunSummary:
     """The summary of a run; of RDES trained to the end also how well networks imitate it."""
     experiment, evaluated = Experiment(**records.experiment), records.evaluations
-    nmpc = controller_of(experiment).nmpc
+    nmpc = controller_of(experiment)
     facts = dict(records.facts)
     if experiment.learner == IMITATED and experiment.episodes >= paper.EPISODES:
         imitation = imitate(records)

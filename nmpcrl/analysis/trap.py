@@ -14,7 +14,7 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.metrics import root_mean_square
 from nmpcrl.analysis.summary import RunSummary
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
 from nmpcrl.study.layouts import ARRIVED
@@ -50,7 +50,7 @@ class Stand:
 def stands(summary: RunSummary, episodes: Iterable[int]) -> list[Stand]:
     """The rollouts of a run's theta after some of its episodes; 0 is the start."""
     experiment, found = summary.name, []
-    controller: Persistent = controller_of(experiment)
+    controller = controller_of(experiment)
     thetas = np.vstack([experiment.theta, summary.episodes["theta"]])
     deltas = np.r_[np.nan, summary.episodes["delta"]]
     for k in episodes:
@@ -97,7 +97,7 @@ def cliff(cost: Callable[[float], float], grid: Vector, costs: Vector) -> float:
 
 def raised_cost(layout: str | Centres, theta: Vector, share: float) -> float:
     """Relative rise of a rollout's cost where theta_c is raised by a share."""
-    controller = Persistent(paper.nmpc(layout))
+    controller = paper.nmpc(layout)
     raised = np.array([*theta[:-1], (1 + share) * theta[-1]])
     before, after = (evaluate(controller, one, paper.STEPS).cost for one in (theta, raised))
     return after / before - 1
@@ -122,7 +122,7 @@ def ending(summary: RunSummary) -> dict[str, float]:
     if np.isfinite(summary.states).all() and summary.evaluations["distance"][-1] > ARRIVED:
         state, controller = summary.states[-1], controller_of(summary.name)
         solution = controller.solve(state, summary.evaluations["theta"][-1])
-        cost = controller.nmpc.task.stage_cost(state, summary.actions[-1])
+        cost = controller.task.stage_cost(state, summary.actions[-1])
         moved, phi_c = _way(summary.states), float(solution.features[-1])
         worth = solution.value * (1 - controller.gamma) / cost
     return {"moved": moved, "worth": worth, "delta_first": first, "delta_last": last,

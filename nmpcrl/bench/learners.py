@@ -12,7 +12,6 @@ from nmpcrl import Matrix
 from nmpcrl.bench.paired import TURN, Ratio, paired_ratio
 from nmpcrl.bench.solves import Columns, transposed
 from nmpcrl.control.solvers import SOLVERS
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Step, train
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
@@ -144,7 +143,7 @@ def ratio(timings: pd.DataFrame, solver: str, learner: str) -> Ratio:
 def learn(learner: str, **fields: Any) -> Iterator[Step]:
     """The steps of one run as they are made; `fields` are those of `Experiment`."""
     experiment = Experiment(learner=learner, **fields)
-    controller = Persistent(paper.nmpc(solver=experiment.solver))
+    controller = paper.nmpc(solver=experiment.solver)
     learning, weights, explore = prepare(experiment, controller)
     return train(learning, controller, weights, explore)
 

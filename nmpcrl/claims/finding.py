@@ -18,7 +18,7 @@ from nmpcrl.claims.failure_modes import Ending, ending
 from nmpcrl.claims.investigation import counted
 from nmpcrl.claims.published import Published
 from nmpcrl.claims.thresholds import cost_reduction, solved, was_stopped, worsens
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 
 LEARNERS = ("ES", "GES")  # which fit no network
@@ -92,7 +92,7 @@ def _by_hand(layout: str) -> dict[str, Any]:
     """theta_c that closes a gap of the first rollout, and the result of theta_c = d_o."""
     task, theta = paper.task(layout), np.array(paper.THETA_INIT)
     thetas = theta, np.array([*theta[:-1], task.margin])
-    first, hand = (evaluate(Persistent(paper.nmpc(layout)), one, paper.STEPS) for one in thetas)
+    first, hand = (evaluate(paper.nmpc(layout), one, paper.STEPS) for one in thetas)
     saved = 1 - hand.cost / first.cost
     arrives = ending(hand.states, task) == Ending.ARRIVED
     closes = closes_at(task, first.states[:, :2])

@@ -23,7 +23,7 @@ from nmpcrl.learning.learners import (
 )
 from nmpcrl.learning.optimisers import Adam, Descent, GaussNewton, Optimiser
 from nmpcrl.learning.policy_gradient import policy_gradient
-from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
+from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.learning.training import (
     Diverged,
     Exploration,
@@ -65,7 +65,6 @@ __all__ = [
     "Imitation",
     "Learner",
     "Optimiser",
-    "Persistent",
     "QNetwork",
     "Rollout",
     "SecondSolve",

@@ -164,7 +164,7 @@ def closed_loop(controller: Any, optimiser: Optimiser, bounds: Bounds | None = N
     """GN-J: Gauss-Newton on the cost of the closed loop, by the policy's sensitivity.
 
     Args:
-        controller: an `Nmpc` with a task, or a `Persistent` of one.
+        controller: an `Nmpc` with a task, or an object that holds one as `nmpc`.
         optimiser: `TrustRegion`, or another that takes a curvature.
         bounds: the least and the largest theta.
 

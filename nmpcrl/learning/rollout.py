@@ -1,14 +1,12 @@
-"""The closed loop without noise, by which theta is judged, and what a failed solve means in it."""
+"""The closed loop without noise, by which theta is judged."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.control import Nmpc, Plant, Problem, Solution, SolverError
-from nmpcrl.control.solution import NoStartLeft
+from nmpcrl.control import Nmpc, Plant, SolverError
 from nmpcrl.learning.environment import (
     Data,
     GymnasiumEnv,
@@ -17,59 +15,6 @@ from nmpcrl.learning.environment import (
     forecasts,
     ran_away,
 )
-
-
-@dataclass(frozen=True)
-class Persistent:
-    """An NMPC that tries a failed solve once more, from a standing start, unless its solver did so.
-
-    With `train`, the one place that decides what a failed solve means.  # departure M
-    """
-
-    nmpc: Nmpc
-
-    @property
-    def problem(self) -> Problem | None:
-        """As `Nmpc.problem`."""
-        return self.nmpc.problem
-
-    @property
-    def gamma(self) -> float:
-        """The discount factor of the NMPC."""
-        return self.nmpc.gamma
-
-    def solve(
-        self,
-        state: Vector,
-        theta: Vector,
-        warm_start: Solution | None = None,
-        action: Vector | None = None,
-        data: Mapping[str, Any] | None = None,
-    ) -> Solution:
-        """As `Nmpc.solve`; the status is "restarted" where only the second attempt succeeded."""
-        try:
-            if data is None:
-                return self.nmpc.solve(state, theta, warm_start, action)
-            return self.nmpc.solve(state, theta, warm_start, action, data=data)
-        except NoStartLeft:
-            raise
-        except SolverError:
-            if warm_start is None:
-                raise
-            solution = self.solve(state, theta, None, action, data)
-            return replace(solution, restarts=solution.restarts + 1)
-
-    def value_hessian_times(self, solution: Solution, vector: Vector) -> Vector:
-        """As `Nmpc.value_hessian_times`."""
-        return self.nmpc.value_hessian_times(solution, vector)
-
-    def value_hessian(self, solution: Solution) -> Matrix:
-        """As `Nmpc.value_hessian`."""
-        return self.nmpc.value_hessian(solution)
-
-    def policy_jacobian(self, solution: Solution) -> Matrix:
-        """As `Nmpc.policy_jacobian`."""
-        return self.nmpc.policy_jacobian(solution)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +32,10 @@ class Rollout:
         return np.inf if self.failure else float(self.costs.sum())
 
 
-def persistent(controller: Any) -> Any:
-    """The controller, made to try a failed solve once more where it is an `Nmpc`."""
-    return Persistent(controller) if isinstance(controller, Nmpc) else controller
-
-
 def nmpc_of(controller: Any) -> Nmpc | None:
     """The `Nmpc` that a controller is or has among its attributes; None where there is none."""
     near = [controller, *getattr(controller, "__dict__", {}).values()]
-    found = (one.nmpc if isinstance(one, Persistent) else one for one in near)
-    return next((one for one in found if isinstance(one, Nmpc)), None)
+    return next((one for one in near if isinstance(one, Nmpc)), None)
 
 
 def stream(rng: np.random.Generator | int, key: int) -> np.random.Generator:
@@ -131,7 +70,7 @@ def evaluate(
         data: of a `Problem` at each time, as in `train`.
         rng: for a plant or a start that draws, as in `train`, with other numbers of the same int.
     """
-    controller, nmpc, rng = persistent(controller), nmpc_of(controller), stream(rng, 2)
+    nmpc, rng = nmpc_of(controller), stream(rng, 2)
     around = environment(nmpc, plant, start)
     state, plan, failure = around.start(rng), None, ""
     states, actions, costs = [], [], []

@@ -23,7 +23,7 @@ from nmpcrl.learning.environment import (
     ran_away,
 )
 from nmpcrl.learning.learners import Learner, Update, Weights
-from nmpcrl.learning.rollout import nmpc_of, persistent, stream
+from nmpcrl.learning.rollout import nmpc_of, stream
 
 Counts = NDArray[np.int_]
 Count = Callable[[int, int], Counts]  # (episodes, steps) -> k of each step
@@ -127,7 +127,7 @@ def train(
     """Algorithm 1: as many episodes, and at most as many steps, as `explore` has noise for.
 
     A solve that fails ends the episode, and so does a plant that runs away to where no plan can
-    begin; learning goes on from the next episode: see `Persistent`.
+    begin; learning goes on from the next episode.  # departure M
     A step holds its solutions, 7 KB for the robot: of a long run, keep what you need of each.
 
     Args:
@@ -169,7 +169,7 @@ def train(
             f" {learner.name} has no Q(s, a): leave it out, or learn V(s) by constrained=False"
         )
     around, known = environment(nmpc, plant, start), forecasts(data, nmpc.horizon)
-    controller, rng = persistent(controller), stream(rng, 1)
+    rng = stream(rng, 1)
     trainer = _Trainer(learner, controller, nmpc, explore, clipped, fixed, around, known, rng)
     own = replace(weights, theta=np.array(weights.theta, float), w=np.array(weights.w, float))
     return trainer.run(own)

@@ -119,5 +119,5 @@ def _slope(experiment: Experiment, by: float) -> float:
     """dV/dtheta_c in the start, a little beside theta."""
     theta = np.array(experiment.theta)
     theta[-1] += by
-    nmpc = controller_of(experiment).nmpc
+    nmpc = controller_of(experiment)
     return float(nmpc.solve(nmpc.task.start, theta).features[-1])

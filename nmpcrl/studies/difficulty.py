@@ -18,7 +18,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims.investigation import Investigation, Part, Row
 from nmpcrl.control import Task
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import COMPARED, LAYOUTS
 from nmpcrl.study.geometry import Centres
@@ -54,7 +54,7 @@ RIVALS = tuple(name for name in MEASURES if name != PILOT)
 def measure(centres: Centres) -> dict[str, float]:
     """`MEASURES` of a layout, from two rollouts and one solve."""
     task = paper.task(centres)
-    controller, theta = Persistent(paper.controller(task)), np.array(paper.THETA_INIT)
+    controller, theta = paper.controller(task), np.array(paper.THETA_INIT)
     first = evaluate(controller, theta, paper.STEPS)
     raised = evaluate(controller, theta + RAISED * np.eye(len(theta))[-1], paper.STEPS)
     phi = controller.solve(task.start, theta).features
@@ -89,7 +89,7 @@ def stops_arriving(centres: Centres, horizon: int, grid: Vector) -> float:
     Nothing is learned. nan where it arrives on the whole grid.
     """
     task = paper.task(centres)
-    controller, theta = Persistent(paper.controller(task, horizon=horizon)), [*paper.THETA_INIT]
+    controller, theta = paper.controller(task, horizon=horizon), [*paper.THETA_INIT]
     for theta_c in grid:
         states = evaluate(controller, np.array([*theta[:-1], theta_c]), paper.STEPS).states
         if len(states) < paper.STEPS or task.distance(states[-1]) > ARRIVED:

@@ -18,8 +18,8 @@ from nmpcrl import Vector
 from nmpcrl.analysis.encounters import judged
 from nmpcrl.analysis.suite import entry, judge
 from nmpcrl.claims.investigation import Row
+from nmpcrl.control import Nmpc
 from nmpcrl.learning import Diverged, Exploration, Learner, Weights, expected_sarsa, train
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import absurd
 from nmpcrl.studies.worlds_run import THETA, controller, exploration, row
 from nmpcrl.study import Experiment, paper
@@ -75,7 +75,7 @@ class Recent(np.random.Generator):
 
 
 def changing(
-    nmpc: Persistent,
+    nmpc: Nmpc,
     layouts: Sequence[Sequence[Motion]],
     order: Sequence[int],
     learner: Learner,

@@ -20,7 +20,7 @@ from nmpcrl.claims.investigation import Condition, Row
 from nmpcrl.control import Nmpc
 from nmpcrl.control.problem import Parameter
 from nmpcrl.learning import Diverged, Exploration, Weights, expected_sarsa, train
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import absurd
 from nmpcrl.study import paper
 from nmpcrl.study.drawn import JUDGE, SCENARIOS
@@ -74,9 +74,9 @@ RICHER: Mapping[str, dict[str, Any]] = {  # arguments of `moving.problem`
 
 
 @cache
-def controller(kind: str = "diagonal", obstacles: int = 4) -> Persistent:
+def controller(kind: str = "diagonal", obstacles: int = 4) -> Nmpc:
     """The NMPC of a kind of `RICHER`, compiled once."""
-    return Persistent(Nmpc(problem(obstacles, **RICHER[kind])))
+    return Nmpc(problem(obstacles, **RICHER[kind]))
 
 
 def row(
@@ -100,14 +100,14 @@ def exploration(episodes: int, seed: int) -> Exploration:
     return Exploration.draw(rng, shape, deviation=paper.NOISE, decay_rate=paper.DECAY_RATE)
 
 
-def begin(nmpc: Persistent, **known: Any) -> Vector:
+def begin(nmpc: Nmpc, **known: Any) -> Vector:
     """Theta where learning begins, with known parameters of the model."""
     assert nmpc.problem
     return nmpc.problem.vector(**known)
 
 
 def theta_of(
-    policy: str, nmpc: Persistent, world: World, start: Vector, episodes: int, seed: int
+    policy: str, nmpc: Nmpc, world: World, start: Vector, episodes: int, seed: int
 ) -> Vector:
     """The theta of a policy in a world, from a start; of ES the last that a solver can take."""
     if policy in ("init", "oracle"):

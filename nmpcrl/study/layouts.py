@@ -20,7 +20,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Task
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.study import paper
 from nmpcrl.study.geometry import Centres
 
@@ -55,7 +55,7 @@ def screen(centres: Centres) -> Screening:
     if not (blocked and clear):
         return Screening(blocked, clear, arrives=False, closing=False)
     theta = np.array(paper.THETA_INIT)
-    rollout = evaluate(Persistent(paper.controller(task)), theta, paper.STEPS)
+    rollout = evaluate(paper.controller(task), theta, paper.STEPS)
     arrives = not rollout.failure and task.distance(rollout.states[-1]) <= ARRIVED
     narrow = [width <= 0 for width in gaps(task, rollout.states[:, :2], task.margin).values()]
     return Screening(blocked, clear, arrives=bool(arrives), closing=any(narrow))

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from nmpcrl import Vector
+from nmpcrl.control import Nmpc
 from nmpcrl.learning import (
     Learner,
     deep_expected_sarsa,
@@ -20,7 +21,6 @@ from nmpcrl.learning import (
     regularized_deep_expected_sarsa,
     step_matched,
 )
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import count_episodes, count_steps
 from nmpcrl.study import paper
 
@@ -38,7 +38,7 @@ class Generators(NamedTuple):
     directions: np.random.Generator  # of the control with random directions
 
 
-Factory = Callable[[Settings, Persistent, Generators], Learner]
+Factory = Callable[[Settings, Nmpc, Generators], Learner]
 
 
 class Network(NamedTuple):
@@ -65,13 +65,12 @@ NETWORKS = {
 }
 
 
-def _scales(controller: Persistent, theta: Vector, *, with_theta: bool) -> tuple[Vector, float]:
+def _scales(nmpc: Nmpc, theta: Vector, *, with_theta: bool) -> tuple[Vector, float]:
     """The scales of the normalised network's inputs and of its target.
 
     A state is divided by the box's half width, or by pi without a box; an action by its bound;
     theta by theta_init; the value by the value of theta_init at the start.
     """
-    nmpc = controller.nmpc
     half = (nmpc.task.upper - nmpc.task.lower) / 2
     state = np.where(np.isfinite(half), half, np.pi)
     parts = [state, nmpc.plant.upper, *([np.abs(theta)] if with_theta else [])]
@@ -100,13 +99,13 @@ class Entry:
 def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:
     """The entry of a learner whose network predicts the next value."""
 
-    def factory(settings: Settings, controller: Persistent, generators: Generators) -> Learner:
+    def factory(settings: Settings, nmpc: Nmpc, generators: Generators) -> Learner:
         from nmpcrl.learning.network import QNetwork, Target  # torch: not for the other learners
 
-        nmpc, read = controller.nmpc, NETWORKS[settings.network]
+        read = NETWORKS[settings.network]
         scales: tuple[Vector | float, float] = (1.0, 1.0)
         if read.normalised:
-            scales = _scales(controller, np.array(settings.theta), with_theta=with_theta)
+            scales = _scales(nmpc, np.array(settings.theta), with_theta=with_theta)
         network = QNetwork(
             nmpc.n + nmpc.m + with_theta * len(settings.theta),
             generators.network,
@@ -117,7 +116,7 @@ def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:
             **read.options,
         )
         return make(
-            controller,
+            nmpc,
             network,
             settings.alpha,
             gated=settings.gated,

@@ -23,7 +23,6 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc, Problem
 from nmpcrl.control.problem import Soft
 from nmpcrl.control.task import Task, overlap
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import paper
 from nmpcrl.study.faults import NONE, Fault, robot
 
@@ -168,9 +167,9 @@ def problem(
 
 
 @cache
-def controller(obstacles: int = 4) -> Persistent:
+def controller(obstacles: int = 4) -> Nmpc:
     """The NMPC of `problem`, compiled once."""
-    return Persistent(Nmpc(problem(obstacles)))
+    return Nmpc(problem(obstacles))
 
 
 def charge(state: Vector, action: Vector, at: Matrix) -> float:

@@ -9,7 +9,6 @@ from gymnasium.spaces import Box
 
 from nmpcrl import Vector
 from nmpcrl.control import Solution
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import geometry, paper
 from nmpcrl.study.drawn import TUNE
 from nmpcrl.study.faults import robot
@@ -104,7 +103,7 @@ class NmpcPolicy:
         state, rest = observation[:3], observation[3:].reshape(-1, 2).tolist()
         centres = tuple((x, y) for x, y in rest)
         if centres != self._centres:
-            self._controller = Persistent(paper.nmpc(centres))
+            self._controller = paper.nmpc(centres)
             self._centres, self._plan = centres, None
         self._plan = self._controller.solve(state, self.theta, self._plan)
         return self._plan.action

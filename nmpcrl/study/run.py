@@ -49,12 +49,12 @@ def run(
 
 def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
     named, controller, weights = job.named, job.controller, job.weights
-    sizes = controller.nmpc.n, controller.nmpc.m, weights.theta.size, named.steps
+    sizes = controller.n, controller.m, weights.theta.size, named.steps
     steps = Table(form_of(StepRow, *sizes), named.episodes * named.steps)
     evaluations = Table(form_of(EvaluationRow, *sizes), named.episodes // named.evaluate_every + 2)
     evaluations.append(_evaluation(job, weights, 0))
     stopped, cost, began = str(Stopped.FINISHED), 0.0, time.perf_counter()
-    own = solver = controller.nmpc.solver.name
+    own = solver = controller.solver.name
     try:
         how = {**job.options, **job.environment}
         for step in train(job.learner, controller, weights, job.explore, **how):
@@ -65,7 +65,7 @@ def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
             if step.last:
                 done = step.episode + 1
                 due = done % named.evaluate_every == 0 or done == named.episodes
-                if due and not absurd(step.weights, controller.nmpc.largest):
+                if due and not absurd(step.weights, controller.largest):
                     evaluations.append(_evaluation(job, step.weights, done))
                 if on_episode:
                     on_episode(done, cost)

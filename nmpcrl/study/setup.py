@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmpcrl.control import SolverError
+from nmpcrl.control import Nmpc, SolverError
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning import Learner, Weights
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.learning.training import Exploration
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
@@ -22,7 +21,7 @@ class Job(NamedTuple):
     """The arguments of `train` and `evaluate` for a run."""
 
     named: Experiment | Trial  # canonical
-    controller: Persistent
+    controller: Nmpc
     learner: Learner
     weights: Weights
     explore: Exploration
@@ -44,7 +43,7 @@ def job_of(named: Experiment | Trial) -> Job:
 def _job_of_trial(trial: Trial) -> Job:
     """The job of a trial; an `Experiment` with the same seed has the same noise."""
     noise, learner, world, judged = np.random.SeedSequence(trial.seed).spawn(4)
-    theta, controller = np.array(trial.theta), Persistent(trial.nmpc)
+    theta, controller = np.array(trial.theta), trial.nmpc
     explore = Exploration.draw(
         np.random.default_rng(noise),
         (trial.episodes, trial.steps, trial.nmpc.m),
@@ -63,15 +62,14 @@ def _job_of_trial(trial: Trial) -> Job:
     )
 
 
-def controller_of(experiment: Experiment) -> Persistent:
+def controller_of(experiment: Experiment) -> Nmpc:
     """The controller whose theta is learned."""
-    nmpc = paper.controller(
+    return paper.controller(
         experiment.task,
         horizon=experiment.horizon,
         solver=SOLVERS[experiment.solver](tolerance=experiment.tolerance),
         ties_active=experiment.ties_active,
     )
-    return Persistent(nmpc)
 
 
 def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
@@ -88,8 +86,7 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
         if isinstance(e, Experiment)
     }
     for experiment in kinds.values():
-        controller = controller_of(experiment)
-        nmpc, theta = controller.nmpc, np.array(paper.THETA_INIT)
+        nmpc, theta = controller_of(experiment), np.array(paper.THETA_INIT)
         solution = nmpc.solve(nmpc.task.start, theta)
         nmpc.plant.step(solution.state, solution.action)
         nmpc.task.stage_cost(solution.state, solution.action)
@@ -97,13 +94,13 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
             nmpc.value_hessian_times(solution, theta)
 
 
-def prepare(experiment: Experiment, controller: Persistent) -> tuple[Learner, Weights, Exploration]:
+def prepare(experiment: Experiment, controller: Nmpc) -> tuple[Learner, Weights, Exploration]:
     """The learner, its first weights and its noise: all that `train` needs besides `controller`."""
     children = np.random.SeedSequence(experiment.seed).spawn(3)
     generators = Generators(*map(np.random.default_rng, children))
     explore = Exploration.draw(
         generators.noise,
-        (experiment.episodes, experiment.steps, controller.nmpc.m),
+        (experiment.episodes, experiment.steps, controller.m),
         deviation=paper.NOISE,
         decay_rate=experiment.decay_rate,
         count=DECAYS[experiment.decay],

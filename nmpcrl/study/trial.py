@@ -14,7 +14,6 @@ import numpy as np
 from nmpcrl.control import Nmpc
 from nmpcrl.control.content import NoContent, content
 from nmpcrl.learning import Learner
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study.parameters import LARGEST_SEED, ParameterError, whole
 
 COUNTS = ("episodes", "steps", "evaluate_every")
@@ -85,7 +84,7 @@ class Trial:
         plain = re.sub(r"\W+", "_", self.learner)
         return f"{plain}-seed{self.seed}-{self.episodes}ep"
 
-    def made(self, controller: Persistent, rng: np.random.Generator) -> Learner:
+    def made(self, controller: Nmpc, rng: np.random.Generator) -> Learner:
         """A learner for one run."""
         takes = inspect.signature(self.make).parameters
         return self.make(controller, rng=rng) if "rng" in takes else self.make(controller)

@@ -9,7 +9,7 @@ from nmpcrl.analysis.trajectory import closes_at
 from nmpcrl.claims import published
 from nmpcrl.control import Obstacle
 from nmpcrl.control.task import Task
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.report.live.introduction import NARROW, WIDE
 from nmpcrl.study import Experiment, paper
 
@@ -35,7 +35,7 @@ def task_of(given: dict) -> Task:
 def by_python(given: dict):
     """The trajectory without noise of what is asked."""
     nmpc = paper.controller(task_of(given))
-    return evaluate(Persistent(nmpc), np.array(given["theta"]), paper.STEPS)
+    return evaluate(nmpc, np.array(given["theta"]), paper.STEPS)
 
 
 def assert_equal_to_python(shown: dict) -> None:

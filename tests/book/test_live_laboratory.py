@@ -137,7 +137,7 @@ def assert_worth_as_in_python(rows: list[dict], experiment: Experiment, digits: 
         costs = [experiment.task.stage_cost(state, action) for state, action in pairs]
         discounted = np.sum(paper.GAMMA ** np.arange(len(costs)) * costs)
         np.testing.assert_allclose(row["judged"]["discounted"], discounted, rtol=digits)
-        value = controller.nmpc.solve(experiment.task.start, theta).value
+        value = controller.solve(experiment.task.start, theta).value
         np.testing.assert_allclose(row["judged"]["value"], value, rtol=digits)
 
 

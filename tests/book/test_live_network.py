@@ -114,7 +114,7 @@ def test_a_run_is_that_of_the_library(page, robot_module, learner, layout, decay
 
 
 def assert_a_run_is_that_of_the_library(page, robot_module, experiment: Experiment) -> None:
-    nmpc = controller_of(experiment).nmpc
+    nmpc = controller_of(experiment)
     given = {name: getattr(experiment, name) for name in ("alpha", "decay", "seed")}
     found = page.evaluate(
         TRAINED,

@@ -7,7 +7,6 @@ import pytest
 from wasm_host import Controller, Module
 
 from nmpcrl.learning import updates
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.setup import prepare
 
@@ -59,7 +58,7 @@ def learned(data: bytes, experiment: Experiment) -> np.ndarray:
     nmpc = paper.nmpc(experiment.layout)
     module = Module(data)
     there, rules = Controller(module, nmpc), Rules(module, 9)
-    _, weights, explore = prepare(experiment, Persistent(nmpc))
+    _, weights, explore = prepare(experiment, nmpc)
     theta, w, thetas = weights.theta, weights.w, []
     alpha, beta, gamma = experiment.alpha, experiment.beta, nmpc.gamma
     beta = experiment.beta_tdc if experiment.learner == "TDC" else beta

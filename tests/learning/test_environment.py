@@ -108,8 +108,6 @@ def test_a_problem_says_that_it_only_plans(tank, missing):
     del options[missing]
     with pytest.raises(ValueError, match="a Problem plans, and says nothing of the environment"):
         evaluate(tank, tank.problem.theta, 5, **options)
-    with pytest.raises(AttributeError, match="an Nmpc of a Problem has no task"):
-        _ = tank.task
 
 
 @pytest.mark.parametrize(

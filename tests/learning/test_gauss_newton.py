@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from nmpcrl.control import Nmpc, Problem, SolverError, Task, differential_drive
-from nmpcrl.learning import Exploration, Persistent, Transition, Weights, evaluate, train
+from nmpcrl.learning import Exploration, Transition, Weights, evaluate, train
 from nmpcrl.learning.bootstrap import Successor
 from nmpcrl.learning.gauss_newton import ClosedLoop, TrustRegion, closed_loop, lstd_q_within
 from nmpcrl.learning.optimisers import GaussNewton
@@ -30,13 +30,13 @@ class Held:
 
 
 @pytest.fixture(scope="module")
-def free() -> Persistent:
+def free() -> Nmpc:
     """The paper's robot without obstacles, at rest near its target."""
     task = Task(
         start=np.array([0.3, 0.2, 0.4]), target=np.zeros(3), lower=np.full(3, -9.0),
         upper=np.full(3, 9.0),
     )  # fmt: skip
-    return Persistent(Nmpc(differential_drive(), task))
+    return Nmpc(differential_drive(), task)
 
 
 def random_problem(seed, *, convex):
@@ -119,7 +119,7 @@ def test_the_curvature_of_j_is_that_of_the_sensitivities(free):
         for e in h * np.eye(9)
     ]
     S = np.array(ends)  # (d, steps, n)
-    wanted = 2 * np.einsum("itn,n,jtn->ij", S, free.nmpc.task.weights, S)
+    wanted = 2 * np.einsum("itn,n,jtn->ij", S, free.task.weights, S)
     np.testing.assert_allclose(curvature, wanted, rtol=5e-3, atol=1e-5 * np.abs(wanted).max())
 
 
@@ -155,10 +155,10 @@ def test_gauss_newton_on_j_lowers_the_cost_of_the_robot(free):
 
 
 def test_an_action_that_noise_took_to_its_bound_does_not_answer_to_theta(free):
-    rule = ClosedLoop(free.nmpc, free, Held())
-    state = free.nmpc.task.start
+    rule = ClosedLoop(free, free, Held())
+    state = free.task.start
     solution = free.solve(state, THETA)
-    action = np.array([free.nmpc.upper[0], 0.0])
+    action = np.array([free.upper[0], 0.0])
     slope = rule.policy_slopes(
         Transition(state, action, 1.0, state, solution), THETA, np.zeros((3, 9))
     )

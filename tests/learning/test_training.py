@@ -3,16 +3,13 @@
 import dataclasses
 import re
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from nmpcrl.control import Nmpc, Riccati, SolverError, differential_drive
-from nmpcrl.control.solvers.codes import End
-from nmpcrl.control.solvers.riccati import machine_code
+from nmpcrl.control import Nmpc, SolverError, differential_drive
 from nmpcrl.learning import Weights, expected_sarsa, frozen, q_learning
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import (
     PATIENCE,
     Diverged,
@@ -44,8 +41,8 @@ class Faulty(Nmpc):
 
 
 @pytest.fixture(scope="module")
-def sound() -> Persistent:
-    return Persistent(paper.nmpc())
+def sound() -> Nmpc:
+    return paper.nmpc()
 
 
 def first_weights():
@@ -78,11 +75,11 @@ def test_steps_come_in_order_and_every_episode_begins_at_the_start(sound):
     steps = training(sound, noisy(3, 4))
     assert places(steps) == [(e, t) for e in range(3) for t in range(4)]
     for step in steps:
-        assert np.array_equal(step.state, sound.nmpc.task.start) == (step.time == 0)
+        assert np.array_equal(step.state, sound.task.start) == (step.time == 0)
 
 
 def test_a_step_is_the_plants_and_costs_what_the_task_says(sound):
-    plant, task = sound.nmpc.plant, sound.nmpc.task
+    plant, task = sound.plant, sound.task
     steps = training(sound, noisy(1, 6), es)
     for now, later in pairwise(steps):
         np.testing.assert_array_equal(plant.step(now.state, now.action), later.state)
@@ -91,7 +88,7 @@ def test_a_step_is_the_plants_and_costs_what_the_task_says(sound):
 
 
 def test_the_action_is_the_policys_with_noise_and_clipped(sound):
-    explore, plant = noisy(2, 5, scale=0.7), sound.nmpc.plant
+    explore, plant = noisy(2, 5, scale=0.7), sound.plant
     clipped = 0
     for step in training(sound, explore):
         wish = step.solution.action + 0.7 * explore.noise[step.episode, step.time]
@@ -106,7 +103,7 @@ def test_an_action_that_is_not_clipped_is_the_wish(sound):
     for step in steps:
         wish = step.solution.action + explore.noise[step.episode, step.time]
         np.testing.assert_array_equal(step.action, wish)
-    assert any((np.abs(step.action) > sound.nmpc.plant.upper).any() for step in steps)
+    assert any((np.abs(step.action) > sound.plant.upper).any() for step in steps)
 
 
 def test_where_actions_are_valued_the_solution_has_the_applied_action_first(sound):
@@ -197,9 +194,9 @@ def test_training_can_be_stopped_at_any_step(sound):
 
 def test_the_second_solve_is_the_next_first_ones_warm_start():
     """It was solved in that very state, so nothing is shifted, and little is left to do."""
-    controller = Persistent(Faulty(lambda call: False))
+    controller = Faulty(lambda call: False)
     steps = training(controller, noisy(1, 4), es)
-    warm_starts = controller.nmpc.warm_starts
+    warm_starts = controller.warm_starts
     assert warm_starts[0] is None
     for k, step in enumerate(steps):
         assert warm_starts[2 * k + 1] is step.solution
@@ -208,10 +205,10 @@ def test_the_second_solve_is_the_next_first_ones_warm_start():
 
 
 def test_without_a_second_solve_the_plan_itself_is_the_next_warm_start():
-    controller = Persistent(Faulty(lambda call: False))
+    controller = Faulty(lambda call: False)
     steps = training(controller, noisy(2, 3))
     plans = [step.solution for step in steps]
-    assert controller.nmpc.warm_starts == [None, *plans[:2], None, *plans[3:5]]
+    assert controller.warm_starts == [None, *plans[:2], None, *plans[3:5]]
 
 
 def test_the_step_reading_counts_time_through_training():
@@ -239,70 +236,23 @@ def test_noise_is_standard_normal(sound):
     assert noise.std() == pytest.approx(1, abs=0.02)
 
 
-def test_a_failed_solve_is_tried_once_more_from_a_standing_start():
-    controller = Persistent(Faulty(lambda call: call == 2))
-    steps = training(controller, quiet(1, 4))
-    assert [step.solution.status for step in steps] == ["solved", "solved", "restarted", "solved"]
-    assert [step.solution.restarts for step in steps] == [0, 0, 1, 0]
-    assert controller.nmpc.warm_starts[2] is steps[1].solution
-    assert controller.nmpc.warm_starts[3] is None
-    assert all(not step.failure for step in steps)
-
-
-def test_a_standing_start_that_failed_is_not_repeated():
-    controller = Persistent(Faulty(lambda call: True))
-    with pytest.raises(SolverError):
-        controller.solve(paper.task().start, THETA)
-    assert len(controller.nmpc.warm_starts) == 1
-
-
-def test_riccati_has_begun_anew_by_itself_and_is_not_asked_again():
-    """After the warm start come a standing one and four random ones, each once."""
-    tried = []
-
-    def failing(plant):
-        code = machine_code(plant)
-
-        def solve(*given):
-            tried.append((given[-5], given[-2].tobytes()))  # the kind of start, and the point
-            value, iterations, _, violation, error = code.solve(*given)
-            return value, iterations, float(End.LIMIT), violation, error
-
-        return code._replace(solve=solve)
-
-    start = paper.task().start
-    warm_start = paper.nmpc().solve(start, THETA)
-    controller = Persistent(paper.nmpc(solver=Riccati(code=failing)))
-    with pytest.raises(SolverError, match="from 6 starts"):
-        controller.solve(start + 0.1, THETA, warm_start)
-    assert len(tried) == len(set(tried)) == 6
-
-
-def test_a_restart_keeps_the_action_that_was_fixed():
-    controller = Persistent(Faulty(lambda call: call == 1))
-    warm_start = controller.solve(paper.task().start, THETA)
-    action = np.array([0.2, -0.3])
-    solution = controller.solve(paper.task().start, THETA, warm_start, action)
-    np.testing.assert_allclose(solution.action, action, atol=1e-7)
-
-
-def test_a_solve_that_fails_twice_ends_the_episode_and_learning_goes_on():
-    controller = Persistent(Faulty(lambda call: call in (2, 3)))
+def test_a_solve_that_fails_ends_the_episode_and_learning_goes_on():
+    controller = Faulty(lambda call: call == 2)
     steps = training(controller, quiet(2, 4))
     assert places(steps) == [(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (1, 3)]
     failed = steps[2]
-    assert "call 3 failed" in failed.failure
+    assert "call 2 failed" in failed.failure
     assert failed.solution is None
     assert failed.update is None
     assert np.isnan(failed.action).all()
     assert np.isnan(failed.cost)
-    np.testing.assert_array_equal(steps[3].state, controller.nmpc.task.start)
+    np.testing.assert_array_equal(steps[3].state, controller.task.start)
     assert [bool(step.failure) for step in steps] == [False, False, True] + [False] * 4
 
 
-def test_a_second_solve_that_fails_twice_ends_the_episode_and_keeps_theta():
-    # the calls are V(s0), V(s1), V(s1), V(s2), and that fails twice
-    controller = Persistent(Faulty(lambda call: call in (3, 4)))
+def test_a_second_solve_that_fails_ends_the_episode_and_keeps_theta():
+    # the calls are V(s0), V(s1), V(s1), V(s2), which fails
+    controller = Faulty(lambda call: call == 3)
     steps = training(controller, quiet(2, 3), es)
     assert places(steps) == [(0, 0), (0, 1), (1, 0), (1, 1), (1, 2)]
     failed = steps[1]
@@ -314,7 +264,7 @@ def test_a_second_solve_that_fails_twice_ends_the_episode_and_keeps_theta():
     np.testing.assert_array_equal(steps[2].solution.theta, steps[0].weights.theta)
 
 
-@pytest.mark.parametrize("failing", [(2, 3), (3, 4)])  # a plan, or the solve after it
+@pytest.mark.parametrize("failing", [2, 3])  # a plan, or the solve after it
 def test_the_learner_is_told_of_a_failed_episode_and_of_each_first_step(failing):
     told = []
 
@@ -329,7 +279,7 @@ def test_the_learner_is_told_of_a_failed_episode_and_of_each_first_step(failing)
         def interrupted(self, memory, weights):
             return dataclasses.replace(weights, theta=1.01 * weights.theta), memory
 
-    controller = Persistent(Faulty(lambda call: call in failing))
+    controller = Faulty(lambda call: call == failing)
     steps = training(controller, quiet(2, 3), lambda c: dataclasses.replace(es(c), rule=Told()))
     assert told == [True, True, False, False]
     failed = next(k for k, step in enumerate(steps) if step.failure)
@@ -338,7 +288,7 @@ def test_the_learner_is_told_of_a_failed_episode_and_of_each_first_step(failing)
 
 
 def test_ten_failed_episodes_in_a_row_are_a_divergence():
-    controller = Persistent(Faulty(lambda call: True))
+    controller = Faulty(lambda call: True)
     steps = []
     with pytest.raises(Diverged, match="10 episodes in a row ended in a failed solve: call 9 fail"):
         steps.extend(train(frozen(controller), controller, first_weights(), quiet(30, 4)))
@@ -348,7 +298,7 @@ def test_ten_failed_episodes_in_a_row_are_a_divergence():
 def test_ten_failed_episodes_not_in_a_row_are_none():
     """Nine fail at once, the tenth goes through, and nine more fail."""
     fails = [True] * 9 + [False] * 2 + [True] * 9
-    controller = Persistent(Faulty(lambda call: fails[call]))
+    controller = Faulty(lambda call: fails[call])
     steps = training(controller, quiet(19, 2))
     assert places(steps)[-1] == (18, 0)
 
@@ -400,12 +350,12 @@ def test_with_theta_c_at_the_penaltys_margin_the_cost_is_the_other_reference(sou
 
 
 def test_ipopt_reaches_the_same_cost(rollout):
-    controller = Persistent(paper.nmpc(solver="ipopt"))
+    controller = paper.nmpc(solver="ipopt")
     assert evaluate(controller, THETA, paper.STEPS).cost == pytest.approx(rollout.cost, rel=1e-4)
 
 
 def test_a_rollout_follows_the_plant_and_adds_up_its_costs(sound, rollout):
-    plant, task = sound.nmpc.plant, sound.nmpc.task
+    plant, task = sound.plant, sound.task
     assert rollout.states.shape == (130, 3)
     assert rollout.actions.shape == (130, 2)
     np.testing.assert_array_equal(rollout.states[0], task.start)
@@ -418,16 +368,16 @@ def test_a_rollout_follows_the_plant_and_adds_up_its_costs(sound, rollout):
 
 
 def test_the_rollout_of_theta_init_reaches_the_target_and_hits_nothing(sound, rollout):
-    task = sound.nmpc.task
+    task = sound.task
     assert task.distance(rollout.states[-1]) < 0.1
     assert (task.overlap(rollout.states) <= 1e-6).all()
-    assert (np.abs(rollout.actions) <= sound.nmpc.plant.upper).all()
+    assert (np.abs(rollout.actions) <= sound.plant.upper).all()
     assert (task.lower <= rollout.states).all()
     assert (rollout.states <= task.upper).all()
 
 
 def test_a_rollout_that_fails_costs_infinity_and_keeps_what_it_had():
-    controller = Persistent(Faulty(lambda call: call >= 3))
+    controller = Faulty(lambda call: call >= 3)
     failed = evaluate(controller, THETA, 10)
     assert failed.cost == np.inf
     assert failed.states.shape == (3, 3)
@@ -460,19 +410,8 @@ def test_a_rollout_needs_no_more_than_a_solve(sound, plant):
 
 
 def test_a_rollout_that_fails_at_once_has_no_steps():
-    controller = Persistent(Faulty(lambda call: True))
+    controller = Faulty(lambda call: True)
     failed = evaluate(controller, THETA, 10)
     assert failed.states.shape == (0, 3)
     assert failed.actions.shape == (0, 2)
     assert failed.cost == np.inf
-
-
-def test_a_rollout_restarts_like_training_does():
-    whole = evaluate(Persistent(Faulty(lambda call: False)), THETA, 6)
-    restarted = evaluate(Persistent(Faulty(lambda call: call == 3)), THETA, 6)
-    assert restarted.failure == ""
-    assert restarted.cost == pytest.approx(whole.cost, rel=1e-6)
-
-
-def test_persistence_has_the_discount_of_its_controller():
-    assert Persistent(SimpleNamespace(gamma=0.5)).gamma == 0.5

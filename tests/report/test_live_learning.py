@@ -12,7 +12,6 @@ from nmpcrl.analysis import two_state
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.control.nmpc import ABSURD
 from nmpcrl.learning import browser, training
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.report import live
 from nmpcrl.report.figures.style import LOOKS
 from nmpcrl.report.live import frame, two_learners, two_states
@@ -75,7 +74,7 @@ def test_both_learners_begin_as_the_experiment_does(figure):
     data = data_of(figure)
     assert data["given"] == {"alpha": 3e-8, "decay": "episode", "seed": 4}
     nmpc = paper.nmpc("C", horizon=7)
-    _, weights, explore = prepare(EXPERIMENT, Persistent(nmpc))
+    _, weights, explore = prepare(EXPERIMENT, nmpc)
     for learner, settings in data["settings"].items():
         assert settings["learner"] == learner
         assert settings["theta"] == weights.theta.tolist()

@@ -12,7 +12,7 @@ from raising import raising
 from nmpcrl.claims import published
 from nmpcrl.control.codegen.source import CannotCompile
 from nmpcrl.learning import browser
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.report import live
 from nmpcrl.report.figures.style import LOOKS
 from nmpcrl.report.live import frame, published_runs
@@ -87,7 +87,7 @@ def test_each_layout_has_a_file_with_every_run_of_the_main_table_and_the_control
 @pytest.mark.parametrize("learner", ["ES", "DES", "RDES", "GES", "TDC", "QL"])
 def test_the_published_theta_leads_to_the_published_cost(learner, known):
     e = Experiment(learner, layout="D", decay="episode", seed=1)
-    found, controller = known.summaries[e].evaluations, Persistent(paper.nmpc(e.layout))
+    found, controller = known.summaries[e].evaluations, paper.nmpc(e.layout)
     for theta, cost in zip(found["theta"][::10], found["cost"][::10], strict=True):
         rollout = evaluate(controller, theta.astype(float), paper.STEPS)
         assert rollout.cost == pytest.approx(cost, rel=SAME)

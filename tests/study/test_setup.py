@@ -5,12 +5,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from nmpcrl.learning.rollout import Persistent
 from nmpcrl.study import Experiment, paper, run
 from nmpcrl.study.learners import DECAYS, LEARNERS, NETWORKS, Generators, readers
 from nmpcrl.study.setup import job_of, prepare
 
-CONTROLLER = Persistent(paper.nmpc())
+CONTROLLER = paper.nmpc()
 ALL = {one.name for one in fields(Experiment)}
 OPTIONAL = {name for name in ALL if readers(name)}
 

@@ -40,7 +40,7 @@ def compile_for_pages() -> None:
     from nmpcrl.study import Experiment, moving
     from nmpcrl.study.setup import controller_of
 
-    nmpc = controller_of(Experiment()).nmpc
+    nmpc = controller_of(Experiment())
     with suppress(CannotCompile):
         browser.module(nmpc.plant, nmpc.task)
         alone.module(moving.problem())

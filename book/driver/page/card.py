@@ -12,7 +12,7 @@ import numpy as np
 from bs4 import BeautifulSoup
 
 from driver.project import from_yaml
-from nmpcrl.learning.rollout import Persistent, evaluate
+from nmpcrl.learning.rollout import evaluate
 from nmpcrl.report.figures.controller.plans import closed_loop
 from nmpcrl.report.figures.sheet import Drawn, Sheet
 from nmpcrl.study import paper
@@ -36,7 +36,7 @@ def site(html: Path) -> None:
 def drawn(target: Path) -> str:
     """Write the picture of the first rollout; what it shows, in words."""
     nmpc, theta = paper.nmpc(), np.array(paper.THETA_INIT)
-    rollout = evaluate(Persistent(nmpc), theta, paper.STEPS)
+    rollout = evaluate(nmpc, theta, paper.STEPS)
     plans = [nmpc.solve(state, theta) for state in rollout.states[: -paper.HORIZON : EVERY]]
     figure = closed_loop(nmpc.task, rollout, plans)
     assert isinstance(figure, Drawn)

@@ -24,7 +24,7 @@ WIDE, NARROW = "A", "E"  # layouts: the first, and the first in which ES closes 
 def intro() -> HTML:
     """Obstacles to be moved, ES that trains among them, and a layout in which it fails."""
     experiment = Experiment("ES", layout=WIDE)  # as the study has trained it
-    nmpc = controller_of(experiment).nmpc
+    nmpc = controller_of(experiment)
 
     def data() -> dict[str, Any]:
         own = settings(experiment, "ES", nmpc)

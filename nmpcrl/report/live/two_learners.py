@@ -61,7 +61,7 @@ def _pair(
     shown: Mapping[str, list[str]],
     scripts: tuple[str, ...],
 ) -> HTML:
-    nmpc = controller_of(experiment).nmpc
+    nmpc = controller_of(experiment)
 
     def data() -> dict[str, Any]:
         return {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib import pyplot
 
-from nmpcrl.learning.rollout import Persistent, Rollout, evaluate
+from nmpcrl.learning.rollout import Rollout, evaluate
 from nmpcrl.report.figures import sheet
 from nmpcrl.report.figures.controller import plans as draw
 from nmpcrl.report.figures.controller import sensitivity
@@ -26,7 +26,7 @@ def theta():
 
 @pytest.fixture(scope="module")
 def rollout(nmpc, theta):
-    return evaluate(Persistent(nmpc), theta, steps=5)
+    return evaluate(nmpc, theta, steps=5)
 
 
 def straight(y: float, cost: float = 1.0) -> Rollout:
@@ -77,7 +77,7 @@ def test_the_plan_that_ends_farthest_from_the_closed_loop_is_drawn_and_named(
     theta, assert_readable, texts
 ):
     nmpc = paper.nmpc(horizon=4)
-    loop = evaluate(Persistent(nmpc), theta, steps=20)
+    loop = evaluate(nmpc, theta, steps=20)
     plans = [nmpc.solve(state, theta) for state in loop.states[:-4]]
     ends = np.array([plan.states[-1, :2] for plan in plans])
     apart = np.linalg.norm(ends - loop.states[4:, :2], axis=1)
