@@ -65,7 +65,7 @@ class Blocks(Mapping[str, tuple[int, ...]]):
         copy = np.array(base, float)
         for name, value in values.items():
             shape, whole = self[name], (*copy.shape[:-1], *self[name])
-            array = numbers(f"{self._what} {name}", value)
+            array = numbers(f"{self._what} {name}", value, empty=0 in shape)
             if array.shape not in (shape, whole):
                 either = f"{shape}" if whole == shape else f"{shape} or {whole}, a stage each"
                 raise ValueError(
