@@ -19,7 +19,7 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.analysis.metrics import root_mean_square
 from nmpcrl.control import Nmpc
-from nmpcrl.learning.bootstrap import Bootstrap, Imitation, Successor, Transition
+from nmpcrl.learning.bootstrap import Bootstrap, Imitation, NextValue, Transition
 from nmpcrl.learning.training import Diverged, train
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.setup import controller_of, prepare
@@ -39,7 +39,7 @@ class StartTheta:
     true_slope: bool = False
     theta: Vector | None = field(default=None, init=False)  # None before an episode
 
-    def __call__(self, transition: Transition, theta: Vector) -> Successor | None:
+    def __call__(self, transition: Transition, theta: Vector) -> NextValue | None:
         """Value the next state."""
         first = theta if self.theta is None else self.theta
         self.theta = None if transition.last else first
@@ -93,7 +93,7 @@ def watch(experiment: Experiment, intervention: str = "none") -> Outcome:
     changed = INTERVENTIONS[intervention](network, controller)
     fed: list[float] = []
 
-    def watched(transition: Transition, theta: Vector) -> Successor | None:
+    def watched(transition: Transition, theta: Vector) -> NextValue | None:
         successor = changed(transition, theta)
         if successor is not None:
             fed.append(feedback(network, transition, theta, learner.gamma))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl import Matrix, Vector
-from nmpcrl.learning import Successor, Weights, td_error
+from nmpcrl.learning import NextValue, Weights, td_error
 from nmpcrl.learning.learners import UpdateRule
 
 FIRST, SECOND = 0, 1
@@ -46,7 +46,7 @@ class Chain:
 
 def sampled_step(chain: Chain, rule: UpdateRule, weights: Weights, state: int) -> Weights:
     """One update in `state`."""
-    here, there = (Successor(float(phi[state] @ weights.theta), phi[state])
+    here, there = (NextValue(float(phi[state] @ weights.theta), phi[state])
                    for phi in (PHI, PHI_NEXT))  # fmt: skip
     solution: Any = here  # which has the value and the features that the rule reads
     return rule(weights, chain.delta(weights.theta, state), solution, there)

@@ -51,8 +51,8 @@ class Described(ABC):
         vars(self).update(state)
 
 
-class Recorded:
-    """A function of the user as the expression that it wrote down."""
+class TracedFunction:
+    """A function of the user as its CasADi expression, so that it can be pickled."""
 
     def __init__(self, function: ca.Function) -> None:
         self.function = function

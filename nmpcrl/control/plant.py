@@ -10,9 +10,9 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control.codegen.jit import callable_of
-from nmpcrl.control.description import Described, Recorded
+from nmpcrl.control.description import Described, TracedFunction
 from nmpcrl.control.expression import column, expression
-from nmpcrl.control.vectors import kept, whole
+from nmpcrl.control.vectors import positive_integer, read_only
 
 Dynamics = Callable[[ca.SX, ca.SX], ca.SX]
 
@@ -56,7 +56,7 @@ class Plant(Described):
 
     def __post_init__(self) -> None:
         for side in ("lower", "upper"):
-            bound = kept(getattr(self, side))
+            bound = read_only(getattr(self, side))
             if bound.shape != (self.m,) or np.isnan(bound).any():
                 raise ValueError(f"plant.{side} = {bound} must hold {self.m} numbers, one an input")
             object.__setattr__(self, side, bound)
@@ -66,14 +66,14 @@ class Plant(Described):
             raise ValueError(f"plant.lower = {self.lower} must lie below upper = {self.upper}")
         if not 0 < self.period < np.inf:
             raise ValueError(f"plant.period = {self.period} must be a positive number of seconds")
-        whole("plant.substeps", self.substeps)
+        positive_integer("plant.substeps", self.substeps)
         state, action = ca.SX.sym("state", self.n), ca.SX.sym("action", self.m)
         symbols = {"state": state, "action": action}
         expression("dynamics", self.dynamics, (state, action), symbols, self.n, "state")
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields, with the dynamics as an expression: a function need not have a name."""
-        return super().__getstate__() | {"dynamics": Recorded(self._derivative)}
+        return super().__getstate__() | {"dynamics": TracedFunction(self._derivative)}
 
     def _described(self) -> tuple[Any, ...]:
         fields = (self.state_names, self.action_names, self.lower, self.upper)

@@ -22,7 +22,7 @@ from nmpcrl import Matrix, Vector
 from nmpcrl.control.blocks import Blocks, Symbols, numbers
 from nmpcrl.control.description import Described
 from nmpcrl.control.expression import expression
-from nmpcrl.control.vectors import kept, whole
+from nmpcrl.control.vectors import positive_integer, read_only
 
 SMALL, LARGE = 1e-2, 1e4  # sizes of states that every solver takes as they are
 LEAST = 1e-200  # curvature, or slope
@@ -141,7 +141,7 @@ class Problem(Described):
             ValueError: something is no such thing; the message names it and says what to write.
         """
         self.states, self.inputs, self.horizon = (
-            whole(name, number)
+            positive_integer(name, number)
             for name, number in (("states", states), ("inputs", inputs), ("horizon", horizon))
         )
         self.gamma = discount(gamma)
@@ -157,9 +157,9 @@ class Problem(Described):
         self.names = Blocks("theta", {name: start.shape for name, start in starts.items()})
         if not self.names.size:
             raise ValueError("theta is empty: name at least one parameter, or nothing is learned")
-        self.theta = kept(self.names.filled(np.zeros(self.names.size), starts))
+        self.theta = read_only(self.names.filled(np.zeros(self.names.size), starts))
         self.theta_lower, self.theta_upper = (
-            kept(np.concatenate([_spread(name, getattr(parameters[name], side), starts[name])
+            read_only(np.concatenate([_spread(name, getattr(parameters[name], side), starts[name])
                                  for name in parameters]))
             for side in ("lower", "upper")
         )  # fmt: skip
@@ -183,7 +183,7 @@ class Problem(Described):
         table = {self.family: (self.lines, width)} if self.family else {}
         self.data_names = Blocks("data", shapes | table)
         empty: Matrix = np.zeros((self.horizon + 1, self.data_names.size))
-        self.data = kept(self.data_names.filled(empty, defaults))
+        self.data = read_only(self.data_names.filled(empty, defaults))
         self._function, sizes = self._written(model, stage, terminal, initial, soft, hard)
         self.weights, self.active = self._spread(soft, hard, sizes)
         e = self.expressions
@@ -258,9 +258,7 @@ class Problem(Described):
         lines = [data[self.own_size + j * width : self.own_size + (j + 1) * width]
                  for j in range(self.lines)]  # fmt: skip
         fixed, _ = sizes(x, u, theta, own, ca.DM.zeros(width))
-        return ca.vertcat(
-            ca.SX(0, 1), fixed, *(sizes(x, u, theta, own, line)[1] for line in lines)
-        )
+        return ca.vertcat(ca.SX(0, 1), fixed, *(sizes(x, u, theta, own, line)[1] for line in lines))
 
     @cached_property
     def typical_row_sizes(self) -> Vector:
@@ -286,9 +284,9 @@ class Problem(Described):
         x, u, *rest = given = self._function.sx_in()
         next_x, *costs = self._function(ca.DM(states) * x, ca.DM(inputs) * u, *rest)
         function = ca.Function("problem", given, [next_x / ca.DM(states), *costs])
-        bounds = {"lower": kept(self.lower / inputs), "upper": kept(self.upper / inputs),
-                  "state_lower": kept(self.state_lower / states),
-                  "state_upper": kept(self.state_upper / states)}  # fmt: skip
+        bounds = {"lower": read_only(self.lower / inputs), "upper": read_only(self.upper / inputs),
+                  "state_lower": read_only(self.state_lower / states),
+                  "state_upper": read_only(self.state_upper / states)}  # fmt: skip
         vars(other).update(_function=function, sizes=_ones(self), **bounds)
         return other
 
@@ -377,7 +375,7 @@ class Problem(Described):
         nothing = np.zeros((stages.size, 0), bool)
         fixed, each = (np.hstack([nothing, *part]) for part in active)
         return (
-            kept(self._every(*map(np.concatenate, weights))),
+            read_only(self._every(*map(np.concatenate, weights))),
             np.hstack([fixed, *[each] * self.lines]),
         )
 
@@ -407,12 +405,14 @@ def _bends(problem: Problem, share: float) -> tuple[Matrix, Matrix]:
     z, costs = ca.vertcat(e.x, e.u), e.stage + share * e.terminal
     both = ca.Function("bends", [e.x, e.u, e.theta, e.d], [*ca.hessian(costs, z)])
     still = np.clip(np.zeros(problem.inputs), problem.lower, problem.upper)
-    curvature, slope = both(np.zeros(problem.states), still, problem.theta, problem.own(problem.data[0]))
+    curvature, slope = both(
+        np.zeros(problem.states), still, problem.theta, problem.own(problem.data[0])
+    )
     return curvature.full(), slope.full()
 
 
 def _ones(problem: Problem) -> tuple[Vector, Vector]:
-    return kept(np.ones(problem.states)), kept(np.ones(problem.inputs))
+    return read_only(np.ones(problem.states)), read_only(np.ones(problem.inputs))
 
 
 def _sizes(scale: Any, problem: Problem) -> tuple[Vector, Vector]:
@@ -438,7 +438,7 @@ def _sizes(scale: Any, problem: Problem) -> tuple[Vector, Vector]:
     inputs = np.where(half < np.inf, half, inputs)
     rounded = (2.0 ** np.round(np.log2(size)) for size in (states, inputs))
     spread = zip(rounded, (problem.states, problem.inputs), strict=True)
-    states, inputs = (kept(np.broadcast_to(size, count)) for size, count in spread)
+    states, inputs = (read_only(np.broadcast_to(size, count)) for size, count in spread)
     return states, inputs
 
 
@@ -457,7 +457,7 @@ def _bounds(of: str, lower: Any, upper: Any, count: int) -> tuple[Vector, Vector
         side = np.array(value, float)
         if side.shape not in ((), (1,), (count,)) or np.isnan(side).any():
             raise ValueError(f"{name} = {value!r} must hold {count} numbers, one an {one}")
-        sides.append(kept(np.broadcast_to(side, count)))
+        sides.append(read_only(np.broadcast_to(side, count)))
     if not (sides[0] < sides[1]).all():
         raise ValueError(
             f"{of}lower = {sides[0]} must lie below {of}upper = {sides[1]}, or no {one} is allowed"

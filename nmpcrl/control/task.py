@@ -13,7 +13,7 @@ from nmpcrl.control.codegen.jit import callable_of
 from nmpcrl.control.description import Described
 from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem, Soft
-from nmpcrl.control.vectors import kept
+from nmpcrl.control.vectors import read_only
 
 
 class Theta(NamedTuple):
@@ -83,7 +83,7 @@ class Task(Described):
 
     def __post_init__(self) -> None:
         for name in ("start", "target", "lower", "upper", "weights"):
-            vector = kept(getattr(self, name))
+            vector = read_only(getattr(self, name))
             if vector.shape != np.shape(self.start) or np.isnan(vector).any():
                 raise ValueError(
                     f"task.{name} = {vector} must hold {np.size(self.start)} numbers, as start does"

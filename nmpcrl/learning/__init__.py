@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from nmpcrl.learning.baselines import frozen, random_direction, step_matched
 from nmpcrl.learning.batches import Batched, batch_semi_gradient, lstd_q
-from nmpcrl.learning.bootstrap import Bootstrap, Imitation, SecondSolve, Successor, Transition
+from nmpcrl.learning.bootstrap import Bootstrap, Imitation, NextValue, SecondSolve, Transition
 from nmpcrl.learning.gymnasium import as_gymnasium
 from nmpcrl.learning.learners import (
     Learner,
@@ -64,13 +64,13 @@ __all__ = [
     "GaussNewton",
     "Imitation",
     "Learner",
+    "NextValue",
     "Optimiser",
     "QNetwork",
     "Rollout",
     "SecondSolve",
     "StatefulRule",
     "Step",
-    "Successor",
     "Transition",
     "Update",
     "Weights",

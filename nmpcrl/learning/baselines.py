@@ -13,7 +13,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.control import Solution
-from nmpcrl.learning.bootstrap import Controller, SecondSolve, Successor, Transition
+from nmpcrl.learning.bootstrap import Controller, NextValue, SecondSolve, Transition
 from nmpcrl.learning.learners import (
     Learner,
     UpdateRule,
@@ -63,7 +63,7 @@ def _as_far_as(
     weights: Weights,
     delta: float,
     solution: Solution,
-    successor: Successor,
+    successor: NextValue,
 ) -> Weights:
     moved = length(weights, delta, solution, successor)
     turned = direction(weights, delta, solution, successor)

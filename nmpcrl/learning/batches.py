@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmpcrl.learning.bootstrap import Controller, SecondSolve, Successor, Transition
+from nmpcrl.learning.bootstrap import Controller, NextValue, SecondSolve, Transition
 from nmpcrl.learning.learners import Learner, Weights, theta_bounds
 from nmpcrl.learning.optimisers import Bounds, GaussNewton, Optimiser
 
@@ -53,7 +53,7 @@ class Batched:
         weights: Weights,
         transition: Transition,
         delta: float,
-        successor: Successor,
+        successor: NextValue,
     ) -> tuple[Weights, Memory]:
         """Add to the sums; move theta and begin anew where the batch is full."""
         found, count = self.sample(transition, delta), memory.steps + 1

@@ -31,8 +31,8 @@ class Transition:
 
 
 @dataclass(frozen=True, eq=False)
-class Successor:
-    """What is known of the next state."""
+class NextValue:
+    """The value that a bootstrap gives to the next state."""
 
     value: float  # Q(s+, a+)
     features: Vector | None = None  # phi+, shape (d,); None from a network
@@ -72,8 +72,8 @@ class Controller(Protocol):
 class Bootstrap(Protocol):
     """Anything that values the next state of a transition."""
 
-    def __call__(self, transition: Transition, theta: Vector) -> Successor | None:
-        """Value `transition.next_state` under `theta`; None if there is nothing to go by yet."""
+    def __call__(self, transition: Transition, theta: Vector) -> NextValue | None:
+        """Value `transition.next_state` under `theta`; None skips the learning step."""
 
 
 @dataclass(frozen=True)
@@ -82,28 +82,28 @@ class SecondSolve:
 
     nmpc: Controller
 
-    def __call__(self, transition: Transition, theta: Vector) -> Successor:
+    def __call__(self, transition: Transition, theta: Vector) -> NextValue:
         """Start from the first solution, shifted by a stage.
 
         Raises:
             SolverError: no optimum was found.
         """
         if transition.end:
-            return Successor(0.0, np.zeros(theta.size))
+            return NextValue(0.0, np.zeros(theta.size))
         what = (transition.next_state, theta, transition.solution)
         if transition.next_data is None:
             solution = self.nmpc.solve(*what)
         else:
             solution = self.nmpc.solve(*what, data=transition.next_data)
-        return Successor(solution.value, solution.features, solution)
+        return NextValue(solution.value, solution.features, solution)
 
 
 @dataclass(frozen=True)
 class Imitation:
-    """A network learns the NMPC's value, Eq. (10), and predicts the next one, Eq. (11).
+    """A network learns the NMPC's value, Eq. (10), and predicts the next one, Eq. (11): (R)DES.
 
-    It is that of DES, and of RDES if theta is an input. What waits, waits until what predicts, the
-    network or its `target`, knows of a fit.
+    RDES has theta among the network's inputs. A gated bootstrap gives no value before the first
+    fit of the network that predicts: `network`, or `target` where there is one.
     """
 
     network: "QNetwork"  # learns in place
@@ -114,7 +114,7 @@ class Imitation:
     late: bool = False  # predict before the fits, as where they run in parallel  # departure I
     actions: tuple[Vector, Vector] | None = None  # a box, whose best is a+  # departure I
 
-    def __call__(self, transition: Transition, theta: Vector) -> Successor | None:
+    def __call__(self, transition: Transition, theta: Vector) -> NextValue | None:
         """Remember (s, a[, theta]) -> Q, fit, and predict Q(s+, a+); a+ = u_1 of the plan."""
         began = time.perf_counter()
         solution = transition.solution
@@ -128,7 +128,7 @@ class Imitation:
         if value is None:
             return None
         value = 0.0 if transition.end else value
-        return Successor(value, loss=loss, seconds=time.perf_counter() - began)
+        return NextValue(value, loss=loss, seconds=time.perf_counter() - began)
 
     def _fit(self) -> float:
         """The loss of the last fit in this step; nan if there are too few examples for one."""

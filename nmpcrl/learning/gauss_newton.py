@@ -14,7 +14,7 @@ import numpy as np
 from nmpcrl import Matrix, Vector
 from nmpcrl.control import Nmpc
 from nmpcrl.learning.batches import Batched, lstd_q
-from nmpcrl.learning.bootstrap import Controller, Successor, Transition
+from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
 from nmpcrl.learning.learners import Learner, Weights
 from nmpcrl.learning.optimisers import Bounds, Optimiser
 from nmpcrl.learning.policy_gradient import no_successor
@@ -114,7 +114,7 @@ class ClosedLoop:
         weights: Weights,
         transition: Transition,
         delta: float,
-        successor: Successor,
+        successor: NextValue,
     ) -> tuple[Weights, Sensitivities]:
         """Carry the sensitivities on; move theta where the episode is over."""
         if transition.first:  # the one before may have ended in a failed solve

@@ -26,8 +26,8 @@ from nmpcrl.learning.bootstrap import (
     Bootstrap,
     Controller,
     Imitation,
+    NextValue,
     SecondSolve,
-    Successor,
     Transition,
 )
 from nmpcrl.learning.optimisers import Bounds
@@ -54,7 +54,7 @@ class Weights:
 
 
 # (weights, delta, solution in s, what is known of s+) -> weights
-UpdateRule = Callable[[Weights, float, Solution, Successor], Weights]
+UpdateRule = Callable[[Weights, float, Solution, NextValue], Weights]
 
 
 class StatefulRule(Protocol):
@@ -72,7 +72,7 @@ class StatefulRule(Protocol):
         weights: Weights,
         transition: Transition,
         delta: float,
-        successor: Successor,
+        successor: NextValue,
     ) -> tuple[Weights, Any]:
         """New weights and memory; `transition` says whether an episode begins or is over.
 
@@ -98,7 +98,7 @@ class Projected:
         weights: Weights,
         transition: Transition,
         delta: float,
-        successor: Successor,
+        successor: NextValue,
     ) -> tuple[Weights, Any]:
         """As the rule does, then project."""
         if callable(self.rule):
@@ -120,7 +120,7 @@ class Update:
     """What one step of learning did."""
 
     weights: Weights  # after the step
-    successor: Successor | None = None  # None when nothing was bootstrapped
+    successor: NextValue | None = None  # None when nothing was bootstrapped
     delta: float | None = None  # TD error; None when there was none, and the weights are unchanged
 
 
@@ -173,7 +173,7 @@ def theta_bounds(nmpc: Any) -> Bounds | None:
 def semi_gradient(alpha: float) -> UpdateRule:
     """Eq. (9): move theta along delta phi."""
 
-    def rule(weights: Weights, delta: float, solution: Solution, _: Successor) -> Weights:
+    def rule(weights: Weights, delta: float, solution: Solution, _: NextValue) -> Weights:
         return Weights(
             semi_gradient_step(weights.theta, delta, solution.features, alpha), weights.w
         )
@@ -184,7 +184,7 @@ def semi_gradient(alpha: float) -> UpdateRule:
 def gradient_td(alpha: float, beta: float, gamma: float) -> UpdateRule:
     """Eq. (16): move theta and w, both from the old ones."""
 
-    def rule(weights: Weights, delta: float, solution: Solution, successor: Successor) -> Weights:
+    def rule(weights: Weights, delta: float, solution: Solution, successor: NextValue) -> Weights:
         if successor.features is None:
             raise ValueError(
                 "gradient TD needs the next state's features: bootstrap by SecondSolve"
@@ -219,7 +219,7 @@ def exact_gradient_td(
     """
     printed = gradient_td(alpha, beta, nmpc.gamma)
 
-    def rule(weights: Weights, delta: float, solution: Solution, successor: Successor) -> Weights:
+    def rule(weights: Weights, delta: float, solution: Solution, successor: NextValue) -> Weights:
         moved = printed(weights, delta, solution, successor)
         theta = moved.theta
         if curvature:

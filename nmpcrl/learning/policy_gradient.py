@@ -13,7 +13,7 @@ import numpy as np
 
 from nmpcrl import Matrix, Vector
 from nmpcrl.learning.batches import Batched, Statistics
-from nmpcrl.learning.bootstrap import Controller, Successor, Transition
+from nmpcrl.learning.bootstrap import Controller, NextValue, Transition
 from nmpcrl.learning.learners import Learner, theta_bounds
 from nmpcrl.learning.optimisers import Bounds, Descent, Optimiser
 
@@ -76,9 +76,9 @@ def policy_gradient_estimate(fisher: Matrix, w: Vector) -> Vector:
     return result
 
 
-def no_successor(transition: Transition, theta: Vector) -> Successor:
+def no_successor(transition: Transition, theta: Vector) -> NextValue:
     """The critic values states, so no value is taken from the NMPC."""
-    return Successor(np.nan)
+    return NextValue(np.nan)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from nmpcrl import Vector
 from nmpcrl.control import Solution
 from nmpcrl.learning.baselines import as_far_as
-from nmpcrl.learning.bootstrap import Controller, SecondSolve, Successor, Transition
+from nmpcrl.learning.bootstrap import Controller, NextValue, SecondSolve, Transition
 from nmpcrl.learning.learners import (
     Learner,
     Projected,
@@ -81,7 +81,7 @@ def _gradient_learner(
     """GES with another step of w, from the old one as in Eq. (16)."""
     printed = gradient_td(alpha, 0.0, nmpc.gamma)
 
-    def rule(weights: Weights, delta: float, solution: Solution, successor: Successor) -> Weights:
+    def rule(weights: Weights, delta: float, solution: Solution, successor: NextValue) -> Weights:
         moved = printed(weights, delta, solution, successor)
         return replace(moved, w=follow(weights.w, delta, solution.features))
 
@@ -96,7 +96,7 @@ def guarded(learner: Learner, alpha: float) -> Learner:
     """
     own = _plain_rule(learner, "a guard")
 
-    def rule(weights: Weights, delta: float, solution: Solution, successor: Successor) -> Weights:
+    def rule(weights: Weights, delta: float, solution: Solution, successor: NextValue) -> Weights:
         moved, allowed = own(weights, delta, solution, successor), guard(alpha, solution.features)
         if allowed == alpha:
             return moved
@@ -142,7 +142,7 @@ class Averaging:
         return Mean(weights.theta, 0, self.rule.init(weights))
 
     def step(
-        self, memory: Mean, weights: Weights, transition: Transition, delta: float, then: Successor
+        self, memory: Mean, weights: Weights, transition: Transition, delta: float, then: NextValue
     ) -> tuple[Weights, Mean]:
         """mean <- mean + (theta - mean) / n; until n = 1, the mean is theta."""
         moved, inner = self.rule.step(memory.inner, weights, transition, delta, then)
@@ -191,7 +191,7 @@ class Undoing:
         return Best(weights.theta, weights.w, cost, 0, self.rule.init(weights))
 
     def step(
-        self, memory: Best, weights: Weights, transition: Transition, delta: float, then: Successor
+        self, memory: Best, weights: Weights, transition: Transition, delta: float, then: NextValue
     ) -> tuple[Weights, Best]:
         """Move as the rule does; judge that at the end of an episode."""
         moved, inner = self.rule.step(memory.inner, weights, transition, delta, then)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.control import Solution
-from nmpcrl.learning import Successor, Weights
+from nmpcrl.learning import NextValue, Weights
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import Diverged, Step, absurd, train
 from nmpcrl.study.experiment import Experiment
@@ -26,7 +26,7 @@ from nmpcrl.study.records import (
 from nmpcrl.study.setup import Job, job_of
 from nmpcrl.study.trial import Trial
 
-UNKNOWN = Successor(np.nan)  # of a step without a bootstrap
+UNKNOWN = NextValue(np.nan)  # of a step without a bootstrap
 UNSOLVED: Any = SimpleNamespace(value=np.nan, features=np.nan)  # it failed or was not needed
 
 

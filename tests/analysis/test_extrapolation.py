@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nmpcrl.analysis.extrapolation import INTERVENTIONS, StartTheta, feedback, watch
-from nmpcrl.learning.bootstrap import Successor
+from nmpcrl.learning.bootstrap import NextValue
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.run import run
 
@@ -26,7 +26,7 @@ class Linear:
         return 3 * self.a @ theta
 
     def __call__(self, transition, theta):
-        return Successor(float(self.predict(theta)))
+        return NextValue(float(self.predict(theta)))
 
 
 def transition(phi=(1.0, 2.0), last=False):

@@ -8,13 +8,13 @@ from scipy.optimize import minimize
 
 from nmpcrl.control import Nmpc, Problem, SolverError, Task, differential_drive
 from nmpcrl.learning import Exploration, Transition, Weights, evaluate, train
-from nmpcrl.learning.bootstrap import Successor
+from nmpcrl.learning.bootstrap import NextValue
 from nmpcrl.learning.gauss_newton import ClosedLoop, TrustRegion, closed_loop, lstd_q_within
 from nmpcrl.learning.optimisers import GaussNewton
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
-NOTHING = Successor(np.nan)
+NOTHING = NextValue(np.nan)
 STEPS = 12
 
 

@@ -22,7 +22,7 @@ from nmpcrl.control.solvers.codes import End, Start
 from nmpcrl.control.solvers.nlpsol import Fatrop, Program
 from nmpcrl.control.solvers.solver import LED_ASTRAY, Solver
 from nmpcrl.control.solvers.starts import MOST, Regulator, cold_inputs, random_inputs
-from nmpcrl.control.vectors import whole
+from nmpcrl.control.vectors import positive_integer
 
 PERTURBED = 4  # starts from random inputs, after everything else
 SEVERAL, FEW = 9, 2  # cold starts of a `Problem` with rows, and without
@@ -99,7 +99,7 @@ class Riccati(Solver):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.starts is not None and whole("starts", self.starts) > MOST:
+        if self.starts is not None and positive_integer("starts", self.starts) > MOST:
             raise ValueError(f"starts = {self.starts} must be at most {MOST}")
 
     @property
