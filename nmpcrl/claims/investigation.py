@@ -55,6 +55,7 @@ class Condition(NamedTuple):
 
 
 NAMES = list(Condition._fields)
+ROWS_OF = "rows of "  # before the name of an array: which rows of the table its entries belong to
 
 
 @dataclass(frozen=True)
@@ -127,6 +128,7 @@ class Investigation:
     seed: Callable[[str, int], int]  # of a place and k
     registered: str = ""  # the commit that fixed parts and questions, before the first row
     epoch: int = 1  # raised by hand where an edit changes a number
+    epochs: Mapping[str, int] = field(default_factory=lambda: EPOCHS)  # of the packages it rests on
     libraries: Sequence[str] = ()  # whose versions matter, beside those of every run
     digits: int | None = None  # to which published numbers are rounded
     arrays: Sequence[str] = ()  # columns of lists, published in NAME.npz for the rows with one
@@ -145,7 +147,8 @@ class Investigation:
         episodes = self.parts[one.part].episodes
         made_with = {**versions(), **{name: installed(name) for name in self.libraries}}
         of_file = [self.source] if self.source else []
-        return hash_of([self.name, self.epoch, EPOCHS, made_with, episodes, *one, *of_file])
+        depends = [self.name, self.epoch, {**self.epochs}, made_with, episodes, *one, *of_file]
+        return hash_of(depends)
 
     def table(self) -> pd.DataFrame:
         """The published rows; a `Damaged` says what is wrong with them."""
@@ -161,10 +164,16 @@ class Investigation:
         """The commit that the published table is registered by; empty if it is by none."""
         return str(published.about(self.name, self.where).get("registered", ""))
 
+    def is_current(self, part: str) -> bool:
+        """Whether the published rows of a part are of the present epochs."""
+        return published.epochs(published.about(self.name, self.where), part) == self.epochs
+
     def known(self) -> pd.DataFrame:
-        """The published rows, then the rows stored here that are not published."""
-        tables = [one for one in (self._published(), self.made()) if len(one)]
-        every = pd.concat(tables) if tables else self._published()
+        """The published rows of these epochs, then the rows stored here that are not published."""
+        there = self._published()
+        parts = [*filter(self.is_current, there.part.unique())]
+        tables = [one for one in (there[there.part.isin(parts)], self.made()) if len(one)]
+        every = pd.concat(tables) if tables else there[:0]
         return every.drop_duplicates(NAMES, ignore_index=True)
 
     @property
@@ -249,7 +258,7 @@ class Investigation:
 
     def price(self, part: str) -> float:
         """Seconds of processor time that the missing rows of a part take."""
-        known, one = self.known(), self.parts[part]
+        known, one = pd.concat([self.made(), self._published()]), self.parts[part]
         known = known[known.part == part]
         means = known.groupby("arm").seconds.mean().dropna() if "seconds" in known else {}
         asked = (each.arm for each in self.missing(part))
@@ -266,6 +275,8 @@ class Investigation:
     def publish(self) -> Path:
         """Add the complete arms that were made here to the published table.
 
+        Rows of earlier epochs are replaced part by part, once every arm of the part is complete.
+
         Raises:
             Unpublishable: an arm is published already with other numbers, or none is complete and
                 new.
@@ -278,25 +289,53 @@ class Investigation:
             block = by.loc[order].reset_index(drop=True).map(partial(rounded, digits=self.digits))
             old = there[(there.part == part) & (there.arm == arm)].reset_index(drop=True)
             same = [name for name in old if name != "seconds"]
-            if old.empty:
+            if old.empty or not self.is_current(str(part)):
                 new.append(block)
             elif not old[same].equals(block[same]):
                 raise Unpublishable(f"{arm} of the part {part!r} is published with other numbers")
-        if not new:
+        added = pd.concat(new) if new else made[:0]
+        replaced = {part for part in there.part.unique() if not self.is_current(part)}
+        replaced &= {*added.part} if len(added) else set()
+        for part in [*replaced]:
+            if {*self.parts[part].settings(self.known())} - {*added[added.part == part].arm}:
+                replaced.remove(part)
+                added = added[added.part != part]
+        if added.empty:
             raise Unpublishable(f"no arm of {self.name} is complete and new")
-        added = pd.concat(new)
-        arrays = published.arrays(self.name, self.where) if self.arrays and len(there) else {}
-        for name in {*self.arrays} & {*added}:
-            lists = added.pop(name).dropna()
-            arrays[name] = np.array([*arrays.get(name, ()), *lists])
+        kept = self._with_lists(there)[~there.part.isin(replaced)]
+        every = pd.concat([kept, added], ignore_index=True) if len(kept) else added
+        if replaced:
+            order = [*dict.fromkeys([*there.part, *added.part])]
+            every = every.sort_values("part", key=lambda part: part.map(order.index), kind="stable")
+        table, arrays = self._without_lists(every.reset_index(drop=True))
+        counts = added.groupby("part", sort=False).size().to_dict()
         return published.write(
             self.name,
-            pd.concat([there, added], ignore_index=True) if len(there) else added,
+            table,
             arrays,
-            batch=made_here() | {"rows": added.groupby("part", sort=False).size().to_dict()},
+            batch=made_here() | {"epochs": {**self.epochs}, "rows": counts},
             registered="" if self.unregistered else self.registered,
+            earlier=published.without(
+                published.about(self.name, self.where).get("batches", []), replaced
+            ),
             where=self.where,
         )
+
+    def _with_lists(self, table: pd.DataFrame) -> pd.DataFrame:
+        """The published rows with the columns of lists that are published apart."""
+        arrays = published.arrays(self.name, self.where) if self.arrays and len(table) else {}
+        for name in {*self.arrays} & {*arrays}:
+            lists = dict(zip(arrays[ROWS_OF + name].tolist(), [*arrays[name]], strict=True))
+            table = table.assign(**{name: pd.Series(lists, table.index, dtype=object)})
+        return table
+
+    def _without_lists(self, table: pd.DataFrame) -> tuple[pd.DataFrame, published.Arrays]:
+        """A table without its columns of lists, and these with the numbers of their rows."""
+        arrays: published.Arrays = {}
+        for name in {*self.arrays} & {*table}:
+            lists = table[name].dropna()
+            arrays |= {name: np.array([*lists]), ROWS_OF + name: lists.index.to_numpy()}
+        return table.drop(columns=[*arrays], errors="ignore"), arrays
 
 
 def _asked(question: Question, known: Any) -> Answer:

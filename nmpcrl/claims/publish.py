@@ -1,6 +1,6 @@
 """Publication of the study: runs, searches, and times of steps."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,8 @@ from nmpcrl.claims.paper_claims import BY_TIME
 from nmpcrl.claims.published import BITS, COLUMNS, FOLLOWED, Evidence, Published
 from nmpcrl.claims.rule import judge
 from nmpcrl.claims.verdict import UNDECIDABLE, Verdict
-from nmpcrl.study import paper
+from nmpcrl.study import design, paper
 from nmpcrl.study import published as store
-from nmpcrl.study.design import LAYOUTS
 from nmpcrl.study.experiment import Experiment, frozen_arm
 from nmpcrl.study.provenance import made_here
 from nmpcrl.study.published import Unpublishable
@@ -37,12 +36,26 @@ def publish_study(
         runs: all of `design.whole_study`.
         variants: the part of the study that each belongs to.
     """
-    timings, searches = time_learners_repeatedly(), search_all([*map(Search, LAYOUTS)])
+    timings = time_learners_repeatedly()
+    place = publish_parts(runs, variants, anew=True)
+    publish_times(timings)
+    return place
+
+
+def publish_parts(
+    runs: Mapping[Experiment, RunSummary],
+    variants: Mapping[Experiment, str],
+    *,
+    anew: bool = False,
+) -> Path:
+    """As `publish_runs`, and with the main table the audit of C8 and the searches, made here."""
+    if design.MAIN_TABLE not in {variants[e] for e in runs}:
+        return publish_runs(runs, variants, anew=anew)
     records = fetch(published.AUDITED)
     audit = measured(published.AUDITED, records, dropped_curvature(records))
-    publish_times(timings)
-    publish_searches(searches)
-    return publish_runs(runs, variants, anew=True, audit=audit)
+    place = publish_runs(runs, variants, anew=anew, audit=audit)
+    publish_searches(search_all([*map(Search, design.LAYOUTS)]))
+    return place
 
 
 def publish_runs(
@@ -54,6 +67,8 @@ def publish_runs(
 ) -> Path:
     """Publish runs that were trained here beside the published ones, in the folder returned.
 
+    Parts that were published in earlier epochs are replaced, and must be whole.
+
     Args:
         runs: with the run with theta frozen beside each, unless that is published.
         variants: the part of the study that each belongs to.
@@ -61,19 +76,34 @@ def publish_runs(
         audit: of `published.AUDITED`.
     """
     earlier = Published() if anew else published.load()
-    known = {*earlier.rows, *runs}
+    known, older = {*earlier.rows, *runs}, {p for p in earlier.parts if not earlier.is_current(p)}
     for e in runs:
-        if e in earlier.rows:
-            raise Unpublishable(f"{e} is published already, in the part {earlier.variants[e]!r}")
+        part = earlier.variants.get(e)
+        if part is not None and part not in older:
+            raise Unpublishable(f"{e} is published already, in the part {part!r}")
         if frozen_arm(e) not in known:
             raise Unpublishable(f"{frozen_arm(e)}, with which {e} is compared, is not published")
+    replaced = older & {earlier.variants.get(e, "") for e in runs}
+    for e, part in earlier.variants.items():
+        if part in replaced and e not in runs:
+            raise Unpublishable(f"{e} is missing: the part {part!r} is of earlier epochs")
     every = earlier.joined(runs, variants)
-    new = every.runs[len(earlier.runs) :]
+    new = every.runs[every.runs.source == "fresh"]
     counts = new.variant.value_counts(sort=False).to_dict()
-    batch = made_here() | {"runs": counts, "hours": float(new.seconds.sum() / 3600)}
+    batch = made_here() | {"runs": counts, "hours": _hours(new)}
     batch |= {"audit": asdict(audit)} if audit else {}
     rows, arrays = every.runs[[*COLUMNS]], _curves(every)
-    return _written(published.RUNS, rows, batch, anew=anew, arrays=arrays)
+    kept = store.without(earlier.batches, replaced)
+    for one in (one for one in kept if one not in earlier.batches):
+        one |= {"hours": _hours(earlier.runs[earlier.runs.variant.isin(one["runs"])])}
+        for name in ("audit", "thetas") if design.MAIN_TABLE in replaced else ():
+            one.pop(name, None)
+    return _written(published.RUNS, rows, batch, kept, arrays)
+
+
+def _hours(runs: pd.DataFrame) -> float:
+    """The hours that runs took on one core."""
+    return float(runs.seconds.sum() / 3600)
 
 
 def publish_searches(searches: Mapping[Search, Found]) -> Path:
@@ -104,11 +134,10 @@ def _written(
     name: str,
     table: pd.DataFrame,
     batch: Mapping[str, Any],
-    *,
-    anew: bool = True,
+    earlier: Iterable[Mapping[str, Any]] = (),
     arrays: Mapping[str, Column] | None = None,
 ) -> Path:
-    path = store.write(name, table, arrays, batch=batch, anew=anew)
+    path = store.write(name, table, arrays, batch=batch, earlier=earlier)
     published._load.cache_clear()
     return path.parent
 

@@ -33,7 +33,7 @@ from nmpcrl.claims.verdict import Verdict
 from nmpcrl.study import design
 from nmpcrl.study import published as store
 from nmpcrl.study.experiment import Experiment
-from nmpcrl.study.provenance import summary_key
+from nmpcrl.study.provenance import EPOCHS, summary_key
 from nmpcrl.study.published import Damaged as Damaged
 from nmpcrl.study.published import folder as folder
 from nmpcrl.study.records import Column
@@ -164,6 +164,10 @@ class Published(Evidence):
         """The number of runs of each part of the study."""
         return {part: n for batch in self.batches for part, n in batch["runs"].items()}
 
+    def is_current(self, part: str) -> bool:
+        """Whether the runs of a part are of the present epochs."""
+        return store.epochs(self.about, part) == EPOCHS
+
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
         """On the paper's claims, each followed by its wider one, and on our own."""
@@ -177,7 +181,7 @@ class Published(Evidence):
     @cached_property
     def _main(self) -> Observations:
         found = [one["audit"] for one in self.batches if "audit" in one]
-        made = assumptions.audit(AUDITED, Measured(**found[0])) if found else ()
+        made = assumptions.audit(AUDITED, Measured(**found[-1])) if found else ()
         return Observations(self.main.runs, self.paths, self.timings, made)
 
     @cached_property

@@ -11,7 +11,7 @@ column has no missing cells.
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -24,7 +24,7 @@ from filelock import FileLock
 
 import nmpcrl
 from nmpcrl.study.files import write_file, write_json
-from nmpcrl.study.provenance import hash_of
+from nmpcrl.study.provenance import EPOCHS, hash_of
 from nmpcrl.study.refusal import Refusal
 
 MANIFEST = "manifest.json"
@@ -37,6 +37,7 @@ ELSEWHERE = (
 )
 
 Arrays = dict[str, npt.NDArray[Any]]
+Batch = Mapping[str, Any]
 
 
 class Damaged(Refusal):
@@ -68,14 +69,46 @@ def about(name: str, where: Path | None = None) -> dict[str, Any]:
     return dict(_manifest(where or folder()).get(name, {}))
 
 
+def counts(batch: Batch) -> dict[str, int]:
+    """The number of rows of each part that a batch added; empty if the manifest has none."""
+    return {**batch.get("rows", {}), **batch.get("runs", {})}
+
+
+def epochs(entry: Mapping[str, Any], part: str = "") -> dict[str, int]:
+    """The epochs in which the rows of a part were made; empty where nothing is published.
+
+    They are those of the last batch that counts the part, else of the first batch. Batches without
+    epochs are of the first.
+
+    Args:
+        entry: of the manifest, as `about` gives it.
+        part: of the table; "" for a table without parts.
+    """
+    batches = entry.get("batches", [])
+    found = [one for one in batches if part in counts(one)] or batches[:1]
+    return {**dict.fromkeys(EPOCHS, 1), **found[-1].get("epochs", {})} if found else {}
+
+
+def without(batches: Iterable[Batch], parts: Collection[str]) -> list[dict[str, Any]]:
+    """The batches without these parts; a batch of which nothing is left is dropped."""
+    kept = []
+    for batch in batches:
+        left = {part: n for part, n in counts(batch).items() if part not in parts}
+        if left or not counts(batch):
+            kept.append(
+                {**batch, **({"runs" if "runs" in batch else "rows": left} if left else {})}
+            )
+    return kept
+
+
 def write(
     name: str,
     table: pd.DataFrame,
     arrays: Mapping[str, npt.NDArray[Any]] | None = None,
     *,
-    batch: Mapping[str, Any],
+    batch: Batch,
     registered: str = "",
-    anew: bool = False,
+    earlier: Iterable[Batch] | None = None,
     where: Path | None = None,
 ) -> Path:
     """Write a table, and its arrays if there are any, note them in the manifest; the table's path.
@@ -86,7 +119,8 @@ def write(
         arrays: all arrays.
         batch: what was added now, and where, when and with what: `provenance.made_here()`.
         registered: the commit that fixed what would be made, before anything was.
-        anew: whether all rows were made now, so that earlier batches are forgotten.
+        earlier: batches whose rows stay; by default all. Where counted rows are the whole table,
+            a batch without counts has no row left and is dropped.
         where: the folder, by default the project's.
     """
     place = where or folder()
@@ -99,12 +133,15 @@ def write(
         if arrays:
             files.append(place / f"{name}.npz")
             write_file(files[1], lambda file: np.savez_compressed(file, **dict(arrays)))  # type: ignore[arg-type]
-        earlier = known.get(name, {})
+        old = known.get(name, {})
+        batches = [*(old.get("batches", ()) if earlier is None else earlier), dict(batch)]
+        if sum(sum(counts(one).values()) for one in batches) == len(table):
+            batches = [one for one in batches if counts(one)]
         entry = {
-            **earlier,
+            **old,
             "files": {file.name: sha256(file.read_bytes()).hexdigest() for file in files},
-            "batches": [*([] if anew else earlier.get("batches", ())), dict(batch)],
-            "registered": earlier.get("registered", registered),
+            "batches": batches,
+            "registered": old.get("registered", registered),
         }
         entries = {**known, name: entry}
         write_json(place / MANIFEST, {**entries, SEAL: hash_of(entries)}, indent=1)

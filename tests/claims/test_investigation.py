@@ -17,6 +17,7 @@ from nmpcrl.claims.investigation import (
 )
 from nmpcrl.claims.verdict import NOT, REPRODUCED, UNDECIDABLE
 from nmpcrl.study import published
+from nmpcrl.study.provenance import EPOCHS
 from nmpcrl.study.published import Damaged, Unpublishable
 from nmpcrl.study.refusal import Refusal
 
@@ -201,6 +202,51 @@ def test_what_is_published_is_neither_changed_nor_published_twice_nor_in_part():
     path.write_text(path.read_text().replace('"cost": ', '"cost": 9'))
     with pytest.raises(Unpublishable, match="low of the part 'tune' is published with other"):
         toy().publish()
+
+
+def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay():
+    parts = {
+        "tune": Part(with_paths, {"low": 1.0, "high": 2.0}, ("a", "b"), 10),
+        "judge": Part(with_paths, best, ("b", "a", "c"), 10),
+    }
+    made = toy(parts=parts, arrays=("path",))
+    made.complete(workers=1)
+    made.publish()
+    first, paths = made.table(), published.arrays("toy")["path"]
+    later = toy(parts=parts, arrays=("path",), epochs={**EPOCHS, "control": 99})
+    assert [later.is_current(part) for part in parts] == [False, False]
+    assert later.known().empty
+    with pytest.raises(Refusal, match="depends on the part 'tune'"):
+        later.conditions("judge")
+    assert later.price("tune") == 4 * 7.0  # of the earlier rows
+    later.complete(["tune"], workers=1)
+    whole = later.log.read_text()
+    later.log.write_text(whole[: whole.rindex("\n")])
+    with pytest.raises(Unpublishable, match="no arm of toy is complete and new"):
+        later.publish()  # an arm of the part is missing
+    later.log.write_text(whole.replace('"path": [[', '"path": [[1000'))
+    later.publish()
+    pd.testing.assert_frame_equal(later.table(), first)
+    now = published.arrays("toy")["path"]
+    assert (now[2:] == paths[2:]).all()
+    assert (now[:2, 0, 0] == [int(f"1000{one}") for one in paths[:2, 0, 0]]).all()
+    assert [later.is_current(part) for part in parts] == [True, False]
+    batches = published.about("toy")["batches"]
+    assert [one["rows"] for one in batches] == [{"judge": 3}, {"tune": 4}]
+    assert [one["epochs"]["control"] for one in batches] == [EPOCHS["control"], 99]
+    assert [*later.conditions("judge")] == [("judge", "best", place, 0) for place in "bac"]
+
+
+def test_batches_that_do_not_count_their_rows_are_of_the_first_part_of_history():
+    first, counted = {"date": "then"}, {"rows": {"tune": 2}, "epochs": {"control": 7}}
+    entry = {"batches": [first, counted]}
+    assert published.epochs({}, "tune") == {}
+    assert published.epochs(entry, "tune")["control"] == 7
+    assert published.epochs(entry, "judge") == dict.fromkeys(EPOCHS, 1)
+    assert published.without(entry["batches"], {"tune"}) == [first]
+    table = pd.DataFrame({"part": ["tune"] * 2 + ["judge"]})
+    published.write("data", table, batch={"rows": {"judge": 1}}, earlier=[first, counted])
+    assert published.about("data")["batches"] == [counted, {"rows": {"judge": 1}}]
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".npz"])

@@ -156,6 +156,37 @@ def test_runs_that_cannot_stand_beside_the_others_are_refused(known, experiment,
     assert list(load().rows) == list(RUNS)
 
 
+def test_a_part_of_earlier_epochs_is_replaced_as_a_whole_and_the_others_stay(
+    known, folder, summaries, monkeypatch
+):
+    monkeypatch.setitem(EPOCHS, "control", EPOCHS["control"] + 1)
+    audit, main = replace(AUDIT, kinks=0.2), {e: LABELS[e] for e in RUNS if LABELS[e] == "main"}
+    anew = {e: scaled(summaries[e], 2.0) for e in main}
+    with pytest.raises(Unpublishable, match=r"is missing: the part 'main' is of earlier epochs"):
+        publish.publish_runs(dict([*anew.items()][1:]), main)
+    publish.publish_runs(anew, main, audit=audit)
+    forget()
+    found = load()
+    assert list(found.rows) == list(RUNS)
+    assert [found.is_current(part) for part in ("main", "N = 2")] == [True, False]
+    for e in RUNS:
+        factor = 2.0 if e in main else 1.0
+        np.testing.assert_equal(
+            found.rows[e]["initial_cost"], factor * row(summaries[e])["initial_cost"]
+        )
+    assert [one["runs"] for one in found.batches] == [{"N = 2": 2}, {"main": 5}]
+    assert [one.get("audit", {}).get("kinks") for one in found.batches] == [None, 0.2]
+    assert sum(one["hours"] for one in found.batches) == pytest.approx(
+        found.runs.seconds.sum() / 3600
+    )
+    with pytest.raises(Unpublishable, match="is published already, in the part 'main'"):
+        publish.publish_runs(anew, main)
+
+
+def scaled(one, factor):
+    return replace(one, evaluations=one.evaluations | {"cost": factor * one.evaluations["cost"]})
+
+
 @pytest.mark.parametrize("name", ["runs.csv", "runs.npz", "searches.csv", "timings.csv"])
 def test_a_file_that_is_missing_or_changed_is_refused_before_a_number_is_shown(known, folder, name):
     (folder / name).write_bytes((folder / name).read_bytes()[:-1])
