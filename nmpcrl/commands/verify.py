@@ -27,7 +27,10 @@ def verify(sample: int, relock: bool, workers: int | None) -> None:
     if relock:
         done = reproduce.relock(known, sample or RELOCKED, workers=workers)
         said = f"{done.published + done.stored} runs trained again gave the same bits"
-        click.echo(f"{said}, {done.published} as published, {done.stored} as stored: {done.lock}")
+        said = f"{said}, {done.published} as published, {done.stored} as stored"
+        if not done.published + done.stored:
+            said = "an epoch was raised, so that no run is comparable with earlier ones"
+        click.echo(f"{said}: {done.lock}")
         return
     wanted = {e for e in known.rows if summaries.SUMMARIES.path_of(e).exists()}
     if sample:

@@ -19,8 +19,9 @@ from nmpcrl.study.learners import LEARNERS
 from nmpcrl.study.machine import fingerprint
 from nmpcrl.study.trial import Trial
 
-# By package; raised by hand where an edit changes a number, so that every run is trained anew.
-EPOCHS = {"control": 1, "learning": 1, "study": 1, "analysis": 1}
+# By package; raised by hand where an edit changes a number, so that every run is trained anew. The
+# first edition is of the first epochs; of the second is one solver for every problem, and one loop.
+EPOCHS = {"control": 2, "learning": 2, "study": 1, "analysis": 1}
 RUN_ROOMS = ("control", "learning", "study")  # whose code bears on a run; all, on its summary
 
 LIBRARIES = ("casadi", "numba", "numpy")  # of every run; also torch, where a network learns

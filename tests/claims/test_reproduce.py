@@ -253,6 +253,14 @@ def test_the_lock_is_written_where_no_bit_has_changed(locked, monkeypatch):
     assert relock(KNOWN, 4)[1:] == (0, 4)  # runs of the first relock are compared with
 
 
+def test_the_lock_is_written_where_an_epoch_was_raised(locked, monkeypatch):
+    edit(monkeypatch, times=2.0)
+    monkeypatch.setitem(provenance.EPOCHS, "learning", 99)
+    assert relock(KNOWN, 4)[1:] == (0, 0)
+    found = json.loads(locked.read_text())
+    assert (found["epochs"]["learning"], found["earlier"]) == (99, [])
+
+
 @pytest.mark.parametrize(
     ("stored", "times", "refusal"),
     [

@@ -645,8 +645,12 @@ def arrays() -> Any:
 
 @cache
 def keys_of_runs() -> dict[Any, tuple[str, str]]:
-    """Keys of each run of the study and of its summary, with the versions that made it."""
-    with mock.patch.object(provenance, "installed", study().batches[0]["versions"].__getitem__):
+    """Keys of each run of the study and of its summary, with what made the first of them."""
+    first = study().batches[0]
+    with (
+        mock.patch.object(provenance, "installed", first["versions"].__getitem__),
+        mock.patch.object(provenance, "EPOCHS", first["epochs"]),
+    ):
         return {e: (provenance.key(e), provenance.summary_key(e)) for e in design.whole_study()}
 
 

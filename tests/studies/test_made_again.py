@@ -2,7 +2,7 @@
 
 Not every row would be: learning is chaotic, and published rows were made on several machines. Of
 21 further rows of `worlds`, 6 differed on another one; the code that had made three of these gave
-other numbers there, too.
+other numbers there, too. A part is asked once its published rows are of the present epochs.
 """
 
 import numpy as np
@@ -27,6 +27,9 @@ CHAOTIC = "other_problems"  # its runs magnify 1e-10 to 1e-4: its own test compa
 def test_drawn_rows_made_afresh_are_the_published_ones(investigation, tmp_path, monkeypatch):
     monkeypatch.setenv("NMPCRL_RUNS", str(tmp_path))
     table = investigation.table()
+    table = table[table.part.map(investigation.is_current)]
+    if table.empty:
+        pytest.skip(f"every published row of {investigation.name} is of earlier epochs")
     if investigation.name == "population":  # a network's products round otherwise on other machines
         networks = [name for name, one in LEARNERS.items() if one.network]
         table = table[~table.arm.str.split().str[0].isin(networks)]

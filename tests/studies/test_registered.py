@@ -154,5 +154,7 @@ def test_every_investigation_is_published_with_the_columns_of_its_conditions():
         table = investigation.table()
         assert not table.duplicated(["part", "arm", "place", "k"]).any()
         for (part, arm), rows in table.groupby(["part", "arm"], sort=False):
+            if investigation.parts[part].at and not investigation.is_current(part):
+                continue  # of runs that were stopped in an earlier edition
             order = investigation.parts[part].order(arm)
             assert [*zip(rows.place, rows.k, strict=True)] == order

@@ -7,7 +7,7 @@ import pytest
 
 from nmpcrl.analysis import suite
 from nmpcrl.analysis.suite import ENTRIES, Judgement
-from nmpcrl.claims.investigation import rounded
+from nmpcrl.claims.investigation import Condition, rounded
 from nmpcrl.claims.verdict import NOT, PARTLY, REPRODUCED, UNDECIDABLE
 from nmpcrl.studies import remedies, worlds
 from nmpcrl.studies.remedies import (
@@ -211,7 +211,14 @@ def test_rows_are_made_in_order_and_the_best_setting_is_judged(judged):
 def test_published_arms_are_those_of_the_published_tuning_and_can_be_sent_to_a_worker():
     known = REMEDIES.table()
     for part in [*PARTS][1:]:
-        conditions = REMEDIES.conditions(part)
+        if len({*map(REMEDIES.is_current, ("best", "tune", part))}) > 1:
+            continue  # tuned anew, and not yet judged anew
+        settings = PARTS[part].settings(known)
+        conditions = {
+            Condition(part, arm, *at): setting
+            for arm, setting in settings.items()
+            for at in PARTS[part].order(arm)
+        }
         there = known[known.part == part]
         assert {*conditions} == {*there[["part", "arm", "place", "k"]].itertuples(False, None)}
     cloudpickle.dumps((REMEDIES, next(iter(conditions.items()))))
@@ -226,6 +233,8 @@ def test_worlds_begin_anew_with_the_entry_to_try_first():
 @pytest.mark.weekly
 def test_a_search_for_the_best_cost_made_again_ends_at_the_published_one():
     known = REMEDIES.table()
+    if not REMEDIES.is_current("best"):
+        pytest.skip("the published searches are of earlier epochs")
     one, setting = next((one, it) for one, it in REMEDIES.conditions("best").items()
                         if one.place == "J003")  # fmt: skip
     made = REMEDIES.make(one, setting)

@@ -117,10 +117,10 @@ def test_the_code_is_what_the_lock_has():
 
 
 @pytest.mark.parametrize("begins", ["07237effb4b1545a", "44134a116cb64ab0"])
-def test_runs_of_the_first_edition_are_read(begins):
-    """The last two source hashes of that edition."""
-    (made,) = (one for one in lock.locks() if one.startswith(begins))
-    assert lock.is_accepted(made)
+def test_no_run_of_the_first_edition_is_taken_for_one_of_this(begins):
+    """By the last two source hashes of that edition; of its epochs, all four were 1."""
+    assert not any(one.startswith(begins) for one in lock.locks())
+    assert provenance.EPOCHS["control"] > 1 < provenance.EPOCHS["learning"]
 
 
 def test_a_warning_names_the_changed_files_once(monkeypatch, capsys):
