@@ -23,6 +23,7 @@ from nmpcrl.control.plant import Plant
 from nmpcrl.control.problem import Problem
 from nmpcrl.control.solution import Solution, SolverError, short
 from nmpcrl.control.solvers import Fatrop, Prepared, Riccati, Solver, solver_of
+from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.task import Task
 from nmpcrl.control.variant import Variant
 
@@ -134,8 +135,8 @@ class Nmpc(Described):
         state = _checked("state", state, self.n, self.farthest)
         theta = _checked("theta", theta, self.problem.theta.size, self.largest)
         known = self.problem.stage_data(data)
-        if (theta < self._bending.least).any():
-            self._bending.judge(state, theta, known)
+        if (theta < self.bending.least).any():
+            self.bending.judge(state, theta, known)
         given: tuple[Vector, ...] = ()
         if action is not None:
             action = _checked("action", action, self.m, self._strong)
@@ -218,6 +219,10 @@ class Nmpc(Described):
         """The nearest action within the bounds, shape (m,)."""
         return np.minimum(np.maximum(action, self.lower), self.upper)
 
+    def machine(self, *, fix_action: bool) -> Compiled | None:
+        """The compiled solver for V(s) or Q(s, a); None where none solves, or in its own units."""
+        return (self._fixed if fix_action else self._free).machine
+
     @property
     def ocp(self) -> Any:
         """The problem with u_0 free, in symbols, an `Ocp`."""
@@ -245,7 +250,7 @@ class Nmpc(Described):
         return self._fixed if solution.ocp.fixed_action.size else self._free
 
     @cached_property
-    def _bending(self) -> Bending:
+    def bending(self) -> Bending:
         """Of a problem's costs."""
         return Bending(self.problem)
 

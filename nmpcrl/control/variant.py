@@ -12,6 +12,7 @@ from nmpcrl.control.ocp import Indices, Ocp
 from nmpcrl.control.sensitivity import Sensitivity
 from nmpcrl.control.solution import DerivativeError, Solution, SolverError
 from nmpcrl.control.solvers import Prepared
+from nmpcrl.control.solvers.riccati import Compiled
 from nmpcrl.control.units import Units, units_of
 
 
@@ -23,6 +24,12 @@ class Variant:
         self._units: Units | None = units_of(ocp)
         self._solver = prepared(ocp if self._units is None else self._units.ocp)
         self.solve = self._solver.solve if self._units is None else self._solve_in_units
+
+    @property
+    def machine(self) -> Compiled | None:
+        """The compiled solver; None where another one solves, or this one in units of its own."""
+        solver = self._solver
+        return solver if self._units is None and isinstance(solver, Compiled) else None
 
     def _solve_in_units(
         self,

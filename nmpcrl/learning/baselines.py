@@ -27,11 +27,11 @@ from nmpcrl.learning.updates import of_length
 
 def frozen(nmpc: Controller) -> Learner:
     """The same exploration and the same noise, and theta never moves."""
-
-    def nothing(transition: Transition, theta: Vector) -> None:
-        return None
-
     return Learner("frozen", nothing, lambda weights, *_: weights, nmpc.gamma)
+
+
+def nothing(transition: Transition, theta: Vector) -> None:
+    """A bootstrap that values no state, so that nothing is learned."""
 
 
 def step_matched(nmpc: Controller, alpha: float, beta: float) -> Learner:

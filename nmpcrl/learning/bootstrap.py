@@ -3,7 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -39,6 +39,15 @@ class NextValue:
     solution: Solution | None = None  # of the second solve, a warm start for the next first one
     loss: float = np.nan  # of the network's last fit in this step
     seconds: float = 0.0  # spent on fit and prediction [s]; a solve keeps its own time
+
+
+class Moves(NamedTuple):
+    """How a rule moves theta, where `loop` knows it: the rule's attribute `moves`."""
+
+    alpha: float  # step size of theta
+    beta: float | None = None  # of w, in gradient TD; None for a semi-gradient
+    curvature: bool = False  # whether that is exact TDC
+    projection: tuple[float, float] | None = None  # least and largest component of theta
 
 
 class Controller(Protocol):

@@ -26,6 +26,7 @@ from nmpcrl.learning.bootstrap import (
     Bootstrap,
     Controller,
     Imitation,
+    Moves,
     NextValue,
     SecondSolve,
     Transition,
@@ -178,6 +179,7 @@ def semi_gradient(alpha: float) -> UpdateRule:
             semi_gradient_step(weights.theta, delta, solution.features, alpha), weights.w
         )
 
+    vars(rule)["moves"] = Moves(alpha)
     return rule
 
 
@@ -197,6 +199,7 @@ def gradient_td(alpha: float, beta: float, gamma: float) -> UpdateRule:
             w=auxiliary_step(w, delta, phi, beta),
         )
 
+    vars(rule)["moves"] = Moves(alpha, beta)
     return rule
 
 
@@ -229,6 +232,7 @@ def exact_gradient_td(
             )
         return Weights(project(theta, *projection) if projection else theta, moved.w)
 
+    vars(rule)["moves"] = Moves(alpha, beta, curvature, projection)
     return rule
 
 

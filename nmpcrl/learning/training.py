@@ -51,6 +51,20 @@ class Step:
     failure: str = ""  # what the solver said, if it failed, or where the plant went
     end: bool = False  # whether the plant ended the episode
     last: bool = False  # whether it is the last step of its episode, for whatever reason
+    next_state: Vector | None = None  # s+; None where it failed
+
+    @property
+    def solves(self) -> list[Solution]:
+        """The different ones: of the plan, of Q(s, a) and of the next state."""
+        successor = self.update and self.update.successor
+        solutions = self.plan, self.solution, successor and successor.solution
+        return list(dict.fromkeys(filter(None, solutions)))
+
+    @property
+    def warm(self) -> Solution | None:
+        """What the next step's first solve begins with."""
+        successor = self.update and self.update.successor
+        return (successor and successor.solution) or self.solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +106,11 @@ class Exploration:
 
     def __call__(self, policy: Vector, episode: int, time: int) -> Vector:
         """The action before it is clipped to the action space."""
-        result: Vector = policy + self._scaled[episode, time]
+        result: Vector = policy + self.scaled[episode, time]
         return result
 
     @cached_property
-    def _scaled(self) -> Matrix:
+    def scaled(self) -> Matrix:
         """The noise of every step at once, shape (episodes, steps, m)."""
         return self.scale[..., None] * self.noise
 
@@ -154,69 +168,67 @@ def train(
             `Problem` without `plant` and `start`.
         Diverged: theta is no longer usable, or `PATIENCE` episodes in a row ended early.
     """
-    nmpc = nmpc_of(controller)
-    if nmpc is None:
-        raise ValueError(f"controller = {controller!r} must be an Nmpc, or hold one")
-    if not isinstance(weights, Weights):
-        raise ValueError(f"weights = {weights!r} must be Weights: write Weights(theta, 0 * theta)")
-    if explore.noise.shape[2] != nmpc.m:
-        raise ValueError(f"the noise has {explore.noise.shape[2]} numbers a step; the NMPC has"
-                         f" {nmpc.m} inputs")  # fmt: skip
-    fixed = learner.values_actions if constrained is None else constrained
-    if fixed and not clipped and np.isfinite([nmpc.lower, nmpc.upper]).any():
-        raise ValueError(
-            f"clipped = False lets actions leave {short(nmpc.lower)} and {short(nmpc.upper)}, where"
-            f" {learner.name} has no Q(s, a): leave it out, or learn V(s) by constrained=False"
-        )
-    around, known = environment(nmpc, plant, start), forecasts(data, nmpc.horizon)
-    rng = stream(rng, 1)
-    trainer = _Trainer(learner, controller, nmpc, explore, clipped, fixed, around, known, rng)
-    own = replace(weights, theta=np.array(weights.theta, float), w=np.array(weights.w, float))
-    return trainer.run(own)
+    trainer = trainer_of(
+        learner, controller, weights, explore, clipped=clipped, constrained=constrained,
+        plant=plant, start=start, data=data, rng=rng,
+    )  # fmt: skip
+    return trainer.run()
 
 
 @dataclass(frozen=True, eq=False)
-class _Trainer:
+class Trainer:
     """What an episode needs, as in `train`."""
 
     learner: Learner
     controller: Any
     nmpc: Nmpc
+    weights: Weights  # to start with
     explore: Exploration
     clipped: bool
     constrained: bool
+    plant: Plant | None  # the environment, if it is one
     environment: Environment
     data: Callable[[int], Mapping[str, Any]] | None
     rng: np.random.Generator
 
-    def run(self, weights: Weights) -> Iterator[Step]:
+    def run(self) -> Iterator[Step]:
         """The steps of all episodes."""
-        failed = 0
+        weights, failed = self.weights, 0
         for episode in range(len(self.explore.scale)):
-            failure = ""
-            for step in self.episode(episode, weights):
+            failure, state = "", self.environment.start(self.rng)
+            for step in self.steps(episode, 0, state, weights, None):
                 weights, failure = step.weights, step.failure
                 yield step
-                left = absurd(weights, self.nmpc.largest)
-                if left:
-                    raise Diverged(f"{left} left the numbers that a solver is given")
-            failed = failed + 1 if failure else 0
-            if failed == PATIENCE:
-                raise Diverged(f"{PATIENCE} episodes in a row ended in a failed solve: {failure}")
+                self.judge(weights)
+            failed = self.counted(failed, failure)
 
-    def episode(self, episode: int, weights: Weights) -> Iterator[Step]:
-        """The steps of one episode; the last one says so if a solve failed."""
+    def judge(self, weights: Weights) -> None:
+        """Raise Diverged where no solver can be called with the weights."""
+        left = absurd(weights, self.nmpc.largest)
+        if left:
+            raise Diverged(f"{left} left the numbers that a solver is given")
+
+    def counted(self, failed: int, failure: str) -> int:
+        """How many episodes in a row failed, after another one; raises Diverged at `PATIENCE`."""
+        failed = failed + 1 if failure else 0
+        if failed == PATIENCE:
+            raise Diverged(f"{PATIENCE} episodes in a row ended in a failed solve: {failure}")
+        return failed
+
+    def steps(
+        self, episode: int, first: int, state: Vector, weights: Weights, warm: Solution | None
+    ) -> Iterator[Step]:
+        """The steps of an episode from the first on; the last one says so if a solve failed."""
         controller, constrained = self.controller, self.constrained
         nmpc, rng = self.nmpc, self.rng
-        state, warm_start = self.environment.start(rng), None
         nothing = np.full(nmpc.m, np.nan)
         final = self.explore.scale.shape[1] - 1
         ahead = self.data
-        known = ahead and ahead(0)
-        for t in range(final + 1):
+        known = ahead and ahead(first)
+        for t in range(first, final + 1):
             data = {} if known is None else {"data": known}
             try:
-                plan = controller.solve(state, weights.theta, warm_start, **data)
+                plan = controller.solve(state, weights.theta, warm, **data)
             except SolverError as error:
                 weights = self.learner.interrupted(weights)
                 yield Step(episode, t, state, weights, nothing, failure=str(error), last=True)
@@ -247,13 +259,58 @@ class _Trainer:
                 yield Step(episode, t, *what, failure=str(error), last=True)
                 return
             weights = update.weights
-            yield Step(
-                episode, t, state, weights, action, cost, plan, solution, update, "", end, last
-            )
+            step = Step(
+                episode, t, state, weights, action, cost, plan, solution, update, "", end, last,
+                next_state,
+            )  # fmt: skip
+            yield step
             if last:
                 return
-            warm_start = (update.successor and update.successor.solution) or solution
-            state, known = next_state, later
+            state, known, warm = next_state, later, step.warm
+
+
+def trainer_of(
+    learner: Learner,
+    controller: Controller,
+    weights: Weights,
+    explore: Exploration,
+    *,
+    clipped: bool = True,
+    constrained: bool | None = None,
+    plant: Plant | StepFunction | GymnasiumEnv | None = None,
+    start: Any = None,
+    data: Data | None = None,
+    rng: np.random.Generator | int = 0,
+) -> Trainer:
+    """The arguments of `train`, checked as it says."""
+    nmpc = nmpc_of(controller)
+    if nmpc is None:
+        raise ValueError(f"controller = {controller!r} must be an Nmpc, or hold one")
+    if not isinstance(weights, Weights):
+        raise ValueError(f"weights = {weights!r} must be Weights: write Weights(theta, 0 * theta)")
+    if explore.noise.shape[2] != nmpc.m:
+        raise ValueError(f"the noise has {explore.noise.shape[2]} numbers a step; the NMPC has"
+                         f" {nmpc.m} inputs")  # fmt: skip
+    fixed = learner.values_actions if constrained is None else constrained
+    if fixed and not clipped and np.isfinite([nmpc.lower, nmpc.upper]).any():
+        raise ValueError(
+            f"clipped = False lets actions leave {short(nmpc.lower)} and {short(nmpc.upper)}, where"
+            f" {learner.name} has no Q(s, a): leave it out, or learn V(s) by constrained=False"
+        )
+    around, known = environment(nmpc, plant, start), forecasts(data, nmpc.horizon)
+    return Trainer(
+        learner,
+        controller,
+        nmpc,
+        replace(weights, theta=np.array(weights.theta, float), w=np.array(weights.w, float)),
+        explore,
+        clipped,
+        fixed,
+        (plant or nmpc.plant) if plant is None or isinstance(plant, Plant) else None,
+        around,
+        known,
+        stream(rng, 1),
+    )
 
 
 def absurd(weights: Weights, largest: float = ABSURD) -> str:

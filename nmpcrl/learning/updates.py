@@ -9,6 +9,12 @@ from nmpcrl import Vector
 OVERSHOOT = 2.0
 
 
+def dot(x: Vector, y: Vector) -> float:
+    """x'y, summed from the first number to the last: `x @ y` has other last bits on other hosts."""
+    result: float = np.cumsum(x * y)[-1]
+    return result
+
+
 def td_error(cost: float, gamma: float, q: float, q_next: float) -> float:
     """TD error: Eq. (7), or Eq. (11) when a network supplies `q_next`."""
     return cost + gamma * q_next - q
@@ -33,12 +39,12 @@ def gradient_td_step(
 
     As printed: without the curvature term of nonlinear TDC (Maei et al. 2009).  # departure K
     """
-    return theta + alpha * (delta * phi - gamma * (w @ phi) * phi_next)
+    return theta + alpha * (delta * phi - gamma * dot(w, phi) * phi_next)
 
 
 def auxiliary_step(w: Vector, delta: float, phi: Vector, beta: float) -> Vector:
     """w of GES, the second line of Eq. (16): least mean squares of delta on phi, shape (d,)."""
-    return w + beta * (delta - phi @ w) * phi
+    return w + beta * (delta - dot(phi, w)) * phi
 
 
 def curvature_correction(delta: float, phi: Vector, w: Vector, hessian_w: Vector) -> Vector:
@@ -50,7 +56,7 @@ def curvature_correction(delta: float, phi: Vector, w: Vector, hessian_w: Vector
         w: auxiliary weights, shape (d,).
         hessian_w: the Hessian of Q_theta(s, a) in theta, times w, shape (d,).
     """
-    return (delta - phi @ w) * hessian_w
+    return (delta - dot(phi, w)) * hessian_w
 
 
 def project(theta: Vector, least: float | Vector, most: float | Vector) -> Vector:

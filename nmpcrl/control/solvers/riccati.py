@@ -132,19 +132,19 @@ class Compiled:
     def __init__(self, ocp: Ocp, solve: Any, solver: Riccati = DEFAULT) -> None:
         problem = self._problem = ocp.problem
         self._ocp, self._solver = ocp, solver
-        self._code = solve
+        self.code = solve
         self._fixed = int(ocp.fixed_action.size > 0)
         self._standing = np.zeros(2 * ocp.lower.size + ocp.equality.size)
         self._split = self._standing.size  # where a solution's gradient begins
         self._size = self._split + ocp.theta.numel()
         self._no_action = np.zeros(problem.inputs)
-        self._tolerance = solver.tolerance
+        self.tolerance = solver.tolerance
         count = solver.starts_of(problem) - 1
         N = problem.horizon
-        self._none = np.zeros((0, N, problem.inputs))
+        self.none = np.zeros((0, N, problem.inputs))
         others = cold_inputs(problem, N, count)
         self._others = np.reshape(np.array(others), (-1, N, problem.inputs))
-        self._drawn = np.array([random_inputs(problem, k, N) for k in range(PERTURBED)])
+        self.drawn = np.array([random_inputs(problem, k, N) for k in range(PERTURBED)])
         sides = [
             (state, sign, limit[state])
             for sign, limit in ((-1.0, problem.state_lower), (1.0, problem.state_upper))
@@ -179,16 +179,16 @@ class Compiled:
         start, point = COLD, self._standing
         if warm_start is not None:
             same = warm_start.state.tolist() == state.tolist()  # faster than np.array_equal
-            start, point = SAME if same else SHIFTED, self._from(warm_start)
+            start, point = SAME if same else SHIFTED, self.point_of(warm_start)
         out, restarts = np.empty(self._size), 0
         while True:
-            others, drawn = self._none, self._drawn
+            others, drawn = self.none, self.drawn
             if start == COLD:
                 held = self._regulated(problem, state, theta, given)
                 others, drawn = np.concatenate([self._others, held]), np.concatenate([held, drawn])
-            value, iterations, end, violation, error, failed = self._code(
+            value, iterations, end, violation, error, failed = self.code(
                 *problem, state, theta, given, fixed, others, drawn,
-                start, self._tolerance, point, out,
+                start, self.tolerance, point, out,
             )  # fmt: skip
             restarts += int(failed)
             if end == SOLVED and value < ABSURD:
@@ -223,7 +223,7 @@ class Compiled:
 
     @cached_property
     def _fatrop(self) -> Program:
-        return Program(self._ocp, Fatrop(self._tolerance))
+        return Program(self._ocp, Fatrop(self.tolerance))
 
     @cached_property
     def _regulator(self) -> Regulator:
@@ -232,11 +232,11 @@ class Compiled:
     def _regulated(self, problem: tuple[Any, ...], *given: Vector) -> Matrix:
         """The inputs of a start that is held by feedback, if there is one, (0 or 1, N, m)."""
         if self._solver.starts is not None:
-            return self._none
+            return self.none
         state, theta, action = given
         fixed = (action,) if self._fixed else ()
         inputs = self._regulator.inputs(state, theta, problem[0], *fixed)
-        return self._none if inputs is None else inputs[None]
+        return self.none if inputs is None else inputs[None]
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector | None:
         """The Hessian of the value in theta, times a vector (d,); None where dense algebra must."""
@@ -259,7 +259,12 @@ class Compiled:
         formed = slopes_code(self._problem)(data, *self.arguments[1:], *given, *directions, out)
         return out if formed else None
 
-    def _from(self, warm_start: Solution) -> Vector:
+    @property
+    def place(self) -> int:
+        """Where the multipliers of a fixed u_0 begin in a solution's numbers."""
+        return int(self._ocp.lower.size + self._ocp.fixed_action[0])
+
+    def point_of(self, warm_start: Solution) -> Vector:
         """The warm start's z, lam and nu in the order of this OCP."""
         ocp, old = self._ocp, warm_start.ocp
         if old is ocp:
