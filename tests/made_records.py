@@ -7,7 +7,7 @@ import numpy as np
 from nmpcrl.study import Experiment, Records
 from nmpcrl.study.records import EvaluationRow, StepRow, form_of
 
-CLOCKS = {"seconds", "solve_seconds", "fit_seconds"}
+CLOCKS = {"seconds"}
 
 
 def made_records(experiment: Experiment, rows: int, seed: int = 0) -> Records:

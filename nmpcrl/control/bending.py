@@ -24,12 +24,6 @@ class Bending:
         self._bends = ca.Function("bends", [e.x, e.u, e.theta, e.d], bends)
         self.least = np.where(weighs & (problem.theta > 0), 0.0, -np.inf)
 
-    def watch(self, states: Matrix, thetas: Matrix) -> None:
-        """Judge each theta in its state, a row each, as `Nmpc.solve` does; without data."""
-        for k in np.flatnonzero((thetas < self.least).any(axis=1)):
-            if (thetas[k] < self.least).any():
-                self.judge(states[k], thetas[k], self._problem.data)
-
     def judge(self, state: Vector, theta: Vector, data: Matrix) -> None:
         """Warn of entries below `least` where a cost bends downwards and would not with their sign.
 

@@ -135,8 +135,8 @@ class Nmpc(Described):
         state = _checked("state", state, self.n, self.farthest)
         theta = _checked("theta", theta, self.problem.theta.size, self.largest)
         known = self.problem.stage_data(data)
-        if (theta < self.bending.least).any():
-            self.bending.judge(state, theta, known)
+        if (theta < self._bending.least).any():
+            self._bending.judge(state, theta, known)
         given: tuple[Vector, ...] = ()
         if action is not None:
             action = _checked("action", action, self.m, self._strong)
@@ -250,7 +250,7 @@ class Nmpc(Described):
         return self._fixed if solution.ocp.fixed_action.size else self._free
 
     @cached_property
-    def bending(self) -> Bending:
+    def _bending(self) -> Bending:
         """Of a problem's costs."""
         return Bending(self.problem)
 

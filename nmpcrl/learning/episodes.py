@@ -15,7 +15,6 @@ from nmpcrl.control.solvers.codes import Start
 from nmpcrl.learning.baselines import nothing
 from nmpcrl.learning.bootstrap import Controller, Moves, NextValue, SecondSolve
 from nmpcrl.learning.learners import Learner, Weights
-from nmpcrl.learning.rollout import nmpc_of
 from nmpcrl.learning.training import Exploration, Step, Trainer, absurd, trainer_of
 
 NOTICE = "Compiling Algorithm 1 (once on this machine) ..."
@@ -54,7 +53,12 @@ class Episode:
     columns: dict[str, Matrix]  # `NUMBERS`, and state, action, features, theta and w after the step
     weights: Weights  # after it
     failure: str = ""  # what the solver said in the last step, or where the plant went
-    solver: str = ""  # which took over, if only once
+    solver: str = ""  # another than the controller's if it took over, if only once
+
+    @property
+    def steps(self) -> int:
+        """How many steps were made."""
+        return len(self.columns["cost"])
 
 
 def episodes(
@@ -97,7 +101,8 @@ def _episode(trainer: Trainer, loop: "Loop | None", number: int, weights: Weight
         for step in trainer.steps(number, t, state, weights, warm):
             rows[t], t = _row(step), t + 1
             weights, failure = step.weights, step.failure
-            solver = next((one.solver for one in step.solves if one.took_over), solver)
+            others = (one.solver for one in step.solves if one.solver != nmpc.solver.name)
+            solver = next(others, solver)
             if loop or absurd(weights, nmpc.largest):
                 break
         if step.last or not loop:
@@ -165,8 +170,10 @@ class Loop:
         learner, nmpc, plant = trainer.learner, trainer.nmpc, trainer.plant
         valued = learner.bootstrap
         moves = Moves(0.0) if valued is nothing else getattr(learner.rule, "moves", None)
-        known = valued is nothing or (type(valued) is SecondSolve and nmpc_of(valued.nmpc) is nmpc)
-        if not (known and moves and plant and type(learner) is Learner and type(nmpc) is Nmpc):
+        known = valued is nothing or (type(valued) is SecondSolve and valued.nmpc is nmpc)
+        if not (known and moves and plant and type(learner) is Learner):
+            return None
+        if trainer.controller is not nmpc or type(nmpc) is not Nmpc:
             return None
         if learner.gamma != nmpc.gamma or (learner.bounds and moves.projection):
             return None
@@ -177,9 +184,9 @@ class Loop:
         step, cost = plant.transition, nmpc.task.charge(nmpc.m)
         try:
             functions = compiled(step, returned=False), compiled(cost, returned=True)
+            return cls(trainer, moves, machine, *functions)
         except CannotCompile:
             return None
-        return cls(trainer, moves, machine, *functions)
 
     def run(
         self, first: int, last: Step, noise: Matrix, rows: Matrix
@@ -189,15 +196,10 @@ class Loop:
         Returns the first step that is not made, and its state, weights and warm start.
         """
         warm, weights, state = last.warm, last.weights, np.array(last.next_state)
-        theta, w, point = (
-            weights.theta.copy(),
-            weights.w.copy(),
-            self._machine.point_of(warm).copy(),
-        )
+        theta, w = weights.theta.copy(), weights.w.copy()
+        point = self._machine.point_of(warm).copy()
         start = Start.SAME if warm.state.tolist() == state.tolist() else Start.SHIFTED
         done = self._episode(*self._given, int(start), first, state, theta, w, point, noise, rows)
-        n, d, nmpc = state.size, theta.size, self._nmpc
-        states = rows[first:done, len(NUMBERS) : len(NUMBERS) + n]
-        nmpc.bending.watch(states, rows[first - 1 : done - 1, -2 * d : -d])
+        n, nmpc = state.size, self._nmpc
         warm = Solution(point[:n], theta, np.nan, w, 0, 0.0, point, nmpc.ocp, nmpc.solver.name)
         return done, state, replace(weights, theta=theta, w=w), warm

@@ -76,8 +76,6 @@ class StepRow(NamedTuple):
     violation: float
     iterations: int
     solves: int
-    solve_seconds: float
-    fit_seconds: float
     seconds: float
 
 
@@ -102,22 +100,9 @@ def form_of(row: type[NamedTuple], n: int, m: int, d: int, steps: int) -> np.dty
     return np.dtype([(one, float, shapes[one]) if one in shapes else (one, t) for one, t in fields])
 
 
-class Table:
-    """Rows of named numbers and arrays in memory of fixed size."""
-
-    def __init__(self, form: np.dtype[Any], capacity: int) -> None:
-        self._rows = np.empty(capacity, form)
-        self._size = 0
-
-    def append(self, row: tuple[Any, ...]) -> None:
-        """Fill the next row with a value for each field, in their order."""
-        self._rows[self._size] = row
-        self._size += 1
-
-    def columns(self) -> dict[str, Column]:
-        """The filled rows, as an array for each field."""
-        filled = self._rows[: self._size]
-        return {name: filled[name].copy() for name in filled.dtype.fields or ()}
+def columns(rows: NDArray[Any]) -> dict[str, Column]:
+    """An array for each field of a structured array."""
+    return {name: rows[name].copy() for name in rows.dtype.fields or ()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +111,9 @@ class Records:
 
     Columns of `steps`, one row per step of training: episode, time, state (n,), action (m,), cost,
     value, next_value, delta, features (d,), theta (d,), w (d,), loss, status (a `StepStatus`),
-    restarts, violation (how far a plan leaves the box [m]), iterations, solves,
-    solve_seconds, fit_seconds, seconds, alpha_phi2 (alpha ||phi||^2). theta and w are those after
-    the step. Numbers that a step lacks are nan.
+    restarts, violation (how far a plan leaves the box [m]), iterations, solves, seconds (a step of
+    its episode takes on average), alpha_phi2 (alpha ||phi||^2). theta and w are those after the
+    step. Numbers that a step lacks are nan.
 
     Columns of `evaluations`, one row per rollout without noise: episode (number of trained ones),
     theta (d,), cost (infinite where a solve failed), states (K + 1, n), actions (K + 1, m).

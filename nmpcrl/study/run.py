@@ -3,31 +3,28 @@
 import gc
 import time
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from nmpcrl.control import Solution
-from nmpcrl.learning import NextValue, Weights
+from nmpcrl.learning import Weights
+from nmpcrl.learning.episodes import Episode, episodes
 from nmpcrl.learning.rollout import evaluate
-from nmpcrl.learning.training import Diverged, Step, absurd, train
+from nmpcrl.learning.training import Diverged, absurd
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.records import (
+    Column,
     EvaluationRow,
     Records,
     StepRow,
     StepStatus,
     Stopped,
-    Table,
+    columns,
     final_cost,
     form_of,
 )
 from nmpcrl.study.setup import Job, job_of
 from nmpcrl.study.trial import Trial
-
-UNKNOWN = NextValue(np.nan)  # of a step without a bootstrap
-UNSOLVED: Any = SimpleNamespace(value=np.nan, features=np.nan)  # it failed or was not needed
 
 
 def run(
@@ -50,76 +47,50 @@ def run(
 def _run(job: Job, on_episode: Callable[[int, float], None] | None) -> Records:
     named, controller, weights = job.named, job.controller, job.weights
     sizes = controller.n, controller.m, weights.theta.size, named.steps
-    steps = Table(form_of(StepRow, *sizes), named.episodes * named.steps)
-    evaluations = Table(form_of(EvaluationRow, *sizes), named.episodes // named.evaluate_every + 2)
-    evaluations.append(_evaluation(job, weights, 0))
-    stopped, cost, began = str(Stopped.FINISHED), 0.0, time.perf_counter()
-    own = solver = controller.solver.name
+    made, stopped = list[tuple[Episode, float]](), str(Stopped.FINISHED)
+    evaluations, began = [_evaluation(job, weights, 0)], time.perf_counter()
     try:
         how = {**job.options, **job.environment}
-        for step in train(job.learner, controller, weights, job.explore, **how):
-            seconds = time.perf_counter() - began
-            steps.append(_row(step, seconds))
-            cost += step.cost
-            solver = next((one.solver for one in _solves(step) if one.solver != own), solver)
-            if step.last:
-                done = step.episode + 1
-                due = done % named.evaluate_every == 0 or done == named.episodes
-                if due and not absurd(step.weights, controller.largest):
-                    evaluations.append(_evaluation(job, step.weights, done))
-                if on_episode:
-                    on_episode(done, cost)
-                cost = 0.0
+        for episode in episodes(job.learner, controller, weights, job.explore, **how):
+            made.append((episode, time.perf_counter() - began))
+            done = episode.number + 1
+            due = done % named.evaluate_every == 0 or done == named.episodes
+            if due and not absurd(episode.weights, controller.largest):
+                evaluations.append(_evaluation(job, episode.weights, done))
+            if on_episode:
+                on_episode(done, float(np.sum(episode.columns["cost"])))
             began = time.perf_counter()
     except Diverged as error:
         stopped = f"{Stopped.DIVERGED}: {error}"
-    table, judged = steps.columns(), evaluations.columns()
+    table = _table(made, form_of(StepRow, *sizes))
+    judged = columns(np.array(evaluations, form_of(EvaluationRow, *sizes)))
     alpha = named.alpha if isinstance(named, Experiment) else np.nan
     table["alpha_phi2"] = alpha * (table["features"] ** 2).sum(axis=1)
+    others = [episode.solver for episode, _ in made if episode.solver]
     facts = {
         "stopped": stopped,
-        "solver": solver,  # another than the run's own if it took over, if only once
+        "solver": [controller.solver.name, *others][-1],  # another if it took over, if only once
         "seconds": float(table["seconds"].sum()),
         "final_cost": final_cost(judged["cost"]),
     }
     return Records(named.stated, table, judged, facts)
 
 
-def _solves(step: Step) -> list[Solution]:
-    """The different solves of a step."""
-    successor = (step.update and step.update.successor) or UNKNOWN
-    return list(dict.fromkeys(filter(None, (step.plan, step.solution, successor.solution))))
-
-
-def _row(step: Step, seconds: float) -> StepRow:
-    """One step of training as a row."""
-    update = step.update
-    successor = (update and update.successor) or UNKNOWN
-    first, solves = step.solution or UNSOLVED, _solves(step)
-    restarts = sum(solve.restarts for solve in solves)
-    status = StepStatus.RESTARTED if restarts else StepStatus.SOLVED
-    return StepRow(
-        episode=step.episode,
-        time=step.time,
-        state=step.state,
-        action=step.action,
-        cost=step.cost,
-        value=first.value,
-        next_value=successor.value,
-        delta=np.nan if update is None or update.delta is None else update.delta,
-        features=first.features,
-        theta=step.weights.theta,
-        w=step.weights.w,
-        loss=successor.loss,
-        status=StepStatus.FAILED if step.failure else status,
-        restarts=restarts,
-        violation=max((solve.violation for solve in solves), default=np.nan),
-        iterations=sum(solve.iterations for solve in solves),
-        solves=len(solves),
-        solve_seconds=sum(solve.seconds for solve in solves),
-        fit_seconds=successor.seconds,
-        seconds=seconds,
-    )
+def _table(made: list[tuple[Episode, float]], form: np.dtype[Any]) -> dict[str, Column]:
+    """`Records.steps` from the episodes and the time that each took [s]."""
+    rows = np.empty(sum(episode.steps for episode, _ in made), form)
+    at = 0
+    for episode, seconds in made:
+        part, length = rows[at : at + episode.steps], episode.steps
+        for name, column in episode.columns.items():
+            part[name] = column
+        part["episode"], part["time"] = episode.number, np.arange(length)
+        part["seconds"] = seconds / length
+        part["status"] = np.where(part["restarts"], StepStatus.RESTARTED, StepStatus.SOLVED)
+        if episode.failure:
+            part["status"][-1] = StepStatus.FAILED
+        at += length
+    return columns(rows)
 
 
 def _evaluation(job: Job, weights: Weights, episode: int) -> EvaluationRow:

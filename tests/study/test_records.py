@@ -10,7 +10,7 @@ import pytest
 from made_records import assert_same_numbers, made_records
 
 from nmpcrl.study import DamagedRecords, Experiment, Records
-from nmpcrl.study.records import Table, about, final_cost
+from nmpcrl.study.records import about, final_cost
 
 RUN = made_records(Experiment("ES", seed=3, episodes=40, steps=10, evaluate_every=20), 40)
 
@@ -113,22 +113,6 @@ def test_a_file_of_another_kind_is_damaged(path, content):
     path.write_bytes(content)
     with pytest.raises(DamagedRecords):
         about(path)
-
-
-def test_the_filled_rows_of_a_table_become_whole_columns():
-    table = Table(np.dtype([("episode", int), ("theta", float, 3)]), capacity=3)
-    table.append((7, np.ones(3)))
-    table.append((8, np.nan))  # in all of the field
-    columns = table.columns()
-    assert list(columns) == ["episode", "theta"]
-    np.testing.assert_array_equal(columns["episode"], [7, 8])
-    np.testing.assert_array_equal(columns["theta"], [[1, 1, 1], [np.nan] * 3])
-    assert all(column.flags.c_contiguous and column.base is None for column in columns.values())
-    with pytest.raises(ValueError, match="tuple of length 1"):
-        table.append((0,))
-    table.append((9, 0.0))
-    with pytest.raises(IndexError):
-        table.append((10, 0.0))
 
 
 @pytest.mark.parametrize(
