@@ -52,6 +52,8 @@ class Trial:
             raise ParameterError(f"make = {self.make!r} must be a function of nmpc")
         theta = self.theta
         if theta is None:
+            if self.nmpc.task is not None:
+                raise ParameterError("theta must be given where the Nmpc has a task and no Problem")
             theta = self.nmpc.problem.theta
         object.__setattr__(self, "theta", tuple(map(float, np.asarray(theta, float))))
         whole(0, LARGEST_SEED).check("seed", self.seed)

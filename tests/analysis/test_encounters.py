@@ -22,7 +22,7 @@ def test_states_inside_and_entries_are_counted_by_hand():
 
 def test_a_rollout_is_judged_by_its_true_states():
     world = World(still(paper.LAYOUTS["A"]), fault=FAULTS["noise"])
-    one, same, other = (judged(controller(), THETA, world, seed) for seed in (0, 0, 1))
+    one, same, other = (judged(controller(), THETA, world, seed) for seed in (1, 1, 2))
     assert one.cost == same.cost != other.cost
     assert one.arrived
     assert len(one.states) == paper.STEPS + 1

@@ -27,7 +27,7 @@ INSIDE = np.array([-0.5, 1.5, 0.0])  # the rim of an obstacle, where the slacks 
 @each_baseline
 @pytest.mark.parametrize("state", [np.array(paper.START), INSIDE], ids=["start", "inside"])
 def test_the_baselines_have_the_value_gradient_and_plan_of_the_problem(nmpc, write, state):
-    ours, theirs = nmpc.solve(state, THETA), write(nmpc.ocp)(state, THETA, None)
+    ours, theirs = nmpc.solve(state, THETA), write(nmpc)(state, THETA, None)
     assert theirs.value == pytest.approx(ours.value, rel=1e-6)
     assert theirs.features[:-1] == pytest.approx(ours.features[:-1], rel=1e-4, abs=1e-4)
     states, inputs, _ = theirs.variables
@@ -37,7 +37,7 @@ def test_the_baselines_have_the_value_gradient_and_plan_of_the_problem(nmpc, wri
 
 @each_baseline
 def test_the_baselines_start_from_the_last_plan(nmpc, write):
-    solve = write(nmpc.ocp)
+    solve = write(nmpc)
     first = solve(nmpc.task.start, THETA, None)
     later = nmpc.plant.step(nmpc.task.start, first.variables[1][:, 0])
     again = solve(later, THETA, first)
@@ -49,7 +49,7 @@ def test_the_baselines_start_from_the_last_plan(nmpc, write):
 def test_the_baselines_say_when_there_is_no_optimum(nmpc, write, monkeypatch):
     monkeypatch.setitem(baselines.OPTIONS["ipopt"], "max_iter", 1)
     with pytest.raises(SolverError, match="Maximum_Iterations_Exceeded"):
-        write(nmpc.ocp)(nmpc.task.start, THETA, None)
+        write(nmpc)(nmpc.task.start, THETA, None)
 
 
 @pytest.fixture(scope="module")

@@ -1,127 +1,135 @@
-"""The value's derivatives in theta against finite differences and CasADi's own multipliers."""
+"""Derivatives in theta where differences say nothing: at bounds, at kinks, and of their algebra.
 
-import casadi as ca
+`test_derivatives` holds them to finite differences and to Ipopt.
+"""
+
 import numpy as np
 import pytest
+from differences import agrees
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-STEP = 1e-4
+from nmpcrl.control import Nmpc, Obstacle, Riccati, Task, differential_drive
+from nmpcrl.control.codegen import jit
+from nmpcrl.study import paper
 
-
-def beside(nmpc, solution):
-    """Solutions on both sides in each theta, each solve started from the same plan."""
-    state, theta, steps = solution.state, solution.theta, STEP * np.eye(solution.theta.size)
-    return [[nmpc.solve(state, theta + d, solution) for d in (e, -e)] for e in steps]
-
-
-def differences(pairs, read):
-    """Central differences of `read(solution)` in theta."""
-    return np.array([(read(above) - read(below)) / (2 * STEP) for above, below in pairs])
+THETA, START = np.array(paper.THETA_INIT), np.array(paper.START)
+BOX = np.array([9.0, 9.0, np.inf])
 
 
-def active(solution):
-    """Which inequalities hold as equalities; None if some multiplier leaves that in doubt."""
-    m = solution.multipliers
-    size = np.abs(np.concatenate([part.ravel() for part in (m.states[1:], m.inputs)]))
-    pressed = np.concatenate([m.obstacles.ravel(), -m.slacks.ravel(), size])
-    if ((pressed > 1e-6) & (pressed < 1e-1)).any():
-        return None
-    return tuple(pressed > 1e-3)
+@pytest.mark.parametrize(("horizon", "count"), [(1, 7), (2, 1), (25, 0)])
+def test_horizon_and_number_of_obstacles_do_not_matter_to_them(horizon, count):
+    obstacles = tuple(Obstacle(-1.0 + x, 2.5) for x in range(count))
+    task = Task(START, np.array(paper.TARGET), -BOX, BOX, obstacles)
+    nmpc = Nmpc(differential_drive(), task, horizon=horizon, solver=Riccati(tolerance=1e-11))
+    assert agrees(nmpc, nmpc.solve(START, THETA), 1e-4)
 
 
-def same_side_throughout(nmpc, solution):
-    """Whether the active set stays as it is within a few steps of theta, in every direction."""
-    steps = STEP * np.vstack([np.eye(9), -np.eye(9)])
-    around = [nmpc.solve(solution.state, solution.theta + 3 * e, solution) for e in steps]
-    here = active(solution)
-    return here is not None and all(active(other) == here for other in around)
+@pytest.mark.parametrize("giver", ["fatrop", "ipopt"])
+def test_the_solution_may_be_another_solvers(controllers, draw, giver):
+    """Those of CasADi multiply by the dense Hessian."""
+    riccati, casadi, rng = controllers["riccati"], controllers[giver], np.random.default_rng(53)
+    for state, theta in draw(10, seed=53):
+        solution, along = casadi.solve(state, theta), rng.normal(size=9) * theta
+        dense = riccati.value_hessian(solution) @ along
+        np.testing.assert_array_equal(casadi.value_hessian_times(solution, along), dense)
+        product = riccati.value_hessian_times(solution, along)
+        np.testing.assert_allclose(product, dense, atol=1e-4 * np.abs(dense).max())
 
 
-def test_features_are_the_differences_of_the_value(robot, draw):
-    for state, theta in draw(10, seed=10):
-        solution = robot.solve(state, theta)
-        slope = differences(beside(robot, solution), lambda s: s.value)
-        scale = np.abs(slope).max()
-        np.testing.assert_allclose(solution.features, slope, atol=2e-6 * scale)
+def test_without_numba_the_product_is_that_of_the_dense_hessian(monkeypatch):
+    monkeypatch.setattr(jit, "numba_version", lambda: None)
+    nmpc = paper.nmpc()
+    with pytest.warns(UserWarning, match="fatrop solves instead of riccati"):
+        solution = nmpc.solve(START, THETA)
+    product = nmpc.value_hessian_times(solution, THETA)
+    np.testing.assert_array_equal(product, nmpc.value_hessian(solution) @ THETA)
 
 
-def test_features_of_a_fixed_action_are_differences_as_well(fatrop, draw):
-    rng = np.random.default_rng(11)
-    for state, theta in draw(5, seed=11):
-        action = rng.uniform(fatrop.plant.lower, fatrop.plant.upper) / 2
-        slope = []
-        for e in STEP * np.eye(9):
-            above, below = (fatrop.solve(state, theta + d, None, action).value for d in (e, -e))
-            slope.append((above - below) / (2 * STEP))
-        found = fatrop.solve(state, theta, None, action).features
-        np.testing.assert_allclose(found, slope, atol=1e-5 * np.abs(slope).max())
+vectors = st.lists(st.floats(-1, 1), min_size=9, max_size=9).map(lambda v: np.array(v) * THETA)
+states = st.tuples(st.floats(-3, 9), st.floats(-3, 9), st.floats(-4, 4)).map(np.array)
+thetas = st.lists(st.floats(0.3, 3), min_size=9, max_size=9).map(lambda v: np.array(v) * THETA)
 
 
-def test_features_are_minus_the_parameter_multipliers_of_casadi(fatrop, draw):
-    """The solver's own sensitivity, from an Ipopt of this test's making."""
-    ocp = fatrop.ocp
-    nlp = {"x": ocp.variables, "p": ocp.parameters, "f": ocp.objective, "g": ocp.constraints}
-    exact = {"print_level": 0, "sb": "yes", "tol": 1e-10, "bound_relax_factor": 0}
-    ipopt = ca.nlpsol("ipopt", "ipopt", nlp, {"print_time": False, "ipopt": exact})
-    for state, theta in draw(10, seed=12):
-        solution = fatrop.solve(state, theta)
-        result = ipopt(
-            x0=solution.primal,
-            p=np.concatenate([state, theta]),
-            lbx=ocp.lower,
-            ubx=ocp.upper,
-            lbg=np.where(ocp.equality, 0, -np.inf),
-            ubg=0,
-        )
-        assert float(result["f"]) == pytest.approx(solution.value, rel=1e-6)
-        multipliers = result["lam_p"].full().ravel()[state.size :]
-        scale = np.abs(multipliers).max()
-        np.testing.assert_allclose(solution.features, -multipliers, atol=2e-6 * scale)
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(state=states, theta=thetas, u=vectors, v=vectors, times=st.floats(-100, 100))
+def test_products_are_linear_and_the_hessian_behind_them_is_symmetric(
+    controllers, state, theta, u, v, times
+):
+    """u'Hv = v'Hu and H(u + t v) = Hu + t Hv, whatever is active and however weakly."""
+    riccati = controllers["riccati"]
+    solution = riccati.solve(state, theta)
+    before, vector = solution.point.copy(), u.copy()
+    one, other, both = (riccati.value_hessian_times(solution, w) for w in (u, v, u + times * v))
+    size = np.abs(u) @ np.abs(other) + np.abs(v) @ np.abs(one)
+    assert v @ one == pytest.approx(u @ other, abs=1e-9 + 1e-6 * size)
+    size = np.abs(one).max() + abs(times) * np.abs(other).max()
+    np.testing.assert_allclose(both, one + times * other, atol=1e-10 + 1e-7 * size)
+    np.testing.assert_array_equal(riccati.value_hessian_times(solution, 0 * u), 0)
+    np.testing.assert_array_equal(solution.point, before)
+    np.testing.assert_array_equal(u, vector)
 
 
-def test_the_hessian_is_the_differences_of_the_features(fatrop, draw):
-    compared = 0
-    for state, theta in draw(20, seed=13):
-        solution = fatrop.solve(state, theta)
-        if not same_side_throughout(fatrop, solution):
-            continue
-        slope = differences(beside(fatrop, solution), lambda s: s.features)
-        found = fatrop.value_hessian(solution)
-        np.testing.assert_allclose(found, slope, atol=1e-5 * np.abs(slope).max())
-        compared += 1
-    assert compared >= 8
+@pytest.mark.parametrize("radius", [0.5, 1.25])
+def test_the_slack_of_stage_zero_is_straight_on_either_side_of_its_kink(radius):
+    """Inside an obstacle as on its boundary, counted as in it or not: it bends nothing."""
+    theta, start = np.append(THETA[:8], 0.0), np.array([radius, 0.0, 0.3])
+    task = Task(start, np.array([5.0, 4.0, 1.0]), -BOX, BOX, (Obstacle(0.0, 0.0),))
+    outside, inside = (
+        Nmpc(differential_drive(), task, solver=Riccati(1e-11), ties_active=active)
+        for active in (False, True)
+    )
+    one, other = (n.value_hessian_times(n.solve(start, theta), theta) for n in (outside, inside))
+    np.testing.assert_array_equal(one, other)
+    assert radius > 1 or agrees(outside, outside.solve(start, theta), 1e-4)
 
 
-def test_the_hessian_is_symmetric(robot, draw):
-    for state, theta in draw(10, seed=14):
-        hessian = robot.value_hessian(robot.solve(state, theta))
-        np.testing.assert_allclose(hessian, hessian.T, atol=1e-11 * np.abs(hessian).max())
+def test_at_a_bound_that_is_just_reached_the_curvature_lies_between_its_sides(
+    point_mass, open_field
+):
+    """An input free to follow theta bends V down; one that is held does not."""
+    theta = np.array([1.2, 0.7, 0.3, 0.2, 0.4, 0.9, 1.5, 2.0, 0.6, 0.8, 0.0])
+    state, along = np.array([0.9, -1.5, 0.0, 0.0]), np.linspace(0.5, 1.5, 11)
+
+    def curvature(bound: float) -> float:
+        nmpc = Nmpc(point_mass(bound), open_field(), horizon=1)
+        return along @ nmpc.value_hessian_times(nmpc.solve(state, theta), along)
+
+    wide = Nmpc(point_mass(), open_field(), horizon=1).solve(state, theta)
+    reached = np.abs(wide.action).max()
+    free, held = curvature(1.001 * reached), curvature(0.999 * reached)
+    assert free < held - 1e-3 * abs(held)
+    margin = 0.01 * (held - free)
+    assert free - margin <= curvature(reached) <= held + margin
 
 
-def test_the_hessian_of_a_fixed_action_exists_too(fatrop, theta):
-    solution = fatrop.solve(fatrop.task.start, theta, action=np.array([0.3, 0.2]))
-    slope = []
-    for e in STEP * np.eye(9):
-        above, below = (
-            fatrop.solve(solution.state, theta + d, None, solution.action).features for d in (e, -e)
-        )
-        slope.append((above - below) / (2 * STEP))
-    found = fatrop.value_hessian(solution)
-    np.testing.assert_allclose(found, slope, atol=1e-5 * np.abs(slope).max())
+@pytest.mark.parametrize(
+    ("vector", "message"),
+    [
+        (np.zeros(8), r"vector has shape \(8,\); it must be \(9,\)"),
+        (np.zeros((9, 9)), r"vector has shape \(9, 9\); it must be \(9,\)"),
+        (np.full(9, np.nan), "vector .* must hold finite numbers"),
+        ("along", "vector = 'along' must hold 9 numbers"),
+    ],
+)
+def test_a_vector_that_is_none_is_refused(robot, vector, message):
+    solution = robot.solve(START, THETA)
+    with pytest.raises(ValueError, match=message):
+        robot.value_hessian_times(solution, vector)
 
 
 def test_minus_the_multiplier_of_the_action_is_the_slope_of_the_action_value(robot, draw):
-    rng, compared = np.random.default_rng(15), 0
+    rng, step, compared = np.random.default_rng(15), 1e-4, 0
     for state, theta in draw(10, seed=15):
         action = rng.uniform(robot.plant.lower, robot.plant.upper) / 2
         solution = robot.solve(state, theta, action=action)
         near = [
             [robot.solve(state, theta, solution, action + d) for d in (e, -e)]
-            for e in STEP * np.eye(2)
+            for e in step * np.eye(2)
         ]
-        moved = max(np.abs(s.primal - solution.primal).max() for pair in near for s in pair)
-        if moved > 0.1:  # fell into another local minimum
-            continue
-        slope = [(above.value - below.value) / (2 * STEP) for above, below in near]
+        if max(np.abs(s.primal - solution.primal).max() for pair in near for s in pair) > 0.1:
+            continue  # fell into another local minimum
+        slope = [(above.value - below.value) / (2 * step) for above, below in near]
         np.testing.assert_allclose(-solution.multipliers.action, slope, rtol=1e-3, atol=1e-3)
         compared += 1
     assert compared >= 7
@@ -132,58 +140,21 @@ def test_the_kkt_residual_of_every_solution_is_small(robot, draw):
     for state, theta in draw(50, seed=16):
         free = robot.solve(state, theta)
         action = rng.uniform(robot.plant.lower, robot.plant.upper) / 2
-        fixed = robot.solve(state, theta, free, action)
-        assert robot.kkt_residual(free) < 1e-4
-        assert robot.kkt_residual(fixed) < 1e-4
+        for one in (free, robot.solve(state, theta, free, action)):
+            assert robot.kkt_residual(one) < 1e-4
+            assert robot.kkt_residual(one, relative=True) <= robot.kkt_residual(one)
 
 
 @pytest.mark.parametrize(
     ("field", "index", "by"),
     [
-        ("primal", 3, 0.01),  # u_0: neither feasible nor stationary
+        ("primal", 3, 0.1),  # u_0: neither feasible nor stationary
         ("constraint_duals", 0, 1.0),
         ("bound_duals", 3, 1.0),
     ],
 )
-def test_the_kkt_residual_notices_what_is_not_a_solution(fatrop, theta, field, index, by):
-    solution = fatrop.solve(fatrop.task.start, theta)
+def test_the_kkt_residual_notices_what_is_not_a_solution(fatrop, field, index, by):
+    solution = fatrop.solve(START, THETA)
     getattr(solution, field)[index] += by
     assert fatrop.kkt_residual(solution) > 1e-3
-
-
-def test_the_jacobian_of_the_policy_is_its_differences(robot, draw):
-    """And so is that of a later stage; with u_0 given, that of the policy is 0."""
-    compared = 0
-    for state, theta in draw(12, seed=17):
-        solution = robot.solve(state, theta)
-        if not same_side_throughout(robot, solution):
-            continue
-        pairs = beside(robot, solution)
-        for stage in (0, 4):
-            plan = robot.plan_jacobian(solution, stage)
-            for found, part in ((plan.states, "states"), (plan.inputs, "inputs")):
-                slope = differences(pairs, lambda s, p=part, i=stage: getattr(s, p)[i])
-                size = max(1.0, np.abs(slope).max())
-                np.testing.assert_allclose(found, slope.T, atol=1e-3 * size)
-        given = robot.solve(state, theta, solution, solution.action * 0.9)
-        np.testing.assert_allclose(robot.policy_jacobian(given), 0, atol=1e-10)
-        compared += 1
-    assert compared >= 4
-
-
-def test_the_jacobian_of_the_policy_is_that_of_the_dense_conditions(controllers, draw):
-    riccati, ipopt = controllers["riccati"], controllers["ipopt"]
-    for state, theta in draw(20, seed=18):
-        solution = riccati.solve(state, theta)
-        dense = ipopt.policy_jacobian(solution)
-        found = riccati.policy_jacobian(solution)
-        assert found.shape == (2, 9)
-        np.testing.assert_allclose(found, dense, atol=1e-4 * max(1.0, np.abs(dense).max()))
-
-
-def test_relative_to_its_plan_and_multipliers_a_solution_violates_less(robot, theta):
-    solution = robot.solve(robot.task.start, theta)
-    relative = robot.kkt_residual(solution, relative=True)
-    assert relative <= robot.kkt_residual(solution)
-    solution.primal[3] += 0.1
-    assert robot.kkt_residual(solution, relative=True) > 1e-3
+    assert field != "primal" or fatrop.kkt_residual(solution, relative=True) > 1e-3

@@ -6,40 +6,15 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from small_problems import tank
 
 from nmpcrl.control import Fatrop, Ipopt, Nmpc, Problem, Riccati, Soft, SolverError
-from nmpcrl.control.solvers import problem_stages
+from nmpcrl.control.solvers import stages
 
 pytestmark = pytest.mark.usefixtures("interpreted")
 
-STATE, UNITS = np.array([0.5, 1.0]), (1e5, 1e-6, 1e12)
-SOLVERS = (Riccati(1e-10), Fatrop(1e-9), Ipopt(1e-10))
-
-
-def tank(unit: float, **changes) -> Problem:
-    """A pressure and a temperature in any unit; the costs and rows have none."""
-
-    def model(x, u, th):
-        pressure = x[0] + 0.1 * (-th["k"] * x[0] + u + 0.1 * unit * ca.sin(x[1] / unit))
-        return ca.vertcat(pressure, x[1] + 0.1 * (0.2 * x[0] - (x[1] - unit)))
-
-    def away(x, th):
-        return ca.sumsqr(x / unit - th["target"])
-
-    fields = {
-        "states": 2,
-        "inputs": 1,
-        "horizon": 8,
-        "gamma": 0.95,
-        "theta": {"k": 0.3, "target": np.array([1.3, 1.2])},
-        "model": model,
-        "stage": lambda x, u, th: away(x, th) + 0.01 * ca.sumsqr(u / unit),
-        "terminal": lambda x, th: 5 * away(x, th),
-        "soft": [Soft(lambda x, u, th: x[0] / unit - 1.2, weight=2.0)],
-        "lower": -unit,
-        "upper": 2 * unit,
-    }
-    return Problem(**fields | changes)
+STATE, SOLVERS = np.array([0.5, 1.0]), (Riccati(1e-10), Fatrop(1e-9), Ipopt(1e-10))
+each = pytest.mark.parametrize("solver", SOLVERS, ids=lambda one: one.name)
 
 
 def numbers(nmpc: Nmpc, unit: float) -> dict[str, np.ndarray]:
@@ -51,49 +26,27 @@ def numbers(nmpc: Nmpc, unit: float) -> dict[str, np.ndarray]:
     found = {}
     for name, one in (("first", first), ("given", given), ("later", later)):
         m, plan = one.multipliers, nmpc.plan_jacobian(one, 5)
-        found |= {
-            f"{name} value": one.value,
-            f"{name} gradient": one.features,
-            f"{name} states": one.states / unit,
-            f"{name} inputs": one.inputs / unit,
-            f"{name} slacks": one.slacks,
-            f"{name} costates": m.dynamics * unit,
-            f"{name} multipliers": m.obstacles,
-            f"{name} bounds": m.inputs * unit,
-            f"{name} fixed": m.action * unit,
-            f"{name} initial": m.initial * unit,
-            f"{name} policy": nmpc.policy_jacobian(one) / unit,
-            f"{name} plan": plan.states / unit,
-            f"{name} plan of inputs": plan.inputs / unit,
-            f"{name} curvature": nmpc.value_hessian_times(one, np.array([1.0, 0.5, -1.0])),
-        }
+        parts = {
+            "value": one.value, "gradient": one.features, "slacks": one.slacks,
+            "states": one.states / unit, "inputs": one.inputs / unit,
+            "costates": m.dynamics * unit, "initial": m.initial * unit, "rows": m.obstacles,
+            "bounds": m.inputs * unit, "fixed": m.action * unit,
+            "policy": nmpc.policy_jacobian(one) / unit,
+            "plan": plan.states / unit, "plan of inputs": plan.inputs / unit,
+            "curvature": nmpc.value_hessian_times(one, np.array([1.0, 0.5, -1.0])),
+        }  # fmt: skip
+        found |= {f"{name} {part}": value for part, value in parts.items()}
         assert nmpc.kkt_residual(one, relative=True) < 1e-6
     return found
 
 
-@pytest.mark.parametrize("solver", SOLVERS, ids=lambda one: one.name)
-@pytest.mark.parametrize("unit", UNITS)
+@each
+@pytest.mark.parametrize("unit", [1e5, 1e-6, 1e12])
 def test_the_plan_in_other_units_is_the_same_plan(solver, unit):
     plain = numbers(Nmpc(tank(1.0), solver=solver), 1.0)
     other = numbers(Nmpc(tank(unit), solver=solver), unit)
     for name, expected in plain.items():
         np.testing.assert_allclose(other[name], expected, rtol=2e-5, atol=2e-6, err_msg=name)
-
-
-@pytest.mark.parametrize("unit", UNITS)
-def test_derivatives_in_other_units_are_finite_differences(unit):
-    nmpc = Nmpc(tank(unit), solver=Riccati(1e-11))
-    theta, state = nmpc.problem.theta, STATE * unit
-    solution, step = nmpc.solve(state, theta), 1e-5
-    sides = [
-        [nmpc.solve(state, theta + sign * step * e, solution) for sign in (1, -1)]
-        for e in np.eye(theta.size)
-    ]
-    slope = [(a.value - b.value) / (2 * step) for a, b in sides]
-    np.testing.assert_allclose(solution.features, slope, rtol=1e-5, atol=1e-6)
-    states = [(a.states[6] - b.states[6]) / (2 * step) for a, b in sides]
-    jacobian = nmpc.plan_jacobian(solution, 6)
-    np.testing.assert_allclose(jacobian.states, np.transpose(states), atol=1e-4 * unit)
 
 
 def test_sizes_may_be_said_and_are_found_where_they_are_extreme():
@@ -120,10 +73,8 @@ def test_a_copy_of_a_problem_in_extreme_units_solves_alike():
 
 
 def test_an_error_names_the_state_in_its_own_units():
-    nmpc = Nmpc(
-        tank(1e5, stage=lambda x, u, th: th["k"] * ca.log(x[0] - 1e9) + 1e-10 * u**2),
-        solver="ipopt",
-    )
+    stage = {"stage": lambda x, u, th: th["k"] * ca.log(x[0] - 1e9) + 1e-10 * u**2}
+    nmpc = Nmpc(tank(1e5, **stage), solver="ipopt")
     with pytest.raises(SolverError, match=r"in state \[ 50000. 100000.\]"):
         nmpc.solve(STATE * 1e5, nmpc.problem.theta)
 
@@ -142,7 +93,7 @@ def test_a_parameter_may_be_as_large_as_it_starts():
         Nmpc(problem).solve(STATE, problem.theta * 1e4)
 
 
-@pytest.mark.parametrize("solver", SOLVERS, ids=lambda one: one.name)
+@each
 @pytest.mark.parametrize("unit", [1.0, 1e-3, 1e-7, 1e5])
 @pytest.mark.parametrize("of", ["a state of that unit", "a state", "an input"])
 def test_on_which_side_of_a_row_a_start_lies_does_not_depend_on_its_unit(solver, unit, of):
@@ -163,7 +114,7 @@ def test_on_which_side_of_a_row_a_start_lies_does_not_depend_on_its_unit(solver,
             assert found.features == pytest.approx(price)
 
 
-@pytest.mark.parametrize("solver", SOLVERS, ids=lambda one: one.name)
+@each
 @pytest.mark.parametrize("unit", [1e-3, 1e-7, 1e6])
 def test_rows_of_any_unit_are_solved_alike(solver, unit):
     """A tolerance of 1e-8 is nothing to a row of metres, and all that there is to one of 1e-7."""
@@ -186,13 +137,14 @@ def test_rows_of_any_unit_are_solved_alike(solver, unit):
             np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4)
 
 
-@pytest.fixture(scope="module", params=SOLVERS, ids=lambda one: one.name)
-def charged(request):
-    """A cart that reaches its bounds and a row, and the same of costs in any unit."""
+@each
+@pytest.mark.parametrize("unit", [1e-9, 1e-6, 1e-3, 1e6])
+def test_derivatives_do_not_depend_on_the_unit_of_the_cost(solver, unit):
+    """Of a cart that reaches its bounds and a row, or neither."""
 
-    def controller(unit):
+    def charged(unit):
         problem = Problem(
-            states=2, inputs=1, horizon=60, theta={"q": np.ones(2), "r": 0.3, "wind": 0.1},
+            states=2, inputs=1, horizon=30, theta={"q": np.ones(2), "r": 0.3, "wind": 0.1},
             model=lambda x, u, th, d: ca.vertcat(
                 x[0] + 0.1 * x[1], x[1] + 0.1 * u + 0.01 * th["wind"]
             ),
@@ -203,35 +155,27 @@ def charged(request):
             soft=[Soft(lambda x, u, th, d: x[1] - 0.6, weight=5.0 * unit)],
             lower=-1.0, upper=1.0, data={"unit": unit},
         )  # fmt: skip
-        return Nmpc(problem, solver=request.param)
+        return Nmpc(problem, solver=solver)
 
-    return controller
-
-
-@pytest.mark.parametrize("unit", [1e-9, 1e-6, 1e-3, 1e6])
-@pytest.mark.parametrize("state", [(0.0, 0.0), (0.9, 0.2)])
-def test_derivatives_do_not_depend_on_the_unit_of_the_cost(charged, unit, state):
-    (one, plan), (nmpc, found) = (
-        (each, each.solve(state, each.problem.theta)) for each in (charged(1.0), charged(unit))
-    )
-    size = np.abs(one.value_hessian(plan)).max()
-    for asked, share in ((one, 1.0), (nmpc, 1 / unit)):
-        at = plan if asked is one else found
-        many = [asked.value_hessian_times(at, k) for k in np.eye(4)]
-        for bends in (asked.value_hessian(at), many):
-            np.testing.assert_allclose(
-                share * np.array(bends), one.value_hessian(plan), atol=1e-3 * size
-            )
-    np.testing.assert_allclose(
-        nmpc.policy_jacobian(found), one.policy_jacobian(plan), rtol=1e-3, atol=1e-5
-    )
-    off = replace(found, point=1.01 * found.point)
-    assert nmpc.kkt_residual(found, relative=True) < 1e-6 < nmpc.kkt_residual(off, relative=True)
+    one, nmpc = charged(1.0), charged(unit)
+    for state in ([0.0, 0.0], [0.9, 0.2]):
+        plan, found = (each.solve(state, each.problem.theta) for each in (one, nmpc))
+        assert found.value == pytest.approx(unit * plan.value, rel=1e-6)
+        dense = one.value_hessian(plan)
+        for asked, at, share in ((one, plan, 1.0), (nmpc, found, 1 / unit)):
+            products = [asked.value_hessian_times(at, k) for k in np.eye(4)]
+            for bends in (asked.value_hessian(at), np.array(products)):
+                np.testing.assert_allclose(share * bends, dense, atol=1e-3 * np.abs(dense).max())
+        policy = one.policy_jacobian(plan)
+        np.testing.assert_allclose(nmpc.policy_jacobian(found), policy, rtol=1e-3, atol=1e-5)
+        off = replace(found, point=1.01 * found.point)
+        assert nmpc.kkt_residual(found, relative=True) < 1e-6
+        assert nmpc.kkt_residual(off, relative=True) > 1e-6
 
 
 def test_another_horizon_or_discount_takes_no_other_code():
     first, *others = (
-        problem_stages.write(tank(1e-6, horizon=horizon, gamma=gamma).solved)
+        stages.write(tank(1e-6, horizon=horizon, gamma=gamma).solved)
         for horizon, gamma in ((8, 0.95), (40, 0.95), (40, 0.5), (1, 1.0))
     )
     assert others == 3 * [first]
