@@ -37,11 +37,13 @@ class Diagnosis:
     def __init__(self, ocp: Ocp) -> None:
         self._ocp = ocp
         of, e = ocp.problem, ocp.problem.expressions
-        z = ca.vertcat(e.x, e.u)
-        given = [e.x, e.u, e.theta, e.d, e.line]
-        rows = ca.vertcat(e.fixed, e.each)
-        parts = {"model": e.next_x, "stage": e.stage, "rows": rows, "initial": e.initial}
-        sharp = {"model": e.next_x, "stage": e.stage, "terminal": e.terminal, "rows": rows}
+        z, data = ca.vertcat(e.x, e.u), ca.SX.sym("d", of.data_names.size)
+        given = [e.x, e.u, e.theta, data]
+        costs = [e.next_x, e.stage, e.terminal, e.initial]
+        model, stage, terminal, initial = ca.substitute(costs, [e.d], [data[: of.own_size]])
+        rows = of.rows(*given)
+        parts = {"model": model, "stage": stage, "rows": rows, "initial": initial}
+        sharp = {"model": model, "stage": stage, "terminal": terminal, "rows": rows}
         self._kinks = {name: kinks_in(written, z) for name, written in sharp.items()}
         self._still = np.clip(np.zeros(of.lower.size), of.lower, of.upper)
         self._orders: dict[str, dict[str, Callable[..., Any]]] = {order: {} for order in ORDERS}
@@ -55,8 +57,7 @@ class Diagnosis:
         """What is wrong on the way that no input leads to, in one sentence; "" if nothing is."""
         N = len(self._ocp.inputs)
         for i in range(N):
-            own = self._ocp.problem.own_size
-            given = state, self._still, theta, data[i][:own], self._line(data[i])
+            given = state, self._still, theta, data[i]
             said = self._not_finite(*given) or self._too_fast(i + 1, *given)
             if said:
                 return said.format(f"at x = {short(state)}, u = {short(self._still)}")
@@ -65,12 +66,6 @@ class Diagnosis:
             if kinks:
                 return f"{name} has a kink ({', '.join(kinks)}); {ROUND}"
         return ""
-
-    def _line(self, data: Vector) -> Vector:
-        """The first line of data, or zeros."""
-        of = self._ocp.problem
-        width = of.line_names.size
-        return data[of.own_size :][:width] if of.lines else np.zeros(width)
 
     def _not_finite(self, *given: Vector) -> str:
         for order, functions in self._orders.items():

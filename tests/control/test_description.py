@@ -15,7 +15,7 @@ import pytest
 from nmpcrl.control import Fatrop, Ipopt, Nmpc, Plant, Problem, Riccati, Series, Soft, Task
 from nmpcrl.control.codegen import jit
 from nmpcrl.control.content import NoContent
-from nmpcrl.control.solvers import problem_stages, stages
+from nmpcrl.control.solvers import stages
 from nmpcrl.study import paper
 
 ELSEWHERE = """
@@ -125,10 +125,13 @@ def test_another_process_finds_the_same_key_and_the_same_bits(k):
 
 
 def test_a_copy_is_written_down_in_the_same_lines_and_so_is_not_compiled_again():
-    problem, (plant, _) = cart(), pendulum()
-    for one in (problem, paper.nmpc().plant, plant):
-        write = problem_stages.write if one is problem else stages.write
-        assert write(pickle.loads(pickle.dumps(one))) == write(one)
+    for problem in (nmpc.problem for nmpc, *_ in controllers()):
+        assert stages.write(pickle.loads(pickle.dumps(problem))) == stages.write(problem)
+    text, *others = (
+        stages.write(nmpc.problem)
+        for nmpc in (paper.nmpc(), paper.nmpc("B"), paper.nmpc(horizon=25, gamma=0.9))
+    )
+    assert others == [text, text]  # layouts, targets, horizons and boxes are arguments
 
 
 @pytest.mark.parametrize("k", range(4))
@@ -148,17 +151,18 @@ def test_a_solution_that_was_pickled_is_a_warm_start(k):
 def test_what_nobody_holds_any_more_is_forgotten(k):
     """A search over plants, tasks and problems keeps none of them."""
     nmpc, state, theta = controllers()[k]
-    nmpc = Nmpc(cart()) if nmpc.problem else Nmpc(nmpc.plant, copy.copy(nmpc.task), 2)
-    known = [nmpc, nmpc.problem or nmpc.plant, nmpc.problem or nmpc.task]
+    task = copy.copy(nmpc.task)
+    nmpc = Nmpc(nmpc.plant, task, 2) if task else Nmpc(cart())
+    known = [nmpc, nmpc.problem, *([nmpc.plant, task] if task else [])]
     solution = nmpc.solve(state, theta)
     nmpc.value_hessian_times(solution, theta)
     nmpc.policy_jacobian(solution)
-    if not nmpc.problem:
-        nmpc.task.stage_cost(state, nmpc.clip(np.zeros(nmpc.m)))
+    if task:
+        task.stage_cost(state, nmpc.clip(np.zeros(nmpc.m)))
     left = [weakref.ref(one) for one in known]
-    del nmpc, known, solution
+    del nmpc, task, known, solution
     gc.collect()
-    assert [one() for one in left] == [None] * 3
+    assert [one() for one in left] == [None] * len(left)
 
 
 def test_what_was_not_to_be_changed_cannot_be_changed_in_a_copy():

@@ -1,10 +1,12 @@
 """The plant against the arc that it follows exactly."""
 
+import math
+
 import casadi as ca
 import numpy as np
 import pytest
 
-from nmpcrl.control import Plant, differential_drive
+from nmpcrl.control import Nmpc, Plant, SolverError, Task, differential_drive
 
 BOUND = np.ones(1)
 
@@ -93,6 +95,16 @@ def plant(**changed):
         ({"period": np.inf}, r"plant.period = inf must be a positive number"),
         ({"period": np.nan}, r"plant.period = nan must be a positive number"),
         ({"state_names": ("x",)}, "dynamics returns 2 numbers; it must return 1 state"),
+        ({"substeps": 0}, r"plant.substeps = 0 must be a whole number"),
+        *(
+            ({"dynamics": wrong}, message)
+            for wrong, message in (
+                (lambda s, a: ca.vertcat(math.sin(s[0]), a), r"dynamics\[0\] holds nan.*ca.sin"),
+                (lambda s, a: [s[0]], "dynamics returns 1 numbers; it must return 2 states"),
+                (lambda s, a: s if s[0] > 0 else -s, "dynamics .* Python `if`"),
+                (lambda s: s, r"dynamics is called as dynamics\(state, action\)"),
+            )
+        ),
     ],
 )
 def test_a_plant_refuses_nonsense_and_says_which(changed, message):
@@ -100,8 +112,13 @@ def test_a_plant_refuses_nonsense_and_says_which(changed, message):
         plant(**changed)
 
 
-def test_bounds_may_be_given_as_lists():
+def test_bounds_and_dynamics_may_be_lists():
     assert plant(lower=[-2], upper=[3]).upper.dtype == float
+    one, other = (
+        plant(dynamics=lambda s, a, kind=kind: kind([s[1], a])).step([1, 2], [0.5])
+        for kind in (list, lambda both: ca.vertcat(*both))
+    )
+    np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("name", ["lower", "upper"])
@@ -112,3 +129,36 @@ def test_a_plant_keeps_its_own_bounds(name):
     assert abs(getattr(made, name)[0]) == BOUND[0]
     with pytest.raises(ValueError, match="read-only"):
         getattr(made, name)[0] = 0.0
+
+
+@pytest.mark.parametrize("solver", ["riccati", "fatrop", "ipopt"])
+@pytest.mark.usefixtures("interpreted")
+def test_a_plant_faster_than_its_period_is_said_to_be(solver):
+    """Time constants of 1 ms sampled at 30 ms: each step multiplies a current by 30,000."""
+    motor = {"dynamics": lambda s, a: ca.vertcat((a - s[0]) / 1e-3, s[0] - s[1]), "period": 0.03}
+    task = Task([0, 0], [0, 1], [-np.inf] * 2, [np.inf] * 2, weights=[1.0, 1.0])
+    message = r"model makes 3e\+04 times as much of a small deviation in one step, .* substeps"
+    with pytest.raises(SolverError, match=message):
+        Nmpc(plant(**motor), task, solver=solver).solve(np.array([900.0, 0]), np.full(6, 1e-6))
+
+
+@pytest.mark.usefixtures("interpreted")
+@pytest.mark.parametrize("solver", ["riccati", "fatrop"])
+def test_a_plant_may_have_one_state_and_a_task_no_obstacle(solver):
+    tank = plant(dynamics=lambda s, a: a - 0.1 * s, state_names=("level",))
+    np.testing.assert_allclose(tank.step(np.array([1.0]), np.array([0.0])), [np.exp(-0.02)])
+    task = Task([0.0], [0.5], [-1.0], [1.0], weights=[1.0])
+    nmpc = Nmpc(tank, task, horizon=5, solver=solver)
+    solution = nmpc.solve(np.array([0.0]), np.array([1.0, 0.1, 1.0, 0.0]))
+    assert solution.states.shape == (6, 1)
+    assert 0.3 < solution.states[-1, 0] <= 0.6
+    assert nmpc.kkt_residual(solution) < 1e-5
+    assert task.stage_cost(np.array([0.0]), np.array([0.0])) == pytest.approx(0.25)
+
+
+def test_dynamics_faster_than_the_period_take_substeps():
+    """Eq. (18) at 30 time constants a step is no motor; forty substeps are."""
+    motor = {"dynamics": lambda s, a: (a - s) / 1e-3, "state_names": ("current",), "period": 0.03}
+    assert abs(plant(**motor).step(np.array([1.0]), np.array([0.0]))[0]) > 1e3
+    fine = plant(**motor, substeps=40)
+    assert abs(fine.step(np.array([1.0]), np.array([0.0]))[0]) < 1e-9

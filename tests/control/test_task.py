@@ -19,28 +19,14 @@ def task(**changed):
     return Task(**fields | changed)
 
 
-def test_overlap_is_one_at_the_centre_and_zero_where_robot_and_obstacle_touch():
-    centre, edge = np.array([0.5, 2.2, 0.3]), np.array([0.5, 2.2 + 1.25, -1.0])
-    assert task().overlap(centre)[0] == 1
-    assert task().overlap(edge)[0] == pytest.approx(0, abs=1e-15)
-
-
-def test_overlap_follows_equation_nineteen():
-    state = np.array([1.0, 1.0, 0.0])
-    by_hand = [
-        1 - 4 * (0.5**2 + 1.2**2) / 2.5**2,
-        1 - 4 * (2.0**2 + 0.5**2) / 2.5**2,
-    ]
-    np.testing.assert_allclose(task().overlap(state), by_hand, rtol=1e-13)
-
-
-def test_overlap_takes_many_states_at_once():
-    states = np.random.default_rng(0).uniform(-3, 9, (4, 5, 3))
-    one_by_one = [[task().overlap(s) for s in row] for row in states]
-    np.testing.assert_array_equal(task().overlap(states), one_by_one)
-
-
-def test_overlap_knows_the_diameters():
+def test_overlap_is_one_at_the_centre_zero_at_the_edge_and_equation_nineteen_between():
+    states = np.array([[0.5, 2.2, 0.3], [0.5, 2.2 + 1.25, -1.0], [1.0, 1.0, 0.0]])
+    by_hand = [1, 0, 1 - 4 * (0.5**2 + 1.2**2) / 2.5**2]
+    np.testing.assert_allclose(task().overlap(states)[:, 0], by_hand, rtol=1e-13, atol=1e-15)
+    assert task().overlap(states[2])[1] == pytest.approx(1 - 4 * (2.0**2 + 0.5**2) / 2.5**2)
+    many = np.random.default_rng(0).uniform(-3, 9, (4, 5, 3))
+    one_by_one = [[task().overlap(s) for s in row] for row in many]
+    np.testing.assert_array_equal(task().overlap(many), one_by_one)
     small = task(obstacles=(Obstacle(0.0, 0.0, diameter=0.5),), robot_diameter=0.3)
     assert small.overlap(np.array([0.4, 0.0, 0.0]))[0] == pytest.approx(0, abs=1e-15)
 
@@ -81,32 +67,25 @@ def test_the_penalty_vanishes_at_a_centre_distance_of_1452_millimetres(angle):
     assert 1.25 * np.sqrt(1.35) == pytest.approx(1.4524, abs=5e-5)
 
 
-def test_the_penalty_adds_up_over_obstacles():
-    twice = task(obstacles=(Obstacle(0.5, 2.2), Obstacle(0.5, 2.2)))
-    assert twice.collision_penalty(np.array([0.5, 2.2, 0.0])) == pytest.approx(2 * 50 * 1.35)
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_the_penalty_adds_up_over_obstacles(count):
+    some = task(obstacles=(Obstacle(0.5, 2.2),) * count)
+    at = np.array([0.5, 2.2, 0.0])
+    assert some.overlap(at).shape == (count,)
+    assert some.collision_penalty(at) == pytest.approx(count * 50 * 1.35)
 
 
-def test_without_obstacles_there_is_no_overlap_and_no_penalty():
-    empty = task(obstacles=())
-    assert empty.overlap(empty.start).shape == (0,)
-    assert empty.collision_penalty(empty.start) == 0
-
-
-def test_a_target_outside_the_box_is_refused_with_the_numbers():
-    with pytest.raises(
-        ValueError, match=r"target \[8.5\s+2.\s+1.57\] is outside the box \[-9, 3\]"
-    ):
-        task(lower=np.array([-9.0, -9.0, -np.inf]), upper=np.array([3.0, 3.0, np.inf]))
+PRINTED = {"lower": np.array([-9, -9, -np.inf]), "upper": np.array([3, 3, np.inf])}
 
 
 def test_a_target_outside_the_box_can_be_asked_for():
-    printed = {"lower": np.array([-9, -9, -np.inf]), "upper": np.array([3, 3, np.inf])}
-    assert task(**printed, target_may_lie_outside=True).target[0] == 8.5
+    assert task(**PRINTED, target_may_lie_outside=True).target[0] == 8.5
 
 
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
+        (PRINTED, r"target \[8.5\s+2.\s+1.57\] is outside the box \[-9, 3\]"),
         ({"start": np.array([-4.0, 1.5, 0.0])}, r"start .* is outside the box \[-3, 9\]"),
         ({"start": np.array([0.0, 1.5, np.inf])}, "task.start = .* must be finite"),
         ({"target": np.array([8.5, 2.0, -np.inf])}, "task.target = .* must be finite"),

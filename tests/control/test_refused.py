@@ -10,21 +10,20 @@ import numpy as np
 import pytest
 
 from nmpcrl.control import (
+    Hard,
     Ipopt,
     Nmpc,
     Parameter,
-    Plant,
     Problem,
     Riccati,
     Soft,
     SolverError,
-    Task,
     rk4,
 )
-from nmpcrl.control.solvers.riccati import random_inputs
-from nmpcrl.study import paper
+from nmpcrl.control.solvers.starts import random_inputs
 
 STRANGER = ca.SX.sym("stranger")
+WITH_DATA = {"model": lambda x, u, th, d: x + u, "stage": lambda x, u, th, d: u**2}
 
 
 def problem(**changes) -> Problem:
@@ -85,6 +84,19 @@ def problem(**changes) -> Problem:
         ({"soft": [Soft(lambda x, u, th: x, stages=7)]}, r"soft\[0\].stages = 7 must lie among"),
         ({"soft": [Soft(lambda x, u, th: x, weight=[1, 2, 3])]}, r"soft\[0\] has 2 rows and 3"),
         ({"soft": [Soft(lambda x, u, th: x, weight=0)]}, r"soft\[0\].weight = 0 must be positive"),
+        ({"hard": Soft(lambda x, u, th: x)}, r"hard\[0\] = Soft.* write hard=\[Hard\(row\)\]"),
+        ({"hard": [Hard(lambda x, u, th: th["alpha"])]}, r"hard\[0\] has a row that depends on"),
+        ({"hard": [Hard(lambda x, u, th: u, stages=[3])]}, r"hard\[0\] depends on u, and there"),
+        ({"state_lower": 1, "state_upper": 0}, r"state_lower = .* must lie below state_upper"),
+        (
+            {"state_upper": [1, 2, 3]},
+            r"state_upper = .* must hold 2 numbers, one an state",
+        ),
+        ({"soft": Soft(lambda x, u, th: x, each="discs")}, r"soft\[0\].each = 'discs' must be the"),
+        (
+            {"soft": Soft(lambda x, u, th, d: x, each="at"), "data": {"at": [1.0]}, **WITH_DATA},
+            "data 'at' must be a table",
+        ),
     ],
 )
 def test_a_problem_that_is_none(changes, message):
@@ -111,17 +123,6 @@ def test_random_starts_lie_between_the_bounds_wherever_these_are(lower, upper):
     inputs = random_inputs(problem(lower=lower, upper=upper), 0, 50)
     assert lower <= inputs.min() < inputs.max() <= upper
     assert np.ptp(inputs) <= 2
-
-
-def test_a_controller_that_is_none():
-    with pytest.raises(ValueError, match="a Problem has its own costs, horizon, gamma"):
-        Nmpc(problem(), horizon=4)
-    with pytest.raises(ValueError, match=r"a plant needs a task: write Nmpc\(plant, task\)"):
-        Nmpc(paper.nmpc().plant)
-    with pytest.raises(ValueError, match="data belong to a Problem"):
-        paper.nmpc().solve(np.array(paper.START), np.array(paper.THETA_INIT), data={"wind": 1})
-    with pytest.raises(ValueError, match="only the parameters of a `Problem` have names"):
-        _ = paper.nmpc().solve(np.array(paper.START), np.array(paper.THETA_INIT)).features_by_name
 
 
 @pytest.mark.usefixtures("interpreted")
@@ -177,7 +178,7 @@ def test_what_is_not_finite_where_a_plan_begins_is_named(solver, changes, state,
         ({"stage": lambda x, u, th: ca.sumsqr(x) + 0.3 * ca.fabs(u)}, "stage has a kink (fabs); "),
         ({"terminal": lambda x, th: ca.fmax(x[0], th["alpha"])}, "terminal has a kink (fmax); "),
         ({"model": lambda x, u, th: ca.sign(x) * ca.fmin(u, 1)}, "model has a kink (fmin, sign); "),
-        ({"soft": Soft(lambda x, u, th: ca.if_else(u > 1, u, 1))}, "soft has a kink (if_else); "),
+        ({"soft": Soft(lambda x, u, th: ca.if_else(u > 1, u, 1))}, "rows has a kink (if_else); "),
         ({"stage": lambda x, u, th: ca.sumsqr(u) * ca.fmax(th["alpha"], 1)}, ""),  # of theta alone
     ],
 )
@@ -263,19 +264,8 @@ def test_a_state_may_be_alone():
 def test_what_an_unstable_model_needs_is_a_shorter_horizon(growth, horizon, said):
     steps = problem(states=1, model=lambda x, u, th: growth * x + u, horizon=horizon,
                     stage=lambda x, u, th: x[0] ** 2 + u**2)  # fmt: skip
-    why = Nmpc(steps, solver="fatrop")._free.diagnosis.why(np.ones(1), steps.theta, None)
+    why = Nmpc(steps, solver="fatrop")._free.diagnosis.why(np.ones(1), steps.theta, steps.data)
     assert re.search(said, why)
-
-
-@pytest.mark.parametrize("solver", ["riccati", "fatrop", "ipopt"])
-@pytest.mark.usefixtures("interpreted")
-def test_a_plant_faster_than_its_period_is_said_to_be(solver):
-    """Time constants of 1 ms sampled at 30 ms: each step multiplies a current by 30,000."""
-    fast = plant(lambda s, a: ca.vertcat((a - s[0]) / 1e-3, s[0] - s[1]), period=0.03)
-    task = Task([0, 0], [0, 1], [-np.inf] * 2, [np.inf] * 2, weights=[1.0, 1.0])
-    message = r"dynamics makes 3e\+04 times as much of a small deviation in one step, .* substeps"
-    with pytest.raises(SolverError, match=message):
-        Nmpc(fast, task, solver=solver).solve(np.array([900.0, 0]), np.full(6, 1e-6))
 
 
 @pytest.mark.usefixtures("interpreted")
@@ -304,51 +294,3 @@ def test_substeps_make_a_fast_model_one_that_can_be_planned_with():
     np.testing.assert_allclose(solution.states, ipopt.states, atol=1e-4)
     assert 0 < solution.states[-1, 1] < 6
     assert np.abs(solution.states[:, 0]).max() < 24.1  # [A], 12 V through half an ohm
-
-
-def plant(dynamics, states=2, **options) -> Plant:
-    names = tuple("abc"[:states])
-    return Plant(dynamics, names, ("u",), lower=[-1], upper=[1], **options)
-
-
-@pytest.mark.parametrize(
-    ("dynamics", "message"),
-    [
-        (lambda s, a: ca.vertcat(math.sin(s[0]), a), r"dynamics\[0\] holds nan.*ca.sin"),
-        (lambda s, a: [s[0]], "dynamics returns 1 numbers; it must return 2 states"),
-        (lambda s, a: s if s[0] > 0 else -s, "dynamics .* Python `if`"),
-        (lambda s: s, r"dynamics is called as dynamics\(state, action\)"),
-    ],
-)
-def test_a_plant_that_is_none(dynamics, message):
-    with pytest.raises(ValueError, match=message):
-        plant(dynamics)
-
-
-def test_dynamics_may_be_a_list():
-    one, other = plant(lambda s, a: [s[1], a]), plant(lambda s, a: ca.vertcat(s[1], a))
-    np.testing.assert_array_equal(one.step([1, 2], [0.5]), other.step([1, 2], [0.5]))
-
-
-@pytest.mark.usefixtures("interpreted")
-@pytest.mark.parametrize("solver", ["riccati", "fatrop"])
-def test_a_plant_may_have_one_state_and_a_task_no_obstacle(solver):
-    tank = plant(lambda s, a: a - 0.1 * s, states=1)
-    np.testing.assert_allclose(tank.step(np.array([1.0]), np.array([0.0])), [np.exp(-0.02)])
-    task = Task([0.0], [0.5], [-1.0], [1.0], weights=[1.0])
-    nmpc = Nmpc(tank, task, horizon=5, solver=solver)
-    solution = nmpc.solve(np.array([0.0]), np.array([1.0, 0.1, 1.0, 0.0]))
-    assert solution.states.shape == (6, 1)
-    assert 0.3 < solution.states[-1, 0] <= 0.6
-    assert nmpc.kkt_residual(solution) < 1e-5
-    assert task.stage_cost(np.array([0.0]), np.array([0.0])) == pytest.approx(0.25)
-
-
-def test_dynamics_faster_than_the_period_take_substeps():
-    """Eq. (18) at 30 time constants a step is no motor; twenty substeps are."""
-    motor = plant(lambda s, a: (a - s) / 1e-3, states=1, period=0.03)
-    assert abs(motor.step(np.array([1.0]), np.array([0.0]))[0]) > 1e3
-    fine = plant(lambda s, a: (a - s) / 1e-3, states=1, period=0.03, substeps=40)
-    assert abs(fine.step(np.array([1.0]), np.array([0.0]))[0]) < 1e-9
-    with pytest.raises(ValueError, match=r"plant.substeps = 0 must be a whole number"):
-        plant(lambda s, a: s, substeps=0)
