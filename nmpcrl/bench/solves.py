@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from nmpcrl import Vector
-from nmpcrl.control import Nmpc, Problem, Riccati, Solution, SolverError
-from nmpcrl.control.solvers import baselines
+from nmpcrl.control import Nmpc, Problem, Riccati, Solution, SolverError, baselines
 from nmpcrl.control.solvers.riccati import machine_code
 from nmpcrl.study import paper
 
