@@ -22,14 +22,13 @@ class Variant:
     def __init__(self, ocp: Ocp, prepared: Callable[[Ocp], Prepared]) -> None:
         self.ocp = ocp
         self._units: Units | None = units_of(ocp)
-        self._solver = prepared(ocp if self._units is None else self._units.ocp)
-        self.solve = self._solver.solve if self._units is None else self._solve_in_units
+        self.solver = prepared(ocp if self._units is None else self._units.ocp)
+        self.solve = self.solver.solve if self._units is None else self._solve_in_units
 
     @property
     def machine(self) -> Compiled | None:
         """The compiled solver; None where another one solves, or this one in units of its own."""
-        solver = self._solver
-        return solver if self._units is None and isinstance(solver, Compiled) else None
+        return self.solver if self._units is None and isinstance(self.solver, Compiled) else None
 
     def _solve_in_units(
         self,
@@ -45,7 +44,7 @@ class Variant:
         begin = None if warm_start is None else units.inside(warm_start)
         scaled = [one / units.inputs for one in action]
         try:
-            found = self._solver.solve(state / units.states, theta, begin, *scaled, **others)
+            found = self.solver.solve(state / units.states, theta, begin, *scaled, **others)
         except SolverError as error:
             raise type(error)(error.status, state, theta) from None
         return units.outside(found, state)
@@ -65,7 +64,7 @@ class Variant:
 
     def hessian_times(self, solution: Solution, vector: Vector) -> Vector:
         """As `Nmpc.value_hessian_times`; by dense algebra where there is no machine code."""
-        product = self._solver.hessian_times(self._inside(solution), vector)
+        product = self.solver.hessian_times(self._inside(solution), vector)
         return self.hessian(solution) @ vector if product is None else product
 
     def inputs_jacobian(self, solution: Solution, stage: int) -> Matrix:
@@ -90,7 +89,7 @@ class Variant:
         inside = self._inside(solution)
         for k in range(chosen.shape[1]):
             chosen[stage] = size * (np.arange(chosen.shape[1]) == k)
-            gradient = self._solver.plan_gradient(inside, states, inputs)
+            gradient = self.solver.plan_gradient(inside, states, inputs)
             if gradient is None:
                 dense = self._dense(self._sensitivity.plan, solution)[part[stage]]
                 return np.asarray(size[:, None] * dense, float)

@@ -1,6 +1,7 @@
 """How the parameters of the NMPC move: a learner is a bootstrap and an update rule.
 
-`train` is Algorithm 1, and `evaluate` judges its result by a rollout without noise.
+`train` is Algorithm 1 step by step, `episodes` the same in compiled code, and `evaluate` judges the
+result by a rollout without noise.
 """
 
 from typing import TYPE_CHECKING, Any
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from nmpcrl.learning.baselines import frozen, random_direction, step_matched
 from nmpcrl.learning.batches import Batched, batch_semi_gradient, lstd_q
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, NextValue, SecondSolve, Transition
+from nmpcrl.learning.episode import Episode, episodes
 from nmpcrl.learning.gymnasium import as_gymnasium
 from nmpcrl.learning.learners import (
     Learner,
@@ -60,6 +62,7 @@ __all__ = [
     "Bootstrap",
     "Descent",
     "Diverged",
+    "Episode",
     "Exploration",
     "GaussNewton",
     "Imitation",
@@ -81,6 +84,7 @@ __all__ = [
     "count_steps",
     "curvature_correction",
     "deep_expected_sarsa",
+    "episodes",
     "evaluate",
     "expected_sarsa",
     "frozen",

@@ -1,6 +1,6 @@
 """Algorithm 1 for the learners that are built in, an episode at a time, as numba compiles it.
 
-`episodes` compiles this file beside `updates`, once for all plants: `find`, `slopes`, the plant and
+`episode` compiles this file beside `updates`, once for all plants: `find`, `slopes`, the plant and
 its cost are arguments. For WebAssembly the same text is compiled with the functions of one plant.
 """
 

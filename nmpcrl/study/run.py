@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from nmpcrl.learning import Weights
-from nmpcrl.learning.episodes import Episode, episodes
+from nmpcrl.learning.episode import Episode, episodes
 from nmpcrl.learning.rollout import evaluate
 from nmpcrl.learning.training import Diverged, absurd
 from nmpcrl.study.experiment import Experiment

@@ -1,16 +1,17 @@
 """The arguments of `train` for an experiment or a trial: controller, learner, weights, noise."""
 
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from nmpcrl.control import Nmpc, SolverError
+from nmpcrl.control import Nmpc
 from nmpcrl.control.solvers import SOLVERS
 from nmpcrl.learning import Learner, Weights
-from nmpcrl.learning.training import Exploration
+from nmpcrl.learning.episode import Loop
+from nmpcrl.learning.training import Exploration, trainer_of
 from nmpcrl.study import paper
 from nmpcrl.study.experiment import Experiment
 from nmpcrl.study.learners import DECAYS, LEARNERS, Generators
@@ -76,22 +77,15 @@ def compile_ahead(named: Iterable[Experiment | Trial]) -> None:
     """Compile the functions of some runs, so that their processes find them compiled."""
     named = tuple(named)
     for trial in {one.nmpc.key: one for one in named if isinstance(one, Trial)}.values():
-        theta = np.array(trial.theta)
-        with suppress(SolverError):
-            plan = trial.nmpc.solve(np.zeros(trial.nmpc.n), theta)
-            trial.nmpc.solve(plan.state, theta, plan, plan.action)
+        trial.nmpc.machine(fix_action=False)
     kinds = {
         (e.layout, e.start, e.target, e.box, e.solver, LEARNERS[e.learner].curved): e
         for e in named
         if isinstance(e, Experiment)
     }
-    for experiment in kinds.values():
-        nmpc, theta = controller_of(experiment), np.array(paper.THETA_INIT)
-        solution = nmpc.solve(nmpc.task.start, theta)
-        nmpc.plant.step(solution.state, solution.action)
-        nmpc.task.stage_cost(solution.state, solution.action)
-        if LEARNERS[experiment.learner].curved:
-            nmpc.value_hessian_times(solution, theta)
+    for (*_, curved), experiment in kinds.items():
+        job = job_of(replace(experiment, learner="TDC" if curved else "ES"))
+        Loop.of(trainer_of(job.learner, job.controller, job.weights, job.explore))
 
 
 def prepare(experiment: Experiment, controller: Nmpc) -> tuple[Learner, Weights, Exploration]:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from nmpcrl.control import Nmpc, Obstacle, Plant, SolverError, Task, differential_drive
 from nmpcrl.control import nmpc as module
-from nmpcrl.control.solvers import SOLVERS
+from nmpcrl.control.solvers import SOLVERS, riccati
 from nmpcrl.study import paper
 
 THETA = np.array(paper.THETA_INIT)
@@ -242,3 +242,13 @@ def test_a_smaller_tolerance_buys_exactness_with_iterations(solver, draw):
     default = paper.nmpc(solver=solver)
     for one, (state, theta) in zip(solved[2], draw(20, seed=34), strict=True):
         np.testing.assert_array_equal(one.point, default.solve(state, theta).point)
+
+
+def test_solver_and_derivatives_are_compiled_ahead(monkeypatch):
+    asked = []
+    monkeypatch.setattr(riccati, "slopes_code", lambda _: asked.append("derivatives"))
+    solver = riccati.Riccati(code=lambda _: asked.append("solver"))
+    paper.nmpc(solver=solver).compile()
+    assert asked == ["solver", "derivatives"]
+    paper.nmpc(solver="fatrop").compile()  # which has nothing to compile
+    assert len(asked) == 2

@@ -143,7 +143,7 @@ def test_the_error_of_a_solve_says_who_failed_and_who_may_not(solver, monkeypatc
 def test_fatrop_takes_over_where_riccati_finds_no_optimum(monkeypatch):
     problem = scalar(5)
     nmpc = Nmpc(problem)
-    code, best = nmpc._free._solver, nmpc.solve([1.0], problem.theta)
+    code, best = nmpc._free.solver, nmpc.solve([1.0], problem.theta)
     monkeypatch.setattr(code, "_code", lambda *_: (0.0, 1.0, float(End.STALLED), 0.0, 1.0))
     found = nmpc.solve([1.0], problem.theta, best)
     assert (found.status, found.solver) == (Status.TAKEN_OVER, "fatrop")

@@ -10,7 +10,7 @@ import pytest
 
 from nmpcrl.control import Nmpc, SolverError
 from nmpcrl.control.codegen import jit
-from nmpcrl.learning.episodes import Loop
+from nmpcrl.learning.episode import Loop
 from nmpcrl.study import Experiment, ParameterError, paper, run
 from nmpcrl.study.design import FIELDS
 from nmpcrl.study.learners import LEARNERS

@@ -256,8 +256,13 @@ class Compiled:
         data = self.arguments.data if solution.data is None else solution.data
         given = (solution.state, solution.theta, action, self._fixed, solution.point)
         out = np.empty(solution.theta.size)
-        formed = slopes_code(self._problem)(data, *self.arguments[1:], *given, *directions, out)
+        formed = self.slopes(data, *self.arguments[1:], *given, *directions, out)
         return out if formed else None
+
+    @cached_property
+    def slopes(self) -> Any:
+        """`slopes.slopes`, compiled."""
+        return slopes_code(self._problem)
 
     @property
     def place(self) -> int:

@@ -155,7 +155,7 @@ class Loop:
         if moves.beta is not None:
             rule = code.EXACT if moves.curvature else code.GRADIENT_TD
         if moves.curvature:
-            slopes = riccati.slopes_code(nmpc.problem)
+            slopes = machine.slopes
         self._machine, self._nmpc, self._episode = machine, nmpc, code.episode
         self._given = (
             machine.code, slopes, *functions, *given[:5], kind, *given[5:],

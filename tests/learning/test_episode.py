@@ -22,7 +22,7 @@ from nmpcrl.learning import (
     q_learning,
     train,
 )
-from nmpcrl.learning.episodes import NUMBERS, Loop, episodes
+from nmpcrl.learning.episode import NUMBERS, Loop, episodes
 from nmpcrl.learning.loop import FIND, SLOPES
 from nmpcrl.learning.loop import NUMBERS as OF_LOOP
 from nmpcrl.learning.training import trainer_of
@@ -187,7 +187,7 @@ def raising(self, state, theta, *_, **__):
     raise SolverError("failed", state, theta)
 
 
-def test_without_a_derivative_of_the_plan_dense_algebra_answers_in_both(nmpc, monkeypatch):
+def test_without_a_derivative_of_the_plan_dense_algebra_answers_in_both(monkeypatch):
     @njit(SLOPES)
     def slopes(
         data, lower, upper, sides, kind, discount, weights, tie,
@@ -196,7 +196,7 @@ def test_without_a_derivative_of_the_plan_dense_algebra_answers_in_both(nmpc, mo
         return False
 
     monkeypatch.setattr(riccati, "slopes_code", lambda _: slopes)
-    assert_same(MAKE["TDC"], nmpc, noise(steps=5))
+    assert_same(MAKE["TDC"], paper.nmpc(), noise(steps=5))
 
 
 def test_a_plant_that_runs_away_ends_the_episode_in_both(nmpc):
