@@ -28,14 +28,6 @@ for words in {words}:
     assert not set({slow}) & set(sys.modules), words
 """
 WORDS = ("--help", "train --help", "runs --json")
-NETWORK = """
-import torch
-torch.set_num_threads(2)
-import nmpcrl.learning
-network = nmpcrl.learning.QNetwork
-assert torch.get_num_threads() == 2
-assert "QNetwork" in nmpcrl.learning.__all__
-"""
 
 
 @pytest.mark.slow
@@ -44,7 +36,6 @@ assert "QNetwork" in nmpcrl.learning.__all__
     [
         (f"import {', '.join(LIGHT)}", []),
         ("import nmpcrl.claims.evidence", ["pandas", "scipy.stats"]),
-        (NETWORK, ["torch"]),
         (TRAIN.format(learner="ES"), ["numba"]),
         (TRAIN.format(learner="RDES"), ["torch", "numba"]),
     ],

@@ -134,6 +134,14 @@ class Module:
         room[...] = array
         return address, room
 
+    def put_bytes(self, array: NDArray[Any]) -> tuple[int, NDArray[Any]]:
+        """Reserve room for an array of any type; its address, and the room itself."""
+        address = self("reserve", array.nbytes)
+        room = self._numbers.view(np.uint8)[address : address + array.nbytes]
+        there = room.view(array.dtype).reshape(array.shape)
+        there[...] = array
+        return address, there
+
     @staticmethod
     def _given(store: wasmtime.Store, name: str, kind: wasmtime.FuncType) -> wasmtime.Func:
         function, code = c.wasmtime_func_t(), machine_code(name)

@@ -6,6 +6,7 @@ import numpy as np
 
 from nmpcrl import Vector
 from nmpcrl.analysis import metrics
+from nmpcrl.learning.network import QNetwork
 from nmpcrl.study import paper
 from nmpcrl.study.records import Records
 
@@ -37,8 +38,6 @@ def imitate(records: Records, *, fits: int = FITS) -> Imitation:
 
     Every `HELD_OUT`-th episode is held out. Both networks have the same seed.
     """
-    from nmpcrl.learning.network import QNetwork  # and with it torch
-
     steps = records.steps
     solved = np.isfinite(steps["value"])
     state_action = np.hstack([steps["state"], steps["action"]])[solved]

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,10 +11,8 @@ import pandas as pd
 from nmpcrl import Vector
 from nmpcrl.control import Nmpc, Problem, Riccati, Solution, SolverError, baselines
 from nmpcrl.control.solvers.riccati import machine_code
+from nmpcrl.learning import QNetwork
 from nmpcrl.study import paper
-
-if TYPE_CHECKING:
-    from nmpcrl.learning import QNetwork
 
 Columns = dict[str, list[Any]]  # lists of one length, by name
 Solve = Callable[..., Any]  # (state, theta, warm_start) -> what has value and iterations
@@ -166,10 +164,8 @@ def watched() -> tuple[Nmpc, list[float]]:
     return nmpc, seconds
 
 
-def _network() -> "QNetwork":
+def _network() -> QNetwork:
     """RDES's network with an episode in its buffer."""
-    from nmpcrl.learning import QNetwork  # and torch, which who reads times does not need
-
     rng = np.random.default_rng(0)
     network = QNetwork(WIDTH, rng, learning_rate=paper.ZETA, batch=paper.BATCH)
     for row in rng.normal(size=(paper.STEPS, WIDTH)):

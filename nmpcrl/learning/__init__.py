@@ -4,8 +4,6 @@
 result by a rollout without noise.
 """
 
-from typing import TYPE_CHECKING, Any
-
 from nmpcrl.learning.baselines import frozen, random_direction, step_matched
 from nmpcrl.learning.batches import Batched, batch_semi_gradient, lstd_q
 from nmpcrl.learning.bootstrap import Bootstrap, Imitation, NextValue, SecondSolve, Transition
@@ -23,6 +21,7 @@ from nmpcrl.learning.learners import (
     q_learning,
     regularized_deep_expected_sarsa,
 )
+from nmpcrl.learning.network import QNetwork
 from nmpcrl.learning.optimisers import Adam, Descent, GaussNewton, Optimiser
 from nmpcrl.learning.policy_gradient import policy_gradient
 from nmpcrl.learning.rollout import Rollout, evaluate
@@ -42,19 +41,6 @@ from nmpcrl.learning.updates import (
     semi_gradient_step,
     td_error,
 )
-
-if TYPE_CHECKING:
-    from nmpcrl.learning.network import QNetwork
-else:
-
-    def __getattr__(name: str) -> Any:
-        """`QNetwork` on demand: most learners need no torch, whose import takes long."""
-        if name != "QNetwork":
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        from nmpcrl.learning.network import QNetwork
-
-        return QNetwork
-
 
 __all__ = [
     "Adam",

@@ -1,126 +1,124 @@
-"""The network that imitates the NMPC's value. The only home of torch."""
+"""The network that imitates the NMPC's value: its arrays, and torch's definition of the same."""
 
-import sys
 import threading
-from collections.abc import Callable, Iterable
 from copy import deepcopy
-from itertools import pairwise
-from typing import Any
+from functools import cache
+from importlib.resources import files
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
-from torch import Tensor
+from numpy.typing import NDArray
 
-from nmpcrl import Vector
+from nmpcrl import Matrix, Vector
+from nmpcrl.control.codegen.jit import load
 
-KEPT = 256  # rows: room for more predictions at once is made anew
+if TYPE_CHECKING:
+    import torch
+
+TEXT = files(__package__).joinpath("dense.py").read_text("utf-8")
+NOTICE = "Compiling the network (once on this machine, a few seconds) ..."
+ACTIVATIONS = ("relu", "tanh")
+UNLIMITED = 2**62
 DRAWING = threading.Lock()  # torch draws first weights from one generator a process
 
 
-def _tanh_slope(y: Tensor, out: Tensor) -> Tensor:
-    return torch.mul(y, y, out=out).neg_().add_(1)
+def in_torch(inputs: int, hidden: int = 64, activation: str = "relu") -> "torch.nn.Sequential":
+    """The network in torch, with new weights."""
+    from torch import float32, nn
+
+    between = {"relu": nn.ReLU, "tanh": nn.Tanh}[activation]
+    first = nn.Linear(inputs, hidden, dtype=float32)
+    second = nn.Linear(hidden, hidden, dtype=float32)
+    third = nn.Linear(hidden, 1, dtype=float32)
+    return nn.Sequential(first, between(), second, between(), third, nn.Flatten(0))
 
 
-# In place, and its slope from what it made, put into `out`; that of a ReLU is its output's sign.
-Activation = tuple[Callable[[Tensor], Tensor], Callable[..., Tensor]]
-ACTIVATIONS: dict[str, Activation] = {
-    "relu": (Tensor.relu_, torch.sign),
-    "tanh": (Tensor.tanh_, _tanh_slope),
-}
+def fit_in_torch(
+    model: "torch.nn.Sequential",
+    adam: "torch.optim.Adam",
+    inputs: "torch.Tensor",
+    targets: "torch.Tensor",
+) -> float:
+    """One step of Adam on the loss of a mini-batch, Eq. (10); the loss before the step."""
+    loss = ((model(inputs) - targets) ** 2).mean()
+    adam.zero_grad()
+    loss.backward()
+    adam.step()
+    return float(loss.detach())
 
 
-class OneThread:
-    """Within it torch computes with one thread; after it, with as many as the program had chosen.
+def weights_of(model: "torch.nn.Sequential") -> NDArray[np.float32]:
+    """All weights of the network in torch, in the order of `dense`."""
+    arrays = [each.numpy() for each in model.state_dict().values()]
+    pairs = zip(arrays[::2], arrays[1::2], strict=True)
+    return np.concatenate([np.vstack([weight.T, bias]).ravel() for weight, bias in pairs])
 
-    More threads make matrices this small slower, and may change last bits.
+
+def _first_weights(inputs: int, hidden: int, seed: int) -> NDArray[np.float32]:
+    """The weights that torch draws after `torch.manual_seed(seed)`."""
+    import torch
+
+    with DRAWING, torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return weights_of(in_torch(inputs, hidden))
+
+
+@cache
+def machine_code() -> ModuleType:
+    """The functions of `dense`, compiled.
+
+    Raises:
+        CannotCompile: numba is not installed.
     """
-
-    def __enter__(self) -> None:
-        self._before = torch.get_num_threads()
-        torch.set_num_threads(1)
-
-    def __exit__(self, *_: object) -> None:
-        torch.set_num_threads(self._before)
+    init = "from .dense import fit, follow, predict, remember\n"
+    return load("network", {"__init__": init, "dense": TEXT}, NOTICE)
 
 
 class Predictor:
-    """What some weights predict: inputs - 64 - 64 - 1."""
+    """Weights that predict a value."""
 
-    _views: tuple[str, ...] = ("_matrices", "_rooms")  # of the weights, and made anew in a copy
+    net: tuple[Any, ...]  # the arrays of `dense`
 
-    def __init__(
-        self,
-        weights: Tensor,
-        gradient: Tensor,
-        widths: tuple[int, ...],
-        activation: Activation,
-        scales: tuple[Vector | float, float],
-    ) -> None:
-        """Look at the weights, which may change.
+    @property
+    def weights(self) -> NDArray[np.float32]:
+        """The weights of all layers in one vector, which may be written to."""
+        weights: NDArray[np.float32] = self.net[0][0]
+        return weights
 
-        Args:
-            weights: of all layers, in one vector.
-            gradient: as long; for who fits them.
-            widths: of the inputs and of each layer.
-            activation: of the hidden layers.
-            scales: what inputs and target are divided by.
-        """
-        self._weights, self._gradient, self._widths = weights, gradient, widths
-        self._activation = activation
-        self._input_scale, self._target_scale = scales
-        self.fitted = False  # whether the weights know of a fit
-        self._view()
-
-    def _view(self) -> None:
-        """Make what looks at the weights."""
-        self._matrices = [_matrices(one, self._widths) for one in (self._weights, self._gradient)]
-        self._rooms = dict[int, _Room]()  # by the number of rows; of few, which are asked for often
-
-    def __getstate__(self) -> dict[str, Any]:
-        """All but the views, which would look at the original."""
-        return {name: value for name, value in vars(self).items() if name not in self._views}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        self._view()
+    @property
+    def fitted(self) -> bool:
+        """Whether the weights have seen a fit."""
+        return bool(self.net[3][1])
 
     def predict(self, inputs: Vector) -> Vector:
         """The value of one input (k,) or of many (..., k); the result drops the last axis."""
-        *shape, k = inputs.shape
-        rows = inputs.reshape(-1, k)
-        room = self._room(len(rows))
-        np.divide(rows, self._input_scale, out=room.inputs, casting="same_kind")
-        with OneThread():
-            room.forward()
-        return room.values.astype(float).reshape(shape) * self._target_scale
+        rows = self._rows(inputs)
+        values = np.empty(len(rows))
+        machine_code().predict(self.net, rows, values)
+        return values.reshape(inputs.shape[:-1])
 
-    def _room(self, rows: int) -> "_Room":
-        """Room for so many rows, which is kept if they are few: to make it takes longer."""
-        if rows in self._rooms:
-            return self._rooms[rows]
-        room = self._room_of(_ones(rows, self._widths[0] + 1))
-        if rows <= KEPT:
-            self._rooms[rows] = room
-        return room
+    def _rows(self, inputs: Vector) -> Matrix:
+        """Inputs as a matrix with one row each.
 
-    def _room_of(self, x: Tensor) -> "_Room":
-        """The three layers, with room for the rows of `x`."""
-        return _Room(x, zip(*self._matrices, strict=True), self._activation)
+        Raises:
+            ValueError: they have another length than the network's.
+        """
+        length = len(self.net[5]) - 1
+        if inputs.shape[-1] != length:
+            raise ValueError(f"inputs of length {inputs.shape[-1]} must have length {length}")
+        return np.ascontiguousarray(inputs, float).reshape(-1, length)
 
 
 class QNetwork(Predictor):
     """Inputs - 64 - 64 - 1 with ReLU, trained by Adam on a growing replay buffer: Eq. (10).
 
-    Learns in place; a copy, or what is read from a pickle, goes on as the original would.
+    `in_torch` and `fit_in_torch` define it; `dense` computes the same in a third of the time. It
+    learns in place; a copy, or a pickle that is read, continues with the bits of the original.
     Activation, initialisation (torch's own), no normalisation, an unlimited buffer and one
     mini-batch a step are this package's reading: the paper names none, and the options read it
     otherwise.  # departure H
-
-    Backpropagation is written out, in place and without autograd: on matrices this small, modules
-    and `torch.optim` take longer than the arithmetic.
     """
-
-    _views = (*Predictor._views, "_count", "_batch", "_targets", "_error")
 
     def __init__(
         self,
@@ -139,37 +137,33 @@ class QNetwork(Predictor):
 
         Args:
             inputs: length of an input vector; 5 for (s, a), 14 for (s, a, theta) of the robot.
-            rng: draws the weights and the mini-batches; torch's global generator is left alone.
+            rng: draws two seeds, of the weights and of the mini-batches.
             learning_rate: zeta, of Adam.
             batch: n, the size of a mini-batch; no fit before the buffer holds as many.
             hidden: neurons in each of the two hidden layers.
-            capacity: room in the buffer at the start; it doubles when full.
+            capacity: examples for which there is room at the start; it doubles when full.
             activation: of the hidden layers, "relu" or "tanh".
             memory: how many of the latest examples are kept; all by default.
-            scales: what inputs (one number, or one each) and target are divided by inside.
+            scales: divisors of the inputs (one number, or one each) and of the target.
         """
         if activation not in ACTIVATIONS:
             raise ValueError(f"activation = {activation!r} must be one of {', '.join(ACTIVATIONS)}")
         if memory is not None and memory < batch:
             raise ValueError(f"memory = {memory} must hold at least a batch of {batch}")
-        self._memory = memory or sys.maxsize
-        self._rng = rng
-        self._learning_rate = learning_rate
-        self._buffer = np.ones((capacity, inputs + 2), np.float32)  # rows of input, 1, target
-        self._seen = 0  # examples so far
-        self._drawn = np.ones((batch, inputs + 2), np.float32)  # the rows of a fit
-        widths = (inputs, hidden, hidden, 1)
-        weights = _first_weights(widths, seed=int(rng.integers(2**63)))
-        gradient, self._mean, self._square = torch.zeros(3, len(weights), dtype=torch.float32)
-        self._fits = torch.zeros((), dtype=torch.float32)
-        super().__init__(weights, gradient, widths, ACTIVATIONS[activation], scales)
-
-    def _view(self) -> None:
-        super()._view()
-        self._count = self._fits.numpy()  # that very number
-        self._batch = self._room_of(torch.from_numpy(self._drawn[:, :-1]))  # looks at those rows
-        self._targets = self._drawn[:, -1:]
-        self._error = np.empty_like(self._targets)
+        seed, draw = (int(rng.integers(2**63)) for _ in range(2))
+        first = _first_weights(inputs, hidden, seed)
+        weights = np.zeros((4, len(first)), np.float32)
+        weights[0] = first
+        self.net = (
+            weights,
+            np.zeros((capacity, inputs + 1), np.float32),
+            np.zeros(capacity, np.int32),
+            np.zeros(2, np.int64),
+            np.array([draw], np.uint64),
+            np.append(np.broadcast_to(scales[0], inputs), scales[1]).astype(float),
+            float(learning_rate),
+            np.array([hidden, batch, memory or UNLIMITED, activation == "tanh"], np.int64),
+        )
 
     def __copy__(self) -> "QNetwork":
         """A deep one: two networks cannot learn in the same weights."""
@@ -177,56 +171,41 @@ class QNetwork(Predictor):
 
     def __len__(self) -> int:
         """How many examples are remembered."""
-        return min(self._seen, self._memory)
+        return int(min(self.net[3][0], self.net[7][2]))
 
     @property
     def ready(self) -> bool:
         """Whether the buffer holds a mini-batch, line 12 of Algorithm 1."""
-        return self._seen >= len(self._drawn)
+        return len(self) >= int(self.net[7][1])
+
+    def reserve(self, count: int) -> None:
+        """Make room in `net` for so many further examples."""
+        weights, examples, order, counts, *rest = self.net
+        needed = min(counts[0] + count, rest[-1][2])
+        while len(order) < needed:
+            examples, order = (np.concatenate([each, each]) for each in (examples, order))
+        self.net = (weights, examples, order, counts, *rest)
 
     def remember(self, inputs: Vector, target: float) -> None:
-        """Store one example; `inputs` has the length given at the start."""
-        at = self._seen % self._memory
-        if at == len(self._buffer):
-            self._buffer = np.concatenate([self._buffer, np.ones_like(self._buffer)])
-        row = self._buffer[at]
-        row[:-2], row[-1] = inputs / self._input_scale, target / self._target_scale
-        self._seen += 1
+        """Store one example.
+
+        Raises:
+            ValueError: the inputs have another length than the network's.
+        """
+        (row,) = self._rows(inputs)
+        self.reserve(1)
+        machine_code().remember(self.net, row, target)
 
     def fit(self) -> float:
-        """One Adam step on a mini-batch drawn without replacement; its loss before the step."""
-        batch = len(self._drawn)
-        if not self.ready:
-            raise ValueError(f"{len(self)} examples are too few for a batch of {batch}")
-        rows = self._rng.choice(len(self), batch, replace=False)
-        self._buffer.take(rows, axis=0, out=self._drawn, mode="clip")
-        with OneThread():
-            self._batch.forward()
-            error = np.subtract(self._batch.values, self._targets, out=self._error)
-            np.multiply(2 / batch, error, out=self._batch.slopes)
-            self._batch.backward()
-            self._descend()
-        self.fitted = True
-        return float(np.vdot(error, error)) / batch * self._target_scale**2
+        """One Adam step on a mini-batch drawn without replacement; its loss before the step.
 
-    def _descend(self) -> None:
-        """Adam: the kernel under torch.optim.Adam(fused=True), whose way there takes 100 us."""
-        self._count += 1
-        torch._fused_adam_(
-            [self._weights],
-            [self._gradient],
-            [self._mean],
-            [self._square],
-            [],
-            [self._fits],
-            lr=self._learning_rate,
-            beta1=0.9,
-            beta2=0.999,
-            eps=1e-8,
-            weight_decay=0.0,
-            amsgrad=False,
-            maximize=False,
-        )
+        Raises:
+            ValueError: there are too few examples for a mini-batch.
+        """
+        if not self.ready:
+            batch = self.net[7][1]
+            raise ValueError(f"{len(self)} examples are too few for a batch of {batch}")
+        return float(machine_code().fit(self.net))
 
 
 class Target(Predictor):
@@ -240,108 +219,15 @@ class Target(Predictor):
         """Copy the weights.
 
         Args:
-            network: which is followed.
+            network: the network to follow.
             every: how many calls of `follow` move the copy once.
             rate: the part of the way; 1 for all of it.
         """
-        weights, scales = network._weights.clone(), (network._input_scale, network._target_scale)
-        gradient = torch.zeros_like(weights)
-        super().__init__(weights, gradient, network._widths, network._activation, scales)
-        self._network, self._every, self._rate, self._steps = network, every, rate, 0
+        weights, examples, order, counts, *rest = network.net
+        empty = (examples[:0].copy(), order[:0].copy(), np.zeros_like(counts))
+        self.net = (weights[:1].copy(), *empty, *rest)
+        self._network, self._every, self._rate = network, every, rate
 
     def follow(self) -> None:
         """Count a step in which the network was fitted, and move where it is time."""
-        self._steps += 1
-        if self._steps % self._every == 0:
-            self._weights.lerp_(self._network._weights, self._rate)
-            self.fitted = self._network.fitted
-
-
-class _Layer:
-    """out = x W for many rows x at once; each ends in a one, so that W ends in the bias."""
-
-    def __init__(self, x: Tensor, W: Tensor, dW: Tensor) -> None:
-        """Make room and every view: a view made at each use would take as long as its use.
-
-        Args:
-            x: rows, shape (rows, in + 1); the `y` of the layer before.
-            W: weights, shape (in + 1, out).
-            dW: where `differentiate` leaves the loss's derivative in W.
-        """
-        self.x, self.W, self.dW = x, W, dW
-        self.y = _ones(len(x), W.shape[1] + 1)
-        self.out = self.y[:, :-1]
-        self.d, self._slope = torch.empty(2, *self.out.shape, dtype=torch.float32)
-        self._x_transposed, self._W_transposed = x.T, W[:-1].T
-
-    def forward(self) -> Tensor:
-        """Compute `out` from `x`."""
-        return torch.mm(self.x, self.W, out=self.out)
-
-    def backward(self, before: "_Layer", slope: Callable[..., Tensor]) -> None:
-        """Compute the `d` of the layer before, where `d` is the loss's derivative in `out`."""
-        torch.mm(self.d, self._W_transposed, out=before.d)
-        before.d.mul_(slope(before.out, out=before._slope))
-
-    def differentiate(self) -> None:
-        """Compute `dW` from `d`."""
-        torch.mm(self._x_transposed, self.d, out=self.dW)
-
-
-class _Room:
-    """The layers for some rows, and what NumPy sees of them."""
-
-    def __init__(
-        self, x: Tensor, matrices: Iterable[tuple[Tensor, Tensor]], activation: Activation
-    ) -> None:
-        """Make room.
-
-        Args:
-            x: the rows.
-            matrices: W and dW of each layer.
-            activation: of all layers but the last.
-        """
-        self._activate, self._slope = activation
-        self._layers: list[_Layer] = []
-        for W, dW in matrices:
-            self._layers.append(_Layer(x, W, dW))
-            x = self._layers[-1].y
-        self._pairs = [*pairwise(self._layers)]
-        first, last = self._layers[0], self._layers[-1]
-        self.inputs, self.values = first.x.numpy()[:, :-1], last.out.numpy()
-        self.slopes = last.d.numpy()  # the loss's derivative in the values
-
-    def forward(self) -> None:
-        """Compute `values` from `inputs`."""
-        *hidden, last = self._layers
-        for layer in hidden:
-            self._activate(layer.forward())
-        last.forward()
-
-    def backward(self) -> None:
-        """Compute every layer's `dW` from `slopes`."""
-        for before, layer in reversed(self._pairs):
-            layer.backward(before, self._slope)
-        for layer in self._layers:
-            layer.differentiate()
-
-
-def _ones(*shape: int) -> Tensor:
-    """In single precision, whatever a program has made torch's default."""
-    return torch.ones(shape, dtype=torch.float32)
-
-
-def _first_weights(widths: tuple[int, ...], seed: int) -> Tensor:
-    """What torch draws for linear layers of these widths, in one vector."""
-    with DRAWING, torch.random.fork_rng(devices=[]):
-        torch.manual_seed(seed)
-        layers = [torch.nn.Linear(*pair, dtype=torch.float32) for pair in pairwise(widths)]
-    matrices = [torch.cat([layer.weight.T, layer.bias[None]]) for layer in layers]
-    return torch.cat([matrix.flatten() for matrix in matrices]).detach()
-
-
-def _matrices(vector: Tensor, widths: tuple[int, ...]) -> list[Tensor]:
-    """The parts of a vector of all weights, as one matrix (in + 1, out) a layer."""
-    shapes = [(k + 1, out) for k, out in pairwise(widths)]
-    parts = vector.split([rows * columns for rows, columns in shapes])
-    return [part.view(shape) for part, shape in zip(parts, shapes, strict=True)]
+        machine_code().follow(self.net, self._network.net, self._every, self._rate)

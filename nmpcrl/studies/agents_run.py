@@ -106,14 +106,12 @@ def trained(
         seed: of all draws.
         settings: values for all of `_DEFAULTS`.
     """
-    from nmpcrl.learning.network import OneThread
-
     scaled, state = _Scaled(env, layouts, settings), list[Any]()
     with _drawing_from(state):
         model = _model(name, scaled, settings, checkpoints[-1], seed)
 
     def policy(observation: Vector) -> Vector:
-        with OneThread():
+        with _one_thread():
             action, _ = model.predict(seen(observation), deterministic=True)
         return scaled.applied(action)
 
@@ -210,14 +208,25 @@ def _model(name: str, env: Any, values: Mapping[str, float], episodes: int, seed
 
 
 @contextmanager
+def _one_thread() -> Iterator[None]:
+    """Compute with one thread of torch: more may change last bits."""
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+@contextmanager
 def _drawing_from(state: list[Any]) -> Iterator[None]:
     """Draw from NumPy's and torch's global generators in `state`, update it, and set both back."""
     import torch
 
-    from nmpcrl.learning.network import OneThread
-
     before = np.random.get_state()  # noqa: NPY002 as stable-baselines3 draws
-    with torch.random.fork_rng(devices=[]), OneThread():
+    with torch.random.fork_rng(devices=[]), _one_thread():
         if state:
             np.random.set_state(state[0])  # noqa: NPY002
             torch.set_rng_state(state[1])

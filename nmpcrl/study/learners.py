@@ -21,6 +21,7 @@ from nmpcrl.learning import (
     regularized_deep_expected_sarsa,
     step_matched,
 )
+from nmpcrl.learning.network import QNetwork, Target
 from nmpcrl.learning.training import count_episodes, count_steps
 from nmpcrl.study import paper
 
@@ -100,8 +101,6 @@ def _imitating(make: Callable[..., Learner], *, with_theta: bool) -> Entry:
     """The entry of a learner whose network predicts the next value."""
 
     def factory(settings: Settings, nmpc: Nmpc, generators: Generators) -> Learner:
-        from nmpcrl.learning.network import QNetwork, Target  # torch: not for the other learners
-
         read = NETWORKS[settings.network]
         scales: tuple[Vector | float, float] = (1.0, 1.0)
         if read.normalised:

@@ -161,12 +161,12 @@ def test_a_lagged_copy_predicts_and_is_refreshed_after_so_many_steps(transition)
 
 def test_an_averaged_copy_goes_a_part_of_the_way_at_each_step(transition):
     network = taught()
-    target, average = Target(network, rate=0.1), network._weights.clone()
+    target, average = Target(network, rate=0.1), network.weights.copy()
     averaged, step = Imitation(network, with_theta=False, target=target), transition(THETA)
     for _ in range(5):
         averaged(step, THETA)
-        average += 0.1 * (network._weights - average)
-        np.testing.assert_allclose(target._weights, average, rtol=1e-5, atol=1e-7)
+        average += 0.1 * (network.weights - average)
+        np.testing.assert_allclose(target.weights, average, rtol=1e-5, atol=1e-7)
 
 
 def test_a_copy_that_follows_at_once_changes_nothing(transition):

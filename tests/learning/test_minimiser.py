@@ -40,7 +40,7 @@ def test_the_best_action_of_a_network_is_that_of_a_fine_grid():
     for seed in range(200):
         rng = np.random.default_rng(seed)
         network = QNetwork(5, rng)
-        network._weights.mul_(float(rng.uniform(0.5, 3)))
+        network.weights[:] *= rng.uniform(0.5, 3)
         state = rng.uniform([-3, -3, -np.pi], [9, 9, np.pi])
 
         def values(actions, network=network, state=state):
